@@ -7,12 +7,14 @@ stamp is the one by which it counts; the frame is empty, which is the one that t
 
 from __future__ import annotations
 
+import heapq
 import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
+from operator import itemgetter
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from lupin_msgs.msg import DiscoveredTag, DiscoveredTags
 from mcap.writer import CompressionType, Writer
@@ -71,8 +73,6 @@ def offered_qos(topic: Topic) -> str:
 # Rows that are read in one go, in one short transaction: the log may not grow meanwhile for long.
 LOT: Final = 2_000
 
-_TABLES: Final = ("scan", "look", "place")
-
 
 class JournalRows:
     """The writes with `start_ns <= stamp < end_ns`.
@@ -94,15 +94,10 @@ class JournalRows:
         return any(run.begun.is_simulated for run in self.runs.values())
 
     def __iter__(self) -> Iterator[tuple[Run, Write]]:
-        """Each with the run of the clock that it belongs to."""
-        after = 0
-        while True:
-            with one_view(self._connection):
-                found, last = self._lot(after)
-            yield from found
-            if last is None:
-                return
-            after = last
+        """Each with the run of the clock that it belongs to, in the order of receiving."""
+        parts = (self._rows("scan"), self._rows("look"), self._places())
+        for _, run, row in heapq.merge(*parts, key=itemgetter(0)):
+            yield run, row
 
     def _places_before(self, start_ns: int) -> list[Pin]:
         first: dict[str, Pin] = {}
@@ -112,34 +107,39 @@ class JournalRows:
                     first.setdefault(pin.tag_id, pin)
         return list(first.values())
 
-    def _lot(self, after: int) -> tuple[list[tuple[Run, Write]], int | None]:
-        """The next rows by their numbers, and the number of the last; None: that is all."""
-        values: dict[str, Any] = self._period | {"after": after}
-        numbers = [
-            [
-                seq
-                for (seq,) in self._connection.execute(
+    def _rows(self, table: str) -> Iterator[tuple[int, Run, Write]]:
+        """Those of scans or of inspections with their numbers, by these."""
+        after = 0
+        while True:
+            with one_view(self._connection):
+                found = self._connection.execute(
                     f"SELECT seq FROM {table} WHERE site = :site AND seq > :after"  # noqa: S608
                     " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
                     " ORDER BY seq LIMIT :lot",
-                    values,
+                    self._period | {"after": after},
                 )
+                seqs = [seq for (seq,) in found]
+                of_table = (seqs, ()) if table == "scan" else ((), seqs)
+                within = [
+                    (seq, run, row)
+                    for run in self.runs.values()
+                    for seq, row in listed_rows(self._connection, run.id, *of_table)
+                    if self._holds(run, row.stamp_ns)
+                ]
+            yield from sorted(within, key=itemgetter(0))
+            if len(seqs) < LOT:
+                return
+            after = seqs[-1]
+
+    def _places(self) -> Iterator[tuple[int, Run, Write]]:
+        with one_view(self._connection):
+            within = [
+                (seq, run, pin)
+                for run in self.runs.values()
+                for seq, pin, is_copy in self._pins(run)
+                if not is_copy and self._holds(run, pin.stamp_ns)
             ]
-            for table in _TABLES
-        ]
-        last = min((found[-1] for found in numbers if len(found) == LOT), default=None)
-        scans, looks, places = (
-            [seq for seq in found if last is None or seq <= last] for found in numbers
-        )
-        within: list[tuple[int, Run, Write]] = []
-        for run in self.runs.values():
-            rows: list[tuple[int, Write]] = list(
-                listed_rows(self._connection, run.id, scans, looks)
-            )
-            rows += [(seq, pin) for seq, pin, _ in self._pins(run) if seq in places]
-            within += [(seq, run, row) for seq, row in rows if self._holds(run, row.stamp_ns)]
-        within.sort(key=lambda entry: entry[0])
-        return [(run, row) for _, run, row in within], last
+        yield from sorted(within, key=itemgetter(0))
 
     def _pins(self, run: Run) -> Iterator[tuple[int, Pin, bool]]:
         for seq, tag, stamp_ns, arrival_ns, is_copy, *pose in self._connection.execute(

@@ -25,7 +25,7 @@ from std_msgs.msg import Header
 
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.relay import Relay, RosTime, Sample, Topic, TwinNames
-from lupin_bridge.feed.ros_thread import BridgedNode, RosThread
+from lupin_bridge.feed.ros_thread import NodeT, RosThread
 from lupin_bridge.feed.source import (
     MAX_AHEAD_NS,
     Battery,
@@ -373,7 +373,6 @@ def names_of(node: Any) -> TwinNames:
     )
 
 
-NodeT = TypeVar("NodeT", bound=BridgedNode)
 # Hands an update over to the loop.
 Post = Callable[[TwinUpdate], None]
 

@@ -11,18 +11,18 @@ import logging
 import threading
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any, Final, Generic, Protocol, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.settings import SettingError
-from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.ros.base_node import NodeUtilities, end_spinning, spin_until_shutdown
+from lupin_twin.ros.base_node import end_spinning, spin_until_shutdown
 from lupin_twin.runtime.process import remove_stale_shared_memory
 
 # rcl would write lines of its own to standard error, between those that a log collector reads. Its
@@ -57,17 +57,8 @@ BEAT_PERIOD_S = 1.0
 _NOT_RUNNING: Final = "the ROS thread is not running"
 
 
-class BridgedNode(Protocol):
-    """What the thread needs of the node it runs."""
-
-    utilities: NodeUtilities
-    parameters: TwinParameters
-
-    def destroy_node(self) -> object:
-        """Give everything back to rclpy."""
-
-
-NodeT = TypeVar("NodeT", bound=BridgedNode)
+# With `utilities` (`NodeUtilities`) and `parameters` (`TwinParameters`).
+NodeT = TypeVar("NodeT", bound=Node)
 EventT = TypeVar("EventT")
 ResultT = TypeVar("ResultT")
 

@@ -237,10 +237,13 @@ def metadata(grid: FieldGrid, sensor: Sensor) -> dict[str, str]:
 def write(
     grid: FieldGrid, field_format: FieldFormat, sensor_type: str, sensors: Sensors, scale: int = 1
 ) -> bytes:
-    """The field in a format. `scale` (PNG only) is the side of a cell in pixels."""
+    """The field in a format. `scale` (PNG only) is the side of a cell in pixels.
+
+    NPY is NumPy's own format, float32 (height, width), row 0 at `bbox_min_y`, NaN as it is.
+    """
     if field_format == PNG:
         return write_png(grid, sensor_type, sensors, scale)
-    return write_npy(grid) if field_format == NPY else write_json(grid)
+    return _npy(_rows(grid)) if field_format == NPY else write_json(grid)
 
 
 def write_json(grid: FieldGrid) -> bytes:
@@ -283,11 +286,6 @@ def numbers(cells: npt.NDArray[np.float32]) -> Iterator[bytes]:
         if start:
             yield b","
         yield orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY)[1:-1]
-
-
-def write_npy(grid: FieldGrid) -> bytes:
-    """NumPy's own format, float32 (height, width), row 0 at `bbox_min_y`, NaN as it is."""
-    return _npy(_rows(grid))
 
 
 def _npy(array: npt.NDArray[np.float32]) -> bytes:
@@ -376,16 +374,16 @@ def within_ideal(estimate: Estimate, sensor: Sensor) -> Estimate:
 def write_estimate(
     estimate: Estimate, field_format: FieldFormat, query: EstimateQuery, sensors: Sensors
 ) -> bytes:
-    """The estimate in a format."""
+    """The estimate in a format; NPY and JSON (`followers.GetEstimateResponse`) have both numbers.
+
+    NPY is float32 (2, height, width): mean and sd, row 0 at `bbox_min_y`.
+    """
     if field_format == PNG:
         picture = estimate_picture(estimate, query.layer)
         return write_png(picture, query.sensor_type, sensors, query.scale)
-    return write_estimate_npy(estimate) if field_format == NPY else write_estimate_json(estimate)
-
-
-def write_estimate_json(estimate: Estimate) -> bytes:
-    """`followers.GetEstimateResponse`."""
     grid = estimate.grid
+    if field_format == NPY:
+        return _npy(np.stack((grid.mean, grid.sd)))
     return _json(
         grid,
         {"mean": grid.mean, "sd": grid.sd},
@@ -393,11 +391,6 @@ def write_estimate_json(estimate: Estimate) -> bytes:
         sample_count=estimate.sample_count,
         reading_count=estimate.reading_count,
     )
-
-
-def write_estimate_npy(estimate: Estimate) -> bytes:
-    """NumPy's own format, float32 (2, height, width): mean and sd, row 0 at `bbox_min_y`."""
-    return _npy(np.stack((estimate.grid.mean, estimate.grid.sd)))
 
 
 def estimate_picture(estimate: Estimate, layer: str) -> FieldGrid:

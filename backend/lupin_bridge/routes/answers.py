@@ -172,7 +172,8 @@ def add_refusals(app: FastAPI) -> None:
 
 def refusal(error: Exception) -> Response:
     """The response to one of the `REFUSALS`."""
-    status, headers = 400, None
+    status: int = 400
+    headers: Mapping[str, str] | None = None
     retry = {"Retry-After": "3"}
     match error:
         case AdmissionError():

@@ -247,7 +247,7 @@ class _FoxgloveConversation(_Conversation):
         if time_ns is None:
             self._offer_is_due = True
         else:
-            self._session.put_time(time_ns)
+            self._session.time_ns = time_ns
         self._write_all()
 
     def _on_writable(self) -> None:

@@ -224,11 +224,6 @@ def alarms_message(now: Board, now_ns: int | None, notes: tuple[Note, ...], coun
     return text_frame(orjson.dumps({"type": "alarms", "notes": count, **body}))
 
 
-def status_frame(status: Status) -> bytes:
-    """A status as a WebSocket frame."""
-    return text_frame(orjson.dumps(status.frame()))
-
-
 @dataclass(slots=True, eq=False)
 class StateFrame:
     """One state on its way to every client.

@@ -16,7 +16,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Generic, Protocol, TypeVar
 
-from lupin_bridge.stream.frames import StateFrame, Status, status_frame
+import orjson
+
+from lupin_bridge.stream.frames import StateFrame, Status, text_frame
 
 # Large messages that wait for sockets, of all clients together. Pure; belongs to one thread.
 #
@@ -329,7 +331,7 @@ class Hub:
         # Written once for all who get it at the same moment, and never kept for later: it tells an
         # age, and who joins a twin long dead must not take its tags for seconds old.
         if self._status_wire is None or now_s != self._status_wire_s:
-            self._status_wire = status_frame(self._status_at(now_s))
+            self._status_wire = text_frame(orjson.dumps(self._status_at(now_s).frame()))
             self._status_wire_s = now_s
         return self._status_wire
 

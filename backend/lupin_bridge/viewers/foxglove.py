@@ -49,10 +49,6 @@ _TIME: Final = 2
 _REFUSED: Final = "refused: lupin-twin only reads, expected subscribe or unsubscribe"
 
 
-class Refused(ValueError):
-    """A message that is not served; the text names the member, the value and the limit."""
-
-
 @dataclass(frozen=True, slots=True)
 class Channel:
     """A topic as it is offered; `id` never stands for another topic or type."""
@@ -74,15 +70,12 @@ def parse(message: str | bytes) -> tuple[list[tuple[int, int]], list[int]]:
     """Read one message: subscriptions to begin (the client's own id, the channel's), or to end.
 
     Raises:
-        Refused: it is none that is served.
+        ValueError: it is none that is served; the text names the member, the value and the limit.
 
     """
     if isinstance(message, bytes):
-        raise Refused(f"a binary message is {_REFUSED}")
-    try:
-        members = members_of(message)
-    except ValueError as error:
-        raise Refused(str(error)) from None
+        raise ValueError(f"a binary message is {_REFUSED}")  # noqa: TRY004
+    members = members_of(message)
     op = members.get("op")
     if op == "subscribe":
         return [_subscription(value) for value in _list(members, "subscriptions")], []
@@ -90,28 +83,28 @@ def parse(message: str | bytes) -> tuple[list[tuple[int, int]], list[int]]:
         ids = _list(members, "subscriptionIds")
         return [], [_id("subscriptionIds", value) for value in ids]
     if isinstance(op, str):
-        raise Refused(f"{op[:64]} is {_REFUSED}")
-    raise Refused(f"op is {shown(op)}, expected subscribe or unsubscribe")
+        raise ValueError(f"{op[:64]} is {_REFUSED}")  # noqa: TRY004
+    raise ValueError(f"op is {shown(op)}, expected subscribe or unsubscribe")
 
 
 def _list(members: Mapping[str, Any], name: str) -> list[Any]:
     value = members.get(name)
     if not isinstance(value, list):
-        raise Refused(f"{name} is {shown(value)}, expected an array")
+        raise ValueError(f"{name} is {shown(value)}, expected an array")  # noqa: TRY004
     if len(value) > MAX_SUBSCRIPTIONS:
-        raise Refused(f"{name} has {len(value)} entries, the limit is {MAX_SUBSCRIPTIONS}")
+        raise ValueError(f"{name} has {len(value)} entries, the limit is {MAX_SUBSCRIPTIONS}")
     return value
 
 
 def _subscription(value: Any) -> tuple[int, int]:
     if not isinstance(value, dict):
-        raise Refused(f"an entry of subscriptions is {shown(value)}, expected an object")
+        raise ValueError(f"an entry of subscriptions is {shown(value)}, expected an object")  # noqa: TRY004
     return _id("id", value.get("id")), _id("channelId", value.get("channelId"))
 
 
 def _id(name: str, value: Any) -> int:
     if type(value) is not int or not 0 <= value <= _MAX_ID:
-        raise Refused(f"{name} is {shown(value)}, expected an integer from 0 to {_MAX_ID}")
+        raise ValueError(f"{name} is {shown(value)}, expected an integer from 0 to {_MAX_ID}")
     return value
 
 
@@ -184,7 +177,7 @@ class Reaction:
 
 
 class Session:
-    """The state of one connection."""
+    """The state of one connection; `time_ns` is simulated time that it has yet to hear of."""
 
     def __init__(self, counts: Counts) -> None:
         self._counts = counts
@@ -192,14 +185,14 @@ class Session:
         self._advertised: dict[int, Channel] = {}
         self._waiting: dict[int, Sample] = {}
         self._too_large: set[int] = set()
-        self._time_ns: int | None = None
+        self.time_ns: int | None = None
 
     def receive(self, message: str | bytes) -> Reaction:
         """Take one message from the client."""
         try:
             begun, ended = parse(message)
-        except Refused as refused:
-            return Reaction((status(ERROR, str(refused)),))
+        except ValueError as error:
+            return Reaction((status(ERROR, str(error)),))
         return self._unsubscribe(ended) if ended else self._subscribe(begun)
 
     def offer(self, channels: Mapping[int, Channel]) -> Reaction:
@@ -249,15 +242,11 @@ class Session:
         self._waiting[subscription_id] = sample
         return None
 
-    def put_time(self, stamp_ns: int) -> None:
-        """Simulated time goes on."""
-        self._time_ns = stamp_ns
-
     def next(self) -> tuple[bytes, bytes] | None:
         """What is to be written next, as a binary message in two parts; None: nothing waits."""
-        if self._time_ns is not None:
-            head = struct.pack("<BQ", _TIME, max(0, self._time_ns))
-            self._time_ns = None
+        if self.time_ns is not None:
+            head = struct.pack("<BQ", _TIME, max(0, self.time_ns))
+            self.time_ns = None
             return head, b""
         if not self._waiting:
             return None

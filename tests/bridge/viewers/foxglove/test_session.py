@@ -91,8 +91,8 @@ def test_the_newest_of_each_subscription_waits_and_each_has_its_turn(stage: Stag
 def test_time_goes_before_messages_and_only_the_newest(stage: Stage) -> None:
     stage.subscribe((1, 10))
     stage.session.put(1, Sample(b"a", 5))
-    stage.session.put_time(7)
-    stage.session.put_time(8)
+    stage.session.time_ns = 7
+    stage.session.time_ns = 8
     assert stage.session.next() == (b"\x02\x08" + bytes(7), b"")
     assert stage.written() == [(1, b"a")]
 

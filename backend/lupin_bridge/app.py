@@ -70,8 +70,7 @@ def create_app(
     for module in ROUTED:
         app.router.routes.extend(module.router.routes)
     # The last one added runs first.
-    if bridge is not None:
-        app.add_middleware(PieceByPiece)
+    app.add_middleware(PieceByPiece)
     app.add_middleware(ReadOnly)
     app.add_middleware(AccessControl, access=access)
     app.add_middleware(BehindProxies, proxies=proxies or Proxies())

@@ -257,8 +257,6 @@ class Mqtt:
         self._is_stopping = self._is_connecting = False
         self._seen_s = 0.0
         self._look: Callable[[], GreenhouseState] = GreenhouseState
-        # One that was never let in is tried again; one that was may hold what was not acknowledged.
-        self._fresh: Client | None = None
 
     def start(self, look: Callable[[], GreenhouseState]) -> None:
         """Publish from now on."""
@@ -306,10 +304,9 @@ class Mqtt:
 
     async def _one_connection(self) -> None:
         """Connect, and publish until the connection ends, with an `MqttError`."""
-        client = self._fresh = self._fresh or self._client()
         self._is_connecting = True
-        async with client:
-            self._is_connecting, self._fresh = False, None
+        async with self._client() as client:
+            self._is_connecting = False
             if self._is_stopping:
                 return
             try:

@@ -26,11 +26,12 @@ from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.field import matches
 from lupin_bridge.past import bodies
 from lupin_bridge.past.fields import Field
-from lupin_bridge.past.plans import PLAN_TAG_S, Answered, NoSuchTag, Query, answered
+from lupin_bridge.past.plans import PLAN_TAG_S, Answered, NoSuchTag, Query, StateQuery, answered
 from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError, Limits
 from lupin_bridge.stream import schema
 from lupin_twin.core.notes import NotesUnwritable
 from lupin_twin.core.past import NotRemembered, PastRefused
+from lupin_twin.core.state import Snapshot
 from lupin_twin.runtime.workers import SMALL_S, ShouldStop
 
 NEVER_STORE: Final = {"Cache-Control": "no-store"}
@@ -90,6 +91,18 @@ def read_route(router: APIRouter, path: str, **documentation: Any) -> Callable[[
 def bridge_of(request: Request) -> Bridge:
     """The application's bridge."""
     return cast("Bridge", request.app.state.bridge)
+
+
+def newest_of(bridge: Bridge) -> Snapshot:
+    """The newest state.
+
+    Raises:
+        TwinUnavailableError: there is none.
+
+    """
+    if bridge.latest is None:
+        raise TwinUnavailableError(NO_TWIN)
+    return bridge.latest.snapshot
 
 
 def person_of(request: HTTPConnection) -> Person | None:
@@ -369,9 +382,7 @@ async def newest_field(bridge: Bridge, client: str, field: Field, etag: str) -> 
         lupin_twin.field.engine.FieldRefused: a bad request.
 
     """
-    if bridge.latest is None:
-        raise TwinUnavailableError(NO_TWIN)
-    snapshot = bridge.latest.snapshot
+    snapshot = newest_of(bridge)
     cost_s = len(snapshot.tags) * PLAN_TAG_S + field.write_s(len(snapshot.tags))
     with (
         bridge.admission.computing(client, is_large=cost_s > SMALL_S),
@@ -384,7 +395,7 @@ async def newest_field(bridge: Bridge, client: str, field: Field, etag: str) -> 
     return answer
 
 
-async def respond_as_of(request: Request, query: Query, at_ns: int) -> Response:
+async def respond_as_of(request: Request, query: StateQuery) -> Response:
     """A query as of a moment; headers say how far the answer is complete.
 
     Raises:
@@ -393,7 +404,7 @@ async def respond_as_of(request: Request, query: Query, at_ns: int) -> Response:
 
     """
     # Of before the answer. Headers, because the body stays the same when older rows are deleted.
-    headers = bodies.moment_headers(bridge_of(request).source.journal(), at_ns)
+    headers = bodies.moment_headers(bridge_of(request).source.journal(), query.at_ns or 0)
     response = await respond_past(request, query, "state")
     response.headers.update(headers)
     return response

@@ -13,19 +13,18 @@ from lupin_bridge import field as formats
 from lupin_bridge import query_string
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.field import FORMATS, JSON, PNG, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.quantities import DAILY
 from lupin_bridge.past.fields import Estimated, Field
 from lupin_bridge.query_string import Name, needed, parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
-    NO_TWIN,
     NOT_REMEMBERED,
     REFUSALS,
     bridge_of,
     error_response,
     json_response,
     list_header,
+    newest_of,
     on_worker,
     read_route,
     refusal,
@@ -162,7 +161,7 @@ async def _answer(request: Request, field_format: FieldFormat | None) -> Respons
     field.check()
     if at_ns is None:
         return await respond_newest(request, field)
-    return await respond_as_of(request, field, at_ns)
+    return await respond_as_of(request, field)
 
 
 FIELDS.register(router, _answer)
@@ -208,9 +207,8 @@ async def _estimate(request: Request, field_format: FieldFormat) -> Response:
     )
     estimated.check()
     if at_ns is not None:
-        return await respond_as_of(request, estimated, at_ns)
-    if now_ns is None:
-        raise TwinUnavailableError(NO_TWIN)
+        return await respond_as_of(request, estimated)
+    newest_of(bridge)  # or it is not known when now is
     return await respond_past(request, estimated, "estimate")
 
 
@@ -322,6 +320,4 @@ async def _report(request: Request, kind: type[QueryT], body: Body[QueryT]) -> R
 
 
 def _sensors(bridge: Bridge) -> list[str]:
-    if bridge.latest is None:
-        raise TwinUnavailableError(NO_TWIN)
-    return sensors_of(bridge.latest.snapshot)
+    return sensors_of(newest_of(bridge))

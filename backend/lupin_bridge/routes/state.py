@@ -35,13 +35,13 @@ from lupin_bridge.past.report_page import (
 from lupin_bridge.query_string import parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
-    NO_TWIN,
     NOT_REMEMBERED,
     REFUSALS,
     bridge_of,
     error_response,
     json_response,
     list_header,
+    newest_of,
     read_route,
     refusal,
     refusing,
@@ -110,16 +110,14 @@ async def state(request: Request) -> Response:
     bridge = bridge_of(request)
     at_ns = query_string.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
-        return await respond_as_of(request, WholeState(at_ns), at_ns)
-    latest = bridge.latest
-    if latest is None:
-        return error_response(NO_TWIN, 503)
+        return await respond_as_of(request, WholeState(at_ns))
+    newest = newest_of(bridge)
     # The newest state always, its ages a little older at most: so thousands of tags that thousands
     # of clients request are written a few times a second.
     key = ("state", bridge.state_number, int(time.monotonic() / AGES_HOLD_S))
 
     async def compute() -> Answer:
-        body = bridge.frames.json.state(latest.snapshot, bridge.ros_time_ns)
+        body = bridge.frames.json.state(newest, bridge.ros_time_ns)
         answer = Answer(body, "application/json", NEVER_STORE)
         bridge.cache.put(key, answer, instead_of=bridge.cached_state)
         bridge.cached_state = key
@@ -157,15 +155,13 @@ async def tag(request: Request, tag_id: str) -> Response:
     at_ns = query_string.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
         return await _tag_as_of(request, tag_id, at_ns)
-    if bridge.latest is None:
-        return error_response(NO_TWIN, 503)
-    found = tag_of(bridge.latest.snapshot, tag_id)
+    found = tag_of(newest_of(bridge), tag_id)
     return json_response(bridge.frames.json.tag(found, bridge.ros_time_ns))
 
 
 async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
     try:
-        return await respond_as_of(request, OneTag(at_ns, tag_id), at_ns)
+        return await respond_as_of(request, OneTag(at_ns, tag_id))
     except NoSuchTag as error:
         journal = bridge_of(request).source.journal()
         response = error_response(f"{error}{bodies.why_not(journal, at_ns)}", 404)

@@ -21,13 +21,13 @@ from lupin_bridge.past.plans import Health
 from lupin_bridge.query_string import parameters_of, read
 from lupin_bridge.routes.answers import (
     NEVER_STORE,
-    NO_TWIN,
     NOT_REMEMBERED,
     bridge_of,
     computed,
     error_response,
     has_etag,
     json_response,
+    newest_of,
     not_modified,
     on_worker,
     read_route,
@@ -195,9 +195,8 @@ async def health(request: Request) -> Response:
     bridge = bridge_of(request)
     at_ns = query_string.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
-        return await respond_as_of(request, Health(at_ns, bridge.criteria), at_ns)
-    if bridge.latest is None:
-        return error_response(NO_TWIN, 503)
+        return await respond_as_of(request, Health(at_ns, bridge.criteria))
+    newest_of(bridge)
     judged = bridge.judged
 
     async def compute() -> Answer:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Generic, Protocol, TypeVar
+from typing import Final, Protocol
 
 import orjson
 
@@ -29,20 +29,18 @@ from lupin_bridge.stream.frames import StateFrame, Status, text_frame
 
 MAX_BYTES: Final = 256_000_000
 
-HolderT = TypeVar("HolderT")
 
-
-class Unsent(Generic[HolderT]):
+class Unsent:
     """Who holds which messages. `bytes`: what all of them together have."""
 
     def __init__(self, max_bytes: int = MAX_BYTES) -> None:
         self.bytes = 0
         self.max_bytes = max_bytes
         # In the order in which they began to wait; of each the messages by their ids.
-        self._holders: dict[HolderT, dict[int, bytes]] = {}
+        self._holders: dict[Client, dict[int, bytes]] = {}
         self._shares: Counter[int] = Counter()
 
-    def hold(self, holder: HolderT, message: bytes) -> list[HolderT]:
+    def hold(self, holder: Client, message: bytes) -> list[Client]:
         """Count a message that a holder waits for; returns who is to go, and counts no more."""
         held = self._holders.setdefault(holder, {})
         key = id(message)
@@ -58,7 +56,7 @@ class Unsent(Generic[HolderT]):
             gone.append(longest)
         return gone
 
-    def let_go(self, holder: HolderT) -> None:
+    def let_go(self, holder: Client) -> None:
         """A holder waits no more; harmless if it does not."""
         for key, message in self._holders.pop(holder, {}).items():
             self._shares[key] -= 1
@@ -158,7 +156,7 @@ class Hub:
         self.client_timeout_s = client_timeout_s
         # In the order in which they came.
         self._clients: dict[Client, None] = {}
-        self.unsent: Unsent[Client] = Unsent()
+        self.unsent = Unsent()
         self._parties: Counter[str] = Counter()
         self._frame: StateFrame | None = None
         self._alarms: bytes | None = None

@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import AsyncGenerator, AsyncIterator, Callable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
+from contextlib import ExitStack, aclosing
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from fastapi import APIRouter, Request, Response
-from starlette.types import Message, Receive, Scope, Send
+from starlette.types import Receive, Scope, Send
 
 from lupin_bridge.access.middleware import client_of
 from lupin_bridge.judge.judging import Criteria
@@ -44,9 +44,11 @@ _ANSWERS = {status: what for status, what in NOT_REMEMBERED.items() if status !=
 # What to import a package, or to write a group of rows, takes at worst, s.
 _WRITE_S = 0.5
 # An export's rows as they were packed, in lots.
-Lots = AsyncIterator[bytes]
+Lots = AsyncGenerator[bytes]
 Pack = Callable[[Sequence[PastRow]], bytes]
 Format = type[Csv] | type[Parquet]
+# Who writes, the lots behind the first, and that; None: there is none.
+Begun = tuple[Csv | Parquet, Lots, bytes | None]
 ResultT = TypeVar("ResultT")
 
 
@@ -146,7 +148,7 @@ async def respond_export(
 
     facts = {"title": "lupin-twin: readings and failed attempts", **_facts(known, given, now_ns)}
 
-    async def begin() -> tuple[Csv | Parquet, Lots, bytes | None]:
+    async def begin() -> Begun:
         def opened() -> Csv | Parquet:
             return kind(sensors, facts, given.sensor_type, has_site)
 
@@ -164,9 +166,24 @@ async def respond_export(
                 return error_response(str(error), 501)
         if begun is None:
             return Response(status_code=CLIENT_DISCONNECTED)
+        parts = _parts(of, export, kind, begun)
         return ExportResponse(
-            of, export, *begun, headers=headers, kind=kind, release=held.pop_all().close
+            parts, headers=headers, media_type=kind.media_type, release=held.pop_all().close
         )
+
+
+async def _parts(of: Exporting, export: Export, kind: Format, begun: Begun) -> Lots:
+    """What is sent; the next lot is read when what was made of the one before has been."""
+    writer, lots, lot = begun
+    async with aclosing(lots):
+        yield writer.begin()
+        while lot is not None:
+            part = await _written(of, kind, partial(writer.add, lot))
+            yield part
+            # Also where that is nothing yet: its reader is not slow.
+            export.take(len(part) or len(lot), time.monotonic())
+            lot = await within_time(of.limits, anext(lots, None))
+        yield await _written(of, kind, writer.end)
 
 
 def _facts(known: Mapping[str, str], given: OfExport, now_ns: int | None) -> dict[str, str]:
@@ -186,25 +203,14 @@ async def _written(of: Exporting, kind: Format, write: Callable[[], ResultT]) ->
 
 
 class ExportResponse(Response):
-    """Rows in a format; the next lot is read when the socket has taken those before."""
+    """Parts, each sent when the socket has taken the one before; in the end `release` is called."""
 
     def __init__(
-        self,
-        of: Exporting,
-        export: Export,
-        writer: Csv | Parquet,
-        lots: Lots,
-        first: bytes | None,
-        *,
-        headers: dict[str, str],
-        kind: Format,
-        release: Callable[[], None],
+        self, parts: Lots, release: Callable[[], None], headers: dict[str, str], media_type: str
     ) -> None:
-        super().__init__(headers=headers, media_type=kind.media_type)
+        super().__init__(headers=headers, media_type=media_type)
         del self.headers["content-length"]
-        self._of, self._export, self._first, self._lots = of, export, first, lots
-        self._writer = writer
-        self._kind = kind
+        self._parts = parts
         self._release = release
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -219,28 +225,12 @@ class ExportResponse(Response):
             await client_left(request)  # or the server would complain of an answer without an end
         finally:
             self._release()
-            if isinstance(self._lots, AsyncGenerator):
-                await self._lots.aclose()
+            await self._parts.aclose()
 
     async def _send_all(self, send: Send) -> None:
-        start: Message = {
-            "type": "http.response.start",
-            "status": self.status_code,
-            "headers": self.raw_headers,
-        }
+        start = {"type": "http.response.start", "status": 200, "headers": self.raw_headers}
         await send(start)
-        await send(_piece(self._writer.begin()))
-        lot = self._first
-        while lot is not None:
-            part = await _written(self._of, self._kind, partial(self._writer.add, lot))
+        async for part in self._parts:
             if part:
-                await send(_piece(part))
-            # Also where that is nothing yet: its reader is not slow.
-            self._export.take(len(part) or len(lot), time.monotonic())
-            lot = await within_time(self._of.limits, anext(self._lots, None))
-        end = await _written(self._of, self._kind, self._writer.end)
-        await send({"type": "http.response.body", "body": end})
-
-
-def _piece(body: bytes) -> Message:
-    return {"type": "http.response.body", "body": body, "more_body": True}
+                await send({"type": "http.response.body", "body": part, "more_body": True})
+        await send({"type": "http.response.body"})

@@ -257,10 +257,7 @@ class AlarmFeed:
                 if str(error) != why:
                     log.info("alarms are as they were: %s", error)
                 why = str(error)
-                if isinstance(error, NotRemembered) and error.is_lasting:
-                    self._follow_states()
-                else:
-                    self._ask_again(loop, RETRY_S)
+                self._ask_again(loop, RETRY_S)
                 await self._publish_silence(loop.time() - answered_s)
             except Exception:  # nobody waits for this task: it begins anew whatever it was
                 log.exception("alarms are as they were, and are worked out anew")
@@ -275,16 +272,6 @@ class AlarmFeed:
         if self._again is not None:
             self._again.cancel()
         self._again = loop.call_later(wait_s, self._wake.set)
-
-    def _follow_states(self) -> None:
-        """The twin keeps no journal, though it did not say so."""
-        seen = self._seen
-        self._begin("heard")
-        if seen is not None:
-            self._received = writes_between(None, seen, self._received_number)
-            self._received_number += len(self._received)
-            self._seen = seen
-        self._wake.set()
 
     async def _take_received(self) -> None:
         lot, self._received = self._received, []
@@ -404,12 +391,11 @@ async def learn_recent(source: TwinSource, judge: Judge, first: Snapshot) -> Non
     while True:
         try:
             judge.learn(await source.ask(recent, len(first.tags) * RECENT_S_PER_TAG))
-        except (NotRemembered, PastRefused, TwinUnavailableError) as error:
-            is_lasting = isinstance(error, NotRemembered) and error.is_lasting
-            if not is_lasting and not isinstance(error, PastRefused):
-                judge.knows_recent = True
-                await asyncio.sleep(LEARN_AGAIN_S)
-                continue
+        except (NotRemembered, TwinUnavailableError):
+            judge.knows_recent = True
+            await asyncio.sleep(LEARN_AGAIN_S)
+            continue
+        except PastRefused as error:
             log.info("what was recent before is not known: %s", error)
         except Exception:  # nobody awaits this, and nothing else needs it
             log.exception("what was recent before is not known")

@@ -253,25 +253,23 @@ class AlarmFeed:
             self._wake.clear()
             try:
                 await (self._take_received() if self._origin == "heard" else self._follow())
-            except (NotRemembered, PastRefused, TwinUnavailableError) as error:
-                if str(error) != why:
+            except Exception as error:  # nobody waits for this task: it goes on whatever it was
+                if not isinstance(error, (NotRemembered, PastRefused, TwinUnavailableError)):
+                    log.exception("alarms are as they were, and are worked out anew")
+                    self._begin(self._origin)
+                elif str(error) != why:
                     log.info("alarms are as they were: %s", error)
                 why = str(error)
-                self._ask_again(loop, RETRY_S)
-                await self._publish_silence(loop.time() - answered_s)
-            except Exception:  # nobody waits for this task: it begins anew whatever it was
-                log.exception("alarms are as they were, and are worked out anew")
-                self._begin(self._origin)
-                self._ask_again(loop, RETRY_S)
+                self._ask_again(RETRY_S)
                 await self._publish_silence(loop.time() - answered_s)
             else:
                 why, answered_s = "", loop.time()
             await asyncio.sleep(REST_S)
 
-    def _ask_again(self, loop: asyncio.AbstractEventLoop, wait_s: float) -> None:
+    def _ask_again(self, wait_s: float) -> None:
         if self._again is not None:
             self._again.cancel()
-        self._again = loop.call_later(wait_s, self._wake.set)
+        self._again = asyncio.get_running_loop().call_later(wait_s, self._wake.set)
 
     async def _take_received(self) -> None:
         lot, self._received = self._received, []
@@ -282,7 +280,7 @@ class AlarmFeed:
         await self._publish()
 
     async def _follow(self) -> None:
-        loop, had = asyncio.get_running_loop(), self._last
+        had = self._last
         while True:
             generation = self._generation
             request = WritesRequest(self._last, self._reach_ns / 1e9, REACH_COUNT, LOT)
@@ -302,7 +300,7 @@ class AlarmFeed:
                 break
         await self._publish()
         if self._last != had:
-            self._ask_again(loop, AGAIN_S)
+            self._ask_again(AGAIN_S)
 
     def _is_another(self, past: PastWrites) -> bool:
         """Whether it is another journal than the one read so far, or the clock began a new run."""

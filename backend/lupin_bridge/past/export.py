@@ -151,10 +151,13 @@ class Parquet:
             **dict.fromkeys(("x_m", "y_m", "value"), pyarrow.float64()),
         }
         known = {name: it.unit for name, it in sensors.by_name.items()}
+        # The values of one sensor alone have one unit.
+        units = sensors.named(sensor).unit if sensor else _OF_VALUES
+        described = {**_COLUMNS, "value": {**_COLUMNS["value"], "units": units}}
         self._schema = pyarrow.schema(
             [
                 pyarrow.field(name, kinds.get(name, pyarrow.string()), metadata=attributes)
-                for name, attributes in _described(sensors, sensor).items()
+                for name, attributes in described.items()
                 if has_site or name != "site"
             ],
             metadata={**facts, "units": json.dumps(known)},
@@ -197,9 +200,3 @@ class Parquet:
         self._waiting, self._rows = [], 0
         if len(table):
             self._writer.write_table(table, row_group_size=len(table))
-
-
-def _described(sensors: Sensors, sensor: str | None) -> dict[str, Mapping[str, str]]:
-    """The columns' attributes; those of one sensor alone have one unit."""
-    units = sensors.named(sensor).unit if sensor else _OF_VALUES
-    return {**_COLUMNS, "value": {**_COLUMNS["value"], "units": units}}

@@ -343,7 +343,7 @@ class _RosbridgeConversation(_Conversation):
     # --- calls of GetField --------------------------------------------------------------------
 
     async def _open(self, field_call: FieldCall) -> None:
-        call = field_call.call
+        call, _ = field_call
         if len(self._calls) >= MAX_OPEN_CALLS:
             text = f"{MAX_OPEN_CALLS} calls are under way, the limit for one client"
             await self._send(service_failure(call.id, call.service, text))
@@ -367,10 +367,10 @@ class _RosbridgeConversation(_Conversation):
     async def _reply(
         self, field_call: FieldCall, limit_s: float, deadline_s: float, held: ExitStack
     ) -> bytes:
-        call = field_call.call
+        call, query = field_call
         try:
             async with asyncio.timeout_at(deadline_s):
-                values = await self._values(field_call.query, held)
+                values = await self._values(query, held)
             response = service_response(call.id, call.service, values, result=True)
         except TimeoutError:
             text = f"{call.service} did not answer within {limit_s:g} s"

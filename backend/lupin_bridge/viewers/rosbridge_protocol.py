@@ -30,7 +30,6 @@ from __future__ import annotations
 import re
 from binascii import b2a_base64
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, Final, Literal
 
@@ -258,12 +257,8 @@ _ROSAPI: Final[Mapping[str, tuple[str, Mapping[str, str | float]]]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class FieldCall:
-    """A checked call of GetField; the field itself may still be refused by the twin."""
-
-    call: CallService
-    query: FieldQuery
+# A checked call of GetField; the field itself may still be refused by the twin.
+FieldCall = tuple[CallService, FieldQuery]
 
 
 def is_type(given: str, expected: str) -> bool:
@@ -299,7 +294,7 @@ def answer(call: CallService, names: TwinNames) -> FieldCall | bytes:
 def _field_call(call: CallService) -> FieldCall:
     if call.type and not is_type(call.type, FIELD_TYPE):
         raise Refused(f"type is {shown(call.type)}, expected {FIELD_TYPE}")
-    return FieldCall(call, FieldQuery(**_arguments(call.args, _FIELD_ARGS)))
+    return call, FieldQuery(**_arguments(call.args, _FIELD_ARGS))
 
 
 def _arguments(args: dict[str, Any], defaults: Mapping[str, str | float]) -> dict[str, Any]:

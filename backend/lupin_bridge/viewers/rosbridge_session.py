@@ -177,7 +177,7 @@ class Session:
 
     def _call_service(self, request: CallService) -> Reaction:
         reply = answer(request, self._names)
-        if isinstance(reply, FieldCall):
+        if isinstance(reply, tuple):
             return Reaction(field_call=reply)
         return Reaction((service_response(request.id, request.service, reply, result=True),))
 

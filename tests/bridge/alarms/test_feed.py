@@ -1,6 +1,5 @@
 """The feed by itself: with journals and replicas it is in test_live_alarms."""
 
-import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
@@ -124,7 +123,7 @@ async def test_what_is_written_is_read_also_where_the_state_stays_as_it_is() -> 
         feed.on_state(told(1))
         await changed(board)
         # Once more it asks by itself, for a disk that is slow; then it has to be woken.
-        feed._ask_again(asyncio.get_running_loop(), 1_000_000.0)
+        feed._ask_again(1_000_000.0)
         source.writes_now += [pest(2, 0), pest(3, 0)]
         source.written = 3
         feed.on_state(told(1))

@@ -11,7 +11,7 @@ import hmac
 import re
 import secrets
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from itsdangerous import BadSignature, Signer
@@ -161,9 +161,8 @@ class Credentials:
         except BadSignature:
             return None
         ends_s = int(session.partition(".")[0])
-        if ends_s <= now_s or session in self._signed_out:
-            return None
-        return Person("", "viewer", by="shared token", session=session, ends_at_s=ends_s)
+        person = replace(SHARED, session=session, ends_at_s=ends_s)
+        return person if self.still(person, now_s) else None
 
     def still(self, person: Person, now_s: float) -> bool:
         """Whether a session that was found has not ended since."""

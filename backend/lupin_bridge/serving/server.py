@@ -420,20 +420,14 @@ async def serve(
     print(f"lupin-twin: {url}", flush=True)  # noqa: T201  # for people and scripts
     supervisor.ready(f"serving {url}")
     tasks = [asyncio.create_task(supervisor.send_watchdog(ailment), name="watchdog")]
-    if (renewal := _follow_certificates(settings, server)) is not None:
-        tasks.append(renewal)
+    server.config.load()
+    if server.config.ssl is not None:
+        # Renewed when its files change, and at once at SIGHUP.
+        certificates = Certificates(settings.tls_cert, settings.tls_key, server.config.ssl)
+        asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, certificates.look)
+        tasks.append(asyncio.create_task(certificates.watch(), name="certificates"))
     try:
         await server.serve(sockets=[listener])
     finally:
         for task in tasks:
             task.cancel()
-
-
-def _follow_certificates(settings: Settings, server: BridgeServer) -> asyncio.Task[None] | None:
-    """Renew the certificate when its files change, and at once at SIGHUP."""
-    server.config.load()
-    if server.config.ssl is None:
-        return None
-    certificates = Certificates(settings.tls_cert, settings.tls_key, server.config.ssl)
-    asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, certificates.look)
-    return asyncio.create_task(certificates.watch(), name="certificates")

@@ -20,7 +20,8 @@ from lupin_bridge.serving.server import check_pair
 from lupin_bridge.settings import SettingError
 from tests.support.access import BEARER, TOKEN, Served, refused_start, served
 from tests.support.processes import limits
-from tests.support.raw_ws import frames_of, handshake_request
+from tests.support.raw_http import handshake
+from tests.support.raw_ws import frames_of
 from tests.support.tls import Certificate, certificate
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import ws_url
@@ -112,7 +113,7 @@ def test_who_asks_in_one_piece_with_the_end_of_the_handshake_is_not_cut_off(
                 except ssl.SSLWantReadError:
                     client.sendall(outgoing.read())
                     take()
-            tls.write(handshake_request(address.netloc, "/ws/state"))
+            tls.write(handshake("/ws/state"))
             client.sendall(outgoing.read())
             received = b""
             while states_in(received.partition(b"\r\n\r\n")[2]) < 5:

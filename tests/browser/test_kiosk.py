@@ -1,6 +1,8 @@
 """A wall screen, which is looked at: whoever brushes past it changes nothing."""
 
+import json
 import re
+from typing import Final
 
 from playwright.sync_api import expect
 
@@ -117,3 +119,21 @@ def test_on_a_phone_what_is_to_be_done_comes_first_whole_and_the_page_scrolls(
     expect(leave.locator("kbd")).to_be_hidden()
     leave.tap()
     expect(wall.map).to_have_attribute("role", "application")
+
+
+BREAK: Final = """() => {
+  window.stayed = true;
+  CanvasRenderingContext2D.prototype.clearRect = () => { throw new Error('no more canvas'); };
+}"""
+
+
+def test_a_wall_screen_that_fails_comes_back_by_itself(house: Bridge, open_page: OpenPage) -> None:
+    wall = open_page(house.url, "sensor=humidity", "?kiosk=1")
+    wall.expect_samples(3)
+    wall.allow_noise("no more canvas")
+    wall.page.evaluate(BREAK)
+    wall.page.set_viewport_size({"width": 1000, "height": 700})
+    expect(wall.test_id("failed-page")).to_contain_text("reloads automatically")
+    wall.expect_samples(3)
+    assert wall.page.evaluate("window.stayed") is None
+    assert json.loads(wall.page.evaluate("sessionStorage['lupin-twin.reload']"))["failures"] == 1

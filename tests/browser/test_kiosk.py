@@ -57,7 +57,7 @@ def test_a_wall_screen_goes_round_and_is_left_by_the_key_that_it_names(
     note, legend = wall.test_id("kiosk-note"), wall.test_id("legend")
     expect(note).to_contain_text(re.compile(r"Temperature next: Humidity in [1-5]\u00a0s"))
     # Too low for the whole list: it says how many are left, and cuts none in two.
-    wall.page.set_viewport_size({"width": 1100, "height": 500})
+    wall.resize(1100, 500)
     listed = wall.page.locator("li[data-fits=true]")
     row, since = places(wall, ".attention > ul > li", ".attention-do small:not(:empty)")
     assert since.right == row.right

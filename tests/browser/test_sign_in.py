@@ -10,8 +10,10 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from tests.browser.hmi import FONTS, slow_down
 from tests.support.access import TOKEN, Served, served
+from tests.support.messages import look
 from tests.support.people import PASSWORD, add
 from tests.support.waiting import PATIENCE_S
+from tests.support.web import bridge
 
 
 @pytest.fixture(scope="module")
@@ -66,9 +68,14 @@ def test_a_person_signs_in_with_the_keyboard_alone(closed: Served, page: Page) -
     assert not [address for address in addresses if TOKEN in address]
 
 
-def test_by_name_one_is_told_what_the_others_see_of_it(browser: Browser, tmp_path: Path) -> None:
-    add(tmp_path / "accounts.sqlite", anna="operator", vera="viewer")
-    with served("--accounts", str(tmp_path / "accounts.sqlite")) as running:
+def test_by_name_one_is_told_who_sees_what_is_done_to_alarms(
+    domain: int, browser: Browser, tmp_path: Path
+) -> None:
+    accounts = tmp_path / "accounts.sqlite"
+    add(accounts, anna="operator", vera="viewer")
+    with bridge("--accounts", str(accounts), domain=domain) as running:
+        running.peer.wait_for_twin()
+        running.peer.observe(look("a", anomaly=True))
         for name, words in (("anna", "Signed in as anna"), ("vera", "vera (viewer)")):
             with browser.new_context() as context:
                 context.set_default_timeout(PATIENCE_S * 1000)

@@ -152,6 +152,28 @@ def test_who_joins_a_silent_twin_is_told_how_long_it_has_been_silent(domain: int
             assert answer["stale_seconds"] >= tag_s + before_s - first_s - 0.01  # rounded
 
 
+def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
+    soon = constants(**{"lupin_twin.ros.inputs:LEFT_OVER_S": 2.0})
+    with (
+        lupin_twin(domain, "web", *soon) as process,
+        lupin_twin(domain, "serve", *soon) as first,
+        Peer(domain) as robot,
+        attached(process, robot) as live,
+        live.listen() as client,
+    ):
+        reason(client, "live")
+        with twin_node(domain) as second:
+            second.wait_for_output("lupin_twin in ROS domain")
+            said = client.until("status", lambda frame: "2 twins" in frame["message"])
+            first.wait_for_output("2 nodes publish /twin/state")
+            assert (said["twin"], said["twin_count"]) == ("live", 2)
+            assert "mixture" in said["message"]
+            assert "2 twins" in live.json("/readyz")["message"]
+            process.wait_for_output("2 nodes publish /twin/state")
+            second.stop()
+            client.until("status", lambda frame: frame["message"] == "The twin is live.")
+
+
 # --- an exception in a callback -----------------------------------------------------------------
 
 

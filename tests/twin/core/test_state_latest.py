@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.core import state
-from lupin_twin.core.drops import Rejected
 from lupin_twin.core.state import (
     STATUS_OK,
     Attempt,
@@ -54,18 +51,6 @@ def test_after_a_clock_that_went_back_all_ages_from_there_and_news_is_news() -> 
     kept = tag(store, "1")
     assert (kept.readings[0].value, kept.flower.species) == (3.0, "lupin")
     assert kept.last_observed_ns == 55 * S
-
-
-def test_a_refused_write_leaves_no_stamp_behind(monkeypatch: pytest.MonkeyPatch) -> None:
-    store = TwinStore()
-    store.record(scan("1", at_s=1.0, co2=1.0))
-    with monkeypatch.context() as full:
-        full.setattr(state, "MAX_ITEMS", 1)
-        with pytest.raises(Rejected):
-            store.record(scan("1", at_s=9.0, co2=9.0, light=9.0))
-    store.record(scan("1", at_s=2.0, co2=2.0))
-    assert tag(store, "1").readings == (Reading("co2", 2.0, 2 * S),)
-    assert not store.hold_to(5 * S)
 
 
 # --- against a model ----------------------------------------------------------------------------

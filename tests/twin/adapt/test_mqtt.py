@@ -136,11 +136,6 @@ def test_who_the_broker_is(tmp_path: Path) -> None:
     assert (plain.port, plain.is_tls) == (1884, False)
 
 
-def test_a_number_without_bounds_is_finite() -> None:
-    with pytest.raises(Rejected, match="the payload is inf, expected a finite number"):
-        said(broker({"topic": "{tag}/t", "sensor": "t"}), "A/t", b"inf")
-
-
 @pytest.mark.parametrize(
     ("payload", "complaint"),
     [

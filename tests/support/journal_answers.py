@@ -56,11 +56,7 @@ def _export(connection: sqlite3.Connection, *arguments: Any) -> Any:
     return [list(asdict(row).values()) for lot in rows(connection, *arguments) for row in lot]
 
 
-_ANSWERS: dict[str, Callable[..., Any]] = {
-    "state": _state,
-    "series": _series,
-    "export": _export,
-}
+_ANSWERS: dict[str, Callable[..., Any]] = {"state": _state, "series": _series, "export": _export}
 
 
 def _plain(value: Any) -> Any:

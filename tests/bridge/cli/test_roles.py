@@ -9,14 +9,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from lupin_bridge.cli.roles import (
-    DAY_S,
-    Feed,
-    fill_past,
-    patrolled,
-    since_morning_s,
-    with_past,
-)
+from lupin_bridge.cli.roles import DAY_S, Feed, fill_past, patrolled, since_morning_s, with_past
 from lupin_bridge.serving.server import listen
 from lupin_patrol.cli import parse as patrol_options
 from lupin_patrol.perception import SECONDS_PER_DAY
@@ -105,9 +98,7 @@ def test_the_player_ends_although_the_demo_is_killed(domain: int, tmp_path: Path
         wait_for(lambda: not is_running(player), "the end of the player")
 
 
-def test_the_process_that_looks_back_ends_with_its_bridge_and_not_before(
-    domain: int,
-) -> None:
+def test_the_process_that_looks_back_ends_with_its_bridge_and_not_before(domain: int) -> None:
     with lupin_twin(domain, "serve") as parent:
         url = f"{url_of(parent)}/api/timeline"
         wait_for(lambda: httpx.get(url, timeout=PATIENCE_S).status_code == 200, "the past")

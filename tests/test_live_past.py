@@ -140,6 +140,7 @@ def test_readings_are_told_one_by_one_or_in_buckets(peer: Peer) -> None:
     assert (list(bucketed.minima), list(bucketed.maxima)) == ([400.0], [500.0])
     assert told(series(peer, "a", "ph")) == []
     assert told(series(peer, "*", "~looks")) == [(10.0, 3.0), (300.0, 0.0)]
+    assert list(series(peer, "*", "~runs").minima) == [0.0], "by no simulated clock"
 
 
 def test_a_namespace_has_services_and_a_past_of_its_own(peer: Peer) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.disk import Disk, after_power_cut, build, notes
+from tests.support.disk import Disk, Weather, after_power_cut, build, notes
 from tests.support.journal import NOW, is_whole, kept, scan, select
 from tests.support.waiting import PATIENCE_S, wait_for
 
@@ -96,7 +96,7 @@ def assert_whole(disk: Disk) -> None:
 
 
 @pytest.mark.parametrize(("fault", "said"), [("full", ""), ("readonly", "Read-only file system")])
-def test_a_fault_from_the_start_is_told_and_heals(disk: Disk, fault: str, said: str) -> None:
+def test_a_fault_from_the_start_is_told_and_heals(disk: Disk, fault: Weather, said: str) -> None:
     disk.be(fault)
     with feeding(disk) as told:
         told.wait("failing", said)

@@ -93,10 +93,6 @@ def brings(write: Write) -> bool:
     return bool(write.flower)
 
 
-def held(write: Write, now_ns: int) -> Write:
-    return replace(write, stamp_ns=min(write.stamp_ns, now_ns))
-
-
 Write = Scan | Inspection
 TAG_IDS = st.sampled_from(["a", "b"])
 STAMPS = st.integers(1, 30).map(lambda at_s: at_s * S)
@@ -136,7 +132,10 @@ def test_against_the_plainest_store(steps: list[Write | int]) -> None:
         if isinstance(step, int):
             store.hold_to(step * S)
             # By time first: of what is equal from now on, the last in the list is the latest.
-            written = [held(write, step * S) for write in in_time(written)]
+            written = [
+                replace(it, stamp_ns=min(it.stamp_ns, step * S))
+                for it in sorted(written, key=lambda it: it.stamp_ns)
+            ]
             continue
         write = numbered(step, number)
         written.append(write)
@@ -149,10 +148,6 @@ def test_against_the_plainest_store(steps: list[Write | int]) -> None:
     kept = {t.tag_id: t for t in store.snapshot(0, "map").tags}
     for tag_id, expected in plainest(written).items():
         assert by_name(kept[tag_id]) == by_name(expected)
-
-
-def in_time(writes: list[Write]) -> list[Write]:
-    return sorted(writes, key=lambda write: write.stamp_ns)
 
 
 def by_name(state_of_tag: TagState) -> TagState:

@@ -13,11 +13,12 @@ import { rosNow, selectTags } from '../store/moment';
 import { type Charted, MOST_CHARTED, withChart } from '../store/view';
 import { S } from '../strings';
 import { Icon, IconButton, Segmented, useFocusBack } from '../widgets/controls';
+import { useSize } from '../widgets/useSize';
 import { ChartTables } from './SeriesTable';
 import { ChartState, LineSign, LineValue, MarksKey, PlotView, SensorChoice } from './PlotView';
 import { plansOf, type PlotModel, tagLabel } from './model';
 import { TIMES_HEIGHT } from './plot';
-import { pointsFor, useCharts, useSensorsOf, useSize } from './useLines';
+import { pointsFor, useCharts, useSensorsOf } from './useLines';
 import { useZoomed, zoomBack, zoomBy } from './zoom';
 
 /** Of one chart of a tag's, and of several tags' only one, without the times; CSS pixels. */

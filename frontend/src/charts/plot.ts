@@ -1,11 +1,12 @@
 /** One chart on the page: uPlot with the layers of `layers.ts`, told what to show and how large. */
-import { type RefObject, useEffect, useLayoutEffect, useRef, useState } from 'react';
+import { type RefObject, useEffect, useLayoutEffect, useRef } from 'react';
 import uPlot from 'uplot';
 
 import { toShown } from '../domain/format';
 import { hasDate, type Span } from '../domain/time';
 import { timeTicks, type Tick } from '../domain/timeline';
 import { LOCALE } from '../strings';
+import { useSize } from '../widgets/useSize';
 import {
   drawAbove,
   drawBelow,
@@ -237,21 +238,16 @@ export function usePlot(
   onLook: (listener: () => void) => () => void,
 ): RefObject<Plot | null> {
   const plot = useRef<Plot | null>(null);
-  const [width, setWidth] = useState(0);
+  const { width } = useSize(place);
   useLayoutEffect(() => {
     const element = place.current;
     if (!element) return undefined;
     const mine = createPlot(element, handlers);
     plot.current = mine;
-    const resize = new ResizeObserver(([entry]) => {
-      if (entry) setWidth(Math.floor(entry.contentRect.width));
-    });
-    resize.observe(element);
     const stop = onLook(mine.recolour);
     return () => {
       plot.current = null;
       stop();
-      resize.disconnect();
       mine.destroy();
       handlers.onPoint(null);
     };

@@ -1,6 +1,6 @@
 /** Pins, blooms, pest rings and labels: what the data moves. All from cached sprites. */
 import { isBad, VERDICTS } from '../domain/health';
-import { type BloomLook, lineOf, type Mark, MARKS, type Point } from '../domain/marks';
+import { type BloomLook, MARKS } from '../domain/marks';
 import { rgbText } from '../domain/ramp';
 import type { LabelRequest, PlacedLabel } from '../geometry/clear';
 import { type MapPoint, toCanvas } from '../geometry/coordinates';
@@ -51,33 +51,31 @@ export function drawBlooms(pen: Pen, blooms: Scene['blooms']): void {
   }
 }
 
-/** A dot about the origin; the shapes have about the same area. */
+/** SVG paths about the origin at radius 1; the shapes have about the same area. */
+const BLOOMS = {
+  circle: MARKS.healthy.outline,
+  square: 'M-.89-.89H.89V.89H-.89Z',
+  triangle: 'M0-1.3L1.2.85H-1.2Z',
+} as const;
+
+/** A dot about the origin. */
 function paintBloom(
   context: CanvasRenderingContext2D,
   radius: number,
   { colour, shape }: BloomLook,
   palette: Palette,
 ): void {
-  context.beginPath();
-  if (shape === 'circle') {
-    context.arc(0, 0, radius, 0, 2 * Math.PI);
-  } else if (shape === 'square') {
-    context.rect(-radius * 0.89, -radius * 0.89, radius * 1.78, radius * 1.78);
-  } else {
-    context.moveTo(0, -radius * 1.3);
-    context.lineTo(radius * 1.2, radius * 0.85);
-    context.lineTo(-radius * 1.2, radius * 0.85);
-    context.closePath();
-  }
+  const outline = new Path2D(BLOOMS[shape]);
+  context.scale(radius, radius);
   // Its colour alone would not stand out from a heat map over a planter.
   context.strokeStyle = palette.halo;
-  context.lineWidth = 2.5;
-  context.stroke();
+  context.lineWidth = 2.5 / radius;
+  context.stroke(outline);
   context.fillStyle = rgbText(colour);
-  context.fill();
+  context.fill(outline);
   context.strokeStyle = palette.bloomLine;
-  context.lineWidth = 0.75;
-  context.stroke();
+  context.lineWidth = 0.75 / radius;
+  context.stroke(outline);
 }
 
 const WARNING_PX = 1;
@@ -129,55 +127,31 @@ function paintPin(
   const isWarning = isBad(verdict);
   const radius = pinSize + (isWarning ? WARNING_PX : 0);
   const isEmpty = kind !== 'value';
-  const isLine = isEmpty || mark.isHollow;
-  traceOutline(context, mark, radius);
+  const isLine = isEmpty || mark.sign === '';
+  const outline = new Path2D(mark.outline);
+  context.scale(radius, radius);
   context.lineJoin = 'round';
   context.lineCap = 'round';
   // The halo tells it from whatever colour lies below.
   context.strokeStyle = palette.halo;
-  context.lineWidth = radius < LEAST_SIGN_PX ? 1.5 : isLine ? 5 : 4;
-  context.stroke();
+  context.lineWidth = (radius < LEAST_SIGN_PX ? 1.5 : isLine ? 5 : 4) / radius;
+  context.stroke(outline);
   context.fillStyle = isEmpty ? palette.verdicts.unknown.body : body;
-  context.fill();
+  context.fill(outline);
   context.strokeStyle = isLine ? own : palette.pinLine;
-  context.lineWidth = isLine ? Math.min(2, radius * 0.4) : 1.25;
-  if (kind === 'lacking') context.setLineDash([3, 3]);
-  context.stroke();
+  context.lineWidth = isLine ? Math.min(2 / radius, 0.4) : 1.25 / radius;
+  if (kind === 'lacking') context.setLineDash([3 / radius, 3 / radius]);
+  context.stroke(outline);
   context.setLineDash([]);
   // Too small for a sign: a dot.
   if (radius < LEAST_SIGN_PX) return;
   context.strokeStyle = isEmpty ? own : ink;
-  context.lineWidth = Math.max(1.5, radius * 0.24);
-  for (const line of kind === 'failed' ? STRUCK : mark.sign) {
-    traceLine(context, line, radius);
-    context.stroke();
-  }
+  context.lineWidth = Math.max(1.5 / radius, 0.24);
+  context.stroke(new Path2D(kind === 'failed' ? STRUCK : mark.sign));
 }
 
 /** There is such a sensor, and it gives no number. */
-const STRUCK: Mark['sign'] = [lineOf('-.45,.45 .45,-.45')];
-
-function traceOutline(context: CanvasRenderingContext2D, { outline }: Mark, radius: number): void {
-  if (outline === 'circle') {
-    context.beginPath();
-    context.arc(0, 0, radius, 0, 2 * Math.PI);
-  } else {
-    traceLine(context, outline, radius);
-    context.closePath();
-  }
-}
-
-function traceLine(
-  context: CanvasRenderingContext2D,
-  line: readonly Point[],
-  radius: number,
-): void {
-  context.beginPath();
-  for (const [index, [x, y]] of line.entries()) {
-    if (index === 0) context.moveTo(x * radius, y * radius);
-    else context.lineTo(x * radius, y * radius);
-  }
-}
+const STRUCK = 'M-.45.45L.45-.45';
 
 function drawPest(pen: Pen, x: number, y: number, radius: number): void {
   const { sprites, palette } = pen;
@@ -212,10 +186,7 @@ function paintBug(context: CanvasRenderingContext2D, palette: Palette): void {
   context.strokeStyle = palette.pestInk;
   context.fillStyle = palette.pestInk;
   context.lineWidth = 1;
-  for (const y of [-1.5, 1, 3.2]) {
-    traceLine(context, [[-4.2, y], [4.2, y]], 1); // prettier-ignore
-    context.stroke();
-  }
+  context.stroke(new Path2D('M-4.2-1.5H4.2M-4.2 1H4.2M-4.2 3.2H4.2'));
   context.beginPath();
   context.ellipse(0, 1, 2.1, 3.4, 0, 0, 2 * Math.PI);
   context.fill();

@@ -131,7 +131,7 @@ const TABLE: Table = {
     ...['contract', 'domain', 'draw', 'connection', 'store'],
     // The file that comes with the bridge: the page itself has no copy of it.
     '../../backend/lupin_bridge/sensors.json',
-    ...['npm:vitest', 'npm:@testing-library/react'],
+    ...['npm:vitest', 'npm:@testing-library/react', 'npm:node:fs', 'npm:node:path'],
   ],
 };
 

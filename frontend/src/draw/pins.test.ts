@@ -5,7 +5,6 @@ import { VERDICTS } from '../domain/health';
 import { mapPoint } from '../geometry/coordinates';
 import { FakeContext } from '../testing/canvas';
 import { penOn } from '../testing/pen';
-import { forcedPalette, LIGHT, type Palette } from './palette';
 import {
   bloomRadius,
   drawBlooms,
@@ -38,7 +37,6 @@ const pin = (over: Partial<Pin> = {}): Pin => ({
 /** Draws and returns what was copied to the surface, and what was painted into each sprite. */
 function draw(
   pins: readonly Pin[],
-  palette: Palette = LIGHT,
   spacing = Infinity,
 ): { copies: FakeContext; sprites: FakeContext[] } {
   const copies = new FakeContext();
@@ -53,7 +51,7 @@ function draw(
       });
     }
   }
-  drawPins(penOn(copies, { view, sprites: new Spy(1), palette }), pins, spacing);
+  drawPins(penOn(copies, { view, sprites: new Spy(1) }), pins, spacing);
   return { copies, sprites };
 }
 
@@ -85,12 +83,12 @@ describe('pins', () => {
     draw([pin(over)]).sprites[0]?.named('stroke') ?? [];
 
   test.each(VERDICTS)('one that is %s has the body of its verdict', (verdict) => {
-    expect(fills({ verdict })).toEqual([LIGHT.verdicts[verdict].body]);
+    expect(fills({ verdict })).toEqual([`pin-${verdict}`]);
   });
 
   test('without a reading of the sensor in view a body is empty, its line in the verdict’s colour', () => {
-    const empty = [LIGHT.verdicts.unknown.body];
-    const red = LIGHT.verdicts.critical.line;
+    const empty = ['pin-unknown'];
+    const red = 'critical';
     for (const kind of ['lacking', 'failed'] as const) {
       expect(fills({ verdict: 'critical', kind })).toEqual(empty);
       expect(strokes({ verdict: 'critical', kind })[1]?.state['strokeStyle']).toBe(red);
@@ -105,17 +103,6 @@ describe('pins', () => {
     expect(sign('lacking')).toEqual(sign('value'));
   });
 
-  test('with forced colours no line is drawn in the colour that it encloses', () => {
-    const forced = forcedPalette((name) => (name === 'Canvas' ? [255, 255, 255] : [0, 0, 0]));
-    for (const verdict of VERDICTS) {
-      for (const kind of ['value', 'lacking', 'failed'] as const) {
-        const [sprite] = draw([pin({ verdict, kind })], forced).sprites;
-        const line = sprite?.named('stroke')[1]?.state['strokeStyle'];
-        expect(line, `${verdict} ${kind}`).toBe('rgb(0 0 0)');
-      }
-    }
-  });
-
   test('who needs somebody lies on top, whatever the order', () => {
     const order = (...verdicts: Verdict[]): unknown[] =>
       draw(verdicts.map((verdict, id) => pin({ id: String(id), verdict, strength: 1 - id / 10 })))
@@ -127,7 +114,7 @@ describe('pins', () => {
   test('where pins crowd only a critical one has room for its sign', () => {
     // Halo and outline; its cross besides.
     const lines = (verdict: Verdict): number | undefined =>
-      draw([pin({ verdict })], LIGHT, 0.02).sprites[0]?.named('stroke').length;
+      draw([pin({ verdict })], 0.02).sprites[0]?.named('stroke').length;
     expect(VERDICTS.map(lines)).toEqual(VERDICTS.map((each) => (each === 'critical' ? 3 : 2)));
   });
 

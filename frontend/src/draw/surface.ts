@@ -1,5 +1,5 @@
 import type { Size, View } from '../geometry/coordinates';
-import type { Palette } from './palette';
+import type { Colours } from './colours';
 
 /** A canvas ready to draw on in CSS pixels. */
 export interface Surface {
@@ -12,7 +12,7 @@ export interface Surface {
 /** What everything of the map is drawn with. */
 export interface Pen extends Surface {
   readonly view: View;
-  readonly palette: Palette;
+  readonly colour: Colours;
   readonly sprites: Sprites;
   /** How large the page's text is, 1 as usual. */
   readonly textScale: number;
@@ -29,29 +29,6 @@ export function contextOf(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
   const context = canvas.getContext('2d');
   if (!context) throw new Error('this browser has no 2d canvas');
   return context;
-}
-
-/** Slanted lines over a box, in the stroke that is set; `slant` 1 leans to the right, -1 to the left. */
-export function hatch(
-  context: CanvasRenderingContext2D,
-  left: number,
-  top: number,
-  { width, height }: Size,
-  step: number,
-  slant: 1 | -1,
-): void {
-  const [from, to] = slant > 0 ? [top + height, top] : [top, top + height];
-  context.save();
-  context.beginPath();
-  context.rect(left, top, width, height);
-  context.clip();
-  context.beginPath();
-  for (let at = Math.floor((left - height) / step) * step; at < left + width; at += step) {
-    context.moveTo(at, from);
-    context.lineTo(at + height, to);
-  }
-  context.stroke();
-  context.restore();
 }
 
 export function clear({ context, size, ratio }: Surface): void {

@@ -26,7 +26,6 @@ import { isPrinting, onThemeChange } from '../store/theme';
 import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
 import { keyCommand, type MapCommand, onMapCommand, pinUnderMouse, pointedAt } from './commands';
 import { Painter, type Canvases } from './painter';
-import { paletteInUse } from './palette';
 
 /** A finger hits a pin from this far, a mouse from a bit less; CSS pixels. */
 const TOUCH_REACH = 26;
@@ -54,7 +53,7 @@ export function runMap(
       onFailure(error);
     }
   };
-  const painter = new Painter(canvases, paletteInUse());
+  const painter = new Painter(canvases);
   const calm = window.matchMedia('(prefers-reduced-motion: reduce)');
   const dirty = new Set<Part>();
   let frame = 0;
@@ -356,7 +355,7 @@ export function runMap(
     store.subscribe(guarded(update)),
     onMapCommand(run),
     onThemeChange(() => {
-      painter.setPalette(paletteInUse());
+      painter.recolour();
       spoil('still', 'pins', 'overlay');
       // Not with the next frame: a page on its way to the printer gets none.
       cancelAnimationFrame(frame);

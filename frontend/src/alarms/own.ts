@@ -109,11 +109,9 @@ const isAhead = ({ verdict, until }: Shelf, at: number): boolean =>
 export const isShelfHeld = (shelf: Shelf, verdict: Verdict, at: number): boolean =>
   isAhead(shelf, at) && !isWorse(verdict, shelf.verdict);
 
-/** When the next shelf ends; null: there is none. */
-export const nextEnd = (kept: Kept, at: number): number | null => {
-  const ends = [...kept.shelved.values()].map(({ until }) => until).filter((until) => until > at);
-  return ends.length > 0 ? Math.min(...ends) : null;
-};
+/** When the next shelf ends; infinite: there is none. */
+export const nextEnd = (kept: Kept, at: number): number =>
+  Math.min(...[...kept.shelved.values()].map(({ until }) => until).filter((until) => until > at));
 
 const KEY = 'lupin-twin.alarms';
 /** Reads what was kept; anything damaged counts as not kept. */

@@ -99,30 +99,33 @@ function marksOf(columns: readonly Column[], barWidth: number) {
   return marks;
 }
 
-function Times({ axis, ticks }: { axis: Axis; ticks: readonly Tick[] }): JSX.Element {
+const Times = ({ axis, ticks }: { axis: Axis; ticks: readonly Tick[] }): JSX.Element => (
+  <>
+    {timesOf(axis, ticks).map(({ x, text, left }) => (
+      <g key={x}>
+        <path className="timebar-tick" d={`M${x} ${MARKS_PX}V${FLOOR_PX + 3}`} />
+        {left !== null && (
+          <text x={left} y={BAR_PX - 3}>
+            {text}
+          </text>
+        )}
+      </g>
+    ))}
+  </>
+);
+
+/** Where the text of each begins; null: it has no room. */
+function timesOf(axis: Axis, ticks: readonly Tick[]) {
   const letterPx = LETTER * (parseFloat(getComputedStyle(document.documentElement).fontSize) || 16);
   let free = 0;
-  return (
-    <>
-      {ticks.map((tick) => {
-        const x = Math.round(xOf(axis, tick.at)) + 0.5;
-        // The date stands beside the first time of a day.
-        const text = tick.text.split('\n').reverse().join(' ');
-        const width = text.length * letterPx;
-        const left = Math.min(axis.width - width, Math.max(0, x - width / 2));
-        const hasRoom = left >= free;
-        if (hasRoom) free = left + width + 10;
-        return (
-          <g key={tick.at}>
-            <path className="timebar-tick" d={`M${x} ${MARKS_PX}V${FLOOR_PX + 3}`} />
-            {hasRoom && (
-              <text x={left} y={BAR_PX - 3}>
-                {text}
-              </text>
-            )}
-          </g>
-        );
-      })}
-    </>
-  );
+  return ticks.map((tick) => {
+    const x = Math.round(xOf(axis, tick.at)) + 0.5;
+    // The date stands beside the first time of a day.
+    const text = tick.text.split('\n').reverse().join(' ');
+    const width = text.length * letterPx;
+    const left = Math.min(axis.width - width, Math.max(0, x - width / 2));
+    if (left < free) return { x, text, left: null };
+    free = left + width + 10;
+    return { x, text, left };
+  });
 }

@@ -9,7 +9,7 @@ import { shown } from '../domain/text';
 import { dateText, rosText, secondsOf, type Span, spanOf } from '../domain/time';
 import { contextOf, newCanvas } from '../draw/surface';
 import { lengthText, scaleBar } from '../geometry/coordinates';
-import { commandMap } from '../map/commands';
+import { theMap } from '../map/commands';
 import { toFragment } from '../store/address';
 import { store } from '../store/app';
 import {
@@ -71,11 +71,8 @@ export async function saveMap(): Promise<void> {
   const style = getComputedStyle(document.documentElement);
   const canvas = newCanvas(first.width, first.height + FOOTER_PX * ratio);
   const context = contextOf(canvas);
-  commandMap({
-    type: 'picture',
-    take: () => {
-      for (const layer of layers) context.drawImage(layer, 0, 0);
-    },
+  theMap.get()?.take(() => {
+    for (const layer of layers) context.drawImage(layer, 0, 0);
   });
 
   const sensor = selectSensor(state);

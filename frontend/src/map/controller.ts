@@ -24,7 +24,7 @@ import {
 import { selectNewest, selectShown, selectTag, type Shown } from '../store/moment';
 import { isPrinting, onThemeChange } from '../store/theme';
 import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
-import { keyCommand, type MapCommand, onMapCommand, pinUnderMouse, pointedAt } from './commands';
+import { keyAction, type MapActions, pinUnderMouse, pointedAt, theMap } from './commands';
 import { Painter, type Canvases } from './painter';
 
 /** A finger hits a pin from this far, a mouse from a bit less; CSS pixels. */
@@ -173,7 +173,7 @@ export function runMap(
     if (selected !== null && selected !== before.view.selected) {
       // Once the card is there, which covers part of the map on a phone.
       requestAnimationFrame(() => {
-        run({ type: 'show', tagId: selected });
+        show(selected);
       });
     }
     const sameContent = !changedTags && sameMap && house.field === last.field;
@@ -262,40 +262,39 @@ export function runMap(
       event.preventDefault();
       return;
     }
-    const command = keyCommand(event);
-    if (!command) return;
+    const action = keyAction(event);
+    if (!action) return;
     aim();
     event.preventDefault();
-    run(command);
+    action(actions);
   };
 
-  const run = (command: MapCommand): void => {
-    switch (command.type) {
-      case 'fit':
-        act({ camera: null });
-        camera.goTo(null, content(store.get()), covered);
-        break;
-      case 'zoom':
-        camera.zoomBy(command.factor);
-        break;
-      case 'pan':
-        camera.panBy(command.x, command.y);
-        break;
-      case 'show': {
-        const tag = selectTag(store.get(), command.tagId);
-        if (tag?.at) camera.show(tag.at, covered);
-        break;
-      }
-      case 'picture':
-        isTaken = true;
-        spoil('pins', 'overlay');
-        paint();
-        command.take();
-        isTaken = false;
-        spoil('pins', 'overlay');
-        break;
-    }
+  const show = (tagId: string): void => {
+    const tag = selectTag(store.get(), tagId);
+    if (tag?.at) camera.show(tag.at, covered);
   };
+  const actions: MapActions = {
+    show,
+    fit: () => {
+      act({ camera: null });
+      goToContent();
+    },
+    zoomBy: (factor) => {
+      camera.zoomBy(factor);
+    },
+    panBy: (x, y) => {
+      camera.panBy(x, y);
+    },
+    take: (draw) => {
+      isTaken = true;
+      spoil('pins', 'overlay');
+      paint();
+      draw();
+      isTaken = false;
+      spoil('pins', 'overlay');
+    },
+  };
+  theMap.set(actions);
 
   /** Also before the map has a size. */
   const isChosenSeen = (): boolean => {
@@ -320,7 +319,7 @@ export function runMap(
     goToContent();
     // A card that opens takes room from the map.
     const { selected } = store.get().view;
-    if (selected !== null && wasSeen) run({ type: 'show', tagId: selected });
+    if (selected !== null && wasSeen) show(selected);
     spoil('still', 'pins', 'overlay');
     // At once: a canvas of another size is empty, and would be seen so until the next frame.
     paint();
@@ -353,7 +352,6 @@ export function runMap(
 
   const stops = [
     store.subscribe(guarded(update)),
-    onMapCommand(run),
     onThemeChange(() => {
       painter.recolour();
       spoil('still', 'pins', 'overlay');
@@ -372,6 +370,7 @@ export function runMap(
   }
   return () => {
     for (const stop of stops) stop();
+    theMap.set(null);
     gone.abort();
     resize.disconnect();
     unwatch();

@@ -36,21 +36,23 @@ export const Bar = memo(function Bar({
       {hatching('unknown', 'M-1 1l2-2M0 6l6-6M5 7l2-2')}
       {hatching('silence', 'M-1 5l2 2M0 0l6 6M5-1l2 2')}
       {(['unknown', 'silence'] as const).map((kind) =>
-        stretchesOf((kind === 'silence' ? timeline?.silences : unknown) ?? [], axis).map((each) => (
-          <rect
-            key={`${kind} ${each.x}`}
-            {...each}
-            y={MARKS_PX}
-            height={FLOOR_PX - MARKS_PX}
-            fill={`url(#timebar-${kind})`}
-            data-mark={kind}
-          />
-        )),
+        stretchesOf((kind === 'silence' ? timeline?.silences : unknown) ?? [], axis).map(
+          (each, index) => (
+            <rect
+              key={`${kind} ${index}`}
+              {...each}
+              y={MARKS_PX}
+              height={FLOOR_PX - MARKS_PX}
+              fill={`url(#timebar-${kind})`}
+              data-mark={kind}
+            />
+          ),
+        ),
       )}
       <Times axis={axis} ticks={timeTicks(axis, width / TICK_ROOM_PX, !hasDate(to))} />
       <path className="timebar-base" d={`M0 ${BASE_PX + 0.5}H${width}`} />
       {columns.map((column) => (
-        <Counts key={column.x} column={column} />
+        <Counts key={column.start} column={column} />
       ))}
       {marksOf(columns, width).map(({ kind, at }) =>
         kind === 'pest' ? (
@@ -101,8 +103,8 @@ function marksOf(columns: readonly Column[], barWidth: number) {
 
 const Times = ({ axis, ticks }: { axis: Axis; ticks: readonly Tick[] }): JSX.Element => (
   <>
-    {timesOf(axis, ticks).map(({ x, text, left }) => (
-      <g key={x}>
+    {timesOf(axis, ticks).map(({ at, x, text, left }) => (
+      <g key={at}>
         <path className="timebar-tick" d={`M${x} ${MARKS_PX}V${FLOOR_PX + 3}`} />
         {left !== null && (
           <text x={left} y={BAR_PX - 3}>
@@ -124,8 +126,8 @@ function timesOf(axis: Axis, ticks: readonly Tick[]) {
     const text = tick.text.split('\n').reverse().join(' ');
     const width = text.length * letterPx;
     const left = Math.min(axis.width - width, Math.max(0, x - width / 2));
-    if (left < free) return { x, text, left: null };
+    if (left < free) return { at: tick.at, x, text, left: null };
     free = left + width + 10;
-    return { x, text, left };
+    return { at: tick.at, x, text, left };
   });
 }

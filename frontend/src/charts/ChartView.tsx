@@ -6,7 +6,7 @@ import { isHad } from '../domain/sensors';
 import { chartCsv } from '../domain/series';
 import { shown } from '../domain/text';
 import type { Span } from '../domain/time';
-import { fileName, save } from '../export/save';
+import { saveCsv } from '../export/save';
 import { act, prefer, store, useApp } from '../store/app';
 import { selectCatalogue, selectSensor } from '../store/derived';
 import { rosNow, selectTags } from '../store/moment';
@@ -247,10 +247,7 @@ function ChartFiles({
             models.flatMap(({ lines }) => lines),
             unit,
           );
-          save(
-            new Blob([text], { type: 'text/csv;charset=utf-8' }),
-            fileName('chart', 'csv', span.to * 1000),
-          );
+          saveCsv('chart', text, span.to * 1000);
         }}
       >
         <Icon name="download" size={16} />

@@ -24,7 +24,7 @@ import {
 import { rosNow, selectHasOwnTime, selectOrigin, selectShown } from '../store/moment';
 import { isChosen } from '../store/view';
 import { LANGUAGE, S } from '../strings';
-import { fileName, save } from './save';
+import { fileName, save, saveCsv } from './save';
 
 /**
  * The table as the operator sees it, filtered and sorted; ages are those of the state's time. Asked
@@ -55,8 +55,7 @@ function writeTable(): void {
     unit,
     snapshot.takenAt,
   );
-  const blob = new Blob([text], { type: 'text/csv;charset=utf-8' });
-  save(blob, fileName('tags', 'csv', epochOf(snapshot.takenAt), moment));
+  saveCsv('tags', text, epochOf(snapshot.takenAt), moment);
 }
 
 /** The map as the operator sees it, with a footer that says what, when and how large. */

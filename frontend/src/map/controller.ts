@@ -65,25 +65,7 @@ export function runMap(
   let drawn = store.get();
   let lastField = selectShown(drawn).field.value;
 
-  const camera = new MapCamera(
-    element,
-    {
-      viewport: () => store.get().viewport,
-      onView: (view) => {
-        moveViewport({ view });
-        publish(view);
-        // The pin has moved away from under the mouse.
-        pinUnderMouse.set(null);
-        spoil('view');
-      },
-      onCamera: (chosen) => {
-        act({ camera: chosen });
-        // Labels find their places anew.
-        spoil('pins');
-      },
-    },
-    isFixed,
-  );
+  const camera = new MapCamera(element, isFixed);
 
   const publish = ({ x, y, scale }: View): void => {
     canvases.overlay.dataset['view'] = [x, y, scale].map((n) => n.toFixed(4)).join(',');
@@ -156,6 +138,12 @@ export function runMap(
       selectHeat(state) !== selectHeat(before) ||
       selectAreaOf(state) !== selectAreaOf(before) ||
       (changedTags && house.snapshot?.revision !== last.snapshot?.revision);
+    if (state.viewport.view !== before.viewport.view) {
+      publish(state.viewport.view);
+      // The pin has moved away from under the mouse.
+      pinUnderMouse.set(null);
+      spoil('view');
+    }
     if (stillChanged) spoil('still');
     if (
       changedTags ||
@@ -169,6 +157,8 @@ export function runMap(
     // A mark follows the mouse, and nothing below it is drawn anew.
     if (view.hovered !== before.view.hovered) spoil('overlay');
     if (view.selected !== before.view.selected) spoil('pins', 'overlay');
+    // Labels find their places anew.
+    if (view.camera !== before.view.camera) spoil('pins');
     const { selected } = view;
     if (selected !== null && selected !== before.view.selected) {
       // Once the card is there, which covers part of the map on a phone.

@@ -261,39 +261,28 @@ export function drawPulses(
   context.globalAlpha = 1;
 }
 
-export function drawMark({ context, view, colour }: Pen, at: MapPoint, strong: boolean): void {
-  // Outside of the ring that tells a pest.
-  const radius = pinRadius(view.scale) + 9;
-  const { x, y } = toCanvas(view, at);
-  context.beginPath();
-  context.arc(x, y, radius, 0, 2 * Math.PI);
+/** In the accent's colour, on a halo that tells it from whatever lies below. */
+function drawOutlined({ context, colour }: Pen, lines: Path2D, halo: number, width: number): void {
   context.strokeStyle = colour('map-halo');
-  context.lineWidth = strong ? 6 : 4;
-  context.stroke();
+  context.lineWidth = halo;
+  context.stroke(lines);
   context.strokeStyle = colour('accent');
-  context.lineWidth = strong ? 3 : 2;
-  context.stroke();
+  context.lineWidth = width;
+  context.stroke(lines);
+}
+
+export function drawMark(pen: Pen, at: MapPoint, strong: boolean): void {
+  // Outside of the ring that tells a pest.
+  const r = pinRadius(pen.view.scale) + 9;
+  const { x, y } = toCanvas(pen.view, at);
+  const ring = new Path2D(`M${x - r} ${y}a${r} ${r} 0 1 1 ${2 * r} 0a${r} ${r} 0 1 1 ${-2 * r} 0Z`);
+  drawOutlined(pen, ring, strong ? 6 : 4, strong ? 3 : 2);
 }
 
 /** The point whose value the keyboard reads: the middle of the view. */
-export function drawCrosshair({ context, size, colour }: Pen): void {
-  const x = Math.round(size.width / 2) + 0.5;
-  const y = Math.round(size.height / 2) + 0.5;
-  for (const [stroke, width] of [
-    [colour('map-halo'), 4],
-    [colour('accent'), 1.5],
-  ] as const) {
-    context.strokeStyle = stroke;
-    context.lineWidth = width;
-    context.beginPath();
-    context.moveTo(x - 12, y);
-    context.lineTo(x - 3, y);
-    context.moveTo(x + 3, y);
-    context.lineTo(x + 12, y);
-    context.moveTo(x, y - 12);
-    context.lineTo(x, y - 3);
-    context.moveTo(x, y + 3);
-    context.lineTo(x, y + 12);
-    context.stroke();
-  }
+export function drawCrosshair(pen: Pen): void {
+  const x = Math.round(pen.size.width / 2) + 0.5;
+  const y = Math.round(pen.size.height / 2) + 0.5;
+  const cross = `M${x - 12} ${y}h9m6 0h9M${x} ${y - 12}v9m0 6v9`;
+  drawOutlined(pen, new Path2D(cross), 4, 1.5);
 }

@@ -47,17 +47,16 @@ export function canvasOfPixels(
   return canvas;
 }
 
+const MOST_SPRITES = 1_000;
+
 /**
  * Small pictures painted once and then only copied: without a GPU a copy is many times cheaper
- * than a path. Emptied when it grows beyond `limit`, so that a page of days stays small.
+ * than a path. Emptied when there are too many, so that a page of days stays small.
  */
 export class Sprites {
   readonly #sprites = new Map<string, HTMLCanvasElement>();
 
-  constructor(
-    private readonly ratio: number,
-    private readonly limit = 1_000,
-  ) {}
+  constructor(private readonly ratio: number) {}
 
   get(
     key: string,
@@ -67,7 +66,7 @@ export class Sprites {
   ): HTMLCanvasElement {
     const known = this.#sprites.get(key);
     if (known) return known;
-    if (this.#sprites.size >= this.limit) this.#sprites.clear();
+    if (this.#sprites.size >= MOST_SPRITES) this.#sprites.clear();
     const sprite = newCanvas(Math.ceil(width) * this.ratio, Math.ceil(height) * this.ratio);
     const context = contextOf(sprite);
     context.scale(this.ratio, this.ratio);

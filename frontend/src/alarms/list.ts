@@ -1,7 +1,7 @@
 /** The list of alarms: what is active, shelved and resolved, in its order. Pure. */
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import { isOfRange, severity, sideOf } from '../domain/health';
-import { groupedBy } from '../domain/memo';
+import { groupedBy, withParts } from '../domain/memo';
 import { secondsOf } from '../domain/time';
 import { compareIds, equal } from '../domain/twin';
 import { isShelfHeld, isWorse, whatOf, type Kept, type Shelf } from './own';
@@ -215,10 +215,9 @@ export function sharedList(before: AlarmList, now: AlarmList): AlarmList {
       ? was
       : items;
   };
-  const active = share(before.active, now.active);
-  const shelved = share(before.shelved, now.shelved);
-  const resolved = share(before.resolved, now.resolved);
-  const isSame =
-    active === before.active && shelved === before.shelved && resolved === before.resolved;
-  return isSame ? before : { active, shelved, resolved };
+  return withParts(before, {
+    active: share(before.active, now.active),
+    shelved: share(before.shelved, now.shelved),
+    resolved: share(before.resolved, now.resolved),
+  });
 }

@@ -41,13 +41,17 @@ export type Timeline = Schemas['Timeline'];
 export type Alarm = Schemas['Alarm'];
 export type Session = Schemas['Session'];
 export type Note = Schemas['Note'];
+export type Notes = Schemas['Notes'];
 export type AlarmsFrame = Schemas['AlarmsFrame'];
 /** A frame also says how many notes the log has. */
 export type Alarms = Schemas['Alarms'] & { readonly notes?: number };
 export type HealthReason = Schemas['HealthReason'];
 export type Verdict = TagHealth['verdict'];
 export type Grade = Schemas['EstimateQualities']['sensors'][string];
+/** What was measured at the tags beside what all the others say. */
+export type ExpectedTags = Schemas['ExpectedTags'];
 /** Where another tag helps. */
+export type Advice = Schemas['Advice'];
 export type Place = Schemas['AdvisedPlace'];
 /** What a robot says of itself; and where it has been. */
 export type RobotNow = Omit<RobotFrame, 'type'>;

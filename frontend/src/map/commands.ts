@@ -37,7 +37,10 @@ export function keyAction({ key, shiftKey }: KeyboardEvent): ((map: MapActions) 
       map.zoomBy(factor);
     };
   }
-  return key === '0' || key === 'Home' ? ({ fit }) => fit() : null;
+  if (key !== '0' && key !== 'Home') return null;
+  return (map) => {
+    map.fit();
+  };
 }
 
 /**

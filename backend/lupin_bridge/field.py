@@ -288,6 +288,16 @@ def numbers(cells: npt.NDArray[np.float32]) -> Iterator[bytes]:
         yield orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY)[1:-1]
 
 
+_ZEROED: Final[Mapping[Any, Any]] = {int: 0, float: 0.0}
+
+
+def refusal_json(service: Any, reason: str) -> bytes:
+    """The failure body of a service, which `schema` has as a type: all but the reason is zeroed."""
+    fields = service.model_fields.items()
+    zeroed = {name: _ZEROED.get(field.annotation, []) for name, field in fields}
+    return orjson.dumps({**zeroed, "ok": False, "error_message": reason})
+
+
 def _npy(array: npt.NDArray[np.float32]) -> bytes:
     buffer = io.BytesIO()
     np.lib.format.write_array(buffer, array, allow_pickle=False)

@@ -94,12 +94,7 @@ def bridge_of(request: Request) -> Bridge:
 
 
 def newest_of(bridge: Bridge) -> Snapshot:
-    """The newest state.
-
-    Raises:
-        TwinUnavailableError: there is none.
-
-    """
+    """The newest state; `TwinUnavailableError`: there is none."""
     if bridge.latest is None:
         raise TwinUnavailableError(NO_TWIN)
     return bridge.latest.snapshot

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, TypeVar
 
 from annotated_types import Interval
 from fastapi import APIRouter, Request, Response
+from pydantic import BaseModel
 
 from lupin_bridge import field as formats
 from lupin_bridge import query_string
@@ -59,7 +60,7 @@ class InFormats:
     summary: str
     description: str
     parameters: Sequence[Any]
-    model: type[schema.Contract]
+    model: type[BaseModel]
 
     def refusals(self) -> dict[int | str, dict[str, Any]]:
         """What stands in the way of an answer, for the OpenAPI document."""
@@ -78,9 +79,9 @@ class InFormats:
         try:
             return await answer
         except (FieldRefused, PastRefused) as error:
-            return json_response(schema.refused(self.model, str(error)), 400)
+            return json_response(formats.refusal_json(self.model, str(error)), 400)
         except ClientLimitError as error:
-            return json_response(schema.refused(self.model, str(error)), 429, error.headers)
+            return json_response(formats.refusal_json(self.model, str(error)), 429, error.headers)
         except REFUSALS as error:
             return refusal(error)
 

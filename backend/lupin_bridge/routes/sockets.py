@@ -29,14 +29,14 @@ from lupin_bridge.access.middleware import client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.relay import NotRelayedError, Sample
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.field import JSON, FieldQuery
+from lupin_bridge.field import JSON, FieldQuery, refusal_json
 from lupin_bridge.past.fields import Field
 from lupin_bridge.routes.answers import error_response, newest_field
 from lupin_bridge.serving.admission import AdmissionError
 from lupin_bridge.serving.ws_protocol import BINARY, CONNECTION_KEY, Connection, frame_head
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.hub import CLOSE_TRY_AGAIN_LATER, Client, Hub
-from lupin_bridge.stream.schema import GetFieldResponse, refused
+from lupin_bridge.stream.schema import GetFieldResponse
 from lupin_bridge.viewers.foxglove import (
     ERROR,
     SUBPROTOCOLS,
@@ -377,7 +377,7 @@ class _RosbridgeConversation(_Conversation):
             response = service_failure(call.id, call.service, text)
         except FieldRefused as error:
             # The service has answered, and the answer is no: as over ROS, `ok` says so.
-            values = refused(GetFieldResponse, str(error))
+            values = refusal_json(GetFieldResponse, str(error))
             response = service_response(call.id, call.service, values, result=True)
         except (AdmissionError, TwinUnavailableError) as error:
             response = service_failure(call.id, call.service, str(error))

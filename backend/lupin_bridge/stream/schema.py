@@ -8,10 +8,8 @@ Positions are metres in the map frame; numbers that ROS carries as NaN or infini
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Final, Literal
+from typing import Literal
 
-import orjson
 from pydantic import BaseModel, ConfigDict, Field
 
 from lupin_bridge.stream.frames import Reason
@@ -443,16 +441,6 @@ class Health(Contract):
     ok: bool
     message: str
     callback_errors: int
-
-
-_ZEROED: Final[Mapping[Any, Any]] = {int: 0, float: 0.0}
-
-
-def refused(service: type[Contract], reason: str) -> bytes:
-    """A service's failure body: `ok` false, the reason, and every other field zeroed."""
-    fields = service.model_fields.items()
-    zeroed = {name: _ZEROED.get(field.annotation, []) for name, field in fields}
-    return orjson.dumps({**zeroed, "ok": False, "error_message": reason})
 
 
 class ErrorMessage(Contract):

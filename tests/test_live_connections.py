@@ -69,6 +69,7 @@ NO_HANDSHAKES = {
     "another method": (asked().replace(b"GET", b"PUT", 1), 405),
     "HTTP/1.0": (asked(version=b"1.0"), 404),
     "no text": (asked(b"X-Bytes: \xff\xfe", b"Content-Length: \xb9"), 400),
+    "TLS": (b"\x16\x03\x01\x02\x00\x01\x00", 400),  # a browser at https: must not wait
 }
 
 

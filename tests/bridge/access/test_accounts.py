@@ -46,6 +46,7 @@ def test_a_session_ends_in_its_time_and_with_its_account(path: Path) -> None:
         assert accounts.of_session(name, NOW) is None
         with pytest.raises(AccountError):
             accounts.begin_session("anna", "::1", NOW)
+    assert b"$argon2id$" not in path.read_bytes(), "it is gone, and not only forgotten"
     add(path, anna="admin")
     with closing(Accounts(path)) as accounts:
         assert accounts.of_session(name, NOW) is None, "of another anna"

@@ -190,7 +190,7 @@ def behind(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     path = tmp_path_factory.mktemp("accounts") / "accounts.sqlite"
     with changing(path) as accounts:
         accounts.add("anna@example.org", "account", "operator", "", by="a test", now_s=1)
-    add(path, "token", scada="viewer")
+    add(path, "token", scada="operator")
     with served(
         "--accounts", str(path), "--trusted-proxy", PROXY, "--proxy-user-header", "Remote-User"
     ) as running:
@@ -213,7 +213,8 @@ def test_a_name_is_believed_of_the_proxy_and_of_nobody_else(behind: Served) -> N
     assert who(behind, PROXY, ("remote-user", "new@example.org")) == "new@example.org viewer"
     assert who(behind, STRANGER, anna) == "401"
     assert who(behind, STRANGER, anna, ("X-Forwarded-For", PROXY)) == "401"
-    assert who(behind, STRANGER, anna, ("Authorization", f"Bearer {SCADA}")) == "scada viewer"
+    assert who(behind, STRANGER, anna, ("Authorization", f"Bearer {SCADA}")) == "scada operator"
+    assert who(behind, PROXY, ("Remote-User", "scada")) == "scada viewer", "no token's right"
     assert who(behind, PROXY) == "401", "who has not signed in there"
 
 

@@ -21,7 +21,6 @@ from typing import Any, Final, TypeVar
 
 from lupin_bridge.access.accounts import SESSION_S, Accounts, digest
 from lupin_bridge.access.credentials import (
-    MAX_PASSWORD,
     SHARED,
     SHARED_SESSION_S,
     AccountError,
@@ -178,7 +177,7 @@ class People:
         return person
 
     async def _check(self, name: str, password: str) -> Person | None:
-        if not is_name(name) or len(password) > MAX_PASSWORD:
+        if not is_name(name):
             return None
         known = self._ask(lambda it: it.of_name(name))
         is_right = await self._on_thread(lambda: verify(known[1] if known else "", password))

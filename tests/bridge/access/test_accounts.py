@@ -9,7 +9,7 @@ import pytest
 from argon2 import PasswordHasher
 
 from lupin_bridge.access import people as people_module
-from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, digest
+from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, Device, digest
 from lupin_bridge.access.credentials import AccountError, Person, check_password
 from lupin_bridge.access.people import ATTEMPT_BURST, MAX_WAITING, People
 from lupin_bridge.serving.admission import ClientLimitError
@@ -168,3 +168,21 @@ def test_a_file_that_has_gone_opens_nothing(path: Path) -> None:
     assert people.is_on
     with pytest.raises(AccountError):
         people.by_token(TOKEN)
+
+
+def test_whom_a_proxy_names_is_asked_after_again(path: Path) -> None:
+    add(path, anna="operator")
+    people = People(path, is_proxied=True)
+    anna = people.by_proxy("anna")
+    assert anna is not None
+    assert people.still(anna)
+    remove(path, "anna")
+    assert not people.still(anna)
+
+
+def test_notified_are_devices_of_who_may_read_the_site(path: Path) -> None:
+    with changing(path) as accounts:
+        accounts.add("anna", "account", "viewer", "", by="a test", now_s=NOW, sites=["north"])
+        accounts.add_device("anna", Device("https://push.example/x", "", "", "en"), "::1", NOW)
+        found = [len(accounts.devices(site)) for site in ("north", "south", "")]
+    assert found == [1, 0, 0]

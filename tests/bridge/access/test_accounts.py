@@ -168,6 +168,8 @@ def test_a_file_that_has_gone_opens_nothing(path: Path) -> None:
     assert people.is_on
     with pytest.raises(AccountError):
         people.by_token(TOKEN)
+    add(path, "token", digest("another"), scada="viewer")  # another file in its place
+    assert people.by_token(TOKEN) is None
 
 
 def test_whom_a_proxy_names_is_asked_after_again(path: Path) -> None:

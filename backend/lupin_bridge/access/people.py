@@ -143,9 +143,7 @@ class People:
             AccountError: the file cannot be read.
 
         """
-        if person.by not in ("account", "proxy") or not self.has_file:
-            return False
-        return self._ask(lambda it: it.of_name(person.name)) is not None
+        return self.has_file and self._ask(lambda it: it.of_name(person.name)) is not None
 
     async def check(self, name: str, password: str, address: str) -> Person | None:
         """Who signs in; None: there is no such account, or the password is another.

@@ -190,8 +190,7 @@ class _Handshake:
 class Acceptor:
     """Accepts and evicts connections; uvicorn closes it as it would an `asyncio.Server`.
 
-    `connections` are all that have a protocol. A handshake of TLS, and its end, may take
-    `timeout_s`.
+    `connections` are all that have a protocol. A handshake of TLS may take `timeout_s`.
     """
 
     def __init__(
@@ -211,11 +210,7 @@ class Acceptor:
         self._options: dict[str, Any] = {}
         if tls is not None:
             SSLProtocol.max_size = TLS_BUFFER_BYTES
-            self._options = {
-                "ssl": tls,
-                "ssl_handshake_timeout": timeout_s,
-                "ssl_shutdown_timeout": timeout_s,
-            }
+            self._options = {"ssl": tls, "ssl_handshake_timeout": timeout_s}
         self._handshakes: set[_Handshake] = set()
         self._warnings = Throttle(WARNING_PERIOD_S)
         self._retry: asyncio.TimerHandle | None = None

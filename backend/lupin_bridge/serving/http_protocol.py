@@ -273,7 +273,7 @@ class HttpConnection(H11Protocol):
         self._deadline = self._reader_deadline = None
 
     def _parse_request(self) -> None:
-        if not self._is_at_work or self._is_refused:
+        if not self._is_at_work:
             self.abort()
 
     def _give_up(self) -> None:

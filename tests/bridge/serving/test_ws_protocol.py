@@ -7,8 +7,10 @@ import pytest
 from websockets.frames import CloseCode
 
 from lupin_bridge.serving import ws_protocol
+from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import Settings
+from tests.support import raw_http
 from tests.support.inprocess import Running, running
 from tests.support.raw_ws import BINARY, CLOSE, PING, TEXT, RawClient, frames_of, masked
 from tests.support.waiting import PATIENCE_S, until
@@ -47,6 +49,24 @@ async def test_a_socket_that_is_free_again_says_so_by_itself(domain: int) -> Non
             assert 0 < queued <= len(SMALL_FRAME), "of what the socket does not take, one frame"
             await asyncio.to_thread(drain, slow, freed)
             assert (taken, freed[0]) == ([False], True)
+
+
+async def test_behind_an_answer_that_nobody_reads_a_handshake_ends_after_the_timeout(
+    domain: int,
+) -> None:
+    async with running(Limits(client_timeout_s=3.0), SILENT) as served:
+        connections = served.server.server_state.connections
+        with raw_http.connect(served.url, room=4_096) as deaf:
+            found = await until(lambda: list(connections), "the connection")
+            assert found is not None
+            found[0].transport.write(bytes(10_000_000))  # as if it were an answer
+            deaf.sendall(b"GET /ws/state HTTP/1.1\r\n" + raw_http.UPGRADE + b"\r\n")
+            found = await until(
+                lambda: [it for it in connections if isinstance(it, Connection)], "its handover"
+            )
+            assert found is not None
+            assert not found[0].can_take
+            await until(lambda: not connections, "its end")
 
 
 async def test_who_does_not_read_gets_no_answer_to_his_pings(domain: int) -> None:

@@ -69,9 +69,11 @@ async def test_behind_an_answer_that_nobody_reads_a_handshake_ends_after_the_tim
             await until(lambda: not connections, "its end")
 
 
-async def test_who_does_not_read_gets_no_answer_to_his_pings(domain: int) -> None:
+async def test_who_does_not_read_gets_no_answer_to_his_pings_and_ends_after_his_good_bye(
+    domain: int,
+) -> None:
     pings = 100
-    async with running(ros_args=SILENT) as served:
+    async with running(Limits(client_timeout_s=3.0), SILENT) as served:
         with deaf_client(served.url) as deaf:
             connection = await joined(served)
             heard = 0
@@ -89,6 +91,8 @@ async def test_who_does_not_read_gets_no_answer_to_his_pings(domain: int) -> Non
             deaf.sendall(masked(PING, bytes(125)) * pings)
             await until(lambda: heard == pings, "all pings")
             assert connection.transport.get_write_buffer_size() == queued
+            deaf.sendall(masked(CLOSE, b"\x03\xe8"))
+            await until(lambda: not served.server.server_state.connections, "its end")
 
 
 def drain(client: socket.socket, freed: list[bool]) -> None:

@@ -22,7 +22,7 @@ from py_vapid import Vapid02
 
 from lupin_bridge.access.accounts import Device
 from lupin_bridge.access.people import People
-from lupin_bridge.alarms.board import AlarmBoard, Change, page_of
+from lupin_bridge.alarms.board import NOTE_BURST, AlarmBoard, Change, page_of
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify import push as push_module
@@ -444,6 +444,13 @@ def test_who_signs_out_everywhere_else_is_notified_there_no_more(open_to: Live) 
         assert kept.get("/api/session").json()["name"] == "carl"
         assert lost.get("/api/session").status_code == 401
     assert phone.endpoint not in {device.endpoint for device in open_to.devices()}
+
+
+def test_one_name_cannot_fill_the_trail_with_devices(open_to: Live) -> None:
+    add(open_to.accounts, dora="viewer")
+    with signed_in(open_to.live.url, "dora") as dora:
+        answers = [dora.post("/api/push", json={}) for _ in range(NOTE_BURST + 100)]
+    assert "dora has written more than" in answers[-1].text
 
 
 def test_a_contact_is_an_address() -> None:

@@ -31,7 +31,8 @@ from tests.support.waiting import until
 
 ROUTES = ("/api/field", "/api/field.json", "/api/field.png", "/api/field.npy", "/api/field/quality")
 QUERY = "?sensor_type=co2&resolution=1&bbox_min_x=0&bbox_min_y=0&bbox_max_x=4&bbox_max_y=4"
-COMPUTED = ("/api/state", "/api/history?tag_id=1&sensor_type=co2", "/metrics", "/docs")
+HISTORY, EXPORT = "/api/history?tag_id=1&sensor_type=co2", "/api/export.csv?from=1&to=5"
+COMPUTED = ("/api/state", HISTORY, EXPORT, "/metrics", "/docs")
 
 
 # --- the rules ----------------------------------------------------------------------------------

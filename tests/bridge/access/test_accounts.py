@@ -1,6 +1,7 @@
 """The file of accounts: who may, for how long, and what is kept of a secret."""
 
 import asyncio
+import sqlite3
 import stat
 from contextlib import closing
 from pathlib import Path
@@ -30,6 +31,7 @@ def test_the_file_is_its_owners_alone_and_holds_no_secret(path: Path) -> None:
         cookie = accounts.begin_session("anna", "::1", NOW)
         assert [stat.S_IMODE(file.stat().st_mode) for file in path.parent.iterdir()] == [0o600] * 3
         raw = b"".join(file.read_bytes() for file in path.parent.iterdir())
+    assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
     for secret in (PASSWORD, TOKEN, cookie):
         assert secret.encode() not in raw
     assert b"$argon2id$" in raw
@@ -83,6 +85,11 @@ def test_somebody_elses_file_is_left_alone(path: Path) -> None:
     with pytest.raises(AccountError):
         add(path, anna="admin")
     assert path.read_text().startswith("no database")
+    path.unlink()
+    with changing(path), closing(sqlite3.connect(path)) as later:
+        later.execute("PRAGMA user_version = 9")
+    with pytest.raises(AccountError, match="is of version 9"):
+        Accounts(path)
 
 
 def test_a_reader_cannot_write_and_the_trail_keeps_the_newest(

@@ -216,6 +216,7 @@ async def test_the_state_is_written_a_few_times_a_second_and_never_old(
         await it.in_ros_thread(lambda node: node.store.record(new))
         await until(lambda: len(it.bridge.latest.snapshot.tags) == 21, "the new tag")  # type: ignore[union-attr]
         assert "new" in (await it.http.get("/api/state")).text
+        assert len(it.bridge.cache) == 1, "those before, which nobody reads any more, made place"
 
 
 def large_map() -> OccupancyMap:

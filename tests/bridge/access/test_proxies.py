@@ -152,7 +152,8 @@ def test_the_scheme_in_origins_and_cookies_is_the_proxys(live: Served) -> None:
     ours = {"Host": "twin.example", "Origin": "https://twin.example"}
     assert status(live, PROXY, X_Forwarded_Proto="https", **ours) == 200
     assert status(live, PROXY, X_Forwarded_Proto="http", **ours) == 403
-    assert status(live, STRANGER, X_Forwarded_Proto="https", **ours) == 403
+    for stranger in (STRANGER, "127.0.0.1"):
+        assert status(live, stranger, X_Forwarded_Proto="https", **ours) == 403
     with live.client(PROXY) as client:
         answer = client.post(
             "/gh1/api/signin", headers={**BEARER, **OWN, "X-Forwarded-Proto": "https"}

@@ -84,6 +84,16 @@ def test_the_slowest_export_makes_place_and_who_takes_enough_does_not() -> None:
     assert admission.exporting == 0
 
 
+def test_an_export_that_was_broken_off_frees_no_place_of_the_next() -> None:
+    admission = Admission(Limits())
+    with ExitStack() as taken, ExitStack() as broken_off:
+        for client, stack in zip("abcdea", (broken_off, *[taken] * 5), strict=True):
+            now_s = 100.0 * admission.exporting
+            stack.enter_context(admission.export(client, now_s, lambda: None))
+        broken_off.close()
+        assert admission.exporting == EXPORTS
+
+
 def test_a_client_has_its_rate_and_is_told_when_to_come_back() -> None:
     admission = Admission(Limits(answers_per_s=0.5, concurrency=9, total_concurrency=9))
     with admission.request("a", 0.0):

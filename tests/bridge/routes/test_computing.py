@@ -177,6 +177,8 @@ async def test_identical_requests_take_one_place_and_one_computation(
         asked = ask(it, *[field("co2", LARGE)] * 6, field("co2", LARGE, "npy"))
         await until(lambda: it.bridge.admission.in_flight["127.0.0.1"] == 7, "all of them")
         await until(lambda: it.bridge.admission.being_computed == 2, "a body each")
+        served = [c for c in it.server.server_state.connections if isinstance(c, HttpConnection)]
+        assert [c.waiting_since_s for c in served] == [None] * 7, "and nobody makes room for others"
         held.gate.set()
         answers = await asyncio.gather(*asked)
         assert {answer.status_code for answer in answers} == {200}

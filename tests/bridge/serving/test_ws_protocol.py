@@ -56,16 +56,18 @@ async def test_behind_an_answer_that_nobody_reads_a_handshake_ends_after_the_tim
 ) -> None:
     async with running(Limits(client_timeout_s=3.0), SILENT) as served:
         connections = served.server.server_state.connections
+
+        def handed_over() -> Connection | None:
+            return next((it for it in connections if isinstance(it, Connection)), None)
+
         with raw_http.connect(served.url, room=4_096) as deaf:
-            found = await until(lambda: list(connections), "the connection")
-            assert found is not None
-            found[0].transport.write(bytes(10_000_000))  # as if it were an answer
+            await until(lambda: connections, "the connection")
+            [plain] = connections
+            plain.transport.write(bytes(10_000_000))  # as if it were an answer
             deaf.sendall(b"GET /ws/state HTTP/1.1\r\n" + raw_http.UPGRADE + b"\r\n")
-            found = await until(
-                lambda: [it for it in connections if isinstance(it, Connection)], "its handover"
-            )
-            assert found is not None
-            assert not found[0].can_take
+            connection = await until(handed_over, "its handover")
+            assert connection is not None
+            assert not connection.can_take
             await until(lambda: not connections, "its end")
 
 

@@ -206,6 +206,8 @@ def test_of_large_messages_that_wait_whoever_has_waited_longest_gives_way(stage:
     free, slowest, *others = (stage.join(socket) for socket in sockets)
     stage.hub.hold(free, bytes(LARGE_BYTES))
     stage.hub.is_free(free)
+    stage.hub.hold(Client(Socket()), bytes(LARGE_BYTES))  # who has left already
+    assert stage.hub.unsent.bytes == 0
     stage.hub.hold(slowest, bytes(LARGE_BYTES))
     shared = bytes(LARGE_BYTES)
     for client in others:

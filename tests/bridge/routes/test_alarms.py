@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.alarms.board import Change, page_of
+from lupin_bridge.alarms.board import Change, board_of
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.routes.status import MAX_ALARMS, _is_in
@@ -89,5 +89,5 @@ def test_a_period_has_what_was_active_at_any_time_of_it() -> None:
 async def test_of_many_alarms_so_many_are_told(domain: int) -> None:
     async with running() as it:
         many = [alarm(str(number)) for number in range(MAX_ALARMS + 1)]
-        it.bridge.alarms.put(page_of(many), Change(tuple(many)), "journal", 0)
+        it.bridge.alarms.put(board_of(many), Change(tuple(many)), "journal", 0)
         assert len((await it.http.get("/api/alarms")).json()["alarms"]) == MAX_ALARMS

@@ -59,6 +59,6 @@ def test_a_frame_has_so_many_alarms_the_active_ones_first_of_all() -> None:
     for active in (MAX_IN_FRAME - 1, MAX_IN_FRAME + 1):
         alarms = [alarm(str(number)) for number in range(active)]
         over = [alarm(f"over {number}", cleared_ns=NOW_NS) for number in range(2)]
-        found = alarms_in_frame(page_of([*over, *alarms]), NOW_NS)
+        found = alarms_in_frame(board_of([*over, *alarms]), NOW_NS)
         assert len(found) == MAX_IN_FRAME
         assert sum(one.is_active for one in found) == min(active, MAX_IN_FRAME)

@@ -22,7 +22,7 @@ from py_vapid import Vapid02
 
 from lupin_bridge.access.accounts import Device
 from lupin_bridge.access.people import People
-from lupin_bridge.alarms.board import NOTE_BURST, AlarmBoard, Change, board_of
+from lupin_bridge.alarms.board import NOTE_BURST, AlarmBoard, Change
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify import push as push_module
@@ -254,23 +254,17 @@ async def test_an_alarm_that_is_raised_while_the_log_is_read_at_the_start_is_new
 
     monkeypatch.setattr(Push, "_notify", notify)
     monkeypatch.setattr(push_module, "TOGETHER_S", 0.0)
-    board = AlarmBoard()
-    source = source_of(board)
+    source = source_of(AlarmBoard())
     source.ros_time_ns = None
     push = Push(PushTarget(CONTACT, frozenset(), ssl.create_default_context()), None, "")  # type: ignore[arg-type]
     push.start(source)
-    board.on_change = push.on_alarms
     source.ros_time_ns = NOW_NS + 1
-
-    def put(change: Change) -> None:
-        board.put(board_of(change.changed), change, "journal", 0)
-
     before, meanwhile = alarm("before", raised_ns=NOW_NS - 9 * S), alarm("meanwhile")
-    put(Change((before, meanwhile), is_past=True))
+    push.on_alarms(Change((before, meanwhile), is_past=True))
     await until(lambda: notified == ["meanwhile"], "what is new")
     # The log is read again, as another journal is begun.
-    put(Change((before, meanwhile, alarm("again")), is_past=True))
-    put(Change((alarm("later"),)))
+    push.on_alarms(Change((before, meanwhile, alarm("again")), is_past=True))
+    push.on_alarms(Change((alarm("later"),)))
     await until(lambda: notified == ["meanwhile", "later"], "the next one")
     await push.stop()
 

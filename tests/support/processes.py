@@ -195,7 +195,7 @@ def constants(**values: float) -> tuple[str, ...]:
 
 
 def patrols_of(pid: int) -> list[int]:
-    """The patrol that a demo has started, and not what makes its past (`lupin_patrol.past`)."""
+    """The patrol that a demo has started, and not what makes its past (`--fill-past`)."""
     return children_of(pid, b"lupin_patrol\0")
 
 

@@ -40,6 +40,7 @@ from lupin_twin.runtime.process import (
     exit_after,
     limit_blas_threads,
     return_large_blocks,
+    split_ros_args,
 )
 
 # Of a repeated message: so many at once of our own, and one a period from then on.
@@ -194,22 +195,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 def command() -> NoReturn:
     """`main` as a process of its own."""
     exit_after(main)
-
-
-def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Our own arguments, and ROS's: from `--ros-args` to `--` or the end, as ROS defines it."""
-    own: list[str] = []
-    ros: list[str] = []
-    in_ros = False
-    for argument in argv:
-        if argument == "--ros-args":
-            in_ros = True
-        elif in_ros and argument == "--":
-            ros.append(argument)
-            in_ros = False
-            continue
-        (ros if in_ros else own).append(argument)
-    return own, ros
 
 
 ROLES = {

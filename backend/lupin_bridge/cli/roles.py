@@ -170,7 +170,7 @@ def fill_past(path: Path, patrol_args: Sequence[str]) -> bool:
         if path.exists() and not _is_empty(path):
             return False
         subprocess.run(  # noqa: S603  # the operator's own words, no shell
-            [sys.executable, "-P", "-m", "lupin_patrol.past", str(path), *patrol_args],
+            [sys.executable, "-P", "-m", "lupin_patrol", "--fill-past", str(path), *patrol_args],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,

@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -40,10 +41,6 @@ from lupin_bridge.settings import SettingError, Settings, option, variable
 from lupin_twin.journal.retention import DAY_NS, RECORD
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign
 
-_COLUMNS: Final = {
-    "meta": 3, "run": 8, "series": 6, "scan": 12, "look": 17, "place": 14, "hour": 7, "tally": 10,
-    "event": 7, "note": 8,
-}  # fmt: skip
 # Where the tables that are in parts by month have the stamp.
 _STAMP: Final = {"scan": 3, "look": 4}
 # What is said anew of a row that is there; of other tables a row stays as it came first.
@@ -54,18 +51,18 @@ _SAID_ANEW: Final = {
 }
 
 
-def _insert(table: str) -> str:
-    marks = ", ".join(["%s"] * _COLUMNS[table])
+@cache
+def _insert(table: str, columns: int) -> str:
+    marks = ", ".join(["%s"] * columns)
     if table == "meta":
         return f"INSERT INTO meta VALUES ({marks}) {META_AGAIN}"
     if table not in _SAID_ANEW:
         return f"INSERT INTO {table} VALUES ({marks}) ON CONFLICT DO NOTHING"
-    key, columns = _SAID_ANEW[table]
-    news = ", ".join(f"{column} = excluded.{column}" for column in columns.split())
+    key, again = _SAID_ANEW[table]
+    news = ", ".join(f"{column} = excluded.{column}" for column in again.split())
     return f"INSERT INTO {table} VALUES ({marks}) ON CONFLICT ({key}) DO UPDATE SET {news}"
 
 
-_INSERT: Final = {table: _insert(table) for table in _COLUMNS}
 _EPOCH: Final = (
     "SELECT journal_id, epoch, seq_offset, run_offset, forwarded_seq FROM epoch WHERE site = %s"
     " ORDER BY epoch DESC LIMIT 1"
@@ -212,7 +209,7 @@ class Sink:
             for table, of_table in rows.items():
                 if of_table:
                     values = ([_text(value) for value in row] for row in of_table)
-                    cursor.executemany(_INSERT[table], values)
+                    cursor.executemany(_insert(table, len(of_table[0])), values)
 
 
 def _text(value: Any) -> Any:

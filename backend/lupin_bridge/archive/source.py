@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from lupin_bridge.archive.database import ArchiveError
 from lupin_twin.core.past import HOUR_NS, Event
-from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
+from lupin_twin.journal.appending import PURGED_SEQ, Appender
 from lupin_twin.journal.beside import forwarded_seq, note_forwarded
 from lupin_twin.journal.retention import RECORD
 from lupin_twin.journal.schema import (
@@ -190,13 +190,7 @@ class Source:
 
     def last_seq(self) -> int:
         """The last number that it has given."""
-        execute = self._connection.execute
-        last = max(
-            int(execute(f"SELECT coalesce(max(seq), 0) FROM {table}").fetchone()[0])
-            for table in _APPENDED
-        )
-        noted = (get_meta(self._connection, key) for key in (PURGED_SEQ, LAST_SEQ))
-        return max(last, *(int(seq or 0) for seq in noted))
+        return Appender(self._connection).last_seq
 
     def arrival_of(self, seq: int) -> int | None:
         """When the row of a number was received; None: it is not there."""

@@ -339,17 +339,18 @@ class StateMessages:
         """The snapshot as lupin_msgs/TwinState; only tags that changed are built anew."""
         tags = []
         for tag in snapshot.tags:
-            _, msg, _ = self._parts(tag)
+            _, msg, _ = self.parts(tag)
             msg.stale_seconds = tag.stale_seconds(snapshot.now_ns)
             tags.append(msg)
         return TwinState(header=_header(snapshot), tags=tags)
 
     def times(self, snapshot: Snapshot) -> Any:
         """The snapshot's times as lupin_msgs/TwinTimes, with the same stamp."""
-        times = [self._parts(tag)[2] for tag in snapshot.tags]
+        times = [self.parts(tag)[2] for tag in snapshot.tags]
         return TwinTimes(header=_header(snapshot), tags=times)
 
-    def _parts(self, tag: TagState) -> tuple[TagState, Any, Any]:
+    def parts(self, tag: TagState) -> tuple[TagState, Any, Any]:
+        """The tag, its TwinTagState but for the age, and its TagTimes."""
         cached = self._cache.get(tag.tag_id)
         if cached is None or cached[0] is not tag:
             cached = self._cache[tag.tag_id] = tag, tag_message(tag), times_message(tag)

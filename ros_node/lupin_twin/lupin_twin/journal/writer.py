@@ -11,7 +11,6 @@ import shutil
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
@@ -60,7 +59,8 @@ class Pending:
         self._weight = 0
         self._lost = 0
         self._lost_ns: tuple[int, int] | None = None
-        self._taken: list[Entry] = []
+        # So many of the oldest are being written.
+        self._held = 0
 
     def put(self, entry: Entry) -> None:
         """Hand over; takes microseconds, whatever the disk does."""
@@ -71,28 +71,27 @@ class Pending:
         if not self.arrived.is_set():
             self.arrived.set()
 
-    def take(self, count: int) -> list[Entry]:
-        """At most so many of the oldest; they wait still, until something is put back."""
+    def hold(self, count: int) -> list[Entry]:
+        """At most so many of the oldest; they wait still, and are not lost, until they are done."""
         self.arrived.clear()
         with self._lock:
-            taken = [self._entries.popleft() for _ in range(min(count, len(self._entries)))]
-            self._weight -= sum(weight(entry.row) for entry in taken)
-            self._taken = taken
-            if self._entries:
+            held = list(islice(self._entries, count))
+            self._held = len(held)
+            if len(self._entries) > count:
                 self.arrived.set()
-        return taken
+        return held
 
-    def put_back(self, entries: Sequence[Entry]) -> None:
-        """What was taken and could not be written is the oldest again; the rest is done with."""
+    def done(self, count: int) -> None:
+        """So many of those are written."""
         with self._lock:
-            self._taken = []
-            self._entries.extendleft(reversed(entries))
-            self._weight += sum(weight(entry.row) for entry in entries)
-            self._shed()
+            self._held = 0
+            for _ in range(count):
+                self._weight -= weight(self._entries.popleft().row)
 
     def _shed(self) -> None:
-        while self._weight > MAX_WEIGHT and len(self._entries) > 1:
-            lost = self._entries.popleft()
+        while self._weight > MAX_WEIGHT and len(self._entries) > self._held + 1:
+            lost = self._entries[self._held]
+            del self._entries[self._held]
             self._weight -= weight(lost.row)
             self._lost += 1
             first_ns, last_ns = self._lost_ns or (lost.at_ns, lost.at_ns)
@@ -102,13 +101,13 @@ class Pending:
         """(waiting, lost, when the oldest that waits was handed over)."""
         with self._lock:
             oldest = self._entries[0].handed_over_s if self._entries else None
-            return len(self._entries) + len(self._taken), self._lost, oldest
+            return len(self._entries), self._lost, oldest
 
     @property
     def complete_ns(self) -> int | None:
         """When the first was received that waits or was lost, ROS time; None: there is none."""
         with self._lock:
-            found = [entry.at_ns for entry in (*self._taken[:1], *islice(self._entries, 1))]
+            found = [entry.at_ns for entry in islice(self._entries, 1)]
             found += (self._lost_ns or ())[:1]
             return min(found, default=None)
 
@@ -365,19 +364,15 @@ class Journal:
         if not self._runs:
             self._pending.arrived.clear()
         while self._runs:
-            entries = self._pending.take(_MAX_BATCH)
+            entries = self._pending.hold(_MAX_BATCH)
             if not entries:
                 return
             # An era that has no run yet comes after all that have one.
             known = [entry for entry in entries if entry.era <= len(self._runs)]
-            later = entries[len(known) :]
-            try:
-                written, refused = file.append(
-                    [(self._runs[max(0, entry.era - 1)], entry.row) for entry in known]
-                )
-            except BaseException:
-                self._pending.put_back(entries)
-                raise
+            written, refused = file.append(
+                [(self._runs[max(0, entry.era - 1)], entry.row) for entry in known]
+            )
+            self._pending.done(len(known))
             self._failures = 0
             self._reported = replace(
                 self._reported,
@@ -388,8 +383,7 @@ class Journal:
             lost_ns = self._pending.take_lost()
             if lost_ns is not None:
                 file.note_lost(self._runs[-1], lost_ns)
-            self._pending.put_back(later)
-            if later or not all_that_waits:
+            if len(known) < len(entries) or not all_that_waits:
                 return
 
     # --- reporting ----------------------------------------------------------------------------

@@ -41,12 +41,11 @@ from lupin_twin.journal.checking import (
     sensors_of,
     size_of,
 )
-from lupin_twin.journal.rebuild import NotPossible, handle_interrupts, vacuum
+from lupin_twin.journal.rebuild import handle_interrupts, vacuum
 from lupin_twin.journal.received import rows
 from lupin_twin.journal.retention import (
     RETENTION_BYTES,
     RETENTION_NS,
-    UnknownTagError,
     forget,
     pages_of,
     records,
@@ -55,6 +54,7 @@ from lupin_twin.journal.schema import (
     FILE_ERRORS,
     Empty,
     Foreign,
+    NotPossible,
     get_meta,
     is_damage_error,
     open_named,
@@ -90,7 +90,6 @@ SHOWN: Final = (
     InUse,
     Empty,
     Foreign,
-    UnknownTagError,
     NotPossible,
     SettingError,
 )
@@ -386,13 +385,15 @@ def _backup(path: Path, target: Path) -> int:
 
 
 def _forget(path: Path, options: argparse.Namespace) -> int:
-    gone = forget(path, options.tag, pose_only=options.pose, by=user(), at_ns=time.time_ns())
+    scans, inspections, places = forget(
+        path, options.tag, pose_only=options.pose, by=user(), at_ns=time.time_ns()
+    )
     if options.pose:
         _say(f"{path}: the pose of tag {options.tag!r} is forgotten; the next twin pins it anew")
     else:
         _say(
-            f"{path}: tag {options.tag!r} is forgotten: {gone.scans:,} scans,"
-            f" {gone.inspections:,} inspections, {gone.places:,} places;"
+            f"{path}: tag {options.tag!r} is forgotten: {scans:,} scans,"
+            f" {inspections:,} inspections, {places:,} places;"
             " counts of the timeline still have them"
         )
     return 0

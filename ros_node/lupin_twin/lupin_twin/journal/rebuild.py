@@ -29,6 +29,7 @@ from lupin_twin.journal.schema import (
     APPLICATION_ID,
     LOCAL_SITE,
     DamagedFile,
+    NotPossible,
     json_text,
     open_named,
     open_writer,
@@ -228,10 +229,6 @@ def _finite(bucket: Bucket) -> tuple[float | None, ...]:
 
 
 _INSTRUCTIONS: Final = 100_000
-
-
-class NotPossible(Exception):
-    """It cannot be made smaller now; the message says why. What is in the file is as it was."""
 
 
 def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:

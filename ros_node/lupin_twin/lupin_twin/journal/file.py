@@ -34,7 +34,6 @@ from lupin_twin.journal.rows import last_rows
 from lupin_twin.journal.runs import (
     CORRECTION_NS,
     FOREVER_NS,
-    Carries,
     Clock,
     Run,
     put_run,
@@ -200,18 +199,18 @@ class JournalFile:
         every = self._runs()
         run = next((r for r in reversed(every) if r.begun.is_simulated == now.is_simulated), None)
         if run is None:
-            return self._restored(self.begin(now, None, Carries.NOTHING))
+            return self._restored(self.begin(now, None))
         root = next(r for r in every if r.id == run.root)
         last = self._last(root)
         if now.is_simulated and not simulation_goes_on(root.begun, last, now):
-            run = self.begin(now, run, Carries.NOTHING)
+            run = self.begin(now, None)
         elif not now.is_simulated and now.arrival_ns < last.arrival_ns - CORRECTION_NS:
             if not is_believed:
                 restored = self._restored(run)
-                return replace(restored, last_ns=last.arrival_ns, is_doubted=True)
-            run = self.begin(now, run, Carries.PLACES)
+                return replace(restored, doubted_ns=last.arrival_ns)
+            run = self.begin(now, run, places_only=True)
         elif not now.is_simulated and now.stamp_ns < last.stamp_ns:
-            run = self.begin(now, run, Carries.ALL, joins=root.id)
+            run = self.begin(now, run, joins=root.id)
         else:
             with self._transaction():
                 self._go_on_with(root.id)
@@ -227,11 +226,12 @@ class JournalFile:
         self,
         now: Clock,
         before: Run | None,
-        carries: Carries,
+        *,
         joins: int | None = None,
         ended_ns: int | None = None,
+        places_only: bool = False,
     ) -> Run:
-        """A new run, or a step into `joins`; what was known in `before` is copied into it.
+        """A new run, or a step into `joins`; what was known in `before`, if any, is copied into it.
 
         `ended_ns` is how far the clock had come in `before`, where the twin saw it go back.
         """
@@ -241,7 +241,7 @@ class JournalFile:
             run = Run(number, now, self._appender.last_seq + 1, joins)
             put_run(self._connection, run)
             if before is not None:
-                rows = copies(self._connection, before, carries)
+                rows = copies(self._connection, before, places_only=places_only)
                 copy_known(self._appender, before, run, rows)
                 if ended_ns is not None and before.root != run.root:
                     execute(
@@ -260,7 +260,7 @@ class JournalFile:
         for older in reversed([r for r in roots if r.id < before.root]):
             ended_ns = self._last(older).stamp_ns
             if begun.stamp_ns < ended_ns <= now.stamp_ns:
-                return self.begin(now, before, Carries.ALL, joins=older.id)
+                return self.begin(now, before, joins=older.id)
         return before
 
     def retain_run(self, run: Run) -> None:

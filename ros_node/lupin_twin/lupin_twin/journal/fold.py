@@ -38,7 +38,7 @@ from lupin_twin.journal.rows import (
     named_numbers,
     newest_of_tag,
 )
-from lupin_twin.journal.runs import FOREVER_NS, Carries, Run, runs, since_seq, span_at
+from lupin_twin.journal.runs import FOREVER_NS, Run, runs, since_seq, span_at
 from lupin_twin.journal.schema import LOCAL_SITE
 
 # What a state takes, about, seconds of one core for each tag.
@@ -76,17 +76,16 @@ _PLACES: Final = (
 class Restored:
     """What a twin that starts in a run knows: the state, and the last writes, for the histories.
 
-    `last_seq` is how many writes the log has seen. `last_ns` is the latest moment of the wall's
-    clock that the log knows; where the clock now contradicts that, `is_doubted`, and there is
-    nothing yet to write to.
+    `last_seq` is how many writes the log has seen. `doubted_ns` is the latest moment of the wall's
+    clock that the log knows, where the clock now contradicts that: there is nothing yet to write
+    to.
     """
 
     run: Run
     known: Known
     rows: tuple[Scan | Inspection, ...]
     last_seq: int
-    last_ns: int = 0
-    is_doubted: bool = False
+    doubted_ns: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,23 +224,24 @@ def _latest(scans: Sequence[tuple[int, int, tuple[Reading, ...]]]) -> tuple[Read
     return tuple(reading for *_, reading in latest.values())[:MAX_SENSORS_PER_TAG]
 
 
-def copies(connection: sqlite3.Connection, run: Run, carries: Carries) -> list[Write]:
+def copies(connection: sqlite3.Connection, run: Run, *, places_only: bool) -> list[Write]:
     """What is known in a run, as rows of another one, or of a step, that begins now.
 
     The rows that the fold rests on, in the order of their tags, of a tag in the order in which
-    they count, with the stamps that they have there.
+    they count, with the stamps that they have there. `places_only`: tags do not move, but how old
+    their readings are is not known.
     """
     known = fold(connection, run.root, FOREVER_NS, run.begun_seq)
     found: dict[str, list[tuple[int, int, Scan | Inspection]]] = {
         tag.tag_id: [] for tag in known.tags
     }
-    if carries is Carries.ALL:
+    if not places_only:
         for seq, row in listed_rows(connection, run.root, known.scans, known.inspections):
             found[row.tag_id].append((row.stamp_ns, seq, row))
     rows: list[Write] = []
     for tag in known.tags:
         placed_ns = known.placed_ns.get(tag.tag_id)
-        if carries is not Carries.NOTHING and tag.pose is not None and placed_ns is not None:
+        if tag.pose is not None and placed_ns is not None:
             rows.append(Pin(tag.tag_id, tag.pose, placed_ns, run.begun.arrival_ns))
         mine = sorted(found[tag.tag_id], key=lambda entry: entry[:2])
         if mine and tag.tag_id not in known.observed:

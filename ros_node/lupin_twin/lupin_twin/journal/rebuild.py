@@ -23,7 +23,7 @@ from lupin_twin.journal.checking import Progress, find_all_damage
 from lupin_twin.journal.fold import copies
 from lupin_twin.journal.hours import DELETED
 from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS
-from lupin_twin.journal.runs import Carries, Run, put_run
+from lupin_twin.journal.runs import Run, put_run
 from lupin_twin.journal.salvage import numbered
 from lupin_twin.journal.schema import (
     APPLICATION_ID,
@@ -180,8 +180,9 @@ class _Upgrade:
         if (purged_ns := self._old.purged_ns(run.id)) >= 0:
             self._carry_counts(run.id, purged_ns)
         before = None if old.follows is None else self._begun.get(old.follows)
-        if before is not None and old.carries is not Carries.NOTHING:
-            copy_known(self._appender, before, run, copies(self._target, before, old.carries))
+        if before is not None:
+            rows = copies(self._target, before, places_only=old.places_only)
+            copy_known(self._appender, before, run, rows)
 
     def _carry_counts(self, run: int, purged_ns: int) -> None:
         """What was counted in hours some of whose rows are deleted; the others are not counted."""

@@ -30,7 +30,7 @@ from lupin_twin.journal.rebuild import is_version3, upgrade
 from lupin_twin.journal.received import NoteQueue
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import weight
-from lupin_twin.journal.runs import Carries, Clock, Run, Turn
+from lupin_twin.journal.runs import Clock, Run, Turn
 from lupin_twin.journal.schema import DamagedFile, Foreign, is_damage_error
 
 # Readings, flowers and rows together: some 60 MB, twenty minutes of the largest greenhouse.
@@ -190,8 +190,8 @@ class Journal:
     ) -> None:
         """Follow a clock from now on, and say why.
 
-        Nothing is written before the first. With that, the journal restores; if what it restores
-        `is_doubted`, it waits for another start, of a clock that agrees or is believed.
+        Nothing is written before the first. With that, the journal restores; if the clock is
+        doubted, it waits for another start, of one that agrees or is believed.
         """
         self._was_attempted.clear()
         self._eras.append(_Era(clock, turn, before_ns))
@@ -345,8 +345,8 @@ class Journal:
             believed = era.turn is Turn.BELIEVED
             restored = file.start(era.clock, is_believed=believed)
             self._quarantined = file.quarantined or self._quarantined
-            self._doubted_ns = restored.last_ns if restored.is_doubted else None
-            if restored.is_doubted:
+            self._doubted_ns = restored.doubted_ns
+            if restored.doubted_ns is not None:
                 del self._eras[0]
             else:
                 self._runs.append(restored.run)
@@ -358,7 +358,7 @@ class Journal:
         if era.turn is Turn.AHEAD:
             return file.rejoin(era.clock, before)
         joins = before.root if era.turn is Turn.STEP else None
-        return file.begin(era.clock, before, Carries.ALL, joins, era.before_ns)
+        return file.begin(era.clock, before, joins=joins, ended_ns=era.before_ns)
 
     def _write(self, file: JournalFile, *, all_that_waits: bool) -> None:
         if not self._runs:

@@ -126,8 +126,7 @@ def run_archive(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
         say(str(error))
         return USAGE_ERROR
     except ArchiveError as error:
-        say(str(error))
-        return FAILED
+        return journal.fail(str(error))
 
 
 def _given(options: argparse.Namespace, environ: Mapping[str, str], name: str) -> str:
@@ -273,8 +272,7 @@ def run_people(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     except BrokenPipeError:
         return 0
     except (AccountError, SettingError, CannotWrite) as error:
-        say(str(error))
-        return FAILED
+        return journal.fail(str(error))
 
 
 def _add(path: Path, options: argparse.Namespace) -> int:

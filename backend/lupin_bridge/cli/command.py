@@ -22,6 +22,7 @@ from typing import Final, NoReturn
 
 from lupin_bridge import __version__
 from lupin_bridge.cli import administration, import_csv, journal
+from lupin_bridge.console import add_role
 from lupin_bridge.serving.admission import RateLimit
 from lupin_bridge.settings import (
     CONFIG_VARIABLE,
@@ -320,9 +321,7 @@ def parser() -> argparse.ArgumentParser:
     journal.add_parser(roles)
     administration.add_archive(roles)
     import_csv.add_parser(roles)
-    adapt.add_options(
-        roles.add_parser("adapt", help=adapt.HELP, description=adapt.HELP, allow_abbrev=False)
-    )
+    adapt.add_options(add_role(roles, "adapt", adapt.HELP))
     administration.add_people(roles)
     return made
 

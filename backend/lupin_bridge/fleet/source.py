@@ -18,7 +18,7 @@ from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.relay import Relay, TwinNames
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
-from lupin_bridge.fleet.overview import Archive, Site, same_tags
+from lupin_bridge.fleet.overview import Archive, Site
 from lupin_bridge.fleet.reader import Latest, Reported
 from lupin_bridge.fleet.watcher import News
 from lupin_bridge.settings import Settings
@@ -26,6 +26,7 @@ from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.notes import Note, NotesUnwritable
 from lupin_twin.core.parameters import TwinParameters, World
 from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.state import same_tags
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.runtime.estimates import Report, ReportRequest
@@ -254,7 +255,7 @@ class SiteTwin(TwinSource):
         before = None if self.update is None else self.update.snapshot
         self.update = TwinUpdate(
             replace(
-                reported.snapshot, stamp_ns=stamp_ns, tags=same_tags(before, reported.snapshot)
+                reported.snapshot, stamp_ns=stamp_ns, tags=same_tags(before, reported.snapshot.tags)
             ),
             # Of what was read: the same in all replicas.
             f"{self.site}-{self._seq}-{self._map_hash}",

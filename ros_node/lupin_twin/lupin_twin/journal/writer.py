@@ -176,7 +176,6 @@ class Journal:
         self._met_damage = self._quarantined = self._left_out = ""
         # What was received last, as the log has it, where the clock contradicts that.
         self._doubted_ns: int | None = None
-        self._unmet_limit = ""
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
 
@@ -312,7 +311,6 @@ class Journal:
                 if self._map is not None:
                     file.put_map(self._map, partial(text_of, self._map))
                 has_more = not is_last and file.check_size(may_purge=bool(self._runs))
-                self._unmet_limit = file.unmet_limit
                 self._report_well(file)
                 if not is_last and not self._pending.arrived.wait(0.0 if has_more else _IDLE_S):
                     continue
@@ -388,13 +386,13 @@ class Journal:
 
     # --- reporting ----------------------------------------------------------------------------
 
-    def _summary(self) -> str:
+    def _summary(self, unmet_limit: str) -> str:
         if self._is_temporary:
             return "what is observed is kept in a temporary file, which goes at the end"
         if self._quarantined:
             return f"recording; a damaged journal was quarantined as {self._quarantined}"
-        if self._unmet_limit:
-            return f"recording; {self._unmet_limit}"
+        if unmet_limit:
+            return f"recording; {unmet_limit}"
         return f"recording; {self._left_out}" if self._left_out else "recording"
 
     def _report_progress(self, share: float) -> None:
@@ -403,7 +401,7 @@ class Journal:
 
     def _report_well(self, file: JournalFile) -> None:
         state = JournalState.OFF if self._is_temporary else JournalState.RECORDING
-        detail = self._summary()
+        detail = self._summary(file.unmet_limit)
         if self._doubted_ns is not None:
             state = JournalState.DOUBTING
             until = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self._doubted_ns // 10**9))

@@ -51,6 +51,7 @@ from lupin_twin.core.state import (
     Scan,
     Snapshot,
     TagState,
+    same_tags,
 )
 from lupin_twin.field.explored import OccupancyMap
 
@@ -244,19 +245,14 @@ def snapshot_of(msg: Any, before: Snapshot | None = None, times: Any = None) -> 
 
     `times` is the lupin_msgs/TwinTimes of the same stamp: without it nothing is known of when what
     was observed, but for the tag's last observation. A tag that is as it was in `before` is the
-    very same value, as it is in the store's snapshots: change detection compares
-    identities.
+    very same value.
     """
-    known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
     of_tag = {} if times is None else {each.tag_id: each for each in times.tags}
-    tags = []
-    for tag in (tag_state(each, of_tag.get(each.tag_id)) for each in msg.tags):
-        same = known.get(tag.tag_id)
-        tags.append(same if same is not None and same == tag else tag)
+    tags = (tag_state(each, of_tag.get(each.tag_id)) for each in msg.tags)
     return Snapshot(
         nanoseconds(msg.header.stamp),
         msg.header.frame_id,
-        tuple(tags),
+        same_tags(before, tags),
         has_times=times is not None,
     )
 

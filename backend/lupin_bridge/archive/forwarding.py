@@ -32,7 +32,7 @@ from lupin_bridge.archive.database import (
     check_url,
     check_version,
     connect,
-    explained,
+    explaining,
     place_of,
 )
 from lupin_bridge.archive.source import Batch, Epoch, Row, Source
@@ -260,17 +260,13 @@ class Forwarder:
 
     def _try(self, *, once: bool) -> bool:
         """Forward until something is wrong, which is said, or the journal is another one."""
-        import psycopg  # noqa: PLC0415  # see `database`
-
         try:
             path = self._path()
             try:
-                with closing(Source(path)) as source:
+                with closing(Source(path)) as source, explaining():
                     self._forward(source, once=once)
             except (Foreign, OSError, *FILE_ERRORS) as error:
                 raise ArchiveError(f"the journal {path} cannot be forwarded: {error}") from error
-            except psycopg.Error as error:
-                raise explained(error) from error
         except UsageError:
             raise
         except ArchiveError as error:

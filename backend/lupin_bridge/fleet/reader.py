@@ -19,7 +19,7 @@ from lupin_bridge.archive.database import (
     ArchiveError,
     archive_url,
     connect,
-    explained,
+    explaining,
     open_archive,
 )
 from lupin_bridge.feed import query
@@ -168,21 +168,17 @@ class ArchiveRecall(Recall):
     def _answer(
         self, question: Callable[[Any, ShouldStop], AnswerT], is_abandoned: ShouldStop
     ) -> AnswerT:
-        import psycopg  # noqa: PLC0415  # the extra `fleet`
-
         try:
             connection = self._connection()
             try:
-                with connection.transaction():
+                with explaining(), connection.transaction():
                     answer = question(connection, is_abandoned)
-            except BaseException as error:
-                if isinstance(error, psycopg.Error):
-                    connection.close()
-                else:
-                    self._idle.append(connection)
+            except ArchiveError:
+                connection.close()
                 raise
-        except psycopg.Error as error:
-            raise NotRemembered(str(explained(error)), is_lasting=False) from error
+            except BaseException:
+                self._idle.append(connection)
+                raise
         except ArchiveError as error:
             raise NotRemembered(str(error), is_lasting=False) from error
         except DamagedFile as error:
@@ -192,25 +188,18 @@ class ArchiveRecall(Recall):
         return answer
 
     def _connection(self) -> Any:
-        while True:
-            with suppress(IndexError):
+        with suppress(IndexError):  # there is none
+            while True:
                 connection: Any = self._idle.pop()
                 # One whose server has gone says so only when it is used.
-                if connection.closed or not _is_alive(connection):
-                    continue
-                return connection
-            return open_archive(archive_url())
-
-
-def _is_alive(connection: Any) -> bool:
-    import psycopg  # noqa: PLC0415  # the extra `fleet`
-
-    try:
-        connection.execute("SELECT 1")
-    except psycopg.Error:
-        connection.close()
-        return False
-    return True
+                try:
+                    with explaining():
+                        connection.execute("SELECT 1")
+                except ArchiveError:
+                    connection.close()
+                else:
+                    return connection
+        return open_archive(archive_url())
 
 
 def main() -> None:

@@ -20,7 +20,7 @@ from lupin_bridge.archive.database import (
     CHANNEL,
     ArchiveError,
     archive_url,
-    explained,
+    explaining,
     open_archive,
 )
 from lupin_bridge.feed import query
@@ -341,19 +341,17 @@ class WatchChild(Child):
         return lambda *_: self._look(question)
 
     def _look(self, settings: Settings) -> News:
-        import psycopg  # noqa: PLC0415  # the extra `fleet`
-
         try:
-            if self._watcher is None:
-                connection = open_archive(archive_url())
-                self._watcher = Watcher(connection, Criteria.of(settings))
-            return self._watcher.news()
-        except (ArchiveError, psycopg.Error) as error:
+            with explaining():
+                if self._watcher is None:
+                    connection = open_archive(archive_url())
+                    self._watcher = Watcher(connection, Criteria.of(settings))
+                return self._watcher.news()
+        except ArchiveError as error:
             if self._watcher is not None:
                 self._watcher.connection.close()
                 self._watcher = None
-            why = error if isinstance(error, ArchiveError) else explained(error)
-            raise NotRemembered(str(why), is_lasting=False) from error
+            raise NotRemembered(str(error), is_lasting=False) from error
 
 
 class _WithoutJournal(Recall):

@@ -35,11 +35,11 @@ from lupin_bridge.archive.database import (
     explaining,
     place_of,
 )
-from lupin_bridge.archive.source import Batch, Epoch, Row, Source
+from lupin_bridge.archive.source import Batch, Epoch, Row, Source, arrival_of
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.settings import SettingError, Settings, option, variable
 from lupin_twin.journal.retention import DAY_NS, RECORD
-from lupin_twin.journal.schema import FILE_ERRORS, Foreign
+from lupin_twin.journal.schema import FILE_ERRORS, Foreign, SiteLog
 
 # Where the tables that are in parts by month have the stamp.
 _STAMP: Final = {"scan": 3, "look": 4}
@@ -66,10 +66,6 @@ def _insert(table: str, columns: int) -> str:
 _EPOCH: Final = (
     "SELECT journal_id, epoch, seq_offset, run_offset, forwarded_seq FROM epoch WHERE site = %s"
     " ORDER BY epoch DESC LIMIT 1"
-)
-_ARRIVAL: Final = " UNION ALL ".join(
-    f"SELECT arrival_ns FROM {table} WHERE site = %(site)s AND seq = %(seq)s"
-    for table in ("scan", "look", "place")
 )
 _HERE: Final = (
     "INSERT INTO forwarder VALUES (%s, %s, %s, now(), now()) ON CONFLICT (site) DO UPDATE SET"
@@ -149,12 +145,11 @@ class Sink:
     def _goes_on(self, source: Source, last: Epoch) -> bool:
         if source.last_seq() < last.forwarded_seq:
             return False
-        here = self._connection.execute(
-            _ARRIVAL, {"site": self._site, "seq": last.seq_offset + last.forwarded_seq}
-        ).fetchone()
+        log = SiteLog(self._connection, self._site)
+        here = arrival_of(log, last.seq_offset + last.forwarded_seq)
         there = source.arrival_of(last.forwarded_seq)
         # One that is no longer here or there was deleted.
-        return here is None or there is None or here == (there,)
+        return here is None or there is None or here == there
 
     def _new_epoch(self, source: Source, epoch: Epoch) -> Epoch:
         # Before the epoch: if this is cut short it is done again, to the same numbers.

@@ -26,6 +26,7 @@ from lupin_twin.journal.schema import (
     LOCAL_SITE,
     MAP,
     ORIGIN,
+    SiteLog,
     get_meta,
     one_view,
     open_named,
@@ -76,6 +77,9 @@ _ROWS: Final = {
         " AND tally.hour = touched.hour"
     ),
 }
+_ARRIVAL: Final = " UNION ALL ".join(
+    f"SELECT arrival_ns FROM {table} WHERE site = :site AND seq = :seq" for table in _APPENDED
+)
 # Few: they are looked through each time, and what has changed is sent.
 _SMALL: Final = {
     "run": (
@@ -149,6 +153,12 @@ class Batch:
         return any(self.rows.values()) or bool(self.events)
 
 
+def arrival_of(log: SiteLog, seq: int) -> int | None:
+    """When the row of a number was received, in a journal or in the archive; None: it is gone."""
+    found = log.execute(_ARRIVAL, {"seq": seq}).fetchone()
+    return None if found is None else int(found[0])
+
+
 class Source:
     """An open journal, in one thread. `path` has to be one.
 
@@ -194,14 +204,7 @@ class Source:
 
     def arrival_of(self, seq: int) -> int | None:
         """When the row of a number was received; None: it is not there."""
-        for table in _APPENDED:
-            found = self._connection.execute(
-                f"SELECT arrival_ns FROM {table} WHERE site = ? AND seq = ?",
-                (LOCAL_SITE, seq),
-            ).fetchone()
-            if found is not None:
-                return int(found[0])
-        return None
+        return arrival_of(SiteLog(self._connection), seq)
 
     def batch(self, epoch: Epoch) -> Batch:
         """What comes next, as of one moment, and on the disk.

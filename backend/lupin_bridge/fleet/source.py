@@ -87,7 +87,8 @@ class Watching:
     async def _look(self) -> News:
         """What is new; that it takes long is said meanwhile."""
         about = Now(0, "", UNKNOWN_JOURNAL)
-        look = asyncio.ensure_future(self.process.ask(self._settings, about, 0.0))  # type: ignore[arg-type]  # see `WatchChild`
+        settings: Any = self._settings  # see `WatchChild`
+        look: asyncio.Task[News] = asyncio.create_task(self.process.ask(settings, about, 0.0))
         try:
             patience_s = STUCK_S if self.looks else _START_S
             done, _ = await asyncio.wait((look,), timeout=patience_s)

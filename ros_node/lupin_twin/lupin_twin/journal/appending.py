@@ -85,7 +85,7 @@ class Appender:
             f"SELECT coalesce(max(seq), 0) FROM {table} WHERE site = '{LOCAL_SITE}'"  # noqa: S608
             for table in ("scan", "look", "place")
         )
-        self.last_seq = max(
+        self.last_seq: int = max(
             int(get_meta(connection, PURGED_SEQ) or 0),
             int(get_meta(connection, LAST_SEQ) or 0),
             last_number(SiteLog(connection)),

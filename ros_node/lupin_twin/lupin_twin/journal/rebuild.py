@@ -18,7 +18,7 @@ from typing import Final
 
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import Appender, copy_known
-from lupin_twin.journal.beside import Lock
+from lupin_twin.journal.beside import writing_alone
 from lupin_twin.journal.checking import Progress, find_all_damage
 from lupin_twin.journal.fold import copies
 from lupin_twin.journal.hours import DELETED
@@ -31,7 +31,6 @@ from lupin_twin.journal.schema import (
     DamagedFile,
     NotPossible,
     json_text,
-    open_named,
     open_writer,
     set_meta,
     sync,
@@ -244,10 +243,7 @@ def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
 
     """
-    # Not a thing is made beside a file that is no journal.
-    with closing(open_named(path)):
-        pass
-    with Lock(path, holder), closing(open_writer(path)) as connection:
+    with writing_alone(path, holder) as connection:
         handle_interrupts(connection)
         before = path.stat().st_size
         with closing(find_all_damage(connection, report)) as found:

@@ -9,14 +9,13 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Iterator, Mapping
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ, Appender
-from lupin_twin.journal.beside import InUse, Lock
+from lupin_twin.journal.beside import writing_alone
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, deleted_ns, extent
 from lupin_twin.journal.runs import FOREVER_NS, runs, spans
 from lupin_twin.journal.schema import (
@@ -25,8 +24,6 @@ from lupin_twin.journal.schema import (
     NotPossible,
     SiteLog,
     get_meta,
-    open_named,
-    open_writer,
     set_meta,
     transaction,
 )
@@ -230,14 +227,7 @@ def forget(path: Path, tag_id: str, *, pose_only: bool, by: str, at_ns: int) -> 
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
 
     """
-    # Not a thing is made beside a file that is no journal.
-    with closing(open_named(path)):
-        pass
-    try:
-        lock = Lock(path, "lupin-twin journal forget")
-    except InUse as error:
-        raise InUse(f"{error}: stop the twin first") from error
-    with lock, closing(open_writer(path)) as connection, transaction(connection):
+    with writing_alone(path, "lupin-twin journal forget") as connection, transaction(connection):
         _check_known(connection, path, tag_id)
         # The numbers go on, also when the newest rows are gone.
         last_seq = Appender(connection).last_seq

@@ -43,13 +43,11 @@ from lupin_twin.journal.runs import (
 from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
-    FILE_ERRORS,
     LOCAL_SITE,
     MAP,
     ORIGIN,
     SiteLog,
     get_meta,
-    is_damage_error,
     open_writer,
     set_meta,
     transaction,
@@ -105,7 +103,9 @@ class JournalFile:
         self._map_rests_until_s = 0.0
         self.quarantined = ""
         if is_sound is False or (is_sound is None and self._is_damaged()):
-            self._quarantine()
+            # Wall time, as whoever looks for the file reads it.
+            when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
+            self.quarantined = str(quarantine(path, when))
         self._open()
 
     def close(self) -> None:
@@ -121,20 +121,8 @@ class JournalFile:
     def _is_damaged(self) -> bool:
         return 0 < size_of(self._path) <= _CHECKED_BYTES and find_damage(self._path) is not None
 
-    def _quarantine(self) -> None:
-        # Wall time, as whoever looks for the file reads it.
-        self.quarantined = str(
-            quarantine(self._path, time.strftime("%Y%m%dT%H%M%SZ", time.gmtime()))
-        )
-
     def _open(self) -> None:
-        try:
-            self._connection = open_writer(self._path)
-        except FILE_ERRORS as error:
-            if not is_damage_error(error):
-                raise
-            self._quarantine()
-            self._connection = open_writer(self._path)
+        self._connection = open_writer(self._path)
         try:
             self._salvage()
             self._appender = Appender(self._connection)
@@ -183,19 +171,8 @@ class JournalFile:
         """What a twin that starts now knows, in the run that it is in: the last one, or a new one.
 
         A wall clock that is behind what the log has received is doubted, unless `is_believed`:
-        nothing is begun then. Of a file that cannot be read what can be is salvaged, once.
+        nothing is begun then.
         """
-        try:
-            return self._start(now, is_believed=is_believed)
-        except FILE_ERRORS as error:
-            if self.quarantined or not is_damage_error(error):
-                raise
-        self.close()
-        self._quarantine()
-        self._open()
-        return self._start(now, is_believed=is_believed)
-
-    def _start(self, now: Clock, *, is_believed: bool) -> Restored:
         every = self._runs()
         run = next((r for r in reversed(every) if r.begun.is_simulated == now.is_simulated), None)
         if run is None:

@@ -276,12 +276,16 @@ class Journal:
             except Exception as error:  # noqa: BLE001  # the twin goes on, whatever it is
                 self._report_failure(error)
                 self._notes.refuse(self._reported.detail)
-                self._was_attempted.set()
+                wait_s = _RETRY_S[min(self._failures, len(_RETRY_S) - 1)]
                 if is_damage_error(error):
                     self._is_sound = False
+                    if not self._failures:
+                        wait_s = 0.0  # a twin that starts waits for what can be read of it
+                if wait_s:
+                    self._was_attempted.set()
             if self._stop.is_set():
                 break
-            self._stop.wait(_RETRY_S[min(self._failures, len(_RETRY_S) - 1)])
+            self._stop.wait(wait_s)
             self._failures += 1
         if self._lock is not None:
             self._lock.release()
@@ -342,7 +346,6 @@ class Journal:
                 continue
             believed = era.turn is Turn.BELIEVED
             restored = file.start(era.clock, is_believed=believed)
-            self._quarantined = file.quarantined or self._quarantined
             self._doubted_ns = restored.doubted_ns
             if restored.doubted_ns is not None:
                 del self._eras[0]

@@ -250,10 +250,7 @@ class Snapshot:
 
 
 def same_tags(before: Snapshot | None, tags: Iterable[TagState]) -> tuple[TagState, ...]:
-    """The tags, each the very same value as before where nothing of it has changed.
-
-    As in the store's own snapshots: change detection compares identities.
-    """
+    """The tags, each the very same value as before if it has not changed: identities tell."""
     known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
     return tuple(
         old if (old := known.get(tag.tag_id)) is not None and old == tag else tag for tag in tags

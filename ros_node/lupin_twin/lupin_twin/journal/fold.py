@@ -29,7 +29,6 @@ from lupin_twin.core.state import (
     TagState,
     Write,
 )
-from lupin_twin.journal.queries import newest
 from lupin_twin.journal.rows import (
     KIND_READING,
     STATUS_OK,
@@ -267,31 +266,3 @@ def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan 
     if span is None:
         return []
     return newest_of_tag(connection, span.run.id, request.tag_id, request.count)
-
-
-# A tag's id, its place (m, map frame), and its readings: (ns of ROS time, value).
-RecentTag = tuple[str, float, float, tuple[tuple[int, float], ...]]
-
-
-def recent_readings(  # noqa: PLR0917
-    connection: sqlite3.Connection,
-    sensor_type: str,
-    at_ns: int,
-    reach_ns: int,
-    most: int,
-    each: int = 1,
-) -> Iterator[RecentTag]:
-    """The tags that had a place and a reading at `at_ns`, with their last finite readings.
-
-    `reach_ns` is how far back, `most` how many of all tags together, but `each` of each.
-    """
-    places = {
-        tag.tag_id: tag.pose
-        for tag in state_at(connection, at_ns, "").tags
-        if tag.pose is not None and any(reading.name == sensor_type for reading in tag.readings)
-    }
-    each = max(most // max(len(places), 1), each)
-    found = newest(connection, sensor_type, max(1, at_ns - reach_ns), at_ns + 1, each)
-    for tag_id, pose in places.items():
-        if tag_id in found:
-            yield tag_id, pose.x, pose.y, tuple(found[tag_id])

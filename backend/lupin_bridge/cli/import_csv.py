@@ -147,6 +147,7 @@ def columns_of(content: Any) -> Columns:
     if zone and place is None:
         why = f"time_zone is {shown(zone)}, expected such as Europe/Amsterdam"
         raise ConfigError(why)
+    places = Table("places", table.take("places", {})).content
     columns = Columns(
         time=table.text("time"),
         zone=place,
@@ -156,7 +157,7 @@ def columns_of(content: Any) -> Columns:
         sensor=table.text("sensor", ""),
         value=table.text("value", ""),
         names=values_of(Table("names", table.take("names", {})), "column"),
-        places=dict(_places(Table("places", table.take("places", {})))),
+        places={str(tag): place_of(f"places.{tag}", at) for tag, at in places.items()},
     )
     table.end()
     if bool(columns.tag) == bool(columns.tag_id):
@@ -164,11 +165,6 @@ def columns_of(content: Any) -> Columns:
     if bool(columns.sensors) == bool(columns.sensor and columns.value):
         raise ConfigError("expected sensors, or sensor and value; one of them")
     return columns
-
-
-def _places(table: Table) -> Iterator[tuple[str, Pose]]:
-    for tag_id in tuple(table.content):
-        yield str(tag_id), place_of(f"places.{tag_id}", table.take(tag_id))
 
 
 def counted(file: TextIO, report_every: Callable[[int], None]) -> Iterator[str]:

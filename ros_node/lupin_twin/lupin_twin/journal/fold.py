@@ -15,7 +15,6 @@ from itertools import repeat
 from typing import Any, Final
 
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
-from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.state import (
     NO_FLOWER,
     Attempt,
@@ -35,7 +34,6 @@ from lupin_twin.journal.rows import (
     flower_of,
     listed_rows,
     named_numbers,
-    newest_of_tag,
 )
 from lupin_twin.journal.runs import FOREVER_NS, Run, runs, since_seq, span_at
 from lupin_twin.journal.schema import LOCAL_SITE
@@ -258,11 +256,3 @@ def _readings(rows: list[tuple[Any, ...]]) -> list[tuple[Reading, ...]]:
         tuple(map(Reading, names, values, repeat(row[5])))
         for row, (names, values) in zip(rows, every, strict=True)
     ]
-
-
-def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan | Inspection]:
-    """The last scans and inspections of a tag in the run of now, in the order of receiving."""
-    span = span_at(runs(connection.execute), FOREVER_NS)
-    if span is None:
-        return []
-    return newest_of_tag(connection, span.run.id, request.tag_id, request.count)

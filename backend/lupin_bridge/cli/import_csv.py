@@ -147,7 +147,6 @@ def columns_of(content: Any) -> Columns:
     if zone and place is None:
         why = f"time_zone is {shown(zone)}, expected such as Europe/Amsterdam"
         raise ConfigError(why)
-    places = Table("places", table.take("places", {})).content
     columns = Columns(
         time=table.text("time"),
         zone=place,
@@ -157,7 +156,10 @@ def columns_of(content: Any) -> Columns:
         sensor=table.text("sensor", ""),
         value=table.text("value", ""),
         names=values_of(Table("names", table.take("names", {})), "column"),
-        places={str(tag): place_of(f"places.{tag}", at) for tag, at in places.items()},
+        places={
+            str(tag): place_of(f"places.{tag}", at)
+            for tag, at in Table("places", table.take("places", {})).content.items()
+        },
     )
     table.end()
     if bool(columns.tag) == bool(columns.tag_id):

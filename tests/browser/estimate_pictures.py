@@ -18,9 +18,8 @@ from greenhouse_sim.simulator import GreenhouseSimulator
 from PIL import Image
 from playwright.sync_api import Browser, expect
 
-from lupin_patrol.cli import parse
 from lupin_patrol.greenhouse import read_greenhouse
-from lupin_patrol.past import past
+from lupin_patrol.mission import past
 from lupin_patrol.perception import FREE, OCCUPIED, RESOLUTION_M
 from lupin_twin.core.state import Scan, Write
 from lupin_twin.journal.runs import Clock
@@ -108,7 +107,7 @@ def remembered(now_ns: int) -> list[Write]:
     """What the twin is to remember, and what is to come until `AHEAD_S` from now."""
     return [
         row
-        for row in past(parse([]), now_ns + AHEAD_S * SECOND)
+        for row in past(GreenhouseSimulator(), 0, 60.0, 1.0, now_ns + AHEAD_S * SECOND)
         if not RESUMED_S < (now_ns - row.stamp_ns) / SECOND < STOPPED_S
     ]
 

@@ -6,10 +6,9 @@ from statistics import fmean
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
-from lupin_patrol.cli import parse
+from lupin_patrol.cli import fill_past, parse
 from lupin_patrol.greenhouse import read_greenhouse
-from lupin_patrol.mission import START_OF_DAY_S
-from lupin_patrol.past import DAYS, SOURCE, main, past
+from lupin_patrol.mission import DAYS, PAST_SOURCE, START_OF_DAY_S, past
 from lupin_twin.core.state import Pin, Scan, Write
 from tests.support.climate import Truth
 from tests.support.journal import NOW, kept, scan, select
@@ -19,7 +18,8 @@ SHORT = ["--speed=50"]
 
 
 def made(*options: str) -> list[Write]:
-    return list(past(parse(options), NOW))
+    patrol = parse(options)
+    return list(past(GreenhouseSimulator(), patrol.seed, patrol.day_speed, patrol.speed, NOW))
 
 
 def at_s(row: Write) -> float:
@@ -107,21 +107,19 @@ def test_where_the_day_stands_still_there_is_no_past() -> None:
 
 def test_it_fills_a_journal_that_is_new_and_leaves_somebody_s(tmp_path: Path) -> None:
     path = tmp_path / "demo.sqlite"
-    main([str(path), *SHORT])
+    assert fill_past(path, parse(SHORT)) == 0
     made_of = select(
         path, "SELECT DISTINCT source, is_copy FROM scan UNION SELECT source, is_copy FROM look"
     )
-    assert made_of == [(SOURCE, 0)]
+    assert made_of == [(PAST_SOURCE, 0)]
     assert select(path, "SELECT count(*) > 3 FROM look") == [(1,)]
     theirs = tmp_path / "theirs.sqlite"
     kept(theirs, [scan()])
-    main([str(theirs), *SHORT])
+    assert fill_past(theirs, parse(SHORT)) == 0
     assert select(theirs, "SELECT count(*) FROM scan") == [(1,)]
 
 
-def test_what_hinders_it_ends_it(tmp_path: Path) -> None:
+def test_what_hinders_it_ends_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "no").write_text("a file where a folder should be")
-    with pytest.raises(SystemExit, match="File exists"):
-        main([str(tmp_path / "no" / "demo.sqlite"), *SHORT])
-    with pytest.raises(SystemExit):
-        main([str(tmp_path / "demo.sqlite"), "--speed", "0"])
+    assert fill_past(tmp_path / "no" / "demo.sqlite", parse(SHORT)) == 2
+    assert "File exists" in capsys.readouterr().err

@@ -6,8 +6,9 @@ Here its times are those of the house, in which a day takes 24 hours: a round ta
 
 from typing import Final
 
-from lupin_patrol.cli import parse
-from lupin_patrol.past import DAYS, past
+from greenhouse_sim.simulator import GreenhouseSimulator
+
+from lupin_patrol.mission import DAYS, past
 from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import NO_FLOWER, Inspection, Pin, Scan
 
@@ -15,14 +16,15 @@ S: Final = 1_000_000_000
 DAY_NS: Final = 86_400 * S
 RUN: Final = 1
 _SCAN, _INSPECTION = 0, 1
+_DAY_SPEED: Final = 60.0
 
 
 def ordinary_days(seed: int = 0) -> list[PastWrite]:
     """Scans and looks of three days, from 0 ns on, as a journal tells them."""
-    options = parse([f"--seed={seed}"])
-    told = (row for row in past(options, 0) if not isinstance(row, Pin))
+    rows = past(GreenhouseSimulator(), seed, _DAY_SPEED, 1.0, 0)
+    told = (row for row in rows if not isinstance(row, Pin))
     return [
-        _write(number, row, DAYS * DAY_NS + round(row.stamp_ns * options.day_speed))
+        _write(number, row, DAYS * DAY_NS + round(row.stamp_ns * _DAY_SPEED))
         for number, row in enumerate(told, start=1)
     ]
 

@@ -213,7 +213,7 @@ def free_port() -> int:
 
 
 def patrols_of(pid: int) -> list[int]:
-    """The patrol that a demo has started, and not what makes its past (`lupin_patrol.past`)."""
+    """The patrol that a demo has started, and not what makes its past (`--fill-past`)."""
     return children_of(pid, b"lupin_patrol\0")
 
 

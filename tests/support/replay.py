@@ -23,7 +23,7 @@ from lupin_twin.core.state import (
 )
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.rows import KIND_FLOWER
-from lupin_twin.journal.runs import CORRECTION_NS, Carries, Clock, Run
+from lupin_twin.journal.runs import CORRECTION_NS, Clock, Run
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ class Received:
         self._pass(to_ns - ended_ns + (self._now.stamp_ns % UNIT if is_step else self._turns))
         before = self._stretch
         joins = before.run.root if is_step else None
-        run = self._file.begin(self._now, before.run, Carries.ALL, joins, ended_ns)
+        run = self._file.begin(self._now, before.run, joins=joins, ended_ns=ended_ns)
         if not is_step:
             self._life.ended_ns = ended_ns
         self._begin(run, before.rows, before.run.root)

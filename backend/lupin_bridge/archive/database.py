@@ -11,6 +11,9 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
@@ -19,10 +22,6 @@ from lupin_twin.journal.schema import POSTGRESQL_TABLES
 
 if TYPE_CHECKING:
     import psycopg
-
-
-from collections.abc import Iterator
-from datetime import UTC, datetime, timedelta
 
 VERSION: Final = 1
 # Whoever listens is told the site that has something new: a hint, which may be lost.
@@ -127,7 +126,7 @@ def connect(url: str, name: str, session: str = "read-write") -> psycopg.Connect
     import psycopg  # noqa: PLC0415
     from psycopg import conninfo  # noqa: PLC0415
 
-    try:
+    with explaining():
         connection = psycopg.connect(
             conninfo.make_conninfo(
                 "",
@@ -136,8 +135,6 @@ def connect(url: str, name: str, session: str = "read-write") -> psycopg.Connect
             autocommit=True,
         )
         connection.execute(_SESSION)
-    except psycopg.Error as error:
-        raise explained(error) from error
     return connection
 
 
@@ -160,24 +157,30 @@ def open_archive(url: str) -> Any:
         connection.read_only = True
         # All that is read in one transaction is of one moment.
         connection.isolation_level = psycopg.IsolationLevel.REPEATABLE_READ
-        connection.execute(f"SET statement_timeout = {_MAX_MS}")
-        check_version(connection)
-    except psycopg.Error as error:
-        connection.close()
-        raise explained(error) from error
+        with explaining():
+            connection.execute(f"SET statement_timeout = {_MAX_MS}")
+            check_version(connection)
     except ArchiveError:
         connection.close()
         raise
     return connection
 
 
-def explained(error: Exception) -> ArchiveError:
-    """What a database's error means, in one line."""
+@contextmanager
+def explaining() -> Iterator[None]:
+    """Turn a database's error into an `ArchiveError`, which says in one line what it means."""
     import psycopg  # noqa: PLC0415
 
-    text = " ".join(str(error).split())
-    if isinstance(error, psycopg.Error) and error.diag.message_primary:
-        text = error.diag.message_primary
+    try:
+        yield
+    except psycopg.Error as error:
+        raise ArchiveError(_explained(error)) from error
+
+
+def _explained(error: psycopg.Error) -> str:
+    import psycopg  # noqa: PLC0415
+
+    text = error.diag.message_primary or " ".join(str(error).split())
     for noise in _NOISE:
         text = noise.sub("", text)
     match error:
@@ -199,7 +202,7 @@ def explained(error: Exception) -> ArchiveError:
             text = f"another forwarder writes the same site: {text}"
         case _:
             text = f"the archive cannot be reached or written: {text}"
-    return ArchiveError(text)
+    return text
 
 
 def check_version(connection: psycopg.Connection[Any]) -> None:
@@ -207,7 +210,7 @@ def check_version(connection: psycopg.Connection[Any]) -> None:
 
     Raises:
         ArchiveError: it is of another one.
-        psycopg.Error: it is none, see `explained`.
+        psycopg.Error: it is none, see `explaining`.
 
     """
     found = connection.execute("SELECT version FROM archive").fetchone()

@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -31,19 +32,15 @@ from lupin_bridge.archive.database import (
     check_url,
     check_version,
     connect,
-    explained,
+    explaining,
     place_of,
 )
-from lupin_bridge.archive.source import Batch, Epoch, Row, Source
+from lupin_bridge.archive.source import Batch, Epoch, Row, Source, arrival_of
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.settings import SettingError, Settings, option, variable
 from lupin_twin.journal.retention import DAY_NS, RECORD
-from lupin_twin.journal.schema import FILE_ERRORS, Foreign
+from lupin_twin.journal.schema import FILE_ERRORS, Foreign, SiteLog
 
-_COLUMNS: Final = {
-    "meta": 3, "run": 8, "series": 6, "scan": 12, "look": 17, "place": 14, "hour": 7, "tally": 10,
-    "event": 7, "note": 8,
-}  # fmt: skip
 # Where the tables that are in parts by month have the stamp.
 _STAMP: Final = {"scan": 3, "look": 4}
 # What is said anew of a row that is there; of other tables a row stays as it came first.
@@ -54,25 +51,21 @@ _SAID_ANEW: Final = {
 }
 
 
-def _insert(table: str) -> str:
-    marks = ", ".join(["%s"] * _COLUMNS[table])
+@cache
+def _insert(table: str, columns: int) -> str:
+    marks = ", ".join(["%s"] * columns)
     if table == "meta":
         return f"INSERT INTO meta VALUES ({marks}) {META_AGAIN}"
     if table not in _SAID_ANEW:
         return f"INSERT INTO {table} VALUES ({marks}) ON CONFLICT DO NOTHING"
-    key, columns = _SAID_ANEW[table]
-    news = ", ".join(f"{column} = excluded.{column}" for column in columns.split())
+    key, again = _SAID_ANEW[table]
+    news = ", ".join(f"{column} = excluded.{column}" for column in again.split())
     return f"INSERT INTO {table} VALUES ({marks}) ON CONFLICT ({key}) DO UPDATE SET {news}"
 
 
-_INSERT: Final = {table: _insert(table) for table in _COLUMNS}
 _EPOCH: Final = (
     "SELECT journal_id, epoch, seq_offset, run_offset, forwarded_seq FROM epoch WHERE site = %s"
     " ORDER BY epoch DESC LIMIT 1"
-)
-_ARRIVAL: Final = " UNION ALL ".join(
-    f"SELECT arrival_ns FROM {table} WHERE site = %(site)s AND seq = %(seq)s"
-    for table in ("scan", "look", "place")
 )
 _HERE: Final = (
     "INSERT INTO forwarder VALUES (%s, %s, %s, now(), now()) ON CONFLICT (site) DO UPDATE SET"
@@ -152,12 +145,11 @@ class Sink:
     def _goes_on(self, source: Source, last: Epoch) -> bool:
         if source.last_seq() < last.forwarded_seq:
             return False
-        here = self._connection.execute(
-            _ARRIVAL, {"site": self._site, "seq": last.seq_offset + last.forwarded_seq}
-        ).fetchone()
+        log = SiteLog(self._connection, self._site)
+        here = arrival_of(log, last.seq_offset + last.forwarded_seq)
         there = source.arrival_of(last.forwarded_seq)
         # One that is no longer here or there was deleted.
-        return here is None or there is None or here == (there,)
+        return here is None or there is None or here == there
 
     def _new_epoch(self, source: Source, epoch: Epoch) -> Epoch:
         # Before the epoch: if this is cut short it is done again, to the same numbers.
@@ -212,7 +204,7 @@ class Sink:
             for table, of_table in rows.items():
                 if of_table:
                     values = ([_text(value) for value in row] for row in of_table)
-                    cursor.executemany(_INSERT[table], values)
+                    cursor.executemany(_insert(table, len(of_table[0])), values)
 
 
 def _text(value: Any) -> Any:
@@ -263,17 +255,13 @@ class Forwarder:
 
     def _try(self, *, once: bool) -> bool:
         """Forward until something is wrong, which is said, or the journal is another one."""
-        import psycopg  # noqa: PLC0415  # see `database`
-
         try:
             path = self._path()
             try:
-                with closing(Source(path)) as source:
+                with closing(Source(path)) as source, explaining():
                     self._forward(source, once=once)
             except (Foreign, OSError, *FILE_ERRORS) as error:
                 raise ArchiveError(f"the journal {path} cannot be forwarded: {error}") from error
-            except psycopg.Error as error:
-                raise explained(error) from error
         except UsageError:
             raise
         except ArchiveError as error:

@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from lupin_bridge.archive.database import ArchiveError
 from lupin_twin.core.past import HOUR_NS, Event
-from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
+from lupin_twin.journal.appending import PURGED_SEQ, Appender
 from lupin_twin.journal.beside import forwarded_seq, note_forwarded
 from lupin_twin.journal.retention import RECORD
 from lupin_twin.journal.schema import (
@@ -26,6 +26,7 @@ from lupin_twin.journal.schema import (
     LOCAL_SITE,
     MAP,
     ORIGIN,
+    SiteLog,
     get_meta,
     one_view,
     open_named,
@@ -76,6 +77,9 @@ _ROWS: Final = {
         " AND tally.hour = touched.hour"
     ),
 }
+_ARRIVAL: Final = " UNION ALL ".join(
+    f"SELECT arrival_ns FROM {table} WHERE site = :site AND seq = :seq" for table in _APPENDED
+)
 # Few: they are looked through each time, and what has changed is sent.
 _SMALL: Final = {
     "run": (
@@ -149,6 +153,12 @@ class Batch:
         return any(self.rows.values()) or bool(self.events)
 
 
+def arrival_of(log: SiteLog, seq: int) -> int | None:
+    """When the row of a number was received, in a journal or in the archive; None: it is gone."""
+    found = log.execute(_ARRIVAL, {"seq": seq}).fetchone()
+    return None if found is None else int(found[0])
+
+
 class Source:
     """An open journal, in one thread. `path` has to be one.
 
@@ -190,24 +200,11 @@ class Source:
 
     def last_seq(self) -> int:
         """The last number that it has given."""
-        execute = self._connection.execute
-        last = max(
-            int(execute(f"SELECT coalesce(max(seq), 0) FROM {table}").fetchone()[0])
-            for table in _APPENDED
-        )
-        noted = (get_meta(self._connection, key) for key in (PURGED_SEQ, LAST_SEQ))
-        return max(last, *(int(seq or 0) for seq in noted))
+        return Appender(self._connection).last_seq
 
     def arrival_of(self, seq: int) -> int | None:
         """When the row of a number was received; None: it is not there."""
-        for table in _APPENDED:
-            found = self._connection.execute(
-                f"SELECT arrival_ns FROM {table} WHERE site = ? AND seq = ?",
-                (LOCAL_SITE, seq),
-            ).fetchone()
-            if found is not None:
-                return int(found[0])
-        return None
+        return arrival_of(SiteLog(self._connection), seq)
 
     def batch(self, epoch: Epoch) -> Batch:
         """What comes next, as of one moment, and on the disk.

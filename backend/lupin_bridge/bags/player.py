@@ -8,19 +8,18 @@ from __future__ import annotations
 
 import argparse
 import math
-import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain, islice
 from pathlib import Path
+from threading import Event
 from typing import Any, Final
 
 import rclpy
 from lupin_msgs.msg import DiscoveredTags, Observation
 from nav_msgs.msg import OccupancyGrid
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 
 from lupin_bridge.bags.recording import (
@@ -34,10 +33,10 @@ from lupin_bridge.bags.recording import (
     clock_ns,
 )
 from lupin_bridge.console import say
-from lupin_twin.ros.base_node import latched
+from lupin_twin.core.parameters import ParameterError
+from lupin_twin.ros.base_node import latched, running_ros
 from lupin_twin.ros.convert import time_msg
 from lupin_twin.runtime import process
-from lupin_twin.runtime.process import remove_stale_shared_memory
 
 NODE_NAME: Final = "lupin_player"
 # With its depth, as a twin subscribes to it (lupin_twin.core.interfaces).
@@ -67,28 +66,21 @@ _DELIVERY_S: Final = 0.5
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Play until a signal comes; at the end of the recording the time stands."""
-    words = sys.argv[1:] if argv is None else list(argv)
-    own, ros_args = words, list[str]()
-    if "--ros-args" in words:
-        at = words.index("--ros-args")
-        own, ros_args = words[:at], words[at:]
+    own, ros_args = process.split_ros_args(sys.argv[1:] if argv is None else argv)
     options = parser().parse_args(own)
     process.end_with_parent()
-    stopped = _stop_flag()
+    process.block()
+    stop = process.stop_flag()
     try:
         with Recording(options.files) as recording:
             recording.check_start(options.start)
-            rclpy.init(args=ros_args, signal_handler_options=SignalHandlerOptions.NO)
-            try:
-                remove_stale_shared_memory(rclpy.get_default_context().get_domain_id())
+            with running_ros(ros_args):
                 node = PlayerNode(recording.inputs)
                 try:
-                    _play(recording, node, options, stopped)
+                    _play(recording, node, options, stop)
                 finally:
                     node.destroy_node()
-            finally:
-                rclpy.try_shutdown()
-    except RecordingError as error:
+    except (RecordingError, ParameterError) as error:
         say(str(error))
         return 1
     return 0
@@ -270,18 +262,18 @@ def _play(
     recording: Recording,
     node: PlayerNode,
     options: argparse.Namespace,
-    stopped: Callable[[], bool],
+    stop: Event,
 ) -> None:
     until_s = time.monotonic() + _TWIN_S
-    while not node.has_subscribers and not stopped():
+    while not node.has_subscribers and not stop.is_set():
         if time.monotonic() > until_s:
             raise RecordingError(f"no twin has subscribed within {_TWIN_S:g} s")
-        time.sleep(_BEAT_S)
+        stop.wait(_BEAT_S)
     say(f"playing {recording.name}")
     player = Player(recording, node, options)
     is_announced = False
     looked_s = -math.inf
-    while not stopped():
+    while not stop.is_set():
         now_s = time.monotonic()
         if now_s - looked_s > _POLL_S:
             looked_s = now_s
@@ -294,25 +286,7 @@ def _play(
         elif player.is_over and not is_announced:
             is_announced = True
             say(f"the end: {player.published:,} messages were published")
-        time.sleep(_BEAT_S)
-
-
-def _stop_flag() -> Callable[[], bool]:
-    """Whether a stop signal has come; from then on the process has to end.
-
-    Handlers only note it: a demo holds both signals back, and its child inherits that.
-    """
-    signals: list[int] = []
-
-    def note(number: int, _frame: object) -> None:
-        if not signals:
-            process.must_end()
-        signals.append(number)
-
-    for number in process.STOP_SIGNALS:
-        signal.signal(number, note)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, process.STOP_SIGNALS)
-    return lambda: bool(signals)
+        stop.wait(_BEAT_S)
 
 
 if __name__ == "__main__":

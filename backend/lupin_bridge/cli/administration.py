@@ -37,7 +37,7 @@ from lupin_bridge.archive.database import (
     check,
     check_version,
     connect,
-    explained,
+    explaining,
     init,
     migrate,
     overview,
@@ -126,8 +126,7 @@ def run_archive(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
         say(str(error))
         return USAGE_ERROR
     except ArchiveError as error:
-        say(str(error))
-        return FAILED
+        return journal.fail(str(error))
 
 
 def _given(options: argparse.Namespace, environ: Mapping[str, str], name: str) -> str:
@@ -140,13 +139,9 @@ def _given(options: argparse.Namespace, environ: Mapping[str, str], name: str) -
 
 
 def _archive(options: argparse.Namespace, url: str) -> int:
-    with closing(connect(url, f"lupin-twin archive {options.action}")) as connection:
-        import psycopg  # noqa: PLC0415  # see `database`
-
-        try:
-            return _act(options, connection, place_of(url))
-        except psycopg.Error as error:
-            raise explained(error) from error
+    name = f"lupin-twin archive {options.action}"
+    with closing(connect(url, name)) as connection, explaining():
+        return _act(options, connection, place_of(url))
 
 
 def _act(options: argparse.Namespace, connection: Any, place: str) -> int:
@@ -273,8 +268,7 @@ def run_people(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     except BrokenPipeError:
         return 0
     except (AccountError, SettingError, CannotWrite) as error:
-        say(str(error))
-        return FAILED
+        return journal.fail(str(error))
 
 
 def _add(path: Path, options: argparse.Namespace) -> int:

@@ -22,6 +22,7 @@ from typing import Final, NoReturn
 
 from lupin_bridge import __version__
 from lupin_bridge.cli import administration, import_csv, journal
+from lupin_bridge.console import add_role
 from lupin_bridge.serving.admission import RateLimit
 from lupin_bridge.settings import (
     CONFIG_VARIABLE,
@@ -40,6 +41,7 @@ from lupin_twin.runtime.process import (
     exit_after,
     limit_blas_threads,
     return_large_blocks,
+    split_ros_args,
 )
 
 # Of a repeated message: so many at once of our own, and one a period from then on.
@@ -196,22 +198,6 @@ def command() -> NoReturn:
     exit_after(main)
 
 
-def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Our own arguments, and ROS's: from `--ros-args` to `--` or the end, as ROS defines it."""
-    own: list[str] = []
-    ros: list[str] = []
-    in_ros = False
-    for argument in argv:
-        if argument == "--ros-args":
-            in_ros = True
-        elif in_ros and argument == "--":
-            ros.append(argument)
-            in_ros = False
-            continue
-        (ros if in_ros else own).append(argument)
-    return own, ros
-
-
 ROLES = {
     "serve": "the twin and the bridge in one process",
     "demo": "serve, plus a simulated patrol in a second process",
@@ -335,9 +321,7 @@ def parser() -> argparse.ArgumentParser:
     journal.add_parser(roles)
     administration.add_archive(roles)
     import_csv.add_parser(roles)
-    adapt.add_options(
-        roles.add_parser("adapt", help=adapt.HELP, description=adapt.HELP, allow_abbrev=False)
-    )
+    adapt.add_options(add_role(roles, "adapt", adapt.HELP))
     administration.add_people(roles)
     return made
 

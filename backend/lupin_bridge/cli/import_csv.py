@@ -23,13 +23,12 @@ from zoneinfo import ZoneInfo
 from lupin_bridge.cli.journal import SHOWN, JournalError, add_which, fail, path_of
 from lupin_bridge.console import Progress, Roles, add_role, say, tell
 from lupin_bridge.judge.judging import zone_of
-from lupin_twin.adapt.config import read_yaml
+from lupin_twin.adapt.config import place_of, read_yaml
 from lupin_twin.adapt.table import (
     AS_IT_IS,
     ConfigError,
     Table,
     Value,
-    is_number,
     seconds_of,
     shown,
     values_of,
@@ -143,11 +142,7 @@ def columns_of(content: Any) -> Columns:
 
     """
     table = Table("", content)
-
-    def text(name: str) -> str:
-        return table.text(name) if table.has(name) else ""
-
-    zone = text("time_zone")
+    zone = table.text("time_zone", "")
     place = zone_of(zone) if zone else None
     if zone and place is None:
         why = f"time_zone is {shown(zone)}, expected such as Europe/Amsterdam"
@@ -155,13 +150,16 @@ def columns_of(content: Any) -> Columns:
     columns = Columns(
         time=table.text("time"),
         zone=place,
-        tag=text("tag"),
+        tag=table.text("tag", ""),
         tag_id=str(table.take("tag_id", "")),
         sensors=values_of(Table("sensors", table.take("sensors", {})), "column"),
-        sensor=text("sensor"),
-        value=text("value"),
+        sensor=table.text("sensor", ""),
+        value=table.text("value", ""),
         names=values_of(Table("names", table.take("names", {})), "column"),
-        places=dict(_places(Table("places", table.take("places", {})))),
+        places={
+            str(tag): place_of(f"places.{tag}", at)
+            for tag, at in Table("places", table.take("places", {})).content.items()
+        },
     )
     table.end()
     if bool(columns.tag) == bool(columns.tag_id):
@@ -169,14 +167,6 @@ def columns_of(content: Any) -> Columns:
     if bool(columns.sensors) == bool(columns.sensor and columns.value):
         raise ConfigError("expected sensors, or sensor and value; one of them")
     return columns
-
-
-def _places(table: Table) -> Iterator[tuple[str, Pose]]:
-    for tag_id in tuple(table.content):
-        at = table.take(tag_id)
-        if not isinstance(at, list) or len(at) != 2 or not all(map(is_number, at)):
-            raise ConfigError(f"places.{tag_id} is {shown(at)}, expected [x, y] in m")
-        yield str(tag_id), Pose(float(at[0]), float(at[1]), 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def counted(file: TextIO, report_every: Callable[[int], None]) -> Iterator[str]:

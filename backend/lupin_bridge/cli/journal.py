@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import sqlite3
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
@@ -32,11 +32,33 @@ from lupin_bridge.query_string import MAX_SECONDS, moment
 from lupin_bridge.settings import SettingError, settings_from, variable
 from lupin_twin.core.past import NotRemembered, PastRefused, seconds
 from lupin_twin.journal.beside import InUse, demo_journal_path, holder_of, journal_path
-from lupin_twin.journal.checking import Overview, RunExtent, find_all_damage, overview
-from lupin_twin.journal.rebuild import NotPossible, handle_interrupts, vacuum
+from lupin_twin.journal.checking import (
+    RunExtent,
+    extents,
+    find_all_damage,
+    quarantined_beside,
+    row_counts,
+    sensors_of,
+    size_of,
+)
+from lupin_twin.journal.rebuild import handle_interrupts, vacuum
 from lupin_twin.journal.received import rows
-from lupin_twin.journal.retention import UnknownTagError, forget
-from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, is_damage_error, open_named
+from lupin_twin.journal.retention import (
+    RETENTION_BYTES,
+    RETENTION_NS,
+    forget,
+    pages_of,
+    records,
+)
+from lupin_twin.journal.schema import (
+    FILE_ERRORS,
+    Empty,
+    Foreign,
+    NotPossible,
+    get_meta,
+    is_damage_error,
+    open_named,
+)
 from lupin_twin.runtime.process import INTERRUPTED
 
 ACTIONS: Final[Mapping[str, str]] = {
@@ -68,7 +90,6 @@ SHOWN: Final = (
     InUse,
     Empty,
     Foreign,
-    UnknownTagError,
     NotPossible,
     SettingError,
 )
@@ -220,64 +241,64 @@ def _reader(path: Path) -> sqlite3.Connection:
 
 def _info(path: Path) -> int:
     with closing(_reader(path)) as connection:
-        found = overview(connection, path)
-    lines = [("file", f"{path}"), *_lines(found, holder_of(path))]
+        lines = [("file", f"{path}"), *_lines(connection, path)]
     width = max(len(what) for what, _ in lines)
     _say(*(f"{what:<{width}}  {text}" for what, text in lines))
     return 0
 
 
-def _lines(found: Overview, holder: str | None) -> list[tuple[str, str]]:
-    rows = found.rows
-    extents = [extent for extent in found.runs if extent.first_ns is not None]
-    hidden = max(0, len(found.runs) - _RUNS_SHOWN)
-    return [
-        ("size", f"{_mb(found.file_bytes)}, {_mb(found.free_bytes)} of it free"),
-        ("log", _mb(found.log_bytes)),
-        ("recording", holder or "nobody"),
-        ("scans", f"{rows['scan']:,}, of them {found.failures:,} failed"),
-        ("looks", f"{rows['look']:,}"),
-        ("places", f"{rows['place']:,}"),
-        ("tags", f"{rows['tag']:,}"),
-        ("sensors", ", ".join(found.sensors) or "none"),
-        ("reach", _reach(extents)),
-        ("hours", f"{rows['hour']:,} of a tag's sensors"),
-        ("retention", _retention(found)),
-        (
-            "runs",
-            f"{len(found.runs):,} of the clock" + (f", the last {_RUNS_SHOWN}" if hidden else ""),
-        ),
-        *(("", _run_line(extent)) for extent in found.runs[hidden:]),
-        *(("quarantined", f"{name}, {_mb(size)}") for name, size in found.quarantined),
-        *(("forgotten", _forgotten_line(record)) for record in found.forgotten),
-    ]
+def _lines(connection: sqlite3.Connection, path: Path) -> Iterator[tuple[str, str]]:
+    pages, free, page_bytes = pages_of(connection)
+    yield "size", f"{_mb(pages * page_bytes)}, {_mb(free * page_bytes)} of it free"
+    yield "log", _mb(size_of(path.with_name(path.name + "-wal")))
+    yield "recording", holder_of(path) or "nobody"
+    rows = row_counts(connection)
+    yield "scans", f"{rows['scan']:,}, of them {rows['failure']:,} failed"
+    yield "looks", f"{rows['look']:,}"
+    yield "places", f"{rows['place']:,}"
+    yield "tags", f"{rows['tag']:,}"
+    yield "sensors", ", ".join(sensors_of(connection)) or "none"
+    found = extents(connection)
+    yield "reach", _reach(found)
+    yield "hours", f"{rows['hour']:,} of a tag's sensors"
+    yield "retention", _retention(connection)
+    hidden = max(0, len(found) - _RUNS_SHOWN)
+    shown = f", the last {_RUNS_SHOWN}" if hidden else ""
+    yield "runs", f"{len(found):,} of the clock{shown}"
+    yield from (("", _run_line(extent)) for extent in found[hidden:])
+    yield from (("quarantined", f"{it}, {_mb(size)}") for it, size in quarantined_beside(path))
+    yield from (("forgotten", _forgotten_line(record)) for record in records(connection))
 
 
-def _reach(extents: list[RunExtent]) -> str:
-    of_wall = [extent for extent in extents if not extent.run.begun.is_simulated]
+def _reach(found: list[RunExtent]) -> str:
+    held = [extent for extent in found if extent[1] is not None]
+    of_wall = [ends for run, *ends in held if not run.begun.is_simulated]
     if not of_wall:
-        return "simulated clocks alone, see runs" if extents else "nothing"
-    first = min(extent.first_ns or 0 for extent in of_wall)
-    last = max(extent.last_ns or 0 for extent in of_wall)
+        return "simulated clocks alone, see runs" if held else "nothing"
+    first = min(first_ns or 0 for first_ns, _ in of_wall)
+    last = max(last_ns or 0 for _, last_ns in of_wall)
     return f"{iso(first)} to {iso(last)}"
 
 
-def _retention(found: Overview) -> str:
-    if not found.kept_ns:
+def _retention(connection: sqlite3.Connection) -> str:
+    kept_ns = int(get_meta(connection, RETENTION_NS) or 0)
+    if not kept_ns:
         return "not written yet by its twin"
-    return f"{found.kept_ns / 86_400e9:g} days and {_mb(found.kept_bytes)} at most; hours for good"
+    kept_bytes = int(get_meta(connection, RETENTION_BYTES) or 0)
+    return f"{kept_ns / 86_400e9:g} days and {_mb(kept_bytes)} at most; hours for good"
 
 
 def _run_line(extent: RunExtent) -> str:
-    begun = extent.run.begun
-    if extent.first_ns is None or extent.last_ns is None:
+    run, first_ns, last_ns = extent
+    begun = run.begun
+    if first_ns is None or last_ns is None:
         stretch = "nothing is in it"
     elif begun.is_simulated:
-        stretch = f"second {extent.first_ns / 1e9:.3f} to {extent.last_ns / 1e9:.3f}"
+        stretch = f"second {first_ns / 1e9:.3f} to {last_ns / 1e9:.3f}"
     else:
-        stretch = f"{iso(extent.first_ns)} to {iso(extent.last_ns)}"
+        stretch = f"{iso(first_ns)} to {iso(last_ns)}"
     clock = "simulated clock" if begun.is_simulated else "wall clock"
-    return f"{extent.run.id}: {clock}, begun {iso(begun.arrival_ns)}: {stretch}"
+    return f"{run.id}: {clock}, begun {iso(begun.arrival_ns)}: {stretch}"
 
 
 def _forgotten_line(record: Mapping[str, Any]) -> str:
@@ -364,13 +385,15 @@ def _backup(path: Path, target: Path) -> int:
 
 
 def _forget(path: Path, options: argparse.Namespace) -> int:
-    gone = forget(path, options.tag, pose_only=options.pose, by=user(), at_ns=time.time_ns())
+    scans, inspections, places = forget(
+        path, options.tag, pose_only=options.pose, by=user(), at_ns=time.time_ns()
+    )
     if options.pose:
         _say(f"{path}: the pose of tag {options.tag!r} is forgotten; the next twin pins it anew")
     else:
         _say(
-            f"{path}: tag {options.tag!r} is forgotten: {gone.scans:,} scans,"
-            f" {gone.inspections:,} inspections, {gone.places:,} places;"
+            f"{path}: tag {options.tag!r} is forgotten: {scans:,} scans,"
+            f" {inspections:,} inspections, {places:,} places;"
             " counts of the timeline still have them"
         )
     return 0

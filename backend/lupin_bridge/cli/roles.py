@@ -134,64 +134,46 @@ def with_past(feed: Feed) -> Feed:
     """Fill its journal if that is empty; else have the patrol go on with the time of day.
 
     A demo that is started again would begin a second morning otherwise, and what comes daily in
-    its journal would fit no day at all.
+    its journal would fit no day at all. Whatever hinders it is logged, and the demo goes on
+    without.
     """
-    path = feed.journal
-    if path is None or fill_past(path, feed.patrol_args):
+    path, past = feed.journal, None
+    if path is None:
         return feed
-    since_s = since_morning_s(path, feed.patrol_args, time.time_ns())
-    if since_s is None:
+    try:
+        is_new = not path.exists() or path.stat().st_size == 0
+        if not is_new:
+            with closing(open_reader(path)) as connection:
+                is_new, past = is_empty(connection), simulated(connection)
+        if is_new:
+            own = ("--fill-past", str(path), *feed.patrol_args)
+            subprocess.run(  # noqa: S603  # the operator's own words, no shell
+                [sys.executable, "-P", "-m", "lupin_patrol", *own],
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                timeout=_TIMEOUT_S,
+                check=True,
+            )
+    except subprocess.CalledProcessError as error:
+        why = (error.stderr.splitlines() or [str(error)])[-1]
+        log.warning("the demo starts without a past: %s", why)
+    except (Foreign, subprocess.TimeoutExpired, OSError, *FILE_ERRORS) as error:
+        log.warning("the demo starts without a past: %s", error)
+    if past is None:
         return feed
+    since_s = since_morning_s(past.end_ns, feed.patrol_args, time.time_ns())
     module, *words = feed.command
     return replace(feed, command=[module, f"--since-morning={since_s!r}", *words])
 
 
-def since_morning_s(path: Path, patrol_args: Sequence[str], now_ns: int) -> float | None:
-    """Patrol seconds from the last nine o'clock of the past in a journal to now; None: it has none.
+def since_morning_s(past_ns: int, patrol_args: Sequence[str], now_ns: int) -> float:
+    """Patrol seconds from the last nine o'clock to now.
 
-    The filled in past ends at nine, and days have gone on since, as long as they are now.
+    The filled in past ended at nine, at `past_ns`, and days have gone on since, as long as they are
+    now.
     """
-    try:
-        with closing(open_reader(path)) as connection:
-            past = simulated(connection)
-    except (Foreign, OSError, *FILE_ERRORS):
-        return None  # the twin reports it when it opens it
-    if past is None:
-        return None
-    return (now_ns - past.end_ns) / 1e9 * _speed(patrol_args) % DAY_S
-
-
-def fill_past(path: Path, patrol_args: Sequence[str]) -> bool:
-    """Fill a journal that is not there, or empty, with what the patrol would have observed.
-
-    Returns whether it had none. Whatever hinders it is logged, and the demo goes on without.
-    """
-    try:
-        if path.exists() and not _is_empty(path):
-            return False
-        subprocess.run(  # noqa: S603  # the operator's own words, no shell
-            [sys.executable, "-P", "-m", "lupin_patrol.past", str(path), *patrol_args],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=_TIMEOUT_S,
-            check=True,
-        )
-    except subprocess.CalledProcessError as error:
-        why = (error.stderr.splitlines() or [str(error)])[-1]
-    except (Foreign, subprocess.TimeoutExpired, OSError, *FILE_ERRORS) as error:
-        why = str(error)
-    else:
-        return True
-    log.warning("the demo starts without a past: %s", why)
-    return False
-
-
-def _is_empty(path: Path) -> bool:
-    if path.stat().st_size == 0:
-        return True
-    with closing(open_reader(path)) as connection:
-        return is_empty(connection)
+    return (now_ns - past_ns) / 1e9 * _speed(patrol_args) % DAY_S
 
 
 def _speed(patrol_args: Sequence[str]) -> float:

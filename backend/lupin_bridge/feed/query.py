@@ -35,9 +35,10 @@ from lupin_twin.core.past import (
     WritesRequest,
     check_moment,
 )
-from lupin_twin.journal.fold import latest, state_at
+from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.received import Export, lots, notes, observed, recent, scans, writes
+from lupin_twin.journal.rows import latest
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 

@@ -18,7 +18,7 @@ from lupin_bridge.judge.verdict import ORDER, Health, Verdict, worst
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.state_json import moment, stamp
 from lupin_twin.core.diagnostics import Origin
-from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.state import TagState
 from lupin_twin.field.grid import reach_of
 
 # Places along each side. Of tags at the same place the worst is drawn, so that no map is larger
@@ -64,15 +64,6 @@ def dots(tags: Iterable[TagState], healths: Mapping[str, Health]) -> str:
         if path:
             paths.append(f'<path class="{verdict}" d="{path}"/>')
     return "".join(paths)
-
-
-def same_tags(before: Snapshot | None, now: Snapshot) -> tuple[TagState, ...]:
-    """The tags of now, the very same values as before where nothing has changed."""
-    known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
-    return tuple(
-        old if (old := known.get(tag.tag_id)) is not None and old == tag else tag
-        for tag in now.tags
-    )
 
 
 def map_svg(paths: str) -> bytes:

@@ -19,7 +19,7 @@ from lupin_bridge.archive.database import (
     ArchiveError,
     archive_url,
     connect,
-    explained,
+    explaining,
     open_archive,
 )
 from lupin_bridge.feed import query
@@ -62,9 +62,8 @@ logger = logging.getLogger(__name__)
 class Latest:
     """What a site's twin would report now, as far as its log has come here."""
 
-    frame_id: str
     # Of the map that is known already.
-    map_hash: int = 0
+    map_hash: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +95,7 @@ class ArchiveChild(Child):
     ) -> Search:
         site = now.condition.path
         if isinstance(question, Latest):
-            return lambda connection, _: _latest(SiteLog(connection, site), question)
+            return lambda connection, _: _latest(SiteLog(connection, site), question, now.frame_id)
         if isinstance(question, Note):
             return lambda _, stop: _write_note(site, question, stop)
         if isinstance(question, Compare | SitesReport):
@@ -129,7 +128,7 @@ def _write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
         return written
 
 
-def _latest(log: SiteLog, asked: Latest) -> Reported:
+def _latest(log: SiteLog, asked: Latest, frame_id: str) -> Reported:
     journal: Any = log
     every = runs(log.execute)
     span = span_at(every, FOREVER_NS)
@@ -141,10 +140,10 @@ def _latest(log: SiteLog, asked: Latest) -> Reported:
     if not is_walls:
         now_ns = (stamp_ns or 0) + max(0, now_ns - (arrival_ns or now_ns))
     # Also what a robot's clock, a little ahead of this one, has stamped: it was received.
-    known = state_at(journal, FOREVER_NS, asked.frame_id)
+    known = state_at(journal, FOREVER_NS, frame_id)
     found = simulated(journal)
     return Reported(
-        Snapshot(max(now_ns, stamp_ns or 0), asked.frame_id, known.tags),
+        Snapshot(max(now_ns, stamp_ns or 0), frame_id, known.tags),
         is_walls,
         world_of(log),
         kept(journal),
@@ -169,21 +168,17 @@ class ArchiveRecall(Recall):
     def _answer(
         self, question: Callable[[Any, ShouldStop], AnswerT], is_abandoned: ShouldStop
     ) -> AnswerT:
-        import psycopg  # noqa: PLC0415  # the extra `fleet`
-
         try:
             connection = self._connection()
             try:
-                with connection.transaction():
+                with explaining(), connection.transaction():
                     answer = question(connection, is_abandoned)
-            except BaseException as error:
-                if isinstance(error, psycopg.Error):
-                    connection.close()
-                else:
-                    self._idle.append(connection)
+            except ArchiveError:
+                connection.close()
                 raise
-        except psycopg.Error as error:
-            raise NotRemembered(str(explained(error)), is_lasting=False) from error
+            except BaseException:
+                self._idle.append(connection)
+                raise
         except ArchiveError as error:
             raise NotRemembered(str(error), is_lasting=False) from error
         except DamagedFile as error:
@@ -193,25 +188,18 @@ class ArchiveRecall(Recall):
         return answer
 
     def _connection(self) -> Any:
-        while True:
-            with suppress(IndexError):
+        with suppress(IndexError):  # there is none
+            while True:
                 connection: Any = self._idle.pop()
                 # One whose server has gone says so only when it is used.
-                if connection.closed or not _is_alive(connection):
-                    continue
-                return connection
-            return open_archive(archive_url())
-
-
-def _is_alive(connection: Any) -> bool:
-    import psycopg  # noqa: PLC0415  # the extra `fleet`
-
-    try:
-        connection.execute("SELECT 1")
-    except psycopg.Error:
-        connection.close()
-        return False
-    return True
+                try:
+                    with explaining():
+                        connection.execute("SELECT 1")
+                except ArchiveError:
+                    connection.close()
+                else:
+                    return connection
+        return open_archive(archive_url())
 
 
 def main() -> None:

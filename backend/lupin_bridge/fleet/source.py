@@ -18,7 +18,7 @@ from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.relay import Relay, TwinNames
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
-from lupin_bridge.fleet.overview import Archive, Site, same_tags
+from lupin_bridge.fleet.overview import Archive, Site
 from lupin_bridge.fleet.reader import Latest, Reported
 from lupin_bridge.fleet.watcher import News
 from lupin_bridge.settings import Settings
@@ -26,6 +26,7 @@ from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.notes import Note, NotesUnwritable
 from lupin_twin.core.parameters import TwinParameters, World
 from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.state import same_tags
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.runtime.estimates import Report, ReportRequest
@@ -39,7 +40,6 @@ STUCK_S: Final = 6.0
 # Before its first answer it has to be started, and to connect.
 _START_S: Final = 15.0
 _RETRY_S: Final = 1.0
-_POLL_S: Final = 0.5
 
 
 class Watching:
@@ -55,10 +55,9 @@ class Watching:
         self._on_news = on_news
         # What an archive's clock is ahead of this process's steady one.
         self._ahead_ns = time.time_ns() - time.monotonic_ns()
-        self._answered_s = time.monotonic()
         self.process = PastProcess("lupin_bridge.fleet.watcher")
         self._settings = settings
-        self._tasks: list[asyncio.Task[None]] = []
+        self._task: asyncio.Task[None] | None = None
 
     @property
     def now_ns(self) -> int:
@@ -67,40 +66,40 @@ class Watching:
 
     def start(self) -> None:
         """Begin to watch."""
-        self._answered_s = time.monotonic()
-        self._tasks = [
-            asyncio.create_task(self._keep(), name="watching"),
-            asyncio.create_task(self._mind(), name="minding"),
-        ]
+        self._task = asyncio.create_task(self._keep(), name="watching")
 
     async def stop(self) -> None:
         """End."""
-        await end(*self._tasks)
+        await end(self._task)
         await self.process.stop()
 
     async def _keep(self) -> None:
         while True:
             try:
-                self._take(await self.process.ask(self._settings, Now(0, "", UNKNOWN_JOURNAL), 0.0))  # type: ignore[arg-type]  # see `WatchChild`
+                self._take(await self._look())
                 continue
             except NotRemembered as error:
-                self._answered_s = time.monotonic()
                 self._down(str(error))
             except Exception:  # nobody waits for this task, and all of the overview depends on it
                 log.exception("the archive is not watched")
             await asyncio.sleep(_RETRY_S)
 
-    async def _mind(self) -> None:
-        while True:
-            await asyncio.sleep(_POLL_S)
+    async def _look(self) -> News:
+        """What is new; that it takes long is said meanwhile."""
+        about = Now(0, "", UNKNOWN_JOURNAL)
+        settings: Any = self._settings  # see `WatchChild`
+        look: asyncio.Task[News] = asyncio.create_task(self.process.ask(settings, about, 0.0))
+        try:
             patience_s = STUCK_S if self.looks else _START_S
+            done, _ = await asyncio.wait((look,), timeout=patience_s)
             # Once it is said why, that stays: a query that is ended for its time says more.
-            is_said = self.archive.since_ns and not self.archive.is_reachable
-            if not is_said and time.monotonic() - self._answered_s >= patience_s:
+            if not done and (self.archive.is_reachable or not self.archive.since_ns):
                 self._down(f"the archive has not answered for {STUCK_S:g} s")
+            return await look
+        finally:
+            look.cancel()
 
     def _take(self, news: News) -> None:
-        self._answered_s = time.monotonic()
         self.looks += 1
         self._ahead_ns = news.now_ns - time.monotonic_ns()
         if not self.archive.is_reachable:
@@ -233,8 +232,7 @@ class SiteTwin(TwinSource):
     async def _read(self) -> None:
         last_seq = self._site.last_seq
         if last_seq != self._seq and self._watching.archive.is_reachable:
-            asked = Latest(self._parameters.frame_id, self._map_hash)
-            found: Reported = await self._in_time(self._reading(asked))
+            found: Reported = await self._in_time(self._reading(Latest(self._map_hash)))
             if found.map_hash != self._map_hash:
                 self._map, self._map_hash = found.occupancy_map, found.map_hash
             self._reported = found
@@ -258,7 +256,7 @@ class SiteTwin(TwinSource):
         before = None if self.update is None else self.update.snapshot
         self.update = TwinUpdate(
             replace(
-                reported.snapshot, stamp_ns=stamp_ns, tags=same_tags(before, reported.snapshot)
+                reported.snapshot, stamp_ns=stamp_ns, tags=same_tags(before, reported.snapshot.tags)
             ),
             # Of what was read: the same in all replicas.
             f"{self.site}-{self._seq}-{self._map_hash}",

@@ -20,12 +20,12 @@ from lupin_bridge.archive.database import (
     CHANNEL,
     ArchiveError,
     archive_url,
-    explained,
+    explaining,
     open_archive,
 )
 from lupin_bridge.feed import query
 from lupin_bridge.feed.query import Child, Now, Search
-from lupin_bridge.fleet.overview import LIVE_S, Site, dots, same_tags
+from lupin_bridge.fleet.overview import LIVE_S, Site, dots
 from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge
@@ -35,7 +35,7 @@ from lupin_bridge.stream.state_json import alarm_json
 from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note, NotesRequest
 from lupin_twin.core.past import NotRemembered, RecentRequest, WritesRequest
-from lupin_twin.core.state import Snapshot
+from lupin_twin.core.state import Snapshot, same_tags
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.received import notes, recent, writes
 from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
@@ -282,7 +282,7 @@ class Watcher:
         found = state_at(log, FOREVER_NS, "")
         before = judged.snapshot
         # What has not changed is judged no second time.
-        tags = same_tags(before, found)
+        tags = same_tags(before, found.tags)
         newest_ns = max((tag.last_observed_ns or 0 for tag in tags), default=0)
         judged.snapshot = replace(found, stamp_ns=newest_ns, tags=tags)
         if before is None and tags:
@@ -341,19 +341,17 @@ class WatchChild(Child):
         return lambda *_: self._look(question)
 
     def _look(self, settings: Settings) -> News:
-        import psycopg  # noqa: PLC0415  # the extra `fleet`
-
         try:
-            if self._watcher is None:
-                connection = open_archive(archive_url())
-                self._watcher = Watcher(connection, Criteria.of(settings))
-            return self._watcher.news()
-        except (ArchiveError, psycopg.Error) as error:
+            with explaining():
+                if self._watcher is None:
+                    connection = open_archive(archive_url())
+                    self._watcher = Watcher(connection, Criteria.of(settings))
+                return self._watcher.news()
+        except ArchiveError as error:
             if self._watcher is not None:
                 self._watcher.connection.close()
                 self._watcher = None
-            why = error if isinstance(error, ArchiveError) else explained(error)
-            raise NotRemembered(str(why), is_lasting=False) from error
+            raise NotRemembered(str(error), is_lasting=False) from error
 
 
 class _WithoutJournal(Recall):

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import NoReturn
 
 from lupin_twin.runtime import process
@@ -66,12 +68,16 @@ def parser() -> argparse.ArgumentParser:
         action="store_true",
         help="end when the process that started this one does, even by kill -9 (Linux)",
     )
+    # Of a demo without a memory: for the twin that is about to start.
+    made.add_argument("--fill-past", metavar="JOURNAL", type=Path, help=argparse.SUPPRESS)
     return made
 
 
 def main() -> int:
     """Run the node until it is stopped or done; returns the exit code."""
     process.block()  # before anything slow is imported
+    own, _ = process.split_ros_args(sys.argv[1:])
+    options = parse(own)
     try:
         from greenhouse_sim.simulator import GreenhouseSimulator  # noqa: PLC0415  # see above
     except ModuleNotFoundError as error:
@@ -81,16 +87,12 @@ def main() -> int:
             f"the simulator is missing ({error}): python3 -m pip install mdp-greenhouse, on a "
             "robot into a virtual environment made with --system-site-packages",
         )
-    from rclpy.utilities import remove_ros_args  # noqa: PLC0415
-
+    if options.fill_past is not None:
+        return fill_past(options.fill_past, options)
     from lupin_patrol.mission import Mission  # noqa: PLC0415
     from lupin_patrol.node import play  # noqa: PLC0415
     from lupin_twin.core.parameters import ParameterError  # noqa: PLC0415
 
-    try:
-        options = parse(remove_ros_args(sys.argv)[1:])
-    except RuntimeError as error:  # what rclpy raises for ROS arguments that it cannot parse
-        return process.refuse("patrol_node: error", f"cannot use these ROS arguments: {error}")
     if options.end_with_parent:
         process.end_with_parent()
     begin_s = options.since_morning
@@ -104,6 +106,24 @@ def main() -> int:
             ros_arguments=sys.argv,
         )
     except ParameterError as error:
+        return process.refuse("patrol_node: error", str(error))
+    return 0
+
+
+def fill_past(journal: Path, options: argparse.Namespace) -> int:
+    """Fill a journal that is new or empty with the patrol's past; returns the exit code."""
+    from greenhouse_sim.simulator import GreenhouseSimulator  # noqa: PLC0415  # see `main`
+
+    from lupin_patrol.mission import past  # noqa: PLC0415
+    from lupin_twin.journal.appending import prefill  # noqa: PLC0415
+    from lupin_twin.journal.beside import InUse  # noqa: PLC0415
+    from lupin_twin.journal.schema import FILE_ERRORS, Foreign  # noqa: PLC0415
+
+    now_ns, of_patrol = time.time_ns(), (options.seed, options.day_speed, options.speed)
+    rows = list(past(GreenhouseSimulator(), *of_patrol, now_ns))
+    try:
+        prefill(journal, "lupin-twin demo", rows, now_ns)
+    except (InUse, Foreign, OSError, *FILE_ERRORS) as error:
         return process.refuse("patrol_node: error", str(error))
     return 0
 

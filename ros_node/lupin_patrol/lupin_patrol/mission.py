@@ -8,12 +8,12 @@ start; positions are metres in the map frame, times of day seconds since simulat
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from itertools import count
 from math import atan2, cos, sin
 from random import Random
-from typing import Any
+from typing import Any, Final
 
 from lupin_patrol.greenhouse import (
     TAG_HEIGHT_M,
@@ -35,7 +35,7 @@ from lupin_patrol.perception import (
     TagDetector,
     stream,
 )
-from lupin_twin.core.state import Inspection, Pose, Reading, Scan
+from lupin_twin.core.state import Inspection, Pin, Pose, Reading, Scan, Write
 
 
 class ScanStatus(IntEnum):
@@ -281,3 +281,40 @@ def _locate(tag: Tag, noise: float, chance: Random) -> Pose:
     """Say where a tag is, to about a centimetre times `noise`."""
     x, y = (at + noise * chance.gauss(0.0, _POSE_NOISE_M) for at in tag.position)
     return pose_of((x, y), tag.yaw + noise * chance.gauss(0.0, _YAW_NOISE_RAD))
+
+
+# --- what it would have observed until now: three simulated days ----------------------------------
+
+PAST_SOURCE: Final = "lupin_patrol (simulated past)"
+DAYS: Final = 3
+# So far before the patrol's own passes that none of them is alike.
+_FIRST_PASS: Final = -1_000_000
+
+
+def past(simulator: Any, seed: int, day_speed: float, speed: float, now_ns: int) -> Iterator[Write]:
+    """What a twin would have written, the oldest first; nothing where the day stands still.
+
+    Places, plants and climate are those of the patrol with the same seed, and so is the time of
+    day: where the past ends, now, the patrol begins.
+    """
+    if day_speed <= 0.0:
+        return
+    begin_s = -DAYS * SECONDS_PER_DAY / day_speed
+    mission = Mission(simulator, seed, day_speed, begin_s=begin_s, first_pass=_FIRST_PASS)
+    pinned: set[str] = set()
+    for event in mission.visits():
+        if event.at_s >= 0.0:
+            return
+        write, at_ns = event.write, now_ns + round(event.at_s / speed * 1e9)
+        if write.pose is not None and write.tag_id not in pinned:
+            pinned.add(write.tag_id)
+            yield Pin(write.tag_id, write.pose, at_ns, at_ns)
+        yield replace(
+            write,
+            stamp_ns=at_ns,
+            pose=None,
+            source=PAST_SOURCE,
+            own_stamp_ns=at_ns,
+            mission=f"past-{event.pass_index - _FIRST_PASS + 1:04d}",
+            arrival_ns=at_ns,
+        )

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import cos, sin
 from threading import Event as Flag
-from threading import Thread
 from time import monotonic
 from typing import Any
 
@@ -128,7 +127,7 @@ def play(
     per second. `ros_arguments` is the whole command line.
     Raises ParameterError, before anything was published.
     """
-    stop = _stop_flag()
+    stop = process.stop_flag()
     with running_ros(ros_arguments):
         node = PatrolNode()
         with spinning(node):
@@ -144,18 +143,6 @@ def play(
                 if once and isinstance(event, PassCompleted):
                     break
             _stopped_before(stop, lambda: node.wait_for_delivery(0.0), _DELIVERY_S)
-
-
-def _stop_flag() -> Flag:
-    """A flag that a stop signal sets."""
-    flag = Flag()
-
-    def wait() -> None:
-        process.wait()
-        flag.set()
-
-    Thread(target=wait, name="signals", daemon=True).start()
-    return flag
 
 
 def _stopped_before(stop: Flag, condition: Callable[[], bool], timeout_s: float) -> bool:

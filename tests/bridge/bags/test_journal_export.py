@@ -19,7 +19,7 @@ from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import Repeats
 from lupin_twin.core.state import Inspection, Pin, Pose, TagState, TwinStore, Write
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.runs import Carries, Clock
+from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from lupin_twin.ros import convert
 from tests.support.bags import is_open, no_file_above, read
@@ -183,7 +183,7 @@ def test_of_an_earlier_run_the_places_are_known(tmp_path: Path) -> None:
     with opened(path) as file:
         first = file.start(Clock(100 * SECOND, NOW, is_simulated=True), is_believed=False).run
         file.append([(first, pin("7", 100 * SECOND)), (first, scan("7", 100 * SECOND))])
-        file.append([(file.begin(again, first, Carries.ALL), row)])
+        file.append([(file.begin(again, first), row)])
     assert exported(path, target, 55 * SECOND, 90 * SECOND) == (1, 1)
     assert [(entry[0], entry[1]) for entry in read(target)] == [
         ("/clock", row.arrival_ns),

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from lupin_bridge.cli import command
-from lupin_bridge.cli.command import split_ros_args
+from lupin_twin.runtime.process import split_ros_args
 from tests.support.processes import lupin_twin, said
 from tests.support.waiting import wait_for
 from tests.support.web import bridge

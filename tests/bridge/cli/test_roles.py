@@ -9,12 +9,12 @@ from pathlib import Path
 import httpx
 import pytest
 
-from lupin_bridge.cli.roles import DAY_S, Feed, fill_past, patrolled, since_morning_s, with_past
+from lupin_bridge.cli.roles import DAY_S, Feed, patrolled, since_morning_s, with_past
 from lupin_bridge.serving.server import listen
 from lupin_patrol.cli import parse as patrol_options
 from lupin_patrol.perception import SECONDS_PER_DAY
 from lupin_twin.core.parameters import World
-from tests.support.journal import CLOCK, NOW, is_whole, kept, select
+from tests.support.journal import CLOCK, is_whole, kept, select
 from tests.support.journal import scan as row
 from tests.support.messages import scan
 from tests.support.processes import Process, children_of, is_running, lupin_twin, patrols_of, url_of
@@ -189,15 +189,21 @@ def test_another_journal_or_none_or_another_clock_gets_no_past(ros_args: list[st
     assert patrolled(ENV, [], ["--ros-args", *ros_args]).journal is None
 
 
+def feed_of(path: Path, options: list[str]) -> Feed:
+    command = ["lupin_patrol", "--end-with-parent", *options]
+    return Feed("patrol", command, [], World(), path, options)
+
+
 def test_started_again_it_goes_on_with_the_day(tmp_path: Path) -> None:
     path = tmp_path / "demo.sqlite"
-    feed = Feed("patrol", ["lupin_patrol", "--end-with-parent", *SHORT], [], World(), path, SHORT)
+    feed = feed_of(path, SHORT)
     assert with_past(feed) == feed, "the first time it is nine"
     [(until_ns,)] = select(path, "SELECT value FROM meta WHERE key = 'simulated_until_ns'")
     # Fifty times as fast, a day takes 28.8 s.
     for later_s, since_s in ((0.0, 0.0), (14.4, 720.0), (28.8, 0.0), (2_894.4, 720.0)):
-        now_ns = int(str(until_ns)) + round(later_s * 1e9)
-        assert since_morning_s(path, SHORT, now_ns) == pytest.approx(since_s, abs=1e-6)
+        past_ns = int(str(until_ns))
+        now_ns = past_ns + round(later_s * 1e9)
+        assert since_morning_s(past_ns, SHORT, now_ns) == pytest.approx(since_s, abs=1e-6)
     again = with_past(feed)
     module, since, *words = again.command
     assert [module, *words] == feed.command
@@ -205,22 +211,10 @@ def test_started_again_it_goes_on_with_the_day(tmp_path: Path) -> None:
     assert 0.0 <= patrol_options([since]).since_morning < DAY_S
 
 
-@pytest.mark.parametrize("journal", ["another's", "empty", "none", "no journal"])
-def test_of_a_journal_without_such_a_past_there_is_no_day_to_go_on_with(
-    tmp_path: Path, journal: str
-) -> None:
-    path = tmp_path / "demo.sqlite"
-    if journal == "another's":
-        kept(path, [row()], CLOCK)
-    elif journal != "none":
-        path.write_text("" if journal == "empty" else "nonsense" * 1_000)
-    assert since_morning_s(path, SHORT, NOW) is None
-
-
 def test_somebody_s_journal_is_left(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = tmp_path / "demo.sqlite"
     kept(path, [row()], CLOCK)
-    assert not fill_past(path, SHORT)
+    assert with_past(feed_of(path, SHORT)) == feed_of(path, SHORT)
     assert select(path, "SELECT count(*) FROM scan") == [(1,)]
     assert caplog.records == []
 
@@ -228,10 +222,17 @@ def test_somebody_s_journal_is_left(tmp_path: Path, caplog: pytest.LogCaptureFix
 def test_what_hinders_it_is_told_and_is_no_end(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    assert not fill_past(tmp_path / "demo.sqlite", ["--speed=0"])
     (tmp_path / "no").write_text("a file where a folder should be")
-    assert not fill_past(tmp_path / "no" / "demo.sqlite", SHORT)
+    (tmp_path / "none.sqlite").write_text("nonsense" * 1_000)
+    for name, options in (
+        ("demo.sqlite", ["--speed=0"]),
+        ("no/demo.sqlite", SHORT),
+        ("none.sqlite", SHORT),
+    ):
+        feed = feed_of(tmp_path / name, options)
+        assert with_past(feed) == feed
     told = [record.message for record in caplog.records]
-    assert len(told) == 2
+    assert len(told) == 3
     assert "argument --speed" in told[0]
     assert "File exists" in told[1]
+    assert "not a database" in told[2]

@@ -16,13 +16,14 @@ from PIL import Image
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
+from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.past import RecentRequest, ScansRequest, SeriesRequest, WritesRequest
 from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.received import recent, scans, writes
 from lupin_twin.journal.retention import kept
-from lupin_twin.journal.rows import newest_of_tag
+from lupin_twin.journal.rows import latest
 from lupin_twin.journal.schema import SiteLog, open_reader
 from tests.support import maps
 from tests.support.archive import Archive, forwarder
@@ -63,7 +64,7 @@ def test_every_query_of_a_journal_is_answered_alike(archive: Archive, tmp_path: 
         asked = SeriesRequest("3", "temperature", now_ns - 10 * MINUTE_NS, now_ns, 5)
         assert series(logs[0], asked, now_ns) == series(logs[1], asked, now_ns)
         for tag in ("1", "3", "7", "none"):
-            one_tag, other_tag = (newest_of_tag(log, 1, tag, 4) for log in logs)  # type: ignore[arg-type]
+            one_tag, other_tag = (latest(log, LatestRequest(tag, 4)) for log in logs)  # type: ignore[arg-type]
             assert one_tag == other_tag
         assert kept(local) == kept(logs[1])  # type: ignore[arg-type]
 

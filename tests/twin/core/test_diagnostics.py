@@ -11,11 +11,9 @@ from lupin_twin.core.diagnostics import (
     UNKNOWN_JOURNAL,
     WARN,
     Condition,
-    Estimates,
     Finding,
     Health,
     JournalState,
-    Layers,
     Origin,
     SelfReport,
     findings,
@@ -44,18 +42,9 @@ def found(name: str, **changes: Any) -> Finding:
     return finding
 
 
-def test_layers_say_what_is_published_and_what_cannot_be() -> None:
-    published = {"/twin/field/co2": 3, "/twin/tags": 0}
-    said = found("layers", layers=Layers(published, 1))
-    assert (said.level, said.message) == (OK, "1 of 2 topics have subscribers")
-    assert said.values == {"/twin/field/co2": "3", "/twin/tags": "0"}
-    said = found("layers", layers=Layers(published, 1, {"/twin/field/co2": "too far"}))
-    assert (said.level, said.message) == (WARN, "/twin/field/co2: too far")
-
-
 def test_a_twin_that_is_well_is_ok_in_all() -> None:
     levels = {finding.name: finding.level for finding in findings(WELL)}
-    names = "clock origin inputs drops queues stamps fields estimates layers journal twins"
+    names = "clock origin inputs drops queues stamps fields journal twins"
     assert levels == dict.fromkeys(names.split(), OK)
 
 
@@ -168,11 +157,3 @@ def test_a_long_word_is_told_up_to_a_limit() -> None:
         assert (len(shown), shown == word) == (MAX_SHOWN, length == MAX_SHOWN)
         [source] = found("stamps", late={word: 1}).values
         assert source == shown
-
-
-def test_estimates_that_are_wrong_are_named() -> None:
-    assert found("estimates").message == "nothing is wrong"
-    wrong = found("estimates", estimates=Estimates({"co2": "singular"}, ("light",), 3))
-    assert wrong.level == WARN
-    assert wrong.message.startswith("co2: singular; light: too sure of itself")
-    assert wrong.values == {"fits failed": "3"}

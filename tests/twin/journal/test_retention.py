@@ -8,7 +8,7 @@ from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal import retention
 from lupin_twin.journal.hours import deleted_ns
 from lupin_twin.journal.retention import Limits, horizon_ns, note_lost, purge_step, used_bytes
-from lupin_twin.journal.runs import FOREVER_NS, Carries, Clock
+from lupin_twin.journal.runs import FOREVER_NS, Clock
 from lupin_twin.journal.schema import SiteLog, open_writer, transaction
 from tests.support.journal import CLOCK, NOW, SECOND, kept, look, opened, pin, restored, scan
 
@@ -90,7 +90,7 @@ def test_what_is_kept_begins_with_the_log_and_behind_what_was_deleted_or_lost(
     with opened(path) as again:
         first = again.start(CLOCK, is_believed=True).run
         back = Clock(NOW - 9, NOW + DAY, is_simulated=False)
-        again.begin(back, first, Carries.ALL, ended_ns=NOW + 2 * DAY)
+        again.begin(back, first, ended_ns=NOW + 2 * DAY)
         assert again.kept() == ((NOW - 9, FOREVER_NS),)
 
 

@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.journal.rebuild import NotPossible, vacuum
-from lupin_twin.journal.schema import Empty, Foreign, open_reader, open_writer
+from lupin_twin.journal.rebuild import vacuum
+from lupin_twin.journal.schema import Empty, Foreign, NotPossible, open_reader, open_writer
 from tests.support.journal import NOW, SECOND, is_whole, kept, known, pin, scan
 from tests.twin.journal.conftest import fail_on_a_full_disk
 

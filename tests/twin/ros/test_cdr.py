@@ -12,26 +12,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lupin_msgs.msg import DiscoveredTags, Observation, TagReading, TwinState
 from nav_msgs.msg import OccupancyGrid
-from rcl_interfaces.msg import ParameterDescriptor, ParameterEvent
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import ByteMultiArray, Empty, Float64MultiArray
-from type_description_interfaces.msg import TypeDescription
+from std_msgs.msg import ByteMultiArray, Float64MultiArray
 
 from lupin_twin.ros.message_limits import MalformedError, MessageShape
 from tests.support.hostile import PACKAGES, lies
 
 OURS = (Observation, DiscoveredTags, TwinState, OccupancyGrid)
-# Arrays of fixed length, sequences and texts with a limit, sequences of texts, all sizes of number.
+# Arrays of fixed length, sequences of texts, all sizes of number.
 OTHERS = (
     PoseWithCovarianceStamped,
-    ParameterDescriptor,
     ParameterEvent,
-    TypeDescription,
     Float64MultiArray,
     ByteMultiArray,
     Polygon,
-    Empty,
 )
 
 

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from dataclasses import replace
 from functools import cache
 from threading import Event
 from types import SimpleNamespace
@@ -13,12 +14,12 @@ import pytest
 from builtin_interfaces.msg import Time
 from lupin_msgs.srv import GetEstimate, GetEstimateReport
 
-from lupin_twin.core.diagnostics import Estimates
+from lupin_twin.core.diagnostics import WARN
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, TwinStore
-from lupin_twin.estimate.engine import TagPast, readings_of
+from lupin_twin.estimate.engine import Grades, Record, TagPast, Tally, readings_of
 from lupin_twin.ros import estimate_service
 from lupin_twin.ros.estimate_service import EstimateService
-from lupin_twin.runtime.estimates import Report, ReportRequest
+from lupin_twin.runtime.estimates import Known, Report, ReportRequest
 from lupin_twin.runtime.workers import MAX_QUERIES, JobQueue, Workers
 from tests.support import messages
 from tests.support.domains import own_domain
@@ -249,7 +250,14 @@ def test_a_report_serves_for_a_while_and_what_is_wrong_is_said_once(
     assert report().fit_problem.startswith("10001 tags have this sensor")
     assert report().places == (), "who asks for no places has none worked out"
     assert len(searches) == 3, "it serves for half a minute"
-    assert service.state() == Estimates({"co2": report().fit_problem}, (), 1)
+    said = service.finding()
+    assert (said.level, said.message) == (WARN, f"co2: {report().fit_problem}")
+    assert said.values == {"fits failed": "1"}
+    graded = Record(1, Tally(40, 10), Tally(40, 10))
+    narrow = Known(Report(at_ns, at_ns, "", graded), Grades(86_400.0))
+    said = replace(service, _known={"light": narrow}).finding()
+    assert (said.level, said.message[:26]) == (WARN, "light: too sure of itself,")
+    assert replace(service, _known={}).finding().message == "nothing is wrong"
     assert reported == [f"no new model of co2: {report().fit_problem}"]
     searches.clear()
     left, waits = [service.report(ReportRequest(name)) for name in ("a", "b", "c")][1:]

@@ -38,11 +38,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """The executable of the ROS package; see `run`."""
-    arguments = list(sys.argv[1:] if argv is None else argv)
-    split = arguments.index("--ros-args") if "--ros-args" in arguments else len(arguments)
+    own, ros_args = process.split_ros_args(sys.argv[1:] if argv is None else argv)
     made = argparse.ArgumentParser(prog="adapt", description=HELP, allow_abbrev=False)
     add_options(made)
-    return run(made.parse_args(arguments[:split]), arguments[split:])
+    return run(made.parse_args(own), ros_args)
 
 
 def run(options: argparse.Namespace, ros_args: Sequence[str]) -> int:

@@ -197,16 +197,25 @@ def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Pose | str]]:
         if isinstance(at, str):
             yield name, check_text(f"tags.{name}", at)
             continue
-        if (
-            not isinstance(at, list)
-            or len(at) not in (2, 3)
-            or not all(is_number(each) and abs(each) <= MAX_M for each in at)
-        ):
-            raise ConfigError(
-                f"tags.{name} is {shown(at)}, expected [x, y] or [x, y, z] in m up to {MAX_M:.0f}, "
-                "or a frame of TF"
-            )
-        yield name, Pose.at(*at)
+        yield name, place_of(f"tags.{name}", at, ", or a frame of TF")
+
+
+def place_of(what: str, at: Any, otherwise: str = "") -> Pose:
+    """A place, m; `otherwise` is what else might stand there.
+
+    Raises:
+        ConfigError: it is none.
+
+    """
+    if (
+        not isinstance(at, list)
+        or len(at) not in (2, 3)
+        or not all(is_number(each) and abs(each) <= MAX_M for each in at)
+    ):
+        raise ConfigError(
+            f"{what} is {shown(at)}, expected [x, y] or [x, y, z] in m up to {MAX_M:.0f}{otherwise}"
+        )
+    return Pose.at(*at)
 
 
 def _sensors(table: Table) -> Iterator[Sensor]:

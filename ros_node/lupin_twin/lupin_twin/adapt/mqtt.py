@@ -83,11 +83,8 @@ class Pattern:
     @property
     def filter(self) -> str:
         """What to subscribe to: a level with a placeholder is any."""
-        return "/".join("+" if _PLACEHOLDER.search(part) else part for part in self._levels)
-
-    @property
-    def _levels(self) -> list[str]:
-        return self.topic.split("/")
+        levels = self.topic.split("/")
+        return "/".join("+" if _PLACEHOLDER.search(level) else level for level in levels)
 
     def match(self, topic: str) -> tuple[str, str] | None:
         """Tag and sensor of a topic, each empty where it says none; None: it is another's."""

@@ -6,7 +6,7 @@ Also what a consumer reads of it again. Times are seconds.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
 from typing import Final, Literal, get_args
@@ -126,27 +126,13 @@ UNKNOWN_JOURNAL = Condition(
 
 
 @dataclass(frozen=True, slots=True)
-class Estimates:
-    """How the estimates do: what is wrong with fits, by sensor, and whose intervals are too narrow.
+class Finding:
+    """One diagnostic_msgs/DiagnosticStatus, its name without the node's."""
 
-    `fits_failed` is since the start.
-    """
-
-    problems: Mapping[str, str] = field(default_factory=dict)
-    distrusted: tuple[str, ...] = ()
-    fits_failed: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Layers:
-    """What is published for viewers: messages so far by topic, and of how many topics it is wanted.
-
-    `problems` says of a topic why there is nothing on it.
-    """
-
-    published: Mapping[str, int] = field(default_factory=dict)
-    watched: int = 0
-    problems: Mapping[str, str] = field(default_factory=dict)
+    name: str
+    level: int
+    message: str
+    values: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +141,8 @@ class Health:
 
     `input_problems` says why not all of what they publish is received, with the remedy.
     `observed_ago_s` is how long ago the last observation was taken in; None: none was. `late` is
-    how many observations each source gave behind its own earlier ones.
+    how many observations each source gave behind its own earlier ones. `others` is what parts of
+    the twin say of themselves.
     """
 
     clock: ClockState
@@ -169,20 +156,9 @@ class Health:
     fields_computed: int
     slowest_field_s: float
     journal: Condition = UNKNOWN_JOURNAL
-    estimates: Estimates = Estimates()
-    layers: Layers = Layers()
+    others: tuple[Finding, ...] = ()
     origin: Origin = "robot"
     input_problems: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One diagnostic_msgs/DiagnosticStatus, its name without the node's."""
-
-    name: str
-    level: int
-    message: str
-    values: Mapping[str, str]
 
 
 def findings(health: Health) -> Iterator[Finding]:
@@ -196,7 +172,7 @@ def findings(health: Health) -> Iterator[Finding]:
     yield Finding(
         "drops",
         WARN if recent or counts.callback_errors else OK,
-        "; ".join(f"{drop.count} recently: {_shown(drop.message)}" for drop in recent)
+        "; ".join(f"{drop.count} recently: {shown(drop.message)}" for drop in recent)
         or "nothing recently",
         {
             **{str(why): str(count) for why, count in counts.dropped.items() if why != LOST},
@@ -211,11 +187,11 @@ def findings(health: Health) -> Iterator[Finding]:
         f"{lost[0].count} messages lost recently" if lost else "nothing lost recently",
         {LOST: str(counts.dropped.get(LOST, 0)), **_recent_readings(lost)},
     )
-    late = {_shown(source): str(count) for source, count in health.late.items()}
+    late = {shown(source): str(count) for source, count in health.late.items()}
     yield Finding(
         "stamps",
         WARN if late else OK,
-        f"stamps behind their own earlier ones from {_shown(', '.join(late))}"
+        f"stamps behind their own earlier ones from {shown(', '.join(late))}"
         if late
         else "no stamps too late",
         late,
@@ -226,15 +202,7 @@ def findings(health: Health) -> Iterator[Finding]:
         f"{health.fields_computing} being computed",
         {"computed": str(health.fields_computed), "slowest, s": f"{health.slowest_field_s:.3f}"},
     )
-    yield _estimates(health.estimates)
-    layers = health.layers
-    wrong = "; ".join(f"{topic}: {why}" for topic, why in layers.problems.items())
-    yield Finding(
-        "layers",
-        WARN if wrong else OK,
-        _shown(wrong) or f"{layers.watched} of {len(layers.published)} topics have subscribers",
-        {topic: str(count) for topic, count in layers.published.items()},
-    )
+    yield from health.others
     journal = health.journal
     yield Finding(
         "journal",
@@ -264,25 +232,12 @@ def findings(health: Health) -> Iterator[Finding]:
     )
 
 
-def _estimates(estimates: Estimates) -> Finding:
-    wrong = [f"{sensor}: {why}" for sensor, why in estimates.problems.items()]
-    wrong += [
-        f"{sensor}: too sure of itself, by what it predicted" for sensor in estimates.distrusted
-    ]
-    return Finding(
-        "estimates",
-        WARN if wrong else OK,
-        _shown("; ".join(wrong)) or "nothing is wrong",
-        {"fits failed": str(estimates.fits_failed)},
-    )
-
-
 def _inputs(health: Health) -> Finding:
     values = {topic: str(count) for topic, count in health.inputs.items()}
     observed_ago_s = health.observed_ago_s
     if observed_ago_s is not None:
         values["last observation, s ago"] = f"{observed_ago_s:.1f}"
-    problems = [_shown(problem) for problem in health.input_problems]
+    problems = [shown(problem) for problem in health.input_problems]
     values |= {f"{_PROBLEM}{number}": problem for number, problem in enumerate(problems, 1)}
     silent = [topic for topic, count in health.inputs.items() if not count]
     if problems:
@@ -298,11 +253,12 @@ def _recent_readings(recent: Iterable[Recent]) -> dict[str, str]:
     values = {}
     for drop in recent:
         values[_RECENTLY + drop.reason] = str(drop.count)
-        values[_LAST + drop.reason] = _shown(drop.message)
+        values[_LAST + drop.reason] = shown(drop.message)
     return values
 
 
-def _shown(text: str) -> str:
+def shown(text: str) -> str:
+    """The text, or of a long one its beginning."""
     return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 1] + "…"
 
 
@@ -333,14 +289,14 @@ def self_report(reported: Iterable[Finding]) -> SelfReport:
     origin = origin_of(values.get("origin", {}).get("origin", ""), is_simulated=False)
     inputs = values.get("inputs", {})
     problems = tuple(
-        _shown(inputs[key])
+        shown(inputs[key])
         for number in range(1, MAX_PROBLEMS + 1)
         if (key := f"{_PROBLEM}{number}") in inputs
     )
     both = {**values.get("drops", {}), **values.get("queues", {})}
     dropped = {reason: _number(both, reason) for reason in _REASONS}
     recent = tuple(
-        Recent(reason, _shown(both.get(_LAST + reason, "")), count)
+        Recent(reason, shown(both.get(_LAST + reason, "")), count)
         for reason in _REASONS
         if (count := _number(both, _RECENTLY + reason))
     )
@@ -361,17 +317,17 @@ def _journal(finding: Finding) -> Condition:
     complete = values.get("complete to", "")
     return Condition(
         state,
-        _shown(finding.message),
-        path=_shown(values.get("file", "")),
+        shown(finding.message),
+        path=shown(values.get("file", "")),
         written=_number(values, "written"),
         waiting=_number(values, "waiting"),
         lost=_number(values, "lost"),
         refused=_number(values, "refused"),
-        set_aside=_shown(values.get("set aside", "")),
+        set_aside=shown(values.get("set aside", "")),
         simulated_ns=simulated[0] if len(simulated) == 1 else None,
         complete_ns=int(complete) if _are_stamps(complete) else None,
         kept_ns=_read_stretches(values.get("kept", "")),
-        journal_id=_shown(values.get("id", "")),
+        journal_id=shown(values.get("id", "")),
     )
 
 

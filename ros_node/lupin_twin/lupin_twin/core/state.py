@@ -249,6 +249,14 @@ class Snapshot:
         return self.stamp_ns if self.clock in ("running", "paused") else None
 
 
+def same_tags(before: Snapshot | None, tags: Iterable[TagState]) -> tuple[TagState, ...]:
+    """The tags, each the very same value as before if it has not changed: identities tell."""
+    known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
+    return tuple(
+        old if (old := known.get(tag.tag_id)) is not None and old == tag else tag for tag in tags
+    )
+
+
 @dataclass(slots=True)
 class TwinStore:
     """The latest of everything, per tag: what has the latest stamp; of equal ones, what came later.

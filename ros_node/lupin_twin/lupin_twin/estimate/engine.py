@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from lupin_twin.core.state import FLOAT32_MAX, NANOSECONDS_PER_SECOND
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.estimate.cholesky import MAX_EXACT, PER_TAG
 from lupin_twin.estimate.kernel import MAX_PER_TAG, Readings
 from lupin_twin.estimate.posterior import EstimateGrid
@@ -67,11 +67,6 @@ class Estimate:
     grid: EstimateGrid
     sample_count: int
     reading_count: int
-
-
-def is_usable(value: float) -> bool:
-    """Whether an estimate, whose numbers become float32, can take a value; NaN it cannot."""
-    return abs(value) <= FLOAT32_MAX
 
 
 def moment_of(tags: Sequence[TagPast], now_ns: int, day_length_s: float) -> int:

@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 from lupin_twin.core.history import KNOWN_BY_NOTHING, kind_of
 from lupin_twin.core.state import Flower, Inspection, Pin, Scan, Write
 from lupin_twin.journal.beside import Lock
-from lupin_twin.journal.hours import WrittenInspection, WrittenScan, count
+from lupin_twin.journal.hours import count_rows
 from lupin_twin.journal.received import last_number
 from lupin_twin.journal.rows import (
     KIND_FLOWER,
@@ -76,7 +76,7 @@ class Appender:
     """Writes rows through a connection, inside its caller's transaction.
 
     What it remembers of the file is wrong after a transaction that was rolled back: make another
-    one then. Rows stand in the tables after `flush`; that returns the scans among them.
+    one then. Rows stand in the tables after `flush`.
     """
 
     def __init__(self, connection: sqlite3.Connection) -> None:
@@ -85,7 +85,7 @@ class Appender:
             f"SELECT coalesce(max(seq), 0) FROM {table} WHERE site = '{LOCAL_SITE}'"  # noqa: S608
             for table in ("scan", "look", "place")
         )
-        self.last_seq = max(
+        self.last_seq: int = max(
             int(get_meta(connection, PURGED_SEQ) or 0),
             int(get_meta(connection, LAST_SEQ) or 0),
             last_number(SiteLog(connection)),
@@ -97,8 +97,7 @@ class Appender:
         self._groups: dict[tuple[int, str, int], _Group] = {}
         self._waiting: dict[str, list[tuple[object, ...]]] = {table: [] for table in _ADD}
         self._waiting_weight = 0
-        self._scans: list[WrittenScan] = []
-        self._inspections: list[WrittenInspection] = []
+        self._counted_seq = self.last_seq
 
     def append(self, run: int, rows: Iterable[Write], *, are_copies: bool = False) -> int:
         """Take in what is not there yet; returns how many rows that were."""
@@ -112,15 +111,16 @@ class Appender:
         return new
 
     def flush(self) -> None:
-        """Have what was taken in in the tables."""
+        """Have what was taken in in the tables, and counted."""
         self._waiting_weight = 0
         for table, rows in self._waiting.items():
             if rows:
                 self._connection.executemany(_ADD[table], rows)
                 rows.clear()
-        if self._scans or self._inspections:
-            count(SiteLog(self._connection), self._scans, self._inspections, self.counted_ns)
-            self._scans, self._inspections = [], []
+        if self.last_seq > self._counted_seq:
+            log = SiteLog(self._connection)
+            count_rows(log, self._counted_seq, self.last_seq, self.counted_ns)
+            self._counted_seq = self.last_seq
 
     # --- the three kinds ----------------------------------------------------------------------
 
@@ -153,7 +153,6 @@ class Appender:
                 return False
         self.last_seq += 1
         series = self._series((run, tag, kind), tuple(readings))
-        values = list(readings.values())
         self._waiting["scan"].append(
             (
                 self.last_seq,
@@ -166,11 +165,9 @@ class Appender:
                 _unicode(scan.mission),
                 _unicode(scan.status_detail),
                 is_copy,
-                _numbers(values),
+                _numbers(readings.values()),
             )
         )
-        if not is_copy:
-            self._scans.append(WrittenScan(run, series, kind, stamp_ns, scan.status, values))
         return True
 
     def _put_inspection(
@@ -202,12 +199,6 @@ class Appender:
                 f"[{','.join(map(_numbers, flower.footprint))}]",
             )
         )
-        if not is_copy:
-            self._inspections.append(
-                WrittenInspection(
-                    run, tag, self.last_seq, inspection.stamp_ns, flower.anomaly, flower.bug_count
-                )
-            )
         return True
 
     # --- what is there already ----------------------------------------------------------------
@@ -292,7 +283,7 @@ def _own_ns(write: Scan | Inspection) -> int | None:
 
 def _numbers(values: Iterable[float]) -> str:
     """A JSON list; what is not finite is null."""
-    text = ",".join(map(repr, values))
+    text = ",".join([repr(float(value)) for value in values])
     return json_text(list(map(_finite, values))) if "n" in text else f"[{text}]"  # nan, inf
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import fcntl
 import os
 import re
+import sqlite3
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Final, Self
 
-from lupin_twin.journal.schema import sync
+from lupin_twin.journal.schema import open_named, open_writer, sync
 
 NO_JOURNAL: Final = "off"
 
@@ -117,6 +119,26 @@ def holder_of(journal: Path) -> str | None:
     finally:
         os.close(descriptor)
     return None
+
+
+@contextmanager
+def writing_alone(journal: Path, holder: str) -> Iterator[sqlite3.Connection]:
+    """A journal that is there, to be written while its twin is stopped.
+
+    Raises:
+        InUse: a twin has it.
+        Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
+
+    """
+    # Not a thing is made beside a file that is no journal.
+    with closing(open_named(journal)):
+        pass
+    try:
+        lock = Lock(journal, holder)
+    except InUse as error:
+        raise InUse(f"{error}: stop the twin first") from error
+    with lock, closing(open_writer(journal)) as connection:
+        yield connection
 
 
 def _beside(journal: Path) -> Path:

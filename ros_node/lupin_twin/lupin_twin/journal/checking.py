@@ -8,14 +8,12 @@ that rows mean something. SQLite keeps no checksums: a digit that has flipped is
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS, pages_of, records
 from lupin_twin.journal.rows import sensor_names
 from lupin_twin.journal.runs import Run, runs
 from lupin_twin.journal.schema import (
@@ -23,7 +21,6 @@ from lupin_twin.journal.schema import (
     LOCAL_SITE,
     Empty,
     Foreign,
-    get_meta,
     is_damage_error,
     open_reader,
 )
@@ -143,49 +140,16 @@ def delete_wrong(connection: sqlite3.Connection, table: str, after: int, until: 
     )
 
 
+# --- what is in it --------------------------------------------------------------------------------
+
 _COUNTED: Final = ("scan", "look", "place", "hour")
 
-
-@dataclass(frozen=True, slots=True)
-class RunExtent:
-    """A run, and its first and last stamp in ns of ROS time; None where nothing is left of it."""
-
-    run: Run
-    first_ns: int | None
-    last_ns: int | None
+# A run, and its first and last stamp in ns of ROS time; None where nothing is left of it.
+RunExtent = tuple[Run, int | None, int | None]
 
 
-@dataclass(frozen=True, slots=True)
-class Overview:
-    """What a journal holds.
-
-    `rows` counts by table, and `tag` by name; `failures` the scans that failed; copies are rows
-    too. `kept_ns` and `kept_bytes` are the limits that its last twin was given, 0 where none has
-    said; `quarantined` names damaged journals beside it, with their sizes; `forgotten` are the
-    `records` of tags that were forgotten.
-    """
-
-    file_bytes: int
-    free_bytes: int
-    log_bytes: int
-    rows: dict[str, int]
-    failures: int
-    sensors: tuple[str, ...]
-    runs: tuple[RunExtent, ...]
-    kept_ns: int
-    kept_bytes: int
-    quarantined: tuple[tuple[str, int], ...]
-    forgotten: tuple[Mapping[str, object], ...]
-
-
-def overview(connection: sqlite3.Connection, path: Path) -> Overview:
-    """What the journal at `path` holds, which the connection reads.
-
-    Raises:
-        sqlite3.Error: it cannot be read.
-
-    """
-    pages, free, size = pages_of(connection)
+def row_counts(connection: sqlite3.Connection) -> dict[str, int]:
+    """How many rows each table has, copies too; how many tags; and how many scans that failed."""
     rows = {
         table: int(connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0])
         for table in _COUNTED
@@ -194,39 +158,28 @@ def overview(connection: sqlite3.Connection, path: Path) -> Overview:
         "SELECT count(*) FROM (SELECT tag FROM series UNION SELECT tag FROM place)"
     ).fetchone()
     # Its index has none but those.
-    (failures,) = connection.execute(
+    (rows["failure"],) = connection.execute(
         "SELECT count(*) FROM scan WHERE status != 0 AND is_copy = 0"
     ).fetchone()
-    return Overview(
-        file_bytes=pages * size,
-        free_bytes=free * size,
-        log_bytes=size_of(path.with_name(path.name + "-wal")),
-        rows=rows,
-        failures=int(failures),
-        sensors=_sensors(connection),
-        runs=_extents(connection),
-        kept_ns=int(get_meta(connection, RETENTION_NS) or 0),
-        kept_bytes=int(get_meta(connection, RETENTION_BYTES) or 0),
-        quarantined=quarantined_beside(path),
-        forgotten=tuple(records(connection)),
-    )
+    return rows
 
 
-def quarantined_beside(path: Path) -> tuple[tuple[str, int], ...]:
+def quarantined_beside(path: Path) -> list[tuple[str, int]]:
     """(name, bytes) of the damaged journals that were quarantined, the newest last."""
     prefix = f"{path.name}.damaged-"
-    return tuple(
+    return [
         (file.name, size_of(file))
         for file in sorted(path.parent.iterdir())
         if file.name.startswith(prefix) and not file.name.endswith(("-wal", "-shm"))
-    )
+    ]
 
 
-def _sensors(connection: sqlite3.Connection) -> tuple[str, ...]:
+def sensors_of(connection: sqlite3.Connection) -> list[str]:
+    """The names of all sensors."""
     names: set[str] = set()
     for (text,) in connection.execute("SELECT DISTINCT sensors FROM series"):
         names.update(sensor_names(text))
-    return tuple(sorted(names))
+    return sorted(names)
 
 
 # One step in the index for each series; an extent over all rows would read all of them.
@@ -240,13 +193,14 @@ _EXTENTS: Final = (
 )
 
 
-def _extents(connection: sqlite3.Connection) -> tuple[RunExtent, ...]:
-    found = {run: extent for run, *extent in connection.execute(_EXTENTS)}
-    return tuple(
-        RunExtent(run, *found.get(run.id, (None, None)))
+def extents(connection: sqlite3.Connection) -> list[RunExtent]:
+    """The runs of the clock, in the order in which they began."""
+    found = {run: ends for run, *ends in connection.execute(_EXTENTS)}
+    return [
+        (run, *found.get(run.id, (None, None)))
         for run in runs(connection.execute)
         if run.joins is None
-    )
+    ]
 
 
 def size_of(path: Path) -> int:

@@ -34,7 +34,6 @@ from lupin_twin.journal.rows import last_rows
 from lupin_twin.journal.runs import (
     CORRECTION_NS,
     FOREVER_NS,
-    Carries,
     Clock,
     Run,
     put_run,
@@ -44,13 +43,11 @@ from lupin_twin.journal.runs import (
 from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
-    FILE_ERRORS,
     LOCAL_SITE,
     MAP,
     ORIGIN,
     SiteLog,
     get_meta,
-    is_damage_error,
     open_writer,
     set_meta,
     transaction,
@@ -106,7 +103,9 @@ class JournalFile:
         self._map_rests_until_s = 0.0
         self.quarantined = ""
         if is_sound is False or (is_sound is None and self._is_damaged()):
-            self._quarantine()
+            # Wall time, as whoever looks for the file reads it.
+            when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
+            self.quarantined = str(quarantine(path, when))
         self._open()
 
     def close(self) -> None:
@@ -122,20 +121,8 @@ class JournalFile:
     def _is_damaged(self) -> bool:
         return 0 < size_of(self._path) <= _CHECKED_BYTES and find_damage(self._path) is not None
 
-    def _quarantine(self) -> None:
-        # Wall time, as whoever looks for the file reads it.
-        self.quarantined = str(
-            quarantine(self._path, time.strftime("%Y%m%dT%H%M%SZ", time.gmtime()))
-        )
-
     def _open(self) -> None:
-        try:
-            self._connection = open_writer(self._path)
-        except FILE_ERRORS as error:
-            if not is_damage_error(error):
-                raise
-            self._quarantine()
-            self._connection = open_writer(self._path)
+        self._connection = open_writer(self._path)
         try:
             self._salvage()
             self._appender = Appender(self._connection)
@@ -184,34 +171,23 @@ class JournalFile:
         """What a twin that starts now knows, in the run that it is in: the last one, or a new one.
 
         A wall clock that is behind what the log has received is doubted, unless `is_believed`:
-        nothing is begun then. Of a file that cannot be read what can be is salvaged, once.
+        nothing is begun then.
         """
-        try:
-            return self._start(now, is_believed=is_believed)
-        except FILE_ERRORS as error:
-            if self.quarantined or not is_damage_error(error):
-                raise
-        self.close()
-        self._quarantine()
-        self._open()
-        return self._start(now, is_believed=is_believed)
-
-    def _start(self, now: Clock, *, is_believed: bool) -> Restored:
         every = self._runs()
         run = next((r for r in reversed(every) if r.begun.is_simulated == now.is_simulated), None)
         if run is None:
-            return self._restored(self.begin(now, None, Carries.NOTHING))
+            return self._restored(self.begin(now, None))
         root = next(r for r in every if r.id == run.root)
         last = self._last(root)
         if now.is_simulated and not simulation_goes_on(root.begun, last, now):
-            run = self.begin(now, run, Carries.NOTHING)
+            run = self.begin(now, None)
         elif not now.is_simulated and now.arrival_ns < last.arrival_ns - CORRECTION_NS:
             if not is_believed:
                 restored = self._restored(run)
-                return replace(restored, last_ns=last.arrival_ns, is_doubted=True)
-            run = self.begin(now, run, Carries.PLACES)
+                return replace(restored, doubted_ns=last.arrival_ns)
+            run = self.begin(now, run, places_only=True)
         elif not now.is_simulated and now.stamp_ns < last.stamp_ns:
-            run = self.begin(now, run, Carries.ALL, joins=root.id)
+            run = self.begin(now, run, joins=root.id)
         else:
             with self._transaction():
                 self._go_on_with(root.id)
@@ -227,11 +203,12 @@ class JournalFile:
         self,
         now: Clock,
         before: Run | None,
-        carries: Carries,
+        *,
         joins: int | None = None,
         ended_ns: int | None = None,
+        places_only: bool = False,
     ) -> Run:
-        """A new run, or a step into `joins`; what was known in `before` is copied into it.
+        """A new run, or a step into `joins`; what was known in `before`, if any, is copied into it.
 
         `ended_ns` is how far the clock had come in `before`, where the twin saw it go back.
         """
@@ -241,7 +218,7 @@ class JournalFile:
             run = Run(number, now, self._appender.last_seq + 1, joins)
             put_run(self._connection, run)
             if before is not None:
-                rows = copies(self._connection, before, carries)
+                rows = copies(self._connection, before, places_only=places_only)
                 copy_known(self._appender, before, run, rows)
                 if ended_ns is not None and before.root != run.root:
                     execute(
@@ -260,7 +237,7 @@ class JournalFile:
         for older in reversed([r for r in roots if r.id < before.root]):
             ended_ns = self._last(older).stamp_ns
             if begun.stamp_ns < ended_ns <= now.stamp_ns:
-                return self.begin(now, before, Carries.ALL, joins=older.id)
+                return self.begin(now, before, joins=older.id)
         return before
 
     def retain_run(self, run: Run) -> None:

@@ -15,7 +15,6 @@ from itertools import repeat
 from typing import Any, Final
 
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
-from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.state import (
     NO_FLOWER,
     Attempt,
@@ -29,16 +28,14 @@ from lupin_twin.core.state import (
     TagState,
     Write,
 )
-from lupin_twin.journal.queries import newest
 from lupin_twin.journal.rows import (
     KIND_READING,
     STATUS_OK,
     flower_of,
     listed_rows,
     named_numbers,
-    newest_of_tag,
 )
-from lupin_twin.journal.runs import FOREVER_NS, Carries, Run, runs, since_seq, span_at
+from lupin_twin.journal.runs import FOREVER_NS, Run, runs, since_seq, span_at
 from lupin_twin.journal.schema import LOCAL_SITE
 
 # What a state takes, about, seconds of one core for each tag.
@@ -76,17 +73,16 @@ _PLACES: Final = (
 class Restored:
     """What a twin that starts in a run knows: the state, and the last writes, for the histories.
 
-    `last_seq` is how many writes the log has seen. `last_ns` is the latest moment of the wall's
-    clock that the log knows; where the clock now contradicts that, `is_doubted`, and there is
-    nothing yet to write to.
+    `last_seq` is how many writes the log has seen. `doubted_ns` is the latest moment of the wall's
+    clock that the log knows, where the clock now contradicts that: there is nothing yet to write
+    to.
     """
 
     run: Run
     known: Known
     rows: tuple[Scan | Inspection, ...]
     last_seq: int
-    last_ns: int = 0
-    is_doubted: bool = False
+    doubted_ns: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,23 +221,24 @@ def _latest(scans: Sequence[tuple[int, int, tuple[Reading, ...]]]) -> tuple[Read
     return tuple(reading for *_, reading in latest.values())[:MAX_SENSORS_PER_TAG]
 
 
-def copies(connection: sqlite3.Connection, run: Run, carries: Carries) -> list[Write]:
+def copies(connection: sqlite3.Connection, run: Run, *, places_only: bool) -> list[Write]:
     """What is known in a run, as rows of another one, or of a step, that begins now.
 
     The rows that the fold rests on, in the order of their tags, of a tag in the order in which
-    they count, with the stamps that they have there.
+    they count, with the stamps that they have there. `places_only`: tags do not move, but how old
+    their readings are is not known.
     """
     known = fold(connection, run.root, FOREVER_NS, run.begun_seq)
     found: dict[str, list[tuple[int, int, Scan | Inspection]]] = {
         tag.tag_id: [] for tag in known.tags
     }
-    if carries is Carries.ALL:
+    if not places_only:
         for seq, row in listed_rows(connection, run.root, known.scans, known.inspections):
             found[row.tag_id].append((row.stamp_ns, seq, row))
     rows: list[Write] = []
     for tag in known.tags:
         placed_ns = known.placed_ns.get(tag.tag_id)
-        if carries is not Carries.NOTHING and tag.pose is not None and placed_ns is not None:
+        if tag.pose is not None and placed_ns is not None:
             rows.append(Pin(tag.tag_id, tag.pose, placed_ns, run.begun.arrival_ns))
         mine = sorted(found[tag.tag_id], key=lambda entry: entry[:2])
         if mine and tag.tag_id not in known.observed:
@@ -259,39 +256,3 @@ def _readings(rows: list[tuple[Any, ...]]) -> list[tuple[Reading, ...]]:
         tuple(map(Reading, names, values, repeat(row[5])))
         for row, (names, values) in zip(rows, every, strict=True)
     ]
-
-
-def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan | Inspection]:
-    """The last scans and inspections of a tag in the run of now, in the order of receiving."""
-    span = span_at(runs(connection.execute), FOREVER_NS)
-    if span is None:
-        return []
-    return newest_of_tag(connection, span.run.id, request.tag_id, request.count)
-
-
-# A tag's id, its place (m, map frame), and its readings: (ns of ROS time, value).
-RecentTag = tuple[str, float, float, tuple[tuple[int, float], ...]]
-
-
-def recent_readings(  # noqa: PLR0917
-    connection: sqlite3.Connection,
-    sensor_type: str,
-    at_ns: int,
-    reach_ns: int,
-    most: int,
-    each: int = 1,
-) -> Iterator[RecentTag]:
-    """The tags that had a place and a reading at `at_ns`, with their last finite readings.
-
-    `reach_ns` is how far back, `most` how many of all tags together, but `each` of each.
-    """
-    places = {
-        tag.tag_id: tag.pose
-        for tag in state_at(connection, at_ns, "").tags
-        if tag.pose is not None and any(reading.name == sensor_type for reading in tag.readings)
-    }
-    each = max(most // max(len(places), 1), each)
-    found = newest(connection, sensor_type, max(1, at_ns - reach_ns), at_ns + 1, each)
-    for tag_id, pose in places.items():
-        if tag_id in found:
-            yield tag_id, pose.x, pose.y, tuple(found[tag_id])

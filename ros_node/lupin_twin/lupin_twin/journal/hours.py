@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from lupin_twin.core.past import HOUR_NS, Event
 from lupin_twin.journal.rows import KIND_READING, STATUS_OK, numbers_of
@@ -30,28 +30,6 @@ _LARGEST: Final = 1e290
 _NOTHING: Final[Mapping[int, int]] = {}
 
 
-class WrittenScan(NamedTuple):
-    """A scan as it stands in the table, no copy; `values` are of its series' sensors, in order."""
-
-    run: int
-    series: int
-    kind: int
-    stamp_ns: int
-    status: int
-    values: Sequence[float]
-
-
-class WrittenInspection(NamedTuple):
-    """An inspection as it stands in the table, no copy."""
-
-    run: int
-    tag: str
-    seq: int
-    stamp_ns: int
-    anomaly: int
-    bug_count: int
-
-
 def is_counted(value: float) -> bool:
     """Whether a reading counts in the long views: those that are no number do not."""
     return -_LARGEST < value < _LARGEST
@@ -60,7 +38,9 @@ def is_counted(value: float) -> bool:
 def count_rows(
     log: SiteLog, after: int, until: int, counted_ns: Mapping[int, int] = _NOTHING
 ) -> None:
-    """Count what has a number behind one, up to another, as `count` does.
+    """Count the rows that have a number behind one, up to another; each once, whatever its stamp.
+
+    `counted_ns`: of some runs, up to when everything is counted already.
 
     Raises:
         DamagedFile: a scan has no series, or its readings are none.
@@ -68,37 +48,15 @@ def count_rows(
     """
     within = {"after": after, "until": until}
     scans = log.execute(_SCANS, within).fetchall()
-    values = numbers_of([row[-1] for row in scans])
-    written = [
-        WrittenScan._make([*row[:-1], of_row]) for row, of_row in zip(scans, values, strict=True)
-    ]
-    if any(scan.kind is None for scan in written):
-        raise DamagedFile("a scan has no series")
-    count(
-        log,
-        written,
-        [WrittenInspection(*row) for row in log.execute(_INSPECTIONS, within)],
-        counted_ns,
-    )
-
-
-def count(
-    log: SiteLog,
-    scans: Iterable[WrittenScan],
-    inspections: Sequence[WrittenInspection],
-    counted_ns: Mapping[int, int] = _NOTHING,
-) -> None:
-    """Count rows that are in the tables now, each once, whatever its stamp.
-
-    `counted_ns`: of some runs, up to when everything is counted already.
-    """
-    if counted_ns:
-        scans = [scan for scan in scans if scan.stamp_ns > counted_ns.get(scan.run, -1)]
-        inspections = [row for row in inspections if row.stamp_ns > counted_ns.get(row.run, -1)]
     hours: dict[tuple[int, int], list[Sequence[float]]] = {}
     tallies: dict[tuple[int, str, int], tuple[int, ...]] = {}
     stamps: dict[int, list[int]] = {}
-    for run, series, kind, stamp_ns, status, values in scans:
+    readings = numbers_of([row[-1] for row in scans])
+    for (run, series, kind, stamp_ns, status, _), values in zip(scans, readings, strict=True):
+        if kind is None:
+            raise DamagedFile("a scan has no series")
+        if stamp_ns <= counted_ns.get(run, -1):
+            continue
         stamps.setdefault(run, []).append(stamp_ns)
         hour = stamp_ns // HOUR_NS
         if status != STATUS_OK:
@@ -107,16 +65,20 @@ def count(
             _tally(tallies, (run, Event.SCANS, hour), len(values), stamp_ns)
         if values:
             hours.setdefault((series, hour), []).append(values)
-    for inspection in inspections:
-        stamps.setdefault(inspection.run, []).append(inspection.stamp_ns)
-        key = (inspection.run, Event.INSPECTIONS, inspection.stamp_ns // HOUR_NS)
-        _tally(tallies, key, inspection.bug_count, inspection.stamp_ns)
+    inspections = [
+        row
+        for row in log.execute(_INSPECTIONS, within).fetchall()
+        if row[1] > counted_ns.get(row[0], -1)
+    ]
+    for run, stamp_ns, _, _, _, bug_count in inspections:
+        stamps.setdefault(run, []).append(stamp_ns)
+        _tally(tallies, (run, Event.INSPECTIONS, stamp_ns // HOUR_NS), bug_count, stamp_ns)
     for run, of_run in stamps.items():
         _note_silences(log, run, sorted(of_run))
     _upsert_hours(log, hours)
     log.execute_many(_TALLY, [(log.site, *key, *entry) for key, entry in sorted(tallies.items())])
     for inspection in inspections:
-        _note_pests(log, inspection)
+        _note_pests(log, *inspection)
 
 
 def extent(log: SiteLog, run: int) -> tuple[int, int] | None:
@@ -141,7 +103,7 @@ _SCANS: Final = (
     " WHERE scan.site = :site AND seq > :after AND seq <= :until AND is_copy = 0"
 )
 _INSPECTIONS: Final = (
-    "SELECT run, tag, seq, stamp_ns, anomaly, bug_count FROM look"
+    "SELECT run, stamp_ns, tag, seq, anomaly, bug_count FROM look"
     " WHERE site = :site AND seq > :after AND seq <= :until AND is_copy = 0"
 )
 
@@ -299,14 +261,11 @@ _LAST_CHANGE: Final = (
 )
 
 
-def _note_pests(log: SiteLog, inspection: WrittenInspection) -> None:
+def _note_pests(  # noqa: PLR0917
+    log: SiteLog, run: int, stamp_ns: int, tag: str, seq: int, anomaly: int, bug_count: int
+) -> None:
     """Note what an inspection changes; a late one may make the next one a change, or none."""
-    within = {
-        "run": inspection.run,
-        "tag": inspection.tag,
-        "at": inspection.stamp_ns,
-        "seq": inspection.seq,
-    }
+    within = {"run": run, "tag": tag, "at": stamp_ns, "seq": seq}
     before = log.execute(_BEFORE, within).fetchone()
     if before is not None:
         had = bool(before[2])
@@ -314,8 +273,8 @@ def _note_pests(log: SiteLog, inspection: WrittenInspection) -> None:
         # A tag without inspection has no pest; that of a deleted one is known by what it changed.
         change = log.execute(_LAST_CHANGE, within).fetchone()
         had = change is not None and change[0] == Event.PESTS_SEEN
-    has = bool(inspection.anomaly)
-    _note_pest(log, within, inspection.bug_count, (had, has))
+    has = bool(anomaly)
+    _note_pest(log, within, bug_count, (had, has))
     after = log.execute(_AFTER, within).fetchone()
     if after is not None:
         within |= {"at": after[0], "seq": after[1]}

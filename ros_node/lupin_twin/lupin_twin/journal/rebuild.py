@@ -18,19 +18,19 @@ from typing import Final
 
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import Appender, copy_known
-from lupin_twin.journal.beside import Lock
+from lupin_twin.journal.beside import writing_alone
 from lupin_twin.journal.checking import Progress, find_all_damage
 from lupin_twin.journal.fold import copies
 from lupin_twin.journal.hours import DELETED
 from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS
-from lupin_twin.journal.runs import Carries, Run, put_run
+from lupin_twin.journal.runs import Run, put_run
 from lupin_twin.journal.salvage import numbered
 from lupin_twin.journal.schema import (
     APPLICATION_ID,
     LOCAL_SITE,
     DamagedFile,
+    NotPossible,
     json_text,
-    open_named,
     open_writer,
     set_meta,
     sync,
@@ -179,8 +179,9 @@ class _Upgrade:
         if (purged_ns := self._old.purged_ns(run.id)) >= 0:
             self._carry_counts(run.id, purged_ns)
         before = None if old.follows is None else self._begun.get(old.follows)
-        if before is not None and old.carries is not Carries.NOTHING:
-            copy_known(self._appender, before, run, copies(self._target, before, old.carries))
+        if before is not None:
+            rows = copies(self._target, before, places_only=old.places_only)
+            copy_known(self._appender, before, run, rows)
 
     def _carry_counts(self, run: int, purged_ns: int) -> None:
         """What was counted in hours some of whose rows are deleted; the others are not counted."""
@@ -230,10 +231,6 @@ def _finite(bucket: Bucket) -> tuple[float | None, ...]:
 _INSTRUCTIONS: Final = 100_000
 
 
-class NotPossible(Exception):
-    """It cannot be made smaller now; the message says why. What is in the file is as it was."""
-
-
 def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:
     """Make the file small; returns its bytes before and after.
 
@@ -246,10 +243,7 @@ def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
 
     """
-    # Not a thing is made beside a file that is no journal.
-    with closing(open_named(path)):
-        pass
-    with Lock(path, holder), closing(open_writer(path)) as connection:
+    with writing_alone(path, holder) as connection:
         handle_interrupts(connection)
         before = path.stat().st_size
         with closing(find_all_damage(connection, report)) as found:

@@ -9,23 +9,21 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Iterator, Mapping
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ, Appender
-from lupin_twin.journal.beside import InUse, Lock
+from lupin_twin.journal.beside import writing_alone
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, deleted_ns, extent
 from lupin_twin.journal.runs import FOREVER_NS, runs, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
     WRITTEN,
+    NotPossible,
     SiteLog,
     get_meta,
-    open_named,
-    open_writer,
     set_meta,
     transaction,
 )
@@ -214,17 +212,8 @@ _OF_SERIES: Final = (
 )
 
 
-class UnknownTagError(Exception):
-    """There is nothing of the tag to be forgotten; the message says so. The file is as it was."""
-
-
-@dataclass(frozen=True, slots=True)
-class Forgotten:
-    """How much of a tag is gone."""
-
-    scans: int
-    inspections: int
-    places: int
+# How many scans, inspections and places of a tag are gone.
+Forgotten = tuple[int, int, int]
 
 
 def forget(path: Path, tag_id: str, *, pose_only: bool, by: str, at_ns: int) -> Forgotten:
@@ -234,25 +223,18 @@ def forget(path: Path, tag_id: str, *, pose_only: bool, by: str, at_ns: int) -> 
 
     Raises:
         InUse: a twin has it.
-        UnknownTagError: the journal knows no such tag, or no place of it.
+        NotPossible: the journal knows no such tag, or no place of it.
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
 
     """
-    # Not a thing is made beside a file that is no journal.
-    with closing(open_named(path)):
-        pass
-    try:
-        lock = Lock(path, "lupin-twin journal forget")
-    except InUse as error:
-        raise InUse(f"{error}: stop the twin first") from error
-    with lock, closing(open_writer(path)) as connection, transaction(connection):
+    with writing_alone(path, "lupin-twin journal forget") as connection, transaction(connection):
         _check_known(connection, path, tag_id)
         # The numbers go on, also when the newest rows are gone.
         last_seq = Appender(connection).last_seq
         set_meta(connection, LAST_SEQ, last_seq)
         forgotten = delete_tag(connection, tag_id, last_seq, pose_only=pose_only)
-        if pose_only and not forgotten.places:
-            raise UnknownTagError(f"the journal {path} knows no place of tag {tag_id!r}")
+        if pose_only and not forgotten[-1]:
+            raise NotPossible(f"the journal {path} knows no place of tag {tag_id!r}")
         what = _POSE if pose_only else "all"
         log = SiteLog(connection)
         for run in runs(connection.execute):
@@ -277,13 +259,13 @@ def records(connection: sqlite3.Connection) -> Iterator[Mapping[str, object]]:
 
 def _check_known(connection: sqlite3.Connection, path: Path, tag_id: str) -> None:
     if get_meta(connection, "salvage"):
-        raise UnknownTagError(f"the journal {path} is being saved from damage: start its twin once")
+        raise NotPossible(f"the journal {path} is being saved from damage: start its twin once")
     query = {"site": LOCAL_SITE, "tag": tag_id}
     for table in ("series", "place"):
         found = connection.execute(f"SELECT 1 FROM {table} WHERE {_OF_TAG} LIMIT 1", query)  # noqa: S608
         if found.fetchone() is not None:
             return
-    raise UnknownTagError(f"the journal {path} knows no tag {tag_id!r}")
+    raise NotPossible(f"the journal {path} knows no tag {tag_id!r}")
 
 
 def delete_recorded(connection: sqlite3.Connection, record: str) -> None:
@@ -310,9 +292,9 @@ def delete_tag(
     of_tag = f"{_OF_TAG} AND seq <= :upto"
     places = gone("place", of_tag)
     if pose_only:
-        return Forgotten(0, 0, places)
+        return 0, 0, places
     gone("hour", _OF_SERIES)
     gone("event", of_tag)
     scans, inspections = gone("scan", _OF_SERIES), gone("look", of_tag)
     gone("series", f"{_OF_TAG} AND series <= :upto")
-    return Forgotten(scans, inspections, places)
+    return scans, inspections, places

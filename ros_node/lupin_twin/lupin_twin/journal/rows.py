@@ -10,8 +10,9 @@ from functools import lru_cache
 from typing import Any, Final
 
 from lupin_twin.core import history, state
+from lupin_twin.core.history import LatestRequest
 from lupin_twin.core.state import Bloom, Flower, Inspection, Reading, Scan, Write
-from lupin_twin.journal.runs import Run
+from lupin_twin.journal.runs import FOREVER_NS, Run, runs, span_at
 from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
 
 KIND_READING = history.KIND_TAG_READING
@@ -47,14 +48,16 @@ def last_rows(connection: sqlite3.Connection, run: Run) -> list[Scan | Inspectio
     return [row for _, row in sorted(found, key=lambda entry: entry[0])[-_LAST:]]
 
 
-def newest_of_tag(
-    connection: sqlite3.Connection, run: int, tag_id: str, per_series: int
-) -> list[Scan | Inspection]:
-    """The newest of each series of a tag, in the order of receiving.
+def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan | Inspection]:
+    """The last scans and inspections of a tag in the run of now, in the order of receiving.
 
     Each series by itself, which is quick on both engines.
     """
-    asked: dict[str, Any] = {"site": LOCAL_SITE, "run": run, "tag": tag_id, "depth": per_series}
+    span = span_at(runs(connection.execute), FOREVER_NS)
+    if span is None:
+        return []
+    asked: dict[str, Any] = {"site": LOCAL_SITE, "run": span.run.id}
+    asked |= {"tag": request.tag_id, "depth": request.count}
     of_tag = "s.site = :site AND s.run = :run AND s.tag = :tag"
     newest = " ORDER BY r.stamp_ns DESC, r.seq DESC LIMIT :depth"
     found = _inspections(connection, f"look AS r WHERE {_OF_RUN} AND r.tag = :tag{newest}", asked)

@@ -13,7 +13,7 @@ import heapq
 from bisect import bisect_right
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from enum import Enum, IntEnum
+from enum import Enum
 from typing import Any, Final
 
 from lupin_twin.core.diagnostics import origin_of
@@ -29,14 +29,6 @@ FOREVER_NS: Final = 2**63 - 1
 
 # `execute` of a connection to either engine.
 Execute = Callable[..., Any]
-
-
-class Carries(IntEnum):
-    """What of an earlier run still holds as another begins: it is copied into that."""
-
-    NOTHING = 0
-    PLACES = 1  # tags do not move, but how old their readings are is not known
-    ALL = 2  # the twin lived through it: what is later than the new now ages from there on
 
 
 class Turn(Enum):

@@ -132,6 +132,10 @@ class Empty(FileNotFoundError):
     """A file with nothing in it: a journal that is just being made."""
 
 
+class NotPossible(Exception):
+    """What cannot be done with a file now; the message says why. The file is as it was."""
+
+
 class DamagedFile(Exception):
     """A journal whose header or tables are not what was written."""
 

@@ -30,7 +30,7 @@ from lupin_twin.core.state import (
 )
 from lupin_twin.journal.hours import SILENCE_NS
 from lupin_twin.journal.rows import KIND_FLOWER, sensor_names
-from lupin_twin.journal.runs import Carries, Clock
+from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.salvage import readable
 from lupin_twin.journal.schema import DamagedFile, is_damage_error
 
@@ -39,6 +39,8 @@ VERSION: Final = 3
 _SCAN: Final = "id, series, stamp_ns, own_stamp_ns, lag_us, mission, detail, readings"
 _TALLIED: Final = {"scan": Event.SCANS, "failure": Event.FAILURES, "look": Event.INSPECTIONS}
 _NOTHING: Final = -(2**63)
+# What of an earlier run a run begins with.
+_PLACES, _ALL = 1, 2
 _COLUMN: Final = struct.Struct("<q")
 _SHAPE: Final = struct.Struct("<HHH")  # flowers, corners of the box, species named
 _LENGTH: Final = struct.Struct("<H")
@@ -52,12 +54,12 @@ Bucket = tuple[int, float, float, float]
 
 
 class OldRun(NamedTuple):
-    """A run of the clock; `follows` is the run whose knowledge it `carries`."""
+    """A run of the clock; `follows` is the run whose knowledge it carries, or places alone."""
 
     id: int
     begun: Clock
     follows: int | None
-    carries: Carries
+    places_only: bool
     ended_ns: int | None
 
 
@@ -193,9 +195,8 @@ class Version3:
         ):
             number, is_simulated, stamp_ns, arrival_ns, follows, carries, ended_ns = row
             begun = Clock(stamp_ns, arrival_ns, bool(is_simulated))
-            is_known = carries in list(Carries) and follows is not None and follows < number
-            what = Carries(carries) if is_known else Carries.NOTHING
-            yield OldRun(number, begun, follows, what, ended_ns)
+            is_known = carries in {_PLACES, _ALL} and follows is not None and follows < number
+            yield OldRun(number, begun, follows if is_known else None, carries == _PLACES, ended_ns)
 
     def _every_series(self) -> Iterator[tuple[int, _Series]]:
         sets: dict[int, tuple[str, ...]] = {}

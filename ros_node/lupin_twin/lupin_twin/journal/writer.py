@@ -11,7 +11,6 @@ import shutil
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
@@ -31,7 +30,7 @@ from lupin_twin.journal.rebuild import is_version3, upgrade
 from lupin_twin.journal.received import NoteQueue
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import weight
-from lupin_twin.journal.runs import Carries, Clock, Run, Turn
+from lupin_twin.journal.runs import Clock, Run, Turn
 from lupin_twin.journal.schema import DamagedFile, Foreign, is_damage_error
 
 # Readings, flowers and rows together: some 60 MB, twenty minutes of the largest greenhouse.
@@ -60,7 +59,8 @@ class Pending:
         self._weight = 0
         self._lost = 0
         self._lost_ns: tuple[int, int] | None = None
-        self._taken: list[Entry] = []
+        # So many of the oldest are being written.
+        self._held = 0
 
     def put(self, entry: Entry) -> None:
         """Hand over; takes microseconds, whatever the disk does."""
@@ -71,28 +71,27 @@ class Pending:
         if not self.arrived.is_set():
             self.arrived.set()
 
-    def take(self, count: int) -> list[Entry]:
-        """At most so many of the oldest; they wait still, until something is put back."""
+    def hold(self, count: int) -> list[Entry]:
+        """At most so many of the oldest; they wait still, and are not lost, until they are done."""
         self.arrived.clear()
         with self._lock:
-            taken = [self._entries.popleft() for _ in range(min(count, len(self._entries)))]
-            self._weight -= sum(weight(entry.row) for entry in taken)
-            self._taken = taken
-            if self._entries:
+            held = list(islice(self._entries, count))
+            self._held = len(held)
+            if len(self._entries) > count:
                 self.arrived.set()
-        return taken
+        return held
 
-    def put_back(self, entries: Sequence[Entry]) -> None:
-        """What was taken and could not be written is the oldest again; the rest is done with."""
+    def done(self, count: int) -> None:
+        """So many of those are written."""
         with self._lock:
-            self._taken = []
-            self._entries.extendleft(reversed(entries))
-            self._weight += sum(weight(entry.row) for entry in entries)
-            self._shed()
+            self._held = 0
+            for _ in range(count):
+                self._weight -= weight(self._entries.popleft().row)
 
     def _shed(self) -> None:
-        while self._weight > MAX_WEIGHT and len(self._entries) > 1:
-            lost = self._entries.popleft()
+        while self._weight > MAX_WEIGHT and len(self._entries) > self._held + 1:
+            lost = self._entries[self._held]
+            del self._entries[self._held]
             self._weight -= weight(lost.row)
             self._lost += 1
             first_ns, last_ns = self._lost_ns or (lost.at_ns, lost.at_ns)
@@ -102,13 +101,13 @@ class Pending:
         """(waiting, lost, when the oldest that waits was handed over)."""
         with self._lock:
             oldest = self._entries[0].handed_over_s if self._entries else None
-            return len(self._entries) + len(self._taken), self._lost, oldest
+            return len(self._entries), self._lost, oldest
 
     @property
     def complete_ns(self) -> int | None:
         """When the first was received that waits or was lost, ROS time; None: there is none."""
         with self._lock:
-            found = [entry.at_ns for entry in (*self._taken[:1], *islice(self._entries, 1))]
+            found = [entry.at_ns for entry in islice(self._entries, 1)]
             found += (self._lost_ns or ())[:1]
             return min(found, default=None)
 
@@ -177,7 +176,6 @@ class Journal:
         self._met_damage = self._quarantined = self._left_out = ""
         # What was received last, as the log has it, where the clock contradicts that.
         self._doubted_ns: int | None = None
-        self._unmet_limit = ""
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
 
@@ -191,8 +189,8 @@ class Journal:
     ) -> None:
         """Follow a clock from now on, and say why.
 
-        Nothing is written before the first. With that, the journal restores; if what it restores
-        `is_doubted`, it waits for another start, of a clock that agrees or is believed.
+        Nothing is written before the first. With that, the journal restores; if the clock is
+        doubted, it waits for another start, of one that agrees or is believed.
         """
         self._was_attempted.clear()
         self._eras.append(_Era(clock, turn, before_ns))
@@ -278,12 +276,16 @@ class Journal:
             except Exception as error:  # noqa: BLE001  # the twin goes on, whatever it is
                 self._report_failure(error)
                 self._notes.refuse(self._reported.detail)
-                self._was_attempted.set()
+                wait_s = _RETRY_S[min(self._failures, len(_RETRY_S) - 1)]
                 if is_damage_error(error):
                     self._is_sound = False
+                    if not self._failures:
+                        wait_s = 0.0  # a twin that starts waits for what can be read of it
+                if wait_s:
+                    self._was_attempted.set()
             if self._stop.is_set():
                 break
-            self._stop.wait(_RETRY_S[min(self._failures, len(_RETRY_S) - 1)])
+            self._stop.wait(wait_s)
             self._failures += 1
         if self._lock is not None:
             self._lock.release()
@@ -313,7 +315,6 @@ class Journal:
                 if self._map is not None:
                     file.put_map(self._map, partial(text_of, self._map))
                 has_more = not is_last and file.check_size(may_purge=bool(self._runs))
-                self._unmet_limit = file.unmet_limit
                 self._report_well(file)
                 if not is_last and not self._pending.arrived.wait(0.0 if has_more else _IDLE_S):
                     continue
@@ -345,9 +346,8 @@ class Journal:
                 continue
             believed = era.turn is Turn.BELIEVED
             restored = file.start(era.clock, is_believed=believed)
-            self._quarantined = file.quarantined or self._quarantined
-            self._doubted_ns = restored.last_ns if restored.is_doubted else None
-            if restored.is_doubted:
+            self._doubted_ns = restored.doubted_ns
+            if restored.doubted_ns is not None:
                 del self._eras[0]
             else:
                 self._runs.append(restored.run)
@@ -359,25 +359,21 @@ class Journal:
         if era.turn is Turn.AHEAD:
             return file.rejoin(era.clock, before)
         joins = before.root if era.turn is Turn.STEP else None
-        return file.begin(era.clock, before, Carries.ALL, joins, era.before_ns)
+        return file.begin(era.clock, before, joins=joins, ended_ns=era.before_ns)
 
     def _write(self, file: JournalFile, *, all_that_waits: bool) -> None:
         if not self._runs:
             self._pending.arrived.clear()
         while self._runs:
-            entries = self._pending.take(_MAX_BATCH)
+            entries = self._pending.hold(_MAX_BATCH)
             if not entries:
                 return
             # An era that has no run yet comes after all that have one.
             known = [entry for entry in entries if entry.era <= len(self._runs)]
-            later = entries[len(known) :]
-            try:
-                written, refused = file.append(
-                    [(self._runs[max(0, entry.era - 1)], entry.row) for entry in known]
-                )
-            except BaseException:
-                self._pending.put_back(entries)
-                raise
+            written, refused = file.append(
+                [(self._runs[max(0, entry.era - 1)], entry.row) for entry in known]
+            )
+            self._pending.done(len(known))
             self._failures = 0
             self._reported = replace(
                 self._reported,
@@ -388,19 +384,18 @@ class Journal:
             lost_ns = self._pending.take_lost()
             if lost_ns is not None:
                 file.note_lost(self._runs[-1], lost_ns)
-            self._pending.put_back(later)
-            if later or not all_that_waits:
+            if len(known) < len(entries) or not all_that_waits:
                 return
 
     # --- reporting ----------------------------------------------------------------------------
 
-    def _summary(self) -> str:
+    def _summary(self, unmet_limit: str) -> str:
         if self._is_temporary:
             return "what is observed is kept in a temporary file, which goes at the end"
         if self._quarantined:
             return f"recording; a damaged journal was quarantined as {self._quarantined}"
-        if self._unmet_limit:
-            return f"recording; {self._unmet_limit}"
+        if unmet_limit:
+            return f"recording; {unmet_limit}"
         return f"recording; {self._left_out}" if self._left_out else "recording"
 
     def _report_progress(self, share: float) -> None:
@@ -409,7 +404,7 @@ class Journal:
 
     def _report_well(self, file: JournalFile) -> None:
         state = JournalState.OFF if self._is_temporary else JournalState.RECORDING
-        detail = self._summary()
+        detail = self._summary(file.unmet_limit)
         if self._doubted_ns is not None:
             state = JournalState.DOUBTING
             until = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self._doubted_ns // 10**9))

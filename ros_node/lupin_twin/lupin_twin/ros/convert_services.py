@@ -10,7 +10,6 @@ import re
 from array import array
 from typing import Any, Final
 
-from lupin_msgs.msg import TwinState, TwinTimes
 from lupin_msgs.srv import (
     GetEstimate,
     GetEstimateReport,
@@ -19,7 +18,6 @@ from lupin_msgs.srv import (
     GetStateAt,
     GetWrites,
 )
-from std_msgs.msg import Header
 
 from lupin_twin.core.drops import MAX_TAGS
 from lupin_twin.core.past import (
@@ -278,18 +276,10 @@ def state_response(snapshot: Snapshot) -> Any:
 
     For a worker's thread: it rests often.
     """
-    tags, times = [], []
+    states = convert.StateMessages()
     for tag in in_turns(snapshot.tags):
-        msg = convert.tag_message(tag)
-        msg.stale_seconds = tag.stale_seconds(snapshot.now_ns)
-        tags.append(msg)
-        times.append(convert.times_message(tag))
-    header = Header(stamp=convert.time_msg(snapshot.stamp_ns), frame_id=snapshot.frame_id)
-    return GetStateAt.Response(
-        ok=True,
-        state=TwinState(header=header, tags=tags),
-        times=TwinTimes(header=header, tags=times),
-    )
+        states.parts(tag)
+    return GetStateAt.Response(ok=True, state=states.build(snapshot), times=states.times(snapshot))
 
 
 # --- a series -------------------------------------------------------------------------------

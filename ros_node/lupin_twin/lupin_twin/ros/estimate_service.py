@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from lupin_msgs.srv import GetEstimate, GetEstimateReport
 
-from lupin_twin.core.diagnostics import Estimates
+from lupin_twin.core.diagnostics import OK, WARN, Finding, shown
 from lupin_twin.core.interfaces import GET_ESTIMATE, GET_ESTIMATE_REPORT
 from lupin_twin.core.state import TwinStore
 from lupin_twin.estimate.engine import (
@@ -186,13 +186,20 @@ class EstimateService:
                 f"scans, {report.record.week.inside} came to lie where 9 of 10 were predicted",
             )
 
-    def state(self) -> Estimates:
+    def finding(self) -> Finding:
         """How those do that were asked for, for the twin's diagnostics."""
-        reports = {sensor: known.report for sensor, known in self._known.items()}
-        return Estimates(
-            {sensor: one.fit_problem for sensor, one in reports.items() if one.fit_problem},
-            tuple(sensor for sensor, one in reports.items() if one.record.is_trusted is False),
-            sum(known.failed for known in self._known.values()),
+        wrong = []
+        for sensor, known in self._known.items():
+            if known.report.fit_problem:
+                wrong.append(f"{sensor}: {known.report.fit_problem}")
+            if known.report.record.is_trusted is False:
+                wrong.append(f"{sensor}: too sure of itself, by what it predicted")
+        failed = sum(known.failed for known in self._known.values())
+        return Finding(
+            "estimates",
+            WARN if wrong else OK,
+            shown("; ".join(wrong)) or "nothing is wrong",
+            {"fits failed": str(failed)},
         )
 
     def _estimate(self, request: Any, reply: Callable[[Any], None]) -> Query:

@@ -19,7 +19,7 @@ from typing import Any, Final
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
-from lupin_twin.core.diagnostics import Layers
+from lupin_twin.core.diagnostics import OK, WARN, Finding, shown
 from lupin_twin.core.interfaces import LAYERS, PLANTERS, TAGS
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, TwinStore
 from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast
@@ -231,12 +231,18 @@ class LayerService:
 
     # --- the node's -------------------------------------------------------------------------
 
-    def state(self) -> Layers:
-        """What is published, for the twin's diagnostics."""
-        return Layers(
-            published={topic.publisher.topic_name: topic.published for topic in self._topics},
-            watched=sum(topic.is_wanted for topic in self._topics),
-            problems={t.publisher.topic_name: t.problem for t in self._topics if t.problem},
+    def finding(self) -> Finding:
+        """What is published, and of how many topics it is wanted, for the twin's diagnostics."""
+        topics = {topic.publisher.topic_name: topic for topic in self._topics}
+        wrong = "; ".join(
+            f"{name}: {topic.problem}" for name, topic in topics.items() if topic.problem
+        )
+        watched = sum(topic.is_wanted for topic in self._topics)
+        return Finding(
+            "layers",
+            WARN if wrong else OK,
+            shown(wrong) or f"{watched} of {len(topics)} topics have subscribers",
+            {name: str(topic.published) for name, topic in topics.items()},
         )
 
     def close(self) -> None:

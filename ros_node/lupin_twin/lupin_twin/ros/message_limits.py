@@ -41,9 +41,8 @@ _SIZES: Final = {
     **dict.fromkeys(("int32", "uint32", "float"), 4),
     **dict.fromkeys(("int64", "uint64", "double"), 8),
 }
-_TEXT: Final = re.compile(r"string(?:<(?P<limit>\d+)>)?")
-_SEQUENCE: Final = re.compile(r"sequence<(?P<element>.+?)(?:, (?P<limit>\d+))?>")
-_ARRAY: Final = re.compile(r"(?P<element>.+)\[(?P<count>\d+)\]")
+_SEQUENCE: Final = re.compile(r"sequence<(?P<element>[^,]+)>")
+_ARRAY: Final = re.compile(r"(?P<number>.+)\[(?P<count>\d+)\]")
 
 
 class MalformedError(ValueError):
@@ -95,7 +94,8 @@ class MessageShape:
 
     `max_bytes` bounds it as a whole, `limits` the elements of a sequence, by its path
     (`tag_reading.readings`), `max_elements` those of all sequences of messages in it together;
-    sequences of plain numbers take no more than their bytes.
+    sequences of plain numbers take no more than their bytes. Of types that are read here none is
+    empty, or has texts or sequences with a limit of their own, or arrays but of numbers.
 
     Raises:
         ImportError: it has a field of a type that is not installed.
@@ -137,32 +137,22 @@ class MessageShape:
 
     def _message(self, message_type: Any, path: str) -> _Part:
         fields = message_type.get_fields_and_field_types()
-        # ROS puts one byte into a message that has no field.
-        parts = [
-            self._field(kind, f"{path}.{name}" if path else name) for name, kind in fields.items()
-        ] or [_fixed(1, 1)]
-        return _in_a_row(parts)
+        return _in_a_row(
+            [self._field(kind, f"{path}.{name}" if path else name) for name, kind in fields.items()]
+        )
 
     def _field(self, kind: str, path: str) -> _Part:
         if kind in _SIZES:
             return _fixed(_SIZES[kind], 1)
-        if text := _TEXT.fullmatch(kind):
-            return _text(path, _number(text["limit"]))
+        if kind == "string":
+            return _text(path)
         if sequence := _SEQUENCE.fullmatch(kind):
-            limit = self._limits.pop(path, _number(sequence["limit"]))
-            element = sequence["element"]
+            limit, element = self._limits.pop(path, None), sequence["element"]
             return _sequence(path, self._field(element, path), limit, element not in _SIZES)
         if array := _ARRAY.fullmatch(kind):
-            count, element = int(array["count"]), array["element"]
-            if element in _SIZES:
-                return _fixed(_SIZES[element], count)
-            return _in_a_row([self._field(element, path)] * count)
+            return _fixed(_SIZES[array["number"]], int(array["count"]))
         package, _, name = kind.partition("/")
         return self._message(getattr(import_module(f"{package}.msg"), name), path)
-
-
-def _number(text: str | None) -> int | None:
-    return None if text is None else int(text)
 
 
 def _fixed(size: int, count: int) -> _Part:
@@ -206,7 +196,7 @@ def _in_a_row(parts: Sequence[_Part]) -> _Part:
     return _Part(walk, sum(part.min_bytes for part in merged))
 
 
-def _text(path: str, limit: int | None) -> _Part:
+def _text(path: str) -> _Part:
     def walk(reader: _Reader, at: int) -> int:
         at += -at % 4
         length = reader.length(at, path)
@@ -214,8 +204,6 @@ def _text(path: str, limit: int | None) -> _Part:
         if at > reader.end:
             left = reader.end - at + length
             raise MalformedError(f"{path} claims {length} bytes, {left} bytes are left")
-        if limit is not None and length > limit + 1:
-            raise TooManyError(f"{path} has {length - 1} bytes, the limit is {limit}")
         return at
 
     return _Part(walk, 4)

@@ -297,8 +297,7 @@ class TwinNode(AdjustableNode):
             fields_computing=self._field_service.queue.waiting,
             fields_computed=self._field_service.queue.answered,
             slowest_field_s=self._field_service.queue.slowest_s,
-            estimates=self.estimates.state(),
-            layers=self.layers.state(),
+            others=(self.estimates.finding(), self.layers.finding()),
             origin=self.origin,
             input_problems=self.utilities.check_inputs(),
         )

@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND
+from lupin_twin.core.state import FLOAT32_MAX, NANOSECONDS_PER_SECOND
 from lupin_twin.estimate.cholesky import Change, Place
 from lupin_twin.estimate.engine import (
     HALF_WIDTH_SDS,
@@ -25,7 +25,6 @@ from lupin_twin.estimate.engine import (
     Record,
     TagPast,
     Tally,
-    is_usable,
     readings_of,
     unchanged,
 )
@@ -35,7 +34,8 @@ from lupin_twin.estimate.posterior import Posterior
 from lupin_twin.field.engine import FieldRefused, check_sensor_type
 from lupin_twin.field.explored import OccupancyMap, floor, free_of
 from lupin_twin.field.idw import never
-from lupin_twin.journal.fold import recent_readings
+from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.queries import newest
 from lupin_twin.runtime.workers import in_turns
 
 # With fewer readings of a day there is little to learn, and nothing to be said of estimates.
@@ -49,13 +49,27 @@ _MAX_READINGS: Final = 20_000
 def readings_at(
     log: sqlite3.Connection, sensor: str, at_ns: int, day_length_s: float
 ) -> list[TagPast]:
-    """What the log has of the day up to a moment; of equal stamps, what was received last."""
-    reach_ns = int(day_length_s * NANOSECONDS_PER_SECOND)
+    """What the log has of the day up to a moment; of equal stamps, what was received last.
+
+    Numbers of an answer are float32: a reading past those does not count.
+    """
+    places = {
+        tag.tag_id: tag.pose
+        for tag in state_at(log, at_ns, "").tags
+        if tag.pose is not None and any(reading.name == sensor for reading in tag.readings)
+    }
+    start_ns = max(1, at_ns - int(day_length_s * NANOSECONDS_PER_SECOND))
+    each = max(_MAX_READINGS // max(len(places), 1), MAX_PER_TAG)
+    found = newest(log, sensor, start_ns, at_ns + 1, each)
     return [
-        TagPast(tag_id, x, y, tuple(one for one in dict(found).items() if is_usable(one[1])))
-        for tag_id, x, y, found in recent_readings(
-            log, sensor, at_ns, reach_ns, _MAX_READINGS, MAX_PER_TAG
+        TagPast(
+            tag_id,
+            pose.x,
+            pose.y,
+            tuple(one for one in dict(found[tag_id]).items() if abs(one[1]) <= FLOAT32_MAX),
         )
+        for tag_id, pose in places.items()
+        if tag_id in found
     ]
 
 

@@ -183,9 +183,9 @@ class Memory:
         doubt, early = self._doubt, self._early or ()
         self._is_requested = False
         self._doubt = None
-        if restored.is_doubted:
-            self._doubt = doubt or _Doubt(now, self._steady_ns(), 0)
-            self._doubt = self._doubt._replace(last_ns=restored.last_ns)
+        if restored.doubted_ns is not None:
+            clock, since_ns, _ = doubt or (now, self._steady_ns(), 0)
+            self._doubt = _Doubt(clock, since_ns, restored.doubted_ns)
         else:
             self._early = None
         self._restore(restored)

@@ -21,7 +21,7 @@ import struct
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Final, NoReturn, TextIO
@@ -62,6 +62,22 @@ def refuse(command: str, reason: str) -> int:
     """Say in a line why a command does not start; the exit code then."""
     sys.stderr.write(f"{command}: {' '.join(reason.split())}\n")
     return USAGE_ERROR
+
+
+def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Our own arguments, and ROS's: from `--ros-args` to `--` or the end, as ROS defines it."""
+    own: list[str] = []
+    ros: list[str] = []
+    in_ros = False
+    for argument in argv:
+        if argument == "--ros-args":
+            in_ros = True
+        elif in_ros and argument == "--":
+            ros.append(argument)
+            in_ros = False
+            continue
+        (ros if in_ros else own).append(argument)
+    return own, ros
 
 
 def open_standard_files() -> None:
@@ -170,6 +186,18 @@ def wait(end_within_s: int = END_S) -> None:
     """
     signal.sigwait(STOP_SIGNALS)
     must_end(end_within_s)
+
+
+def stop_flag() -> threading.Event:
+    """A flag that a stop signal sets; `block` was called. From then on the process has to end."""
+    flag = threading.Event()
+
+    def note() -> None:
+        wait()
+        flag.set()
+
+    threading.Thread(target=note, name="signals", daemon=True).start()
+    return flag
 
 
 def must_end(within_s: int = END_S) -> None:

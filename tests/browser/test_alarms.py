@@ -137,7 +137,7 @@ def test_the_counts_agree_and_healthy_beside_an_alarm_says_why(
         hmi.page.get_by_role("button", name="Acknowledge: Tag a").click()
         leave(hmi)
         expect(hmi.page).to_have_title("(2) Lupin twin")
-        expect(hmi.page.locator(".list-choice [data-testid=alarm-count]")).to_have_text("2")
+        expect(hmi.page.locator(".list-choice [data-testid=alarm-count]")).to_have_text("(2)")
         expect(hmi.page.locator("[data-group=active] h3")).to_have_text("Active (2)")
         expect(rows(hmi, "active").get_by_text("Ventilate or shade")).to_have_count(2)
         # Well again, but for too short a time to resolve anything.

@@ -175,7 +175,7 @@ function Also({ of, than }: { of: readonly Urgent[]; than: Verdict }): JSX.Eleme
   const verdicts = [than, ...of.map(({ reasons: [{ verdict }] }) => verdict)];
   return (
     <span>
-      {S.todoAlso}{' '}
+      {S.todoAlso(of.length)}{' '}
       {of.slice(0, MOST_ALSO).map(({ tagId, reasons: [{ verdict }] }, index) => (
         <Fragment key={tagId}>
           {index > 0 && ', '}

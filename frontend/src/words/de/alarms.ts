@@ -173,7 +173,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   },
   todoPestAgain: 'Nochmals kontrollieren: Ohne Befund ist der Alarm behoben',
   todoWell: 'Mit der nächsten guten Messung behoben',
-  todoAlso: 'auch',
+  todoAlso: (tags) => (tags === 1 ? 'auch Messpunkt' : 'auch Messpunkte'),
   todoLabel: 'Jetzt zu tun',
   reasonsLabel: 'Warum',
   healthHeading: 'Zustand des Gewächshauses',

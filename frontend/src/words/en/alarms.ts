@@ -182,7 +182,7 @@ export const HEALTH = {
   },
   todoPestAgain: 'Inspect again: a second clean inspection resolves it',
   todoWell: 'The next good scan resolves it',
-  todoAlso: 'also',
+  todoAlso: (tags: number): string => (tags === 1 ? 'also tag' : 'also tags'),
   todoLabel: 'Do this now',
   reasonsLabel: 'Why',
   healthHeading: 'Greenhouse status',

@@ -168,7 +168,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   },
   todoPestAgain: 'Nogmaals controleren: zonder plaag is het alarm opgelost',
   todoWell: 'Opgelost bij de volgende goede meting',
-  todoAlso: 'ook',
+  todoAlso: (tags) => (tags === 1 ? 'ook meetpunt' : 'ook meetpunten'),
   todoLabel: 'Nu doen',
   reasonsLabel: 'Waarom',
   healthHeading: 'Toestand van de kas',

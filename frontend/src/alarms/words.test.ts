@@ -137,16 +137,16 @@ test('of a pest how many: now, at worst and at first', () => {
   expect(valuesOf(alarm('a', { worst: 0, reason }), C, known(0, 'stressed')).worst).toBeNull();
 });
 
-test('since when and until when: of today the time alone', () => {
+test('since when and until when: of today the time alone, to the minute', () => {
   const since = alarm('a', { raised: NOON });
-  expect(spanText(since, NOON + 1_500)).toBe('since 12:00:00 (25\u00a0min)');
-  expect(spanText(since, NOON + 86_400)).toBe('since 14 Nov, 12:00:00 (1\u00a0d\u00a00\u00a0h)');
-  expect(spanText(since, null)).toBe('since 14 Nov, 12:00:00');
+  expect(spanText(since, NOON + 1_500)).toBe('since 12:00 (25\u00a0min)');
+  expect(spanText(since, NOON + 86_400)).toBe('since 14 Nov, 12:00 (1\u00a0d\u00a00\u00a0h)');
+  expect(spanText(since, null)).toBe('since 14 Nov, 12:00');
   const over = alarm('a', { raised: NOON, cleared: NOON + 600 });
-  expect(spanText(over, NOON + 1_500)).toBe('12:00:00 until 12:10:00 (10\u00a0min)');
-  expect(spanText(over, NOON + 86_400)).toBe('14 Nov, 12:00:00 until 12:10:00 (10\u00a0min)');
+  expect(spanText(over, NOON + 1_500)).toBe('12:00 until 12:10 (10\u00a0min)');
+  expect(spanText(over, NOON + 86_400)).toBe('14 Nov, 12:00 until 12:10 (10\u00a0min)');
   const night = alarm('a', { raised: NOON, cleared: NOON + 50_000 });
-  expect(spanText(night, NOON + 50_001)).toMatch(/^14 Nov, 12:00:00 until 01:53:20 \(13/);
+  expect(spanText(night, NOON + 50_001)).toMatch(/^14 Nov, 12:00 until 01:53 \(13/);
   expect(whenText(100, 200)).toBe('sim 00:01:40');
 });
 
@@ -157,11 +157,11 @@ test('for how long comes first, with the day only where it is another, and the e
     note: '',
   });
   expect(timesOf(since, NOON + 86_400, false).note).toBe('14 Nov');
-  expect(timesOf(since, null, false).length).toBe('14 Nov, 12:00:00');
+  expect(timesOf(since, null, false).length).toBe('14 Nov, 12:00');
   const over = alarm('a', { raised: NOON, cleared: NOON + 600 });
   expect(timesOf(over, NOON + 1_500, true)).toEqual({
     length: '10\u00a0min',
-    note: 'resolved 12:10:00',
+    note: 'resolved 12:10',
   });
   // Of a simulation's clock there are no days.
   expect(timesOf(alarm('a', { raised: 100 }), 160, false)).toEqual({

@@ -4,7 +4,7 @@ import { isOldReading, trendOf, type TagThen } from '../domain/difference';
 import {
   ageText,
   beyondLimitText,
-  clockText,
+  minuteText,
   readingText,
   type TemperatureUnit,
 } from '../domain/format';
@@ -145,9 +145,12 @@ const lengthText = (seconds: number): string => inOnePiece(ageText(Math.max(0, s
 /** A line does not break in it. */
 export const inOnePiece = (text: string): string => text.replace(' ', '\u00a0');
 
-/** A moment: of today the time alone; an alarm's year goes without saying. */
-export const whenText = (at: number, nowS: number | null): string =>
-  nowS !== null && isSameDay(at, nowS) ? clockOf(at) : shortRosText(at);
+/** A moment to the minute: of today the time alone; an alarm's year goes without saying. */
+export function whenText(at: number, nowS: number | null): string {
+  if (!hasDate(at)) return shortRosText(at);
+  const isToday = nowS !== null && isSameDay(at, nowS);
+  return isToday ? clockOf(at) : `${dayFormat.format(at * 1000)}, ${clockOf(at)}`;
+}
 
 const isSameDay = (a: number, b: number): boolean =>
   hasDate(a) && hasDate(b) && dayOf(a) === dayOf(b);
@@ -155,7 +158,7 @@ const isSameDay = (a: number, b: number): boolean =>
 /** On the operator's own clock. */
 const dayOf = (at: number): string => new Date(at * 1000).toDateString();
 
-const clockOf = (at: number): string => clockText(Math.floor(at) * 1000);
+const clockOf = (at: number): string => minuteText(at * 1000);
 
 /** Some alarms in one breath; `text` is that of one. */
 export function severalText(

@@ -4,7 +4,7 @@ import { byCause, tagsText } from '../alarms/arrange';
 import { selectSpeech } from '../alarms/speech';
 import { timeOfDay } from '../clock';
 import type { HealthReason } from '../contract/types';
-import { clockText, shortAgeText } from '../domain/format';
+import { minuteText, shortAgeText } from '../domain/format';
 import { isBad, severity, todoText, type HouseHealth } from '../domain/health';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
@@ -133,7 +133,7 @@ export function KioskNote({ wish }: { wish: CycleWish }): JSX.Element {
   const left = useTicking((now) =>
     next ? shortAgeText(Math.max(0, Math.ceil((next.at - now) / 1000))) : null,
   );
-  const time = useTicking(() => clockText(timeOfDay()).slice(0, -3));
+  const time = useTicking(() => minuteText(timeOfDay()));
   return (
     <div className="kiosk-note" data-testid="kiosk-note">
       {wish.refused !== null && (

@@ -76,13 +76,14 @@ test('its limit is that of now: what is critical; on the way back it stands besi
   });
 });
 
-test('the worst value is never better than that of now, which may come first', () => {
+test('the worst value is told where that of now is better, which may come first', () => {
   const cold = alarm('a', { worst: 8.7, reason: { value: 9, limit: 10 } });
-  expect(valuesOf(cold, C, known(8.2, 'critical')).worst).toBe('worst 8.2\u00a0°C');
+  expect(valuesOf(cold, C, known(8.7, 'critical')).worst).toBeNull();
+  expect(valuesOf(cold, C, known(8.2, 'critical')).worst).toBeNull();
   expect(alarmText(cold, C, known(8.2, 'critical'))).not.toContain('worst');
   const humid = { sensor: 'humidity', value: 68, limit: 60 } as const;
   const damp = alarm('b', { worst: 72.9, reason: humid });
-  expect(valuesOf(damp, C, known(73.7, 'stressed')).worst).toBe('worst 73.7\u00a0%');
+  expect(valuesOf(damp, C, known(72.88, 'stressed')).worst, 'reads the same').toBeNull();
   expect(valuesOf(damp, C, known(59, 'healthy')).worst).toBe('worst 72.9\u00a0%');
   const unknown = { kind: 'unknown', last: 80, lastAt: 'unknown' } as const;
   expect(valuesOf(damp, C, unknown).worst).toBe('worst 72.9\u00a0%');

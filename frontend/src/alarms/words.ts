@@ -47,7 +47,7 @@ export interface Values {
   readonly todo: string;
   /** Null: it is not of a value, or resolved. */
   readonly now: string | null;
-  /** Null: there is no such value. */
+  /** Null: there is no such value, or it is that of now. */
   readonly worst: string | null;
   readonly first: string | null;
 }
@@ -69,17 +69,18 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
         : readingText(sensor, value, unit);
   const nowText = (value: number): string =>
     isPest && value > 0 ? S.pestCount(value) : text(value);
+  const value = now?.kind === 'known' ? now.value : null;
+  const worstText = worst === null || (isPest && worst === 0) ? null : text(worst);
   const noneText = isPest ? S.alarmPests.none : S.alarmStatus.healthy;
   const isMeasured = isOfRange(reason) || isPest || reason.kind === 'changed';
   return {
     what: whatText({ ...alarm, reason }, speech),
     todo: todoText(reason),
-    now:
-      now?.kind === 'known' ? S.alarmNow(now.value === null ? noneText : nowText(now.value)) : null,
+    now: now?.kind === 'known' ? S.alarmNow(value === null ? noneText : nowText(value)) : null,
     worst:
-      worst === null || (isPest && worst === 0)
+      worstText === null || (value !== null && text(value) === worstText)
         ? null
-        : S.alarmWorst[isOfRange(reason) ? sideOf(reason) : 'pest'](text(worst)),
+        : S.alarmWorst[isOfRange(reason) ? sideOf(reason) : 'pest'](worstText),
     first: isMeasured && first !== null ? S.alarmFirst(text(first)) : null,
   };
 }
@@ -88,12 +89,11 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
 export function alarmText(alarm: Alarm, speech: Speech, now: Now | null): string {
   const { what, now: nowText, worst } = valuesOf(alarm, speech, now);
   const isKnown = now?.kind === 'known';
-  const isWorstNow = isKnown && now.value === (worstOf(alarm, now) ?? alarm.reason.value);
   const texts = [
     what,
     // What has no value says by itself how it is.
     isKnown && nowText !== null && now.value !== null ? rated(nowText, now.verdict) : nowText,
-    worst === null || isWorstNow ? null : rated(worst, alarm.reason.verdict),
+    worst === null ? null : rated(worst, alarm.reason.verdict),
   ];
   return S.alarmWhat(whereText(alarm), texts.filter((text) => text !== null).join(', '));
 }

@@ -65,7 +65,7 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
         ? String(value)
         : S.alarmPests.seen
       : isOfRange(reason)
-        ? beyondLimitText(sensor, value, reason.limit, unit)
+        ? beyondLimitText(sensor, value, reason.release ?? reason.limit, unit)
         : readingText(sensor, value, unit);
   const nowText = (value: number): string =>
     isPest && value > 0 ? S.pestCount(value) : text(value);

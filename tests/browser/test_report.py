@@ -112,6 +112,18 @@ def test_nothing_is_cut_on_paper_and_names_are_text(
         assert page.locator("script").count() == 0
 
 
+def test_on_a_phone_a_wide_table_scrolls_and_the_page_does_not(
+    troubled: Bridge, browser: Browser
+) -> None:
+    with browser.new_context(viewport={"width": 390, "height": 844}) as context:
+        page = context.new_page()
+        page.goto(f"{troubled.url}/api/report.html")
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
+        raised, _, active = (page.locator("dt").nth(at).bounding_box() for at in range(3))
+        assert raised is not None and active is not None
+        assert raised["x"] == active["x"], "two in a row"
+
+
 def test_in_the_dark_it_is_light(troubled: Bridge, browser: Browser) -> None:
     with browser.new_context(color_scheme="dark") as context:
         page = context.new_page()

@@ -192,7 +192,7 @@ export const PAGE: In<typeof EN.PAGE> = {
       ['A', 'Alarme'],
       ['C', 'Verlauf des gewählten Messpunkts'],
       ['L', 'Zurück zu Live'],
-      ['Leertaste', 'Vergangenheit abspielen oder anhalten'],
+      ['Leertaste', 'Rückblick abspielen oder anhalten'],
       ['U', '°C oder °F'],
       ['T', 'Hell oder dunkel'],
       ['Esc', 'Schließen, dann zurück zu Live'],
@@ -220,8 +220,8 @@ export const PAGE: In<typeof EN.PAGE> = {
 
 /** Ein anderer Zeitpunkt als jetzt, und die Zeitleiste. */
 export const PAST: In<typeof EN.PAST> = {
-  past: 'Vergangenheit',
-  pastTitle: (moment) => `${moment} (vergangen) · Lupin twin`,
+  past: 'Rückblick',
+  pastTitle: (moment) => `${moment} (Rückblick) · Lupin twin`,
   pastFetching: (moment) => `${moment} wird geladen`,
   pastFetchingHint: 'Bis dahin wird nichts angezeigt.',
   pastFailed: (moment) => `${moment} kann nicht angezeigt werden`,
@@ -231,16 +231,16 @@ export const PAST: In<typeof EN.PAST> = {
   pastFault: (wanted) => `${wanted} konnte nicht geladen werden.`,
   pastFaultShown: (shown, why) => `Angezeigt wird ${shown}; die Seite versucht es weiter. ${why}`,
   phasePast: {
-    connecting: 'Vergangen · verbindet',
-    live: 'Vergangen',
-    stale: 'Vergangen · kein Signal',
-    offline: 'Vergangen · Zwilling offline',
-    reconnecting: 'Vergangen · verbindet neu',
+    connecting: 'Rückblick · verbindet',
+    live: 'Rückblick',
+    stale: 'Rückblick · kein Signal',
+    offline: 'Rückblick · Zwilling offline',
+    reconnecting: 'Rückblick · verbindet neu',
   },
   backToLive: 'Zurück zu Live',
   backToRecording: 'Zurück zur Aufzeichnung',
   frozenBehindPast: (clock) => `Keine Live-Daten mehr. Letzte Daten um ${clock}`,
-  frozenPastStays: 'Die gezeigte Vergangenheit ist nicht betroffen.',
+  frozenPastStays: 'Der Rückblick ist nicht betroffen.',
   meanwhileShow: (tag) => `Zurück zu Live, zu Messpunkt ${tag}`,
 
   timebar: 'Zeitleiste',
@@ -262,7 +262,7 @@ export const PAST: In<typeof EN.PAST> = {
   timebarPlay: 'Abspielen',
   timebarPause: 'Anhalten',
   timebarSpeed: 'Geschwindigkeit',
-  timebarMarks: 'Was die Zeichen bedeuten',
+  timebarMarks: 'Zeichenerklärung',
   timebarMark: {
     scans: 'Balken nach oben: Messungen',
     failures: 'Balken nach unten: fehlgeschlagene Versuche',

@@ -66,7 +66,7 @@ export const ALARMS = {
   alarmsNew: (count: number): string => `${count} new`,
   alarmsNewHint: 'The order stays fixed while you use the list. Show new alarms',
   alarmFilter: 'Filter alarms',
-  alarmFilterHint: 'Filter …',
+  alarmFilterHint: 'Filter…',
   alarmOrder: 'Order',
   alarmOrders: { cause: 'By cause', newest: 'Newest first', tag: 'By tag' },
   alarmSaveCsv: 'Save alarms as CSV',

@@ -187,7 +187,7 @@ export const PAGE: In<typeof EN.PAGE> = {
       ['A', 'Alarmas'],
       ['C', 'Gráficas del punto elegido'],
       ['L', 'Volver al directo'],
-      ['Espacio', 'Reproducir o pausar el pasado'],
+      ['Espacio', 'Reproducir o pausar el histórico'],
       ['U', '°C o °F'],
       ['T', 'Claro u oscuro'],
       ['Esc', 'Cerrar; después, volver al directo'],
@@ -215,8 +215,8 @@ export const PAGE: In<typeof EN.PAGE> = {
 
 /** Otro momento que no es ahora, y la barra de tiempo. */
 export const PAST: In<typeof EN.PAST> = {
-  past: 'Pasado',
-  pastTitle: (moment) => `${moment} (pasado) · Lupin twin`,
+  past: 'Histórico',
+  pastTitle: (moment) => `${moment} (histórico) · Lupin twin`,
   pastFetching: (moment) => `Cargando ${moment}`,
   pastFetchingHint: 'No se muestra nada hasta que se cargue.',
   pastFailed: (moment) => `No se puede mostrar ${moment}`,
@@ -226,16 +226,16 @@ export const PAST: In<typeof EN.PAST> = {
   pastFault: (wanted) => `No se pudo cargar ${wanted}.`,
   pastFaultShown: (shown, why) => `Se muestra ${shown} mientras la página lo reintenta. ${why}`,
   phasePast: {
-    connecting: 'Pasado · conectando',
-    live: 'Pasado',
-    stale: 'Pasado · sin señal',
-    offline: 'Pasado · sin gemelo',
-    reconnecting: 'Pasado · reconectando',
+    connecting: 'Histórico · conectando',
+    live: 'Histórico',
+    stale: 'Histórico · sin señal',
+    offline: 'Histórico · sin gemelo',
+    reconnecting: 'Histórico · reconectando',
   },
   backToLive: 'Volver al directo',
   backToRecording: 'Volver a la grabación',
   frozenBehindPast: (clock) => `Ya no llegan datos en directo. Los últimos, a las ${clock}`,
-  frozenPastStays: 'El pasado que se muestra no se ve afectado.',
+  frozenPastStays: 'El histórico que se muestra no se ve afectado.',
   meanwhileShow: (tag) => `Volver al directo, al punto ${tag}`,
 
   timebar: 'Barra de tiempo',

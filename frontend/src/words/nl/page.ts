@@ -191,7 +191,7 @@ export const PAGE: In<typeof EN.PAGE> = {
       ['A', 'Alarmen'],
       ['C', 'Grafieken van het gekozen meetpunt'],
       ['L', 'Terug naar live'],
-      ['Spatie', 'Verleden afspelen of pauzeren'],
+      ['Spatie', 'Terugblik afspelen of pauzeren'],
       ['U', '°C of °F'],
       ['T', 'Licht of donker'],
       ['Esc', 'Sluiten, daarna terug naar live'],
@@ -219,8 +219,8 @@ export const PAGE: In<typeof EN.PAGE> = {
 
 /** Een ander moment dan nu, en de tijdbalk. */
 export const PAST: In<typeof EN.PAST> = {
-  past: 'Verleden',
-  pastTitle: (moment) => `${moment} (verleden) · Lupin twin`,
+  past: 'Terugblik',
+  pastTitle: (moment) => `${moment} (terugblik) · Lupin twin`,
   pastFetching: (moment) => `${moment} wordt geladen`,
   pastFetchingHint: 'Tot het geladen is, wordt niets getoond.',
   pastFailed: (moment) => `${moment} kan niet worden getoond`,
@@ -230,16 +230,16 @@ export const PAST: In<typeof EN.PAST> = {
   pastFault: (wanted) => `${wanted} kon niet worden geladen.`,
   pastFaultShown: (shown, why) => `Getoond wordt ${shown}; de pagina blijft het proberen. ${why}`,
   phasePast: {
-    connecting: 'Verleden · verbinden',
-    live: 'Verleden',
-    stale: 'Verleden · geen signaal',
-    offline: 'Verleden · twin offline',
-    reconnecting: 'Verleden · verbindt opnieuw',
+    connecting: 'Terugblik · verbinden',
+    live: 'Terugblik',
+    stale: 'Terugblik · geen signaal',
+    offline: 'Terugblik · twin offline',
+    reconnecting: 'Terugblik · verbindt opnieuw',
   },
   backToLive: 'Terug naar live',
   backToRecording: 'Terug naar de opname',
   frozenBehindPast: (clock) => `Geen live gegevens meer. Laatste gegevens om ${clock}`,
-  frozenPastStays: 'Het getoonde verleden heeft er geen last van.',
+  frozenPastStays: 'De terugblik heeft er geen last van.',
   meanwhileShow: (tag) => `Terug naar live, naar meetpunt ${tag}`,
 
   timebar: 'Tijdbalk',
@@ -261,7 +261,7 @@ export const PAST: In<typeof EN.PAST> = {
   timebarPlay: 'Afspelen',
   timebarPause: 'Pauzeren',
   timebarSpeed: 'Afspeelsnelheid',
-  timebarMarks: 'Wat de tekens betekenen',
+  timebarMarks: 'Verklaring van de tekens',
   timebarMark: {
     scans: 'balk omhoog: metingen',
     failures: 'balk omlaag: mislukte pogingen',

@@ -97,10 +97,7 @@ export function DoNow({
 }): JSX.Element {
   const health = useApp(selectHealth);
   const urgent = useUrgent();
-  // The alarms are those of now.
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const active = useSelected(alarmList, (list) => list.active.length);
-  const hasAlarms = isNow && active > 0;
   const hasOwn = health.reasons.length > 0;
   // Of a twin that is not heard, what had to be done stays, with its time.
   const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict) || isSilent(health));
@@ -127,19 +124,17 @@ export function DoNow({
                 id={index === 0 ? id : undefined}
               />
             </button>
-            {index === lines.length - 1 &&
-              (hasAlarms ? urgent.length > lines.length : rest > 0) && (
-                <button
-                  type="button"
-                  className="do-more"
-                  onClick={() => {
-                    act(withList(hasAlarms ? 'alarms' : 'tags'));
-                  }}
-                >
-                  {/* Each counts what it opens: a tag may have two alarms, or none yet. */}
-                  {hasAlarms ? `${S.alarms} (${active})` : S.attentionMore(rest)}
-                </button>
-              )}
+            {index === lines.length - 1 && rest > 0 && (
+              <button
+                type="button"
+                className="do-more"
+                onClick={() => {
+                  act(withList('tags'));
+                }}
+              >
+                {S.attentionMore(rest)}
+              </button>
+            )}
           </li>
         ))
       ) : (

@@ -180,7 +180,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   },
   todoPestAgain: 'Revisar otra vez: si no hay plaga, queda resuelta',
   todoWell: 'Queda resuelta con la próxima medición buena',
-  todoAlso: (tags) => (tags === 1 ? 'también el punto' : 'también los puntos'),
+  todoAlso: (tags) => (tags === 1 ? 'también punto' : 'también puntos'),
   todoLabel: 'Hacer ahora',
   reasonsLabel: 'Por qué',
   healthHeading: 'Estado del invernadero',

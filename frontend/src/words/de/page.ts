@@ -27,7 +27,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   },
   phaseLabel: 'Verbindung',
   retryNow: 'Jetzt versuchen',
-  frozenSince: (clock) => `Keine neuen Messwerte. Letzte Daten um ${clock}`,
+  frozenSince: (clock) => `Letzte Daten um ${clock}`,
   agoSuffix: (age) => `vor ${age}`,
   hours: 'h',
   frozenWhy: {

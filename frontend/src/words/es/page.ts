@@ -25,7 +25,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   },
   phaseLabel: 'Conexión',
   retryNow: 'Reintentar',
-  frozenSince: (clock) => `Sin lecturas nuevas. Últimos datos a las ${clock}`,
+  frozenSince: (clock) => `Últimos datos a las ${clock}`,
   agoSuffix: (age) => `hace ${age}`,
   hours: 'h',
   frozenWhy: {

@@ -25,7 +25,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   },
   phaseLabel: 'Verbinding',
   retryNow: 'Nu proberen',
-  frozenSince: (clock) => `Geen nieuwe meetwaarden. Laatste gegevens om ${clock}`,
+  frozenSince: (clock) => `Laatste gegevens om ${clock}`,
   agoSuffix: (age) => `${age} geleden`,
   hours: 'u',
   frozenWhy: {

@@ -5,7 +5,7 @@ import { alarmOf, isAwaited, type Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import { epochOf, now } from '../clock';
 import type { HealthReason, Verdict } from '../contract/types';
-import { clockText } from '../domain/format';
+import { minuteText } from '../domain/format';
 import { type HouseHealth, isBad, isSilent, severity, todoText, VERDICTS } from '../domain/health';
 import { secondsOf } from '../domain/time';
 import { rowsOf } from '../domain/table';
@@ -80,7 +80,7 @@ export function useSince(tagId: string, reason: HealthReason): string | null {
     isSilent(selectHealth(state)) ? selectNewest(state).snapshot?.takenAt : undefined,
   );
   if (!isNow) return null;
-  if (takenAt !== undefined) return S.asOf(clockText(epochOf(takenAt)));
+  if (takenAt !== undefined) return S.asOf(minuteText(epochOf(takenAt)));
   if (!found) return isKnown && isAwaited(reason) ? S.alarmNotYet : null;
   if (found.isAcknowledged) return S.healthAcknowledged;
   return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);

@@ -114,10 +114,6 @@ def many_readings(count: int, name: str) -> Any:
     return msg
 
 
-def different_readings(count: int) -> Any:
-    return scan("different readings", {f"s{n}": 1.0 for n in range(count)})
-
-
 def of_a_megabyte(where: str) -> Any:
     if where == "tag_id":
         return scan(MEGABYTE, {"co2": 1.0})
@@ -135,7 +131,10 @@ def of_a_megabyte(where: str) -> Any:
     [
         pytest.param(lambda: many_readings(100_000, ""), id="100,000 readings"),
         pytest.param(lambda: many_readings(40_000, "same"), id="40,000 readings of one name"),
-        pytest.param(lambda: different_readings(MAX_SENSORS_PER_TAG + 1), id="65 sensors"),
+        pytest.param(
+            lambda: scan("sensors", {f"s{n}": 1.0 for n in range(MAX_SENSORS_PER_TAG + 1)}),
+            id="65 sensors",
+        ),
         *(
             pytest.param(lambda where=where: of_a_megabyte(where), id=f"a megabyte of {where}")
             for where in ("tag_id", "reading", "species", "status_detail", "mission_id")

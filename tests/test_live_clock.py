@@ -1,15 +1,21 @@
-"""A twin whose clock does not run says so, and gives no age: over DDS, in `serve` and in `web`.
+"""A twin whose clock does not run, or is wrong, says so: over DDS, in `serve` and in `web`.
 
 `web` knows it, and what the twin dropped, from `/diagnostics`.
 """
 
 import re
+import time
 from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
-import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rosgraph_msgs.msg import Clock
 
 from tests.support.domains import own_domain
+from tests.support.journal import SECOND, kept
+from tests.support.journal import scan as row
 from tests.support.live import attached
 from tests.support.messages import scan
 from tests.support.processes import limits, lupin_twin
@@ -21,11 +27,12 @@ PATIENT = limits(answer_timeout_s=PATIENCE_S)
 SIM_TIME = ("--ros-args", "-p", "use_sim_time:=true", "-p", "state_publish_rate_hz:=10.0")
 
 
-@pytest.fixture
-def both() -> Iterator[tuple[Bridge, Bridge]]:
+@contextmanager
+def both(*options: str) -> Iterator[tuple[Bridge, Bridge]]:
+    """`serve`, and a `web` of its twin."""
     with (
         own_domain() as domain,
-        bridge(*PATIENT, *SIM_TIME, domain=domain) as twin,
+        bridge(*PATIENT, *options, domain=domain) as twin,
         lupin_twin(domain, "web", *PATIENT) as process,
         attached(process, twin.peer) as apart,
     ):
@@ -59,9 +66,12 @@ def ages(live: Bridge, is_so: str) -> list[float]:
     return known if reason(live) == (200, is_so) and len(known) == 2 else []
 
 
-def test_the_clock_never_starts_runs_is_paused_stops_and_runs_again(
-    both: tuple[Bridge, Bridge],
-) -> None:
+def test_the_clock_never_starts_runs_is_paused_stops_and_runs_again() -> None:
+    with both(*SIM_TIME) as lives:
+        check_clock(lives)
+
+
+def check_clock(both: tuple[Bridge, Bridge]) -> None:
     twin, _ = both
     until = twin.peer.until
     twin.peer.observe(scan("1", {"co2": 1.0}, stamp_s=1_000.0))
@@ -132,6 +142,32 @@ def goes_back_while_the_past_is_asked(twin: Bridge, live: Bridge, seconds: int) 
     found = wait_for(lambda: live.json("/api/state", at=seconds)["tags"], "the new run in the log")
     [tag] = found
     assert [reading["value"] for reading in tag["readings"]] == [2.0]
+
+
+def test_a_clock_that_contradicts_the_journal_is_told_beside_what_was_known(tmp_path: Path) -> None:
+    """As of a board that starts years ago; what a twin does then is in `test_memory_one_truth`."""
+    journal = tmp_path / "journal.sqlite"
+    kept(journal, [row("1", time.time_ns() + 86_400 * SECOND, co2=5.0)])
+    with both("--ros-args", "-p", f"journal:={journal}") as lives:
+        peer, said = lives[0].peer, list[DiagnosticArray]()
+        peer.node.create_subscription(DiagnosticArray, "/diagnostics", said.append, 10)
+
+        def journal_of(live: Bridge) -> Any:
+            return live.get("/readyz").json()["journal"]
+
+        for live in lives:
+            peer.until(lambda live=live: reason(live) == (503, "clock_doubted"), "the doubt")  # type: ignore[misc]
+            peer.until(lambda live=live: journal_of(live)["state"] == "doubting", "the journal's")  # type: ignore[misc]
+            assert "contradicts the journal" in journal_of(live)["detail"]
+            [tag] = live.json("/api/state")["tags"]
+            assert ([it["value"] for it in tag["readings"]], tag["stale_seconds"]) == ([5.0], None)
+
+        def levels() -> dict[str, bytes]:
+            return {it.name: it.level for it in said[-1].status} if said else {}
+
+        for name in ("/lupin_twin: clock", "/lupin_twin: journal"):
+            peer.until(lambda name=name: levels().get(name) == DiagnosticStatus.ERROR, name)  # type: ignore[misc]
+        assert "contradicts the journal" in lives[0].process.output
 
 
 def drops(live: Bridge) -> dict[str, tuple[str, int]]:

@@ -63,17 +63,10 @@ def now_s(live: Bridge) -> float:
     return seconds(live.json("/api/state")["header"]["stamp"])
 
 
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build(tmp_path_factory.mktemp("disk"))
-
-
-def test_with_a_full_disk_answers_say_up_to_when_they_are_complete(
-    library: Path, tmp_path: Path
-) -> None:
+def test_with_a_full_disk_answers_say_up_to_when_they_are_complete(tmp_path: Path) -> None:
     folder = tmp_path / "disk"
     folder.mkdir()
-    disk = Disk(folder, library, tmp_path / "control")
+    disk = Disk(folder, build(tmp_path), tmp_path / "control")
     journal = folder / "j.sqlite"
     with both(journal, env={"afresh": True, **disk.env}) as lives:
         serve, _ = lives

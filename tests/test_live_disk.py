@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.disk import Disk, after_power_cut, build, notes
+from tests.support.disk import Disk, Weather, after_power_cut, build, notes
 from tests.support.journal import NOW, is_whole, kept, scan, select
 from tests.support.waiting import PATIENCE_S, wait_for
 
@@ -90,41 +90,29 @@ def numbers(path: Path) -> list[int]:
     return [stamp - NOW for (stamp,) in rows if isinstance(stamp, int)]
 
 
-def test_a_disk_that_is_full_from_the_start_heals_too(disk: Disk) -> None:
-    disk.be("full")
-    with feeding(disk) as told:
-        told.wait("failing")
-        disk.be("well")
-        told.wait("recording", written=100)
+def assert_whole(disk: Disk) -> None:
     found = numbers(disk.folder / "j.sqlite")
     assert found == list(range(1, len(found) + 1))
 
 
-def test_a_read_only_folder_is_told_and_heals(disk: Disk) -> None:
-    disk.be("readonly")
+@pytest.mark.parametrize(("fault", "said"), [("full", ""), ("readonly", "Read-only file system")])
+def test_a_fault_from_the_start_is_told_and_heals(disk: Disk, fault: Weather, said: str) -> None:
+    disk.be(fault)
     with feeding(disk) as told:
-        told.wait("failing", "Read-only file system")
+        told.wait("failing", said)
         disk.be("well")
         told.wait("recording", written=100)
-    found = numbers(disk.folder / "j.sqlite")
-    assert found == list(range(1, len(found) + 1))
+    assert_whole(disk)
 
 
 def test_a_journal_in_a_read_only_folder_can_be_read(disk: Disk) -> None:
     path = disk.folder / "j.sqlite"
     kept(path, [scan()])
     disk.be("readonly")
+    command = (sys.executable, "-m", "lupin_bridge.cli.command", "journal")
     for action, said in (("info", "scans      1, of them 0 failed"), ("check", f"{path} is whole")):
         done = subprocess.run(
-            [
-                sys.executable,
-                "-m",
-                "lupin_bridge.cli.command",
-                "journal",
-                action,
-                "--journal",
-                path,
-            ],
+            [*command, action, "--journal", path],
             env={**os.environ, **disk.env},
             check=True,
             capture_output=True,
@@ -150,8 +138,7 @@ def test_a_slow_disk_is_told_and_nothing_is_lost(disk: Disk) -> None:
         told.wait("slow", "the disk is slow: the journal is ")
         disk.be("well")
         told.wait("recording", written=told.last[1] + 200)
-    found = numbers(disk.folder / "j.sqlite")
-    assert found == list(range(1, len(found) + 1))
+    assert_whole(disk)
 
 
 @pytest.mark.parametrize("log_bytes", [50_000, 8_000_000])

@@ -16,10 +16,7 @@ from tests.support.waiting import wait_for
 from tests.support.web import Bridge, Frame, Listener, listener, tag_ids
 
 # Errors are counted with each heartbeat.
-CLI = (
-    "tests.support.limited",
-    *constants(**{"lupin_bridge.feed.ros_thread:BEAT_PERIOD_S": 0.1}),
-)
+CLI = ("tests.support.limited", *constants(**{"lupin_bridge.feed.ros_thread:BEAT_PERIOD_S": 0.1}))
 FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5}
 
 

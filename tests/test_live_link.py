@@ -133,9 +133,7 @@ def home_for_all() -> Iterator[str]:
 
 if os.geteuid() == 0:  # nobody else can run a process as another user; see test_inputs too
 
-    def test_a_publisher_of_another_user_from_whom_nothing_comes_is_hinted_at(
-        domain: int,
-    ) -> None:
+    def test_a_publisher_of_another_user_from_whom_nothing_comes_is_hinted_at(domain: int) -> None:
         with (
             home_for_all() as home,
             bridge(*SETTLES_SOON, *OFTEN, domain=domain) as live,

@@ -25,20 +25,14 @@ CHANGED = {
 SHIPPED = Path("ros_node/lupin_twin/config/twin.yaml")
 
 
-@pytest.fixture
-def parameter_file(tmp_path: Path) -> str:
-    """The shipped file with some values changed."""
+def test_the_same_file_means_the_same_to_both(domain: int, tmp_path: Path) -> None:
     document = yaml.safe_load(SHIPPED.read_text(encoding="utf-8"))
     [node] = document.values()
     node["ros__parameters"].update(CHANGED)
     path = tmp_path / "twin.yaml"
     path.write_text(yaml.safe_dump(document), encoding="utf-8")
-    return str(path)
-
-
-def test_the_same_file_means_the_same_to_both(domain: int, parameter_file: str) -> None:
     renaming = ["-r", "__node:=other", "-r", "__ns:=/house1"]
-    file = ["--ros-args", "--params-file", parameter_file]
+    file = ["--ros-args", "--params-file", str(path)]
     with (
         Peer(domain) as peer,
         twin_node(domain, *file, *renaming),

@@ -20,10 +20,10 @@ from websockets.exceptions import ConnectionClosed
 from lupin_bridge.serving.server import MAX_INBOUND_BYTES
 from lupin_bridge.serving.ws_protocol import FRAMES_AT_ONCE, MAX_PIECES
 from tests.bench.live_parts import Server, serving
-from tests.support import raw_http
 from tests.support.foxglove import viewer
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
 from tests.support.processes import limits
+from tests.support.raw_http import connect, handshake, is_over
 from tests.support.raw_ws import CLOSE, CONT, TEXT, RawClient, masked
 from tests.support.rosbridge import ros_at
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -67,11 +67,6 @@ def metric(server: Server, name: str) -> float:
         if line.startswith(f"{name} "):
             return float(line.rpartition(" ")[2])
     raise AssertionError(f"there is no metric {name}")
-
-
-def is_over(client: socket.socket) -> bool:
-    """Whether the server has closed or reset a connection (tcp.h: 1 is ESTABLISHED)."""
-    return client.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 1)[0] != 1
 
 
 def vanish(client: socket.socket) -> None:
@@ -273,18 +268,16 @@ def test_one_client_too_many_is_told_so_and_may_come_when_another_has_gone() -> 
             client.until("state")
 
 
-@pytest.mark.parametrize("path", [b"/ws/state", b"/foxglove"])
-def test_one_address_does_not_keep_the_places_from_the_others(path: bytes) -> None:
-    spoken = b"Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n"
-    hello = b"GET %b HTTP/1.1\r\n%b%b\r\n" % (path, raw_http.UPGRADE, spoken)
+@pytest.mark.parametrize("path", ["/ws/state", "/foxglove"])
+def test_one_address_does_not_keep_the_places_from_the_others(path: str) -> None:
     with bridge("--max-clients", "4") as live, ExitStack() as stack:
         greedy = [stack.enter_context(live.listen()) for _ in range(4)]
         for client in greedy:
             client.until("state")
         others = []
         for number in range(2):
-            other = stack.enter_context(raw_http.connect(live.url, f"127.0.9.{number}"))
-            other.sendall(hello)
+            other = stack.enter_context(connect(live.url, f"127.0.9.{number}"))
+            other.sendall(handshake(path))
             others.append(other)
             with pytest.raises(ConnectionClosed) as closed:
                 greedy.pop().until("never", lambda _: False)

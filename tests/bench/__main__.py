@@ -14,7 +14,6 @@ BENCHES = (
     "bench_estimate_speed",
     "bench_log",
     "bench_alarms",
-    "bench_bridge",
     "bench_page",
     "bench_house",
     "bench_import",

@@ -3,8 +3,7 @@
 Of each field: the error (RMSE) as a ratio to that of IDW over the cells that IDW paints; the share
 of all cells of the floor whose truth lies in the 90 % interval; the CRPS as a ratio to IDW's error.
 `narrow` is the share of fields with a coverage under 0.7, `worse` that of fields with a larger
-error than IDW's. Numbers were chosen on other seeds (`--choosing`) than these. `--yardstick` adds
-the method that the aim was set by (minutes more).
+error than IDW's. Numbers were chosen on other seeds (`--choosing`) than these.
 """
 
 import argparse
@@ -22,7 +21,6 @@ from lupin_twin.estimate.kernel import Readings
 from lupin_twin.estimate.model import Model, fit
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.idw import compute_idw_field
-from tests.bench import plain_estimate
 from tests.bench.other_worlds import CHOOSING, HOUR_S, JUDGING, SORTS, Floats, World, world_of
 
 CELL_M = 0.25
@@ -138,20 +136,15 @@ def line(name: str, fields: list[Field]) -> str:
 def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--choosing", action="store_true", help="the seeds that are for choosing")
-    parser.add_argument("--yardstick", action="store_true", help="the method that set the aim too")
     options = parser.parse_args([] if arguments is None else arguments)
     rows: dict[str, list[Field]] = defaultdict(list)
     for sort, phase, case in cases(CHOOSING if options.choosing else JUDGING):
         field = judged(case)
         for name in (sort, phase, "all"):
             rows[name].append(field)
-        if options.yardstick:
-            other = plain_estimate.estimate(case.readings, case.places, case.at_s)
-            rows["all, by the yardstick"].append(compared(case, *other))
     print(f"{'':<26}{'fields':>7}{'to IDW':>9}{'covers':>9}{'CRPS':>9}{'narrow':>8}{'worse':>8}")
-    for name in (*SORTS, *PHASES, "all", "all, by the yardstick"):
-        if rows[name]:
-            print(line(name, rows[name]))
+    for name in (*SORTS, *PHASES, "all"):
+        print(line(name, rows[name]))
 
 
 if __name__ == "__main__":

@@ -291,10 +291,7 @@ class Hmi:
         self, wanted: Callable[[Pixel], bool], *points: tuple[float, float], what: str
     ) -> None:
         """Wait until all points of the map frame look as wanted."""
-        wait_for(
-            lambda: all(wanted(pixel) for pixel in self.pixels(points)),
-            f"{what} at {points}",
-        )
+        wait_for(lambda: all(wanted(pixel) for pixel in self.pixels(points)), f"{what} at {points}")
 
     def click_map(self, x: float, y: float) -> None:
         """Click on a point of the map frame, m."""

@@ -150,10 +150,6 @@ def rows(hmi: Hmi) -> list[dict[str, str]]:
     return found
 
 
-def seconds(stamp: dict[str, int]) -> float:
-    return stamp["sec"] + stamp["nanosec"] / 1e9
-
-
 def test_a_gap_stays_open_and_the_table_says_what_the_api_says(
     garden: Garden, open_page: OpenPage
 ) -> None:
@@ -178,7 +174,8 @@ def test_a_gap_stays_open_and_the_table_says_what_the_api_says(
     found = rows(hmi)
     readings = [row for row in reversed(found) if row["kind"] == "reading"]
     assert [float(row["at"]) for row in readings] == [
-        pytest.approx(seconds(each["stamp"])) for each in told["readings"]
+        pytest.approx(each["stamp"]["sec"] + each["stamp"]["nanosec"] / 1e9)
+        for each in told["readings"]
     ]
     for row, each in zip(readings, told["readings"], strict=True):
         assert f"|{each['value']:.1f}\u00a0°C|" in row["text"]

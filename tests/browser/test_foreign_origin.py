@@ -136,31 +136,6 @@ def test_a_foreign_page_gets_nothing(page: Page, running: Bridge, host: str) -> 
         assert try_all(page, origin, running.url) == NOTHING
 
 
-def test_the_bridges_own_page_gets_all_of_it(page: Page, running: Bridge) -> None:
-    got = try_all(page, running.url + "/docs", running.url)
-    assert "secret tag" in got["fetch"]
-    assert got["opaque"] == "basic"
-    assert got["image"] == got["corsImage"] == "6 px, data:image"
-    assert got["socket"] == got["rosbridge"] == "open"
-    assert got["style"] == "loaded"
-
-
-def test_a_foreign_page_cannot_show_the_bridge_in_a_frame(page: Page, running: Bridge) -> None:
-    with foreign_page("localhost") as origin:
-        page.goto(origin)
-        page.evaluate(
-            """(url) => new Promise((resolve) => {
-              const frame = document.createElement('iframe');
-              frame.onload = resolve;
-              frame.src = url;
-              document.body.append(frame);
-            })""",
-            running.url,
-        )
-        (frame,) = page.main_frame.child_frames
-        frame.wait_for_url("chrome-error://**")
-
-
 def test_an_allowed_page_gets_what_it_names_itself_for(page: Page) -> None:
     with foreign_page("localhost") as origin, bridge_with_a_tag("--allow-origin", origin) as it:
         got = try_all(page, origin, it.url)

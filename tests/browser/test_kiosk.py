@@ -1,6 +1,8 @@
 """A wall screen, which is looked at: whoever brushes past it changes nothing."""
 
+import json
 import re
+from typing import Final
 
 from playwright.sync_api import expect
 
@@ -55,7 +57,7 @@ def test_a_wall_screen_goes_round_and_is_left_by_the_key_that_it_names(
     note, legend = wall.test_id("kiosk-note"), wall.test_id("legend")
     expect(note).to_contain_text(re.compile(r"Temperature next: Humidity in [1-5]\u00a0s"))
     # Too low for the whole list: it says how many are left, and cuts none in two.
-    wall.page.set_viewport_size({"width": 1100, "height": 500})
+    wall.resize(1100, 500)
     listed = wall.page.locator("li[data-fits=true]")
     row, since = places(wall, ".attention > ul > li", ".attention-do small:not(:empty)")
     assert since.right == row.right
@@ -117,3 +119,21 @@ def test_on_a_phone_what_is_to_be_done_comes_first_whole_and_the_page_scrolls(
     expect(leave.locator("kbd")).to_be_hidden()
     leave.tap()
     expect(wall.map).to_have_attribute("role", "application")
+
+
+BREAK: Final = """() => {
+  window.stayed = true;
+  CanvasRenderingContext2D.prototype.clearRect = () => { throw new Error('no more canvas'); };
+}"""
+
+
+def test_a_wall_screen_that_fails_comes_back_by_itself(house: Bridge, open_page: OpenPage) -> None:
+    wall = open_page(house.url, "sensor=humidity", "?kiosk=1")
+    wall.expect_samples(3)
+    wall.allow_noise("no more canvas")
+    wall.page.evaluate(BREAK)
+    wall.page.set_viewport_size({"width": 1000, "height": 700})
+    expect(wall.test_id("failed-page")).to_contain_text("reloads automatically")
+    wall.expect_samples(3)
+    assert wall.page.evaluate("window.stayed") is None
+    assert json.loads(wall.page.evaluate("sessionStorage['lupin-twin.reload']"))["failures"] == 1

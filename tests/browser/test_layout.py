@@ -195,6 +195,20 @@ def test_a_longer_word_about_the_house_does_not_move_the_table(
     expect(driver).to_have_attribute("title", f"Tag {long}: Temperature 79.0\u00a0°C, above 35.0")
 
 
+def test_the_table_stays_where_it_is_while_tags_arrive(
+    running: Bridge, open_page: OpenPage
+) -> None:
+    hmi = open_page(running.url)
+    table = hmi.page.locator(".table-scroll")
+    # Each comes above those that are there, as the robot meets them in no order.
+    for first in range(60, 0, -20):
+        ids = [str(first + i) for i in range(20)]
+        running.peer.observe(*(scan(i, {"temperature": 20.0}, at=(1, 1)) for i in ids))
+        expect(hmi.row(ids[-1])).to_be_attached()
+        assert table.evaluate("table => table.scrollTop") == 0
+    expect(hmi.row("20")).to_be_in_viewport()
+
+
 def stands_at(hmi: Hmi, filter_bar: list[Box]) -> bool:
     return places(hmi, ".filter-bar") == filter_bar
 

@@ -188,27 +188,6 @@ def test_the_end_of_the_bar_is_now_before_memory_is_nothing_and_between_what_was
     expect(page.card("b")).not_to_contain_text(re.compile("pests? seen", re.IGNORECASE))
 
 
-def test_a_link_shows_the_same_moment_to_somebody_else_and_back_leads_to_now(
-    page: Hmi, hour: Hour, open_page: OpenPage
-) -> None:
-    press_at(page, 0.5)
-    at = expect_past(page)
-    told = page.app.get_attribute("data-moment")
-    page.expect(lambda: f"at={told}&" in page.address(), "the link")
-    theirs = open_page(hour.bridge.url, page.address().partition("#")[2], viewport=PHONE)
-    # Also where there is hardly room, the header says that it is the past.
-    expect(theirs.page.locator(".past-header .past-word")).to_be_visible()
-    assert theirs.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
-    assert expect_past(theirs) == at
-    theirs.page.get_by_role("navigation").get_by_role("button", name="Tags").click()
-    for tag, text in hour.read_then(at).items():
-        expect(theirs.cell(tag, "temperature")).to_have_text(text)
-    page.page.go_back()
-    expect_now(page)
-    page.page.go_forward()
-    assert expect_past(page) == at
-
-
 def test_axe_has_no_objection_to_the_past(hour: Hour, open_page: OpenPage) -> None:
     past = f"at={hour.begun_s + 700}&tag=b&period=hour"
     hmi = open_page(hour.bridge.url, past, bypass_csp=True)

@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 
 from tests.browser.hmi import SERVER_GONE, Hmi, OpenPage
 from tests.support.messages import occupancy_grid, scan
-from tests.support.processes import lupin_twin, twin_node, url_of
+from tests.support.processes import lupin_twin, url_of
 from tests.support.ros import Peer
 
 CLOCK = re.compile(r"Last data at \d\d:\d\d:\d\d")
@@ -38,38 +38,6 @@ def seqs(hmi: Hmi) -> list[int]:
 def stay(hmi: Hmi) -> None:
     """Mark the page, so that a reload would be noticed."""
     hmi.page.evaluate("window.stayed = true")
-
-
-def test_a_twin_that_comes_is_killed_and_comes_back(domain: int, open_page: OpenPage) -> None:
-    with lupin_twin(domain, "web") as web, Peer(domain) as peer:
-        hmi = open_page(url_of(web), "sort=tag")
-        # The bridge tells what the twin's service will not answer while there is no twin, by 504 of
-        # one that DDS has not missed yet: of the field, and of the past below the map.
-        hmi.allow_noise(r"50[34] .*/api/(field|(state|health|timeline)\?)")
-        stay(hmi)
-        hmi.expect_phase("offline")
-        expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-twin")
-        expect(hmi.test_id("notice")).to_contain_text("has received nothing from a twin")
-
-        with twin_node(domain) as first:
-            peer.observe(scan("a", {"temperature": 20.0}, at=(1, 1)))
-            hmi.expect_rows("a")
-            hmi.expect_samples(1)
-            expect_live(hmi)
-            first.kill()
-            hmi.expect_phase("offline")
-            expect_frozen(hmi, "The twin has stopped sending")
-            expect(hmi.cell("a", "temperature")).to_have_text("20.0")
-        told = next(frame for frame in hmi.frames if frame.get("reason") == "stale")
-        assert told["type"] == "status"
-        # Three publications were missed; how soon that is told is held by `test_live_faults.py`.
-        assert told["state_age_seconds"] >= 3.0
-
-        with twin_node(domain):
-            peer.observe(scan("b", {"temperature": 30.0}, at=(2, 1)))
-            hmi.expect_rows("a", "b")
-            hmi.expect_samples(2)
-            expect_live(hmi)
 
 
 def test_a_server_that_is_killed_and_starts_anew_with_other_tags(

@@ -4,65 +4,13 @@ import io
 import math
 import re
 from functools import partial
-from urllib.parse import parse_qs, urlsplit
 
-import pytest
 from PIL import Image, ImageStat
 from playwright.sync_api import Download, ViewportSize, expect
 
 from tests.browser.hmi import PHONE, Hmi, OpenPage, changed_box
 from tests.browser.house import TAGS
 from tests.support.web import Bridge
-
-
-def test_a_link_shows_the_same_view_to_somebody_else(house: Bridge, open_page: OpenPage) -> None:
-    mine = open_page(house.url)
-    mine.expect_rows(*TAGS)
-    mine.choose_sensor("Humidity")
-    mine.expect_samples(3)
-    mine.settled_picture()
-    mine.click_map(3, 3)
-    mine.page.get_by_role("button", name="Layers").click()
-    mine.page.get_by_role("checkbox", name="Metre grid").uncheck()
-    mine.page.get_by_role("checkbox", name="Smooth heat map").check()
-    mine.page.keyboard.press("Escape")
-    mine.page.get_by_role("button", name="Zoom in").click()
-    mine.page.get_by_role("searchbox").fill("lupin")
-    column = mine.page.get_by_role("columnheader", name="Tag").get_by_role("button")
-    column.click()
-    column.click()  # from ascending to descending
-    mine.expect_rows("10", "1")
-    mine.page.get_by_test_id("house-health").get_by_role("button", name="Healthy").click()
-    mine.expect_rows("1")
-    of_map = {"sensor", "tag", "view", "layers"}
-    of_table = {"filter": ["lupin"], "sort": ["-tag"], "health": ["healthy"]}
-
-    def is_told() -> bool:
-        told = parse_qs(urlsplit(mine.address()).fragment)
-        return set(told) == of_map | set(of_table) and of_table.items() <= told.items()
-
-    mine.expect(is_told, "an address that holds all of the view")
-
-    theirs = open_page(house.url, urlsplit(mine.address()).fragment)
-    expect(theirs.test_id("legend")).to_contain_text("Humidity %")
-    expect(theirs.card("3")).to_be_visible()
-    theirs.expect_samples(3)
-
-    def same_view() -> bool:
-        before, after = mine.view(), theirs.view()
-        wanted = pytest.approx((before.x, before.y, before.scale), abs=2)
-        return (after.x, after.y, after.scale) == wanted
-
-    theirs.expect(same_view, "the same view")
-    theirs.page.get_by_role("button", name="Layers").click()
-    expect(theirs.page.get_by_role("checkbox", name="Metre grid")).not_to_be_checked()
-    expect(theirs.page.get_by_role("checkbox", name="Smooth heat map")).to_be_checked()
-    expect(theirs.page.get_by_role("checkbox", name="Tag pins")).to_be_checked()
-    theirs.page.keyboard.press("Escape")
-    theirs.expect_rows("1")
-    expect(theirs.page.get_by_role("searchbox")).to_have_value("lupin")
-    theirs.page.get_by_test_id("house-health").get_by_role("button", name="Healthy").click()
-    theirs.expect_rows("10", "1")
 
 
 def save(hmi: Hmi, name: str) -> Download:

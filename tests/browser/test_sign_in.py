@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
@@ -9,7 +10,10 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from tests.browser.hmi import FONTS, slow_down
 from tests.support.access import TOKEN, Served, served
+from tests.support.messages import look
+from tests.support.people import PASSWORD, add
 from tests.support.waiting import PATIENCE_S
+from tests.support.web import bridge
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +66,27 @@ def test_a_person_signs_in_with_the_keyboard_alone(closed: Served, page: Page) -
     expect(page).to_have_url(re.compile(f"^{closed.url}/(#.*)?$"))
     expect_live(page)
     assert not [address for address in addresses if TOKEN in address]
+
+
+def test_by_name_one_is_told_who_sees_what_is_done_to_alarms(
+    domain: int, browser: Browser, tmp_path: Path
+) -> None:
+    accounts = tmp_path / "accounts.sqlite"
+    add(accounts, anna="operator", vera="viewer")
+    with bridge("--accounts", str(accounts), domain=domain) as running:
+        running.peer.wait_for_twin()
+        running.peer.observe(look("a", anomaly=True))
+        for name, words in (("anna", "Signed in as anna"), ("vera", "vera (viewer)")):
+            with browser.new_context() as context:
+                context.set_default_timeout(PATIENCE_S * 1000)
+                page = new_page(context)
+                page.goto(running.url)
+                page.get_by_label("Name").fill(name)
+                page.get_by_label("Password or token").fill(PASSWORD)
+                page.keyboard.press("Enter")
+                expect_live(page)
+                page.keyboard.press("a")
+                expect(page.locator(".alarms-mine")).to_contain_text(words)
 
 
 def test_a_wrong_token_can_be_corrected_and_nothing_of_the_right_one_is_kept(

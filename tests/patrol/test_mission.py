@@ -58,11 +58,6 @@ def patrol() -> list[Event]:
 
 
 @pytest.fixture(scope="module")
-def first_pass(patrol: list[Event]) -> list[Event]:
-    return list(until(1, iter(patrol)))
-
-
-@pytest.fixture(scope="module")
 def many_first_passes() -> list[list[Event]]:
     return [played(seed) for seed in range(4)]
 
@@ -78,8 +73,8 @@ def test_the_same_seed_gives_the_same_events(patrol: list[Event]) -> None:
 # --- the map -------------------------------------------------------------------------------------
 
 
-def test_the_map_grows_and_never_forgets(first_pass: list[Event]) -> None:
-    grids = [event.grid for event in only(MapGrown, first_pass)]
+def test_the_map_grows_and_never_forgets(patrol: list[Event]) -> None:
+    grids = [event.grid for event in only(MapGrown, list(until(1, iter(patrol))))]
     assert len(grids) > 10
     for before, after in pairwise(grids):
         assert known_in(after) > known_in(before)

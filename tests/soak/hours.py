@@ -50,11 +50,6 @@ def scans(hour: int, chance: random.Random) -> Iterator[Scan]:
             )
 
 
-def computed_bytes(count: int, hours: int) -> float:
-    """What a file of so many scans is, by the sizes of their rows."""
-    return count * (SCAN / FULL + ENTRY / SPREAD) + hours * TAGS * ROLLUP / SPREAD
-
-
 def main(hours: int = HOURS) -> bool:
     """Write; whether memory stays within a twentieth, and the file is as computed.
 
@@ -87,7 +82,8 @@ def main(hours: int = HOURS) -> bool:
         memory.close()
         size, whole = path.stat().st_size, is_whole(path)
         ((kept,),) = select(path, "SELECT count(*) FROM scan")
-    computed = computed_bytes(count, hours)
+    # By the sizes of their rows.
+    computed = count * (SCAN / FULL + ENTRY / SPREAD) + hours * TAGS * ROLLUP / SPREAD
     readings = count * len(SENSORS)
     print(
         f"{kept} scans of {count} in the file, whole: {whole}; {size / 1e6:.1f} MB, computed"

@@ -137,11 +137,7 @@ def is_whole(path: Path) -> bool:
 
 @contextmanager
 def recording(
-    path: Path,
-    now: Clock = CLOCK,
-    *,
-    limits: Limits = LIMITS,
-    world: World = World(),
+    path: Path, now: Clock = CLOCK, *, limits: Limits = LIMITS, world: World = World()
 ) -> Iterator[Journal]:
     """A journal at work, its clock begun."""
     journal = Journal(path, "/test/lupin_twin", limits, world=world)

@@ -38,7 +38,7 @@ def answers(name: str) -> list[tuple[list[Any], Any]]:
 def answer(connection: sqlite3.Connection, question: list[Any]) -> Any:
     """What the journal says, as JSON reads it back."""
     kind, *arguments = question
-    return _plain(_ANSWERS[kind](connection, *arguments))
+    return json.loads(json.dumps(_ANSWERS[kind](connection, *arguments)))
 
 
 def _state(connection: sqlite3.Connection, at_ns: int) -> Any:
@@ -56,15 +56,7 @@ def _export(connection: sqlite3.Connection, *arguments: Any) -> Any:
     return [list(asdict(row).values()) for lot in rows(connection, *arguments) for row in lot]
 
 
-_ANSWERS: dict[str, Callable[..., Any]] = {
-    "state": _state,
-    "series": _series,
-    "export": _export,
-}
-
-
-def _plain(value: Any) -> Any:
-    return json.loads(json.dumps(value))
+_ANSWERS: dict[str, Callable[..., Any]] = {"state": _state, "series": _series, "export": _export}
 
 
 def same(one: Any, other: Any) -> bool:

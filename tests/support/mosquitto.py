@@ -2,31 +2,22 @@
 
 import json
 import os
-import socket
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
-from tests.support.processes import Process
+from tests.support.processes import Process, free_port
 from tests.support.programs import program
 from tests.support.tls import Certificate
 from tests.support.waiting import wait_for
 
 USER, PASSWORD = "twin", "a password: with spaces"
-
-
-def free_port() -> int:
-    """A port of loopback that nobody listens on."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return int(free.getsockname()[1])
 
 
 @dataclass
@@ -59,13 +50,7 @@ class Broker:
         file = self.folder / "mosquitto.conf"
         file.write_text("\n".join(lines) + "\n", encoding="utf-8")
         with Process([program("mosquitto"), "-c", str(file)], os.environ) as process:
-
-            def listens() -> bool:
-                assert process.exit_code is None, process.output
-                with socket.socket() as client:
-                    return client.connect_ex(("127.0.0.1", self.port)) == 0
-
-            wait_for(listens, "mosquitto to listen")
+            process.wait_until_listening(self.port)
             yield process
 
 
@@ -91,12 +76,7 @@ class Subscriber:
         wait_for(lambda: self._is_there, "the subscription")
         return self
 
-    def __exit__(
-        self,
-        _type: type[BaseException] | None,
-        _error: BaseException | None,
-        _trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._client.disconnect()
         self._client.loop_stop()
 

@@ -1,14 +1,12 @@
 """A real nginx with a configuration that we ship or show, on ports of the test's own."""
 
 import os
-import socket
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from tests.support.processes import Process
+from tests.support.processes import Process, free_port
 from tests.support.programs import program
-from tests.support.waiting import wait_for
 
 CONFIGURATION = Path(__file__).parents[2] / "backend" / "deploy" / "nginx.conf"
 _SHIPPED_PORTS = (8001, 8002, 8003)
@@ -40,9 +38,7 @@ def nginx(folder: Path, upstreams: Sequence[int | Path], text: str = "") -> Iter
     `text` is its configuration, that which we ship if there is none.
     """
     text = text or CONFIGURATION.read_text(encoding="utf-8")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     file = folder / "nginx.conf"
     file.write_text(configured(text, folder, port, upstreams), encoding="utf-8")
     # Root's nginx would become somebody else, who may not into the test's folder.
@@ -50,11 +46,5 @@ def nginx(folder: Path, upstreams: Sequence[int | Path], text: str = "") -> Iter
     own = f"{user}daemon off; pid {folder / 'pid'}; error_log stderr warn;"
     command = [program("nginx"), "-p", str(folder), "-e", "stderr", "-c", str(file), "-g", own]
     with Process(command, os.environ) as process:
-
-        def listens() -> bool:
-            assert process.exit_code is None, process.output
-            with socket.socket() as client:
-                return client.connect_ex(("127.0.0.1", port)) == 0
-
-        wait_for(listens, "nginx to listen")
+        process.wait_until_listening(port)
         yield f"http://127.0.0.1:{port}"

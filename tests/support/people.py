@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,6 +64,20 @@ def signed_in(url: str, name: str) -> Iterator[httpx.Client]:
         answer = sign_in(browser, name)
         assert answer.status_code == 204, answer.text
         yield browser
+
+
+@cache
+def _cookies_of_anna(url: str) -> httpx.Cookies:
+    with signed_in(url, "anna") as browser:
+        return browser.cookies
+
+
+def signed_in_once(live: Bridge) -> httpx.Client:
+    """Anna, in one session for many tests: an address has few sign-ins a minute."""
+    cookies = _cookies_of_anna(live.url)
+    return httpx.Client(
+        base_url=live.url, cookies=cookies, headers=OWN, timeout=PATIENCE_S, trust_env=False
+    )
 
 
 def write(browser: httpx.Client, **note: Any) -> httpx.Response:

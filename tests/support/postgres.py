@@ -34,12 +34,7 @@ class Postgres:
     """A server; `url` is its connection string, `folder` has its socket."""
 
     def __init__(
-        self,
-        folder: Path,
-        *,
-        fsync: bool,
-        connections: int = 100,
-        primary: Postgres | None = None,
+        self, folder: Path, *, fsync: bool, connections: int = 100, primary: Postgres | None = None
     ) -> None:
         found = Path(shutil.which("initdb") or _BIN / "initdb").resolve()
         self.folder = folder
@@ -128,10 +123,7 @@ class Postgres:
 
 @contextmanager
 def server(
-    *,
-    fsync: bool = False,
-    connections: int = 100,
-    primary: Postgres | None = None,
+    *, fsync: bool = False, connections: int = 100, primary: Postgres | None = None
 ) -> Iterator[Postgres]:
     """One that runs; it ends, and is gone, with the block.
 

@@ -4,6 +4,7 @@ import contextlib
 import io
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -99,6 +100,16 @@ class Process:
 
         return str(wait_for(look, f"{text!r} in the output", timeout_s))
 
+    def wait_until_listening(self, port: int) -> None:
+        """Wait until it takes connections at a port of loopback."""
+
+        def listens() -> bool:
+            assert self.exit_code is None, self.output
+            with socket.socket() as client:
+                return client.connect_ex(("127.0.0.1", port)) == 0
+
+        wait_for(listens, f"{self._process.args!r} to listen")
+
     def send(self, number: signal.Signals) -> None:
         """Send a signal to the process alone."""
         self._process.send_signal(number)
@@ -192,6 +203,13 @@ def constants(**values: float) -> tuple[str, ...]:
     """Arguments of `lupin_twin` for other constants of modules, by `module:NAME`."""
     pairs = [f"{name}={value!r}" for name, value in values.items()]
     return tuple(word for pair in pairs for word in ("--constant", pair))
+
+
+def free_port() -> int:
+    """A port of loopback that nobody listens on."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
 
 
 def patrols_of(pid: int) -> list[int]:

@@ -13,6 +13,14 @@ UPGRADE = (
 )
 
 
+def handshake(path: str) -> bytes:
+    """The request for a WebSocket; of the protocol's name, only Foxglove's route takes notice."""
+    return b"GET %b HTTP/1.1\r\n%bSec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n" % (
+        path.encode(),
+        UPGRADE,
+    )
+
+
 def connect(url: str, source: str = "", *, room: int | None = None) -> socket.socket:
     """A connection to a bridge; `source` is our own address, `room` what it takes unread, bytes."""
     address = urlsplit(url)

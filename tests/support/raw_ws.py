@@ -6,11 +6,9 @@ import socket
 import struct
 from collections.abc import Iterator
 from contextlib import suppress
-from types import TracebackType
 from typing import Self
-from urllib.parse import urlsplit
 
-from tests.support.waiting import PATIENCE_S
+from tests.support.raw_http import connect, handshake
 
 CONT, TEXT, BINARY, CLOSE, PING, PONG = 0x0, 0x1, 0x2, 0x8, 0x9, 0xA
 
@@ -42,23 +40,12 @@ def frames_of(data: bytes) -> Iterator[tuple[int, bytes]]:
         start = end
 
 
-def handshake_request(host: str, path: str) -> bytes:
-    return (
-        f"GET {path} HTTP/1.1\r\nHost: {host}\r\nUpgrade: websocket\r\n"
-        "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
-        "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n"  # which other routes pass over
-        "Sec-WebSocket-Version: 13\r\n\r\n"
-    ).encode()
-
-
 class RawClient:
     """A connection after its handshake."""
 
     def __init__(self, url: str, path: str) -> None:
-        address = urlsplit(url)
-        assert address.hostname is not None
-        self.socket = socket.create_connection((address.hostname, address.port), PATIENCE_S)
-        self.socket.sendall(handshake_request(address.netloc, path))
+        self.socket = connect(url)
+        self.socket.sendall(handshake(path))
         self.received = b""
         while b"\r\n\r\n" not in self.received:
             self.received += self.socket.recv(65_536)
@@ -68,12 +55,7 @@ class RawClient:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        _type: type[BaseException] | None,
-        _error: BaseException | None,
-        _trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.socket.close()
 
     def say(self, data: bytes) -> list[tuple[int, bytes]]:
@@ -91,14 +73,10 @@ class RawClient:
 
 async def deaf(url: str, path: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
     """A client that reads nothing but the answer to its handshake."""
-    address = urlsplit(url)
-    raw = socket.socket()
-    raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    raw = connect(url, room=4_096)
     raw.setblocking(False)
-    loop = asyncio.get_running_loop()
-    await loop.sock_connect(raw, (address.hostname, address.port))
     reader, writer = await asyncio.open_connection(sock=raw, limit=1024)
-    writer.write(handshake_request(address.netloc, path))
+    writer.write(handshake(path))
     assert b" 101 " in await reader.readuntil(b"\r\n\r\n")
     return reader, writer
 

@@ -1,13 +1,11 @@
 """The other side of the topics: a ROS node of the test's own, in the test's own process."""
 
 from collections.abc import Callable, Sequence
-from types import TracebackType
 from typing import Any, Self, TypeVar
 
 import rclpy
-from lupin_msgs.msg import DiscoveredTags, Observation, TwinState
+from lupin_msgs.msg import TwinState
 from lupin_msgs.srv import GetField
-from nav_msgs.msg import OccupancyGrid
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -53,12 +51,7 @@ class Peer:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        _type: type[BaseException] | None,
-        _error: BaseException | None,
-        _trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._executor.shutdown(timeout_sec=2)
         self.node.destroy_node()
         rclpy.try_shutdown(context=self._context)
@@ -158,6 +151,3 @@ class Peer:
         self.until(lambda: all(future.done() for future in futures), f"answers of {service}")
         self.node.destroy_client(client)
         return [future.result() for future in futures]
-
-
-__all__ = ["DiscoveredTags", "Observation", "OccupancyGrid", "Peer", "latched"]

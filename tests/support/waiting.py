@@ -46,19 +46,18 @@ async def until_answered(
     ask: Callable[[], Awaitable[T]],
     what: str,
     is_it: Callable[[T], object] = bool,
-    timeout_s: float = PATIENCE_S,
 ) -> T:
     """`until` where the answer has to be awaited: asked again until `is_it` says so."""
     begun_s = time.monotonic()
     last: T | None = None
     try:
-        async with asyncio.timeout(timeout_s):
+        async with asyncio.timeout(PATIENCE_S):
             while not is_it(found := await ask()):
                 last = found
-                await asyncio.sleep(_pause(begun_s, timeout_s, what, last))
+                await asyncio.sleep(_pause(begun_s, PATIENCE_S, what, last))
             return found
     except TimeoutError as error:
-        raise AssertionError(_complaint(timeout_s, what, last)) from error
+        raise AssertionError(_complaint(PATIENCE_S, what, last)) from error
 
 
 def _pause(begun_s: float, timeout_s: float, what: str, last: object) -> float:

@@ -10,6 +10,7 @@ from urllib.parse import urlencode
 import httpx
 from websockets.sync.client import ClientConnection
 
+from tests.support import raw_http
 from tests.support.domains import own_domain
 from tests.support.messages import look
 from tests.support.processes import Process, lupin_twin, url_of
@@ -184,11 +185,6 @@ def bridge(
 
 # --- clients that do not read -------------------------------------------------------------------
 
-_UPGRADE = (
-    "Upgrade: websocket\r\nConnection: Upgrade\r\n"
-    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
-)
-
 
 @contextmanager
 def deaf_client(url: str, *paths: str) -> Iterator[socket.socket]:
@@ -196,14 +192,10 @@ def deaf_client(url: str, *paths: str) -> Iterator[socket.socket]:
 
     Without a path it is a WebSocket client that asks for frames.
     """
-    host, port = url.removeprefix("http://").split(":")
-    with socket.socket() as client:
-        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        client.settimeout(PATIENCE_S)
-        client.connect((host, int(port)))
-        head = "Host: localhost\r\n" if paths else f"Host: localhost\r\n{_UPGRADE}"
-        for path in paths or ("/ws/state",):
-            client.sendall(f"GET {path} HTTP/1.1\r\n{head}\r\n".encode())
+    asked = [f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode() for path in paths]
+    with raw_http.connect(url, room=4_096) as client:
+        for request in asked or [raw_http.handshake("/ws/state")]:
+            client.sendall(request)
         yield client
 
 

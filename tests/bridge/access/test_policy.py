@@ -5,13 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from starlette.datastructures import Headers
 
-from lupin_bridge.access.policy import (
-    AccessPolicy,
-    Decision,
-    exposure,
-    host_of,
-    parse_origin,
-)
+from lupin_bridge.access.policy import AccessPolicy, Decision, exposure, host_of, parse_origin
 
 POLICY = AccessPolicy(
     "greenhouse.lan",

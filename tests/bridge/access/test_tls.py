@@ -20,7 +20,7 @@ from lupin_bridge.serving.server import check_pair
 from lupin_bridge.settings import SettingError
 from tests.support.access import BEARER, TOKEN, Served, refused_start, served
 from tests.support.processes import limits
-from tests.support.raw_ws import frames_of, handshake_request
+from tests.support.raw_http import handshake
 from tests.support.tls import Certificate, certificate
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import ws_url
@@ -86,10 +86,6 @@ def test_https_and_wss_are_served_and_announced(secure: Served, ours: Certificat
             assert connection.next_state()["seq"] == first + number
 
 
-def states_in(data: bytes) -> int:
-    return sum(text.startswith(b'{"type":"state"') for _, text in frames_of(data))
-
-
 def test_who_asks_in_one_piece_with_the_end_of_the_handshake_is_not_cut_off(
     ours: Certificate,
 ) -> None:
@@ -112,10 +108,10 @@ def test_who_asks_in_one_piece_with_the_end_of_the_handshake_is_not_cut_off(
                 except ssl.SSLWantReadError:
                     client.sendall(outgoing.read())
                     take()
-            tls.write(handshake_request(address.netloc, "/ws/state"))
+            tls.write(handshake("/ws/state"))
             client.sendall(outgoing.read())
             received = b""
-            while states_in(received.partition(b"\r\n\r\n")[2]) < 5:
+            while received.count(b'{"type":"state"') < 5:
                 try:
                     received += tls.read(1 << 16)
                 except ssl.SSLWantReadError:

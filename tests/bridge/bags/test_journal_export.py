@@ -249,10 +249,7 @@ def test_export_writes_a_recording_of_a_period(path: Path, tmp_path: Path) -> No
     ],
 )
 def test_a_recording_that_cannot_be_made_is_one_clear_line(
-    path: Path,
-    tmp_path: Path,
-    words: tuple[str, ...],
-    text: str,
+    path: Path, tmp_path: Path, words: tuple[str, ...], text: str
 ) -> None:
     done = said("journal", "export", tmp_path / words[0], *words[1:], "--journal", path)
     assert done.returncode == 1

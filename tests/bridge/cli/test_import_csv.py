@@ -238,10 +238,7 @@ def test_a_time_without_offset_is_in_the_zone_that_is_given_and_an_hour_may_come
     ],
 )
 def test_what_cannot_be_imported_at_all_is_one_line(
-    importing: Import,
-    columns: Any,
-    rows: str | bytes,
-    complaint: str,
+    importing: Import, columns: Any, rows: str | bytes, complaint: str
 ) -> None:
     done = importing.given(columns, rows).run("--write")
     assert done.returncode == 1

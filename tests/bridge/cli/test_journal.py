@@ -118,10 +118,7 @@ def test_a_mistake_is_one_clear_line(words: list[str], named: str) -> None:
     ],
 )
 def test_a_domain_or_a_journal_that_cannot_be_is_one_clear_line(
-    words: str,
-    domain: str,
-    named: str,
-    monkeypatch: pytest.MonkeyPatch,
+    words: str, domain: str, named: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", domain)
     done = journal("info", *words.split())

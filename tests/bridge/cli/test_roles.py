@@ -1,6 +1,7 @@
 """The roles as processes: what stops them at once, what they show, and how they end."""
 
 import os
+import re
 import signal
 from dataclasses import replace
 from pathlib import Path
@@ -8,14 +9,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from lupin_bridge.cli.roles import (
-    DAY_S,
-    Feed,
-    fill_past,
-    patrolled,
-    since_morning_s,
-    with_past,
-)
+from lupin_bridge.cli.roles import DAY_S, Feed, fill_past, patrolled, since_morning_s, with_past
 from lupin_bridge.serving.server import listen
 from lupin_patrol.cli import parse as patrol_options
 from lupin_patrol.perception import SECONDS_PER_DAY
@@ -104,9 +98,7 @@ def test_the_player_ends_although_the_demo_is_killed(domain: int, tmp_path: Path
         wait_for(lambda: not is_running(player), "the end of the player")
 
 
-def test_the_process_that_looks_back_ends_with_its_bridge_and_not_before(
-    domain: int,
-) -> None:
+def test_the_process_that_looks_back_ends_with_its_bridge_and_not_before(domain: int) -> None:
     with lupin_twin(domain, "serve") as parent:
         url = f"{url_of(parent)}/api/timeline"
         wait_for(lambda: httpx.get(url, timeout=PATIENCE_S).status_code == 200, "the past")
@@ -136,8 +128,7 @@ def test_a_demo_has_a_past_from_its_first_moment_on(domain: int, tmp_path: Path)
             os.killpg(demo.pid, signal.SIGINT)  # as a terminal does at Ctrl-C
             assert demo.wait() == 0
             assert not is_running(patrol)
-            assert "has ended" not in demo.output
-            assert "Traceback" not in demo.output
+            assert unbidden(demo.output) == []
         pasts += select(path, filled_in)
     assert is_whole(path)
     (filled,) = select(path, "SELECT value FROM meta WHERE key = 'simulated_until_ns'")
@@ -147,6 +138,16 @@ def test_a_demo_has_a_past_from_its_first_moment_on(domain: int, tmp_path: Path)
     assert pasts[0][1] > 2500  # type: ignore[operator]
     (after,) = select(path, "SELECT min(stamp_ns) FROM scan WHERE source = 'lupin_patrol'")
     assert after[0] is None or after[0] > until_ns
+
+
+def unbidden(output: str) -> list[str]:
+    """Lines of a log that say something went wrong, beside what a busy machine makes true."""
+    return [
+        line
+        for line in output.splitlines()
+        if re.search(r"warn|error|critical|traceback|exception|has ended", line, re.IGNORECASE)
+        and not re.search(r"left behind|fallen silent|estimate of .* not to be trusted", line)
+    ]
 
 
 # --- a demo's past --------------------------------------------------------------------------------

@@ -129,10 +129,7 @@ def test_a_callback_that_hangs_is_told_to_health_checks_and_ends_the_watchdogs_w
     env = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "1500000"}
     soon = constants(**{"lupin_bridge.feed.source:STUCK_AFTER_S": 2.0})
     serve = ("tests.support.limited", *soon, "serve", "--port", "0")
-    with (
-        sabotaged(domain, faults, *serve, **env) as process,
-        Peer(domain) as peer,
-    ):
+    with sabotaged(domain, faults, *serve, **env) as process, Peer(domain) as peer:
         url = url_of(process)
 
         def health() -> httpx.Response:

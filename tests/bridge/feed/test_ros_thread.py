@@ -14,12 +14,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from lupin_bridge.feed.ros_thread import RosThread, forward
-from lupin_bridge.feed.source import (
-    STUCK_AFTER_S,
-    ThreadState,
-    TwinUnavailableError,
-    ailment,
-)
+from lupin_bridge.feed.source import STUCK_AFTER_S, ThreadState, TwinUnavailableError, ailment
 from tests.support.inprocess import ros_domain
 from tests.support.messages import scan
 from tests.support.processes import url_of

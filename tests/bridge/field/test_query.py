@@ -88,13 +88,7 @@ def test_any_accept_header_gives_a_format_or_none(accept: str) -> None:
 
 @pytest.mark.parametrize(
     ("if_none_match", "holds"),
-    [
-        (None, False),
-        ('"x","abc" ,"y"', True),
-        ('"ab"', False),
-        ("abc", False),
-        ('"abc', False),
-    ],
+    [(None, False), ('"x","abc" ,"y"', True), ('"ab"', False), ("abc", False), ('"abc', False)],
 )
 def test_if_none_match_names_the_tag_or_does_not(if_none_match: str | None, holds: bool) -> None:
     assert field_query.matches(if_none_match, '"abc"') is holds

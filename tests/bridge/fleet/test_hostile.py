@@ -240,10 +240,7 @@ def test_rows_that_cannot_be_read_are_said_on_their_sites_page(
     journal = tmp_path / "journal"
     now_ns = time.time_ns()
     write(journal, [*scans_lately(), look("1", now_ns - 10**9)])
-    with (
-        forwarder(archive, journal),
-        fleet(archive, *limits(answer_timeout_s=2)) as running,
-    ):
+    with forwarder(archive, journal), fleet(archive, *limits(answer_timeout_s=2)) as running:
         running.site(is_live=True, last_verdict="healthy")
         archive.copy_site("gh2")
         wait_for(lambda: "gh2" in running.sites(), "gh2")

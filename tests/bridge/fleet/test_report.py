@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import time
-from datetime import time as dtime
 from pathlib import Path
 
 import pyarrow
@@ -18,8 +17,6 @@ from tests.support.journal import SECOND, look, scan
 from tests.support.waiting import wait_for
 
 HOUR_S = 3600
-# By the tests' settings it is always day.
-CLOCK_OF_TESTS = dtime(0)
 
 
 def rows_of(begun_s: int) -> list[Write]:

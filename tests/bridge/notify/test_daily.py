@@ -22,7 +22,8 @@ from lupin_bridge.serving.admission import Answer
 from lupin_bridge.settings import Secrets, SettingError, Settings
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
-from tests.support.mosquitto import Broker, Subscriber, free_port
+from tests.support.mosquitto import Broker, Subscriber
+from tests.support.processes import free_port
 from tests.support.receiver import Answer as Reply
 from tests.support.receiver import Receiver, receiver, status
 from tests.support.seen import SENSORS, Alarms, seen, tag

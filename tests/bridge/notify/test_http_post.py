@@ -12,7 +12,7 @@ import pytest
 from lupin_bridge.notify.destinations import Targets, WebhookTarget
 from lupin_bridge.notify.webhook import MAX_HEAD_BYTES, PostError, post
 from lupin_bridge.settings import Secrets, Settings
-from tests.support.mosquitto import free_port
+from tests.support.processes import free_port
 from tests.support.receiver import Posted, receiver, status
 from tests.support.tls import certificate
 

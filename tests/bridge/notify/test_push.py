@@ -33,12 +33,12 @@ from lupin_bridge.notify.webhook import PostError, until_taken
 from lupin_bridge.settings import Settings
 from tests.support.access import refused_start
 from tests.support.messages import look
-from tests.support.people import OWN, TOKEN, add, changing, remove, signed_in
+from tests.support.people import OWN, TOKEN, add, changing, remove, signed_in, signed_in_once
 from tests.support.processes import constants
 from tests.support.receiver import Answer, Posted, Receiver, receiver, status
 from tests.support.seen import NOW_NS, Alarms, S, alarm
 from tests.support.tls import Certificate, certificate
-from tests.support.waiting import PATIENCE_S, until, wait_for
+from tests.support.waiting import until, wait_for
 from tests.support.web import Bridge, bridge
 
 CONTACT = "mailto:grower@example.org"
@@ -353,21 +353,9 @@ def test_a_critical_alarm_reaches_those_phones_alone_that_may_have_it_and_until_
     ],
 )
 def test_an_address_that_no_push_service_has_is_refused(open_to: Live, endpoint: str) -> None:
-    with signed_in_once(open_to) as anna:
+    with signed_in_once(open_to.live) as anna:
         answer = anna.post("/api/push", json=Phone(endpoint).subscription)
     assert (answer.status_code, "endpoint" in answer.json()["detail"]) == (400, True), answer.text
-
-
-_anna: list[httpx.Cookies] = []
-
-
-def signed_in_once(on: Live) -> httpx.Client:
-    if not _anna:
-        with signed_in(on.live.url, "anna") as browser:
-            _anna.append(browser.cookies)
-    return httpx.Client(
-        base_url=on.live.url, cookies=_anna[0], headers=OWN, timeout=PATIENCE_S, trust_env=False
-    )
 
 
 @pytest.mark.parametrize(
@@ -376,7 +364,7 @@ def signed_in_once(on: Live) -> httpx.Client:
 def test_a_key_that_is_none_is_refused(open_to: Live, name: str, value: str) -> None:
     given = open_to.phone("x").subscription
     given["keys"][name] = value
-    with signed_in_once(open_to) as anna:
+    with signed_in_once(open_to.live) as anna:
         answer = anna.post("/api/push", json=given)
     assert (answer.status_code, f"keys.{name}" in answer.text) == (400, True), answer.text
 
@@ -387,7 +375,7 @@ def test_a_name_that_leads_into_a_private_network_is_posted_nothing(
 ) -> None:
     """What it leads to is looked at before each post, and connected to."""
     phone = Phone(f"https://{host}/x")
-    with signed_in_once(open_to) as anna:
+    with signed_in_once(open_to.live) as anna:
         before, posted = count(anna, "dropped"), len(open_to.service.posted)
         subscribe(anna, phone)
         open_to.live.peer.observe(look(f"at {host}", anomaly=True, bug_count=2))
@@ -425,7 +413,7 @@ def test_of_one_person_so_many_browsers_are_notified_and_the_trail_has_each_once
             return [row.what for row in accounts.audited()].count("add device")
 
     before = added()
-    with signed_in_once(open_to) as anna:
+    with signed_in_once(open_to.live) as anna:
         for number in range(12):
             subscribe(anna, open_to.phone(f"many{number}"))
             subscribe(anna, open_to.phone(f"many{number}"))

@@ -15,7 +15,7 @@ from lupin_bridge.notify.webhook import MAX_REFUSALS, MAX_WAITING, ORIGIN_S, Del
 from lupin_bridge.settings import Secrets, Settings
 from lupin_twin.core.diagnostics import Origin
 from tests.support.docs import block_named
-from tests.support.mosquitto import free_port
+from tests.support.processes import free_port
 from tests.support.receiver import Answer, Posted, receiver, silence, status
 from tests.support.seen import NOW_NS, Alarms, S, alarm
 from tests.support.waiting import PATIENCE_S, until

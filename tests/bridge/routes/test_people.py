@@ -25,6 +25,7 @@ from tests.support.people import (
     remove,
     sign_in,
     signed_in,
+    signed_in_once,
     write,
 )
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -259,19 +260,6 @@ def test_what_cannot_be_a_note_is_refused_in_one_line(
     assert (answer.status_code, says in answer.json()["detail"]) == (status, True), answer.text
     assert len(answer.text) < 300
     assert notes(live) == before
-
-
-_anna: list[httpx.Cookies] = []
-
-
-def signed_in_once(live: Bridge) -> httpx.Client:
-    """One session for many tests: an address has few sign-ins a minute."""
-    if not _anna:
-        with signed_in(live.url, "anna") as browser:
-            _anna.append(browser.cookies)
-    return httpx.Client(
-        base_url=live.url, cookies=_anna[0], headers=OWN, timeout=PATIENCE_S, trust_env=False
-    )
 
 
 def test_a_comment_on_a_tag_or_the_greenhouse_is_found_by_subject_and_period(live: Bridge) -> None:

@@ -34,7 +34,7 @@ from tests.support.processes import Process, lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
 from tests.support.sabotage import sabotaged
 from tests.support.waiting import PATIENCE_S, wait_for
-from tests.support.web import Bridge, Listener, bridge, deaf_client, listener, overfill
+from tests.support.web import Listener, bridge, deaf_client, listener, overfill
 
 # What asks the twin itself, in its ROS thread or through its service.
 REPORT = "/api/estimate/quality?sensor_type=co2"
@@ -43,12 +43,6 @@ MILLION_CELLS = (
     "/api/field?sensor_type=co2&resolution=0.001"
     "&bbox_min_x=0&bbox_min_y=0&bbox_max_x=1&bbox_max_y=1"
 )
-
-
-@pytest.fixture(scope="module")
-def live() -> Iterator[Bridge]:
-    with bridge() as running_bridge:
-        yield running_bridge
 
 
 def open_files() -> set[str]:
@@ -164,8 +158,8 @@ def last_words(listener: Listener) -> tuple[str, int]:
 # --- limits -------------------------------------------------------------------------------------
 
 
-def test_frames_are_not_compressed(live: Bridge) -> None:
-    with live.listen() as listener:
+def test_frames_are_not_compressed() -> None:
+    with bridge() as live, live.listen() as listener:
         assert listener.connection.response is not None
         assert "sec-websocket-extensions" not in listener.connection.response.headers
 

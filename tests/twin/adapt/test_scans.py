@@ -34,8 +34,8 @@ def move(scans: Scans, at_s: float, x: float, y: float = 0.0) -> list[Scan]:
 def test_a_stop_is_one_scan_of_the_mean_when_the_robot_leaves() -> None:
     scans = scans_of()
     assert move(scans, 1, 0.3) == []
-    assert read(scans, 2, 20.0)
-    assert read(scans, 3, 22.0)
+    assert read(scans, 3, 20.0)
+    assert read(scans, 2, 22.0)  # the scan is of the newest, whatever came last
     (scan,) = move(scans, 4, 1.5)
     assert scan == Scan(
         "A",
@@ -46,14 +46,6 @@ def test_a_stop_is_one_scan_of_the_mean_when_the_robot_leaves() -> None:
         source=VISIT_SOURCE,
     )
     assert scans.tag is None
-
-
-def test_what_is_read_between_tags_belongs_to_none() -> None:
-    scans = scans_of()
-    assert not read(scans, 0)
-    move(scans, 1, 1.5)
-    assert not read(scans, 2)
-    assert move(scans, 3, 0.0) == []
 
 
 def test_a_long_stop_is_a_scan_each_window() -> None:
@@ -133,15 +125,6 @@ def test_where_no_tag_is_in_reach_a_cell_may_be_one() -> None:
     (scan,) = move(scans, 2, 0.0)
     assert (scan.tag_id, scan.pose) == ("cell 3 -1", Pose.at(7.0, -1.0))
     assert scans.tag == "A"
-
-
-def test_a_scan_is_of_the_moment_of_its_newest_reading_whatever_came_last() -> None:
-    scans = scans_of()
-    move(scans, 0, 0.0)
-    read(scans, 3)
-    read(scans, 2)
-    (scan,) = move(scans, 4, 9.0)
-    assert scan.stamp_ns == 3 * S
 
 
 def test_tags_are_bounded_fixed_and_found_ones() -> None:

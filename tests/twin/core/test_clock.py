@@ -21,14 +21,6 @@ def test_a_simulated_clock_that_was_never_set_is_none_however_long() -> None:
     assert not watch.should_subscribe
 
 
-def test_a_clock_that_stands_for_three_seconds_has_stopped() -> None:
-    watch = ClockWatch()
-    assert look(watch, 5, 10.0) == "running"
-    assert look(watch, 5, 10.0 + STANDS_AFTER_S - BIT) == "running"
-    assert look(watch, 5, 10.0 + STANDS_AFTER_S) == "stopped"
-    assert look(watch, 6, 20.0) == "running"
-
-
 def test_one_that_stands_and_is_still_told_is_paused() -> None:
     watch = ClockWatch()
     look(watch, 5, 10.0)

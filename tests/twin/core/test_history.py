@@ -7,11 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_twin.core import ingest
-from lupin_twin.core.history import (
-    KNOWN_PER_TAG,
-    Repeats,
-    tag_history,
-)
+from lupin_twin.core.history import KNOWN_PER_TAG, Repeats, tag_history
 from lupin_twin.core.state import Inspection, Reading, Scan, TwinStore
 from tests.support.store import S, look, scan
 

@@ -39,12 +39,6 @@ def reason_of(heard: Received) -> Reason | None:
 # --- observations -------------------------------------------------------------------------------
 
 
-def test_a_tag_reading_is_a_scan_with_its_pose_and_stamp() -> None:
-    assert ingest.observation(heard_reading(), "map", NOW_NS) == Scan(
-        "1", 4 * S, READINGS, at(1.0, 2.0), source="robot", own_stamp_ns=4 * S
-    )
-
-
 @pytest.mark.parametrize(("own_s", "at_s"), [(0, 3), (101, 100)])
 def test_a_scan_without_a_stamp_was_made_when_its_sensors_were_read(own_s: int, at_s: int) -> None:
     write = ingest.observation(heard_reading(own_stamp_ns=own_s * S), "map", NOW_NS)

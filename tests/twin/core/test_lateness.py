@@ -1,10 +1,6 @@
 """A producer whose clock has gone back is found, and none whose messages come as messages do."""
 
-from collections.abc import Iterable
-
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from lupin_twin.core.clock import APART_S, FEW, MAX_SOURCES, OTHERS, Late, Lateness
 
@@ -91,21 +87,3 @@ def test_names_are_bounded_and_the_rest_is_counted_together() -> None:
     assert len(lateness.counts) == MAX_SOURCES + 1
     assert lateness.counts["robot 0"] == FEW + 1
     assert lateness.counts[OTHERS] == 2 * MAX_SOURCES * (FEW + 1)
-
-
-def runs(stamps_s: Iterable[int]) -> int:
-    """How many are late by the plainest count: those of runs of more than a few."""
-    late = run = 0
-    newest = 0
-    for stamp_s in stamps_s:
-        run = 0 if stamp_s >= newest else run + 1
-        newest = max(newest, stamp_s)
-        late += (run > FEW) + (FEW if run == FEW + 1 else 0)
-    return late
-
-
-@given(st.lists(st.integers(1, 20), max_size=60))
-def test_the_count_is_that_of_the_runs(stamps_s: list[int]) -> None:
-    robot = Robot(Lateness())
-    robot.says(*stamps_s)
-    assert sum(robot.lateness.counts.values()) == runs(stamps_s)

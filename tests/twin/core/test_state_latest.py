@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.core import state
-from lupin_twin.core.drops import Rejected
 from lupin_twin.core.state import (
     STATUS_OK,
     Attempt,
@@ -56,18 +53,6 @@ def test_after_a_clock_that_went_back_all_ages_from_there_and_news_is_news() -> 
     assert kept.last_observed_ns == 55 * S
 
 
-def test_a_refused_write_leaves_no_stamp_behind(monkeypatch: pytest.MonkeyPatch) -> None:
-    store = TwinStore()
-    store.record(scan("1", at_s=1.0, co2=1.0))
-    with monkeypatch.context() as full:
-        full.setattr(state, "MAX_ITEMS", 1)
-        with pytest.raises(Rejected):
-            store.record(scan("1", at_s=9.0, co2=9.0, light=9.0))
-    store.record(scan("1", at_s=2.0, co2=2.0))
-    assert tag(store, "1").readings == (Reading("co2", 2.0, 2 * S),)
-    assert not store.hold_to(5 * S)
-
-
 # --- against a model ----------------------------------------------------------------------------
 
 
@@ -106,10 +91,6 @@ def brings(write: Write) -> bool:
     if isinstance(write, Scan):
         return write.status == STATUS_OK or bool(write.readings)
     return bool(write.flower)
-
-
-def held(write: Write, now_ns: int) -> Write:
-    return replace(write, stamp_ns=min(write.stamp_ns, now_ns))
 
 
 Write = Scan | Inspection
@@ -151,7 +132,10 @@ def test_against_the_plainest_store(steps: list[Write | int]) -> None:
         if isinstance(step, int):
             store.hold_to(step * S)
             # By time first: of what is equal from now on, the last in the list is the latest.
-            written = [held(write, step * S) for write in in_time(written)]
+            written = [
+                replace(it, stamp_ns=min(it.stamp_ns, step * S))
+                for it in sorted(written, key=lambda it: it.stamp_ns)
+            ]
             continue
         write = numbered(step, number)
         written.append(write)
@@ -164,10 +148,6 @@ def test_against_the_plainest_store(steps: list[Write | int]) -> None:
     kept = {t.tag_id: t for t in store.snapshot(0, "map").tags}
     for tag_id, expected in plainest(written).items():
         assert by_name(kept[tag_id]) == by_name(expected)
-
-
-def in_time(writes: list[Write]) -> list[Write]:
-    return sorted(writes, key=lambda write: write.stamp_ns)
 
 
 def by_name(state_of_tag: TagState) -> TagState:

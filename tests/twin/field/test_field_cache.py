@@ -43,9 +43,7 @@ def test_64_fields_are_kept_and_the_least_recently_used_goes_first() -> None:
     assert cache.get(key(2)) is not None
 
 
-def test_bytes_are_bounded_whatever_the_number(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_bytes_are_bounded_whatever_the_number(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lupin_twin.field.engine.MAX_BYTES", 100)
     cache = FieldCache()
     for number in range(5):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import replace
 from datetime import UTC
 from itertools import pairwise
@@ -97,7 +96,11 @@ def test_nothing_of_what_came_later_is_in_it(living: Living) -> None:
         lives, end_ns = told
         lives = [step for step in lives if step[0] != "back"]
         start_ns = max(1, end_ns - minutes * MINUTE)
-        before = [(what, until(arg, end_ns)) for what, arg in lives if what == "rows"]
+        before = [
+            (what, [row for row in arg if row.stamp_ns < end_ns])
+            for what, arg in lives
+            if what == "rows"
+        ]
         with living(lives) as life, living([step for step in before if step[1]]) as earlier:
             both = [report(it.connection, start_ns, end_ns) for it in (life, earlier)]
         assert both[0] == both[1]
@@ -105,14 +108,14 @@ def test_nothing_of_what_came_later_is_in_it(living: Living) -> None:
     hold()
 
 
-def until(rows: Iterable[Any], end_ns: int) -> list[Any]:
-    return [row for row in rows if row.stamp_ns < end_ns]
-
-
 def check(found: dict[str, Any], life: Life, start_ns: int, end_ns: int) -> None:
     known = [(n, row) for n, row in life._holds() if row.stamp_ns < end_ns]
     told = sorted(
-        (write(number, life.rows[number][0], row) for number, row in known if not is_pin(row)),
+        (
+            write(number, life.rows[number][0], row)
+            for number, row in known
+            if not isinstance(row, Pin)
+        ),
         key=lambda it: (it.stamp_ns, it.number),
     )
     within = [it for it in told if it.stamp_ns >= start_ns]
@@ -207,10 +210,6 @@ def write(number: int, run: int, row: Any) -> PastWrite:
     names = tuple(reading.name for reading in readings)
     values = tuple(reading.value for reading in readings)
     return PastWrite(number, run, row.tag_id, row.stamp_ns, kind_of(row), row.status, names, values)
-
-
-def is_pin(row: Any) -> bool:
-    return isinstance(row, Pin)
 
 
 def plain(alarm: dict[str, Any]) -> Plain:

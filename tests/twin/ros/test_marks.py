@@ -15,10 +15,6 @@ def tag(name: str, x: float | None = 0.0, age_s: float = 0.0, **more: object) ->
     return TagState(name, pose=pose, last_observed_ns=observed_ns, **more)  # type: ignore[arg-type]
 
 
-def house(*tags: TagState) -> Snapshot:
-    return Snapshot(NOW_NS, "map", tags)
-
-
 @pytest.mark.parametrize(
     ("age_s", "look"),
     [
@@ -37,6 +33,10 @@ def test_planters_are_told_once_by_the_number_of_their_first_tag() -> None:
     seen = Flower(footprint=BOX)
     others = Flower(footprint=((5.0, 0.0, 0.0), *BOX[1:]))
     marks = planter_marks(
-        house(tag("bare"), tag("a", flower=seen), tag("b", flower=others), tag("c", flower=seen))
+        Snapshot(
+            NOW_NS,
+            "map",
+            (tag("bare"), tag("a", flower=seen), tag("b", flower=others), tag("c", flower=seen)),
+        )
     )
     assert marks == [PlanterMark(1, BOX), PlanterMark(2, others.footprint)]

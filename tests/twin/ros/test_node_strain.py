@@ -96,11 +96,6 @@ def ask(strained: Strained, **request: float) -> Any:
     return client.call_async(GetField.Request(sensor_type="co2", **{**HEAVY, **request}))
 
 
-def shifted(number: int) -> dict[str, float]:
-    """Another field of the same size."""
-    return {"bbox_min_x": -0.25 * number, "bbox_max_x": 10.0 - 0.25 * number}
-
-
 def test_a_heavy_field_holds_up_no_observation_no_state_and_not_the_end(wide: Strained) -> None:
     peer = wide.peer
     heavy = [ask(wide), ask(wide)]
@@ -127,7 +122,8 @@ def test_a_heavy_field_holds_up_no_observation_no_state_and_not_the_end(wide: St
     assert first.values == second.values
 
     for x in range(4):
-        ask(wide, **shifted(x))
+        # Another field of the same size.
+        ask(wide, bbox_min_x=-0.25 * x, bbox_max_x=10.0 - 0.25 * x)
     cheap = ask(wide, resolution=1.0)
     peer.until(cheap.done, "the cheap field: the heavy ones are being computed")
     pid = wide.process.pid

@@ -25,7 +25,7 @@ const RULES = [
   'src/{domain,geometry}/**/*.test.ts',
   'src/charts/{layers,model,zoom}.test.ts',
   'src/connection/machine.test.ts',
-  'src/draw/palette.test.ts',
+  'src/draw/colours.test.ts',
   'src/store/{create,fetcher,twin,view}.test.ts',
   'src/timebar/axis.test.ts',
   'src/ui/{fitting,later}.test.ts',

@@ -69,6 +69,7 @@ NO_HANDSHAKES = {
     "another method": (asked().replace(b"GET", b"PUT", 1), 405),
     "HTTP/1.0": (asked(version=b"1.0"), 404),
     "no text": (asked(b"X-Bytes: \xff\xfe", b"Content-Length: \xb9"), 400),
+    "TLS": (b"\x16\x03\x01\x02\x00\x01\x00", 400),  # a browser at https: must not wait
 }
 
 
@@ -272,23 +273,30 @@ def test_who_reads_no_refusal_is_gone_after_the_timeout(
 
 # --- from one protocol to the other -------------------------------------------------------------
 
+LARGE_FIELD = (
+    b"GET /api/field.npy?sensor_type=co2&resolution=0.01&bbox_min_x=0&bbox_min_y=0"
+    b"&bbox_max_x=%d&bbox_max_y=1 HTTP/1.1\r\n" + HOST
+)
+
 
 def test_a_websocket_behind_an_answer_that_nobody_reads_keeps_nothing(plain: Served) -> None:
     pid = plain.process.pid
     files, memory = open_files(pid), resident_mb(pid)
     reset_peak(pid)
-    field = (
-        b"GET /api/field.npy?sensor_type=co2&resolution=0.01&bbox_min_x=0&bbox_min_y=0"
-        b"&bbox_max_x=%d&bbox_max_y=1 HTTP/1.1\r\n" + HOST
-    )
     with ExitStack() as stack:
         # As many large answers as one address may have made at once; each is longer than a socket.
         clients = [stack.enter_context(raw_http.connect(plain.url, room=4_096)) for _ in range(4)]
         for width, client in enumerate(clients, 16):
-            client.sendall(field % width + asked())
+            client.sendall(LARGE_FIELD % width + asked())
         wait_for(lambda: all(map(raw_http.is_over, clients)), "their end")
         wait_for(lambda: open_files(pid) <= files, "the end of their files")
         assert peak_mb(pid) - memory < 2 * MEMORY_MB
+
+
+def test_behind_an_answer_that_nobody_reads_no_more_is_read(plain: Served) -> None:
+    with raw_http.connect(plain.url, room=4_096) as client:
+        client.sendall(LARGE_FIELD % 16)
+        assert pour(client, (b"GET /healthz HTTP/1.1\r\n" + HOST) * 1_000) < FLOOD_BYTES
 
 
 def test_a_websocket_after_an_answer_stays(plain: Served) -> None:

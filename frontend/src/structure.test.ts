@@ -93,10 +93,7 @@ const TABLE: Table = {
   widgets: ['clock', 'npm:react'],
   // What people say, wherever it is shown.
   notes: [...['words', 'strings', 'contract', 'domain', 'store', 'widgets'], ...['npm:react']],
-  timebar: [
-    ...['strings', 'clock', 'domain', 'draw', 'store', 'widgets', 'notes'],
-    ...['npm:react'],
-  ],
+  timebar: [...['strings', 'clock', 'domain', 'store', 'widgets', 'notes'], ...['npm:react']],
   export: ['strings', 'clock', 'geometry', 'domain', 'draw', 'store', 'map'],
   charts: [
     ...['strings', 'clock', 'contract', 'geometry', 'domain', 'draw', 'store', 'widgets', 'export'],
@@ -134,7 +131,7 @@ const TABLE: Table = {
     ...['contract', 'domain', 'draw', 'connection', 'store'],
     // The file that comes with the bridge: the page itself has no copy of it.
     '../../backend/lupin_bridge/sensors.json',
-    ...['npm:vitest', 'npm:@testing-library/react'],
+    ...['npm:vitest', 'npm:@testing-library/react', 'npm:node:fs', 'npm:node:path'],
   ],
 };
 

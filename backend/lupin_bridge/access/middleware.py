@@ -296,8 +296,8 @@ class AccessControl:
             return people.by_proxy(named) or _unauthorized("the proxy names nobody who can be")
         if header is not None:
             return self._check_header(people, header, client_of(request))
-        if path == SIGN_IN and people.has_file:
-            return None  # by name and password, which the route looks at
+        if path == SIGN_IN:
+            return None  # by name and password, if there are accounts: the route looks
         # A cookie is no guess: it cannot be made without the token, however often one tries.
         try:
             person = people.by_cookies(request.scope["headers"])

@@ -17,11 +17,10 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Final, TypeVar
 
 from lupin_bridge.access.accounts import SESSION_S, Accounts, digest
 from lupin_bridge.access.credentials import (
-    MAX_PASSWORD,
     SHARED,
     SHARED_SESSION_S,
     AccountError,
@@ -144,9 +143,7 @@ class People:
             AccountError: the file cannot be read.
 
         """
-        if person.by not in ("account", "proxy") or not self.has_file:
-            return False
-        return self._ask(lambda it: it.of_name(person.name)) is not None
+        return self.has_file and self._ask(lambda it: it.of_name(person.name)) is not None
 
     async def check(self, name: str, password: str, address: str) -> Person | None:
         """Who signs in; None: there is no such account, or the password is another.
@@ -169,7 +166,7 @@ class People:
         try:
             person = await self._check(name, password)
         except asyncio.CancelledError:
-            # The thread works on it all the same: whoever leaves has tried.
+            # The thread may work on it all the same: whoever leaves has tried.
             self._attempts.take(address, time.monotonic())
             raise
         if person is None:
@@ -178,7 +175,7 @@ class People:
         return person
 
     async def _check(self, name: str, password: str) -> Person | None:
-        if not is_name(name) or len(password) > MAX_PASSWORD:
+        if not is_name(name):
             return None
         known = self._ask(lambda it: it.of_name(name))
         is_right = await self._on_thread(lambda: verify(known[1] if known else "", password))
@@ -234,16 +231,10 @@ class People:
                 f"{MAX_WAITING} sign-ins wait already: try again in a moment", 2.0
             )
         self._waiting += 1
-        doing = self._thread.submit(work)
-        # Not when the client has left: until the thread is free again.
-        waiting = asyncio.wrap_future(doing)
-        waiting.add_done_callback(self._done)
-        return await asyncio.shield(waiting)
-
-    def _done(self, doing: asyncio.Future[Any]) -> None:
-        self._waiting -= 1
-        if not doing.cancelled():
-            doing.exception()  # of a client that has left nobody looks at it
+        try:
+            return await asyncio.wrap_future(self._thread.submit(work))
+        finally:
+            self._waiting -= 1
 
     def _cookie_name(self) -> str:
         """Browsers keep one jar for all ports of a host, so each file has a cookie of its own."""

@@ -150,17 +150,16 @@ class BehindProxies:
         return forwarded
 
     def _user(self, scope: Scope) -> dict[str, object]:
-        """Whom the proxy names, in the state; the header itself goes, whoever sent it."""
+        """Whom the proxy names, in the state: nothing reads the header itself."""
         header = self._proxies.user_header.lower().encode()
         if not header:
             return {}
         named = [value for name, value in scope["headers"] if name == header]
-        others = [line for line in scope["headers"] if line[0] != header]
         if not named or not self._proxies.trusts((scope.get("client") or ("", 0))[0]):
-            return {"headers": others}
+            return {}
         # A proxy that adds its line to the client's, and does not replace it, names two.
         name = named[0].decode("latin-1").strip() if len(named) == 1 else ""
-        return {"headers": others, "state": {**scope.get("state", {}), PROXY_USER_KEY: name}}
+        return {"state": {**scope.get("state", {}), PROXY_USER_KEY: name}}
 
     def _path(self, scope: Scope) -> dict[str, object]:
         prefix = self._proxies.path_prefix

@@ -12,7 +12,6 @@ its own first, so however many it opens, it evicts none but itself.
 from __future__ import annotations
 
 import asyncio
-import errno
 import heapq
 import logging
 import resource
@@ -161,8 +160,6 @@ TLS_BUFFER_BYTES: Final = 32 * 1024
 RETRY_S: Final = 0.25
 WARNING_PERIOD_S: Final = 30.0
 
-_NO_FILES: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
-
 
 def room_for_connections() -> int:
     """How many connections this process's limit on open files leaves room for."""
@@ -190,8 +187,7 @@ class _Handshake:
 class Acceptor:
     """Accepts and evicts connections; uvicorn closes it as it would an `asyncio.Server`.
 
-    `connections` are all that have a protocol. A handshake of TLS, and its end, may take
-    `timeout_s`.
+    `connections` are all that have a protocol. A handshake of TLS may take `timeout_s`.
     """
 
     def __init__(
@@ -211,11 +207,7 @@ class Acceptor:
         self._options: dict[str, Any] = {}
         if tls is not None:
             SSLProtocol.max_size = TLS_BUFFER_BYTES
-            self._options = {
-                "ssl": tls,
-                "ssl_handshake_timeout": timeout_s,
-                "ssl_shutdown_timeout": timeout_s,
-            }
+            self._options = {"ssl": tls, "ssl_handshake_timeout": timeout_s}
         self._handshakes: set[_Handshake] = set()
         self._warnings = Throttle(WARNING_PERIOD_S)
         self._retry: asyncio.TimerHandle | None = None
@@ -256,8 +248,6 @@ class Acceptor:
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
             except OSError as error:
-                if error.errno not in _NO_FILES:
-                    raise
                 self._warn("no new connections for now: %s", error.strerror)
                 self._make_room()
                 self._pause()

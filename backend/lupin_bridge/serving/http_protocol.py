@@ -75,14 +75,14 @@ class _Requests(h11.Connection):
 
 
 def _body_of(event: h11.Request, most: int) -> int:
-    """How long the body is; h11 has seen to it that one length is given, in digits.
+    """How long the body is; h11 has seen to it that one length is given, in few digits.
 
     RFC 9112, section 6: these two headers, and nothing else, say that there is a body.
     """
     length = 0
     for name, value in event.headers:
         if name == b"content-length":
-            length = int(value.lstrip(b"0")[:10] or b"0")
+            length = int(value)
         if name == b"transfer-encoding" or length > most:
             limit = f"the limit is {most} bytes" if most else "and none is read here"
             given = f"{name.decode()}: {value[:32].decode('latin-1')}"
@@ -273,7 +273,7 @@ class HttpConnection(H11Protocol):
         self._deadline = self._reader_deadline = None
 
     def _parse_request(self) -> None:
-        if not self._is_at_work or self._is_refused:
+        if not self._is_at_work:
             self.abort()
 
     def _give_up(self) -> None:

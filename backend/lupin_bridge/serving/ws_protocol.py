@@ -169,6 +169,12 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         # An earlier answer over HTTP may still fill the socket. Then HTTP's protocol was notified.
         if self.transport.get_write_buffer_size() > 0:
             self.pause_writing()
+        # Until it is taken, the handshake has no answer, and the client no place with us.
+        self.loop.call_later(self.config.timeout_keep_alive, self._end_unless_open)
+
+    def _end_unless_open(self) -> None:
+        if not self.handshake_complete:
+            tear_down(self.transport)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection."""

@@ -249,7 +249,7 @@ class Hub:
         """
         for client in self._clients:
             silence_s = max(REMINDED_AFTER_S, client.min_interval_s)
-            if client.blocked_since_s is None and now_s >= client.written_s + silence_s:
+            if now_s >= client.written_s + silence_s:
                 client.status_due = True
 
     def publish_alarms(self, wire: bytes, now_s: float) -> None:

@@ -2,6 +2,7 @@
 import type { Alarm, WireTime } from '../contract/types';
 import { type Cell, csv, finder, shown } from '../domain/text';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
+import { groupedBy } from '../domain/memo';
 import { secondsOf } from '../domain/time';
 import { compareIds } from '../domain/twin';
 import { toShown, unitOf } from '../domain/format';
@@ -67,20 +68,15 @@ export function arranged(items: readonly Item[], order: Order, speech: Speech): 
 
 /** Many of one cause in one block, where the worst of them stands. */
 export function byCause<T extends Wrong>(items: readonly T[], speech: Speech): readonly Block<T>[] {
-  const causes = new Map<string, T[]>();
-  for (const item of items) {
-    const cause = causeOf(item.alarm, speech);
-    const own = causes.get(cause);
-    if (own) own.push(item);
-    else causes.set(cause, [item]);
-  }
+  const causes = groupedBy(items, ({ alarm }) => causeOf(alarm, speech));
   const blocks: (Block<T> & { readonly items: T[] })[] = [];
   for (const item of items) {
     const key = causeOf(item.alarm, speech);
     const own = causes.get(key) ?? [];
     const before = blocks.at(-1);
     if (own.length > MOST_LOOSE) {
-      if (own[0] === item) blocks.push({ key, cause: causeText(item.alarm, speech), items: own });
+      if (own[0] === item)
+        blocks.push({ key, cause: causeText(item.alarm, speech), items: [...own] });
     } else if (before?.cause === null) before.items.push(item);
     else blocks.push({ key: `from ${item.alarm.id}`, cause: null, items: [item] });
   }

@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { onMapCommand } from '../map/commands';
+import { theMap, type MapActions } from '../map/commands';
 import { act, receive, store } from '../store/app';
 import { withState } from '../store/twin';
 import { withList, withTag } from '../store/view';
@@ -40,16 +40,17 @@ describe('period', () => {
 });
 
 describe('follow', () => {
-  const commands: unknown[] = [];
+  const seen: string[] = [];
   let stops: (() => void)[];
   beforeEach(() => {
     vi.spyOn(performance, 'now').mockReturnValue(performance.now());
-    commands.length = 0;
+    seen.length = 0;
     own.set(NOTHING_KEPT);
     showTags([]);
     const latest = stateFrame([wireTag()], { sec: 10_000 });
     receive(withState(latest, performance.now()));
-    stops = [startAlarms(), onMapCommand((command) => commands.push(command))];
+    stops = [startAlarms()];
+    theMap.set({ show: (tagId) => void seen.push(tagId) } as MapActions);
   });
   afterEach(() => {
     for (const stop of stops) stop();
@@ -66,7 +67,7 @@ describe('follow', () => {
     const { view } = store.get();
     expect(view).toMatchObject({ moment: null, selected: '5', sensor: 'co2', pane: 'tags' });
     expect(view).toMatchObject({ chart: null, compare: null });
-    expect(commands).toEqual([{ type: 'show', tagId: '5' }]);
+    expect(seen).toEqual(['5']);
     expect(calling(alarmList.get())).toHaveLength(1);
   });
 
@@ -80,7 +81,7 @@ describe('follow', () => {
     const { view } = store.get();
     expect(view).toMatchObject({ moment: 9_000.002, selected: '5', sensor: 'co2', pane: 'map' });
     expect(view.period).toEqual({ kind: 'day' });
-    expect(commands).toEqual([{ type: 'show', tagId: '5' }]);
+    expect(seen).toEqual(['5']);
   });
 
   test('of the greenhouse it leads to the moment alone; there is none that has not come yet', () => {
@@ -100,7 +101,7 @@ describe('follow', () => {
       selected: null,
       sensor: 'temperature',
     });
-    expect(commands).toEqual([]);
+    expect(seen).toEqual([]);
     goToStart(alarm('b', { raised: 99_000 }));
     expect(store.get().view.moment).toBe(9_500);
   });

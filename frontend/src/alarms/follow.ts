@@ -2,7 +2,7 @@
 import { now } from '../clock';
 import type { Alarm } from '../contract/types';
 import { type Period, secondsOf, spanOf } from '../domain/time';
-import { commandMap } from '../map/commands';
+import { theMap } from '../map/commands';
 import { act, store } from '../store/app';
 import { rosNow } from '../store/moment';
 import type { ViewState } from '../store/view';
@@ -55,5 +55,5 @@ function look(alarm: Alarm, when: Partial<Pick<ViewState, 'moment' | 'period' | 
     chart: null,
     compare: null,
   });
-  if (alarm.tag_id !== '') commandMap({ type: 'show', tagId: alarm.tag_id });
+  if (alarm.tag_id !== '') theMap.get()?.show(alarm.tag_id);
 }

@@ -1,6 +1,7 @@
 /** The list of alarms: what is active, shelved and resolved, in its order. Pure. */
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import { isOfRange, severity, sideOf } from '../domain/health';
+import { groupedBy, withParts } from '../domain/memo';
 import { secondsOf } from '../domain/time';
 import { compareIds, equal } from '../domain/twin';
 import { isShelfHeld, isWorse, whatOf, type Kept, type Shelf } from './own';
@@ -102,20 +103,19 @@ export function causesFirst(
   reasonOf: (item: Item) => HealthReason,
   speech: Speech,
 ): readonly Item[] {
-  const causes = new Map<string, { readonly urgency: number; count: number }>();
-  const blockOf = ({ urgency, cause }: (typeof ranked)[number]) =>
-    cause.count > MOST_LOOSE ? cause : { urgency, count: 1 };
-  const ranked = inOrder(items, reasonOf).map((item) => {
-    const urgency = Math.floor(rankOf(reasonOf(item), item.isAcknowledged));
-    const key = causeOf(item.alarm, speech);
-    const cause = causes.get(key) ?? { urgency, count: 0 };
-    cause.count += 1;
-    causes.set(key, cause);
-    return { item, urgency, cause };
-  });
+  const ranked = inOrder(items, reasonOf).map((item) => ({
+    item,
+    urgency: Math.floor(rankOf(reasonOf(item), item.isAcknowledged)),
+    cause: causeOf(item.alarm, speech),
+  }));
+  const causes = groupedBy(ranked, ({ cause }) => cause);
   return ranked
-    .map((each) => ({ item: each.item, block: blockOf(each) }))
-    .sort((a, b) => b.block.urgency - a.block.urgency || b.block.count - a.block.count)
+    .map((each) => {
+      const own = causes.get(each.cause) ?? [];
+      const [first = each] = own.length > MOST_LOOSE ? own : [];
+      return { ...each, urgency: first.urgency, count: own.length > MOST_LOOSE ? own.length : 1 };
+    })
+    .sort((a, b) => b.urgency - a.urgency || b.count - a.count)
     .map(({ item }) => item);
 }
 
@@ -215,10 +215,9 @@ export function sharedList(before: AlarmList, now: AlarmList): AlarmList {
       ? was
       : items;
   };
-  const active = share(before.active, now.active);
-  const shelved = share(before.shelved, now.shelved);
-  const resolved = share(before.resolved, now.resolved);
-  const isSame =
-    active === before.active && shelved === before.shelved && resolved === before.resolved;
-  return isSame ? before : { active, shelved, resolved };
+  return withParts(before, {
+    active: share(before.active, now.active),
+    shelved: share(before.shelved, now.shelved),
+    resolved: share(before.resolved, now.resolved),
+  });
 }

@@ -1,6 +1,7 @@
 /** For who looks at something else: notifications and sounds on wish, and the page's icon. */
 import { now } from '../clock';
-import { route } from '../contract/api';
+import { ask } from '../contract/api';
+import { postPush } from '../contract/people';
 import type { Verdict } from '../contract/types';
 import { store } from '../store/app';
 import { createStore } from '../store/create';
@@ -99,13 +100,11 @@ export async function wishPush(isWished: boolean): Promise<void> {
   const known = await pushManager.getSubscription();
   if (!isWished) {
     if (!known) return;
-    await post({ endpoint: known.endpoint });
+    await postPush({ endpoint: known.endpoint });
     await known.unsubscribe();
     return;
   }
-  const answer = await fetch(route('api/push'));
-  if (!answer.ok) return;
-  const { public_key: key } = (await answer.json()) as Key;
+  const { public_key: key } = (await (await ask('api/push', {})).json()) as Key;
   if (key === null) return;
   const options = { userVisibleOnly: true, applicationServerKey: key };
   let subscription;
@@ -117,16 +116,7 @@ export async function wishPush(isWished: boolean): Promise<void> {
     await known.unsubscribe();
     subscription = await pushManager.subscribe(options);
   }
-  await post(subscription.toJSON());
-}
-
-async function post(body: PushSubscriptionJSON): Promise<void> {
-  const answer = await fetch(route('api/push'), {
-    method: 'POST',
-    headers: { 'Content-Type': 'application/json', 'X-Lupin-Twin': '1' },
-    body: JSON.stringify(body),
-  });
-  if (!answer.ok) throw new Error(`/api/push: ${answer.status}`);
+  await postPush(subscription.toJSON());
 }
 
 /** The browser's bar of tabs follows no theme of ours: white on these is legible on any. */

@@ -8,9 +8,6 @@ import type { Alarm, Verdict } from '../contract/types';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
 import { createStore } from '../store/create';
 
-/** More than any list has; the oldest go first. */
-export const MOST_ACKNOWLEDGED = 1_000;
-export const MOST_SHELVED = 200;
 /** What was acknowledged and is listed no more is forgotten after this long, ms. */
 export const FORGET_MS = 7 * 86_400_000;
 /** For how long an alarm can be shelved, minutes: a critical one not as long. */
@@ -71,34 +68,26 @@ export interface Rated {
   readonly verdict: Verdict;
 }
 
-export function acknowledge(kept: Kept, alarms: readonly Rated[], at: number): Kept {
-  const acknowledged = new Map(kept.acknowledged);
-  for (const { alarm, verdict } of alarms) {
-    // The newest last, so that the oldest are the first to go.
-    acknowledged.delete(alarm.id);
-    acknowledged.set(alarm.id, { verdict, at });
-  }
-  return { ...kept, acknowledged };
-}
+export const acknowledge = (kept: Kept, alarms: readonly Rated[], at: number): Kept => ({
+  ...kept,
+  acknowledged: new Map([
+    ...kept.acknowledged,
+    ...alarms.map(({ alarm, verdict }) => [alarm.id, { verdict, at }] as const),
+  ]),
+});
 
-export function unacknowledge(kept: Kept, alarm: Alarm): Kept {
-  const acknowledged = new Map(kept.acknowledged);
-  acknowledged.delete(alarm.id);
-  return { ...kept, acknowledged };
-}
+export const shelve = (
+  kept: Kept,
+  { alarm, verdict }: Rated,
+  until: number,
+  reason: string,
+): Kept => ({
+  ...kept,
+  shelved: new Map([...kept.shelved, [whatOf(alarm), { verdict, until, reason }]]),
+});
 
-export function shelve(kept: Kept, { alarm, verdict }: Rated, until: number, reason: string): Kept {
-  const shelved = new Map(kept.shelved);
-  shelved.delete(whatOf(alarm));
-  shelved.set(whatOf(alarm), { verdict, until, reason });
-  return { ...kept, shelved };
-}
-
-export function unshelve(kept: Kept, alarm: Alarm): Kept {
-  const shelved = new Map(kept.shelved);
-  shelved.delete(whatOf(alarm));
-  return { ...kept, shelved };
-}
+const without = <Value>(map: ReadonlyMap<string, Value>, key: string): ReadonlyMap<string, Value> =>
+  new Map([...map].filter(([each]) => each !== key));
 
 /** The same without shelves that ended, and what was acknowledged long ago and is not listed. */
 export function pruned(kept: Kept, listed: ReadonlySet<string>, at: number): Kept {
@@ -106,19 +95,11 @@ export function pruned(kept: Kept, listed: ReadonlySet<string>, at: number): Kep
     ([id, each]) => listed.has(id) || Math.abs(at - each.at) < FORGET_MS,
   );
   const shelved = [...kept.shelved].filter(([, shelf]) => isAhead(shelf, at));
-  if (
-    acknowledged.length === kept.acknowledged.size &&
-    shelved.length === kept.shelved.size &&
-    acknowledged.length <= MOST_ACKNOWLEDGED &&
-    shelved.length <= MOST_SHELVED
-  ) {
-    return kept;
-  }
-  return {
-    ...kept,
-    acknowledged: new Map(acknowledged.slice(-MOST_ACKNOWLEDGED)),
-    shelved: new Map(shelved.slice(-MOST_SHELVED)),
-  };
+  const isSame =
+    acknowledged.length === kept.acknowledged.size && shelved.length === kept.shelved.size;
+  return isSame
+    ? kept
+    : { ...kept, acknowledged: new Map(acknowledged), shelved: new Map(shelved) };
 }
 
 /** Not for ever where somebody sets the clock back. */
@@ -128,69 +109,54 @@ const isAhead = ({ verdict, until }: Shelf, at: number): boolean =>
 export const isShelfHeld = (shelf: Shelf, verdict: Verdict, at: number): boolean =>
   isAhead(shelf, at) && !isWorse(verdict, shelf.verdict);
 
-/** When the next shelf ends; null: there is none. */
-export const nextEnd = (kept: Kept, at: number): number | null => {
-  const ends = [...kept.shelved.values()].map(({ until }) => until).filter((until) => until > at);
-  return ends.length > 0 ? Math.min(...ends) : null;
-};
+/** When the next shelf ends; infinite: there is none. */
+export const nextEnd = (kept: Kept, at: number): number =>
+  Math.min(...[...kept.shelved.values()].map(({ until }) => until).filter((until) => until > at));
 
 const KEY = 'lupin-twin.alarms';
-/** Another tab of this browser has kept something: this is what it wrote. */
-export const isKept = (key: string | null): boolean => key === KEY || key === null;
-
-/** Reads what was kept; anything unknown or damaged counts as not kept. */
+/** Reads what was kept; anything damaged counts as not kept. */
 export function readKept(storage: Pick<Storage, 'getItem'>): Kept {
-  let parsed: unknown;
   try {
-    parsed = JSON.parse(storage.getItem(KEY) ?? '{}');
+    const {
+      acknowledged = [],
+      shelved = [],
+      sound = false,
+      notify = false,
+    } = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<KeptRows>;
+    return {
+      acknowledged: new Map(acknowledged.map(([id, verdict, at]) => [id, { verdict, at }])),
+      shelved: new Map(
+        shelved.map(([what, verdict, until, reason = '']) => [what, { verdict, until, reason }]),
+      ),
+      ...{ sound, notify },
+    };
   } catch {
     return NOTHING_KEPT;
   }
-  if (typeof parsed !== 'object' || parsed === null) return NOTHING_KEPT;
-  const { acknowledged, shelved, sound, notify } = parsed as Readonly<Record<string, unknown>>;
-  return {
-    acknowledged: new Map(
-      rows(acknowledged, MOST_ACKNOWLEDGED).map(([id, verdict, at]) => [id, { verdict, at }]),
-    ),
-    shelved: new Map(
-      rows(shelved, MOST_SHELVED).map(([what, verdict, until, reason = '']) => [
-        what,
-        { verdict, until, reason: reason.slice(0, LONGEST_REASON) },
-      ]),
-    ),
-    sound: sound === true,
-    notify: notify === true,
-  };
 }
 
-type KeptRow = readonly [string, Verdict, number, string?];
-
-const rows = (list: unknown, most: number): readonly KeptRow[] =>
-  Array.isArray(list) ? list.filter(isRow).slice(-most) : [];
-
-function isRow(row: unknown): row is KeptRow {
-  if (!Array.isArray(row)) return false;
-  const [name, verdict, moment, text] = row as readonly unknown[];
-  return (
-    typeof name === 'string' &&
-    VERDICTS.some((each) => each === verdict) &&
-    typeof moment === 'number' &&
-    Number.isFinite(moment) &&
-    (text === undefined || typeof text === 'string')
-  );
+/** As it is stored. */
+interface KeptRows {
+  readonly acknowledged: readonly (readonly [id: string, Verdict, at: number])[];
+  readonly shelved: readonly (readonly [what: string, Verdict, until: number, reason?: string])[];
+  readonly sound: boolean;
+  readonly notify: boolean;
 }
 
 export function writeKept(storage: Pick<Storage, 'setItem'>, kept: Kept): void {
-  const acknowledged = [...kept.acknowledged].map(([id, { verdict, at }]) => [id, verdict, at]);
-  const shelved = [...kept.shelved].map(([what, { verdict, until, reason }]) => [
-    what,
-    verdict,
-    until,
-    reason,
-  ]);
   const { sound, notify } = kept;
+  const rows: KeptRows = {
+    acknowledged: [...kept.acknowledged].map(([id, { verdict, at }]) => [id, verdict, at]),
+    shelved: [...kept.shelved].map(([what, { verdict, until, reason }]) => [
+      what,
+      verdict,
+      until,
+      reason,
+    ]),
+    ...{ sound, notify },
+  };
   try {
-    storage.setItem(KEY, JSON.stringify({ acknowledged, shelved, sound, notify }));
+    storage.setItem(KEY, JSON.stringify(rows));
   } catch {
     // Storage is full or forbidden: it then lasts as long as the page.
   }
@@ -236,7 +202,8 @@ export const acknowledgeAlarms = (items: readonly Rated[]): void => {
 };
 
 export const unacknowledgeAlarm = (alarm: Alarm): void => {
-  change('unacknowledge', 1, unacknowledge(own.get(), alarm));
+  const kept = own.get();
+  change('unacknowledge', 1, { ...kept, acknowledged: without(kept.acknowledged, alarm.id) });
 };
 
 export const shelveAlarm = (item: Rated, minutes: number, reason: string): void => {
@@ -244,7 +211,8 @@ export const shelveAlarm = (item: Rated, minutes: number, reason: string): void 
 };
 
 export const unshelveAlarm = (alarm: Alarm): void => {
-  change('unshelve', 1, unshelve(own.get(), alarm));
+  const kept = own.get();
+  change('unshelve', 1, { ...kept, shelved: without(kept.shelved, whatOf(alarm)) });
 };
 
 /** Takes the last action back. */
@@ -270,7 +238,7 @@ export function startOwn(storage: Pick<Storage, 'getItem' | 'setItem'>): () => v
   });
   // Another tab has kept something: to undo what was done here would undo that as well.
   const onStorage = ({ key }: StorageEvent): void => {
-    if (!isKept(key)) return;
+    if (key !== KEY && key !== null) return;
     own.set(readKept(storage));
     setDone(null);
   };

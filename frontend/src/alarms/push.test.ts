@@ -25,7 +25,7 @@ function stage(key: string | null, { known = false, fails = false } = {}): unkno
   const getRegistration = () => Promise.resolve({ pushManager });
   vi.stubGlobal('navigator', { serviceWorker: { getRegistration } });
   vi.stubGlobal('fetch', (_path: string, init?: RequestInit) => {
-    if (init) log.push(JSON.parse(init.body as string));
+    if (init?.body) log.push(JSON.parse(init.body as string));
     return Promise.resolve({ ok: true, json: () => Promise.resolve({ public_key: key }) });
   });
   return log;

@@ -51,7 +51,7 @@ export function startAlarms(): () => void {
     const { alarms } = state.twin;
     const kept = pruned(own.get(), idsOf(alarms), at);
     looked = kept;
-    timer = setTimeout(look, Math.min(SWEEP_MS, (nextEnd(kept, at) ?? Infinity) - at), false);
+    timer = setTimeout(look, Math.min(SWEEP_MS, nextEnd(kept, at) - at), false);
     if (kept !== own.get()) own.set(kept);
     if (!alarms) return;
     const list = listOf(alarms.alarms, kept, rosNow(state, now()), at);

@@ -4,15 +4,9 @@ import { act, useApp } from '../store/app';
 import { withChart } from '../store/view';
 import { S } from '../strings';
 import { Icon } from '../widgets/controls';
+import { useSize } from '../widgets/useSize';
 import { ChartState, MarksKey, PlotView, SensorChoice } from './PlotView';
-import {
-  chosenSensor,
-  pointsFor,
-  useCharts,
-  useChosenSensor,
-  useSensorsOf,
-  useSize,
-} from './useLines';
+import { chosenSensor, pointsFor, useCharts, useChosenSensor, useSensorsOf } from './useLines';
 
 const HEIGHT = 172;
 

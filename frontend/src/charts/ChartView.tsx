@@ -6,18 +6,19 @@ import { isHad } from '../domain/sensors';
 import { chartCsv } from '../domain/series';
 import { shown } from '../domain/text';
 import type { Span } from '../domain/time';
-import { fileName, save } from '../export/save';
+import { saveCsv } from '../export/save';
 import { act, prefer, store, useApp } from '../store/app';
 import { selectCatalogue, selectSensor } from '../store/derived';
 import { rosNow, selectTags } from '../store/moment';
 import { type Charted, MOST_CHARTED, withChart } from '../store/view';
 import { S } from '../strings';
 import { Icon, IconButton, Segmented, useFocusBack } from '../widgets/controls';
+import { useSize } from '../widgets/useSize';
 import { ChartTables } from './SeriesTable';
 import { ChartState, LineSign, LineValue, MarksKey, PlotView, SensorChoice } from './PlotView';
 import { plansOf, type PlotModel, tagLabel } from './model';
 import { TIMES_HEIGHT } from './plot';
-import { pointsFor, useCharts, useSensorsOf, useSize } from './useLines';
+import { pointsFor, useCharts, useSensorsOf } from './useLines';
 import { useZoomed, zoomBack, zoomBy } from './zoom';
 
 /** Of one chart of a tag's, and of several tags' only one, without the times; CSS pixels. */
@@ -246,10 +247,7 @@ function ChartFiles({
             models.flatMap(({ lines }) => lines),
             unit,
           );
-          save(
-            new Blob([text], { type: 'text/csv;charset=utf-8' }),
-            fileName('chart', 'csv', span.to * 1000),
-          );
+          saveCsv('chart', text, span.to * 1000);
         }}
       >
         <Icon name="download" size={16} />

@@ -1,7 +1,7 @@
 /** What a chart has below and above its lines: drawn by functions that keep no state. */
 import { valueText } from '../domain/format';
 import type { Span } from '../domain/time';
-import { hatch } from '../draw/surface';
+import type { Colours } from '../draw/colours';
 import { S } from '../strings';
 import { limitsOf, type Line, type PlotModel, pointsOf } from './model';
 
@@ -15,7 +15,7 @@ export interface Frame {
   /** Of a value in the sensor's own unit. */
   readonly y: (value: number) => number;
   readonly model: PlotModel;
-  readonly palette: ChartPalette;
+  readonly colour: Colours;
 }
 
 /** Closer together than this, markers would hide the line; CSS pixels. */
@@ -40,7 +40,7 @@ export function drawBelow(frame: Frame): void {
   context.restore();
 }
 
-function drawIdeal({ context, ratio, x, y, model, palette }: Frame): void {
+function drawIdeal({ context, ratio, x, y, model, colour }: Frame): void {
   context.lineWidth = ratio;
   for (const { from, to, ranges } of model.bands) {
     const [left, right] = [x(from), x(to)];
@@ -55,21 +55,21 @@ function drawIdeal({ context, ratio, x, y, model, palette }: Frame): void {
     };
     const { ideal, critical } = ranges;
     if (!ideal) continue;
-    context.fillStyle = palette.ideal;
+    context.fillStyle = colour('chart-ideal');
     context.fillRect(left, y(ideal[1]), right - left, y(ideal[0]) - y(ideal[1]));
-    context.strokeStyle = palette['ideal-line'];
+    context.strokeStyle = colour('chart-ideal-line');
     context.setLineDash([2 * ratio, 4 * ratio]);
     lines(ideal);
     context.setLineDash([]);
     // Where the values come near it: a line that nothing ever crosses has no room.
-    context.strokeStyle = palette.failure;
+    context.strokeStyle = colour('chart-failure');
     lines(critical ?? []);
   }
 }
 
 /** Hatched, so that an empty stretch is seen to be told and not forgotten. */
 function drawGaps(frame: Frame, { series }: Line): void {
-  frame.context.strokeStyle = frame.palette.gap;
+  frame.context.strokeStyle = frame.colour('chart-gap');
   frame.context.lineWidth = frame.ratio;
   hatched(frame, series.gaps, 1);
   // Leaning to the other side: of these nobody knows whether anything came.
@@ -77,20 +77,34 @@ function drawGaps(frame: Frame, { series }: Line): void {
 }
 
 function hatched({ context, box, ratio, x }: Frame, spans: readonly Span[], slant: 1 | -1): void {
-  for (const { from, to } of spans) {
-    const left = Math.max(box.left, x(from));
-    const width = Math.min(box.left + box.width, x(to)) - left;
+  const edges = [box.top + box.height, box.top] as const;
+  const [from, to] = slant > 0 ? edges : [edges[1], edges[0]];
+  for (const span of spans) {
+    const left = Math.max(box.left, x(span.from));
+    const width = Math.min(box.left + box.width, x(span.to)) - left;
     if (width < 3 * ratio) continue;
-    hatch(context, left, box.top, { width, height: box.height }, 9 * ratio, slant);
+    const step = 9 * ratio;
+    context.save();
+    context.beginPath();
+    context.rect(left, box.top, width, box.height);
+    context.clip();
+    context.beginPath();
+    const first = Math.floor((left - box.height) / step) * step;
+    for (let at = first; at < left + width; at += step) {
+      context.moveTo(at, from);
+      context.lineTo(at + box.height, to);
+    }
+    context.stroke();
+    context.restore();
   }
 }
 
 /** From the least to the most of each bucket, as wide as the bucket: none joins two of them. */
-function drawRanges({ context, ratio, x, y, model, palette }: Frame, line: Line): void {
+function drawRanges({ context, ratio, x, y, model, colour }: Frame, line: Line): void {
   const { series } = line;
   if (series.bucketS === null) return;
   context.globalAlpha = model.lines.length === 1 ? 0.28 : 0.14;
-  context.fillStyle = palette.lines[lookOf(line.look).colour] ?? palette.ink;
+  context.fillStyle = lineColour(colour, line.look);
   context.beginPath();
   for (const { at, min, max } of series.points) {
     const left = x(at);
@@ -119,10 +133,10 @@ const NAME_HEIGHT = 13;
 const NAME_GAP = 6;
 
 /** Each limit at its line, and with an arrow where its line lies above or below the picture. */
-function drawNames({ context, box, ratio, y, model, palette }: Frame): void {
+function drawNames({ context, box, ratio, y, model, colour }: Frame): void {
   const height = NAME_HEIGHT * ratio;
   const names = limitsOf(model).sort((a, b) => b.value - a.value);
-  context.font = palette.font.replace(/[\d.]+(?=px)/, (size) => String(Number(size) * ratio));
+  context.font = `${fontPx() * ratio}px ${colour('font')}`;
   context.textAlign = 'left';
   context.textBaseline = 'middle';
   let least = box.top;
@@ -132,7 +146,7 @@ function drawNames({ context, box, ratio, y, model, palette }: Frame): void {
     least = at + height;
     const word = kind === 'ideal' ? S.idealParts.any : S.alarmStatus.critical;
     const text = `${ARROWS[side]}${word} ${valueText(model.sensor, value, model.unit)}`;
-    context.fillStyle = kind === 'ideal' ? palette.text : palette.failure;
+    context.fillStyle = kind === 'ideal' ? colour('chart-text') : colour('chart-failure');
     context.fillText(text, box.left + box.width + NAME_GAP * ratio, at);
   });
 }
@@ -140,14 +154,14 @@ function drawNames({ context, box, ratio, y, model, palette }: Frame): void {
 const ARROWS = { below: '↓ ', inside: '', above: '↑ ' } as const;
 
 /** Each reading where there is room; a point between two breaks always, or it would not be seen. */
-function drawMarkers({ context, ratio, x, y, box, model, palette }: Frame, line: Line): void {
-  const { colour, marker } = lookOf(line.look);
+function drawMarkers({ context, ratio, x, y, box, model, colour }: Frame, line: Line): void {
+  const { marker } = lookOf(line.look);
   const points = pointsOf(line.series);
   const seen = points.filter(
     ({ at, value }) => value !== null && at >= model.span.from && at <= model.span.to,
   );
   const hasRoom = line.series.bucketS === null && seen.length * MARKER_ROOM * ratio <= box.width;
-  const stroke = palette.lines[colour] ?? palette.ink;
+  const stroke = lineColour(colour, line.look);
   context.strokeStyle = stroke;
   context.fillStyle = stroke;
   context.lineWidth = 1.5 * ratio;
@@ -168,12 +182,12 @@ const MARK_SIZE = 7;
 /** Between the values and their times, marks have a lane of their own; CSS pixels. */
 export const MARKS_LANE = 24;
 
-export function drawMarks({ context, ratio, x, box, palette }: Frame, { marks }: Line): void {
+export function drawMarks({ context, ratio, x, box, colour }: Frame, { marks }: Line): void {
   const bottom = box.top + box.height;
   context.lineWidth = 1.75 * ratio;
   for (const kind of ['look', 'failure'] as const) {
     const isFailure = kind === 'failure';
-    context.strokeStyle = isFailure ? palette.failure : palette.look;
+    context.strokeStyle = isFailure ? colour('chart-failure') : colour('chart-look');
     const y = bottom + (isFailure ? 20 : 8) * ratio;
     let last = -Infinity;
     for (const mark of marks) {
@@ -187,11 +201,11 @@ export function drawMarks({ context, ratio, x, box, palette }: Frame, { marks }:
   }
 }
 
-function drawMoment({ context, box, ratio, x, model: { moment }, palette }: Frame): void {
+function drawMoment({ context, box, ratio, x, model: { moment }, colour }: Frame): void {
   if (moment === null) return;
   const at = Math.round(x(moment));
-  context.strokeStyle = palette.moment;
-  context.fillStyle = palette.moment;
+  context.strokeStyle = colour('chart-moment');
+  context.fillStyle = colour('chart-moment');
   context.lineWidth = 2 * ratio;
   context.beginPath();
   context.moveTo(at, box.top);
@@ -222,6 +236,15 @@ export function lookOf(index: number) {
   return { colour, dash, marker };
 }
 
+export const lineColour = (colour: Colours, look: number): string =>
+  colour(`chart-${lookOf(look).colour + 1}`);
+
+/** Larger where the page's text is. */
+export const fontPx = (): number => {
+  const { fontSize } = getComputedStyle(document.documentElement);
+  return Math.round(11.5 * (parseFloat(fontSize) / 16 || 1));
+};
+
 /** Outline of a marker around a point; `size` is its width. Filled but for crosses and the ring. */
 export function markerPath(marker: Marker, x: number, y: number, size: number): string {
   const r = size / 2;
@@ -248,35 +271,3 @@ export function markerPath(marker: Marker, x: number, y: number, size: number): 
 
 export const isStroked = (marker: Marker): boolean =>
   marker === 'cross' || marker === 'plus' || marker === 'ring';
-
-/** The colours of charts beside those of the lines, by their names in the style sheet. */
-const COLOURS = [
-  'ink',
-  'text',
-  'grid',
-  'surface',
-  'ideal',
-  'ideal-line',
-  'gap',
-  'failure',
-  'look',
-  'moment',
-] as const;
-
-type Colours = Readonly<Record<(typeof COLOURS)[number], string>>;
-type ChartPalette = ReturnType<typeof readPalette>;
-
-/** As the style sheet has them now: light or dark, forced, or for paper. */
-export function readPalette(element: HTMLElement) {
-  const style = getComputedStyle(element);
-  const root = getComputedStyle(document.documentElement);
-  const read = (name: string): string => style.getPropertyValue(`--chart-${name}`).trim();
-  // Larger where the page's text is.
-  const fontPx = Math.round(11.5 * (parseFloat(root.fontSize) / 16 || 1));
-  return {
-    ...(Object.fromEntries(COLOURS.map((name) => [name, read(name)])) as Colours),
-    lines: LOOKS.map((_, index) => read(String(index + 1))),
-    fontPx,
-    font: `${fontPx}px ${style.getPropertyValue('--font')}`,
-  };
-}

@@ -1,19 +1,22 @@
 /** One chart on the page: uPlot with the layers of `layers.ts`, told what to show and how large. */
-import { type RefObject, useEffect, useLayoutEffect, useRef, useState } from 'react';
+import { type RefObject, useEffect, useLayoutEffect, useRef } from 'react';
 import uPlot from 'uplot';
 
 import { toShown } from '../domain/format';
 import { hasDate, type Span } from '../domain/time';
 import { timeTicks, type Tick } from '../domain/timeline';
+import { coloursOf } from '../draw/colours';
 import { LOCALE } from '../strings';
+import { useSize } from '../widgets/useSize';
 import {
   drawAbove,
   drawBelow,
   drawMarks,
   type Frame,
+  fontPx,
+  lineColour,
   lookOf,
   MARKS_LANE,
-  readPalette,
 } from './layers';
 import { aligned, drawnOf, hasMarks, limitsOf, valueRange, type PlotModel } from './model';
 
@@ -48,7 +51,7 @@ const AXIS_NUMBER = new Intl.NumberFormat(LOCALE);
 type Plot = ReturnType<typeof createPlot>;
 
 function createPlot(element: HTMLElement, handlers: PlotHandlers) {
-  let palette = readPalette(element);
+  const colour = coloursOf(element);
   let model: PlotModel | null = null;
   let chart: uPlot | null = null;
   let shape = '';
@@ -61,14 +64,14 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
     x: (at) => u.valToPos(at, 'x', true),
     y: (value) => u.valToPos(toShown(model.sensor, value, model.unit), 'y', true),
     model,
-    palette,
+    colour,
   });
 
   const axis = (): Partial<uPlot.Axis> => ({
-    stroke: () => palette.text,
-    grid: { stroke: () => palette.grid, width: 1 },
-    ticks: { stroke: () => palette.grid, width: 1, size: 5 },
-    font: palette.font,
+    stroke: () => colour('chart-text'),
+    grid: { stroke: () => colour('chart-grid'), width: 1 },
+    ticks: { stroke: () => colour('chart-grid'), width: 1, size: 5 },
+    font: `${fontPx()}px ${colour('font')}`,
   });
 
   const build = (first: PlotModel, { hasTimes, ...size }: PlotSize): uPlot => {
@@ -78,11 +81,11 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
         ...size,
         class: 'plot',
         legend: { show: false },
-        padding: [8, (hasNames(first) ? LIMITS_ROOM : 1) * palette.fontPx, 0, 0],
+        padding: [8, (hasNames(first) ? LIMITS_ROOM : 1) * fontPx(), 0, 0],
         cursor: {
           y: false,
           dataIdx: heldIndex,
-          points: { size: 8, width: 2, stroke: () => palette.surface, fill: colourOf },
+          points: { size: 8, width: 2, stroke: () => colour('chart-surface'), fill: colourOf },
           drag: { x: true, y: false, setScale: false, dist: SHORTEST_DRAG },
           sync: {
             key: SYNC_KEY,
@@ -101,7 +104,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
         series: [
           {},
           ...drawnOf(first).map(({ look, isBefore }) => ({
-            stroke: () => palette.lines[lookOf(look).colour] ?? palette.ink,
+            stroke: () => lineColour(colour, look),
             width: isBefore ? 1.25 : 1.75,
             alpha: isBefore ? 0.55 : 1,
             dash: [...(isBefore ? DASH_BEFORE : lookOf(look).dash)],
@@ -173,7 +176,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
 
   const colourOf = (_: uPlot, series: number): string => {
     const look = (model && drawnOf(model)[series - 1]?.look) ?? 0;
-    return palette.lines[lookOf(look).colour] ?? palette.ink;
+    return lineColour(colour, look);
   };
 
   /** The point of the reading that held then, or of the bucket: the value beside the chart is that. */
@@ -211,7 +214,6 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
     },
     /** Draws anew in the colours that are in force now, at once: a printer does not wait. */
     recolour: (): void => {
-      palette = readPalette(element);
       chart?.batch(() => {
         chart?.redraw();
       });
@@ -237,21 +239,16 @@ export function usePlot(
   onLook: (listener: () => void) => () => void,
 ): RefObject<Plot | null> {
   const plot = useRef<Plot | null>(null);
-  const [width, setWidth] = useState(0);
+  const { width } = useSize(place);
   useLayoutEffect(() => {
     const element = place.current;
     if (!element) return undefined;
     const mine = createPlot(element, handlers);
     plot.current = mine;
-    const resize = new ResizeObserver(([entry]) => {
-      if (entry) setWidth(Math.floor(entry.contentRect.width));
-    });
-    resize.observe(element);
     const stop = onLook(mine.recolour);
     return () => {
       plot.current = null;
       stop();
-      resize.disconnect();
       mine.destroy();
       handlers.onPoint(null);
     };

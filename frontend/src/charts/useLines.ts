@@ -1,4 +1,4 @@
-import { type RefObject, useLayoutEffect, useMemo, useRef, useState } from 'react';
+import { useMemo, useRef, useState } from 'react';
 
 import { now, pause } from '../clock';
 import { type Catalogue, isHad, isMeasured } from '../domain/sensors';
@@ -9,7 +9,6 @@ import { selectCatalogue, selectCatalogues } from '../store/derived';
 import { useFetched } from '../store/fetcher';
 import { rosNow, selectDayS, selectNewestTag, selectTag } from '../store/moment';
 import { turnOf } from '../store/remembered';
-import type { Size } from '../geometry/coordinates';
 import { useNow } from '../widgets/useNow';
 import { fetchLines, type Lines, modelOf, NO_LINES, type Pair, pairKey, type Plan } from './model';
 
@@ -157,25 +156,6 @@ function inOrder({ all }: Catalogue, names: readonly string[]): readonly string[
     return index < 0 ? all.length : index;
   };
   return [...names].sort((a, b) => place(a) - place(b) || (a < b ? -1 : 1));
-}
-
-/** The room inside an element, CSS pixels; none before it is laid out. */
-export function useSize(ref: RefObject<HTMLElement | null>): Size {
-  const [size, setSize] = useState<Size>({ width: 0, height: 0 });
-  useLayoutEffect(() => {
-    const element = ref.current;
-    if (!element) return undefined;
-    const observer = new ResizeObserver(([entry]) => {
-      if (!entry) return;
-      const { width, height } = entry.contentRect;
-      setSize({ width: Math.floor(width), height: Math.floor(height) });
-    });
-    observer.observe(element);
-    return () => {
-      observer.disconnect();
-    };
-  }, [ref]);
-  return size;
 }
 
 /** A bucket of fewer pixels is a line that nobody can tell from the next. */

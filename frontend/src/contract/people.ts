@@ -21,13 +21,15 @@ interface Draft {
   readonly until?: string | null;
 }
 
-export async function postNote(note: Draft): Promise<void> {
-  await ask('api/notes', {
-    method: 'POST',
-    headers: { ...OWN, 'Content-Type': 'application/json' },
-    body: JSON.stringify(note),
-  });
-}
+const post = async (path: string, body: object): Promise<void> => {
+  const headers = { ...OWN, 'Content-Type': 'application/json' };
+  await ask(path, { method: 'POST', headers, body: JSON.stringify(body) });
+};
+
+export const postNote = (note: Draft): Promise<void> => post('api/notes', note);
+
+/** Subscribes a browser to notifications; with its endpoint alone, not any more. */
+export const postPush = (body: PushSubscriptionJSON): Promise<void> => post('api/push', body);
 
 /** Takes the word back that stands of a subject, if there is one. */
 export async function withdrawNote(kind: Draft['kind'], subject: string): Promise<void> {

@@ -50,7 +50,6 @@ export type Verdict = TagHealth['verdict'];
 export type Grade = Schemas['EstimateQualities']['sensors'][string];
 /** What was measured at the tags beside what all the others say. */
 export type ExpectedTags = Schemas['ExpectedTags'];
-export type Expected = Schemas['ExpectedReading'];
 /** Where another tag helps. */
 export type Advice = Schemas['Advice'];
 export type Place = Schemas['AdvisedPlace'];

@@ -1,8 +1,8 @@
 import { describe, expect, test } from 'vitest';
 
-import { DARK, LIGHT } from '../draw/palette';
 import { mapPoint } from '../geometry/coordinates';
 import { judgement, reason } from '../testing/health';
+import { THEMES } from '../testing/colours';
 import { sensorNamed } from '../testing/sensors';
 import { readings, wireTag } from '../testing/tags';
 import {
@@ -102,7 +102,8 @@ function lab(colour: Rgb, seen: readonly number[]): [number, number, number] {
 }
 
 describe.each(Object.entries(SEEN))('colours as seen with %s', (_, seen) => {
-  test.each([LIGHT, DARK])('are apart from each other and from the floor, %#', ({ floor }) => {
+  test.each(THEMES)('are apart from each other and from the floor, %s', (_, token) => {
+    const floor = token('floor');
     const painted = (by: number): Rgb => mix(floor, idealColour(by), IDEAL_ALPHA);
     const all = [floor, painted(-1), painted(-0.01), painted(0), painted(0.01), painted(1)];
     const labs = all.map((colour) => lab(colour, seen));

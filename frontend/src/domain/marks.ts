@@ -1,61 +1,27 @@
 /**
  * The look of a verdict without its colour: one outline and one sign each, the same on the map, in
  * the table and in the legend. Outlines differ as silhouettes, so that a pin of a few pixels is told
- * by whoever sees no colours. About the origin, y down; most of an outline is at radius 1.
+ * by whoever sees no colours. SVG paths about the origin, y down; most of an outline is at radius 1.
  */
 import type { Verdict } from '../contract/types';
 import { S } from '../strings';
 import type { Rgb } from './ramp';
 import { shown } from './text';
 
-export type Point = readonly [number, number];
-
-export interface Mark {
-  /** A closed line; "circle": one of radius 1. */
-  readonly outline: readonly Point[] | 'circle';
-  /** What is drawn on it: open lines; a dot is a line of no length. */
-  readonly sign: readonly (readonly Point[])[];
-  /** Nothing is known: the outline alone. */
-  readonly isHollow: boolean;
+interface Mark {
+  readonly outline: string;
+  /** What is drawn on it; a dot is a line of next to no length. Empty: nothing is known. */
+  readonly sign: string;
 }
 
-/** Its points as "x,y x,y". */
-export const lineOf = (points: string): Point[] =>
-  points.split(' ').map((point) => {
-    const [x = 0, y = 0] = point.split(',').map(Number);
-    return [x, y];
-  });
+const CIRCLE = 'M-1 0A1 1 0 1 1 1 0A1 1 0 1 1-1 0Z';
 
 export const MARKS: Readonly<Record<Verdict, Mark>> = {
-  critical: {
-    outline: lineOf('-.92,-.92 .92,-.92 .92,.92 -.92,.92'),
-    sign: [lineOf('-.42,-.42 .42,.42'), lineOf('.42,-.42 -.42,.42')],
-    isHollow: false,
-  },
-  stressed: {
-    outline: lineOf('0,-1.08 1.14,.9 -1.14,.9'),
-    sign: [lineOf('0,-.34 0,.24'), lineOf('0,.6 0,.61')],
-    isHollow: false,
-  },
-  unknown: { outline: 'circle', sign: [], isHollow: true },
-  healthy: { outline: 'circle', sign: [lineOf('-.44,.04 -.12,.36 .46,-.3')], isHollow: false },
+  critical: { outline: 'M-.92-.92H.92V.92H-.92Z', sign: 'M-.42-.42L.42.42M.42-.42L-.42.42' },
+  stressed: { outline: 'M0-1.08L1.14.9H-1.14Z', sign: 'M0-.34V.24M0 .6V.61' },
+  unknown: { outline: CIRCLE, sign: '' },
+  healthy: { outline: CIRCLE, sign: 'M-.44.04L-.12.36L.46-.3' },
 };
-
-/** The lines as an SVG path in the middle of a box of 16 by 16; `closed`: each ends where it began. */
-export function svgPath(
-  lines: readonly (readonly Point[])[],
-  radius: number,
-  closed = false,
-): string {
-  const at = (value: number): string => String(Math.round((8 + value * radius) * 100) / 100);
-  return lines
-    .map(
-      (line) =>
-        line.map(([x, y], index) => `${index === 0 ? 'M' : 'L'}${at(x)} ${at(y)}`).join('') +
-        (closed ? 'Z' : ''),
-    )
-    .join('');
-}
 
 /** How a species' blooms are drawn: colour and shape, so that colour is never alone. */
 export interface BloomLook {

@@ -77,11 +77,13 @@ export const dateText = (epochMs: number): string =>
 
 export const two = (value: number): string => String(value).padStart(2, '0');
 
-function simText(at: number): string {
-  const seconds = Math.floor(at);
-  const parts = [Math.floor(seconds / 3_600), Math.floor(seconds / 60) % 60, seconds % 60];
-  return `sim ${parts.map(two).join(':')}`;
+/** "1:02:03" since a simulation began. */
+export function countText(seconds: number): string {
+  const s = Math.floor(seconds);
+  return [Math.floor(s / 3_600), two(Math.floor(s / 60) % 60), two(s % 60)].join(':');
 }
+
+const simText = (at: number): string => `sim ${countText(at).padStart(8, '0')}`;
 
 /** Lengths that end now, in seconds. */
 const LENGTHS = { hour: 3_600, day: 86_400, week: 604_800, month: 2_592_000 } as const;

@@ -2,7 +2,7 @@
 import type { Timeline as WireTimeline } from '../contract/types';
 import { LOCALE } from '../strings';
 import type { Shared } from './memo';
-import { dayFormat, secondsOf, type Span, two } from './time';
+import { countText, dayFormat, secondsOf, type Span, two } from './time';
 
 /** What happened in one bucket, from when it begins, ROS seconds. */
 export type Happened = Timeline['buckets'][number];
@@ -88,7 +88,9 @@ export function timeTicks(span: Span, most: number, isSimulated: boolean): reado
   const times = isSimulated ? evenTimes(span, step) : clockTimes(span, step);
   let before = '';
   return times.map((at) => {
-    if (isSimulated) return { at, text: countText(at, step) };
+    if (isSimulated) {
+      return { at, text: countText(Math.round(at)).slice(0, step < MINUTE ? undefined : -3) };
+    }
     const date = new Date(at * 1000);
     const below = step < DAY ? dayFormat.format(date) : String(date.getFullYear());
     const text = step < DAY ? clockText(date, step) : dateText(date, step);
@@ -142,9 +144,3 @@ function clockText(date: Date, step: number): string {
 
 const dateText = (date: Date, step: number): string =>
   (step >= 30 * DAY ? monthFormat : dayFormat).format(date);
-
-function countText(at: number, step: number): string {
-  const seconds = Math.round(at);
-  const text = `${Math.floor(seconds / HOUR)}:${two(Math.floor(seconds / MINUTE) % 60)}`;
-  return step < MINUTE ? `${text}:${two(seconds % 60)}` : text;
-}

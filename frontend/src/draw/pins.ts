@@ -1,10 +1,10 @@
 /** Pins, blooms, pest rings and labels: what the data moves. All from cached sprites. */
 import { isBad, VERDICTS } from '../domain/health';
-import { type BloomLook, lineOf, type Mark, MARKS, type Point } from '../domain/marks';
+import { type BloomLook, MARKS } from '../domain/marks';
 import { rgbText } from '../domain/ramp';
 import type { LabelRequest, PlacedLabel } from '../geometry/clear';
 import { type MapPoint, toCanvas } from '../geometry/coordinates';
-import type { Palette } from './palette';
+import type { Colours } from './colours';
 import type { Pin, Scene } from './scene';
 import type { Pen, Surface } from './surface';
 
@@ -36,7 +36,7 @@ const inside = ({ size }: Surface, x: number, y: number, margin: number): boolea
   x > -margin && y > -margin && x < size.width + margin && y < size.height + margin;
 
 export function drawBlooms(pen: Pen, blooms: Scene['blooms']): void {
-  const { view, sprites, palette } = pen;
+  const { view, sprites, colour } = pen;
   const radius = bloomRadius(view.scale);
   const box = Math.ceil(radius * 1.3 + 2) * 2;
   for (const { at, look } of blooms) {
@@ -45,39 +45,37 @@ export function drawBlooms(pen: Pen, blooms: Scene['blooms']): void {
     const key = `bloom ${radius} ${look.shape} ${look.colour.join()}`;
     const sprite = sprites.get(key, box, box, (context) => {
       context.translate(box / 2, box / 2);
-      paintBloom(context, radius, look, palette);
+      paintBloom(context, radius, look, colour);
     });
     sprites.draw(pen, sprite, x - box / 2, y - box / 2);
   }
 }
 
-/** A dot about the origin; the shapes have about the same area. */
+/** SVG paths about the origin at radius 1; the shapes have about the same area. */
+const BLOOMS = {
+  circle: MARKS.healthy.outline,
+  square: 'M-.89-.89H.89V.89H-.89Z',
+  triangle: 'M0-1.3L1.2.85H-1.2Z',
+} as const;
+
+/** A dot about the origin. */
 function paintBloom(
   context: CanvasRenderingContext2D,
   radius: number,
-  { colour, shape }: BloomLook,
-  palette: Palette,
+  look: BloomLook,
+  colour: Colours,
 ): void {
-  context.beginPath();
-  if (shape === 'circle') {
-    context.arc(0, 0, radius, 0, 2 * Math.PI);
-  } else if (shape === 'square') {
-    context.rect(-radius * 0.89, -radius * 0.89, radius * 1.78, radius * 1.78);
-  } else {
-    context.moveTo(0, -radius * 1.3);
-    context.lineTo(radius * 1.2, radius * 0.85);
-    context.lineTo(-radius * 1.2, radius * 0.85);
-    context.closePath();
-  }
+  const outline = new Path2D(BLOOMS[look.shape]);
+  context.scale(radius, radius);
   // Its colour alone would not stand out from a heat map over a planter.
-  context.strokeStyle = palette.halo;
-  context.lineWidth = 2.5;
-  context.stroke();
-  context.fillStyle = rgbText(colour);
-  context.fill();
-  context.strokeStyle = palette.bloomLine;
-  context.lineWidth = 0.75;
-  context.stroke();
+  context.strokeStyle = colour('map-halo');
+  context.lineWidth = 2.5 / radius;
+  context.stroke(outline);
+  context.fillStyle = rgbText(look.colour);
+  context.fill(outline);
+  context.strokeStyle = colour('map-bloom-line');
+  context.lineWidth = 0.75 / radius;
+  context.stroke(outline);
 }
 
 const WARNING_PX = 1;
@@ -85,7 +83,7 @@ const WARNING_PX = 1;
 const BY_SEVERITY = [...VERDICTS].reverse();
 
 export function drawPins(pen: Pen, pins: readonly Pin[], spacing: number): void {
-  const { context: target, view, sprites, palette } = pen;
+  const { context: target, view, sprites, colour } = pen;
   const usual = pinRadius(view.scale, spacing);
   for (const verdict of BY_SEVERITY) {
     const radius = Math.max(usual, LEAST_PX[verdict]);
@@ -97,7 +95,7 @@ export function drawPins(pen: Pen, pins: readonly Pin[], spacing: number): void 
       const key = `pin ${radius} ${verdict} ${pin.kind}`;
       const sprite = sprites.get(key, box, box, (context) => {
         context.translate(box / 2, box / 2);
-        paintPin(context, radius, pin, palette);
+        paintPin(context, radius, pin, colour);
       });
       target.globalAlpha = pin.strength;
       sprites.draw(pen, sprite, x - box / 2, y - box / 2);
@@ -122,70 +120,45 @@ function paintPin(
   context: CanvasRenderingContext2D,
   pinSize: number,
   { verdict, kind }: Pick<Pin, 'verdict' | 'kind'>,
-  palette: Palette,
+  colour: Colours,
 ): void {
   const mark = MARKS[verdict];
-  const { body, ink, line: own } = palette.verdicts[verdict];
   const isWarning = isBad(verdict);
   const radius = pinSize + (isWarning ? WARNING_PX : 0);
   const isEmpty = kind !== 'value';
-  const isLine = isEmpty || mark.isHollow;
-  traceOutline(context, mark, radius);
+  const isLine = isEmpty || mark.sign === '';
+  const outline = new Path2D(mark.outline);
+  context.scale(radius, radius);
   context.lineJoin = 'round';
   context.lineCap = 'round';
   // The halo tells it from whatever colour lies below.
-  context.strokeStyle = palette.halo;
-  context.lineWidth = radius < LEAST_SIGN_PX ? 1.5 : isLine ? 5 : 4;
-  context.stroke();
-  context.fillStyle = isEmpty ? palette.verdicts.unknown.body : body;
-  context.fill();
-  context.strokeStyle = isLine ? own : palette.pinLine;
-  context.lineWidth = isLine ? Math.min(2, radius * 0.4) : 1.25;
-  if (kind === 'lacking') context.setLineDash([3, 3]);
-  context.stroke();
+  context.strokeStyle = colour('map-halo');
+  context.lineWidth = (radius < LEAST_SIGN_PX ? 1.5 : isLine ? 5 : 4) / radius;
+  context.stroke(outline);
+  context.fillStyle = colour(isEmpty ? 'pin-unknown' : `pin-${verdict}`);
+  context.fill(outline);
+  context.strokeStyle = colour(isLine ? verdict : 'pin-line');
+  context.lineWidth = isLine ? Math.min(2 / radius, 0.4) : 1.25 / radius;
+  if (kind === 'lacking') context.setLineDash([3 / radius, 3 / radius]);
+  context.stroke(outline);
   context.setLineDash([]);
   // Too small for a sign: a dot.
   if (radius < LEAST_SIGN_PX) return;
-  context.strokeStyle = isEmpty ? own : ink;
-  context.lineWidth = Math.max(1.5, radius * 0.24);
-  for (const line of kind === 'failed' ? STRUCK : mark.sign) {
-    traceLine(context, line, radius);
-    context.stroke();
-  }
+  context.strokeStyle = colour(isEmpty ? verdict : `pin-${verdict}-ink`);
+  context.lineWidth = Math.max(1.5 / radius, 0.24);
+  context.stroke(new Path2D(kind === 'failed' ? STRUCK : mark.sign));
 }
 
 /** There is such a sensor, and it gives no number. */
-const STRUCK: Mark['sign'] = [lineOf('-.45,.45 .45,-.45')];
-
-function traceOutline(context: CanvasRenderingContext2D, { outline }: Mark, radius: number): void {
-  if (outline === 'circle') {
-    context.beginPath();
-    context.arc(0, 0, radius, 0, 2 * Math.PI);
-  } else {
-    traceLine(context, outline, radius);
-    context.closePath();
-  }
-}
-
-function traceLine(
-  context: CanvasRenderingContext2D,
-  line: readonly Point[],
-  radius: number,
-): void {
-  context.beginPath();
-  for (const [index, [x, y]] of line.entries()) {
-    if (index === 0) context.moveTo(x * radius, y * radius);
-    else context.lineTo(x * radius, y * radius);
-  }
-}
+const STRUCK = 'M-.45.45L.45-.45';
 
 function drawPest(pen: Pen, x: number, y: number, radius: number): void {
-  const { sprites, palette } = pen;
+  const { sprites, colour } = pen;
   const ring = radius + 6;
   const box = (ring + 10) * 2;
   const sprite = sprites.get(`pest ${radius}`, box, box, (context) => {
     context.translate(box / 2, box / 2);
-    context.strokeStyle = palette.pest;
+    context.strokeStyle = colour('critical');
     context.lineWidth = 2;
     context.setLineDash([5, 3.5]);
     context.beginPath();
@@ -195,27 +168,24 @@ function drawPest(pen: Pen, x: number, y: number, radius: number): void {
     context.translate(ring * 0.74, -ring * 0.74);
     // Small pins stand close together.
     context.scale(radius < 8 ? 0.8 : 1, radius < 8 ? 0.8 : 1);
-    paintBug(context, palette);
+    paintBug(context, colour);
   });
   sprites.draw(pen, sprite, x - box / 2, y - box / 2);
 }
 
 /** A bug on a disc about the origin: no shape of any verdict. */
-function paintBug(context: CanvasRenderingContext2D, palette: Palette): void {
+function paintBug(context: CanvasRenderingContext2D, colour: Colours): void {
   context.beginPath();
   context.arc(0, 0, 7, 0, 2 * Math.PI);
-  context.strokeStyle = palette.halo;
+  context.strokeStyle = colour('map-halo');
   context.lineWidth = 3;
   context.stroke();
-  context.fillStyle = palette.pest;
+  context.fillStyle = colour('critical');
   context.fill();
-  context.strokeStyle = palette.pestInk;
-  context.fillStyle = palette.pestInk;
+  context.strokeStyle = colour('map-pest-ink');
+  context.fillStyle = colour('map-pest-ink');
   context.lineWidth = 1;
-  for (const y of [-1.5, 1, 3.2]) {
-    traceLine(context, [[-4.2, y], [4.2, y]], 1); // prettier-ignore
-    context.stroke();
-  }
+  context.stroke(new Path2D('M-4.2-1.5H4.2M-4.2 1H4.2M-4.2 3.2H4.2'));
   context.beginPath();
   context.ellipse(0, 1, 2.1, 3.4, 0, 0, 2 * Math.PI);
   context.fill();
@@ -245,17 +215,17 @@ export function labelRequests(
 }
 
 export function drawLabels(pen: Pen, labels: readonly PlacedLabel[]): void {
-  const { view, sprites, palette, textScale } = pen;
+  const { view, sprites, colour, textScale } = pen;
   const height = labelHeight(textScale);
   for (const { text, x, y, width } of labels) {
     if (!inside(pen, view.x + x, view.y + y, width + height)) continue;
     const sprite = sprites.get(`label ${text}`, width, height, (context) => {
-      context.fillStyle = palette.labelFill;
+      context.fillStyle = colour('map-label');
       context.beginPath();
       context.roundRect(0, 0, width, height, 5);
       context.fill();
       context.font = labelFont(textScale);
-      context.fillStyle = palette.labelText;
+      context.fillStyle = colour('map-label-text');
       context.textBaseline = 'middle';
       context.fillText(text, LABEL_PADDING, height / 2 + 0.5);
     });
@@ -273,12 +243,12 @@ export interface Pulse {
 }
 
 export function drawPulses(
-  { context, view, palette }: Pen,
+  { context, view, colour }: Pen,
   pulses: readonly Pulse[],
   now: number,
 ): void {
   const radius = pinRadius(view.scale);
-  context.strokeStyle = palette.accent;
+  context.strokeStyle = colour('accent');
   context.lineWidth = 2;
   for (const { at, since } of pulses) {
     const share = Math.min(1, Math.max(0, (now - since) / PULSE_MS));
@@ -291,39 +261,28 @@ export function drawPulses(
   context.globalAlpha = 1;
 }
 
-export function drawMark({ context, view, palette }: Pen, at: MapPoint, strong: boolean): void {
+/** In the accent's colour, on a halo that tells it from whatever lies below. */
+function drawOutlined({ context, colour }: Pen, lines: Path2D, halo: number, width: number): void {
+  context.strokeStyle = colour('map-halo');
+  context.lineWidth = halo;
+  context.stroke(lines);
+  context.strokeStyle = colour('accent');
+  context.lineWidth = width;
+  context.stroke(lines);
+}
+
+export function drawMark(pen: Pen, at: MapPoint, strong: boolean): void {
   // Outside of the ring that tells a pest.
-  const radius = pinRadius(view.scale) + 9;
-  const { x, y } = toCanvas(view, at);
-  context.beginPath();
-  context.arc(x, y, radius, 0, 2 * Math.PI);
-  context.strokeStyle = palette.halo;
-  context.lineWidth = strong ? 6 : 4;
-  context.stroke();
-  context.strokeStyle = palette.accent;
-  context.lineWidth = strong ? 3 : 2;
-  context.stroke();
+  const r = pinRadius(pen.view.scale) + 9;
+  const { x, y } = toCanvas(pen.view, at);
+  const ring = new Path2D(`M${x - r} ${y}a${r} ${r} 0 1 1 ${2 * r} 0a${r} ${r} 0 1 1 ${-2 * r} 0Z`);
+  drawOutlined(pen, ring, strong ? 6 : 4, strong ? 3 : 2);
 }
 
 /** The point whose value the keyboard reads: the middle of the view. */
-export function drawCrosshair({ context, size, palette }: Pen): void {
-  const x = Math.round(size.width / 2) + 0.5;
-  const y = Math.round(size.height / 2) + 0.5;
-  for (const [colour, width] of [
-    [palette.halo, 4],
-    [palette.accent, 1.5],
-  ] as const) {
-    context.strokeStyle = colour;
-    context.lineWidth = width;
-    context.beginPath();
-    context.moveTo(x - 12, y);
-    context.lineTo(x - 3, y);
-    context.moveTo(x + 3, y);
-    context.lineTo(x + 12, y);
-    context.moveTo(x, y - 12);
-    context.lineTo(x, y - 3);
-    context.moveTo(x, y + 3);
-    context.lineTo(x, y + 12);
-    context.stroke();
-  }
+export function drawCrosshair(pen: Pen): void {
+  const x = Math.round(pen.size.width / 2) + 0.5;
+  const y = Math.round(pen.size.height / 2) + 0.5;
+  const cross = `M${x - 12} ${y}h9m6 0h9M${x} ${y - 12}v9m0 6v9`;
+  drawOutlined(pen, new Path2D(cross), 4, 1.5);
 }

@@ -1,7 +1,6 @@
 /** What changes only with the data or the view: ground, SLAM map, heat map, grid, boxes. */
 import type { Field, Sureness } from '../contract/types';
 import { written } from '../domain/format';
-import { mix, rgbText } from '../domain/ramp';
 import { stepsIn } from '../domain/field';
 import type { AreaOnMap } from '../domain/table';
 import { shown } from '../domain/text';
@@ -16,38 +15,52 @@ import {
   toMap,
 } from '../geometry/coordinates';
 import { imageToCanvas, type Placement } from '../geometry/image';
-import type { Palette } from './palette';
+import type { Colours } from './colours';
 import { canvasOfPixels, contextOf, newCanvas, type Pen } from './surface';
 
-export function drawGround({ context, size, palette }: Pen): void {
-  context.fillStyle = rgbText(palette.ground);
+export function drawGround({ context, size, colour }: Pen): void {
+  context.fillStyle = colour('sunken');
   context.fillRect(0, 0, size.width, size.height);
 }
 
 /** The greys of /api/map.png between which a cell lies, from occupied to free. */
 const OCCUPIED_GREY = 70;
 const FREE_GREY = 236;
-export const LEAST_FREE_GREY = (OCCUPIED_GREY + FREE_GREY) / 2;
+const LEAST_FREE_GREY = (OCCUPIED_GREY + FREE_GREY) / 2;
+
+/** Black where the SLAM map has something, as much as `share` says of its grey. */
+function maskOf({ data, width, height }: ImageData, share: (grey: number) => number) {
+  const mask = new Uint8ClampedArray(data.length);
+  for (let at = 0; at < data.length; at += 4) {
+    mask[at + 3] = (data[at + 3] ?? 0) * share(data[at] ?? 0);
+  }
+  return canvasOfPixels({ data: mask, width, height });
+}
+
+function filled(mask: HTMLCanvasElement, colour: string): HTMLCanvasElement {
+  const context = contextOf(mask);
+  context.globalCompositeOperation = 'source-in';
+  context.fillStyle = colour;
+  context.fillRect(0, 0, mask.width, mask.height);
+  context.globalCompositeOperation = 'source-over';
+  return mask;
+}
 
 /** The SLAM map in the theme's colours: its grey becomes the way from wall to floor. */
-export function tintMap(pixels: ImageData, palette: Palette): HTMLCanvasElement {
-  const source = pixels.data;
-  const data = new Uint8ClampedArray(source.length);
-  const tones = Array.from({ length: 256 }, (_, grey) => {
-    const free = (grey - OCCUPIED_GREY) / (FREE_GREY - OCCUPIED_GREY);
-    return mix(palette.wall, palette.floor, Math.min(1, Math.max(0, free)));
-  });
-  for (let i = 0; i < source.length; i += 4) {
-    const alpha = source[i + 3] ?? 0;
-    if (alpha === 0) continue;
-    const tone = tones[source[i] ?? 0] ?? palette.floor;
-    data[i] = tone[0];
-    data[i + 1] = tone[1];
-    data[i + 2] = tone[2];
-    data[i + 3] = alpha;
-  }
-  return canvasOfPixels({ data, width: pixels.width, height: pixels.height });
+export function tintMap(pixels: ImageData, colour: Colours): HTMLCanvasElement {
+  const wall = (grey: number): number =>
+    Math.min(1, Math.max(0, (FREE_GREY - grey) / (FREE_GREY - OCCUPIED_GREY)));
+  const tinted = filled(
+    maskOf(pixels, () => 1),
+    colour('floor'),
+  );
+  contextOf(tinted).drawImage(filled(maskOf(pixels, wall), colour('map-wall')), 0, 0);
+  return tinted;
 }
+
+/** The floor of the SLAM map: what is inside the house. */
+export const floorOf = (pixels: ImageData): HTMLCanvasElement =>
+  maskOf(pixels, (grey) => Number(grey >= LEAST_FREE_GREY));
 
 interface Placed {
   readonly picture: HTMLCanvasElement;
@@ -89,11 +102,11 @@ function gridTicks({ size, view, textScale }: Pen) {
 
 /** Lines at round metres, so far apart that their numbers have room. */
 export function drawGridLines(pen: Pen): void {
-  const { context, size, view, palette } = pen;
+  const { context, size, view, colour } = pen;
   const { columns, rows } = gridTicks(pen);
   const sharp = (value: number): number => Math.round(value) + 0.5;
 
-  context.strokeStyle = palette.gridLine;
+  context.strokeStyle = colour('map-grid');
   context.lineWidth = 1;
   context.beginPath();
   for (const x of columns) {
@@ -113,9 +126,9 @@ export function drawGridLines(pen: Pen): void {
 const EDGE_PX = 8;
 
 export function drawGridLabels(pen: Pen): void {
-  const { context, size, view, palette, textScale } = pen;
+  const { context, size, view, colour, textScale } = pen;
   const { columns, rows } = gridTicks(pen);
-  context.fillStyle = palette.gridText;
+  context.fillStyle = colour('map-text');
   context.font = `500 ${10.5 * textScale}px "Inter Variable", system-ui, sans-serif`;
   context.textBaseline = 'top';
   context.textAlign = 'left';
@@ -142,11 +155,11 @@ const tick = (metres: number): string =>
   (Math.abs(metres) < 1e-9 ? '0' : written(lengthText(Math.abs(metres)))).replace('\u00a0', ' ');
 
 export function drawBoxes(
-  { context, view, palette }: Pen,
+  { context, view, colour }: Pen,
   boxes: readonly (readonly MapPoint[])[],
 ): void {
-  context.fillStyle = palette.boxFill;
-  context.strokeStyle = palette.boxLine;
+  context.fillStyle = colour('map-box');
+  context.strokeStyle = colour('map-box-line');
   context.lineWidth = 1.25;
   context.beginPath();
   for (const box of boxes) {
@@ -165,11 +178,11 @@ export function drawBoxes(
 const AREA_M = 0.25;
 
 export function drawAreas(
-  { context, view, palette, textScale }: Pen,
+  { context, view, colour, textScale }: Pen,
   areas: readonly AreaOnMap[],
 ): void {
   if (areas.length === 0) return;
-  context.strokeStyle = context.fillStyle = palette.gridText;
+  context.strokeStyle = context.fillStyle = colour('map-text');
   context.lineWidth = 1.25;
   context.setLineDash([6, 4]);
   context.font = `600 ${11 * textScale}px "Inter Variable", system-ui, sans-serif`;
@@ -187,7 +200,7 @@ export function drawAreas(
   context.setLineDash([]);
   // Over a heat map, and a line of another area.
   context.lineWidth = 4;
-  context.strokeStyle = rgbText(palette.ground);
+  context.strokeStyle = colour('sunken');
   for (const [name, x, y] of names) {
     context.strokeText(name, x, y);
     context.fillText(name, x, y);
@@ -198,16 +211,6 @@ export function drawAreas(
 const GAP_PX = 9;
 /** The same over what is known ever less surely: each has all strokes of the one before it. */
 const UNSURE_GAPS_PX = [18, 9, 4.5] as const;
-
-/** The floor of the SLAM map: what is inside the house. `free` is the least grey that is no wall. */
-export function floorOf(pixels: ImageData, free: number): HTMLCanvasElement {
-  const { data, width, height } = pixels;
-  const floor = new Uint8ClampedArray(data.length);
-  for (let at = 0; at < data.length; at += 4) {
-    if ((data[at + 3] ?? 0) > 0 && (data[at] ?? 0) >= free) floor[at + 3] = 255;
-  }
-  return canvasOfPixels({ data: floor, width, height });
-}
 
 /** The cells of a field for which `isIn` holds, top row first. */
 export function cellsOf(
@@ -276,10 +279,10 @@ export function drawUnsure(pen: Pen, steps: readonly (Placed | null)[], hatching
   });
 }
 
-function strokes({ context, size, view, palette }: Pen, gap: number): void {
+function strokes({ context, size, view, colour }: Pen, gap: number): void {
   const { width, height } = size;
   const first = ((view.x + view.y) % gap) - gap;
-  context.strokeStyle = palette.hatch;
+  context.strokeStyle = colour('map-hatch');
   context.lineWidth = 1;
   context.beginPath();
   for (let x = first; x < width + height + gap; x += gap) {
@@ -289,8 +292,8 @@ function strokes({ context, size, view, palette }: Pen, gap: number): void {
   context.stroke();
 }
 
-export function drawEdges({ context, size, view, palette }: Pen, lines: readonly number[]): void {
-  context.strokeStyle = palette.edge;
+export function drawEdges({ context, size, view, colour }: Pen, lines: readonly number[]): void {
+  context.strokeStyle = colour('map-edge');
   context.lineWidth = 1.25;
   context.beginPath();
   for (let at = 0; at < lines.length; at += 4) {

@@ -1,5 +1,5 @@
 import type { Size, View } from '../geometry/coordinates';
-import type { Palette } from './palette';
+import type { Colours } from './colours';
 
 /** A canvas ready to draw on in CSS pixels. */
 export interface Surface {
@@ -12,7 +12,7 @@ export interface Surface {
 /** What everything of the map is drawn with. */
 export interface Pen extends Surface {
   readonly view: View;
-  readonly palette: Palette;
+  readonly colour: Colours;
   readonly sprites: Sprites;
   /** How large the page's text is, 1 as usual. */
   readonly textScale: number;
@@ -31,29 +31,6 @@ export function contextOf(canvas: HTMLCanvasElement): CanvasRenderingContext2D {
   return context;
 }
 
-/** Slanted lines over a box, in the stroke that is set; `slant` 1 leans to the right, -1 to the left. */
-export function hatch(
-  context: CanvasRenderingContext2D,
-  left: number,
-  top: number,
-  { width, height }: Size,
-  step: number,
-  slant: 1 | -1,
-): void {
-  const [from, to] = slant > 0 ? [top + height, top] : [top, top + height];
-  context.save();
-  context.beginPath();
-  context.rect(left, top, width, height);
-  context.clip();
-  context.beginPath();
-  for (let at = Math.floor((left - height) / step) * step; at < left + width; at += step) {
-    context.moveTo(at, from);
-    context.lineTo(at + height, to);
-  }
-  context.stroke();
-  context.restore();
-}
-
 export function clear({ context, size, ratio }: Surface): void {
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.globalAlpha = 1;
@@ -70,17 +47,16 @@ export function canvasOfPixels(
   return canvas;
 }
 
+const MOST_SPRITES = 1_000;
+
 /**
  * Small pictures painted once and then only copied: without a GPU a copy is many times cheaper
- * than a path. Emptied when it grows beyond `limit`, so that a page of days stays small.
+ * than a path. Emptied when there are too many, so that a page of days stays small.
  */
 export class Sprites {
   readonly #sprites = new Map<string, HTMLCanvasElement>();
 
-  constructor(
-    private readonly ratio: number,
-    private readonly limit = 1_000,
-  ) {}
+  constructor(private readonly ratio: number) {}
 
   get(
     key: string,
@@ -90,7 +66,7 @@ export class Sprites {
   ): HTMLCanvasElement {
     const known = this.#sprites.get(key);
     if (known) return known;
-    if (this.#sprites.size >= this.limit) this.#sprites.clear();
+    if (this.#sprites.size >= MOST_SPRITES) this.#sprites.clear();
     const sprite = newCanvas(Math.ceil(width) * this.ratio, Math.ceil(height) * this.ratio);
     const context = contextOf(sprite);
     context.scale(this.ratio, this.ratio);

@@ -1,7 +1,7 @@
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { snapshotOf } from '../domain/twin';
-import { onMapCommand } from '../map/commands';
+import { theMap, type MapActions } from '../map/commands';
 import { act, prefer, receive, store } from '../store/app';
 import { withSort } from '../store/view';
 import { NO_HOUSE, withPast } from '../store/twin';
@@ -110,11 +110,12 @@ test('a picture is taken of layers that are as on paper', async () => {
   await saveMap();
   // Nobody draws a map here, so nothing was shown to take.
   expect(drawn()).toBe(0);
-  const stop = onMapCommand((command) => {
-    if (command.type === 'picture') command.take();
-  });
+  const take = (draw: () => void): void => {
+    draw();
+  };
+  theMap.set({ take } as MapActions);
   await saveMap();
-  stop();
+  theMap.set(null);
   layer.remove();
   expect(drawn()).toBe(1);
   expect(height()).toBe(20 + 2 * FOOTER_PX);

@@ -9,7 +9,7 @@ import { shown } from '../domain/text';
 import { dateText, rosText, secondsOf, type Span, spanOf } from '../domain/time';
 import { contextOf, newCanvas } from '../draw/surface';
 import { lengthText, scaleBar } from '../geometry/coordinates';
-import { commandMap } from '../map/commands';
+import { theMap } from '../map/commands';
 import { toFragment } from '../store/address';
 import { store } from '../store/app';
 import {
@@ -24,7 +24,7 @@ import {
 import { rosNow, selectHasOwnTime, selectOrigin, selectShown } from '../store/moment';
 import { isChosen } from '../store/view';
 import { LANGUAGE, S } from '../strings';
-import { fileName, save } from './save';
+import { fileName, save, saveCsv } from './save';
 
 /**
  * The table as the operator sees it, filtered and sorted; ages are those of the state's time. Asked
@@ -55,8 +55,7 @@ function writeTable(): void {
     unit,
     snapshot.takenAt,
   );
-  const blob = new Blob([text], { type: 'text/csv;charset=utf-8' });
-  save(blob, fileName('tags', 'csv', epochOf(snapshot.takenAt), moment));
+  saveCsv('tags', text, epochOf(snapshot.takenAt), moment);
 }
 
 /** The map as the operator sees it, with a footer that says what, when and how large. */
@@ -71,11 +70,8 @@ export async function saveMap(): Promise<void> {
   const style = getComputedStyle(document.documentElement);
   const canvas = newCanvas(first.width, first.height + FOOTER_PX * ratio);
   const context = contextOf(canvas);
-  commandMap({
-    type: 'picture',
-    take: () => {
-      for (const layer of layers) context.drawImage(layer, 0, 0);
-    },
+  theMap.get()?.take(() => {
+    for (const layer of layers) context.drawImage(layer, 0, 0);
   });
 
   const sensor = selectSensor(state);

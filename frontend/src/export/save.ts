@@ -12,6 +12,18 @@ export function save(blob: Blob, name: string): void {
   }, 60_000);
 }
 
+export const saveCsv = (
+  kind: string,
+  text: string,
+  epochMs: number,
+  moment?: number | null,
+): void => {
+  save(
+    new Blob([text], { type: 'text/csv;charset=utf-8' }),
+    fileName(kind, 'csv', epochMs, moment),
+  );
+};
+
 /**
  * A name that sorts by time and is legal everywhere, local time: 2026-05-01T14-03-22. `moment`, ROS
  * seconds: of what was then, and the name says so.

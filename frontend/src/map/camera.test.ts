@@ -1,39 +1,48 @@
-import { beforeEach, describe, expect, test, vi, type Mock } from 'vitest';
+import { afterEach, beforeEach, describe, expect, test, vi, type Mock } from 'vitest';
 
 import { isClear } from '../geometry/clear';
-import { corners, mapPoint, toCanvas, type Camera, type View } from '../geometry/coordinates';
-import { NO_VIEWPORT, type Viewport } from '../store/app';
+import { corners, mapPoint, toCanvas, type Camera } from '../geometry/coordinates';
+import { act, moveViewport, NO_VIEWPORT, onChange, store, type Viewport } from '../store/app';
 import { MapCamera } from './camera';
 import { startGestures } from './gestures';
 
 const size = { width: 600, height: 400 };
 const bounds = { minX: 0, minY: 0, maxX: 4, maxY: 8 };
 const content = { bounds, pins: corners(bounds) };
-let viewport: Viewport;
-let onView: Mock<(view: View) => void>;
-let onCamera: Mock<(camera: Camera) => void>;
+const viewport = (): Viewport => store.get().viewport;
+let onView: Mock<() => void>;
+let onCamera: Mock<(camera: Camera | null) => void>;
+let stops: (() => void)[];
 let camera: MapCamera;
 let element: HTMLElement;
 
-const cameraOn = (target: HTMLElement, isFixed = false): MapCamera =>
-  new MapCamera(target, { viewport: () => viewport, onView, onCamera }, isFixed);
-
 beforeEach(() => {
   startGestures();
-  viewport = { ...NO_VIEWPORT, size };
-  onView = vi.fn<(view: View) => void>((view) => {
-    viewport = { ...viewport, view };
-  });
-  onCamera = vi.fn<(camera: Camera) => void>();
+  act({ camera: null });
+  moveViewport({ ...NO_VIEWPORT, size });
+  onView = vi.fn<() => void>();
+  onCamera = vi.fn<(camera: Camera | null) => void>();
+  stops = [
+    onChange((state) => [state.viewport.view], onView),
+    onChange(
+      ({ view }) => [view.camera],
+      () => {
+        onCamera(store.get().view.camera);
+      },
+    ),
+  ];
   element = document.createElement('div');
-  camera = cameraOn(element);
+  camera = new MapCamera(element);
+});
+afterEach(() => {
+  for (const stop of stops) stop();
 });
 
 describe('camera', () => {
   test('shows everything, and does not take that for the operator’s choice', () => {
     camera.goTo(null, content);
     for (const corner of corners(bounds)) {
-      const { x, y } = toCanvas(viewport.view, corner);
+      const { x, y } = toCanvas(viewport().view, corner);
       expect(x >= 0 && x <= size.width && y >= 0 && y <= size.height).toBe(true);
     }
     expect(onView).toHaveBeenCalledTimes(1);
@@ -53,17 +62,17 @@ describe('camera', () => {
   });
 
   test('before its size is known it stays where it is', () => {
-    viewport = NO_VIEWPORT;
+    moveViewport(NO_VIEWPORT);
     camera.goTo(null, content);
     expect(onView).not.toHaveBeenCalled();
   });
 
   test('zooming keeps the middle, and is a choice', () => {
     camera.goTo({ x: 2, y: 4, span: 8 }, null);
-    const before = viewport.view.scale;
+    const before = viewport().view.scale;
     camera.zoomBy(2);
-    expect(viewport.view.scale).toBeCloseTo(before * 2);
-    const middle = toCanvas(viewport.view, mapPoint(2, 4));
+    expect(viewport().view.scale).toBeCloseTo(before * 2);
+    const middle = toCanvas(viewport().view, mapPoint(2, 4));
     expect(middle.x).toBeCloseTo(300);
     expect(middle.y).toBeCloseTo(200);
     expect(onCamera).toHaveBeenLastCalledWith(expect.objectContaining({ span: 4 }));
@@ -71,16 +80,16 @@ describe('camera', () => {
 
   test('a double click zooms at once, about where it was', () => {
     camera.goTo({ x: 2, y: 4, span: 8 }, null);
-    const before = viewport.view.scale;
+    const before = viewport().view.scale;
     element.dispatchEvent(new MouseEvent('dblclick', { clientX: 300, clientY: 200 }));
-    expect(viewport.view.scale).toBeCloseTo(before * 2);
-    expect(toCanvas(viewport.view, mapPoint(2, 4)).x).toBeCloseTo(300);
+    expect(viewport().view.scale).toBeCloseTo(before * 2);
+    expect(toCanvas(viewport().view, mapPoint(2, 4)).x).toBeCloseTo(300);
   });
 
   test('panning right and down moves the map left and up', () => {
     camera.goTo({ x: 2, y: 4, span: 8 }, null);
     camera.panBy(0.1, 0.1);
-    const middle = toCanvas(viewport.view, mapPoint(2, 4));
+    const middle = toCanvas(viewport().view, mapPoint(2, 4));
     expect(middle.x).toBeCloseTo(300 - 60);
     expect(middle.y).toBeCloseTo(200 - 40);
   });
@@ -88,36 +97,36 @@ describe('camera', () => {
   test('shows a point that is out of sight, in the middle', () => {
     camera.goTo({ x: 2, y: 4, span: 8 }, null);
     camera.show(mapPoint(2, 40));
-    const shown = toCanvas(viewport.view, mapPoint(2, 40));
+    const shown = toCanvas(viewport().view, mapPoint(2, 40));
     expect(shown.x).toBeCloseTo(300);
     expect(shown.y).toBeCloseTo(200);
   });
 
   test('a point below the buttons is not in sight', () => {
     camera.goTo({ x: 2, y: 4, span: 8 }, null);
-    const { view } = viewport;
+    const { view } = viewport();
     const buttons = { left: 540, top: 40, right: 590, bottom: 240 };
     const hidden = mapPoint(2 + 250 / view.scale, 4);
     camera.show(hidden);
-    expect(viewport.view).toEqual(view);
+    expect(viewport().view).toEqual(view);
     camera.show(hidden, [buttons]);
-    expect(toCanvas(viewport.view, hidden).x).toBeCloseTo(300);
+    expect(toCanvas(viewport().view, hidden).x).toBeCloseTo(300);
   });
 
   test('a fit leaves no pin below the buttons', () => {
     const buttons = { left: 300, top: 0, right: 600, bottom: 120 };
     camera.goTo(null, content);
     const corner = mapPoint(bounds.maxX, bounds.maxY);
-    expect(isClear(viewport.view, corner, [buttons])).toBe(false);
+    expect(isClear(viewport().view, corner, [buttons])).toBe(false);
     camera.goTo(null, content, [buttons]);
-    for (const pin of content.pins) expect(isClear(viewport.view, pin, [buttons])).toBe(true);
+    for (const pin of content.pins) expect(isClear(viewport().view, pin, [buttons])).toBe(true);
   });
 
   test('no hand and no link leads to where nothing of it is in sight', () => {
     camera.goTo(null, content);
     const isSeen = (): boolean => {
-      const low = toCanvas(viewport.view, mapPoint(bounds.minX, bounds.minY));
-      const high = toCanvas(viewport.view, mapPoint(bounds.maxX, bounds.maxY));
+      const low = toCanvas(viewport().view, mapPoint(bounds.minX, bounds.minY));
+      const high = toCanvas(viewport().view, mapPoint(bounds.maxX, bounds.maxY));
       return high.x >= 0 && low.x <= size.width && low.y >= 0 && high.y <= size.height;
     };
     for (const [x, y] of [
@@ -137,9 +146,9 @@ describe('camera', () => {
     const wide = { ...bounds, minX: -1000, maxX: 1000 };
     for (const each of [bounds, wide]) {
       camera.goTo(null, { bounds: each, pins: corners(each) });
-      const whole = viewport.view.scale;
+      const whole = viewport().view.scale;
       camera.zoomBy(1e-6);
-      expect(viewport.view.scale).toBeCloseTo(whole / 2);
+      expect(viewport().view.scale).toBeCloseTo(whole / 2);
     }
   });
 
@@ -152,11 +161,11 @@ describe('camera', () => {
 
   test('nothing that arrives takes the map out of the operator’s hand', () => {
     camera.goTo(null, content);
-    const before = viewport.view;
+    const before = viewport().view;
     mouse(element, 'mousedown', 100);
     mouse(window, 'mousemove', 140);
     camera.goTo(null, { ...content, bounds: { ...bounds, maxX: 40 } });
-    expect(viewport.view).toEqual({ ...before, x: before.x + 40 });
+    expect(viewport().view).toEqual({ ...before, x: before.x + 40 });
     mouse(window, 'mouseup', 140);
     expect(onCamera).toHaveBeenCalledTimes(1);
   });
@@ -164,9 +173,9 @@ describe('camera', () => {
   test('what the wheel chose holds for a hand that grabs the map at once', () => {
     vi.useFakeTimers();
     camera.goTo(null, content);
-    const { scale } = viewport.view;
+    const { scale } = viewport().view;
     element.dispatchEvent(new WheelEvent('wheel', { deltaY: -240 }));
-    const zoomed = viewport.view;
+    const zoomed = viewport().view;
     expect(zoomed.scale).toBeGreaterThan(scale);
     mouse(element, 'mousedown', 100);
     // The wheel's gesture ends by a pause, inside that of the hand.
@@ -175,7 +184,7 @@ describe('camera', () => {
     mouse(window, 'mousemove', 140);
     mouse(window, 'mouseup', 140);
     expect(onCamera).toHaveBeenCalledTimes(2);
-    expect(viewport.view).toEqual({ ...zoomed, x: zoomed.x + 40 });
+    expect(viewport().view).toEqual({ ...zoomed, x: zoomed.x + 40 });
     vi.useRealTimers();
   });
 
@@ -190,26 +199,26 @@ describe('camera', () => {
 
   test('a fixed one is moved by the program alone', () => {
     const wall = document.createElement('div');
-    const fixed = cameraOn(wall, true);
+    const fixed = new MapCamera(wall, true);
     fixed.goTo(null, content);
-    const { view } = viewport;
+    const { view } = viewport();
     mouse(wall, 'mousedown', 100);
     mouse(window, 'mousemove', 140);
     mouse(window, 'mouseup', 140);
     wall.dispatchEvent(new WheelEvent('wheel', { deltaY: -200 }));
-    expect(viewport.view).toEqual(view);
+    expect(viewport().view).toEqual(view);
     expect(onCamera).not.toHaveBeenCalled();
     fixed.goTo(null, { ...content, bounds: { ...bounds, maxX: 40 } });
-    expect(viewport.view).not.toEqual(view);
+    expect(viewport().view).not.toEqual(view);
   });
 
   test('a map that comes back into the page goes on where it was', () => {
     camera.goTo(null, content);
-    const { view } = viewport;
-    const again = cameraOn(document.createElement('div'));
-    expect(viewport.view).toBe(view);
+    const { view } = viewport();
+    const again = new MapCamera(document.createElement('div'));
+    expect(viewport().view).toBe(view);
     again.panBy(0.1, 0);
-    expect(viewport.view.x).toBeCloseTo(view.x - 60);
-    expect(viewport.view).toMatchObject({ y: view.y, scale: view.scale });
+    expect(viewport().view.x).toBeCloseTo(view.x - 60);
+    expect(viewport().view).toMatchObject({ y: view.y, scale: view.scale });
   });
 });

@@ -20,17 +20,9 @@ import {
   type View,
   viewOf,
 } from '../geometry/coordinates';
-import type { Viewport } from '../store/app';
+import { act, moveViewport, store } from '../store/app';
 import { createStore } from '../store/create';
 import type { House } from '../store/twin';
-
-interface CameraHandlers {
-  /** What is on the screen now; the store has it, and nobody but this camera moves it. */
-  readonly viewport: () => Viewport;
-  readonly onView: (view: View) => void;
-  /** The operator came to rest on a view. */
-  readonly onCamera: (camera: Camera) => void;
-}
 
 export interface Hand {
   /** The map was moved by something else; the hand goes on from there. */
@@ -39,11 +31,9 @@ export interface Hand {
 }
 
 export interface Held {
-  readonly viewport: () => Viewport;
   readonly leastScale: () => number;
   readonly inSight: (view: View) => View;
   readonly onStart: () => void;
-  readonly onMove: (view: View) => void;
   readonly onEnd: () => void;
 }
 
@@ -65,9 +55,10 @@ function fitInsets({ width, height }: Size): Box {
     : { top: 30, right: 76, bottom: 52, left: 40 };
 }
 
+const viewport = () => store.get().viewport;
+
 /** Fits, follows links and moves as told; where that leads is kept in the store. */
 export class MapCamera {
-  readonly #handlers: CameraHandlers;
   #hand: Hand | null = null;
   readonly #stop: () => void;
   /** The view that the gestures under way began with. */
@@ -77,23 +68,20 @@ export class MapCamera {
   #leastScale = MIN_SCALE;
 
   /** `isFixed`: the program alone moves it; no wheel, finger or mouse does. */
-  constructor(element: HTMLElement, handlers: CameraHandlers, isFixed = false) {
-    this.#handlers = handlers;
+  constructor(element: HTMLElement, isFixed = false) {
     const take = (): void => {
       const start = gestures.get();
       if (isFixed || !start || this.#hand) return;
       this.#hand = start(element, {
-        viewport: handlers.viewport,
         leastScale: () => this.#leastScale,
         inSight: (view) => this.#inSight(view),
         onStart: () => {
           // Not anew by a hand that grabs the map before the gesture of the wheel has ended.
-          this.#held ??= handlers.viewport().view;
+          this.#held ??= viewport().view;
         },
-        onMove: handlers.onView,
         onEnd: () => {
           // A click is a gesture too, and moves nothing.
-          const hasMoved = this.#held !== handlers.viewport().view;
+          const hasMoved = this.#held !== viewport().view;
           this.#held = null;
           if (hasMoved) this.#choose();
         },
@@ -104,13 +92,13 @@ export class MapCamera {
   }
 
   /**
-   * Shows a camera, or everything there is, with no pin below what is `covered`. Not told to
-   * `onCamera`. While the operator has hold of the map it stays with the operator, whatever else
+   * Shows a camera, or everything there is, with no pin below what is `covered`: nobody's choice.
+   * While the operator has hold of the map it stays with the operator, whatever else
    * arrives.
    */
   goTo(camera: Camera | null, content: Content | null, covered: readonly Box[] = []): void {
     if (this.#held !== null) return;
-    const { view: before, size } = this.#handlers.viewport();
+    const { view: before, size } = viewport();
     if (size.width === 0 || size.height === 0) return;
     const whole = content && fitClear(content.bounds, content.pins, size, fitInsets(size), covered);
     if (whole) {
@@ -123,22 +111,22 @@ export class MapCamera {
   }
 
   #inSight(view: View): View {
-    const { size } = this.#handlers.viewport();
+    const { size } = viewport();
     return this.#content ? inSight(view, size, this.#content.bounds) : view;
   }
 
   #move(view: View): void {
-    this.#handlers.onView(view);
+    moveViewport({ view });
     this.#hand?.follow(view);
   }
 
   #choose(): void {
-    const { view, size } = this.#handlers.viewport();
-    this.#handlers.onCamera(cameraOf(view, size));
+    const { view, size } = viewport();
+    act({ camera: cameraOf(view, size) });
   }
 
   #step(view: View): void {
-    const before = this.#handlers.viewport().view;
+    const before = viewport().view;
     const within = this.#inSight(view);
     if (!isSame(within, before)) this.#move(within);
     if (this.#held === null) this.#choose();
@@ -150,7 +138,7 @@ export class MapCamera {
   }
 
   zoomBy(factor: number): void {
-    const { view, size } = this.#handlers.viewport();
+    const { view, size } = viewport();
     const scale = Math.min(MAX_SCALE, Math.max(this.#leastScale, view.scale * factor));
     const about = (at: number, length: number): number =>
       length / 2 + ((at - length / 2) * scale) / view.scale;
@@ -158,13 +146,13 @@ export class MapCamera {
   }
 
   panBy(x: number, y: number): void {
-    const { view, size } = this.#handlers.viewport();
+    const { view, size } = viewport();
     this.#step({ ...view, x: view.x - x * size.width, y: view.y - y * size.height });
   }
 
   /** Brings a point into view; one that is well inside the free part stays where it is. */
   show(point: MapPoint, covered: readonly Box[] = []): void {
-    const { view, size } = this.#handlers.viewport();
+    const { view, size } = viewport();
     const { x, y } = toCanvas(view, point);
     const { width, height } = size;
     const margin = Math.min(40, height / 4);

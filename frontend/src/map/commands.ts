@@ -1,48 +1,46 @@
 import type { CanvasPoint, MapPoint, Size } from '../geometry/coordinates';
 import { createStore } from '../store/create';
 
-export type MapCommand =
-  | { readonly type: 'fit' }
-  | { readonly type: 'zoom'; readonly factor: number }
-  /** Share of the view's size to move by; x to the right, y down. */
-  | { readonly type: 'pan'; readonly x: number; readonly y: number }
-  | { readonly type: 'show'; readonly tagId: string }
-  /** Shows the layers as on paper, without what moves or follows the pointer, while `take` runs. */
-  | { readonly type: 'picture'; readonly take: () => void };
-
-const listeners = new Set<(command: MapCommand) => void>();
-
-export function onMapCommand(listener: (command: MapCommand) => void): () => void {
-  listeners.add(listener);
-  return () => listeners.delete(listener);
+/** What can be done to the map from elsewhere in the page. */
+export interface MapActions {
+  readonly fit: () => void;
+  readonly zoomBy: (factor: number) => void;
+  /** By a share of the view's size; x to the right, y down. */
+  readonly panBy: (x: number, y: number) => void;
+  readonly show: (tagId: string) => void;
+  /** Shows the layers as on paper, without what moves or follows the pointer, while `draw` runs. */
+  readonly take: (draw: () => void) => void;
 }
 
-export function commandMap(command: MapCommand): void {
-  for (const listener of [...listeners]) listener(command);
-}
+/** Null: no map is in the page. */
+export const theMap = createStore<MapActions | null>(null);
 
-export function keyCommand({ key, shiftKey }: KeyboardEvent): MapCommand | null {
-  const far = shiftKey ? 0.5 : 0.1;
-  switch (key) {
-    case 'ArrowLeft':
-      return { type: 'pan', x: -far, y: 0 };
-    case 'ArrowRight':
-      return { type: 'pan', x: far, y: 0 };
-    case 'ArrowUp':
-      return { type: 'pan', x: 0, y: -far };
-    case 'ArrowDown':
-      return { type: 'pan', x: 0, y: far };
-    case '+':
-    case '=':
-      return { type: 'zoom', factor: 1.25 };
-    case '-':
-      return { type: 'zoom', factor: 0.8 };
-    case '0':
-    case 'Home':
-      return { type: 'fit' };
-    default:
-      return null;
+const ARROWS: Readonly<Record<string, readonly [x: number, y: number]>> = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, -1],
+  ArrowDown: [0, 1],
+};
+const ZOOMS: Readonly<Record<string, number>> = { '+': 1.25, '=': 1.25, '-': 0.8 };
+
+/** What a key does to the map; null: nothing. */
+export function keyAction({ key, shiftKey }: KeyboardEvent): ((map: MapActions) => void) | null {
+  const [arrow, factor] = [ARROWS[key], ZOOMS[key]];
+  if (arrow) {
+    const far = shiftKey ? 0.5 : 0.1;
+    return (map) => {
+      map.panBy(far * arrow[0], far * arrow[1]);
+    };
   }
+  if (factor !== undefined) {
+    return (map) => {
+      map.zoomBy(factor);
+    };
+  }
+  if (key !== '0' && key !== 'Home') return null;
+  return (map) => {
+    map.fit();
+  };
 }
 
 /**

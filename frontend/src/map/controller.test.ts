@@ -8,7 +8,7 @@ import { NOTHING } from '../store/fetcher';
 import { FakeContext } from '../testing/canvas';
 import { showField, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { commandMap, pinUnderMouse, pointedAt } from './commands';
+import { pinUnderMouse, pointedAt, theMap } from './commands';
 import { runMap } from './controller';
 import { startGestures } from './gestures';
 
@@ -137,7 +137,7 @@ describe('pulses', () => {
     const take = (): void => {
       rings = drawn('arc') - 1;
     };
-    commandMap({ type: 'picture', take });
+    theMap.get()?.take(take);
     expect(rings).toBe(0);
     expect(drawn('arc')).toBe(1);
     paint();

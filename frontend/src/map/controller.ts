@@ -24,9 +24,8 @@ import {
 import { selectNewest, selectShown, selectTag, type Shown } from '../store/moment';
 import { isPrinting, onThemeChange } from '../store/theme';
 import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
-import { keyCommand, type MapCommand, onMapCommand, pinUnderMouse, pointedAt } from './commands';
+import { keyAction, type MapActions, pinUnderMouse, pointedAt, theMap } from './commands';
 import { Painter, type Canvases } from './painter';
-import { paletteInUse } from './palette';
 
 /** A finger hits a pin from this far, a mouse from a bit less; CSS pixels. */
 const TOUCH_REACH = 26;
@@ -54,7 +53,7 @@ export function runMap(
       onFailure(error);
     }
   };
-  const painter = new Painter(canvases, paletteInUse());
+  const painter = new Painter(canvases);
   const calm = window.matchMedia('(prefers-reduced-motion: reduce)');
   const dirty = new Set<Part>();
   let frame = 0;
@@ -66,25 +65,7 @@ export function runMap(
   let drawn = store.get();
   let lastField = selectShown(drawn).field.value;
 
-  const camera = new MapCamera(
-    element,
-    {
-      viewport: () => store.get().viewport,
-      onView: (view) => {
-        moveViewport({ view });
-        publish(view);
-        // The pin has moved away from under the mouse.
-        pinUnderMouse.set(null);
-        spoil('view');
-      },
-      onCamera: (chosen) => {
-        act({ camera: chosen });
-        // Labels find their places anew.
-        spoil('pins');
-      },
-    },
-    isFixed,
-  );
+  const camera = new MapCamera(element, isFixed);
 
   const publish = ({ x, y, scale }: View): void => {
     canvases.overlay.dataset['view'] = [x, y, scale].map((n) => n.toFixed(4)).join(',');
@@ -157,6 +138,12 @@ export function runMap(
       selectHeat(state) !== selectHeat(before) ||
       selectAreaOf(state) !== selectAreaOf(before) ||
       (changedTags && house.snapshot?.revision !== last.snapshot?.revision);
+    if (state.viewport.view !== before.viewport.view) {
+      publish(state.viewport.view);
+      // The pin has moved away from under the mouse.
+      pinUnderMouse.set(null);
+      spoil('view');
+    }
     if (stillChanged) spoil('still');
     if (
       changedTags ||
@@ -170,11 +157,13 @@ export function runMap(
     // A mark follows the mouse, and nothing below it is drawn anew.
     if (view.hovered !== before.view.hovered) spoil('overlay');
     if (view.selected !== before.view.selected) spoil('pins', 'overlay');
+    // Labels find their places anew.
+    if (view.camera !== before.view.camera) spoil('pins');
     const { selected } = view;
     if (selected !== null && selected !== before.view.selected) {
       // Once the card is there, which covers part of the map on a phone.
       requestAnimationFrame(() => {
-        run({ type: 'show', tagId: selected });
+        show(selected);
       });
     }
     const sameContent = !changedTags && sameMap && house.field === last.field;
@@ -263,40 +252,39 @@ export function runMap(
       event.preventDefault();
       return;
     }
-    const command = keyCommand(event);
-    if (!command) return;
+    const action = keyAction(event);
+    if (!action) return;
     aim();
     event.preventDefault();
-    run(command);
+    action(actions);
   };
 
-  const run = (command: MapCommand): void => {
-    switch (command.type) {
-      case 'fit':
-        act({ camera: null });
-        camera.goTo(null, content(store.get()), covered);
-        break;
-      case 'zoom':
-        camera.zoomBy(command.factor);
-        break;
-      case 'pan':
-        camera.panBy(command.x, command.y);
-        break;
-      case 'show': {
-        const tag = selectTag(store.get(), command.tagId);
-        if (tag?.at) camera.show(tag.at, covered);
-        break;
-      }
-      case 'picture':
-        isTaken = true;
-        spoil('pins', 'overlay');
-        paint();
-        command.take();
-        isTaken = false;
-        spoil('pins', 'overlay');
-        break;
-    }
+  const show = (tagId: string): void => {
+    const tag = selectTag(store.get(), tagId);
+    if (tag?.at) camera.show(tag.at, covered);
   };
+  const actions: MapActions = {
+    show,
+    fit: () => {
+      act({ camera: null });
+      goToContent();
+    },
+    zoomBy: (factor) => {
+      camera.zoomBy(factor);
+    },
+    panBy: (x, y) => {
+      camera.panBy(x, y);
+    },
+    take: (draw) => {
+      isTaken = true;
+      spoil('pins', 'overlay');
+      paint();
+      draw();
+      isTaken = false;
+      spoil('pins', 'overlay');
+    },
+  };
+  theMap.set(actions);
 
   /** Also before the map has a size. */
   const isChosenSeen = (): boolean => {
@@ -321,7 +309,7 @@ export function runMap(
     goToContent();
     // A card that opens takes room from the map.
     const { selected } = store.get().view;
-    if (selected !== null && wasSeen) run({ type: 'show', tagId: selected });
+    if (selected !== null && wasSeen) show(selected);
     spoil('still', 'pins', 'overlay');
     // At once: a canvas of another size is empty, and would be seen so until the next frame.
     paint();
@@ -354,9 +342,8 @@ export function runMap(
 
   const stops = [
     store.subscribe(guarded(update)),
-    onMapCommand(run),
     onThemeChange(() => {
-      painter.setPalette(paletteInUse());
+      painter.recolour();
       spoil('still', 'pins', 'overlay');
       // Not with the next frame: a page on its way to the printer gets none.
       cancelAnimationFrame(frame);
@@ -373,6 +360,7 @@ export function runMap(
   }
   return () => {
     for (const stop of stops) stop();
+    theMap.set(null);
     gone.abort();
     resize.disconnect();
     unwatch();

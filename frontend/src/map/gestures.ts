@@ -3,6 +3,7 @@ import { select } from 'd3-selection';
 import { zoom, zoomIdentity, type D3ZoomEvent, type ZoomTransform } from 'd3-zoom';
 
 import { MAX_SCALE, type View } from '../geometry/coordinates';
+import { moveViewport, store } from '../store/app';
 import { gestures, type Hand, type Held } from './camera';
 
 const transformOf = ({ x, y, scale }: View): ZoomTransform =>
@@ -18,7 +19,7 @@ function takeHold(element: HTMLElement, held: Held): Hand {
     // Without the browser's layout: the size is known from the resize observer.
     .extent(() => [
       [0, 0],
-      [held.viewport().size.width, held.viewport().size.height],
+      [store.get().viewport.size.width, store.get().viewport.size.height],
     ])
     .constrain((transform) => transformOf(held.inSight(toView(transform))))
     .clickDistance(6)
@@ -37,13 +38,13 @@ function takeHold(element: HTMLElement, held: Held): Hand {
   };
   selection.call(behaviour);
   // A map that comes back into the page goes on where it was.
-  follow(held.viewport().view);
+  follow(store.get().viewport.view);
   behaviour
     .on('start', byHand(held.onStart))
     .on(
       'zoom',
       byHand(({ transform }) => {
-        held.onMove(toView(transform));
+        moveViewport({ view: toView(transform) });
       }),
     )
     .on('end', byHand(held.onEnd));

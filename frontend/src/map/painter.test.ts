@@ -1,6 +1,5 @@
 import { beforeEach, describe, expect, test } from 'vitest';
 
-import { DARK, LIGHT } from '../draw/palette';
 import { cataloguesOf } from '../domain/sensors';
 import { act, prefer, receive, store } from '../store/app';
 import { withField } from '../store/twin';
@@ -28,7 +27,7 @@ beforeEach(() => {
     pins: document.createElement('canvas'),
     overlay: document.createElement('canvas'),
   };
-  painter = new Painter(canvases, LIGHT);
+  painter = new Painter(canvases);
   painter.resize({ width: 300, height: 400 }, 2);
   showTags([
     wireTag({ tag_id: '1', readings: readings({ temperature: 20 }) }),
@@ -139,9 +138,12 @@ describe('painter', () => {
 
   test('the theme changes what is drawn', () => {
     show();
-    painter.paintStill(store.get(), view, 0, true);
-    painter.setPalette(DARK);
-    painter.paintStill(store.get(), view, 0, true);
+    document.body.append(canvases.still);
+    for (const ground of ['white', 'black']) {
+      canvases.still.style.setProperty('--sunken', ground);
+      painter.recolour();
+      painter.paintStill(store.get(), view, 0, true);
+    }
     const grounds = named(canvases.still, 'fillRect').map(({ state }) => state['fillStyle']);
     expect(new Set(grounds).size).toBe(2);
   });

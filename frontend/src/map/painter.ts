@@ -17,7 +17,7 @@ import {
   labelRequests,
   type Pulse,
 } from '../draw/pins';
-import type { Palette } from '../draw/palette';
+import { coloursOf, type Colours } from '../draw/colours';
 import {
   canvasOfPixels,
   clear,
@@ -41,7 +41,6 @@ import {
   floorOf,
   Hatching,
   knownOf,
-  LEAST_FREE_GREY,
   placedField,
   tintMap,
   unsureOf,
@@ -72,7 +71,7 @@ const knownPart = memoOne(knownOf);
 const unsureParts = memoOne((field: Field) =>
   field.sureness ? unsureOf(field, field.sureness) : [],
 );
-const floor = memoOne(({ pixels }: MapPicture) => floorOf(pixels, LEAST_FREE_GREY));
+const floor = memoOne(({ pixels }: MapPicture) => floorOf(pixels));
 /** Of what a field tells the part that holds, and the part that is too old to say. */
 const holding = memoLast((field: Field, old: Uint8Array | null) =>
   old ? cellsWhere(field, (cell) => old[cell] === 0) : field,
@@ -109,10 +108,12 @@ export class Painter {
   readonly #stillBuffer = new PanBuffer();
   readonly #pinBuffer = new PanBuffer();
 
-  constructor(
-    private readonly canvases: Canvases,
-    private palette: Palette,
-  ) {}
+  /** Another one where colours are others. */
+  #colour: Colours;
+
+  constructor(private readonly canvases: Canvases) {
+    this.#colour = coloursOf(canvases.still);
+  }
 
   /** `textScale`: how large the page's text is there, 1 as usual. */
   resize(size: Size, ratio: number, textScale = 1): void {
@@ -130,8 +131,8 @@ export class Painter {
     this.forget();
   }
 
-  setPalette(palette: Palette): void {
-    this.palette = palette;
+  recolour(): void {
+    this.#colour = coloursOf(this.canvases.still);
     this.forget();
   }
 
@@ -147,7 +148,7 @@ export class Painter {
   #penOn(canvas: HTMLCanvasElement, view: View): Pen {
     const pen = {
       ...{ context: contextOf(canvas), size: this.#size, ratio: this.#ratio, view },
-      ...{ palette: this.palette, sprites: this.#sprites, textScale: this.#textScale },
+      ...{ colour: this.#colour, sprites: this.#sprites, textScale: this.#textScale },
     };
     clear(pen);
     return pen;
@@ -170,7 +171,7 @@ export class Painter {
     const picture = house.map.value;
     if (picture && layers.has('map')) {
       const { placement } = picture;
-      drawPicture(pen, { picture: this.#mapPicture(picture, this.palette), placement });
+      drawPicture(pen, { picture: this.#mapPicture(picture, this.#colour), placement });
     }
     const isTold = layers.has('field') && layers.has('unknown');
     const mapped = isTold ? selectMapped(state) : null;
@@ -311,8 +312,8 @@ export class Painter {
     return width;
   }
 
-  readonly #mapPicture = memoLast((picture: MapPicture, palette: Palette) =>
-    tintMap(picture.pixels, palette),
+  readonly #mapPicture = memoLast((picture: MapPicture, colour: Colours) =>
+    tintMap(picture.pixels, colour),
   );
 
   readonly #heatPicture = memoLast(

@@ -5,9 +5,8 @@ import { fetchNotes } from '../contract/people';
 import type { Alarm, Note } from '../contract/types';
 import { shown } from '../domain/text';
 import { rosText, secondsOf, type Span } from '../domain/time';
-import { act, store, useApp } from '../store/app';
+import { act, keepFetched, useApp } from '../store/app';
 import { createStore, useSelected } from '../store/create';
-import { createFetcher } from '../store/fetcher';
 import { LANGUAGE, S } from '../strings';
 import { COMMENTS } from '../words/comments';
 
@@ -31,26 +30,18 @@ export const standing = (notes: readonly Note[]) =>
 
 const PACE_MS = 500;
 
-export function startNotes(): () => void {
-  const fetcher = createFetcher<readonly Note[]>({
-    paceMs: PACE_MS,
-    onValue: (notes) => {
-      standingNotes.set(standing(notes));
+export const startNotes = (): (() => void) =>
+  keepFetched<readonly Note[]>(
+    {
+      paceMs: PACE_MS,
+      onValue: (notes) => {
+        standingNotes.set(standing(notes));
+      },
     },
-  });
-  const update = (): void => {
-    const { alarms, connection } = store.get().twin;
-    // A log without notes is not asked for any.
-    if (!alarms?.notes) return;
-    fetcher.want({ key: `${connection.epoch}|${alarms.notes}`, run: fetchNotes });
-  };
-  update();
-  const stop = store.subscribe(update);
-  return () => {
-    stop();
-    fetcher.want(null);
-  };
-}
+    ({ twin: { alarms, connection } }) =>
+      // A log without notes is not asked for any.
+      alarms?.notes ? { key: `${connection.epoch}|${alarms.notes}`, run: fetchNotes } : undefined,
+  );
 
 /** Nearer than this, as a share of the span, marks would cover each other. */
 const NEAR = 0.02;

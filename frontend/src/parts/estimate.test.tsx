@@ -1,7 +1,7 @@
 import { act as flush, render, screen, waitFor } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
-import type { Expected, Field, Grade, Place, TwinTagState } from '../contract/types';
+import type { Field, Grade, Place, TwinTagState } from '../contract/types';
 import { houseHealth } from '../domain/health';
 import { snapshotOf } from '../domain/twin';
 import { mapPoint } from '../geometry/coordinates';
@@ -9,7 +9,7 @@ import { pointedAt } from '../map/commands';
 import { act, moveViewport, prefer, receive, store } from '../store/app';
 import { withPast } from '../store/twin';
 import { selectTag } from '../store/moment';
-import { bodies, estimated, expectedReading, grade } from '../testing/field';
+import { bodies, estimated, type Expected, expectedReading, grade } from '../testing/field';
 import { judgement, reason } from '../testing/health';
 import { goLive, nextStamp, showField, showTags } from '../testing/page';
 import { CATALOGUES } from '../testing/sensors';

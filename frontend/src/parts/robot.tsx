@@ -8,10 +8,9 @@ import type { Robot, RobotNow, WireTime } from '../contract/types';
 import { ageText, percentText, written } from '../domain/format';
 import { ageSeconds, ageStep, secondsOf } from '../domain/time';
 import { mapPoint, toCanvas } from '../geometry/coordinates';
-import { act, type AppState, store, useApp } from '../store/app';
+import { act, type AppState, keepFetched, store, useApp } from '../store/app';
 import { withLayer } from '../store/view';
 import { robotFrame, useSelected } from '../store/create';
-import { createFetcher } from '../store/fetcher';
 import { isHeardNow, rosNow, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { Check } from '../widgets/controls';
@@ -150,33 +149,29 @@ const PACE_MS = 5_000;
 
 /** Where the robot has been: as the bridge has it, and what was heard since. */
 function useTrail(): readonly TrailPoint[] {
-  const isOpen = useApp((state) => state.twin.connection.socket.kind === 'open');
   const [trail, setTrail] = useState<readonly TrailPoint[]>([]);
   useEffect(() => {
-    if (!isOpen) return undefined;
-    const fetcher = createFetcher<Robot>({
-      paceMs: PACE_MS,
-      onValue: (robot) => {
-        setTrail(robot.trail.map(trailPoint));
+    const stop = keepFetched<Robot>(
+      {
+        paceMs: PACE_MS,
+        onValue: (robot) => {
+          setTrail(robot.trail.map(trailPoint));
+        },
       },
-    });
-    fetcher.want({
-      key: 'robot',
-      group: 'robot',
-      run: (signal) => answer('Robot', signal, 'api/robot'),
+      ({ twin }) =>
+        twin.connection.socket.kind === 'open'
+          ? { key: 'robot', run: (signal) => answer('Robot', signal, 'api/robot') }
+          : null,
+    );
+    const unhear = robotFrame.subscribe(() => {
+      const position = robotFrame.get()?.position;
+      if (position) setTrail((last) => extended(last, position));
     });
     return () => {
-      fetcher.want(null);
+      stop();
+      unhear();
     };
-  }, [isOpen]);
-  useEffect(
-    () =>
-      robotFrame.subscribe(() => {
-        const position = robotFrame.get()?.position;
-        if (position) setTrail((last) => extended(last, position));
-      }),
-    [],
-  );
+  }, []);
   return trail;
 }
 

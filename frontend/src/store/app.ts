@@ -1,5 +1,6 @@
 import type { Size, View } from '../geometry/coordinates';
 import { type Change, changed, createStore, useSelected } from './create';
+import { createFetcher, type FetcherOptions, type Wish } from './fetcher';
 import { DEFAULT_SETTINGS, type Settings } from './settings';
 import { NO_TWIN, type TwinState } from './twin';
 import { DEFAULT_VIEW, type ViewState, viewAfter } from './view';
@@ -54,6 +55,33 @@ export function onChange(
     seen = parts(store.get());
     if (seen.some((part, index) => part !== before[index])) listener();
   });
+}
+
+interface KeepOptions<T> extends FetcherOptions<T> {
+  /** What the wish follows from; none: all of the state. */
+  readonly parts?: (state: AppState) => readonly unknown[];
+  /** It follows from the time as well. */
+  readonly everyMs?: number;
+}
+
+/** Fetches what the state wishes for; undefined: as before. Returns the way to stop. */
+export function keepFetched<T>(
+  { everyMs, parts = (state) => [state], ...options }: KeepOptions<T>,
+  wishFor: (state: AppState) => Wish<T> | null | undefined,
+): () => void {
+  const fetcher = createFetcher(options);
+  const update = (): void => {
+    const wish = wishFor(store.get());
+    if (wish !== undefined) fetcher.want(wish);
+  };
+  update();
+  const stop = onChange(parts, update);
+  const timer = everyMs === undefined ? undefined : setInterval(update, everyMs);
+  return () => {
+    stop();
+    clearInterval(timer);
+    fetcher.want(null);
+  };
 }
 
 export function useApp<Part>(select: (state: AppState) => Part): Part {

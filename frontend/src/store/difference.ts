@@ -6,11 +6,11 @@ import { now } from '../clock';
 import { differenceOf, otherMoment, type Compare } from '../domain/difference';
 import type { Snapshot } from '../domain/twin';
 import { type Bounds, widened } from '../geometry/coordinates';
-import { onChange, receive, store, type AppState } from './app';
+import { keepFetched, receive, type AppState } from './app';
 import { sourceOf } from './derived';
 import { ASSUMED_MARGIN_M, boundsOfPins, fetchHeat, fieldResolution } from './heat';
 import { rosNow, selectNewest, selectShown } from './moment';
-import { createFetcher, DRAG_PACE_MS, failed, NOTHING, ready, type Wish } from './fetcher';
+import { DRAG_PACE_MS, failed, NOTHING, ready, type Wish } from './fetcher';
 import { type Difference } from './twin';
 
 /** Live, the other moment moves on with now; this far at once, seconds. */
@@ -18,56 +18,41 @@ const STEP_S = 10;
 const TICK_MS = 2_000;
 
 export function startDifference(): () => void {
-  const fetcher = createFetcher<Difference>({
-    paceMs: DRAG_PACE_MS,
-    isDragged: true,
-    onValue: (value) => {
-      receive({ difference: ready(value) });
-    },
-    onError: (message) => {
-      receive({ difference: failed(message) });
-    },
-  });
   let before: AppState | null = null;
-  const update = (): void => {
-    const state = store.get();
-    const { compare, sensor } = state.view;
-    const { difference } = state.twin;
-    if (compare === null) {
-      fetcher.want(null);
-      if (difference !== NOTHING) receive({ difference: NOTHING });
-      return;
-    }
-    // Of another sensor or source, or to another moment, it is none of what is wanted.
-    const isOther =
-      before?.view.compare !== compare ||
-      before.view.sensor !== sensor ||
-      sourceOf(before) !== sourceOf(state);
-    before = state;
-    if (isOther && difference !== NOTHING) receive({ difference: NOTHING });
-    const wish = wishFor(state, compare);
-    if (wish) fetcher.want(wish);
-  };
-  update();
-  const stop = onChange((state) => {
-    const { view, twin } = state;
-    return [view.compare, view.sensor, sourceOf(state), twin.connection, selectShown(state)];
-  }, update);
-  const timer = setInterval(update, TICK_MS);
-  return () => {
-    stop();
-    clearInterval(timer);
-    fetcher.want(null);
-  };
+  return keepFetched<Difference>(
+    {
+      paceMs: DRAG_PACE_MS,
+      everyMs: TICK_MS,
+      isDragged: true,
+      onValue: (value) => {
+        receive({ difference: ready(value) });
+      },
+      onError: (message) => {
+        receive({ difference: failed(message) });
+      },
+    },
+    (state) => {
+      const { compare, sensor } = state.view;
+      // Of another sensor or source, or to another moment, it is none of what is wanted.
+      const isOther =
+        compare === null ||
+        before?.view.compare !== compare ||
+        before.view.sensor !== sensor ||
+        sourceOf(before) !== sourceOf(state);
+      before = state;
+      if (isOther && state.twin.difference !== NOTHING) receive({ difference: NOTHING });
+      return compare && wishFor(state, compare);
+    },
+  );
 }
 
-function wishFor(state: AppState, compare: Compare): Wish<Difference> | null {
+function wishFor(state: AppState, compare: Compare): Wish<Difference> | undefined {
   const { moment, snapshot } = selectShown(state);
   const { epoch, socket } = state.twin.connection;
   const nowS = rosNow(state, now());
   const resolution = fieldResolution(selectNewest(state).snapshot);
   const box = boxOf(snapshot, resolution);
-  if (!snapshot || !box || nowS === null || socket.kind !== 'open') return null;
+  if (!snapshot || !box || nowS === null || socket.kind !== 'open') return undefined;
   const { sensor } = state.view;
   const source = sourceOf(state);
   const at = moment ?? Math.floor(nowS / STEP_S) * STEP_S;

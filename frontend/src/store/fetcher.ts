@@ -50,7 +50,7 @@ export interface Wish<T> {
   readonly run: (signal: AbortSignal) => Promise<T>;
 }
 
-interface FetcherOptions<T> {
+export interface FetcherOptions<T> {
   /** Shortest time between two starts, ms. */
   readonly paceMs: number;
   /** For a wish that somebody drags: two fetches at once, and answers that serve again. */

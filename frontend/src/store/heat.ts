@@ -3,7 +3,8 @@ import { now } from '../clock';
 import { fetchEstimate, fetchField, Refusal, type FieldQuery } from '../contract/api';
 import type { Field, NoEstimate } from '../contract/types';
 import { estimatedField, resolutionFor } from '../domain/field';
-import type { Snapshot } from '../domain/twin';
+import { memoOne } from '../domain/memo';
+import type { Snapshot, Tag } from '../domain/twin';
 import { boundsOf, type Bounds, widened } from '../geometry/coordinates';
 import type { Source } from './derived';
 
@@ -47,8 +48,10 @@ const MAX_CELLS = 60_000;
 /** As the server has it, where no tag has a place. */
 const DEFAULT_RESOLUTION_M = 0.1;
 
+const boundsIn = memoOne((tags: readonly Tag[]) => boundsOf(tags.flatMap(({ at }) => at ?? [])));
+
 export const boundsOfPins = (snapshot: Snapshot | null): Bounds | null =>
-  boundsOf((snapshot?.tags ?? []).flatMap((tag) => (tag.at ? [tag.at] : [])));
+  snapshot && boundsIn(snapshot.tags);
 
 /** The side of a cell, in metres, for the field of a house as large as this one. */
 export function fieldResolution(snapshot: Snapshot | null): number {

@@ -5,9 +5,8 @@ import { intervalText } from '../domain/format';
 import { secondsOf } from '../domain/time';
 import { sameReading, type TagThen } from '../domain/difference';
 import { snapshotOf, type Tag } from '../domain/twin';
-import { store, type AppState } from './app';
+import { keepFetched, store, type AppState } from './app';
 import { createStore } from './create';
-import { createFetcher } from './fetcher';
 import { rosNow, selectDayS, selectNewest, selectShown } from './moment';
 import { isColumnShown } from './settings';
 import { NOT_JUDGED } from '../domain/health';
@@ -71,24 +70,16 @@ export function thenOf(last: HourAgo | null, tag: Tag, sensor: string): TagThen 
 }
 
 export function startHourAgo(): () => void {
-  const fetcher = createFetcher<HourAgo>({
-    paceMs: PACE_MS,
-    // Where there is none, the table and the alarms do without.
-    onValue: hourAgo.set,
-  });
-  const update = (): void => {
-    const state = store.get();
+  // Where there is none, the table and the alarms do without.
+  const stop = keepFetched<HourAgo>({ paceMs: PACE_MS, onValue: hourAgo.set }, (state) => {
     const { moment } = selectShown(state);
     const hourS = selectHourS(state);
     const base = moment ?? rosNow(state, now());
     const isSeen = isColumnShown(state.settings, 'trend') || state.view.list === 'alarms';
     // The bridge's status says how long a day is, and with it an hour.
     const hasStatus = state.twin.connection.status !== null;
-    if (base === null || base < hourS || !isSeen || !hasStatus) {
-      fetcher.want(null);
-      return;
-    }
-    fetcher.want({
+    if (base === null || base < hourS || !isSeen || !hasStatus) return null;
+    return {
       key: moment === null ? `now ${Math.floor(base / (SERVES * hourS))}` : `at ${moment}`,
       run: (signal) =>
         fetchStateAt(base - hourS, signal).then((latest) => {
@@ -99,13 +90,10 @@ export function startHourAgo(): () => void {
           ]);
           return { of: base, isNow: moment === null, tags: new Map(known) };
         }),
-    });
-  };
-  update();
-  const stop = store.subscribe(update);
+    };
+  });
   return () => {
     stop();
-    fetcher.want(null);
     hourAgo.set(null);
     compared.clear();
   };

@@ -1,12 +1,13 @@
 /** Fetches what the frames do not carry, whenever the twin's revision says that it changed. */
+import { now } from '../clock';
 import { answer, bodyOf, fetchQuality, get } from '../contract/api';
 import type { Field, FieldQuality, SensorsFile } from '../contract/types';
 import { cataloguesOf } from '../domain/sensors';
 import { type MapPicture, mapPlacement, opaqueBox, pixelBoxCorners } from '../geometry/image';
-import { act, type AppState, onChange, receive, store } from './app';
+import { act, type AppState, keepFetched, onChange, receive, store } from './app';
 import { withField, withLatest } from './twin';
 import { sourceOf } from './derived';
-import { createFetcher, failed, NOTHING, ready, type Wish } from './fetcher';
+import { failed, NOTHING, ready, type Wish } from './fetcher';
 import { boundsOfPins, fetchHeat, fieldResolution } from './heat';
 import { selectNewest } from './moment';
 import { DEFAULT_VIEW } from './view';
@@ -19,95 +20,92 @@ const MAP_INTERVAL_MS = 1_000;
 const QUALITY_INTERVAL_MS = 3_000;
 
 export function startLoaders(): () => void {
-  const field = createFetcher<Field>({
-    paceMs: FIELD_INTERVAL_MS,
-    onValue: (value) => {
-      receive(withField(ready(value)));
-    },
-    onError: (message) => {
-      receive(withField(failed(message, selectNewest(store.get()).field.value)));
-    },
-  });
-  const map = createFetcher<MapPicture>({
-    paceMs: MAP_INTERVAL_MS,
-    onValue: (value) => {
-      receive(withLatest({ map: ready(value) }));
-    },
-    onError: (message) => {
-      receive(withLatest({ map: failed(message, selectNewest(store.get()).map.value) }));
-    },
-  });
-  const quality = createFetcher<FieldQuality>({
-    paceMs: QUALITY_INTERVAL_MS,
-    onValue: (value) => {
-      receive(withLatest({ quality: value }));
-    },
-    onError: () => {
-      receive(withLatest({ quality: null }));
-    },
-  });
-
-  let ticking: ReturnType<typeof setInterval> | undefined;
-  let ticks = 0;
-
-  const update = (): void => {
-    const state = store.get();
-    const source = sourceOf(state);
-    const isEstimate = source === 'estimate';
-    if (isEstimate) {
-      ticking ??= setInterval(() => {
-        ticks += 1;
-        update();
-      }, ESTIMATE_TICK_MS);
-    } else {
-      clearInterval(ticking);
-      ticking = undefined;
-    }
-    const { status } = state.twin.connection;
-    const newest = selectNewest(state);
-    const { sensor } = state.view;
-    const base = baseKey(state);
-    const resolution = fieldResolution(newest.snapshot);
-    const wanted: Wish<Field> | null =
-      base === null || !boundsOfPins(newest.snapshot)
-        ? null
-        : {
-            key: [base, sensor, resolution, source, isEstimate ? ticks : ''].join('|'),
-            group: `${sensor}|${source}`,
-            paceMs: isEstimate ? ESTIMATE_INTERVAL_MS : FIELD_INTERVAL_MS,
-            run: (signal) => fetchHeat(source, { sensor, resolution }, signal),
-          };
-    // What the page does not show any more goes at once: a restarted twin begins empty.
-    const { value } = newest.field;
-    if (value && (value.sensor !== sensor || (base !== null && !wanted))) {
-      receive(withField(NOTHING));
-      receive(withLatest({ quality: null }));
-    }
-    field.want(wanted);
-    if (base === null) {
-      map.want(null);
-      quality.want(null);
-      return;
-    }
-    if (newest.map.value && !state.twin.lastStatus?.has_map) receive(withLatest({ map: NOTHING }));
-    map.want(status?.has_map ? { key: base, group: 'map', run: loadMap } : null);
-    quality.want(
-      // Of the nearest readings: an estimate tells its own error.
-      isEstimate
-        ? null
-        : {
-            key: `${base}|${sensor}`,
-            group: sensor,
-            run: (signal) => fetchQuality(sensor, signal),
-          },
-    );
-  };
-  update();
-  const stop = onChange((state) => [state.twin, state.view.sensor, sourceOf(state)], update);
+  forgetOld();
+  const stops = [
+    onChange((state) => [state.twin, state.view.sensor], forgetOld),
+    keepFetched<Field>(
+      {
+        paceMs: FIELD_INTERVAL_MS,
+        everyMs: ESTIMATE_TICK_MS,
+        onValue: (value) => {
+          receive(withField(ready(value)));
+        },
+        onError: (message) => {
+          receive(withField(failed(message, selectNewest(store.get()).field.value)));
+        },
+      },
+      fieldWish,
+    ),
+    keepFetched<MapPicture>(
+      {
+        paceMs: MAP_INTERVAL_MS,
+        onValue: (value) => {
+          receive(withLatest({ map: ready(value) }));
+        },
+        onError: (message) => {
+          receive(withLatest({ map: failed(message, selectNewest(store.get()).map.value) }));
+        },
+      },
+      (state) => {
+        const base = baseKey(state);
+        const hasMap = state.twin.connection.status?.has_map;
+        return base !== null && hasMap ? { key: base, group: 'map', run: loadMap } : null;
+      },
+    ),
+    keepFetched<FieldQuality>(
+      {
+        paceMs: QUALITY_INTERVAL_MS,
+        onValue: (quality) => {
+          receive(withLatest({ quality }));
+        },
+        onError: () => {
+          receive(withLatest({ quality: null }));
+        },
+      },
+      (state) => {
+        const base = baseKey(state);
+        const { sensor } = state.view;
+        // Of the nearest readings: an estimate tells its own error.
+        if (base === null || sourceOf(state) === 'estimate') return null;
+        const run = (signal: AbortSignal): Promise<FieldQuality> => fetchQuality(sensor, signal);
+        return { key: `${base}|${sensor}`, group: sensor, run };
+      },
+    ),
+  ];
   return () => {
-    stop();
-    clearInterval(ticking);
+    for (const stop of stops) stop();
   };
+}
+
+function fieldWish(state: AppState): Wish<Field> | null {
+  const { sensor } = state.view;
+  const { snapshot } = selectNewest(state);
+  const base = baseKey(state);
+  if (base === null || !boundsOfPins(snapshot)) return null;
+  const source = sourceOf(state);
+  const isEstimate = source === 'estimate';
+  const resolution = fieldResolution(snapshot);
+  const tick = isEstimate ? Math.floor(now() / ESTIMATE_TICK_MS) : '';
+  return {
+    key: [base, sensor, resolution, source, tick].join('|'),
+    group: `${sensor}|${source}`,
+    paceMs: isEstimate ? ESTIMATE_INTERVAL_MS : FIELD_INTERVAL_MS,
+    run: (signal) => fetchHeat(source, { sensor, resolution }, signal),
+  };
+}
+
+/** What the page does not show any more goes at once: a restarted twin begins empty. */
+function forgetOld(): void {
+  const state = store.get();
+  const { field, map, snapshot } = selectNewest(state);
+  const isKnown = baseKey(state) !== null;
+  const isEmpty = isKnown && !boundsOfPins(snapshot);
+  if (field.value && (field.value.sensor !== state.view.sensor || isEmpty)) {
+    receive(withField(NOTHING));
+    receive(withLatest({ quality: null }));
+  }
+  if (map.value && isKnown && !state.twin.lastStatus?.has_map)
+    receive(withLatest({ map: NOTHING }));
 }
 
 /**
@@ -128,37 +126,34 @@ const fetchFile = async (signal: AbortSignal): Promise<SensorsFile> =>
 /** Fetches the file of sensors: at once, and again on each new connection, behind which may be another. */
 export function startSensors(): () => void {
   let known = '';
-  const sensors = createFetcher<SensorsFile>({
-    paceMs: SENSORS_INTERVAL_MS,
-    onValue: (file) => {
-      const text = JSON.stringify(file);
-      // The browser asks with its ETag, and mostly is told that it has it: nothing follows then.
-      if (text === known) return;
-      known = text;
-      const value = cataloguesOf(file);
-      receive({ sensors: ready(value) });
-      // A file without what the page opens with: then the first that it has.
-      const [first] = value.day.all;
-      const { sensor } = store.get().view;
-      const isChosen = sensor !== DEFAULT_VIEW.sensor || sensor in file.sensors;
-      if (first && !isChosen) act({ sensor: first.name });
+  return keepFetched<SensorsFile>(
+    {
+      paceMs: SENSORS_INTERVAL_MS,
+      onValue: (file) => {
+        const text = JSON.stringify(file);
+        // The browser asks with its ETag, and mostly is told that it has it: nothing follows then.
+        if (text === known) return;
+        known = text;
+        const value = cataloguesOf(file);
+        receive({ sensors: ready(value) });
+        // A file without what the page opens with: then the first that it has.
+        const [first] = value.day.all;
+        const { sensor } = store.get().view;
+        const isChosen = sensor !== DEFAULT_VIEW.sensor || sensor in file.sensors;
+        if (first && !isChosen) act({ sensor: first.name });
+      },
+      onError: (message) => {
+        // What was in force before goes on: a bridge that is away has no other ranges.
+        if (known === '') receive({ sensors: failed(message) });
+      },
     },
-    onError: (message) => {
-      // What was in force before goes on: a bridge that is away has no other ranges.
-      if (known === '') receive({ sensors: failed(message) });
-    },
-  });
-  const update = (): void => {
-    // The first connection is made while this is fetched, and to the same bridge.
-    const epoch = Math.max(1, store.get().twin.connection.epoch);
-    sensors.want({ key: String(epoch), group: 'sensors', run: fetchFile });
-  };
-  update();
-  const stop = store.subscribe(update);
-  return () => {
-    stop();
-    sensors.want(null);
-  };
+    ({ twin: { connection } }) => ({
+      // The first connection is made while this is fetched, and to the same bridge.
+      key: String(Math.max(1, connection.epoch)),
+      group: 'sensors',
+      run: fetchFile,
+    }),
+  );
 }
 
 /**

@@ -24,15 +24,17 @@ export interface Shown extends House {
  * in one, so that nothing can be taken for what it is not.
  */
 export function shownAt(twin: TwinState, moment: number | null): Shown {
-  if (moment === null || twin.past === null) return SHOWN_NOW[clockOf(twin)](twin.latest);
+  if (moment === null || twin.past === null) return shownNow(twin.latest)(clockOf(twin));
   const { at, house } = twin.past;
   return shownThen(house, twin.latest.map, at);
 }
 
 const CLOCKS_LOST = new Set<unknown>(['no_clock', 'clock_stopped', 'clock_doubted']);
 
+type Clock = 'running' | 'paused' | 'unknown';
+
 /** How the time of the newest house goes on, as far as anybody knows. */
-function clockOf({ isTimeLost, connection, phase }: TwinState): keyof typeof SHOWN_NOW {
+function clockOf({ isTimeLost, connection, phase }: TwinState): Clock {
   const reason = connection.status?.reason;
   if (isTimeLost || CLOCKS_LOST.has(reason)) return 'unknown';
   if (reason !== 'paused') return 'running';
@@ -40,12 +42,13 @@ function clockOf({ isTimeLost, connection, phase }: TwinState): keyof typeof SHO
   return phase === 'live' ? 'paused' : 'unknown';
 }
 
-const SHOWN_NOW = {
-  running: memoOne((house: House): Shown => ({ ...house, moment: null, ageing: GROWING })),
-  unknown: memoOne((house: House): Shown => ({ ...house, moment: null, ageing: AGES_UNKNOWN })),
-  // The twin's time stands still, and with it every age.
-  paused: memoOne((house: House): Shown => ({ ...house, moment: null, ageing: asTaken(house) })),
-};
+const shownNow = memoOne((house: House) =>
+  memoLast((clock: Clock): Shown => {
+    // While the twin's time stands still, every age does.
+    const ageing = { running: GROWING, unknown: AGES_UNKNOWN, paused: asTaken(house) }[clock];
+    return { ...house, moment: null, ageing };
+  }),
+);
 
 const asTaken = ({ snapshot }: House): Ageing => ({ kind: 'as-of', at: snapshot?.takenAt ?? 0 });
 

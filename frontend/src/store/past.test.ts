@@ -66,7 +66,8 @@ beforeEach(() => {
 afterEach(async () => {
   act({ moment: null });
   stop();
-  await pass(0);
+  // What was asked for only once a moment stays was not yet.
+  await pass(500);
   expect(vi.getTimerCount()).toBe(0);
   vi.useRealTimers();
 });

@@ -1,21 +1,14 @@
 /** Fetches the greenhouse as of the moment that is wanted, and the field of that moment with it. */
+import { pause } from '../clock';
 import { fetchQuality, Refusal } from '../contract/api';
 import { fetchStateAt } from '../contract/past';
-import type { Field } from '../contract/types';
+import type { Field, FieldQuality } from '../contract/types';
 import { snapshotOf } from '../domain/twin';
-import { onChange, receive, store, type AppState } from './app';
+import { type AppState, keepFetched, receive, store } from './app';
 import { sourceOf } from './derived';
 import { fetchHeat, fieldResolution } from './heat';
 import { selectNewest, selectPast } from './moment';
-import {
-  createFetcher,
-  DRAG_PACE_MS,
-  failed,
-  type Fetched,
-  NOTHING,
-  ready,
-  type Wish,
-} from './fetcher';
+import { DRAG_PACE_MS, failed, type Fetched, NOTHING, ready, type Wish } from './fetcher';
 import { NO_HOUSE, type Past, withPast } from './twin';
 
 /**
@@ -28,8 +21,6 @@ const QUALITY_AFTER_MS = 400;
 
 export function startPast(): () => void {
   let patience: ReturnType<typeof setTimeout> | undefined;
-  let calm: ReturnType<typeof setTimeout> | undefined;
-  let judging: AbortController | null = null;
   let heardOn = 0;
 
   const show = (past: Past): void => {
@@ -39,61 +30,25 @@ export function startPast(): () => void {
   const showNothing = (at: number): void => {
     show({ at, house: NO_HOUSE });
   };
-
   const losePatience = (): void => {
     const { moment } = store.get().view;
     if (moment !== null) showNothing(moment);
   };
-
-  const forgetQuality = (): void => {
-    clearTimeout(calm);
-    judging?.abort();
-    judging = null;
-  };
-  const askQuality = (): void => {
-    const past = selectPast(store.get());
-    const field = past?.house.field.value;
-    if (!past || !field || field.sureness || past.at !== store.get().view.moment) return;
-    judging = new AbortController();
-    const { signal } = judging;
-    fetchQuality(field.sensor, signal, past.at).then(
-      (quality) => {
-        if (signal.aborted) return;
-        receive(withPast({ ...past, house: { ...past.house, quality } }));
-      },
-      () => {
-        // The legend does without.
-      },
-    );
+  const onError = (message: string, isLasting: boolean): void => {
+    const { moment } = store.get().view;
+    if (moment === null) return;
+    if (selectPast(store.get()) === null || isLasting) showNothing(moment);
+    receive({ pastFault: { at: moment, message, isLasting } });
   };
 
-  const fetcher = createFetcher<Past>({
-    paceMs: DRAG_PACE_MS,
-    isDragged: true,
-    onValue: (past) => {
-      show(past);
-      forgetQuality();
-      calm = setTimeout(askQuality, QUALITY_AFTER_MS);
-    },
-    onError: (message, isLasting) => {
-      const { moment } = store.get().view;
-      if (moment === null) return;
-      if (selectPast(store.get()) === null || isLasting) showNothing(moment);
-      receive({ pastFault: { at: moment, message, isLasting } });
-    },
-  });
-
-  const update = (): void => {
-    const state = store.get();
+  const wish = (state: AppState): Wish<Past> | null => {
     const { moment, sensor } = state.view;
     const past = selectPast(state);
     if (moment === null) {
       clearTimeout(patience);
       patience = undefined;
-      forgetQuality();
-      fetcher.want(null);
       if (past) receive(withPast(null));
-      return;
+      return null;
     }
     const fault = state.twin.pastFault;
     if (fault && fault.at !== moment) receive({ pastFault: null });
@@ -108,15 +63,46 @@ export function startPast(): () => void {
     const { epoch, socket } = state.twin.connection;
     // Each connection asks anew: another server may be behind it, or more was heard meanwhile.
     if (socket.kind === 'open') heardOn = epoch;
-    fetcher.want(wishFor(state, moment, heardOn));
+    return wishFor(state, moment, heardOn);
   };
-  update();
-  const stop = onChange(({ view, twin }) => [view, twin], update);
+  const parts = ({ view, twin }: AppState): readonly unknown[] => [view, twin];
+  const stops = [
+    keepFetched<Past>(
+      { paceMs: DRAG_PACE_MS, isDragged: true, parts, onValue: show, onError },
+      wish,
+    ),
+    keepFetched<FieldQuality>(
+      {
+        paceMs: 0,
+        parts,
+        onValue: (quality) => {
+          const past = selectPast(store.get());
+          if (past) receive(withPast({ ...past, house: { ...past.house, quality } }));
+        },
+      },
+      qualityWish,
+    ),
+  ];
   return () => {
-    stop();
+    for (const stop of stops) stop();
     clearTimeout(patience);
-    forgetQuality();
-    fetcher.want(null);
+  };
+}
+
+/** An estimate tells its own error. */
+function qualityWish(state: AppState): Wish<FieldQuality> | null {
+  const past = selectPast(state);
+  const field = past?.house.field.value;
+  if (!past || !field || field.sureness || past.at !== state.view.moment) return null;
+  const key = `${past.at}|${field.sensor}`;
+  return {
+    key,
+    group: key,
+    run: async (signal) => {
+      await pause(QUALITY_AFTER_MS);
+      signal.throwIfAborted();
+      return fetchQuality(field.sensor, signal, past.at);
+    },
   };
 }
 

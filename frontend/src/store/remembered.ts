@@ -4,8 +4,8 @@ import { Refusal } from '../contract/api';
 import { fetchTimeline } from '../contract/past';
 import { endsNow, type Period, type Span, spanOf } from '../domain/time';
 import { timelineOf } from '../domain/timeline';
-import { act, onChange, receive, store } from './app';
-import { createFetcher, NOTHING } from './fetcher';
+import { act, keepFetched, receive, store } from './app';
+import { NOTHING } from './fetcher';
 import { rosNow, selectNewest } from './moment';
 import type { Remembered } from './twin';
 import { DEFAULT_VIEW, SHORT_PERIOD } from './view';
@@ -37,65 +37,58 @@ export function turnOf(period: Period, nowS: number): number {
 }
 
 export function startRemembered(): () => void {
-  let group = '';
+  let asked = '';
+  let changes = 0;
   /** The connection whose server keeps nothing. */
   let offSince = -1;
-  const fetcher = createFetcher<Remembered>({
-    paceMs: INTERVAL_MS,
-    onValue: (remembered) => {
-      receive({ remembered });
+  return keepFetched<Remembered>(
+    {
+      paceMs: INTERVAL_MS,
+      everyMs: INTERVAL_MS,
+      parts: (state) => [
+        state.view.period,
+        state.twin.connection.epoch,
+        selectNewest(state).snapshot === null,
+      ],
+      onValue: (remembered) => {
+        receive({ remembered });
+      },
+      onError: (message) => {
+        const { value } = store.get().twin.remembered;
+        receive({ remembered: { value, state: 'failed', message } });
+      },
     },
-    onError: (message) => {
-      const { value } = store.get().twin.remembered;
-      receive({ remembered: { value, state: 'failed', message } });
+    (state) => {
+      const { epoch, socket, status } = state.twin.connection;
+      const nowS = rosNow(state, now());
+      if (socket.kind !== 'open' || status === null || nowS === null || epoch === offSince) {
+        return undefined;
+      }
+      const { period } = state.view;
+      const next = JSON.stringify(period);
+      if (next !== asked) {
+        asked = next;
+        changes += 1;
+        // What is known of another period is of no use.
+        if (state.twin.remembered.value) receive({ remembered: NOTHING });
+        // Which may have led back to the period before.
+        if (store.get().view.period !== period) return undefined;
+      }
+      return {
+        key: `${epoch}|${turnOf(period, nowS)}`,
+        group: String(changes),
+        run: (signal) =>
+          fetchTimeline(askedSpan(period, nowS), BUCKETS, signal).then(
+            (wire): Remembered => ({ value: timelineOf(wire, nowS), state: 'ready', message: '' }),
+            (error: unknown): Remembered => {
+              if (!(error instanceof Refusal) || error.status !== 404) throw error;
+              offSince = epoch;
+              return { value: null, state: 'off', message: error.message };
+            },
+          ),
+      };
     },
-  });
-
-  const update = (): void => {
-    const state = store.get();
-    const { epoch, socket, status } = state.twin.connection;
-    const nowS = rosNow(state, now());
-    if (socket.kind !== 'open' || status === null || nowS === null || epoch === offSince) return;
-    const { period } = state.view;
-    const next = JSON.stringify(period);
-    const { value } = state.twin.remembered;
-    if (next !== group) {
-      group = next;
-      // What is known of another period is of no use; how far memory reaches stays true.
-      fetcher.want(null);
-      if (value) receive({ remembered: NOTHING });
-      // Which may have led back to the period before.
-      if (store.get().view.period !== period) return;
-    }
-    fetcher.want({
-      key: `${epoch}|${group}|${turnOf(period, nowS)}`,
-      group,
-      run: (signal) =>
-        fetchTimeline(askedSpan(period, nowS), BUCKETS, signal).then(
-          (wire): Remembered => ({ value: timelineOf(wire, nowS), state: 'ready', message: '' }),
-          (error: unknown): Remembered => {
-            if (!(error instanceof Refusal) || error.status !== 404) throw error;
-            offSince = epoch;
-            return { value: null, state: 'off', message: error.message };
-          },
-        ),
-    });
-  };
-  update();
-  const timer = setInterval(update, INTERVAL_MS);
-  const stop = onChange(
-    (state) => [
-      state.view.period,
-      state.twin.connection.epoch,
-      selectNewest(state).snapshot === null,
-    ],
-    update,
   );
-  return () => {
-    stop();
-    clearInterval(timer);
-    fetcher.want(null);
-  };
 }
 
 /** In a day's bar, memory that is shorter than this is squeezed into its right end, seconds. */

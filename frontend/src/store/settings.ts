@@ -24,10 +24,6 @@ export const DEFAULT_SETTINGS: Settings = {
   dayBefore: false,
 };
 
-/** More columns nobody has, and longer names nobody reads. */
-const MOST_HIDDEN = 100;
-const LONGEST_ID = 128;
-
 /** The tag's own column always is. */
 export const isColumnShown = ({ hidden }: Pick<Settings, 'hidden'>, id: string): boolean =>
   id === 'tag' || !hidden.includes(id);
@@ -37,36 +33,18 @@ export const withColumn = (
   id: string,
   on: boolean,
 ): readonly string[] =>
-  on || id === 'tag'
-    ? hidden.filter((each) => each !== id)
-    : [...new Set([...hidden, id])].slice(-MOST_HIDDEN);
+  on || id === 'tag' ? hidden.filter((each) => each !== id) : [...new Set([...hidden, id])];
 
 const KEY = 'lupin-twin.settings';
 
-/** Reads what was kept; anything unknown or damaged counts as the default. */
+/** Reads what was kept; what is not there or damaged is as by default. */
 export function readSettings(storage: Pick<Storage, 'getItem'>): Settings {
-  let kept: Partial<Record<keyof Settings, unknown>>;
   try {
-    const parsed: unknown = JSON.parse(storage.getItem(KEY) ?? '{}');
-    kept = typeof parsed === 'object' && parsed !== null ? parsed : {};
+    const kept = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<Settings>;
+    return { ...DEFAULT_SETTINGS, ...kept };
   } catch {
     return DEFAULT_SETTINGS;
   }
-  return {
-    theme: kept.theme === 'light' || kept.theme === 'dark' ? kept.theme : 'system',
-    unit: kept.unit === 'F' ? 'F' : 'C',
-    shortcuts: kept.shortcuts !== false,
-    hidden: idsIn(kept.hidden),
-    density: kept.density === 'compact' ? 'compact' : 'usual',
-    byArea: kept.byArea === true,
-    dayBefore: kept.dayBefore === true,
-  };
-}
-
-function idsIn(kept: unknown): readonly string[] {
-  if (!Array.isArray(kept)) return [];
-  const ids = kept.filter((id): id is string => typeof id === 'string' && id.length <= LONGEST_ID);
-  return ids.filter((id) => id !== 'tag').slice(0, MOST_HIDDEN);
 }
 
 /** The browser's storage; where it is forbidden, one that keeps nothing. */

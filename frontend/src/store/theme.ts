@@ -9,9 +9,6 @@ export function isPrinting(): boolean {
   return printing;
 }
 
-/** Whether the system has few colours; paper has colours of its own. */
-export const isForced = (): boolean => forced.matches && !printing;
-
 export function isDark(): boolean {
   if (printing) return false;
   const { theme } = store.get().settings;
@@ -38,7 +35,9 @@ export function onThemeChange(listener: () => void): () => void {
 
 export function startTheme(): () => void {
   const apply = (): void => {
-    document.documentElement.dataset['theme'] = isDark() ? 'dark' : 'light';
+    const root = document.documentElement;
+    root.dataset['theme'] = isDark() ? 'dark' : 'light';
+    root.toggleAttribute('data-printing', printing);
   };
   apply();
   return onThemeChange(apply);

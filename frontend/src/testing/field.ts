@@ -1,5 +1,5 @@
 /** Fields, as the page has them and as the server sends them. */
-import type { Expected, Field, Grade, Place, Sureness } from '../contract/types';
+import type { Field, Grade, Place, Schemas, Sureness } from '../contract/types';
 import { wireTime } from './timeline';
 
 /** These rows of cells, the lowest first, a metre each from the origin on. */
@@ -43,6 +43,8 @@ const npyAnswer = (
 };
 
 /** One row of cells from (-1.5, 0.5) on. */
+export type Expected = Schemas['ExpectedReading'];
+
 export const npyField = (values: readonly number[]): Response =>
   npyAnswer('Field', npy([1, values.length], values), {
     ...{ Resolution: 0.05, 'Value-Min': 1, 'Value-Max': 2 },

@@ -1,4 +1,3 @@
-import { LIGHT } from '../draw/palette';
 import { type Pen, Sprites } from '../draw/surface';
 import type { FakeContext } from './canvas';
 
@@ -7,7 +6,7 @@ export const penOn = (context: FakeContext, over: Partial<Pen> = {}): Pen => ({
   size: { width: 400, height: 300 },
   ratio: 1,
   view: { x: 50, y: 250, scale: 40 },
-  palette: LIGHT,
+  colour: (name) => name,
   sprites: new Sprites(1),
   textScale: 1,
   ...over,

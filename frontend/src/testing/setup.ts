@@ -34,6 +34,10 @@ globalThis.ImageData = class {
   ) {}
 } as unknown as typeof ImageData;
 
+globalThis.Path2D = class {
+  constructor(readonly d: string) {}
+} as unknown as typeof Path2D;
+
 // Nothing has a size here.
 const nothing = (): void => undefined;
 globalThis.ResizeObserver = class {

@@ -1,21 +1,12 @@
-import {
-  useLayoutEffect,
-  useMemo,
-  useRef,
-  useState,
-  type JSX,
-  type KeyboardEvent,
-  type PointerEvent,
-} from 'react';
+import { useMemo, useRef, useState, type JSX, type KeyboardEvent, type PointerEvent } from 'react';
 
-import { endsNow, hasDate, rosText, type Span } from '../domain/time';
-import { type Timeline, timeTicks } from '../domain/timeline';
-import { contextOf } from '../draw/surface';
+import { endsNow, rosText, type Span } from '../domain/time';
+import type { Timeline } from '../domain/timeline';
 import { act, store, useApp } from '../store/app';
 import { pointedBy, pointedTime, useSelected } from '../store/create';
 import { newestWord, selectAwaited, selectShown } from '../store/moment';
-import { onThemeChange } from '../store/theme';
 import { S } from '../strings';
+import { useSize } from '../widgets/useSize';
 import {
   type Axis,
   chosenAt,
@@ -27,11 +18,9 @@ import {
   stepped,
   xOf,
 } from './axis';
-import { BAR_PX, drawBar, readBarPalette } from './draw';
+import { Bar, BAR_PX } from './Bar';
 import { pause } from './playback';
 
-/** Room that the text of a time needs, CSS pixels. */
-const TICK_ROOM_PX = 76;
 const FAR = 10;
 const PAGES = 10;
 
@@ -44,13 +33,11 @@ export function Slider({
   timeline: Timeline | null;
   nowS: number;
 }): JSX.Element {
-  const [width, setWidth] = useState(0);
-  const [theme, setTheme] = useState(0);
   const [pointed, setPointed] = useState<number | null>(null);
   /** While it is dragged the bar stays where it is. */
   const [held, setHeld] = useState<Span | null>(null);
   const element = useRef<HTMLDivElement>(null);
-  const canvas = useRef<HTMLCanvasElement>(null);
+  const { width } = useSize(element);
   const moment = useApp((state) => state.view.moment);
   const shown = useApp((state) => selectShown(state).moment);
   const awaited = useApp(selectAwaited);
@@ -62,34 +49,6 @@ export function Slider({
     () => (timeline && width > 0 ? columnsOf(timeline, axis) : []),
     [timeline, axis, width],
   );
-
-  useLayoutEffect(() => {
-    const box = element.current;
-    if (!box) return undefined;
-    const observer = new ResizeObserver(() => {
-      setWidth(box.clientWidth);
-    });
-    observer.observe(box);
-    setWidth(box.clientWidth);
-    const stop = onThemeChange(() => {
-      setTheme((count) => count + 1);
-    });
-    return () => {
-      observer.disconnect();
-      stop();
-    };
-  }, []);
-
-  useLayoutEffect(() => {
-    const target = canvas.current;
-    if (!target || width === 0) return;
-    const ratio = window.devicePixelRatio || 1;
-    target.width = Math.round(width * ratio);
-    target.height = Math.round(BAR_PX * ratio);
-    const surface = { context: contextOf(target), size: { width, height: BAR_PX }, ratio };
-    const ticks = timeTicks(axis, width / TICK_ROOM_PX, !hasDate(axis.to));
-    drawBar(surface, { axis, timeline, columns, ticks }, readBarPalette());
-  }, [axis, columns, timeline, width, theme]);
 
   const at = (event: PointerEvent): number =>
     event.clientX - (element.current?.getBoundingClientRect().left ?? 0);
@@ -156,7 +115,7 @@ export function Slider({
       }}
       onKeyDown={onKeyDown}
     >
-      <canvas ref={canvas} aria-hidden="true" />
+      <Bar axis={axis} timeline={timeline} columns={columns} />
       {awaited !== null && shown !== null && (
         <span className="timebar-arrived" style={{ left: `${place(shown)}px` }} />
       )}

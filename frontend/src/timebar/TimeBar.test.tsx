@@ -20,10 +20,19 @@ const remember = (from: number, to: number): void => {
   receive({ remembered: { value, state: 'ready', message: '' } });
 };
 
+/** A bar as wide as a screen. */
+class Laid {
+  constructor(private readonly tell: (entries: readonly object[]) => void) {}
+  observe = (): void => {
+    this.tell([{ contentRect: { width: 1_000, height: 62 } }]);
+  };
+  disconnect = (): void => undefined;
+}
+
 beforeEach(() => {
   // The page's clock stands still.
   vi.spyOn(performance, 'now').mockReturnValue(performance.now());
-  vi.spyOn(HTMLElement.prototype, 'clientWidth', 'get').mockReturnValue(1_000);
+  vi.stubGlobal('ResizeObserver', Laid);
   showTags([wireTag()]);
   const latest = stateFrame([wireTag()], { sec: NOW });
   receive(withState(latest, performance.now()));

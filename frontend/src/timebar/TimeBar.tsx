@@ -1,7 +1,8 @@
 import { type JSX, type ReactNode, useState } from 'react';
 
+import { momentText } from '../domain/format';
 import { shown } from '../domain/text';
-import { hasDate, type Period, PERIOD_KINDS, shortRosText, two } from '../domain/time';
+import { countText, hasDate, type Period, PERIOD_KINDS, shortRosText } from '../domain/time';
 import { NoteMarks } from '../notes/NoteMarks';
 import { SiteComment } from '../notes/Comments';
 import { act, store, useApp } from '../store/app';
@@ -201,15 +202,8 @@ function OwnPeriod({ period, isSimulated }: { period: Own; isSimulated: boolean 
 }
 
 /** "2026-11-14T03:12:40" on the operator's clock; of a simulation "1:02:03". */
-export function fieldOf(at: number, isSimulated: boolean): string {
-  const seconds = Math.floor(at);
-  if (isSimulated) {
-    return `${Math.floor(seconds / 3_600)}:${two(Math.floor(seconds / 60) % 60)}:${two(seconds % 60)}`;
-  }
-  const date = new Date(seconds * 1000);
-  const day = [date.getFullYear(), two(date.getMonth() + 1), two(date.getDate())].join('-');
-  return `${day}T${[date.getHours(), date.getMinutes(), date.getSeconds()].map(two).join(':')}`;
-}
+export const fieldOf = (at: number, isSimulated: boolean): string =>
+  isSimulated ? countText(at) : momentText(Math.floor(at) * 1000).replace(' ', 'T');
 
 /** ROS seconds; null: that is no time. */
 export function momentOf(text: string, isSimulated: boolean): number | null {

@@ -4,7 +4,6 @@ import type { Happened } from '../domain/timeline';
 import { timelineWith } from '../testing/timeline';
 import {
   type Axis,
-  beforeMemory,
   chosenAt,
   columnAt,
   columnsOf,
@@ -141,15 +140,6 @@ describe('columns', () => {
       { from: 150, to: 200, isSimulated: true },
     ];
     expect(runStarts(timelineWith({ runs }), AXIS)).toEqual([500]);
-  });
-
-  test('what lies before memory is told, and a memory of nothing is all of it', () => {
-    expect(beforeMemory(timelineWith({ reach: { from: 150, to: 200 } }), AXIS)).toEqual({
-      x: 0,
-      width: 500,
-    });
-    expect(beforeMemory(timelineWith({}), AXIS)).toBeNull();
-    expect(beforeMemory(timelineWith({ reach: null }), AXIS)).toEqual({ x: 0, width: 1_000 });
   });
 
   test('the column under a point', () => {

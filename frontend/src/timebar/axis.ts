@@ -46,8 +46,6 @@ const LEAST_COLUMN_PX = 3;
 /** What happened within a few pixels. */
 export type Column = ReturnType<typeof columnsOf>[number];
 
-export type Stretch = Pick<Column, 'x' | 'width'>;
-
 /**
  * A few scans beside many would vanish; by their root they stay in sight. The smallest is a tenth.
  */
@@ -91,7 +89,7 @@ const added = (sum: Happened | undefined, bucket: Happened, start: number): Happ
 });
 
 /** The parts of spans that lie on the bar; what is less than a pixel is shown as one. */
-export function stretchesOf(spans: readonly Span[], axis: Axis): readonly Stretch[] {
+export function stretchesOf(spans: readonly Span[], axis: Axis) {
   return spans
     .filter(({ from, to }) => to > axis.from && from < axis.to)
     .map(({ from, to }) => {
@@ -106,12 +104,6 @@ export function runStarts({ runs }: Timeline, axis: Axis): readonly number[] {
   return runs
     .filter(({ from }) => from > first && from > axis.from && from < axis.to)
     .map(({ from }) => xOf(axis, from));
-}
-
-/** The part of the bar that memory does not reach: before its beginning; null: none. */
-export function beforeMemory({ reach }: Timeline, axis: Axis): Stretch | null {
-  const until = reach ? Math.min(axis.width, xOf(axis, reach.from)) : axis.width;
-  return until > 0 ? { x: 0, width: until } : null;
 }
 
 export const columnAt = (columns: readonly Column[], x: number): Column | undefined =>

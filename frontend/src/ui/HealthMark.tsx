@@ -1,11 +1,8 @@
 import type { JSX } from 'react';
 
 import type { Verdict } from '../contract/types';
-import { MARKS, svgPath } from '../domain/marks';
+import { MARKS } from '../domain/marks';
 import { S } from '../strings';
-
-/** As large as leaves room for its line in a box of 16. */
-const RADIUS = 6.7;
 
 /** The same mark as the tag's pin has: one shape each, so that it is told without colour. */
 export function HealthShape({ verdict }: { verdict: Verdict }): JSX.Element {
@@ -37,13 +34,10 @@ export function HealthMark({
 function VerdictMark({ verdict }: { verdict: Verdict }): JSX.Element {
   const { outline, sign } = MARKS[verdict];
   return (
-    <svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">
-      {outline === 'circle' ? (
-        <circle cx="8" cy="8" r={RADIUS} className="body" />
-      ) : (
-        <path d={svgPath([outline], RADIUS, true)} className="body" />
-      )}
-      {sign.length > 0 && <path d={svgPath(sign, RADIUS)} className="sign" />}
+    // As large as leaves room for its line.
+    <svg viewBox="-1.2 -1.2 2.4 2.4" width="16" height="16" aria-hidden="true">
+      <path d={outline} className="body" />
+      {sign !== '' && <path d={sign} className="sign" />}
     </svg>
   );
 }

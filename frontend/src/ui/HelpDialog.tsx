@@ -1,7 +1,7 @@
 import { useEffect, useRef, type JSX } from 'react';
 
 import { shown } from '../domain/text';
-import { commandMap } from '../map/commands';
+import { theMap } from '../map/commands';
 import { act, prefer, store, useApp } from '../store/app';
 import { announce } from '../store/create';
 import { selectRows, selectSensors } from '../store/derived';
@@ -139,7 +139,7 @@ function runKey(key: string): boolean {
       requestAnimationFrame(() => document.getElementById(FILTER_ID)?.focus());
       return true;
     case 'f':
-      commandMap({ type: 'fit' });
+      theMap.get()?.fit();
       return true;
     case 'n':
       stepTag(1);

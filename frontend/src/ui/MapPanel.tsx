@@ -6,7 +6,7 @@ import { metresText, readingText, written } from '../domain/format';
 import { idealText, rangesAt } from '../domain/ideal';
 import { rosText } from '../domain/time';
 import { lengthText, scaleBar } from '../geometry/coordinates';
-import { commandMap, pointedAt } from '../map/commands';
+import { pointedAt, theMap } from '../map/commands';
 import { MapView } from '../map/MapView';
 import { act, useApp } from '../store/app';
 import { useSelected } from '../store/create';
@@ -62,13 +62,13 @@ function MapControls(): JSX.Element {
     <div className="map-controls" data-over-map>
       <div className="stack">
         {button(S.zoomIn, 'plus', () => {
-          commandMap({ type: 'zoom', factor: 1.5 });
+          theMap.get()?.zoomBy(1.5);
         })}
         {button(S.zoomOut, 'minus', () => {
-          commandMap({ type: 'zoom', factor: 1 / 1.5 });
+          theMap.get()?.zoomBy(1 / 1.5);
         })}
         {button(S.fit, 'fit', () => {
-          commandMap({ type: 'fit' });
+          theMap.get()?.fit();
         })}
       </div>
       <Disclosure label={S.layersButton} button={<Icon name="layers" />} className="layers">

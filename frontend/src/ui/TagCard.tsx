@@ -19,7 +19,7 @@ import { rangesFor } from '../domain/sensors';
 import { shown } from '../domain/text';
 import { secondsOf, type When } from '../domain/time';
 import { whenOf, type Tag } from '../domain/twin';
-import { commandMap } from '../map/commands';
+import { theMap } from '../map/commands';
 import { Comments } from '../notes/Comments';
 import { act, useApp } from '../store/app';
 import { withTag } from '../store/view';
@@ -175,7 +175,7 @@ function CardBody({
               title={S.cardShow}
               onClick={() => {
                 act({ pane: 'map', chartedFrom: null });
-                commandMap({ type: 'show', tagId: tag.id });
+                theMap.get()?.show(tag.id);
               }}
             >
               {S.position(metresText(at.x), metresText(at.y))}

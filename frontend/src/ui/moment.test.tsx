@@ -2,7 +2,6 @@
 import { act as flush, render, screen } from '@testing-library/react';
 import { beforeEach, expect, test, vi } from 'vitest';
 
-import { LIGHT } from '../draw/palette';
 import { snapshotOf } from '../domain/twin';
 import { Painter } from '../map/painter';
 import { act, receive, store } from '../store/app';
@@ -37,14 +36,11 @@ const go = (moment: number | null): void => {
 };
 
 test('table, card, legend, health and map are those of the moment', () => {
-  const painter = new Painter(
-    {
-      still: document.createElement('canvas'),
-      pins: document.createElement('canvas'),
-      overlay: document.createElement('canvas'),
-    },
-    LIGHT,
-  );
+  const painter = new Painter({
+    still: document.createElement('canvas'),
+    pins: document.createElement('canvas'),
+    overlay: document.createElement('canvas'),
+  });
   const then = stateFrame([tagWith(40, -6_700, 3)], { sec: 500 });
   receive(
     withPast({

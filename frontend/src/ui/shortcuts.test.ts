@@ -1,7 +1,7 @@
 import { fireEvent } from '@testing-library/react';
-import { afterEach, beforeAll, beforeEach, describe, expect, test } from 'vitest';
+import { afterEach, beforeAll, beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { onMapCommand, type MapCommand } from '../map/commands';
+import { theMap, type MapActions } from '../map/commands';
 import { act, prefer, store } from '../store/app';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
@@ -14,18 +14,16 @@ beforeAll(() => loadParts());
 const READINGS = readings({ temperature: 20, humidity: 60, co2: 700 });
 
 let stop: () => void;
-let commands: MapCommand[];
-let unhear: () => void;
+const fit = vi.fn();
 
 beforeEach(() => {
   showTags(['1', '2', '3'].map((tag_id) => wireTag({ tag_id, readings: READINGS })));
-  commands = [];
-  unhear = onMapCommand((command) => commands.push(command));
+  theMap.set({ fit } as unknown as MapActions);
   stop = startKeys();
 });
 afterEach(() => {
   stop();
-  unhear();
+  theMap.set(null);
   document.body.replaceChildren();
 });
 
@@ -57,7 +55,7 @@ describe('keys', () => {
 
   test('f, s, u and t', () => {
     press('f');
-    expect(commands).toEqual([{ type: 'fit' }]);
+    expect(fit).toHaveBeenCalledTimes(1);
     press('s');
     expect(store.get().view.layers.has('smooth')).toBe(true);
     press('u');

@@ -3,20 +3,20 @@ import { ENGLISH } from './en';
 import type { Language } from './languages';
 import type { Words } from './shape';
 
-/** null: they could not be had. */
-export async function wordsOf(language: Language): Promise<Words | null> {
-  try {
-    switch (language) {
-      case 'en':
-        return ENGLISH;
-      case 'de':
-        return (await import('./de')).GERMAN;
-      case 'nl':
-        return (await import('./nl')).DUTCH;
-      case 'es':
-        return (await import('./es')).SPANISH;
-    }
-  } catch {
-    return null;
-  }
+type Loads<Part> = Readonly<Record<Exclude<Language, 'en'>, () => Promise<Part>>>;
+
+/** A part of the words; null: it could not be had. */
+export async function partOf<Part>(
+  language: Language,
+  english: Part,
+  loads: Loads<Part>,
+): Promise<Part | null> {
+  return language === 'en' ? english : loads[language]().catch(() => null);
 }
+
+export const wordsOf = (language: Language): Promise<Words | null> =>
+  partOf<Words>(language, ENGLISH, {
+    de: async () => (await import('./de')).GERMAN,
+    nl: async () => (await import('./nl')).DUTCH,
+    es: async () => (await import('./es')).SPANISH,
+  });

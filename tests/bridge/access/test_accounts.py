@@ -1,14 +1,16 @@
 """The file of accounts: who may, for how long, and what is kept of a secret."""
 
 import asyncio
+import sqlite3
 import stat
 from contextlib import closing
 from pathlib import Path
 
 import pytest
+from argon2 import PasswordHasher
 
 from lupin_bridge.access import people as people_module
-from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, digest
+from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, Device, digest
 from lupin_bridge.access.credentials import AccountError, Person, check_password
 from lupin_bridge.access.people import ATTEMPT_BURST, MAX_WAITING, People
 from lupin_bridge.serving.admission import ClientLimitError
@@ -29,6 +31,7 @@ def test_the_file_is_its_owners_alone_and_holds_no_secret(path: Path) -> None:
         cookie = accounts.begin_session("anna", "::1", NOW)
         assert [stat.S_IMODE(file.stat().st_mode) for file in path.parent.iterdir()] == [0o600] * 3
         raw = b"".join(file.read_bytes() for file in path.parent.iterdir())
+    assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
     for secret in (PASSWORD, TOKEN, cookie):
         assert secret.encode() not in raw
     assert b"$argon2id$" in raw
@@ -45,6 +48,7 @@ def test_a_session_ends_in_its_time_and_with_its_account(path: Path) -> None:
         assert accounts.of_session(name, NOW) is None
         with pytest.raises(AccountError):
             accounts.begin_session("anna", "::1", NOW)
+    assert b"$argon2id$" not in path.read_bytes(), "it is gone, and not only forgotten"
     add(path, anna="admin")
     with closing(Accounts(path)) as accounts:
         assert accounts.of_session(name, NOW) is None, "of another anna"
@@ -81,6 +85,11 @@ def test_somebody_elses_file_is_left_alone(path: Path) -> None:
     with pytest.raises(AccountError):
         add(path, anna="admin")
     assert path.read_text().startswith("no database")
+    path.unlink()
+    with changing(path), closing(sqlite3.connect(path)) as later:
+        later.execute("PRAGMA user_version = 9")
+    with pytest.raises(AccountError, match="is of version 9"):
+        Accounts(path)
 
 
 def test_a_reader_cannot_write_and_the_trail_keeps_the_newest(
@@ -101,21 +110,22 @@ async def test_a_wrong_name_takes_the_same_work_as_a_wrong_password(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     add(path, anna="operator")
-    add(path, secret=" ", bert="operator")
+    with changing(path) as accounts:  # who signs in elsewhere
+        accounts.add("bert", "account", "operator", "", by="a test", now_s=NOW)
     worked: list[str] = []
-    verify = people_module.verify
+    verify = PasswordHasher.verify
 
-    def counted(kept: str, password: str) -> bool:
+    def counted(hasher: PasswordHasher, kept: str, password: str) -> bool:
         worked.append(kept)
-        return verify(kept, password)
+        return verify(hasher, kept, password)
 
-    monkeypatch.setattr(people_module, "verify", counted)
+    monkeypatch.setattr(PasswordHasher, "verify", counted)
     people = People(path)
     assert await people.check("anna", PASSWORD, "1") == Person("anna", "operator")
     for name in ("anna", "nobody", "bert"):
         assert await people.check(name, "wrong" + PASSWORD, "1") is None
     assert await people.check("nobody", "", "1") is None
-    assert len(worked) == 5
+    assert [kept[:10] for kept in worked] == ["$argon2id$"] * 5
 
 
 async def test_a_flood_of_sign_ins_waits_in_a_short_queue_and_lets_others_write(
@@ -165,3 +175,23 @@ def test_a_file_that_has_gone_opens_nothing(path: Path) -> None:
     assert people.is_on
     with pytest.raises(AccountError):
         people.by_token(TOKEN)
+    add(path, "token", digest("another"), scada="viewer")  # another file in its place
+    assert people.by_token(TOKEN) is None
+
+
+def test_whom_a_proxy_names_is_asked_after_again(path: Path) -> None:
+    add(path, anna="operator")
+    people = People(path, is_proxied=True)
+    anna = people.by_proxy("anna")
+    assert anna is not None
+    assert people.still(anna)
+    remove(path, "anna")
+    assert not people.still(anna)
+
+
+def test_notified_are_devices_of_who_may_read_the_site(path: Path) -> None:
+    with changing(path) as accounts:
+        accounts.add("anna", "account", "viewer", "", by="a test", now_s=NOW, sites=["north"])
+        accounts.add_device("anna", Device("https://push.example/x", "", "", "en"), "::1", NOW)
+        found = [len(accounts.devices(site)) for site in ("north", "south", "")]
+    assert found == [1, 0, 0]

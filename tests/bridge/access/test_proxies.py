@@ -152,7 +152,8 @@ def test_the_scheme_in_origins_and_cookies_is_the_proxys(live: Served) -> None:
     ours = {"Host": "twin.example", "Origin": "https://twin.example"}
     assert status(live, PROXY, X_Forwarded_Proto="https", **ours) == 200
     assert status(live, PROXY, X_Forwarded_Proto="http", **ours) == 403
-    assert status(live, STRANGER, X_Forwarded_Proto="https", **ours) == 403
+    for stranger in (STRANGER, "127.0.0.1"):
+        assert status(live, stranger, X_Forwarded_Proto="https", **ours) == 403
     with live.client(PROXY) as client:
         answer = client.post(
             "/gh1/api/signin", headers={**BEARER, **OWN, "X-Forwarded-Proto": "https"}
@@ -190,7 +191,7 @@ def behind(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     path = tmp_path_factory.mktemp("accounts") / "accounts.sqlite"
     with changing(path) as accounts:
         accounts.add("anna@example.org", "account", "operator", "", by="a test", now_s=1)
-    add(path, "token", scada="viewer")
+    add(path, "token", scada="operator")
     with served(
         "--accounts", str(path), "--trusted-proxy", PROXY, "--proxy-user-header", "Remote-User"
     ) as running:
@@ -213,7 +214,8 @@ def test_a_name_is_believed_of_the_proxy_and_of_nobody_else(behind: Served) -> N
     assert who(behind, PROXY, ("remote-user", "new@example.org")) == "new@example.org viewer"
     assert who(behind, STRANGER, anna) == "401"
     assert who(behind, STRANGER, anna, ("X-Forwarded-For", PROXY)) == "401"
-    assert who(behind, STRANGER, anna, ("Authorization", f"Bearer {SCADA}")) == "scada viewer"
+    assert who(behind, STRANGER, anna, ("Authorization", f"Bearer {SCADA}")) == "scada operator"
+    assert who(behind, PROXY, ("Remote-User", "scada")) == "scada viewer", "no token's right"
     assert who(behind, PROXY) == "401", "who has not signed in there"
 
 

@@ -22,7 +22,7 @@ from py_vapid import Vapid02
 
 from lupin_bridge.access.accounts import Device
 from lupin_bridge.access.people import People
-from lupin_bridge.alarms.board import AlarmBoard, Change, page_of
+from lupin_bridge.alarms.board import NOTE_BURST, AlarmBoard, Change, page_of
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify import push as push_module
@@ -33,7 +33,16 @@ from lupin_bridge.notify.webhook import PostError, until_taken
 from lupin_bridge.settings import Settings
 from tests.support.access import refused_start
 from tests.support.messages import look
-from tests.support.people import OWN, TOKEN, add, changing, remove, signed_in, signed_in_once
+from tests.support.people import (
+    OWN,
+    PASSWORD,
+    TOKEN,
+    add,
+    changing,
+    remove,
+    signed_in,
+    signed_in_once,
+)
 from tests.support.processes import constants
 from tests.support.receiver import Answer, Posted, Receiver, receiver, status
 from tests.support.seen import NOW_NS, Alarms, S, alarm
@@ -323,7 +332,8 @@ def test_a_critical_alarm_reaches_those_phones_alone_that_may_have_it_and_until_
         authorization = to_anna.headers["authorization"]
         assert authorization.endswith(f"k={key}")
         assert Vapid02.verify(authorization)
-        bert.post("/api/push", json={"endpoint": berts.endpoint})
+        for phone in (annas, berts):  # hers is not his to remove
+            bert.post("/api/push", json={"endpoint": phone.endpoint})
         on.live.peer.observe(look("8", anomaly=True, bug_count=1))
         wait_for(lambda: len(on.posted_to(annas)) == 2, "the next one")
         assert annas.read(on.posted_to(annas)[1])["body"].startswith("Tag 8:")
@@ -417,8 +427,22 @@ def test_of_one_person_so_many_browsers_are_notified_and_the_trail_has_each_once
         for number in range(12):
             subscribe(anna, open_to.phone(f"many{number}"))
             subscribe(anna, open_to.phone(f"many{number}"))
+        answers = [anna.post("/api/push", json={}) for _ in range(NOTE_BURST + 100)]
     assert len(open_to.devices()) == 10
     assert added() == before + 12
+    assert "anna has written more than" in answers[-1].text, "or they would fill the trail"
+
+
+def test_who_signs_out_everywhere_else_is_notified_there_no_more(open_to: Live) -> None:
+    add(open_to.accounts, carl="viewer")
+    with signed_in(open_to.live.url, "carl") as lost, signed_in(open_to.live.url, "carl") as kept:
+        phone = open_to.phone("lost")
+        subscribe(lost, phone)
+        given = {"name": "carl", "password": PASSWORD, "ends_others": True}
+        assert kept.post("/api/signin", json=given).status_code == 204
+        assert kept.get("/api/session").json()["name"] == "carl"
+        assert lost.get("/api/session").status_code == 401
+    assert phone.endpoint not in {device.endpoint for device in open_to.devices()}
 
 
 def test_a_contact_is_an_address() -> None:

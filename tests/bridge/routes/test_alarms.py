@@ -7,12 +7,15 @@ from typing import Any
 
 import pytest
 
+from lupin_bridge.alarms.board import Change, page_of
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
-from lupin_bridge.routes.status import _is_in
+from lupin_bridge.routes.status import MAX_ALARMS, _is_in
 from lupin_bridge.stream import schema
+from tests.support.inprocess import running
 from tests.support.messages import look
 from tests.support.rosbridge import ros_at
+from tests.support.seen import alarm
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
 
@@ -81,3 +84,10 @@ def test_a_period_has_what_was_active_at_any_time_of_it() -> None:
     assert found(31, 41) == found(31, 0) == found(0, 0, active="1") == ["2"]
     assert found(21, 40) == found(0, 21) == found(0, 0, active="0") == ["1"]
     assert found(0, 20) == found(31, 40) == []
+
+
+async def test_of_many_alarms_so_many_are_told(domain: int) -> None:
+    async with running() as it:
+        many = [alarm(str(number)) for number in range(MAX_ALARMS + 1)]
+        it.bridge.alarms.put(page_of(many), Change(tuple(many)), "journal", 0)
+        assert len((await it.http.get("/api/alarms")).json()["alarms"]) == MAX_ALARMS

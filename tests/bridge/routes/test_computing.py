@@ -4,6 +4,8 @@ import asyncio
 import threading
 from collections.abc import AsyncIterator, Callable
 from contextlib import ExitStack, asynccontextmanager
+from functools import partial
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
@@ -15,7 +17,8 @@ from lupin_bridge.past import fields
 from lupin_bridge.routes import status
 from lupin_bridge.routes.state import AGES_HOLD_S
 from lupin_bridge.serving.admission import Limits
-from lupin_bridge.serving.http_protocol import PIECE_BYTES
+from lupin_bridge.serving.http_protocol import PIECE_BYTES, HttpConnection
+from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import StateJson
 from lupin_twin.core.state import Pose, Reading, Scan
 from lupin_twin.field.engine import FieldRequest, compute_field
@@ -23,8 +26,10 @@ from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.ros.node import TwinNode
 from lupin_twin.runtime.workers import LARGE_THREADS, ShouldStop, Workers
+from tests.support import raw_http
 from tests.support.inprocess import Running, running
 from tests.support.maps import map_of
+from tests.support.tls import certificate
 from tests.support.waiting import PATIENCE_S, until
 from tests.support.web import deaf_client
 
@@ -172,6 +177,8 @@ async def test_identical_requests_take_one_place_and_one_computation(
         asked = ask(it, *[field("co2", LARGE)] * 6, field("co2", LARGE, "npy"))
         await until(lambda: it.bridge.admission.in_flight["127.0.0.1"] == 7, "all of them")
         await until(lambda: it.bridge.admission.being_computed == 2, "a body each")
+        served = [c for c in it.server.server_state.connections if isinstance(c, HttpConnection)]
+        assert [c.waiting_since_s for c in served] == [None] * 7, "and nobody makes room for others"
         held.gate.set()
         answers = await asyncio.gather(*asked)
         assert {answer.status_code for answer in answers} == {200}
@@ -211,6 +218,7 @@ async def test_the_state_is_written_a_few_times_a_second_and_never_old(
         await it.in_ros_thread(lambda node: node.store.record(new))
         await until(lambda: len(it.bridge.latest.snapshot.tags) == 21, "the new tag")  # type: ignore[union-attr]
         assert "new" in (await it.http.get("/api/state")).text
+        assert len(it.bridge.cache) == 1, "those before, which nobody reads any more, made place"
 
 
 def large_map() -> OccupancyMap:
@@ -242,3 +250,20 @@ async def test_a_hundred_readers_of_a_map_that_do_not_read_hold_one_picture_and_
         tiny = await asyncio.wait_for(it.http.get(field("co2 7")), PATIENCE_S)
         assert tiny.status_code == 200
         stack.close()
+
+
+async def test_over_tls_no_more_waits_for_a_reader_that_does_not_read(
+    domain: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    ours, occupancy = certificate(tmp_path), large_map()
+    settings = Settings(tls_cert=str(ours.cert), tls_key=str(ours.key))
+    async with running(settings=settings) as it:
+        monkeypatch.setattr(it.twin, "occupancy_map", lambda: occupancy)
+        with raw_http.connect(it.url, room=4_096) as plain:
+            wrap = partial(ours.trust.wrap_socket, plain, server_hostname="127.0.0.1")
+            with await asyncio.to_thread(wrap) as deaf:
+                deaf.sendall(b"GET /api/map.png HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+                [reader] = it.server.server_state.connections
+                assert isinstance(reader, HttpConnection)
+                await until(lambda: reader.flow.write_paused, "a socket that is full")
+                assert reader.transport.get_write_buffer_size() <= 2 * PIECE_BYTES

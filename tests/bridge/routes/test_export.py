@@ -215,6 +215,17 @@ async def test_who_leaves_while_a_lot_is_being_read_ends_the_reading(
     assert [record for record in caplog.records if record.levelname == "ERROR"] == []
 
 
+async def test_a_lot_that_does_not_come_in_time_breaks_it_off(domain: int) -> None:
+    async def lots(*_: object) -> AsyncIterator[bytes]:
+        yield b"a lot\r\n"
+        await asyncio.Event().wait()
+
+    async with remembering(MadeUp(), Limits(answer_timeout_s=1.0)) as it:
+        it.twin.rows = lots  # type: ignore[assignment]
+        with pytest.raises(httpx.TransportError):
+            await it.http.get(PATH)
+
+
 async def test_a_bridge_that_ends_breaks_it_off(domain: int) -> None:
     past = MadeUp(lots=[rows(1_000)] * 1_000 * MANY)  # more than can be read before it is over
     async with remembering(past) as it, it.http.stream("GET", PATH) as answer:

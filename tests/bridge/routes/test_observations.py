@@ -118,6 +118,8 @@ def test_times_are_iso_or_seconds(live: Bridge, folder: Path) -> None:
     assert post(live.url, body).status_code == 202
     wait_for(lambda: rows(folder, "iso"), "the row")
     assert rows(folder, "iso")[0][2] == round(moment.timestamp() * 4) * 250_000_000
+    ahead = {**body, "tag_id": "ahead", "observed_at": time.time() + 9}
+    assert post(live.url, ahead).json()["observed_at"]["sec"] <= time.time(), "it counts as now"
 
 
 GOOD = {"tag_id": "bad", "readings": {"t": 1.0}}
@@ -235,6 +237,7 @@ def test_web_publishes_too_and_only_while_it_hears_a_twin(domain: int, folder: P
             peer.listen()
             wait_for(lambda: post(url, body).status_code == 202, "the twin to be heard")
             assert peer.tag("far", lambda tag: tag.readings).readings[0].value == 20.0
+        wait_for(lambda: post(url, body).status_code == 503, "its silence to be noticed")
 
 
 @pytest.mark.parametrize(

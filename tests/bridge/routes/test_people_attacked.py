@@ -17,6 +17,7 @@ from lupin_bridge.access.accounts import digest
 from lupin_bridge.routes.written import MAX_LISTED
 from lupin_twin.core.notes import COMMENT
 from tests.support import raw_http
+from tests.support.access import served
 from tests.support.journal import kept
 from tests.support.messages import look
 from tests.support.people import (
@@ -184,6 +185,18 @@ def test_a_stop_amid_a_sign_in_is_no_error(tmp_path: Path) -> None:
         assert running.process.stop(signal.SIGTERM) == 0
         assert raw_http.status(raw_http.heard(client)) == 503
         assert "ERROR" not in running.process.output
+
+
+def test_without_the_accounts_nobody_is_let_in_and_what_is_open_ends(tmp_path: Path) -> None:
+    path = tmp_path / "accounts.sqlite"
+    add(path, "token", scada="viewer")
+    with served("--accounts", str(path)) as live:
+        ws = f"{live.url.replace('http', 'ws', 1)}/ws/state"
+        with open_websocket(ws, additional_headers=BEARER) as stream:
+            path.unlink()
+            refused = live.get("/api/state", BEARER)
+            assert (refused.status_code, "cannot be read" in refused.text) == (503, True)
+            assert "the session has ended" in end_of(stream)
 
 
 def test_ten_thousand_notes_hold_nobody_up(accounts: Path, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 from lupin_msgs.msg import Observation
 from websockets.exceptions import ConnectionClosedError
 
+from lupin_bridge.routes.state import MAX_REASON_BYTES
 from lupin_bridge.stream import schema
 from tests.support.messages import discovered, look, pose, scan
 from tests.support.waiting import wait_for
@@ -42,15 +43,17 @@ def test_a_change_is_pushed_without_waiting_for_the_twins_next_publication(live:
 
 
 def test_what_cannot_be_served_is_refused_with_the_reason(live: Bridge) -> None:
-    for name in ("rate", "encoding"):
+    reasons = {
+        "rate": "parameter 'rate' is unknown, expected delta, max_rate_hz",
+        "max_rate_hz": ("max_rate_hz is '" + r"\U0001f337" * 40)[:MAX_REASON_BYTES],
+    }
+    for name, reason in reasons.items():
         with live.listen(**{name: "\U0001f337" * 40}) as refused:
             with pytest.raises(ConnectionClosedError) as closed:
                 refused.next()
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 1008
-            assert closed.value.rcvd.reason == (
-                f"parameter {name!r} is unknown, expected delta, max_rate_hz"
-            )
+            assert closed.value.rcvd.reason == reason
 
 
 # --- one tag ------------------------------------------------------------------------------------

@@ -3,9 +3,11 @@
 import asyncio
 import resource
 import socket
+import ssl
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
+from pathlib import Path
 
 import pytest
 
@@ -21,6 +23,7 @@ from tests.support.access import Served
 from tests.support.domains import own_domain, ros_env
 from tests.support.proc_stat import open_files
 from tests.support.processes import Process, limits, url_of
+from tests.support.tls import certificate
 from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import deaf_client
 
@@ -164,6 +167,19 @@ async def test_nobody_is_turned_out_before_somebody_else_comes() -> None:
         await door.wait_closed()
         stack.close()
         await until(lambda: not guests, "their end")
+
+
+async def test_who_never_agrees_on_tls_makes_room_too(tmp_path: Path) -> None:
+    ours, tls = certificate(tmp_path), ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    tls.load_cert_chain(ours.cert, ours.key)
+    with listen("127.0.0.1", 0) as listener, ExitStack() as stack:
+        door = Acceptor(listener, asyncio.Protocol, [], room=2, tls=tls, timeout_s=PATIENCE_S)
+        url = address_of(listener)
+        first, *others = (stack.enter_context(raw_http.connect(url)) for _ in range(3))
+        await until(lambda: raw_http.is_over(first), "its place")
+        assert not any(map(raw_http.is_over, others))
+        door.close()
+        await door.wait_closed()
 
 
 def test_room_is_what_the_limit_leaves(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -31,7 +31,8 @@ from tests.support.waiting import until
 
 ROUTES = ("/api/field", "/api/field.json", "/api/field.png", "/api/field.npy", "/api/field/quality")
 QUERY = "?sensor_type=co2&resolution=1&bbox_min_x=0&bbox_min_y=0&bbox_max_x=4&bbox_max_y=4"
-COMPUTED = ("/api/state", "/api/history?tag_id=1&sensor_type=co2", "/metrics", "/docs")
+HISTORY, EXPORT = "/api/history?tag_id=1&sensor_type=co2", "/api/export.csv?from=1&to=5"
+COMPUTED = ("/api/state", HISTORY, EXPORT, "/metrics", "/docs")
 
 
 # --- the rules ----------------------------------------------------------------------------------
@@ -81,6 +82,16 @@ def test_the_slowest_export_makes_place_and_who_takes_enough_does_not() -> None:
         begin("f", 105.0)
         assert len(ended) == 2
     assert admission.exporting == 0
+
+
+def test_an_export_that_was_broken_off_frees_no_place_of_the_next() -> None:
+    admission = Admission(Limits())
+    with ExitStack() as taken, ExitStack() as broken_off:
+        for client, stack in zip("abcdea", (broken_off, *[taken] * 5), strict=True):
+            now_s = 100.0 * admission.exporting
+            stack.enter_context(admission.export(client, now_s, lambda: None))
+        broken_off.close()
+        assert admission.exporting == EXPORTS
 
 
 def test_a_client_has_its_rate_and_is_told_when_to_come_back() -> None:

@@ -33,6 +33,10 @@ def test_the_table_is_bounded_and_the_least_recently_active_leaves_first() -> No
     assert len(limit) == 3
     assert limit.take("a", 0.0) == 0.0, "it was forgotten"
     assert limit.take("e", 0.0) > 0.0, "it was not"
+    limit = RateLimit(rate_hz=0.001, burst=2.0, max_keys=2)
+    for client in ("a", "b", "a", "c"):
+        limit.take(client, 0.0)
+    assert limit.take("a", 0.0) > 0.0, "of b less was heard"
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,10 @@ import pytest
 from websockets.frames import CloseCode
 
 from lupin_bridge.serving import ws_protocol
+from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import Settings
+from tests.support import raw_http
 from tests.support.inprocess import Running, running
 from tests.support.raw_ws import BINARY, CLOSE, PING, TEXT, RawClient, frames_of, masked
 from tests.support.waiting import PATIENCE_S, until
@@ -49,9 +51,31 @@ async def test_a_socket_that_is_free_again_says_so_by_itself(domain: int) -> Non
             assert (taken, freed[0]) == ([False], True)
 
 
-async def test_who_does_not_read_gets_no_answer_to_his_pings(domain: int) -> None:
+async def test_behind_an_answer_that_nobody_reads_a_handshake_ends_after_the_timeout(
+    domain: int,
+) -> None:
+    async with running(Limits(client_timeout_s=3.0), SILENT) as served:
+        connections = served.server.server_state.connections
+
+        def handed_over() -> Connection | None:
+            return next((it for it in connections if isinstance(it, Connection)), None)
+
+        with raw_http.connect(served.url, room=4_096) as deaf:
+            await until(lambda: connections, "the connection")
+            [plain] = connections
+            plain.transport.write(bytes(10_000_000))  # as if it were an answer
+            deaf.sendall(b"GET /ws/state HTTP/1.1\r\n" + raw_http.UPGRADE + b"\r\n")
+            connection = await until(handed_over, "its handover")
+            assert connection is not None
+            assert not connection.can_take
+            await until(lambda: not connections, "its end")
+
+
+async def test_who_does_not_read_gets_no_answer_to_his_pings_and_ends_after_his_good_bye(
+    domain: int,
+) -> None:
     pings = 100
-    async with running(ros_args=SILENT) as served:
+    async with running(Limits(client_timeout_s=3.0), SILENT) as served:
         with deaf_client(served.url) as deaf:
             connection = await joined(served)
             heard = 0
@@ -69,6 +93,8 @@ async def test_who_does_not_read_gets_no_answer_to_his_pings(domain: int) -> Non
             deaf.sendall(masked(PING, bytes(125)) * pings)
             await until(lambda: heard == pings, "all pings")
             assert connection.transport.get_write_buffer_size() == queued
+            deaf.sendall(masked(CLOSE, b"\x03\xe8"))
+            await until(lambda: not served.server.server_state.connections, "its end")
 
 
 def drain(client: socket.socket, freed: list[bool]) -> None:

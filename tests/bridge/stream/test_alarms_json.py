@@ -5,8 +5,9 @@ from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.frames import alarms_message
-from lupin_bridge.stream.state_json import alarms_body
+from lupin_bridge.stream.state_json import MAX_IN_FRAME, alarms_body, alarms_in_frame
 from tests.bridge.stream.test_frames import received
+from tests.support.seen import NOW_NS, alarm
 
 NIGHT_NS = 1_000_000_000_000
 COLD = Alarm(
@@ -49,3 +50,12 @@ def test_an_answer_without_alarms_says_how_far_it_knows() -> None:
     body = alarms_body([], "starting", None)
     assert body == {"alarms": [], "source": "starting", "since": None}
     schema.Alarms.model_validate(body)
+
+
+def test_a_frame_has_so_many_alarms_the_active_ones_first_of_all() -> None:
+    for active in (MAX_IN_FRAME - 1, MAX_IN_FRAME + 1):
+        alarms = [alarm(str(number)) for number in range(active)]
+        over = [alarm(f"over {number}", cleared_ns=NOW_NS) for number in range(2)]
+        found = alarms_in_frame(page_of([*over, *alarms]), NOW_NS)
+        assert len(found) == MAX_IN_FRAME
+        assert sum(one.is_active for one in found) == min(active, MAX_IN_FRAME)

@@ -7,7 +7,7 @@ import pytest
 
 from lupin_bridge.alarms.board import Board, page_of
 from lupin_bridge.stream.frames import FrameWriter, Reason, Status, alarms_message
-from lupin_bridge.stream.hub import CLOSE_POLICY, Client, Hub
+from lupin_bridge.stream.hub import CLOSE_POLICY, LARGE_BYTES, Client, Hub
 from lupin_twin.core.state import Snapshot, TagState
 from tests.bridge.stream.test_frames import received
 from tests.support.seen import alarm
@@ -198,6 +198,24 @@ def test_a_slow_client_is_never_queued_for_and_gets_the_newest(stage: Stage) -> 
     stage.hub.serve(client, 1.1)
     assert slow.got == [1, 8], "the same frame twice"
     assert (stage.hub.blocked, stage.hub.frames_sent, stage.hub.frames_skipped) == (0, 10, 6)
+
+
+def test_of_large_messages_that_wait_whoever_has_waited_longest_gives_way(stage: Stage) -> None:
+    stage.hub.unsent.max_bytes = 2 * LARGE_BYTES
+    sockets = [Socket() for _ in range(4)]
+    free, slowest, *others = (stage.join(socket) for socket in sockets)
+    stage.hub.hold(free, bytes(LARGE_BYTES))
+    stage.hub.is_free(free)
+    stage.hub.hold(Client(Socket()), bytes(LARGE_BYTES))  # who has left already
+    assert stage.hub.unsent.bytes == 0
+    stage.hub.hold(slowest, bytes(LARGE_BYTES))
+    shared = bytes(LARGE_BYTES)
+    for client in others:
+        stage.hub.hold(client, shared)
+    gone = [socket.dismissed is not None for socket in sockets]
+    stage.hub.hold(others[0], bytes(LARGE_BYTES))
+    assert gone == [False] * 4, "what many wait for counts once"
+    assert [socket.dismissed is not None for socket in sockets] == [False, True, False, False]
 
 
 def test_a_client_that_takes_nothing_for_too_long_is_closed_and_forgotten(stage: Stage) -> None:

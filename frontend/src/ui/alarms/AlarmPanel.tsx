@@ -25,7 +25,7 @@ import { acknowledgeAlarms } from '../../alarms/own';
 import { selectNow, selectSpeech, todoNow, worstNow, worstNowFirst } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { timeOfDay } from '../../clock';
-import { fileName, save } from '../../export/save';
+import { saveCsv } from '../../export/save';
 import { store, useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
 import { selectNewestTag } from '../../store/moment';
@@ -116,8 +116,7 @@ export function AlarmPanel(): JSX.Element {
           onClick={() => {
             const found = filtered(alarmList.get(), filter, speech, isTag);
             const text = alarmsCsv(found, speech, (alarm) => selectNow(store.get(), alarm));
-            const blob = new Blob([text], { type: 'text/csv;charset=utf-8' });
-            save(blob, fileName('alarms', 'csv', timeOfDay()));
+            saveCsv('alarms', text, timeOfDay());
           }}
         >
           <Icon name="download" size={18} /> <span className="csv-word">{S.saveCsvShort}</span>

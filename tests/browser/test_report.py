@@ -14,6 +14,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.hmi import FONTS, OpenPage
+from tests.browser.places import place
 from tests.support.messages import look, scan
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
@@ -110,6 +111,17 @@ def test_nothing_is_cut_on_paper_and_names_are_text(
             (0, 0, 595, 842)
         }
         assert page.locator("script").count() == 0
+
+
+def test_on_a_phone_a_wide_table_scrolls_and_the_page_does_not(
+    troubled: Bridge, browser: Browser
+) -> None:
+    with browser.new_context(viewport={"width": 390, "height": 844}) as context:
+        page = context.new_page()
+        page.goto(f"{troubled.url}/api/report.html")
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
+        left = [place(it).left for it in page.locator("dt").all()]
+        assert left[0] == left[2] < left[1] == left[3], "two in a row"
 
 
 def test_in_the_dark_it_is_light(troubled: Bridge, browser: Browser) -> None:

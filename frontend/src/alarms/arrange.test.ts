@@ -103,7 +103,7 @@ test('of a cause how many are how bad, and the value farthest beyond', () => {
     'worst 2.9\u00a0°C (Tag\u00a04)',
   ]);
   const unknown = (): Now => ({ kind: 'unknown', last: 9, lastAt: 'unknown' });
-  expect(causeFacts(items.active, speech, unknown)[0]).toBe('2 unknown');
+  expect(causeFacts(items.active, speech, unknown)[0], 'no word for all alike').toBe('');
 });
 
 test('the newest first, or by tag: in one row', () => {

@@ -102,7 +102,10 @@ export function tagsText(ids: readonly string[]): string {
   return S.alarmTags(named, ids.length - count);
 }
 
-/** Of many alarms of one cause: how many are how bad now, and the furthest value now and at worst; empty: none. */
+/**
+ * Of many alarms of one cause: how many are how bad now, and the furthest value now and at worst; empty:
+ * none. Of those that are all as bad the cause's own word says it.
+ */
 export function causeFacts(
   items: readonly Item[],
   speech: Speech,
@@ -133,14 +136,15 @@ export function causeFacts(
   const current = furthest(({ value }) => value);
   const worst = furthest(({ alarm, now }) => worstOf(alarm, now));
   const active = all.filter(({ alarm }) => alarm.cleared_at === null);
-  const counts = VERDICTS.map((verdict) => {
+  const counts = VERDICTS.flatMap((verdict) => {
     const count = active.filter((each) => each.verdict === verdict).length;
-    return count > 0
-      ? `${count} ${(verdict === 'healthy' ? S.alarmBack : (count === 1 ? S.health : S.healthMany)[verdict]).toLowerCase()}`
-      : null;
+    if (count === 0) return [];
+    const word =
+      verdict === 'healthy' ? S.alarmBack : (count === 1 ? S.health : S.healthMany)[verdict];
+    return [`${count} ${word.toLowerCase()}`];
   });
   return [
-    counts.filter((text) => text !== null).join(', '),
+    counts.length > 1 ? counts.join(', ') : '',
     current?.now ? `${current.now} (${current.where})` : '',
     worst?.worst ? `${worst.worst} (${worst.where})` : '',
   ];

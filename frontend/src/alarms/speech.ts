@@ -38,10 +38,6 @@ export function worstNow(state: AppState, items: readonly Item[]): Verdict | nul
   return VERDICTS.find((each) => verdicts.includes(each)) ?? null;
 }
 
-/** How many of some alarms are of one severity now. */
-export const countNow = (state: AppState, items: readonly Item[], verdict: Verdict): number =>
-  items.filter(({ alarm }) => reasonIn(state, alarm).verdict === verdict).length;
-
 /** What to do first about some alarms of one cause, as they are now. */
 export function todoNow(state: AppState, items: readonly Item[]): string {
   const verdict = worstNow(state, items);

@@ -4,7 +4,7 @@ import { isOldReading, trendOf, type TagThen } from '../domain/difference';
 import {
   ageText,
   beyondLimitText,
-  clockText,
+  minuteText,
   readingText,
   type TemperatureUnit,
 } from '../domain/format';
@@ -47,7 +47,7 @@ export interface Values {
   readonly todo: string;
   /** Null: it is not of a value, or resolved. */
   readonly now: string | null;
-  /** Null: there is no such value. */
+  /** Null: there is no such value, or it is that of now. */
   readonly worst: string | null;
   readonly first: string | null;
 }
@@ -65,21 +65,22 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
         ? String(value)
         : S.alarmPests.seen
       : isOfRange(reason)
-        ? beyondLimitText(sensor, value, reason.limit, unit)
+        ? beyondLimitText(sensor, value, reason.release ?? reason.limit, unit)
         : readingText(sensor, value, unit);
   const nowText = (value: number): string =>
     isPest && value > 0 ? S.pestCount(value) : text(value);
+  const value = now?.kind === 'known' ? now.value : null;
+  const worstText = worst === null || (isPest && worst === 0) ? null : text(worst);
   const noneText = isPest ? S.alarmPests.none : S.alarmStatus.healthy;
   const isMeasured = isOfRange(reason) || isPest || reason.kind === 'changed';
   return {
     what: whatText({ ...alarm, reason }, speech),
     todo: todoText(reason),
-    now:
-      now?.kind === 'known' ? S.alarmNow(now.value === null ? noneText : nowText(now.value)) : null,
+    now: now?.kind === 'known' ? S.alarmNow(value === null ? noneText : nowText(value)) : null,
     worst:
-      worst === null || (isPest && worst === 0)
+      worstText === null || (value !== null && text(value) === worstText)
         ? null
-        : S.alarmWorst[isOfRange(reason) ? sideOf(reason) : 'pest'](text(worst)),
+        : S.alarmWorst[isOfRange(reason) ? sideOf(reason) : 'pest'](worstText),
     first: isMeasured && first !== null ? S.alarmFirst(text(first)) : null,
   };
 }
@@ -88,12 +89,11 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
 export function alarmText(alarm: Alarm, speech: Speech, now: Now | null): string {
   const { what, now: nowText, worst } = valuesOf(alarm, speech, now);
   const isKnown = now?.kind === 'known';
-  const isWorstNow = isKnown && now.value === (worstOf(alarm, now) ?? alarm.reason.value);
   const texts = [
     what,
     // What has no value says by itself how it is.
     isKnown && nowText !== null && now.value !== null ? rated(nowText, now.verdict) : nowText,
-    worst === null || isWorstNow ? null : rated(worst, alarm.reason.verdict),
+    worst === null ? null : rated(worst, alarm.reason.verdict),
   ];
   return S.alarmWhat(whereText(alarm), texts.filter((text) => text !== null).join(', '));
 }
@@ -145,9 +145,12 @@ const lengthText = (seconds: number): string => inOnePiece(ageText(Math.max(0, s
 /** A line does not break in it. */
 export const inOnePiece = (text: string): string => text.replace(' ', '\u00a0');
 
-/** A moment: of today the time alone; an alarm's year goes without saying. */
-export const whenText = (at: number, nowS: number | null): string =>
-  nowS !== null && isSameDay(at, nowS) ? clockOf(at) : shortRosText(at);
+/** A moment to the minute: of today the time alone; an alarm's year goes without saying. */
+export function whenText(at: number, nowS: number | null): string {
+  if (!hasDate(at)) return shortRosText(at);
+  const isToday = nowS !== null && isSameDay(at, nowS);
+  return isToday ? clockOf(at) : `${dayFormat.format(at * 1000)}, ${clockOf(at)}`;
+}
 
 const isSameDay = (a: number, b: number): boolean =>
   hasDate(a) && hasDate(b) && dayOf(a) === dayOf(b);
@@ -155,7 +158,7 @@ const isSameDay = (a: number, b: number): boolean =>
 /** On the operator's own clock. */
 const dayOf = (at: number): string => new Date(at * 1000).toDateString();
 
-const clockOf = (at: number): string => clockText(Math.floor(at) * 1000);
+const clockOf = (at: number): string => minuteText(at * 1000);
 
 /** Some alarms in one breath; `text` is that of one. */
 export function severalText(

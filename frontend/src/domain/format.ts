@@ -112,6 +112,9 @@ export function clockText(epochMs: number): string {
   return clock.format(epochMs);
 }
 
+/** Without the seconds. */
+export const minuteText = (epochMs: number): string => clockText(epochMs).slice(0, -3);
+
 /** Date and time of day on the operator's own clock, for files' names: 2026-05-01 14:03:22. */
 export function momentText(epochMs: number): string {
   return new Date(epochMs).toLocaleString('sv-SE');

@@ -40,9 +40,12 @@ test('lists who needs somebody and why, the worst first', () => {
     '2 pests seen',
     'Temperature 6.6\u00a0°C, below 10.0',
   ]);
-  expect(first.querySelector('.attention-do')?.textContent).toContain(
-    'Inspect and treat the plants · Heat, or close the vents',
-  );
+  // Each in a piece of its own: no line begins or ends with what stands between two.
+  const todos = [...first.querySelectorAll('.attention-do strong .dotted > *')];
+  expect(todos.map(({ textContent }) => textContent)).toEqual([
+    'Inspect and treat the plants',
+    'Heat, or close the vents',
+  ]);
   expect(last?.querySelector('.attention-do strong')?.textContent).toBe('Check the sensor');
 });
 
@@ -70,7 +73,12 @@ test('of what ails many as well, since when it is active where it is worst', () 
   });
   show(Object.fromEntries(Array.from({ length: 13 }, (_, at) => [`${at + 1}`, [cold(at + 1)]])));
   const [cause] = document.querySelectorAll('li[data-cause]');
-  expect(cause?.textContent).toMatch(/Tag 13: Temperature [^·]*· since [^·]*· Tags 13/);
+  const facts = [...(cause?.querySelectorAll('small .dotted > *') ?? [])];
+  expect(facts.map(({ textContent }) => textContent)).toEqual([
+    expect.stringMatching(/^Tag 13: Temperature/),
+    expect.stringMatching(/^since/),
+    expect.stringMatching(/^Tags 13/),
+  ]);
   stop();
 });
 

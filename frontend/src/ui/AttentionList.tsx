@@ -4,7 +4,7 @@ import { byCause, tagsText } from '../alarms/arrange';
 import { selectSpeech } from '../alarms/speech';
 import { timeOfDay } from '../clock';
 import type { HealthReason } from '../contract/types';
-import { clockText, shortAgeText } from '../domain/format';
+import { minuteText, shortAgeText } from '../domain/format';
 import { isBad, severity, todoText, type HouseHealth } from '../domain/health';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
@@ -102,7 +102,9 @@ function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.
         )}
         <span className="attention-do">
           <Todo reasons={all} />{' '}
-          <small className="faint">{facts.filter(Boolean).join('\u00a0· ')}</small>
+          <small className="faint">
+            <Dotted texts={facts.filter((fact) => fact !== null)} />
+          </small>
         </span>
       </span>
     </li>
@@ -110,9 +112,23 @@ function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.
 }
 
 /** What to do about each of them, no word twice; of some nothing. */
-function Todo({ reasons }: { reasons: readonly HealthReason[] }): JSX.Element | null {
-  const texts = [...new Set(reasons.map(todoText))].filter(Boolean);
-  return texts.length > 0 ? <strong>{texts.join(' · ')}</strong> : null;
+function Todo({ reasons }: { reasons: readonly HealthReason[] }): JSX.Element {
+  return (
+    <strong>
+      <Dotted texts={[...new Set(reasons.map(todoText))].filter(Boolean)} />
+    </strong>
+  );
+}
+
+function Dotted({ texts }: { texts: readonly string[] }): JSX.Element | null {
+  if (texts.length === 0) return null;
+  return (
+    <span className="dotted">
+      {texts.map((text) => (
+        <span key={text}>{text}</span>
+      ))}
+    </span>
+  );
 }
 
 /** Null: all of it is shelved, there is no tag yet, or the greenhouse's own reason says more. */
@@ -133,7 +149,7 @@ export function KioskNote({ wish }: { wish: CycleWish }): JSX.Element {
   const left = useTicking((now) =>
     next ? shortAgeText(Math.max(0, Math.ceil((next.at - now) / 1000))) : null,
   );
-  const time = useTicking(() => clockText(timeOfDay()).slice(0, -3));
+  const time = useTicking(() => minuteText(timeOfDay()));
   return (
     <div className="kiosk-note" data-testid="kiosk-note">
       {wish.refused !== null && (

@@ -5,7 +5,7 @@ import { alarmOf, isAwaited, type Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import { epochOf, now } from '../clock';
 import type { HealthReason, Verdict } from '../contract/types';
-import { clockText } from '../domain/format';
+import { minuteText } from '../domain/format';
 import { type HouseHealth, isBad, isSilent, severity, todoText, VERDICTS } from '../domain/health';
 import { secondsOf } from '../domain/time';
 import { rowsOf } from '../domain/table';
@@ -80,7 +80,7 @@ export function useSince(tagId: string, reason: HealthReason): string | null {
     isSilent(selectHealth(state)) ? selectNewest(state).snapshot?.takenAt : undefined,
   );
   if (!isNow) return null;
-  if (takenAt !== undefined) return S.asOf(clockText(epochOf(takenAt)));
+  if (takenAt !== undefined) return S.asOf(minuteText(epochOf(takenAt)));
   if (!found) return isKnown && isAwaited(reason) ? S.alarmNotYet : null;
   if (found.isAcknowledged) return S.healthAcknowledged;
   return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
@@ -97,10 +97,7 @@ export function DoNow({
 }): JSX.Element {
   const health = useApp(selectHealth);
   const urgent = useUrgent();
-  // The alarms are those of now.
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const active = useSelected(alarmList, (list) => list.active.length);
-  const hasAlarms = isNow && active > 0;
   const hasOwn = health.reasons.length > 0;
   // Of a twin that is not heard, what had to be done stays, with its time.
   const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict) || isSilent(health));
@@ -127,19 +124,17 @@ export function DoNow({
                 id={index === 0 ? id : undefined}
               />
             </button>
-            {index === lines.length - 1 &&
-              (hasAlarms ? urgent.length > lines.length : rest > 0) && (
-                <button
-                  type="button"
-                  className="do-more"
-                  onClick={() => {
-                    act(withList(hasAlarms ? 'alarms' : 'tags'));
-                  }}
-                >
-                  {/* Each counts what it opens: a tag may have two alarms, or none yet. */}
-                  {hasAlarms ? `${S.alarms} (${active})` : S.attentionMore(rest)}
-                </button>
-              )}
+            {index === lines.length - 1 && rest > 0 && (
+              <button
+                type="button"
+                className="do-more"
+                onClick={() => {
+                  act(withList('tags'));
+                }}
+              >
+                {S.attentionMore(rest)}
+              </button>
+            )}
           </li>
         ))
       ) : (
@@ -175,7 +170,7 @@ function Also({ of, than }: { of: readonly Urgent[]; than: Verdict }): JSX.Eleme
   const verdicts = [than, ...of.map(({ reasons: [{ verdict }] }) => verdict)];
   return (
     <span>
-      {S.todoAlso}{' '}
+      {S.todoAlso(of.length)}{' '}
       {of.slice(0, MOST_ALSO).map(({ tagId, reasons: [{ verdict }] }, index) => (
         <Fragment key={tagId}>
           {index > 0 && ', '}

@@ -26,12 +26,12 @@ test('live data carry no banner', () => {
   expect(screen.queryByTestId('frozen')).toBeNull();
 });
 
-test('a lost connection: frozen, since when, and a way to try now', () => {
+test('a lost connection: since when, why, and a way to try now, in two lines of a phone', () => {
   showTags([wireTag()]);
   goLost();
   render(<FrozenBanner />);
   const since = clockText(epochOf(store.get().twin.latest.snapshot?.takenAt ?? NaN));
-  expect(text()).toContain(`Last data at ${since}`);
+  expect(text()).toBe(`Last data at ${since}0\u00a0s agoConnection to the server lost.Try now`);
   expect(screen.getByRole('button', { name: 'Try now' })).toBeTruthy();
 });
 

@@ -154,8 +154,6 @@ export function FrozenBanner(): JSX.Element | null {
   const isPast = useApp((state) => selectShown(state).moment !== null);
   const now = useNow();
   if (phase === 'live' || takenAt === undefined) return null;
-  const { socket } = connection;
-  const wait = socket.kind === 'closed' ? Math.ceil((socket.retryAt - now) / 1000) : 0;
   return (
     <div className="frozen" role="alert" data-testid="frozen">
       <strong>{(isPast ? S.frozenBehindPast : S.frozenSince)(clockText(epochOf(takenAt)))}</strong>
@@ -169,12 +167,9 @@ export function FrozenBanner(): JSX.Element | null {
       {phase === 'offline' && <More label={S.more} text={offlineMore(connection.status)} />}
       {isPast && <span>{S.frozenPastStays}</span>}
       {phase === 'reconnecting' && (
-        <>
-          <span aria-hidden="true">{S.nextTry(Math.max(0, wait))}</span>
-          <button type="button" onClick={retryConnection}>
-            {S.retryNow}
-          </button>
-        </>
+        <button type="button" onClick={retryConnection}>
+          {S.retryNow}
+        </button>
       )}
     </div>
   );

@@ -204,6 +204,13 @@ describe.each([
     expect(texts.filter((text) => foreign.test(text.replaceAll(/⟦\w+⟧/g, '')))).toEqual([]);
     const leftover = /\b(the|and|with|not|readings?|shown)\b/i;
     expect(texts.filter((text) => leftover.test(text.replaceAll(/⟦\w+⟧/g, '')))).toEqual([]);
+    // What is right, and what no grower says; and a second word for the ideal range.
+    const translated = {
+      de: /Sollbereich|Typischer Fehler|Vergangen|Was die Zeichen/,
+      nl: /gestrest|Typische fout|verleden|[Vv]raagt aandacht| …/i,
+      es: /Error típico|calentar|\(?pasado|anomalía| …/i,
+    }[language];
+    expect(texts.filter((text) => translated.test(text))).toEqual([]);
     // Of whatever sensor: a word that agrees with one noun disagrees with another.
     const tooMuch = [words.tooLow, words.tooHigh].map((text) => text(null));
     expect(tooMuch.filter((text) => /(baj|alt)[oa]$/.test(text))).toEqual([]);

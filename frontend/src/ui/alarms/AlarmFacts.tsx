@@ -1,6 +1,5 @@
 import type { JSX } from 'react';
 
-import { isWorse } from '../../alarms/own';
 import type { Item } from '../../alarms/list';
 import {
   spanText,
@@ -83,15 +82,7 @@ export function AlarmFacts({
         </Fact>
       )}
       {state?.kind === 'unknown' && <NotKnown alarm={alarm} state={state} />}
-      {worst !== null && (
-        <Fact
-          name="worst"
-          verdict={
-            state?.kind === 'known' && isWorse(state.verdict, verdict) ? state.verdict : verdict
-          }
-          text={worst}
-        />
-      )}
+      {worst !== null && <Fact name="worst" verdict={verdict} text={worst} />}
     </>
   );
 }

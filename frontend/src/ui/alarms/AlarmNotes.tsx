@@ -13,7 +13,7 @@ import { done, own, undo } from '../../alarms/own';
 import { textNow } from '../../alarms/speech';
 import { alarmList, meanwhile } from '../../alarms/watch';
 import { epochOf } from '../../clock';
-import { clockText } from '../../domain/format';
+import { minuteText } from '../../domain/format';
 import { shown } from '../../domain/text';
 import { rosText, secondsOf } from '../../domain/time';
 import { act, useApp, type AppState } from '../../store/app';
@@ -56,7 +56,7 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
   return (
     <div className="alarm-notes">
       {moment !== null && <p data-note="now">{S.alarmsOfNow(rosText(moment))}</p>}
-      {isLast && <p data-note="lost">{S.alarmsLost(clockText(epochOf(takenAt)))}</p>}
+      {isLast && <p data-note="lost">{S.alarmsLost(minuteText(epochOf(takenAt)))}</p>}
       {isStarting && <p data-note="starting">{S.alarmsStarting}</p>}
       {isEmpty && !isLast && (
         <p className="alarm-none" data-note={isKnown ? 'none' : 'unknown'}>

@@ -307,7 +307,7 @@ function CauseHeading({
             </span>
           </span>
           {group === 'active' && <span className="alarm-do">{todo}</span>}
-          <span className="alarm-facts">{counts}</span>
+          {counts && <span className="alarm-facts">{counts}</span>}
           <span className="alarm-facts faint">{tagsText(tags)}</span>
         </span>
         <span data-fact="now">{current}</span>

@@ -13,7 +13,7 @@ import {
 } from '../../alarms/own';
 import { selectSpeech } from '../../alarms/speech';
 import { lastKnown, nameText, whereText } from '../../alarms/words';
-import { clockText } from '../../domain/format';
+import { minuteText } from '../../domain/format';
 import { C } from '../../notes/NoteMarks';
 import { CommentField, CommentList } from '../../notes/Comments';
 import { useApp } from '../../store/app';
@@ -80,7 +80,7 @@ export const AlarmRow = memo(function AlarmRow({
           {group === 'shelved' && item.shelf && (
             <span className="alarm-facts faint">
               {S.alarmShelved(
-                clockText(item.shelf.until),
+                minuteText(item.shelf.until),
                 item.shelf.reason,
                 alarm.shelved_by ?? '',
               )}
@@ -118,7 +118,7 @@ function useStatus(item: Item, group: keyof AlarmList): string | null {
   const belongs = groupOf(item);
   if (group !== belongs && belongs === 'resolved') return S.alarmResolved;
   if (group !== belongs && shelf !== null) {
-    return S.alarmShelved(clockText(shelf.until), '', alarm.shelved_by ?? '');
+    return S.alarmShelved(minuteText(shelf.until), '', alarm.shelved_by ?? '');
   }
   return isAcknowledged ? (who ?? S.healthAcknowledged) : null;
 }

@@ -120,26 +120,28 @@ test('what is shelved says until when and why, has its way back, and is no order
   expect(order()).toBe('Heat, or close the vents');
 });
 
-test('the count of alarms says how many of them are of its sign, and none of now where that is not known', () => {
-  render(<AlarmsLabel />);
-  const count = (): string => screen.getByTestId('alarm-count').textContent;
+test('the count of alarms is of all behind the sign of the worst, and none of now where that is not known', () => {
+  const { container } = render(<AlarmsLabel />);
+  const count = (): string => screen.getByTestId('alarm-count').textContent.trim();
+  const sign = (): unknown =>
+    container.querySelector<HTMLElement>('.health-mark')?.dataset['health'];
   const bad = ['8', '9'].map((id) => alarm(id, { tag_id: id, reason: { verdict: 'stressed' } }));
   flush(() => {
     tellAlarms(...bad);
   });
-  expect(count()).toBe('2');
+  expect([sign(), count()]).toEqual(['stressed', '(2)']);
   flush(() => {
     tellAlarms(...bad, alarm('c', { reason: { verdict: 'critical' } }));
   });
-  expect(count()).toBe('1/3');
+  expect([sign(), count()]).toEqual(['critical', '(3)']);
   flush(() => {
     acknowledgeAlarms(alarmList.get().active);
   });
-  expect(count()).toBe('3');
+  expect([sign(), count()]).toEqual([undefined, '(3)']);
   flush(() => {
     act({ moment: 10 });
   });
-  expect(count()).toBe('now 3');
+  expect([sign(), count()]).toEqual([undefined, '(now 3)']);
   flush(goLost);
   expect(screen.queryByTestId('alarm-count')).toBeNull();
 });

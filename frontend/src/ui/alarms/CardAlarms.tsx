@@ -5,7 +5,7 @@ import { acknowledgeAlarms, unshelveAlarm } from '../../alarms/own';
 import { selectSpeech, todoNow, worstNow } from '../../alarms/speech';
 import { spanText, whatText } from '../../alarms/words';
 import { alarmList } from '../../alarms/watch';
-import { clockText } from '../../domain/format';
+import { minuteText } from '../../domain/format';
 import { store, useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
 import { rosNow } from '../../store/moment';
@@ -82,7 +82,7 @@ function Shelved({ tagId }: { tagId: string }): JSX.Element {
               <span>
                 {S.alarmWhat(
                   whatText(alarm, speech),
-                  S.alarmShelved(clockText(shelf.until), shelf.reason, alarm.shelved_by ?? ''),
+                  S.alarmShelved(minuteText(shelf.until), shelf.reason, alarm.shelved_by ?? ''),
                 )}
               </span>
               {isAble && (

@@ -1,7 +1,7 @@
 import type { JSX } from 'react';
 
 import { calling } from '../../alarms/list';
-import { countNow, worstNow } from '../../alarms/speech';
+import { worstNow } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { act, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
@@ -38,8 +38,8 @@ export function ListChoice(): JSX.Element {
 }
 
 /**
- * "Alarms" and how many are active; with the sign of the worst now and how many of them are so, until
- * all are acknowledged. Who looks back reads that they are those of now, as long as that is known.
+ * "Alarms (7)", those that are active, behind the sign of the worst now until all are acknowledged.
+ * Who looks back reads that they are those of now, as long as that is known.
  */
 export function AlarmsLabel(): JSX.Element {
   const list = useSelected(alarmList);
@@ -51,18 +51,19 @@ export function AlarmsLabel(): JSX.Element {
   const worst = useApp((state) =>
     unacknowledged.length === 0 ? null : worstNow(state, list.active),
   );
-  const worstCount = useApp((state) => (worst ? countNow(state, list.active, worst) : length));
   if (isCut && !isNow) return <>{S.alarms}</>;
   return (
     <>
-      {S.alarms}
-      {length > 0 && (
-        <span className="alarm-count" data-testid="alarm-count" aria-hidden="true">
-          {worst && isNow && <HealthShape verdict={worst} />}
-          {worstCount < length && isNow && `${worstCount}/`}
-          {isNow ? length : S.alarmNow(String(length))}
-        </span>
-      )}
+      {worst && isNow && <HealthShape verdict={worst} />}
+      <span>
+        {S.alarms}
+        {length > 0 && (
+          <span data-testid="alarm-count" aria-hidden="true">
+            {' '}
+            ({isNow ? length : S.alarmNow(String(length))})
+          </span>
+        )}
+      </span>
       {isKnown && <span className="unseen">, {S.alarmsCount(unacknowledged.length, length)}</span>}
     </>
   );

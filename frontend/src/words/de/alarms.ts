@@ -33,7 +33,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     pest: (reading) => `höchste Anzahl ${reading}`,
   },
   alarmFirst: (reading) => `anfangs ${reading}`,
-  alarmStatus: { critical: 'kritisch', healthy: 'im Sollbereich' },
+  alarmStatus: { critical: 'kritisch', healthy: 'im Idealbereich' },
   alarmBack: 'Wieder normal',
   alarmShow: 'Messpunkt jetzt anzeigen',
   alarmStart: 'Zum Beginn',
@@ -146,7 +146,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
             : `seit ${age} kein Messwert`;
       return `${sensor === '' ? '' : `${sensor}: `}${since}${holds === null ? '' : ` (Messwerte gelten ${holds} lang)`}`;
     },
-    outOfRange: 'außerhalb des Sollbereichs',
+    outOfRange: 'außerhalb des Idealbereichs',
     changed: (reading) => `${reading}: möglicher Sensorfehler`,
     silent: 'Keine Daten vom digitalen Zwilling: Die letzten Daten können veraltet sein',
     stopped: 'Es wird nichts mehr gemessen: Der Roboter steht, oder seine Daten kommen nicht an',
@@ -173,7 +173,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   },
   todoPestAgain: 'Nochmals kontrollieren: Ohne Befund ist der Alarm behoben',
   todoWell: 'Mit der nächsten guten Messung behoben',
-  todoAlso: 'auch',
+  todoAlso: (tags) => (tags === 1 ? 'auch Messpunkt' : 'auch Messpunkte'),
   todoLabel: 'Jetzt zu tun',
   reasonsLabel: 'Warum',
   healthHeading: 'Zustand des Gewächshauses',

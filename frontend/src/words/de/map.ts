@@ -47,9 +47,9 @@ export const MAP: In<typeof EN.MAP> = {
   legendTags: (count) => counted(count, 'Messpunkt trägt bei', 'Messpunkte tragen bei'),
   legendFetching: 'Die Heatmap wird geladen',
   legendNoTags: 'Kein Messpunkt trägt bei',
-  legendError: (error) => `Typischer Fehler ${error}`,
+  legendError: (error) => `Typische Abweichung ${error}`,
   legendErrorHint:
-    'Typischer Fehler zwischen den Messpunkten: Jeder Messpunkt wird aus allen anderen geschätzt und mit seinem Messwert verglichen.',
+    'Typische Abweichung zwischen den Messpunkten: Jeder Messpunkt wird aus allen anderen geschätzt und mit seinem Messwert verglichen.',
   legendErrorWorst: (tag, error) => `Am größten an Messpunkt ${tag}: ${error}.`,
   legendTransparent: 'Kräftigere Farbe: höherer Wert. Ohne Farbe: kleinster Wert.',
   legendMore: 'Details',

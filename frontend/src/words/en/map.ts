@@ -111,7 +111,7 @@ export const TAGS = {
   tags: 'Tags',
   tableCaption: 'All tags with their latest readings',
   filter: 'Filter tags',
-  filterHint: 'Tag, species, pest …',
+  filterHint: 'Tag, species, pest…',
   filterClear: 'Clear filter',
   shownOf: (shown: number, all: number): string =>
     shown === all

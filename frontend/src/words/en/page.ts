@@ -25,8 +25,7 @@ export const PAGE = {
   },
   phaseLabel: 'Connection',
   retryNow: 'Try now',
-  nextTry: (seconds: number): string => (seconds > 0 ? `next try in ${seconds} s` : 'trying now'),
-  frozenSince: (clock: string): string => `No new readings. Last data at ${clock}`,
+  frozenSince: (clock: string): string => `Last data at ${clock}`,
   agoSuffix: (age: string): string => `${age} ago`,
   /** As an age has it: "1 h 18 min". */
   hours: 'h',

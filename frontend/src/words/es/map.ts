@@ -45,9 +45,9 @@ export const MAP: In<typeof EN.MAP> = {
   legendTags: (count) => counted(count, 'punto aporta datos', 'puntos aportan datos'),
   legendFetching: 'Cargando el mapa de calor',
   legendNoTags: 'Ningún punto aporta datos',
-  legendError: (error) => `Error típico ${error}`,
+  legendError: (error) => `Error habitual ${error}`,
   legendErrorHint:
-    'Error típico entre los puntos: cada punto se estima a partir de los demás y se compara con su propia lectura.',
+    'Error habitual entre los puntos: cada punto se estima a partir de los demás y se compara con su propia lectura.',
   legendErrorWorst: (tag, error) => `El mayor, en el punto ${tag}: ${error}.`,
   legendTransparent: 'Color más intenso: valor más alto. Sin color: el mínimo.',
   legendMore: 'Detalles',
@@ -114,7 +114,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   tags: 'Puntos',
   tableCaption: 'Todos los puntos de medida con sus últimas lecturas',
   filter: 'Filtrar los puntos',
-  filterHint: 'N.º, especie, plaga …',
+  filterHint: 'N.º, especie, plaga…',
   filterClear: 'Borrar el filtro',
   shownOf: (shown, all) =>
     shown === all

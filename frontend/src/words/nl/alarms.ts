@@ -60,7 +60,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmsNew: (count) => `${count} nieuw`,
   alarmsNewHint: 'De volgorde blijft gelijk zolang u de lijst gebruikt. Nieuwe alarmen tonen',
   alarmFilter: 'Alarmen filteren',
-  alarmFilterHint: 'Filteren …',
+  alarmFilterHint: 'Filteren…',
   alarmOrder: 'Volgorde',
   alarmOrders: { cause: 'Per oorzaak', newest: 'Nieuwste eerst', tag: 'Per meetpunt' },
   alarmSaveCsv: 'Alarmen opslaan als CSV',
@@ -104,7 +104,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
 
 const ONE_OR_MANY = {
   healthy: 'Gezond',
-  stressed: 'Gestrest',
+  stressed: 'Onder stress',
   critical: 'Kritiek',
   unknown: 'Onbekend',
 };
@@ -168,7 +168,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   },
   todoPestAgain: 'Nogmaals controleren: zonder plaag is het alarm opgelost',
   todoWell: 'Opgelost bij de volgende goede meting',
-  todoAlso: 'ook',
+  todoAlso: (tags) => (tags === 1 ? 'ook meetpunt' : 'ook meetpunten'),
   todoLabel: 'Nu doen',
   reasonsLabel: 'Waarom',
   healthHeading: 'Toestand van de kas',
@@ -202,8 +202,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       ? 'alle meetpunten op tijd'
       : counted(count, 'meetpunt te laat', 'meetpunten te laat'),
   tagChosen: (tag, health, row, rows) => `Meetpunt ${tag}, ${health}, ${row} van ${rows}`,
-  attention: 'Vraagt aandacht',
-  attentionNone: 'Niets vraagt aandacht',
+  attention: 'Aandachtspunten',
+  attentionNone: 'Geen aandachtspunten',
   attentionNoneKnown: (unknown) =>
     `Geen bekende problemen; geen gegevens van ${counted(unknown, 'meetpunt', 'meetpunten')}`,
   attentionMore: (count) => `+ nog ${count}`,

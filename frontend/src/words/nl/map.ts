@@ -45,10 +45,10 @@ export const MAP: In<typeof EN.MAP> = {
   legendTags: (count) => counted(count, 'meetpunt telt mee', 'meetpunten tellen mee'),
   legendFetching: 'De heatmap wordt geladen',
   legendNoTags: 'Geen meetpunt telt mee',
-  legendError: (error) => `Typische fout ${error}`,
+  legendError: (error) => `Typische afwijking ${error}`,
   legendErrorHint:
-    'Typische fout tussen de meetpunten: elk meetpunt wordt uit alle andere geschat en vergeleken met de eigen meetwaarde.',
-  legendErrorWorst: (tag, error) => `Grootste fout bij meetpunt ${tag}: ${error}.`,
+    'Typische afwijking tussen de meetpunten: elk meetpunt wordt uit alle andere geschat en vergeleken met de eigen meetwaarde.',
+  legendErrorWorst: (tag, error) => `Grootste afwijking bij meetpunt ${tag}: ${error}.`,
   legendTransparent: 'Sterkere kleur: hogere waarde. Geen kleur: laagste waarde.',
   legendMore: 'Details',
   legendHatched: 'Gearceerd: geen gegevens',
@@ -114,7 +114,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   tags: 'Meetpunten',
   tableCaption: 'Alle meetpunten met hun nieuwste meetwaarden',
   filter: 'Meetpunten filteren',
-  filterHint: 'Nr., soort, plaag …',
+  filterHint: 'Nr., soort, plaag…',
   filterClear: 'Filter wissen',
   shownOf: (shown, all) =>
     shown === all

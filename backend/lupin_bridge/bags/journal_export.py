@@ -10,8 +10,9 @@ from __future__ import annotations
 import heapq
 import os
 import sqlite3
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from operator import itemgetter
 from pathlib import Path
 from typing import Final
@@ -21,25 +22,14 @@ from mcap.writer import CompressionType, Writer
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 
-from lupin_bridge.bags.recording import (
-    CLOCK_TOPIC,
-    CLOCK_TYPE,
-    MESSAGE_ENCODING,
-    OBSERVATION_TYPE,
-    TAGS_TYPE,
-)
-from lupin_bridge.feed.relay import ENCODING, Topic, schema_text
-from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.core.state import Inspection, Pin, Pose, Scan, Write
+from lupin_bridge.bags.recording import MESSAGE_ENCODING
+from lupin_bridge.feed.relay import ENCODING, schema_text
+from lupin_twin.core.interfaces import CLOCK, DISCOVERED_TAGS, OBSERVATIONS, Topic
+from lupin_twin.core.state import Pin, Pose, Write
 from lupin_twin.journal.rows import listed_rows
 from lupin_twin.journal.runs import Run, runs, spans_within
 from lupin_twin.journal.schema import LOCAL_SITE, one_view
 from lupin_twin.ros.convert import observation_message, pose_message, time_msg
-
-# What rosbag2 calls it in a channel's metadata; without it rosbag2 plays everything as volatile.
-QOS_KEY: Final = "offered_qos_profiles"
-PROFILE: Final = "ros2"
-LIBRARY: Final = "lupin-twin"
 
 # One of rosbag2's profiles, as it writes them since its metadata's version 9 (Jazzy), without which
 # it takes a file for of that version. No deadline, no lifespan: RMW_DURATION_INFINITE.
@@ -64,7 +54,7 @@ _PROFILE: Final = """\
 
 def offered_qos(topic: Topic) -> str:
     """How a topic is published, as rosbag2 writes that."""
-    durability = "transient_local" if topic.latched else "volatile"
+    durability = "transient_local" if topic.is_latched else "volatile"
     return _PROFILE.format(depth=topic.depth, durability=durability)
 
 
@@ -87,11 +77,6 @@ class JournalRows:
             self._spans = spans_within(runs(connection.execute), start_ns, end_ns)
             self.runs: dict[int, Run] = {span.run.id: span.run for span in self._spans}
             self.places = self._places_before(start_ns)
-
-    @property
-    def is_simulated(self) -> bool:
-        """Whether any of it goes by a clock that was simulated."""
-        return any(run.begun.is_simulated for run in self.runs.values())
 
     def __iter__(self) -> Iterator[tuple[Run, Write]]:
         """Each with the run of the clock that it belongs to, in the order of receiving."""
@@ -156,26 +141,12 @@ class JournalRows:
         )
 
 
-# --- their messages, serialised -------------------------------------------------------------------
-
-
-def observation(row: Scan | Inspection) -> bytes:
-    """lupin_msgs/Observation."""
-    return bytes(serialize_message(observation_message(row, "")))
-
-
-def discovered(pins: Iterable[Pin]) -> bytes:
+def discovered(pins: Sequence[Pin]) -> DiscoveredTags:
     """lupin_msgs/DiscoveredTags."""
-    pins = list(pins)
     tags = [DiscoveredTag(tag_id=pin.tag_id, pose_in_map=pose_message(pin.pose)) for pin in pins]
     msg = DiscoveredTags(tags=tags)
-    msg.header.stamp = time_msg(max((pin.stamp_ns for pin in pins), default=0))
-    return bytes(serialize_message(msg))
-
-
-def clock(now_ns: int) -> bytes:
-    """rosgraph_msgs/Clock."""
-    return bytes(serialize_message(Clock(clock=time_msg(now_ns))))
+    msg.header.stamp = time_msg(max(pin.stamp_ns for pin in pins))
+    return msg
 
 
 # --- the file -------------------------------------------------------------------------------------
@@ -201,12 +172,15 @@ def export(
 
     """
     rows = JournalRows(connection, start_ns, end_ns)
-    topics = _topics(namespace, has_clock=rows.is_simulated)
+    root = f"/{namespace.strip('/')}/".replace("//", "/")
+    topics = [replace(it, name=root + it.name) for it in (OBSERVATIONS, DISCOVERED_TAGS)]
+    if any(run.begun.is_simulated for run in rows.runs.values()):
+        topics.append(replace(CLOCK, depth=10))
     texts = {topic.type_name: schema_text(topic.type_name) for topic in topics}
     with ExitStack() as if_not_kept, path.open("xb") as file:
         if_not_kept.callback(path.unlink)
         writer = Writer(file, compression=CompressionType.ZSTD)
-        writer.start(profile=PROFILE, library=LIBRARY)
+        writer.start(profile="ros2", library="lupin-twin")
         schemas = {
             name: writer.register_schema(name, ENCODING, text.encode())
             for name, text in texts.items()
@@ -216,7 +190,8 @@ def export(
                 topic.name,
                 MESSAGE_ENCODING,
                 schemas[topic.type_name],
-                {QOS_KEY: offered_qos(topic)},
+                # Without it rosbag2 plays everything as volatile.
+                {"offered_qos_profiles": offered_qos(topic)},
             )
             for topic in topics
         ]
@@ -229,36 +204,25 @@ def export(
     return written
 
 
-def _topics(namespace: str, *, has_clock: bool) -> list[Topic]:
-    names = TwinParameters()
-    root = f"/{namespace.strip('/')}/".replace("//", "/")
-    topics = [
-        Topic(root + names.observations_topic, OBSERVATION_TYPE, depth=50),
-        Topic(root + names.discovered_tags_topic, TAGS_TYPE, depth=50),
-        Topic(CLOCK_TOPIC, CLOCK_TYPE, latched=False, depth=10),
-    ]
-    return topics if has_clock else topics[:_CLOCK]
-
-
 def _write(writer: Writer, channels: Sequence[int], rows: JournalRows) -> tuple[int, int]:
     counts = [0, 0]
 
-    def write(topic: int, at_ns: int, data: bytes) -> None:
-        writer.add_message(channels[topic], at_ns, data, at_ns)
+    def write(topic: int, at_ns: int, message: object) -> None:
+        writer.add_message(channels[topic], at_ns, bytes(serialize_message(message)), at_ns)
 
     for run, row in rows:
         at_ns = row.arrival_ns
         if run.begun.is_simulated:
             # What ROS time was when it arrived.
             now_ns = max(row.stamp_ns, at_ns - run.begun.arrival_ns + run.begun.stamp_ns)
-            write(_CLOCK, at_ns, clock(now_ns))
+            write(_CLOCK, at_ns, Clock(clock=time_msg(now_ns)))
         if rows.places and not sum(counts):
             write(_TAGS, at_ns, discovered(rows.places))
             counts[_TAGS] += 1
         if isinstance(row, Pin):
-            topic, data = _TAGS, discovered([row])
+            topic, message = _TAGS, discovered([row])
         else:
-            topic, data = _OBSERVATIONS, observation(row)
-        write(topic, at_ns, data)
+            topic, message = _OBSERVATIONS, observation_message(row, "")
+        write(topic, at_ns, message)
         counts[topic] += 1
     return counts[_OBSERVATIONS], counts[_TAGS]

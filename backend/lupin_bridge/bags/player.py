@@ -17,35 +17,21 @@ from threading import Event
 from typing import Any, Final
 
 import rclpy
-from lupin_msgs.msg import DiscoveredTags, Observation
-from nav_msgs.msg import OccupancyGrid
 from rclpy.node import Node
+from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 
-from lupin_bridge.bags.recording import (
-    CLOCK_TOPIC,
-    MAP_TYPE,
-    OBSERVATION_TYPE,
-    TAGS_TYPE,
-    Recorded,
-    Recording,
-    RecordingError,
-    clock_ns,
-)
+from lupin_bridge.bags.recording import INPUTS, Recorded, Recording, RecordingError
 from lupin_bridge.console import say
+from lupin_twin.adapt.messages import message_type
+from lupin_twin.core.interfaces import CLOCK, MAP, STATE
 from lupin_twin.core.parameters import ParameterError
-from lupin_twin.ros.base_node import latched, running_ros
-from lupin_twin.ros.convert import time_msg
+from lupin_twin.ros.base_node import qos_of, running_ros
+from lupin_twin.ros.convert import nanoseconds, time_msg
+from lupin_twin.ros.inputs import name_of
 from lupin_twin.runtime import process
 
 NODE_NAME: Final = "lupin_player"
-# With its depth, as a twin subscribes to it (lupin_twin.core.interfaces).
-_TYPES: Final[Mapping[str, tuple[Any, int]]] = {
-    OBSERVATION_TYPE: (Observation, 50),
-    TAGS_TYPE: (DiscoveredTags, 50),
-    MAP_TYPE: (OccupancyGrid, 1),
-}
-_STATE_TYPE: Final = "lupin_msgs/msg/TwinState"
 _BEAT_S: Final = 0.02
 # So many a beat, 100 a second: of the 50 that may wait at a twin none is lost while its thread is
 # busy for half a second. DDS acknowledges what waits there, taken or not.
@@ -103,7 +89,7 @@ class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
     def __init__(self, inputs: Mapping[str, str]) -> None:
         super().__init__(NODE_NAME)
         self._inputs = inputs
-        self._clock = self.create_publisher(Clock, CLOCK_TOPIC, 1)
+        self._clock = self.create_publisher(Clock, CLOCK.name, 1)
         self._publishers_by_topic: dict[str, Any] = {}
         self.advertise()
 
@@ -112,9 +98,9 @@ class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for publisher in self._publishers_by_topic.values():
             self.destroy_publisher(publisher)
         for topic, kind in self._inputs.items():
-            message_type, depth = _TYPES[kind]
-            publisher = self.create_publisher(message_type, topic, latched(depth))
-            self._publishers_by_topic[topic] = publisher
+            self._publishers_by_topic[topic] = self.create_publisher(
+                message_type(kind), topic, qos_of(INPUTS[kind])
+            )
 
     def publish_time(self, now_ns: int) -> None:
         """Publish `/clock`."""
@@ -142,9 +128,9 @@ class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
         """
         twins = [
-            f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+            name_of(info)
             for topic, types in self.get_topic_names_and_types()
-            if _STATE_TYPE in types
+            if STATE.type_name in types
             for info in self.get_publishers_info_by_topic(topic)
         ]
         if len(twins) > 1:
@@ -177,19 +163,19 @@ class Player:
         self._position_ns = self._start_ns
         self._time_ns: int | None = None if recording.has_clock else self._start_ns
         if recording.has_clock:
-            newest = recording.messages([CLOCK_TOPIC], before_ns=self._start_ns, newest_first=True)
+            newest = recording.messages([CLOCK.name], before_ns=self._start_ns, newest_first=True)
             for message in islice(newest, 1):
-                self._time_ns = clock_ns(message.data)
+                self._time_ns = _clock_ns(message)
         self._earlier: Iterator[Recorded] = iter(())
         if self._start_ns > recording.start_ns:
-            maps = [topic for topic, kind in inputs.items() if kind == MAP_TYPE]
+            maps = [topic for topic, kind in inputs.items() if kind == MAP.type_name]
             last = [
                 recording.messages([topic], before_ns=self._start_ns, newest_first=True)
                 for topic in maps
             ]
             rest = recording.messages(inputs.keys() - {*maps}, before_ns=self._start_ns)
             self._earlier = chain(*(islice(of_map, 1) for of_map in last), rest)
-        topics = [*inputs, *([CLOCK_TOPIC] if recording.has_clock else [])]
+        topics = [*inputs, *([CLOCK.name] if recording.has_clock else [])]
         self._rest = recording.messages(topics, from_ns=self._start_ns)
         self._next = next(self._rest, None)
         self._noted_ns = -1
@@ -219,11 +205,11 @@ class Player:
         self._move(round(step_s * self._speed * 1e9))
         lag_ns = round(_LAG_S * self._speed * 1e9)
         while (message := self._next) is not None:
-            is_clock = message.topic == CLOCK_TOPIC
+            is_clock = message.topic == CLOCK.name
             if message.log_ns > self._position_ns - (0 if is_clock else lag_ns):
                 break
             if is_clock:
-                self._time_ns = clock_ns(message.data) or self._time_ns
+                self._time_ns = _clock_ns(message) or self._time_ns
             elif left:
                 left -= 1
                 self._publish(message)
@@ -256,6 +242,10 @@ class Player:
     def _publish_time(self) -> None:
         if self._time_ns is not None:
             self._node.publish_time(self._time_ns)
+
+
+def _clock_ns(message: Recorded) -> int:
+    return nanoseconds(deserialize_message(message.data, Clock).clock)
 
 
 def _play(

@@ -18,23 +18,13 @@ from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.records import Statistics
 
-from lupin_twin.core import interfaces
+from lupin_twin.core.interfaces import CLOCK, DISCOVERED_TAGS, MAP, OBSERVATIONS
 
 # Of the files' names.
 SUFFIX: Final = ".mcap"
 MESSAGE_ENCODING: Final = "cdr"
-CLOCK_TOPIC: Final = interfaces.CLOCK.name
-CLOCK_TYPE: Final = interfaces.CLOCK.type_name
-OBSERVATION_TYPE: Final = interfaces.OBSERVATIONS.type_name
-TAGS_TYPE: Final = interfaces.DISCOVERED_TAGS.type_name
-MAP_TYPE: Final = interfaces.MAP.type_name
-# What a twin subscribes to, and which of its parameters names the topic.
-INPUTS: Final = {
-    topic.type_name: topic.parameter for topic in interfaces.SUBSCRIBED if topic.parameter
-}
-# CDR: the second byte of the header gives the byte order; then come sec and nanosec.
-_CLOCK: Final = {0: struct.Struct(">iI"), 1: struct.Struct("<iI")}
-_HEADER_BYTES: Final = 4
+# What a twin subscribes to, by type.
+INPUTS: Final = {it.type_name: it for it in (OBSERVATIONS, DISCOVERED_TAGS, MAP)}
 # What reading a damaged file ends in, whichever of the library's layers meets it.
 _DAMAGE: Final = (McapError, ValueError, LookupError, struct.error, RuntimeError, EOFError)
 
@@ -90,7 +80,7 @@ class Recording:
     @property
     def has_clock(self) -> bool:
         """Whether simulated time was recorded: then ROS time is that."""
-        return self.topics.get(CLOCK_TOPIC) == CLOCK_TYPE
+        return self.topics.get(CLOCK.name) == CLOCK.type_name
 
     @property
     def inputs(self) -> dict[str, str]:
@@ -103,14 +93,15 @@ class Recording:
 
         """
         found = {name: kind for name, kind in self.topics.items() if kind in INPUTS}
-        grids = {name for name, kind in found.items() if kind == MAP_TYPE}
+        grids = {name for name, kind in found.items() if kind == MAP.type_name}
         maps = {name for name in grids if name.rpartition("/")[2] == "map"}
         chosen = {k: v for k, v in found.items() if not maps or k not in grids or k in maps}
-        if all(kind == MAP_TYPE for kind in chosen.values()):
+        if all(kind == MAP.type_name for kind in chosen.values()):
             there = ", ".join(f"{name} ({kind})" for name, kind in list(self.topics.items())[:20])
             raise RecordingError(
                 f"{self.name} has nothing that a twin subscribes to: expected a topic of "
-                f"{OBSERVATION_TYPE} or {TAGS_TYPE}, it has {there or 'no topics'}"
+                f"{OBSERVATIONS.type_name} or {DISCOVERED_TAGS.type_name}, "
+                f"it has {there or 'no topics'}"
             )
         return chosen
 
@@ -189,15 +180,6 @@ class Recording:
                     f"{self.topics[channel.topic]}: they are not of one recording"
                 )
         return reader, summary.statistics
-
-
-def clock_ns(data: bytes) -> int | None:
-    """The time of a serialised rosgraph_msgs/Clock, ns; None: it is none."""
-    order = _CLOCK.get(data[1]) if len(data) > 1 else None
-    if order is None or len(data) < _HEADER_BYTES + order.size:
-        return None
-    seconds, nanoseconds = order.unpack_from(data, _HEADER_BYTES)
-    return int(seconds) * 1_000_000_000 + int(nanoseconds)
 
 
 def _files(named: Sequence[Path]) -> list[Path]:

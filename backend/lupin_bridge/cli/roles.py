@@ -116,7 +116,7 @@ def recorded(
     with Recording([Path(file) for file in files]) as recording:
         inputs = recording.inputs
     journal = folder / "journal.sqlite"
-    values = {INPUTS[kind]: json.dumps(name) for name, kind in inputs.items()}
+    values = {INPUTS[kind].parameter: json.dumps(name) for name, kind in inputs.items()}
     values |= {"journal": json.dumps(str(journal)), "use_sim_time": "true"}
     return Feed(
         "player",

@@ -4,11 +4,11 @@
     ...
     close()
 
-`topic` is one of `topics_of(source.names)`, or a `Topic` of one's own. `on_sample(sample)`
-is called on the event loop for each sample, and must not wait. Of a latched topic the newest ones
-come first. One `Topic` is one subscription, however many listen; it ends some seconds after the
-last of them has closed, so that who comes and goes makes no work in the ROS thread. While nobody
-listens there is none.
+`topic` is one of `topics_of(source.names)`, or a `Topic` of one's own, its name from the root on.
+`on_sample(sample)` is called on the event loop for each sample, and must not wait. Of a latched
+topic the newest ones come first. One `Topic` is one subscription, however many listen; it ends some
+seconds after the last of them has closed, so that who comes and goes makes no work in the ROS
+thread. While nobody listens there is none.
 
 The ROS thread hands over bytes and does nothing else with them. Of what the loop has not taken yet,
 as of what is kept for who listens later, the oldest give way to the newest. A sample that is larger
@@ -29,17 +29,15 @@ import sys
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
 
 from lupin_twin.core import interfaces
+from lupin_twin.core.interfaces import Topic
 
 log = logging.getLogger(__name__)
-
-# What is the largest that a twin itself takes in, see `lupin_twin.ros.message_limits`.
-_LARGEST: Final = 64_000_000
 
 
 def absolute(name: str) -> str:
@@ -62,35 +60,15 @@ class TwinNames:
     planters_layer: str = absolute(interfaces.PLANTERS.name)
 
 
-@dataclass(frozen=True, slots=True)
-class Topic:
-    """A topic and how it is to be heard.
-
-    `name` is from the root on, `type_name` such as `lupin_msgs/msg/TwinState`. `latched`: reliable
-    and transient local, so that the last ones come to who is late; otherwise as ROS has it by
-    default. What is held of it are `depth` samples and `max_bytes` in all, at most.
-    """
-
-    name: str
-    type_name: str
-    latched: bool = True
-    depth: int = 1
-    max_bytes: int = _LARGEST
-
-
 def topics_of(names: TwinNames) -> tuple[Topic, ...]:
     """A twin's state, what it listens to, and what it says of itself."""
     return (
-        _received(names.state_topic, interfaces.STATE),
-        _received(names.observations_topic, interfaces.OBSERVATIONS, 8_000_000),
-        _received(names.discovered_tags_topic, interfaces.DISCOVERED_TAGS, 16_000_000),
-        _received(names.map_topic, interfaces.MAP),
-        _received(names.diagnostics_topic, interfaces.DIAGNOSTICS, 4_000_000),
+        replace(interfaces.STATE, name=names.state_topic),
+        replace(interfaces.OBSERVATIONS, name=names.observations_topic),
+        replace(interfaces.DISCOVERED_TAGS, name=names.discovered_tags_topic),
+        replace(interfaces.MAP, name=names.map_topic),
+        replace(interfaces.DIAGNOSTICS, name=names.diagnostics_topic),
     )
-
-
-def _received(name: str, topic: interfaces.Topic, max_bytes: int = _LARGEST) -> Topic:
-    return Topic(name, topic.type_name, topic.is_latched, topic.depth, max_bytes)
 
 
 # How long, s, a topic that nobody listens to any more is still relayed.
@@ -160,7 +138,7 @@ class _Relayed:
         """Give all that has come to all who listen."""
         while self.incoming:
             sample = self.incoming.popleft()
-            if self.topic.latched:
+            if self.topic.is_latched:
                 self.latched.put(sample)
             for on_sample in list(self.listeners):
                 on_sample(sample)

@@ -24,7 +24,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
 from lupin_bridge.feed.past_process import PastProcess
-from lupin_bridge.feed.relay import Relay, RosTime, Sample, Topic, TwinNames
+from lupin_bridge.feed.relay import Relay, RosTime, Sample, TwinNames
 from lupin_bridge.feed.ros_thread import NodeT, RosThread
 from lupin_bridge.feed.source import (
     MAX_AHEAD_NS,
@@ -39,6 +39,7 @@ from lupin_twin.adapt.config import POSES
 from lupin_twin.adapt.messages import message_type
 from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.drops import Drop, Reason
+from lupin_twin.core.interfaces import Topic
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Scan
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.ros import convert, message_limits
@@ -318,7 +319,7 @@ class RelayRos:
                 message_type(topic.type_name),
                 topic.name,
                 hand_over,
-                latched(topic.depth) if topic.latched else QoSProfile(depth=topic.depth),
+                qos_of(topic),
                 raw=True,
             )
         except InvalidTopicNameException as error:

@@ -29,9 +29,11 @@ from typing import Any, Final
 
 import orjson
 
-from lupin_bridge.feed.relay import Sample, Topic, TwinNames, schema_text, topics_of
+from lupin_bridge.feed.relay import Sample, TwinNames, schema_text, topics_of
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_bridge.serving.ws_protocol import members_of, shown
+from lupin_twin.core import interfaces
+from lupin_twin.core.interfaces import Topic
 
 # Of the same content. The newer one is what Foxglove asks for today, the older one what Lichtblick
 # does; a client that offers both gets the first that it names.
@@ -293,9 +295,6 @@ POLL_S: Final = 2.0
 TICK_S: Final = 0.1
 MAX_LAYERS: Final = 64
 
-_POINTS: Final = "sensor_msgs/msg/PointCloud2"
-_MARKERS: Final = "visualization_msgs/msg/MarkerArray"
-
 
 class Offer:
     """What clients may subscribe to; belongs to the event loop.
@@ -351,7 +350,7 @@ class Offer:
             self.has_time = (await self._source.relay.time()).is_simulated
         except TwinUnavailableError:
             published = {}
-        wanted += [Topic(name, kind) for name, kind in sorted(published.items())[:MAX_LAYERS]]
+        wanted += [Topic(kind, "", name) for name, kind in sorted(published.items())[:MAX_LAYERS]]
         known = {channel.topic: channel for channel in self.channels.values()}
         found = [known.get(topic) or await self._channel(topic) for topic in wanted]
         channels = {channel.id: channel for channel in found if channel is not None}
@@ -398,6 +397,7 @@ class Offer:
 
 
 def _is_layer(names: TwinNames, topic: str, type_name: str) -> bool:
-    if type_name == _POINTS:
+    if type_name == interfaces.LAYERS.type_name:
         return topic.startswith(names.field_layers)
-    return type_name == _MARKERS and topic in (names.tags_layer, names.planters_layer)
+    is_markers = type_name == interfaces.TAGS.type_name
+    return is_markers and topic in (names.tags_layer, names.planters_layer)

@@ -19,7 +19,6 @@ from lupin_bridge.feed.relay import (
     NotRelayedError,
     Relay,
     Sample,
-    Topic,
     TwinNames,
     absolute,
     topics_of,
@@ -44,6 +43,7 @@ from lupin_bridge.viewers.rosbridge_protocol import (
     service_response,
     status,
 )
+from lupin_twin.core.interfaces import Topic
 from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)

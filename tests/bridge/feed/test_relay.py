@@ -3,17 +3,20 @@
 import asyncio
 import weakref
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from lupin_bridge.feed.relay import Relay, Sample, Topic, schema_text
+from lupin_bridge.feed.relay import Relay, Sample, schema_text
 from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_twin.core import interfaces
+from lupin_twin.core.interfaces import Topic
 from tests.support.waiting import until
 
-STATE = Topic("/twin/state", "lupin_msgs/msg/TwinState", depth=2, max_bytes=10)
-LIVE = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", latched=False, max_bytes=10)
+STATE = replace(interfaces.STATE, name="/twin/state", depth=2, max_bytes=10)
+LIVE = replace(interfaces.DIAGNOSTICS, depth=1, max_bytes=10)
 
 
 class Ros:

@@ -12,9 +12,10 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
 
 from lupin_bridge.feed.local import LocalTwin
-from lupin_bridge.feed.relay import NotRelayedError, Relay, Sample, Topic, topics_of
+from lupin_bridge.feed.relay import NotRelayedError, Relay, Sample, topics_of
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.feed.web import WebTwin
+from lupin_twin.core.interfaces import Topic
 from lupin_twin.ros import convert
 from lupin_twin.runtime.estimates import ReportRequest
 from tests.support.inprocess import started
@@ -119,8 +120,8 @@ async def test_a_twins_topics_come_as_they_are_on_the_wire(
         now = await relay.time()
         assert (now.is_simulated, abs(now.now_ns - came_ns) < 60e9) == (False, True)
         for topic, said in (
-            (Topic("/a", "sensor_smsgs/msg/A"), "is not installed here"),
-            (Topic("/a b", "lupin_msgs/msg/TwinState"), "topic name"),
+            (Topic("sensor_smsgs/msg/A", "", "/a"), "is not installed here"),
+            (Topic("lupin_msgs/msg/TwinState", "", "/a b"), "topic name"),
         ):
             for _ in range(2):
                 with pytest.raises(NotRelayedError, match=f"{topic.name} cannot be .*{said}"):

@@ -25,7 +25,7 @@ def subscribing(offer: Any, *topics: str) -> bytes:
     return masked(TEXT, json.dumps({"op": "subscribe", "subscriptions": entries}).encode())
 
 
-def refuse(_: int) -> NoReturn:
+def refuse(_: object) -> NoReturn:
     raise ValueError("no subscription to it")
 
 
@@ -37,7 +37,7 @@ async def topics_are_heard_while_they_are_wanted(here: Any) -> None:
     await until(lambda: len(hub) == 1, "one more")
     got = b""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ros_source, "latched", refuse)
+        patch.setattr(ros_source, "qos_of", refuse)
         writer.write(subscribing(offer, "/map"))
         while b"cannot be served now" not in got:
             got += await reader.read(1 << 20)

@@ -34,7 +34,7 @@ class Service:
 
     def __post_init__(self) -> None:
         """The name that the parameter has by default."""
-        if self.parameter:
+        if not self.name:
             object.__setattr__(self, "name", getattr(_DEFAULTS, self.parameter))
 
 
@@ -42,12 +42,14 @@ class Service:
 class Topic(Service):
     """A topic and its QoS; `type_name` such as `lupin_msgs/msg/TwinState`.
 
-    `is_latched`: TRANSIENT_LOCAL, so that a late subscriber gets the last `depth` messages.
+    `is_latched`: TRANSIENT_LOCAL, so that a late subscriber gets the last `depth` messages. The
+    bridge holds so many of them too, and `max_bytes` in all at most.
     """
 
     depth: int = 1
     is_latched: bool = True
     is_reliable: bool = True
+    max_bytes: int = 64_000_000  # the largest that a twin itself takes in, see `message_limits`
 
 
 # Below it each layer's name is made of its sensor's, see `layers.topic_of`.
@@ -58,12 +60,14 @@ OBSERVATIONS: Final = Topic(
     "one scan, one inspection of flowers, or one failed attempt",
     parameter="observations_topic",
     depth=50,
+    max_bytes=8_000_000,
 )
 DISCOVERED_TAGS: Final = Topic(
     "lupin_msgs/msg/DiscoveredTags",
     "tags that perception has seen, and their places",
     parameter="discovered_tags_topic",
     depth=50,
+    max_bytes=16_000_000,
 )
 MAP: Final = Topic(
     "nav_msgs/msg/OccupancyGrid", "the floor as SLAM knows it", parameter="map_topic"
@@ -119,6 +123,7 @@ DIAGNOSTICS: Final = Topic(
     "/diagnostics",
     depth=10,
     is_latched=False,
+    max_bytes=4_000_000,
 )
 PUBLISHED: Final = (STATE, TIMES, LAYERS, TAGS, PLANTERS, DIAGNOSTICS)
 

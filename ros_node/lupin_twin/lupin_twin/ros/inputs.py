@@ -126,7 +126,7 @@ class Input:
         for one in unlike:
             why, remedies = zip(*_faults(one), strict=True)
             yield (
-                f"{_name(one)} publishes {self.topic} with another QoS than the contract's: "
+                f"{name_of(one)} publishes {self.topic} with another QoS than the contract's: "
                 f"{', '.join(why)}; use {' and '.join(remedies)}"
             )
         if publishers and has_settled and not self._has_received:
@@ -169,7 +169,8 @@ def _id(publisher: Any) -> bytes:
     return bytes(publisher.endpoint_gid)
 
 
-def _name(publisher: Any) -> str:
+def name_of(publisher: Any) -> str:
+    """What a publisher's node is called, for a person to read."""
     if publisher.node_name == _NO_NAME:
         return "somebody"
     return f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"

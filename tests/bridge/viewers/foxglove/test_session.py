@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.feed.relay import Sample, Topic
+from lupin_bridge.feed.relay import Sample
 from lupin_bridge.viewers.foxglove import (
     MAX_MESSAGE_BYTES,
     MAX_SUBSCRIPTIONS,
@@ -14,8 +14,9 @@ from lupin_bridge.viewers.foxglove import (
     Reaction,
     Session,
 )
+from lupin_twin.core.interfaces import Topic
 
-CHANNELS = {n: Channel(n, Topic(f"/topic{n}", "a/msg/B"), "int32 x\n") for n in range(1, 201)}
+CHANNELS = {n: Channel(n, Topic("a/msg/B", "", f"/topic{n}"), "int32 x\n") for n in range(1, 201)}
 
 
 class Stage:
@@ -115,7 +116,7 @@ def test_channels_that_come_and_go_are_told_and_their_subscriptions_end(stage: S
     stage.subscribe((1, 10), (2, 20))
     stage.session.put(1, Sample(b"a", 5))
     now = {n: channel for n, channel in CHANNELS.items() if n != 10}
-    now[300] = Channel(300, Topic("/new", "a/msg/B"), "")
+    now[300] = Channel(300, Topic("a/msg/B", "", "/new"), "")
     reaction = stage.session.offer(now)
     gone, new = map(json.loads, reaction.replies)
     assert gone == {"op": "unadvertise", "channelIds": [10]}

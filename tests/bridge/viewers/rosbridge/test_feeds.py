@@ -8,14 +8,15 @@ from typing import Any
 import orjson
 import pytest
 
-from lupin_bridge.feed.relay import NotRelayedError, Sample, Topic
+from lupin_bridge.feed.relay import NotRelayedError, Sample
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.viewers import rosbridge_session as feeds
 from lupin_bridge.viewers.rosbridge_session import Feed, Feeds, Writer
+from lupin_twin.core.interfaces import Topic
 from lupin_twin.runtime.workers import Workers
 from tests.support.waiting import until
 
-INPUT = Topic("/in", "a/msg/B", depth=3)
+INPUT = Topic("a/msg/B", "", "/in", depth=3)
 
 
 class Relay:

@@ -43,7 +43,6 @@ from lupin_bridge.viewers.foxglove import (
     Channel,
     Reaction,
     Session,
-    chosen,
     server_info,
     status,
 )
@@ -125,6 +124,8 @@ class _Conversation:
 
     async def run(self) -> None:
         """Until the client has gone."""
+        if not await has_place(self._websocket, self._bridge.hub):
+            return
         self._connection.on_writable = self._on_writable
         self._bridge.join(self._client)
         try:
@@ -168,13 +169,12 @@ class _Conversation:
 async def foxglove(websocket: WebSocket) -> None:
     """The read-only part of Foxglove's WebSocket protocol."""
     bridge: Bridge = websocket.app.state.bridge
-    subprotocol = chosen(websocket.scope["subprotocols"])
+    offered = websocket.scope["subprotocols"]
+    subprotocol = next((name for name in offered if name in SUBPROTOCOLS), None)
     if subprotocol is None:
         await websocket.send_denial_response(error_response(_WRONG_SUBPROTOCOL, 400))
         return
     await websocket.accept(subprotocol=subprotocol)
-    if not await has_place(websocket, bridge.hub):
-        return
     await _FoxgloveConversation(websocket, bridge).run()
 
 
@@ -195,7 +195,7 @@ class _FoxgloveConversation(_Conversation):
         await self._offer.look()
         info = server_info(self._offer.session_id, has_time=self._offer.has_time)
         await self._send(info)
-        with self._offer.followed(self._on_news):
+        async with self._offer.followed(self._on_news):
             self._on_news(None)
             await self._receive_all()
 
@@ -285,8 +285,6 @@ async def rosbridge(websocket: WebSocket) -> None:
     """The read-only part of the rosbridge v2 protocol."""
     bridge: Bridge = websocket.app.state.bridge
     await websocket.accept()
-    if not await has_place(websocket, bridge.hub):
-        return
     await _RosbridgeConversation(websocket, bridge).run()
 
 

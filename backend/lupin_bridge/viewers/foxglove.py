@@ -20,8 +20,8 @@ import asyncio
 import logging
 import struct
 import uuid
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
@@ -30,6 +30,7 @@ from typing import Any, Final
 import orjson
 
 from lupin_bridge.feed.relay import Sample, TwinNames, schema_text, topics_of
+from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_bridge.serving.ws_protocol import members_of, shown
 from lupin_twin.core import interfaces
@@ -58,11 +59,6 @@ class Channel:
     id: int
     topic: Topic
     schema: str
-
-
-def chosen(offered: Iterable[str]) -> str | None:
-    """The first of the subprotocols that a client offers that is served here."""
-    return next((name for name in offered if name in SUBPROTOCOLS), None)
 
 
 # --- incoming ---------------------------------------------------------------------------------
@@ -312,29 +308,32 @@ class Offer:
         self._ids = count(1)
         self._missing: set[str] = set()
         self._followers: dict[Callable[[int | None], None], None] = {}
-        self._following: asyncio.Task[None] | None = None
+        self._following: tuple[Periodic, ...] = ()
         self._looking: asyncio.Task[None] | None = None
 
-    @contextmanager
-    def followed(self, on_news: Callable[[int | None], None]) -> Iterator[None]:
+    @asynccontextmanager
+    async def followed(self, on_news: Callable[[int | None], None]) -> AsyncIterator[None]:
         """Have `on_news` called when channels come or go (None), or time does (ROS time, ns).
 
         Of time that stands, at once: the others have it, and it may never go on.
         """
         self._followers[on_news] = None
-        if self._following is not None:
-            if self._sent_ns is not None:
-                on_news(self._sent_ns)
-        else:
+        if len(self._followers) == 1:
             self._sent_ns = None
-            self._following = asyncio.create_task(self._follow(), name="foxglove")
+            self._following = (
+                Periodic(self.look, POLL_S, "foxglove's layers"),
+                Periodic(self._send_time, TICK_S, "foxglove's time"),
+            )
+            for each in self._following:
+                each.start()
+        elif self._sent_ns is not None:
+            on_news(self._sent_ns)
         try:
             yield
         finally:
             del self._followers[on_news]
             if not self._followers:
-                self._following.cancel()
-                self._following = None
+                await asyncio.gather(*(each.stop() for each in self._following))
 
     async def look(self) -> None:
         """Bring the channels up to date; concurrent callers share one look."""
@@ -369,24 +368,13 @@ class Offer:
             return None
         return Channel(next(self._ids), topic, text)
 
-    async def _follow(self) -> None:
-        loop = asyncio.get_running_loop()
-        poll_s = loop.time() + POLL_S
-        while True:
-            await asyncio.sleep(TICK_S if self.has_time else POLL_S)
-            try:
-                if self.has_time:
-                    await self._send_time()
-                if loop.time() >= poll_s:
-                    poll_s = loop.time() + POLL_S
-                    await self.look()
-            except TwinUnavailableError:
-                continue
-            except Exception:  # nobody awaits this task: the next look comes whatever it was
-                log.exception("looking for layers met an error and goes on")
-
     async def _send_time(self) -> None:
-        now_ns = (await self._source.relay.time()).now_ns
+        if not self.has_time:
+            return
+        try:
+            now_ns = (await self._source.relay.time()).now_ns
+        except TwinUnavailableError:  # its thread has ended, which others tell
+            return
         if now_ns not in (0, self._sent_ns):  # 0: there is no time yet
             self._sent_ns = now_ns
             self._notify(now_ns)

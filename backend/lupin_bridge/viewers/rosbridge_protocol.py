@@ -184,10 +184,13 @@ def json_of(message: Any) -> bytes:
     """The message in JSON.
 
     Raises:
-        TypeError: a text that is no Unicode.
+        ValueError: a text that is no Unicode.
 
     """
-    return orjson.dumps(_message(message))
+    try:
+        return orjson.dumps(_message(message))
+    except TypeError as error:
+        raise ValueError(str(error)) from error
 
 
 def _array(values: Any) -> orjson.Fragment:

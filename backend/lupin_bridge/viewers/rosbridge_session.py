@@ -203,21 +203,16 @@ class Writer:
             ValueError: it is none of its type, or too large.
 
         """
-        return await self._writing.get((feed.name, id(sample)), lambda: self._write(feed, sample))
 
-    async def _write(self, feed: Feed, sample: Sample) -> bytes:
-        cost_s = len(sample.data) * _WRITE_S
-        return await asyncio.wrap_future(
-            self._workers.submit(lambda _: _written(self.relay, feed, sample), cost_s)
-        )
+        def written(_: object) -> bytes:
+            message = json_of(self.relay.read(feed.topic, sample))
+            return text_frame(publish(feed.name, message))
 
+        async def write() -> bytes:
+            cost_s = len(sample.data) * _WRITE_S
+            return await asyncio.wrap_future(self._workers.submit(written, cost_s))
 
-def _written(relay: Relay, feed: Feed, sample: Sample) -> bytes:
-    message = relay.read(feed.topic, sample)
-    try:
-        return text_frame(publish(feed.name, json_of(message)))
-    except TypeError as error:
-        raise ValueError(str(error)) from error
+        return await self._writing.get((feed.name, id(sample)), write)
 
 
 class Feeds:

@@ -113,7 +113,7 @@ async def test_looking_goes_on_after_an_error(
     source = Source()
     source.fault = RuntimeError("a fault")
     offer = offer_of(source)
-    with offer.followed(lambda _: None):
+    async with offer.followed(lambda _: None):
         await until(lambda: "met an error and goes on" in caplog.text, "the error")
         source.fault = None
         await until(lambda: offer.channels, "the topics")
@@ -149,7 +149,7 @@ async def test_followers_are_told_of_news_alone_and_an_id_never_comes_back(
     offer = offer_of(source)
     await offer.look()
     news: list[int | None] = []
-    with offer.followed(news.append):
+    async with offer.followed(news.append):
         looks = source.looks
         await until(lambda: source.looks > looks + 2, "some looks")
         assert news == []
@@ -167,7 +167,7 @@ async def test_followers_are_told_of_news_alone_and_an_id_never_comes_back(
         await until(lambda: source.looks > looks + 2, "some looks")
         assert news[2:] == [7], "time that stands is told once"
         late: list[int | None] = []
-        with offer.followed(late.append):
+        async with offer.followed(late.append):
             assert late == [7], "and once to whoever comes meanwhile"
 
     def following() -> list[str]:
@@ -176,7 +176,7 @@ async def test_followers_are_told_of_news_alone_and_an_id_never_comes_back(
 
     await until(lambda: not following(), "an end of looking: nobody follows")
     next_one: list[int | None] = []
-    with offer.followed(next_one.append):
+    async with offer.followed(next_one.append):
         await until(lambda: next_one == [7], "the time that still stands")
 
 
@@ -190,7 +190,7 @@ async def test_a_layer_and_each_moment_are_told_as_they_come(
     offer = offer_of(source)
     await offer.look()
     news: list[int | None] = []
-    with offer.followed(news.append):
+    async with offer.followed(news.append):
         source.now_published["/n/twin/field/a"] = POINTS
         await until(lambda: news == [None], "the layer")
         source.now = RosTime(7, is_simulated=True)

@@ -71,5 +71,5 @@ def test_a_list_of_any_length_is_whole(monkeypatch: pytest.MonkeyPatch, length: 
 
 def test_a_text_that_is_no_unicode_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(Everything.FIELDS, "text", ("string", "\udcff"))
-    with pytest.raises(TypeError):
+    with pytest.raises(ValueError, match="UTF-8"):
         json_of(Everything())

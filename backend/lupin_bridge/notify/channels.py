@@ -181,38 +181,36 @@ class Channels:
     ) -> None:
         self._targets, self._folder = targets or Targets(), folder
         self.push = push
-        self._mqtt: Mqtt | None = None
-        self._webhook: Webhook | None = None
+        self._running: list[Mqtt | Webhook | Push] = []
         self._reports: list[DailyReport] = []
 
     def start(self, source: Source, sensors: Sensors) -> None:
         """Begin to notify."""
         targets = self._targets
-        if targets.mqtt is None and targets.webhook is None and self.push is None:
-            return
-        asyncio.get_running_loop().set_default_executor(
-            DetachedThreads(thread_name_prefix="notify")
-        )
+        reporting: list[Mqtt | Webhook] = []
         if targets.mqtt is not None:
-            self._mqtt = Mqtt(targets.mqtt, Mirror(targets.mqtt.topics, sensors))
-            self._mqtt.start(source.seen)
+            reporting.append(Mqtt(targets.mqtt, Mirror(targets.mqtt.topics, sensors)))
         if targets.webhook is not None:
-            self._webhook = Webhook(targets.webhook)
-            self._webhook.start(source)
+            reporting.append(Webhook(targets.webhook))
+        self._running += reporting
         if self.push is not None:
-            self.push.start(source)
+            self._running.append(self.push)
+        if self._running:
+            asyncio.get_running_loop().set_default_executor(
+                DetachedThreads(thread_name_prefix="notify")
+            )
+        for channel in self._running:
+            channel.start(source)
         if targets.report_at is not None:
             daily = DailyTarget(targets.report_at, source.criteria.clock.zone, self._folder)
-            self._reports = [
-                DailyReport(daily, it, source) for it in (self._mqtt, self._webhook) if it
-            ]
+            self._reports = [DailyReport(daily, it, source) for it in reporting]
         for report in self._reports:
             report.start()
 
     def on_alarms(self, change: Change) -> None:
         """Alarms have changed: those that notify of each change do."""
-        for channel in (self._webhook, self.push):
-            if channel is not None:
+        for channel in self._running:
+            if not isinstance(channel, Mqtt):
                 channel.on_alarms(change)
 
     async def stop(self) -> None:
@@ -231,7 +229,3 @@ class Channels:
         yield "lupin_outward_sent", {k: it.sent for k, it in conditions.items()}
         yield "lupin_outward_failed", {k: it.failed for k, it in conditions.items()}
         yield "lupin_outward_dropped", {k: it.dropped for k, it in conditions.items()}
-
-    @property
-    def _running(self) -> tuple[Mqtt | Webhook | Push, ...]:
-        return tuple(it for it in (self._mqtt, self._webhook, self.push) if it is not None)

@@ -36,6 +36,7 @@ from lupin_bridge.notify.messages import (
     Backoff,
     Condition,
     GreenhouseState,
+    Source,
     Topics,
     alarms_payload,
     expire_after_s,
@@ -240,7 +241,7 @@ AT_LEAST_ONCE: Final = 1
 
 
 class Mqtt:
-    """Belongs to the event loop; `look` returns the state of now."""
+    """Belongs to the event loop."""
 
     name: Final = "mqtt"
 
@@ -258,9 +259,9 @@ class Mqtt:
         self._seen_s = 0.0
         self._look: Callable[[], GreenhouseState] = GreenhouseState
 
-    def start(self, look: Callable[[], GreenhouseState]) -> None:
+    def start(self, source: Source) -> None:
         """Publish from now on."""
-        self._look = look
+        self._look = source.seen
         self._see()
         self._count()
         self._task = asyncio.create_task(self._run(), name="mqtt")

@@ -16,6 +16,7 @@ from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify import channels, mqtt, webhook
 from lupin_bridge.notify.channels import MOST_DAYS, DailyReport, DailyTarget
 from lupin_bridge.notify.destinations import Targets
+from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.notify.mqtt import Mirror, Mqtt
 from lupin_bridge.notify.webhook import MAX_REFUSALS, Webhook
 from lupin_bridge.past.plans import Answered
@@ -54,6 +55,9 @@ class House:
     @property
     def source(self) -> Any:
         return self
+
+    def seen(self) -> GreenhouseState:
+        return seen(tag("a", temperature=20.0))
 
     def journal(self) -> Condition:
         self.looks += 1
@@ -295,8 +299,8 @@ async def test_a_broker_gets_it_once_it_is_there_and_keeps_it(tmp_path: Path) ->
     assert target is not None
     house = House(ns("2026-05-01T07:00Z"))
     channel = Mqtt(target, Mirror(target.topics, SENSORS))
-    channel.start(lambda: seen(tag("a", temperature=20.0)))
     of: Any = house
+    channel.start(of)
     report = DailyReport(DailyTarget(SIX, UTC, tmp_path), channel, of)
     report.start()
     try:

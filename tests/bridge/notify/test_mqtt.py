@@ -30,7 +30,7 @@ class House:
         self.now = seen(tag("a", temperature=20.0))
         self._number = 0
 
-    def look(self) -> GreenhouseState:
+    def seen(self) -> GreenhouseState:
         return self.now
 
     def scan(self) -> float:
@@ -57,7 +57,7 @@ async def telling(
         patch.setattr(mqtt, "FIRST_WAIT_S", 0.001)
         patch.setattr(mqtt, "ANSWER_S", answer_s)
         channel = Mqtt(target, Mirror(target.topics, SENSORS))
-        channel.start(house.look)
+        channel.start(house)  # type: ignore[arg-type]  # what it needs of one
         try:
             yield channel
         finally:

@@ -118,14 +118,6 @@ EXPORTS: Final = 4
 STRETCH_BYTES: Final = 500_000
 SLOW_STRETCH_S: Final = 5.0
 
-# Why something was refused, as it is counted.
-IN_FLIGHT: Final = "client_in_flight"
-RATE: Final = "client_rate"
-LARGE: Final = "large_in_flight"
-TOTAL: Final = "total_in_flight"
-CLIENT_EXPORTS: Final = "client_exports"
-ALL_EXPORTS: Final = "total_exports"
-
 
 class AdmissionError(RuntimeError):
     """One request too many; the message names the limit."""
@@ -170,6 +162,7 @@ class Admission:
     """The requests in flight. Belongs to the event loop."""
 
     def __init__(self, limits: Limits) -> None:
+        # By why, as it is counted.
         self.refused: Counter[str] = Counter()
         self._limits = limits
         self._rate = RateLimit(limits.answers_per_s, limits.answers_per_s * BURST_S)
@@ -193,7 +186,7 @@ class Admission:
 
         """
         if self.in_flight[client] >= self._limits.concurrency:
-            self.refused[IN_FLIGHT] += 1
+            self.refused["client_in_flight"] += 1
             raise ClientLimitError(
                 f"{client} has {self._limits.concurrency} requests for computed answers in "
                 "flight, the limit",
@@ -201,7 +194,7 @@ class Admission:
             )
         wait_s = self._rate.take(client, now_s)
         if wait_s > 0.0:
-            self.refused[RATE] += 1
+            self.refused["client_rate"] += 1
             raise ClientLimitError(
                 f"{client} requests more than {self._limits.answers_per_s:g} computed answers a "
                 "second, the limit",
@@ -230,12 +223,12 @@ class Admission:
 
         """
         if client in self._exports:
-            self.refused[CLIENT_EXPORTS] += 1
+            self.refused["client_exports"] += 1
             raise ClientLimitError(f"{client} has 1 export under way, the limit", 5.0)
         if len(self._exports) >= EXPORTS:
             slowest = min(self._exports, key=lambda other: self._exports[other].since_s)
             if now_s - self._exports[slowest].since_s < SLOW_STRETCH_S:
-                self.refused[ALL_EXPORTS] += 1
+                self.refused["total_exports"] += 1
                 raise BusyError(f"{EXPORTS} exports are under way, the limit", 5.0)
             self._exports.pop(slowest).end()
         export = self._exports[client] = Export(now_s, end)
@@ -256,10 +249,10 @@ class Admission:
 
         """
         if self._computing.is_full_for(client):
-            self.refused[TOTAL] += 1
+            self.refused["total_in_flight"] += 1
             raise BusyError(self._computing.why_not(client, "answers"), 1.0)
         if is_large and self._large.is_full_for(client):
-            self.refused[LARGE] += 1
+            self.refused["large_in_flight"] += 1
             raise BusyError(self._large.why_not(client, "large answers"), 1.0)
         taken = (self._computing, self._large) if is_large else (self._computing,)
         for places in taken:

@@ -165,8 +165,6 @@ def room_for_connections() -> int:
     """How many connections this process's limit on open files leaves room for."""
     limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     if limit == resource.RLIM_INFINITY:
-        limit = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
-    if limit == resource.RLIM_INFINITY:
         return 1 << 20
     return max(MIN_CONNECTIONS, limit - len(list(Path("/proc/self/fd").iterdir())) - SPARE_FILES)
 

@@ -382,12 +382,6 @@ class Supervisor:
             self._notify("WATCHDOG=1" if wrong is None else f"STATUS={wrong}")
             await asyncio.sleep(self.watchdog_s / _MESSAGES_A_TIMEOUT)
 
-    def close(self) -> None:
-        """Notify no more."""
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
-
     def _notify(self, words: str) -> None:
         if self._socket is None:
             return

@@ -10,13 +10,8 @@ import pytest
 
 from lupin_bridge.routes import answers as answers_of
 from lupin_bridge.serving.admission import (
-    ALL_EXPORTS,
     BURST_S,
-    CLIENT_EXPORTS,
     EXPORTS,
-    IN_FLIGHT,
-    LARGE,
-    TOTAL,
     Admission,
     BusyError,
     ClientLimitError,
@@ -77,7 +72,7 @@ def test_the_slowest_export_makes_place_and_who_takes_enough_does_not() -> None:
             begin("f", 100.0)
         with pytest.raises(ClientLimitError):
             begin("c", 100.0)
-        assert admission.refused == {CLIENT_EXPORTS: 1, ALL_EXPORTS: 1}
+        assert admission.refused == {"client_exports": 1, "total_exports": 1}
         assert admission.exporting == EXPORTS
         begin("f", 105.0)
         assert len(ended) == 2
@@ -137,7 +132,7 @@ def test_of_six_clients_that_ask_for_all_they_may_each_has_a_place(is_large: boo
                     taken.enter_context(admission.computing(client, is_large=is_large))
                     places[client] += 1
         assert places["a"] == limits.concurrency, "who is alone has all that he may have"
-        assert admission.refused.keys() == {LARGE if is_large else TOTAL}
+        assert admission.refused.keys() == {"large_in_flight" if is_large else "total_in_flight"}
         assert min(places[client] for client in "abcdef") >= 1
     assert admission.being_computed == 0
 
@@ -207,7 +202,7 @@ async def test_with_all_places_taken_it_is_503_until_one_is_free(domain: int) ->
             for client in "ab":
                 taken.enter_context(it.bridge.admission.computing(client))
             busy = await it.http.get("/api/field" + QUERY)
-            assert it.bridge.admission.refused == {TOTAL: 1}
+            assert it.bridge.admission.refused == {"total_in_flight": 1}
             assert busy.status_code == 503
             assert (busy.headers["retry-after"], busy.headers["vary"]) == ("1", "Accept")
             assert "the limit is 2" in busy.json()["detail"]
@@ -237,7 +232,7 @@ async def test_a_place_is_held_until_there_is_an_answer_and_then_given_back(
         time_is_up.set()
         answers = await asyncio.gather(*asked)
         assert sorted(answer.status_code for answer in answers) == [429] * 5 + [504] * 3
-        assert it.bridge.admission.refused == {IN_FLIGHT: 5}
+        assert it.bridge.admission.refused == {"client_in_flight": 5}
         assert not it.bridge.admission.in_flight
 
 

@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from fastapi import APIRouter, Request, Response
+from starlette.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 
 from lupin_bridge.access.middleware import client_of
@@ -202,14 +203,13 @@ async def _written(of: Exporting, kind: Format, write: Callable[[], ResultT]) ->
     return await asyncio.wrap_future(of.workers.submit(lambda _: write(), _WRITE_S))
 
 
-class ExportResponse(Response):
+class ExportResponse(StreamingResponse):
     """Parts, each sent when the socket has taken the one before; in the end `release` is called."""
 
     def __init__(
         self, parts: Lots, release: Callable[[], None], headers: dict[str, str], media_type: str
     ) -> None:
-        super().__init__(headers=headers, media_type=media_type)
-        del self.headers["content-length"]
+        super().__init__(parts, headers=headers, media_type=media_type)
         self._parts = parts
         self._release = release
 
@@ -217,7 +217,7 @@ class ExportResponse(Response):
         """Send it; where that fails, break the connection: a part must not pass for the whole."""
         request = Request(scope, receive)
         try:
-            await while_client_waits(request, self._send_all(send))
+            await while_client_waits(request, self.stream_response(send))
         except Exception as error:
             log.warning("an export ended before its end: %s", error, exc_info=True)
             connection: HttpConnection = scope["state"][CONNECTION_KEY]
@@ -226,11 +226,3 @@ class ExportResponse(Response):
         finally:
             self._release()
             await self._parts.aclose()
-
-    async def _send_all(self, send: Send) -> None:
-        start = {"type": "http.response.start", "status": 200, "headers": self.raw_headers}
-        await send(start)
-        async for part in self._parts:
-            if part:
-                await send({"type": "http.response.body", "body": part, "more_body": True})
-        await send({"type": "http.response.body"})

@@ -263,7 +263,7 @@ async def quality(request: Request) -> Response:
     """
 
     async def body(bridge: Bridge, query: QualityQuery) -> bytes:
-        names = [query.sensor_type] if query.sensor_type else _sensors(bridge)
+        names = [query.sensor_type] if query.sensor_type else sensors_of(newest_of(bridge))
         reports = {name: await bridge.source.estimate_report(ReportRequest(name)) for name in names}
         return followers.qualities(reports)
 
@@ -318,7 +318,3 @@ async def _report(request: Request, kind: type[QueryT], body: Body[QueryT]) -> R
             return json_answer(await body(bridge, query))
 
     return await respond(request, query, compute)
-
-
-def _sensors(bridge: Bridge) -> list[str]:
-    return sensors_of(newest_of(bridge))

@@ -23,7 +23,6 @@ from lupin_bridge.stream.schema import Contract, Time
 from lupin_bridge.stream.state_json import moment, stamp
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
-from lupin_twin.estimate.engine import Tally
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import in_turns
@@ -143,8 +142,7 @@ def tags(sensor_type: str, report: Report) -> bytes:
 
 def advice(sensor_type: str, report: Report) -> bytes:
     """`Advice`."""
-    places = [{"x": one.x, "y": one.y, "error_ratio": one.error_ratio} for one in report.places]
-    return orjson.dumps({"sensor_type": sensor_type, "places": places})
+    return orjson.dumps({"sensor_type": sensor_type, "places": report.places})
 
 
 def _quality(report: Report) -> dict[str, Any]:
@@ -153,16 +151,12 @@ def _quality(report: Report) -> dict[str, Any]:
         "fitted_at": moment(report.fitted_at_ns),
         "fit_problem": report.fit_problem,
         "graded_since": moment(record.since_ns),
-        "day": _graded(record.day),
-        "week": _graded(record.week),
+        "day": record.day,
+        "week": record.week,
         "share_day": record.day.share,
         "share_week": record.week.share,
         "is_trusted": record.is_trusted,
     }
-
-
-def _graded(tally: Tally) -> dict[str, int]:
-    return {"scans": tally.scans, "inside": tally.inside}
 
 
 # --- every sensor's report, every few seconds -----------------------------------------------------

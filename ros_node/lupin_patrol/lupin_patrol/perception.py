@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import ceil, cos, dist, radians
 from random import Random
@@ -150,43 +149,23 @@ SECONDS_PER_DAY = 86_400.0
 _TO_CONTRACT_UNIT = {"soil_moisture": 100.0}
 
 
-class Climate:
-    """The climate of one greenhouse, anywhere on its floor and at any time of day."""
+def read(
+    registry: Any, sensors: Sequence[str], position: Point, time_of_day_s: float, chance: Random
+) -> tuple[Reading, ...]:
+    """Read sensors at a place (m, map) and time (s since midnight), noise from `chance` included.
 
-    def __init__(self, simulator: Any) -> None:
-        self._registry = simulator.sensor_registry
-
-    def read(
-        self,
-        sensors: Sequence[str],
-        position: Point,
-        time_of_day_s: float,
-        chance: random.Random,
-    ) -> tuple[Reading, ...]:
-        """Read sensors at a place (m, map) and time (s since midnight), noise included."""
-        with _as_global_random(chance):
-            return tuple(
-                Reading(name, value_of(self._registry, name, position, time_of_day_s))
-                for name in sensors
-            )
+    The simulator draws from the process's own stream, which goes on from there.
+    """
+    random.setstate(chance.getstate())
+    return tuple(
+        Reading(name, value_of(registry, name, position, time_of_day_s)) for name in sensors
+    )
 
 
 def value_of(registry: Any, sensor: str, position: Point, time_of_day_s: float) -> float:
     """A sensor's value at a place (m, map) and time (s since midnight), in the contract's unit."""
     value = registry.get_sensor(sensor).retrieve_data(position, time_of_day_s % SECONDS_PER_DAY)
     return float(value) * _TO_CONTRACT_UNIT.get(sensor, 1.0)
-
-
-@contextmanager
-def _as_global_random(chance: random.Random) -> Iterator[None]:
-    """Let the simulator, which draws from the process's global stream, draw from `chance`."""
-    outer = random.getstate()
-    random.setstate(chance.getstate())
-    try:
-        yield
-    finally:
-        chance.setstate(random.getstate())
-        random.setstate(outer)
 
 
 TAG_RANGE_M = 1.2

@@ -232,15 +232,11 @@ ClockState = Literal["running", "paused", "stopped", "none", "doubted"]
 
 @value
 class Snapshot:
-    """Every tag at one moment, in the order in which the tags were first seen.
-
-    Without `has_times`, only each tag's last observation has a known time.
-    """
+    """Every tag at one moment, in the order in which the tags were first seen."""
 
     stamp_ns: int
     frame_id: str
     tags: tuple[TagState, ...]
-    has_times: bool = True
     clock: ClockState = "running"
 
     @property

@@ -32,7 +32,7 @@ from lupin_patrol.perception import (
     Plants,
     Sighting,
     TagDetector,
-    read,
+    readings_at,
     stream,
 )
 from lupin_twin.core.state import Inspection, Pin, Pose, Reading, Scan, Write
@@ -234,7 +234,7 @@ class Mission:
             # The first pass builds the map and so defines where the tags are: it is exact. The
             # later ones localise themselves in it.
             pose = _locate(tag, 0.0 if pass_index == self._first_pass else 1.0, chance)
-            readings = read(self._sensors, tag.sensors, tag.position, time_of_day_s, chance)
+            readings = readings_at(self._sensors, tag.sensors, tag.position, time_of_day_s, chance)
         scan = Scan(tag.tag_id, 0, readings, pose, status, _DETAILS[status])
         yield Visited(self._now_s, pass_index, time_of_day_s, scan)
         if pose is not None:

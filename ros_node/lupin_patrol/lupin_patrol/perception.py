@@ -53,24 +53,16 @@ class Plants:
     def __init__(self, greenhouse: Greenhouse, seed: int, first_pass: int = 0) -> None:
         self._seed = seed
         self._first_pass = first_pass
-        self._tag_ids = [tag.tag_id for tag in greenhouse.tags]
-        self._boxes = {
-            tag.tag_id: tuple((x, y, 0.0) for x, y in tag.table.rect.corners)
-            for tag in greenhouse.tags
-        }
-        self._blooms: dict[str, list[Bloom]] = {tag_id: [] for tag_id in self._tag_ids}
-        self._species: dict[str, str] = {}
+        self._tags = {tag.tag_id: tag for tag in greenhouse.tags}
+        self._blooms: dict[str, list[Bloom]] = {tag_id: [] for tag_id in self._tags}
         for table in greenhouse.tables:
             tags = [tag for tag in greenhouse.tags if tag.table == table]
-            species = stream(seed, "species", table.name).choice(SPECIES)
-            for tag in tags:
-                self._species[tag.tag_id] = species
-            for bloom in _grow(table, species, seed) if tags else ():
+            for bloom in _grow(table, self.species(tags[0].tag_id), seed) if tags else ():
                 self._blooms[_nearest(tags, (bloom.x, bloom.y)).tag_id].append(bloom)
 
     def species(self, tag_id: str) -> str:
         """Return what grows at a tag."""
-        return self._species[tag_id]
+        return stream(self._seed, "species", self._tags[tag_id].table.name).choice(SPECIES)
 
     def bugs(self, tag_id: str, pass_index: int) -> int:
         """How many pests sit at a tag during one pass; 0: none.
@@ -84,7 +76,7 @@ class Plants:
         ):
             chance = stream(self._seed, "outbreak", start)
             breaks_out = chance.random() < _OUTBREAK or start == self._first_pass
-            where = chance.choice(self._tag_ids)
+            where = chance.choice(list(self._tags))
             passes = chance.randint(1, _LONGEST_OUTBREAK)
             at_first = chance.randint(3, 12)
             if breaks_out and where == tag_id and pass_index < start + passes:
@@ -113,7 +105,7 @@ class Plants:
             flower_count=len(seen),
             bug_count=bugs,
             blooms=seen,
-            footprint=self._boxes[tag_id],
+            footprint=tuple((x, y, 0.0) for x, y in self._tags[tag_id].table.rect.corners),
         )
 
 

@@ -308,8 +308,8 @@ class TwinStore:
         tag = replace(tag, pose=tag.pose or inspection.pose)
         self._store_attempt(tag, inspection, brought=flower is not None)
 
-    def pin(self, tag_id: str, pose: Pose) -> bool:
-        """Give a discovered tag its place; False, and nothing changed, if it has one already.
+    def pin(self, tag_id: str, pose: Pose) -> None:
+        """Give a discovered tag its place, unless it has one already.
 
         Raises:
             Rejected: a text past its bound, or one tag too many.
@@ -317,10 +317,8 @@ class TwinStore:
         """
         check_texts(tag_id)
         tag = self._tag(tag_id)
-        if tag.pose is not None:
-            return False
-        self._store(replace(tag, pose=pose))
-        return True
+        if tag.pose is None:
+            self._store(replace(tag, pose=pose))
 
     def hold_to(self, now_ns: int) -> bool:
         """Follow a clock that has gone back: whatever was observed after `now_ns` was, now.

@@ -119,7 +119,7 @@ def compute_idw_field(
     (height, width). `should_stop()` is called every millisecond or so.
 
     Raises:
-        ValueError: a box that makes no grid, or samples that are none; it names the value.
+        ValueError: a box that makes no grid, or samples that are none, with the value and the limit.
         Abandoned: `should_stop` was true.
 
     """

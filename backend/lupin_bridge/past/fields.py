@@ -182,7 +182,14 @@ def _quality(
     should_stop: ShouldStop,
 ) -> bytes:
     """`schema.FieldQuality` of a field and of the tags that it was made from."""
-    quality = leave_one_out(tags, sensor.name, rules, should_stop)
+    quality = leave_one_out(
+        tags,
+        sensor.name,
+        falloff_radius_m=rules.falloff_radius_m,
+        max_distance_m=rules.max_distance_m,
+        power=rules.idw_power,
+        should_stop=should_stop,
+    )
     return orjson.dumps(
         {
             "sensor_type": sensor.name,

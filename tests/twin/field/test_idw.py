@@ -132,6 +132,25 @@ def test_range_leaves_out_what_float32_cannot_hold() -> None:
 
 
 @pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"falloff_radius_m": -0.1}, r"falloff_radius_m is -0\.1, must not be less than 0"),
+        ({"falloff_radius_m": math.nan}, "falloff_radius_m is nan, must be finite"),
+        ({"max_distance_m": math.inf}, "max_distance_m is inf, must be finite"),
+        ({"max_distance_m": -1.0}, r"max_distance_m is -1\.0, must not be less than 0"),
+        ({"power": -2.0}, r"power is -2\.0, must not be less than 0"),
+        ({"power": math.nan}, "power is nan, must be finite"),
+        ({"explored_mask": np.ones((3, 2), dtype=np.bool_)}, r"shape \(3, 2\), must be bool"),
+        ({"explored_mask": np.ones((2, 3))}, "float64 of shape"),
+        ({"resolution": 0.0}, r"resolution is 0\.0 m, must be greater than 0"),
+    ],
+)
+def test_rules_out_of_range_are_refused(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        field_over(3, 2, [(0.0, 0.0, 1.0)], **changes)
+
+
+@pytest.mark.parametrize(
     ("samples", "message"),
     [
         ([(0.0, 0.0, 1.0), (0.0, math.nan, 1.0)], r"samples\[1\]\.y is nan, must be finite"),

@@ -2,7 +2,8 @@
 
 import math
 import tracemalloc
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,11 +12,11 @@ from hypothesis import strategies as st
 
 from lupin_twin.core.state import Pose, Reading, TagState
 from lupin_twin.field import idw
-from lupin_twin.field.engine import FieldQuality, FieldRules, leave_one_out, painted_share
+from lupin_twin.field.engine import FieldQuality, leave_one_out, painted_share
 from lupin_twin.field.idw import Abandoned, compute_idw_field
 from tests.oracle_idw import value_at
 
-RULES = FieldRules(2.0, 1.5, 1.5, 1_000)
+RULES: dict[str, Any] = {"falloff_radius_m": 1.5, "max_distance_m": 1.5, "power": 2.0}
 
 Spot = tuple[float, float, float]
 
@@ -32,12 +33,8 @@ def tags_at(spots: Iterable[Spot]) -> list[TagState]:
     return [tag(f"tag-{index}", *spot) for index, spot in enumerate(spots)]
 
 
-def quality_of(
-    spots: Sequence[Spot],
-    rules: FieldRules = RULES,
-    should_stop: Callable[[], bool] = idw.never,
-) -> FieldQuality:
-    return leave_one_out(tags_at(spots), "temperature", rules, should_stop)
+def quality_of(spots: Sequence[Spot], **changes: Any) -> FieldQuality:
+    return leave_one_out(tags_at(spots), "temperature", **{**RULES, **changes})
 
 
 def test_nothing_can_be_said_about_lonely_tags() -> None:
@@ -51,9 +48,9 @@ def test_only_pinned_tags_with_a_finite_reading_of_the_sensor_take_part() -> Non
         TagState("unpinned", readings=(Reading("temperature", 90.0),)),
         TagState("silent", pose=Pose(0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)),
     ]
-    quality = leave_one_out(tags, "temperature", RULES)
+    quality = leave_one_out(tags, "temperature", **RULES)
     assert (quality.judged, quality.unjudged, quality.rmse) == (2, 0, 2.0)
-    assert leave_one_out(tags, "light", RULES) == FieldQuality(0, 0, None, None)
+    assert leave_one_out(tags, "light", **RULES) == FieldQuality(0, 0, None, None)
 
 
 @settings(max_examples=150)
@@ -77,7 +74,7 @@ def test_error_is_the_definitions(
     with pytest.MonkeyPatch.context() as patch:  # in many parts
         patch.setattr(idw, "MAX_PAIRS", 16)
         patch.setattr(idw, "_MIN_POINTS", 1)
-        quality = quality_of(spots, FieldRules(power, falloff, max_distance, 1_000))
+        quality = quality_of(spots, **rules)
     errors = [
         value_at((x, y), [*spots[:index], *spots[index + 1 :]], **rules) - value
         for index, (x, y, value) in enumerate(spots)
@@ -101,7 +98,7 @@ def test_memory_does_not_grow_with_the_square_of_the_tags() -> None:
     tags = tags_at((x, y, x + y) for x, y in spots)
     tracemalloc.start()
     try:
-        quality = leave_one_out(tags, "temperature", RULES)
+        quality = leave_one_out(tags, "temperature", **RULES)
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()

@@ -303,7 +303,10 @@ class FieldQuality:
 def leave_one_out(
     tags: Iterable[TagState],
     sensor_type: str,
-    rules: FieldRules,
+    *,
+    falloff_radius_m: float,
+    max_distance_m: float,
+    power: float,
     should_stop: Callable[[], bool] = never,
 ) -> FieldQuality:
     """The quality of the field of `sensor_type` made of `tags` (a snapshot's) by these rules.
@@ -312,17 +315,14 @@ def leave_one_out(
     pairs of tags in reach of each other. `should_stop()` is called every millisecond or so.
 
     Raises:
+        ValueError: a rule out of its range, named with its value and the limit.
         Abandoned: `should_stop` was true.
 
     """
     named = [(tag.tag_id, sample) for tag in tags for sample in samples_of((tag,), sensor_type)]
     samples = [sample for _, sample in named]
     x, y, measured = sample_columns(samples)
-    idw = PairwiseIdw(
-        falloff_radius_m=rules.falloff_radius_m,
-        max_distance_m=rules.max_distance_m,
-        power=rules.idw_power,
-    )
+    idw = PairwiseIdw(falloff_radius_m=falloff_radius_m, max_distance_m=max_distance_m, power=power)
     predicted = _predictions(x, y, measured, idw, should_stop)
     judged = np.flatnonzero(~np.isnan(predicted))
     if judged.size == 0:

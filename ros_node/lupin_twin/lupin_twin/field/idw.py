@@ -40,6 +40,7 @@ from lupin_twin.field.grid import (
     FieldGrid,
     FloatArray,
     cell_centres,
+    check_finite,
     grid_dimensions,
 )
 
@@ -119,11 +120,18 @@ def compute_idw_field(
     (height, width). `should_stop()` is called every millisecond or so.
 
     Raises:
-        ValueError: a box that makes no grid, or samples that are none, with the value and the limit.
+        ValueError: an argument out of its range, named with its value and the limit.
         Abandoned: `should_stop` was true.
 
     """
     width, height = grid_dimensions(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
+    if explored_mask is not None and (
+        explored_mask.shape != (height, width) or explored_mask.dtype != np.bool_
+    ):
+        raise ValueError(
+            f"explored_mask is {explored_mask.dtype} of shape {explored_mask.shape}, must be bool "
+            f"of shape {(height, width)} (height, width)"
+        )
     x, y, value = sample_columns(samples)
     idw = PairwiseIdw(falloff_radius_m=falloff_radius_m, max_distance_m=max_distance_m, power=power)
     cell_x = cell_centres(bbox_min_x, width, resolution)
@@ -193,9 +201,21 @@ class PairwiseIdw:
     """The definition's rules 2 to 5 for any points, given their squared distances to the samples.
 
     Not to be shared between threads: the intermediate arrays are reused by the next evaluation.
+
+    Raises:
+        ValueError: a rule out of its range, named with its value and the limit.
+
     """
 
     def __init__(self, *, falloff_radius_m: float, max_distance_m: float, power: float) -> None:
+        for name, number in (
+            ("falloff_radius_m", falloff_radius_m),
+            ("max_distance_m", max_distance_m),
+            ("power", power),
+        ):
+            check_finite(name, number)
+            if number < 0.0:
+                raise ValueError(f"{name} is {number}, must not be less than 0")
         self.power = power
         self.falloff_radius = falloff_radius_m
         self.max_distance = max_distance_m

@@ -17,9 +17,8 @@ import numpy as np
 
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.estimate.engine import TagPast, readings_of
-from lupin_twin.estimate.kernel import Model, Readings
-from lupin_twin.estimate.model import fit
-from lupin_twin.estimate.posterior import Posterior
+from lupin_twin.estimate.kernel import Readings
+from lupin_twin.estimate.model import Model, fit
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.idw import compute_idw_field
 from tests.bench.other_worlds import CHOOSING, HOUR_S, JUDGING, SORTS, Floats, World, world_of
@@ -44,6 +43,7 @@ class Case(NamedTuple):
 
     world: World
     readings: Readings
+    at_s: float
     places: Floats
     truth: Floats
     idw: Floats
@@ -79,7 +79,7 @@ def case_of(world: World, phase: str, seed: int) -> Case:
         power=RULES.idw_power,
     ).values.astype(np.float64)
     truth = world.truth(places, np.full(len(places), at_s))
-    return Case(world, as_received(all_read, at_s), places, truth, idw)
+    return Case(world, as_received(all_read, at_s), 0.0, places, truth, idw)
 
 
 def as_received(read: Readings, at_s: float) -> Readings:
@@ -94,7 +94,7 @@ def as_received(read: Readings, at_s: float) -> Readings:
 
 def judged(case: Case, model: Model | None = None) -> Field:
     model = fit(case.readings) if model is None else model
-    return compared(case, *Posterior(model, case.readings).points(case.places))
+    return compared(case, *model.posterior(case.readings, case.at_s).points(case.places))
 
 
 def compared(case: Case, mean: Floats, sd: Floats) -> Field:

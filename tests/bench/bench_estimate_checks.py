@@ -28,7 +28,6 @@ from tests.bench.other_worlds import (
     restless,
     world_of,
 )
-from tests.support.estimates import posterior_of
 
 OFFSET = 3.0
 AFTER = (1, 2, 4, 8)
@@ -40,7 +39,7 @@ ROUNDS = 10
 
 def posterior_at(all_read: Readings, at_s: float) -> Posterior:
     heard = thinned(all_read.take(all_read.time_s <= at_s), at_s, DAY_S)
-    return posterior_of(fit(heard), heard, at_s)
+    return fit(heard).posterior(heard, at_s)
 
 
 def changed(all_read: Readings, at_s: float) -> list[int]:

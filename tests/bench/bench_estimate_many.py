@@ -20,7 +20,6 @@ from lupin_twin.estimate.posterior import Cells
 from lupin_twin.field.idw import compute_idw_field
 from tests.bench.bench_estimate import INTERVAL_SDS, RULES, rmse
 from tests.bench.other_worlds import DAY_S, HOUR_S, Floats
-from tests.support.estimates import posterior_of
 
 # Tags, m of the greenhouse's side.
 HOUSES = ((200, 20.0), (1_000, 20.0), (1_000, 50.0), (10_000, 100.0))
@@ -95,8 +94,7 @@ def judged(tags: int, metres: float, seed: int, phase: str) -> list[float]:
         max_distance_m=RULES.max_distance_m,
         power=RULES.idw_power,
     ).values.ravel()
-    posterior = posterior_of(fit(readings), readings, silent_s)
-    grid = posterior.grid(Cells(**box, resolution=cell_m))
+    grid = fit(readings).posterior(readings, silent_s).grid(Cells(**box, resolution=cell_m))
     centres = (np.arange(CELLS) + 0.5) * cell_m
     places = np.stack(np.meshgrid(centres, centres), axis=-1).reshape(-1, 2)
     true = truth(places, np.full(len(places), silent_s))

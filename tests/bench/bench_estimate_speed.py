@@ -12,7 +12,7 @@ from lupin_twin.estimate.engine import thinned
 from lupin_twin.estimate.model import fit
 from lupin_twin.estimate.posterior import Cells, Posterior
 from lupin_twin.field.idw import FieldSample, compute_idw_field
-from tests.support.estimates import DAY_S, many_tags, posterior_of
+from tests.support.estimates import DAY_S, many_tags
 
 Made = TypeVar("Made")
 # Tags, readings of each, m of the house's side, cells of a side.
@@ -59,7 +59,7 @@ def costs(tags: int, each: int, metres: float, side: int) -> list[float]:
     fit_ms, model = best(partial(fit, readings), 2)
 
     def load() -> Posterior:
-        posterior = posterior_of(model, readings, at_s)
+        posterior = model.posterior(readings, at_s)
         posterior.points(readings.xy[:1])  # of many tags, the work begins when it is asked
         return posterior
 

@@ -1,16 +1,12 @@
 """Readings for estimates, at random and by hand."""
 
-from collections.abc import Callable
-from dataclasses import replace
-
 import numpy as np
 from hypothesis import strategies as st
 
 from lupin_twin.estimate.engine import Estimate
-from lupin_twin.estimate.kernel import Hyper, Model, Readings
-from lupin_twin.estimate.posterior import EstimateGrid, Posterior
+from lupin_twin.estimate.kernel import Hyper, Readings
+from lupin_twin.estimate.posterior import EstimateGrid
 from lupin_twin.field.grid import FloatArray
-from lupin_twin.field.idw import never
 from tests.support.textbook_gp import Spot
 
 DAY_S = 86_400.0
@@ -35,13 +31,6 @@ def spots_of(readings: Readings) -> list[Spot]:
 def spot_at(place: FloatArray, hour: float) -> Spot:
     """A place (2,), m, at an hour."""
     return Spot(float(place[0]), float(place[1]), hour)
-
-
-def posterior_of(
-    model: Model, readings: Readings, at_s: float, should_stop: Callable[[], bool] = never
-) -> Posterior:
-    """What they say of the moment `at_s`."""
-    return Posterior(model, replace(readings, time_s=readings.time_s - at_s), should_stop)
 
 
 def a_day(tags: int = 8, passes: int = 12, seed: int = 0) -> Readings:

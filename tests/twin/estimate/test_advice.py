@@ -6,18 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from lupin_twin.estimate.kernel import Hyper, Model, Readings, Scale
-from lupin_twin.estimate.model import fit
+from lupin_twin.estimate.kernel import Hyper, Readings, Scale
+from lupin_twin.estimate.model import Model, fit
 from tests.support import textbook_gp
-from tests.support.estimates import (
-    DAY_S,
-    a_day,
-    hypers,
-    posterior_of,
-    some_readings,
-    spot_at,
-    spots_of,
-)
+from tests.support.estimates import DAY_S, a_day, hypers, some_readings, spot_at, spots_of
 
 CANDIDATES = np.array([(0.0, 0.0), (1.3, -2.0), (-4.0, 4.5), (9.0, 9.0)])
 TARGETS = np.array([(0.5, 0.5), (-3.0, 2.0), (8.0, 8.0)])
@@ -38,7 +30,7 @@ def test_each_place_is_the_best_of_those_left_and_its_error_the_textbook_s(
     readings: Readings, h: Hyper
 ) -> None:
     model = Model(Scale(20.0, 2.0), DAY_S, h)
-    posterior = posterior_of(model, readings, float(readings.time_s.max()))
+    posterior = model.posterior(readings, float(readings.time_s.max()))
     advice = posterior.advice(CANDIDATES, 3, over=TARGETS)
     at_first = error_by_the_textbook(readings, h, [])
     taken: list[int] = []
@@ -55,6 +47,6 @@ def test_each_place_is_the_best_of_those_left_and_its_error_the_textbook_s(
 
 def test_who_asks_for_none_gets_none() -> None:
     day = a_day(tags=3, passes=2)
-    posterior = posterior_of(fit(day), day, DAY_S)
+    posterior = fit(day).posterior(day, DAY_S)
     assert posterior.advice(TARGETS, 0, over=TARGETS) == []
     assert posterior.advice(np.empty((0, 2)), 5, over=TARGETS) == []

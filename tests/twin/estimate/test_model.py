@@ -5,18 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_twin.estimate.kernel import INFLATION, Hyper, Model, Readings, Scale
-from lupin_twin.estimate.model import FitFailed, fit
+from lupin_twin.estimate.kernel import Hyper, Readings, Scale
+from lupin_twin.estimate.model import FitFailed, Model, fit
+from lupin_twin.estimate.posterior import INFLATION
 from tests.support import textbook_gp
-from tests.support.estimates import (
-    DAY_S,
-    a_day,
-    hypers,
-    posterior_of,
-    readings_of,
-    some_readings,
-    spots_of,
-)
+from tests.support.estimates import DAY_S, a_day, hypers, readings_of, some_readings, spots_of
 from tests.support.textbook_gp import Spot
 
 PLACES = [(0.0, 0.0), (1.3, -2.0), (-4.0, 4.5)]
@@ -29,7 +22,7 @@ def model_of(h: Hyper) -> Model:
 @given(some_readings(), hypers, st.floats(0.0, 12.0))
 def test_the_estimate_is_the_textbook_s(readings: Readings, h: Hyper, later_h: float) -> None:
     at_hour = float(readings.time_s.max()) / 3600.0 + later_h
-    mean, sd = posterior_of(model_of(h), readings, at_hour * 3600.0).points(np.array(PLACES))
+    mean, sd = model_of(h).posterior(readings, at_hour * 3600.0).points(np.array(PLACES))
     y = (readings.value - 20.0) / 2.0
     for index, place in enumerate(PLACES):
         middle, variance = textbook_gp.predicted(spots_of(readings), y, Spot(*place, at_hour), h)
@@ -51,7 +44,7 @@ def test_one_reading_duplicates_and_equal_values_make_a_model(
     rows: list[tuple[float, int, float]],
 ) -> None:
     readings = readings_of(rows, [(0.0, 0.0), (1.0, 1.0)])
-    posterior = posterior_of(fit(readings), readings, DAY_S / 2)
+    posterior = fit(readings).posterior(readings, DAY_S / 2)
     mean, sd = posterior.points(np.array(PLACES))
     assert np.isfinite(mean).all()
     assert (sd > 0.0).all()
@@ -67,9 +60,9 @@ def test_what_is_known_has_a_limit_in_how_places_and_readings_differ() -> None:
 def test_the_day_s_course_bridges_an_outage_only_where_the_day_is_as_long_as_told() -> None:
     day = a_day(passes=24)
     true = 21.0 + 4.0 * np.sin(2.0 * np.pi * 1.25) + 0.4 * day.xy[:, 1]
-    told = posterior_of(fit(day), day, 1.25 * DAY_S).points(day.xy)
+    told = fit(day).posterior(day, 1.25 * DAY_S).points(day.xy)
     wrong = fit(day, day_length_s=60 * DAY_S)
-    off = posterior_of(wrong, day, 1.25 * DAY_S).points(day.xy)
+    off = wrong.posterior(day, 1.25 * DAY_S).points(day.xy)
     assert np.abs(told[0] - true).mean() < 0.3
     assert np.abs(off[0] - true).mean() > 1.0
 
@@ -82,7 +75,7 @@ def test_numbers_at_the_end_of_what_there_is_make_an_estimate_or_say_so(
     rows = [(hour / 2.0, hour % 2, value * (1 + hour % 3)) for hour in range(12)]
     readings = readings_of(rows, [(metres, -metres), (-metres, metres)])
     try:
-        mean, sd = posterior_of(fit(readings), readings, DAY_S / 2).points(np.array(PLACES))
+        mean, sd = fit(readings).posterior(readings, DAY_S / 2).points(np.array(PLACES))
     except FitFailed:
         return
     assert np.isfinite(mean).all()
@@ -100,7 +93,7 @@ def test_a_model_is_learnt_from_few_readings_of_tags_and_hours_all_over() -> Non
     model = fit(many)
     assert model == fit(many), "the same ones every time"
     assert 0.8 < model.hyper.l < 6.0
-    mean, sd = posterior_of(model, many.recent(DAY_S, per_tag=6), DAY_S).points(xy)
+    mean, sd = model.posterior(many.recent(DAY_S, per_tag=6), DAY_S).points(xy)
     true = 20.0 + 3.0 * np.sin(0.9 * xy[:, 0])
     assert (np.abs(mean - true) <= 1.645 * sd).mean() > 0.85
     assert sd.mean() < 1.0

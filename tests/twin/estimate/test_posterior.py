@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from lupin_twin.estimate.cholesky import MAX_EXACT
-from lupin_twin.estimate.kernel import INFLATION, Pairs, Readings
+from lupin_twin.estimate.kernel import Pairs, Readings
 from lupin_twin.estimate.model import fit
-from lupin_twin.estimate.posterior import Cells, EstimateGrid, Posterior
+from lupin_twin.estimate.posterior import INFLATION, Cells, EstimateGrid, Posterior
 from lupin_twin.field.grid import FloatArray
 from lupin_twin.field.idw import Abandoned
 from tests.support import textbook_gp
-from tests.support.estimates import DAY_S, a_day, posterior_of, spot_at, spots_of
+from tests.support.estimates import DAY_S, a_day, spot_at, spots_of
 
 PLACES = np.array([(0.0, 0.0), (1.3, -2.0), (-4.0, 4.5)])
 BOX = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": 4.0, "bbox_max_y": 8.0}
@@ -22,7 +22,7 @@ BOX = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": 4.0, "bbox_max_y": 8.
 @pytest.mark.parametrize(("resolution", "tags"), [(0.5, 8), (0.5, 30)])
 def test_a_grid_is_its_cells_centres(resolution: float, tags: int) -> None:
     day = a_day(tags=tags, passes=4)
-    posterior = posterior_of(fit(day), day, DAY_S)
+    posterior = fit(day).posterior(day, DAY_S)
     grid = posterior.grid(Cells(**BOX, resolution=resolution))
     assert grid.mean.shape == grid.sd.shape == grid.known.shape == (grid.height, grid.width)
     mean, sd, x, y = beside(posterior, grid)
@@ -37,7 +37,7 @@ def test_a_fine_grid_is_interpolated_and_off_by_little(length: float) -> None:
     day = a_day(tags=30, passes=6)
     model = fit(day)
     model = replace(model, hyper=model.hyper._replace(l=length))
-    posterior = posterior_of(model, day, DAY_S)
+    posterior = model.posterior(day, DAY_S)
     grid = posterior.grid(Cells(**BOX, resolution=0.02))
     mean, sd, x, y = beside(posterior, grid)
     assert (np.abs(grid.mean[y, x] - mean) <= 0.1 * sd).all()
@@ -72,7 +72,7 @@ def test_of_more_readings_than_can_be_solved_at_once_the_nearest_say_nearly_the_
     many = Readings(time_s, tag, warm + chance.normal(0.0, 0.2, len(tag)), xy)
     assert len(many) > MAX_EXACT
     model = fit(many)
-    near = posterior_of(model, many, DAY_S)
+    near = model.posterior(many, DAY_S)
     places = chance.uniform(0.0, 12.0, (200, 2))
     mean, sd = near.points(places)
     y, h = (many.value - model.scale.centre) / model.scale.spread, model.hyper
@@ -98,7 +98,7 @@ def test_of_more_readings_than_can_be_solved_at_once_the_nearest_say_nearly_the_
 def test_who_is_not_waited_for_ends_soon(tags: int) -> None:
     day = a_day(tags=tags, passes=2)
     is_over = False
-    posterior = posterior_of(fit(day), day, DAY_S, lambda: is_over)
+    posterior = fit(day).posterior(day, DAY_S, lambda: is_over)
     posterior.points(PLACES)
     is_over = True
     for ask in (lambda: posterior.points(PLACES), posterior.changes):

@@ -25,17 +25,7 @@ from typing import Final
 
 import numpy as np
 
-from lupin_twin.estimate.kernel import (
-    HOURS,
-    INFLATION,
-    Hyper,
-    IntArray,
-    Model,
-    Pairs,
-    Readings,
-    in_time,
-    nearness,
-)
+from lupin_twin.estimate.kernel import HOURS, Hyper, IntArray, Pairs, Readings, in_time, nearness
 from lupin_twin.field.grid import FloatArray
 
 
@@ -85,35 +75,33 @@ class Solved:
 class Factor:
     """Readings by tag and their covariance: `root` (n, n) with root' root its inverse."""
 
-    model: Model
     readings: Readings
     root: FloatArray
     alpha: FloatArray
 
     @classmethod
-    def of(cls, model: Model, readings: Readings) -> Factor:
-        """Of readings by tag, each tag with some.
+    def of(cls, h: Hyper, readings: Readings, y: FloatArray, day_length_s: float) -> Factor:
+        """Of standardised readings `y`; `readings` are by tag, each tag has some.
 
         Raises:
             numpy.linalg.LinAlgError: their covariance is singular, as far as floats can tell.
 
         """
-        covariance = Pairs(readings, model.day_length_s).covariance(model.hyper)
+        covariance = Pairs(readings, day_length_s).covariance(h)
         root = np.linalg.inv(np.linalg.cholesky(covariance))
-        y = model.scale.standardised(readings.value)
-        return cls(model, readings, root, root.T @ (root @ y))
+        return cls(readings, root, root.T @ (root @ y))
 
-    def solved(self) -> Solved:
-        """What it says of the moment that times count from."""
-        ages_h = -self.readings.time_s * (HOURS / self.model.day_length_s)
-        common, place = in_time(self.model.hyper, ages_h)
+    def solved(self, h: Hyper, at_s: float, day_length_s: float) -> Solved:
+        """What it says of the moment `at_s`, s."""
+        ages_h = (at_s - self.readings.time_s) * (HOURS / day_length_s)
+        common, place = in_time(h, ages_h)
         tag = self.readings.tag
         starts = np.flatnonzero(np.r_[True, tag[1:] != tag[:-1]])
         rooted = np.empty((len(tag), 1 + len(starts)))
         rooted[:, 0] = self.root @ common
         rooted[:, 1:] = np.add.reduceat(self.root * place, starts, axis=1)
         w = np.r_[common @ self.alpha, np.add.reduceat(place * self.alpha, starts)]
-        return Solved(self.model.hyper, self.readings.xy, w, rooted.T @ rooted)
+        return Solved(h, self.readings.xy, w, rooted.T @ rooted)
 
 
 # All readings of so many are solved at once.
@@ -211,16 +199,20 @@ class Off:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeftOut:
-    """Readings by tag, for any of them to be left out: `precision` (n, n) is A, `alpha` (n,) a."""
+    """Readings by tag, for any of them to be left out.
+
+    `wider` is the inflation of sds; `precision` (n, n) and `alpha` (n,) are A and a.
+    """
 
     readings: Readings
+    wider: float
     precision: FloatArray
     alpha: FloatArray
 
     @classmethod
-    def of(cls, factor: Factor) -> LeftOut:
+    def of(cls, factor: Factor, wider: float) -> LeftOut:
         """Of readings that were solved."""
-        return cls(factor.readings, factor.root.T @ factor.root, factor.alpha)
+        return cls(factor.readings, wider, factor.root.T @ factor.root, factor.alpha)
 
     def changed(self) -> dict[int, tuple[float, float, float | None]]:
         """Of each tag: z, offset, and since when it has changed, s.
@@ -270,7 +262,7 @@ class LeftOut:
         # Sums over the last one, the last two, ..: those before them count, those after are off.
         a = self.alpha[own][::-1].cumsum()
         weight = np.diagonal(self.precision[np.ix_(own, own)][::-1, ::-1].cumsum(0).cumsum(1))
-        z = a / np.sqrt(weight) / INFLATION
+        z = a / np.sqrt(weight) / self.wider
         # Before a change it was another: not all of them are off.
         best = 1 + int(np.argmax(np.abs(z[: max(len(own) - 1, 1)])))
         first: int | None = len(own) - best
@@ -287,6 +279,7 @@ class LeftOut:
         lost = np.linalg.solve(self.precision[np.ix_(block, block)], across.T)
         return LeftOut(
             self.readings.take(rest),
+            self.wider,
             self.precision[np.ix_(rest, rest)] - across @ lost,
             self.alpha[rest] - lost.T @ self.alpha[block],
         )

@@ -18,7 +18,6 @@ The 100 makes it ordinary kriging: the mean is not known.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -161,29 +160,6 @@ class Hyper(NamedTuple):
     def noise(self) -> float:
         """The variance of a reading about what is true."""
         return self.tau**2 + JITTER
-
-
-# The most probable parameters do not know how little they know: sds are so much wider. Chosen on
-# `tests/bench/other_worlds.CHOOSING`.
-INFLATION: Final = 1.3
-# Beyond this share of how far places differ, one knows no more of a place than of any other; nor
-# beyond how far readings spread.
-_KNOWN_SHARE: Final = 0.6
-
-
-@dataclass(frozen=True, slots=True)
-class Model:
-    """How readings of one sensor hang together."""
-
-    scale: Scale
-    day_length_s: float
-    hyper: Hyper
-
-    @property
-    def sd_known(self) -> float:
-        """Where the estimate's sd (the sensor's unit) is below this, it is known."""
-        local = INFLATION * math.sqrt(self.hyper.local_variance)
-        return min(_KNOWN_SHARE * local, 1.0) * self.scale.spread
 
 
 # Log-normal: these are the medians, and the sds of the logarithms. The day's swing (sp) is taken to

@@ -1,4 +1,4 @@
-"""From readings to a model. Pure.
+"""From readings to a model, and from a model to an estimate as of a moment. Pure, immutable.
 
 The kernel's most probable parameters: maximum a posteriori by BFGS with the analytic gradient
 (Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2006, 5.9). Coordinates are
@@ -7,7 +7,9 @@ those in which the prior is a standard normal: (log parameter - log median) / sd
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -16,11 +18,12 @@ from lupin_twin.estimate.kernel import (
     PRIOR_LOG_SD,
     PRIOR_MEDIAN,
     Hyper,
-    Model,
     Pairs,
     Readings,
+    Scale,
     scale_of,
 )
+from lupin_twin.estimate.posterior import INFLATION, Posterior
 from lupin_twin.field.grid import FloatArray
 from lupin_twin.field.idw import Abandoned, never
 
@@ -115,6 +118,38 @@ MAX_FITTED: Final = 150
 # metres the truth changes.
 _TAGS: Final = 30
 _TOGETHER: Final = 6
+# Beyond this share of how far places differ, one knows no more of a place than of any other; nor
+# beyond how far readings spread.
+_KNOWN_SHARE: Final = 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """How readings of one sensor hang together."""
+
+    scale: Scale
+    day_length_s: float
+    hyper: Hyper
+
+    @property
+    def sd_known(self) -> float:
+        """Where the estimate's sd (the sensor's unit) is below this, it is known."""
+        local = INFLATION * math.sqrt(self.hyper.local_variance)
+        return min(_KNOWN_SHARE * local, 1.0) * self.scale.spread
+
+    def posterior(
+        self, readings: Readings, at_s: float, should_stop: Callable[[], bool] = never
+    ) -> Posterior:
+        """What the readings say of the moment `at_s` (ROS time, s), everywhere.
+
+        Its methods raise `numpy.linalg.LinAlgError` if the readings' covariance is
+        singular, as far as floats can tell.
+
+        There are some, and none is later.
+        """
+        return Posterior(
+            self.scale, self.hyper, self.sd_known, self.day_length_s, readings, at_s, should_stop
+        )
 
 
 def fit(

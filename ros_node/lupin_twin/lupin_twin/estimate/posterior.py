@@ -29,7 +29,7 @@ from lupin_twin.estimate.cholesky import (
     gap_of,
     shared_out,
 )
-from lupin_twin.estimate.kernel import INFLATION, IntArray, Model, Readings
+from lupin_twin.estimate.kernel import Hyper, IntArray, Readings, Scale
 from lupin_twin.field.grid import BoolArray, CellGrid, FloatArray, cell_centres, grid_dimensions
 from lupin_twin.field.idw import Abandoned, never
 
@@ -145,6 +145,9 @@ def _shares(cells: FloatArray, places: FloatArray) -> list[tuple[slice, slice, F
     return result
 
 
+# The most probable parameters do not know how little they know: sds are so much wider. Chosen on
+# `tests/bench/other_worlds.CHOOSING`.
+INFLATION: Final = 1.3
 # Numbers in an array of places and tags at a time.
 _AT_ONCE: Final = 4_000_000
 # Of fewer other tags nothing can be said of a tag that is left out.
@@ -153,14 +156,17 @@ _LEAST_OTHERS: Final = 4
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """What readings say everywhere of a moment; their times are s from then on, none is later.
+    """The estimate as of `at_s` (ROS time, s); `sd_known` is in the sensor's unit.
 
-    `should_stop` is called every few milliseconds; methods raise `Abandoned` when it is true, and
-    `numpy.linalg.LinAlgError` if the readings' covariance is singular, as far as floats can tell.
+    `should_stop` is called every few milliseconds; methods raise `Abandoned` when it is true.
     """
 
-    model: Model
+    scale: Scale
+    hyper: Hyper
+    sd_known: float
+    day_length_s: float
     readings: Readings
+    at_s: float
     should_stop: Callable[[], bool] = never
 
     def points(self, xy: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -179,7 +185,7 @@ class Posterior:
         Fine grids are interpolated between places that are no farther apart than a fifth of the
         length over which the truth changes.
         """
-        x, y = cells.lattice(self.model.hyper.l)
+        x, y = cells.lattice(self.hyper.l)
         if self._is_exact:
             solved, parts = self._whole, []
             for rows in _split(np.arange(len(y)), len(x) * len(solved.xy)):
@@ -191,7 +197,7 @@ class Posterior:
             mean, sd = self.points(np.stack(np.meshgrid(x, y), axis=-1))
         self._go_on()
         mean, sd = (cells.spread(x, y, one.reshape(len(y), len(x))) for one in (mean, sd))
-        return cells.filled(mean, sd, self.model.sd_known)
+        return cells.filled(mean, sd, self.sd_known)
 
     def changes(self) -> tuple[Change | None, ...]:
         """For each tag, how far its last readings are off; None for a tag without any."""
@@ -201,7 +207,7 @@ class Posterior:
             for row in judged.tolist():
                 z, offset, since_s = found[row]
                 _, expected, sd = self._said_of(tags[row], left_out.last(row, since_s))
-                change = Change(z, offset * self.model.scale.spread, expected, sd, since_s)
+                change = Change(z, offset * self.scale.spread, expected, sd, since_s)
                 result[self._tags[tags[row]]] = change
         return tuple(result)
 
@@ -257,11 +263,12 @@ class Posterior:
 
     @cached_property
     def _whole(self) -> Solved:
-        return self._factor(self._present).solved()
+        return self._factor(self._present).solved(self.hyper, self.at_s, self.day_length_s)
 
     def _factor(self, readings: Readings) -> Factor:
         self._go_on()
-        return Factor.of(self.model, readings)
+        y = self.scale.standardised(readings.value)
+        return Factor.of(self.hyper, readings, y, self.day_length_s)
 
     def _around(self, places: FloatArray) -> Iterator[tuple[Solved, IntArray]]:
         """All rows of `places`, with what is solved of the readings that say most of them."""
@@ -271,11 +278,12 @@ class Posterior:
         for tags, rows in shared_out(self._present.xy, places):
             if len(rows):
                 near, _ = self._neighbours.around(tags)
-                yield self._factor(near).solved(), rows
+                factor = self._factor(near)
+                yield factor.solved(self.hyper, self.at_s, self.day_length_s), rows
 
     @cached_property
     def _left_out_exactly(self) -> LeftOut:
-        return LeftOut.of(self._factor(self._present))
+        return LeftOut.of(self._factor(self._present), INFLATION)
 
     def _left_out(
         self, wanted: IntArray | None = None
@@ -294,7 +302,7 @@ class Posterior:
             if len(judged):
                 near, numbers = self._neighbours.around(tags)
                 rows = np.searchsorted(numbers, judged)
-                yield LeftOut.of(self._factor(near)), numbers, rows
+                yield LeftOut.of(self._factor(near), INFLATION), numbers, rows
 
     def _said_of(self, tag: int, off: Off) -> tuple[float, float, float]:
         """A tag's newest reading, and mean and sd of what the others say of it.
@@ -302,12 +310,12 @@ class Posterior:
         What is true is less sure, the noise of a reading is as it is.
         """
         newest = float(self._present.value[self._present.tag == tag][-1])
-        noise, spread = self.model.hyper.noise, self.model.scale.spread
+        noise, spread = self.hyper.noise, self.scale.spread
         true = max(off.variance - noise, 0.0)
         return newest, newest - off.off * spread, (INFLATION**2 * true + noise) ** 0.5 * spread
 
     def _in_unit(self, mean: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray]:
-        scale = self.model.scale
+        scale = self.scale
         sd = np.sqrt(variance) * (INFLATION * scale.spread)
         return mean * scale.spread + scale.centre, sd
 

@@ -28,8 +28,8 @@ from lupin_twin.estimate.engine import (
     readings_of,
     unchanged,
 )
-from lupin_twin.estimate.kernel import MAX_PER_TAG, Model, Readings
-from lupin_twin.estimate.model import FitFailed, fit
+from lupin_twin.estimate.kernel import MAX_PER_TAG, Readings
+from lupin_twin.estimate.model import FitFailed, Model, fit
 from lupin_twin.estimate.posterior import Cells, Posterior
 from lupin_twin.field.engine import FieldRefused, check_sensor_type
 from lupin_twin.field.explored import OccupancyMap, floor, free_of
@@ -131,7 +131,7 @@ def load(
     """
     readings = readings_of(pasts, at_ns, day_length_s)
     model = fit(readings, day_length_s=day_length_s, should_stop=should_stop)
-    posterior = Posterior(model, readings, should_stop)
+    posterior = model.posterior(readings, 0.0, should_stop)
     checks = tuple(
         _check(past, change, at_ns)
         for past, change in in_turns(zip(pasts, posterior.changes(), strict=True))
@@ -142,7 +142,7 @@ def load(
         rest = readings_of(unchanged(pasts, loaded.changed), at_ns, day_length_s)
         # What they have read since says as little of how readings hang together.
         model = fit(rest, day_length_s=day_length_s, should_stop=should_stop)
-        posterior = Posterior(model, rest, should_stop)
+        posterior = model.posterior(rest, 0.0, should_stop)
         loaded = Loaded(at_ns, model, rest, checks)
     return loaded, posterior
 
@@ -289,5 +289,5 @@ def advice(loaded: Loaded, occupancy: OccupancyMap | None, count: int) -> tuple[
     places = free_of(tags, over)
     if not len(places):
         return ()
-    posterior = Posterior(loaded.model, loaded.readings)
+    posterior = loaded.model.posterior(loaded.readings, 0.0)
     return tuple(posterior.advice(places, count, over=over))

@@ -16,7 +16,6 @@ import numpy as np  # its threads are counted when it is loaded
 from lupin_twin.estimate.engine import thinned
 from lupin_twin.estimate.kernel import Readings
 from lupin_twin.estimate.model import fit
-from lupin_twin.estimate.posterior import Cells
 from lupin_twin.field.idw import compute_idw_field
 from tests.bench.bench_estimate import INTERVAL_SDS, RULES, rmse
 from tests.bench.other_worlds import DAY_S, HOUR_S, Floats
@@ -94,7 +93,7 @@ def judged(tags: int, metres: float, seed: int, phase: str) -> list[float]:
         max_distance_m=RULES.max_distance_m,
         power=RULES.idw_power,
     ).values.ravel()
-    grid = fit(readings).posterior(readings, silent_s).grid(Cells(**box, resolution=cell_m))
+    grid = fit(readings).posterior(readings, silent_s).grid(**box, resolution=cell_m)
     centres = (np.arange(CELLS) + 0.5) * cell_m
     places = np.stack(np.meshgrid(centres, centres), axis=-1).reshape(-1, 2)
     true = truth(places, np.full(len(places), silent_s))

@@ -10,7 +10,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from lupin_twin.estimate.engine import thinned
 from lupin_twin.estimate.model import fit
-from lupin_twin.estimate.posterior import Cells, Posterior
+from lupin_twin.estimate.posterior import Posterior
 from lupin_twin.field.idw import FieldSample, compute_idw_field
 from tests.support.estimates import DAY_S, many_tags
 
@@ -65,7 +65,7 @@ def costs(tags: int, each: int, metres: float, side: int) -> list[float]:
 
     load_ms, posterior = best(load, 3)
     times = 7 if tags < 1_000 else 1
-    grid_ms, _ = best(partial(posterior.grid, Cells(**box, resolution=resolution)), times)
+    grid_ms, _ = best(partial(posterior.grid, **box, resolution=resolution), times)
     checks_ms, _ = best(posterior.changes, 1)
     return [idw_ms, fit_ms, load_ms, grid_ms, checks_ms]
 

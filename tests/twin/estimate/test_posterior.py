@@ -23,7 +23,7 @@ BOX = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": 4.0, "bbox_max_y": 8.
 def test_a_grid_is_its_cells_centres(resolution: float, tags: int) -> None:
     day = a_day(tags=tags, passes=4)
     posterior = fit(day).posterior(day, DAY_S)
-    grid = posterior.grid(Cells(**BOX, resolution=resolution))
+    grid = posterior.grid(**BOX, resolution=resolution)
     assert grid.mean.shape == grid.sd.shape == grid.known.shape == (grid.height, grid.width)
     mean, sd, x, y = beside(posterior, grid)
     assert grid.mean[y, x] == pytest.approx(mean, rel=1e-5)
@@ -38,7 +38,7 @@ def test_a_fine_grid_is_interpolated_and_off_by_little(length: float) -> None:
     model = fit(day)
     model = replace(model, hyper=model.hyper._replace(l=length))
     posterior = model.posterior(day, DAY_S)
-    grid = posterior.grid(Cells(**BOX, resolution=0.02))
+    grid = posterior.grid(**BOX, resolution=0.02)
     mean, sd, x, y = beside(posterior, grid)
     assert (np.abs(grid.mean[y, x] - mean) <= 0.1 * sd).all()
     assert grid.sd[y, x] == pytest.approx(sd, rel=0.15)
@@ -50,7 +50,7 @@ def test_a_fine_grid_is_interpolated_and_off_by_little(length: float) -> None:
 def test_a_lattice_is_never_coarser_than_a_fifth_of_the_length(
     side_m: float, length: float
 ) -> None:
-    x, y = Cells(0.0, 0.0, side_m, side_m, side_m / 2_000).lattice(length)
+    x, y = Cells.of(0.0, 0.0, side_m, side_m, side_m / 2_000).lattice(length)
     assert max(np.diff(x).max(), np.diff(y).max()) <= max(length / 5.0, side_m / 2_000) + 1e-9
 
 
@@ -89,7 +89,7 @@ def test_of_more_readings_than_can_be_solved_at_once_the_nearest_say_nearly_the_
     assert off.max() < 1.0
     assert off.mean() < 0.3
     assert 0.9 < (sd / exact_sd).min() <= (sd / exact_sd).max() < 1.5
-    grid = near.grid(Cells(0.0, 0.0, 12.0, 12.0, 0.5))
+    grid = near.grid(bbox_min_x=0, bbox_min_y=0, bbox_max_x=12, bbox_max_y=12, resolution=0.5)
     centres = np.stack(np.meshgrid(*[(np.arange(24) + 0.5) / 2.0] * 2), axis=-1)
     assert grid.mean == pytest.approx(near.points(centres)[0].reshape(24, 24), rel=1e-5)
 

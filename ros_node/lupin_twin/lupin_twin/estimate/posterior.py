@@ -56,22 +56,27 @@ class EstimateGrid(CellGrid):
     sd_known: float
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class Cells:
-    """The cells of a grid over a box: centres `x` and `y`, lower corner, size; m."""
+    """The cells of a grid: centres `x` and `y`, lower corner, size; m."""
 
-    def __init__(
-        self,
-        bbox_min_x: float,
-        bbox_min_y: float,
-        bbox_max_x: float,
-        bbox_max_y: float,
-        resolution: float,
-    ) -> None:
-        width, height = grid_dimensions(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
-        self.x = cell_centres(bbox_min_x, width, resolution)
-        self.y = cell_centres(bbox_min_y, height, resolution)
-        self.origin_x, self.origin_y = float(bbox_min_x), float(bbox_min_y)
-        self.resolution = float(resolution)
+    x: FloatArray
+    y: FloatArray
+    origin_x: float
+    origin_y: float
+    resolution: float
+
+    @classmethod
+    def of(cls, min_x: float, min_y: float, max_x: float, max_y: float, resolution: float) -> Cells:
+        """Of a box, m."""
+        width, height = grid_dimensions(min_x, min_y, max_x, max_y, resolution)
+        return cls(
+            cell_centres(min_x, width, resolution),
+            cell_centres(min_y, height, resolution),
+            float(min_x),
+            float(min_y),
+            float(resolution),
+        )
 
     def lattice(self, length: float) -> tuple[FloatArray, FloatArray]:
         """Where along x and y, m, to compute what changes over `length`, m.
@@ -179,12 +184,21 @@ class Posterior:
                 mean[some], variance[some] = solved.moments(solved.near(places[some]))
         return self._in_unit(mean, variance)
 
-    def grid(self, cells: Cells) -> EstimateGrid:
-        """The estimate on a grid of cells, as GetField has it.
+    def grid(
+        self,
+        *,
+        bbox_min_x: float,
+        bbox_min_y: float,
+        bbox_max_x: float,
+        bbox_max_y: float,
+        resolution: float,
+    ) -> EstimateGrid:
+        """The estimate on a grid of cells, as GetField has it. Box and resolution are metres.
 
         Fine grids are interpolated between places that are no farther apart than a fifth of the
         length over which the truth changes.
         """
+        cells = Cells.of(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
         x, y = cells.lattice(self.hyper.l)
         if self._is_exact:
             solved, parts = self._whole, []

@@ -30,7 +30,7 @@ from lupin_twin.estimate.engine import (
 )
 from lupin_twin.estimate.kernel import MAX_PER_TAG, Readings
 from lupin_twin.estimate.model import FitFailed, Model, fit
-from lupin_twin.estimate.posterior import Cells, Posterior
+from lupin_twin.estimate.posterior import Posterior
 from lupin_twin.field.engine import FieldRefused, check_sensor_type
 from lupin_twin.field.explored import OccupancyMap, floor, free_of
 from lupin_twin.field.idw import never
@@ -177,7 +177,7 @@ def estimate_at(
     """
     try:
         loaded, posterior = load(pasts, request.at_ns, day_length_s, should_stop)
-        grid = posterior.grid(Cells(**request.box.cells))
+        grid = posterior.grid(**request.box.cells)
     except (FitFailed, np.linalg.LinAlgError) as error:
         raise FieldRefused(f"these readings cannot be computed with: {error}") from error
     return Estimate(grid, len(np.unique(loaded.readings.tag)), len(loaded.readings))

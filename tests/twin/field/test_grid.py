@@ -77,7 +77,9 @@ def test_part_of_a_cell_is_a_cell(tenths: int, cells: int, part: float, through:
     assert width == cells + 1
 
 
-@pytest.mark.parametrize(("extent", "resolution"), [(1000.0, 1e-9), (3.4e38, 1e-45)])
+@pytest.mark.parametrize(
+    ("extent", "resolution"), [(1000.0, 1e-9), (3.4e38, 1e-45), (1e308, 5e-324), (1.7e308, 1e-3)]
+)
 def test_bombs_have_exact_dimensions(extent: float, resolution: float) -> None:
     dimensions = grid_dimensions(0.0, -extent, extent, extent, resolution)
     assert [type(number) for number in dimensions] == [int, int]

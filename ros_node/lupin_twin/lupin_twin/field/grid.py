@@ -13,8 +13,9 @@ page has the same rule (`domain/farOff.ts`). Both are held to `tests/twin/far_of
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from fractions import Fraction
 from statistics import median_low
 from typing import Final
 
@@ -25,6 +26,7 @@ from lupin_twin.core.parameters import FARTHEST_M
 from lupin_twin.core.state import TagState
 
 _FLOAT32_MANTISSA_BITS: Final = 24
+_FLOAT64_NOISE_ULPS: Final = 4
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -66,9 +68,9 @@ def grid_dimensions(
     """(width, height) in cells: each `max(1, ceil(extent / resolution))`, float noise apart.
 
     Box and resolution are metres. An exact multiple stays one although its numbers were rounded:
-    1.1 m at 0.1 m is 11 cells, not 12, near the origin or far from it, also of numbers that went
-    through float32, as GetField's do. The result may be too large to allocate, which is for the
-    caller to refuse.
+    1.1 m at 0.1 m is 11 cells, not 12, near the origin or far from it, whether the numbers are
+    float64 or went through float32 as GetField's do (which shows: none has a digit more). The
+    result may be too large to allocate, which is for the caller to refuse; it never overflows.
 
     Raises:
         ValueError: a number that is not finite, a resolution that is not positive, or an inverted
@@ -83,7 +85,15 @@ def grid_dimensions(
         raise ValueError(f"resolution is {resolution} m, must be greater than 0")
     _check_side("x", low_x, high_x)
     _check_side("y", low_y, high_y)
-    return _cells_along(low_x, high_x, resolution), _cells_along(low_y, high_y, resolution)
+    noise = (
+        _noise_of_float32
+        if all(map(_fits_float32, (low_x, low_y, high_x, high_y, resolution)))
+        else _noise_of_float64
+    )
+    return (
+        _cells_along(low_x, high_x, resolution, noise),
+        _cells_along(low_y, high_y, resolution, noise),
+    )
 
 
 def _check_side(axis: str, low: float, high: float) -> None:
@@ -95,18 +105,33 @@ def _check_side(axis: str, low: float, high: float) -> None:
         )
 
 
-def _cells_along(low: float, high: float, resolution: float) -> int:
+def _cells_along(
+    low: float, high: float, resolution: float, noise: Callable[[float], float]
+) -> int:
     quotient = (high - low) / resolution
+    if math.isinf(quotient):
+        # Past float64: exact arithmetic still names the size, so that a limit can be held to it.
+        return math.ceil((Fraction(high) - Fraction(low)) / Fraction(resolution))
     nearest = round(quotient)
-    slack = (_noise(low) + _noise(high) + quotient * _noise(resolution)) / resolution
+    slack = (noise(low) + noise(high) + quotient * noise(resolution)) / resolution
     if abs(quotient - nearest) <= slack:
         return max(1, nearest)
     return max(1, math.ceil(quotient))
 
 
-def _noise(number: float) -> float:
+def _fits_float32(number: float) -> bool:
+    mantissa, _ = math.frexp(number)
+    return math.ldexp(mantissa, _FLOAT32_MANTISSA_BITS).is_integer()
+
+
+def _noise_of_float32(number: float) -> float:
     """How far `number` may be off if it was rounded to float32: a unit in its last place."""
     return math.ldexp(1.0, math.frexp(number)[1] - _FLOAT32_MANTISSA_BITS) if number else 0.0
+
+
+def _noise_of_float64(number: float) -> float:
+    """How far a few operations in float64 may have moved `number`."""
+    return _FLOAT64_NOISE_ULPS * math.ulp(number)
 
 
 def cell_centres(low: float, count: int, resolution: float) -> FloatArray:

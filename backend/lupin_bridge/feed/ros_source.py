@@ -39,6 +39,7 @@ from lupin_twin.adapt.config import POSES
 from lupin_twin.adapt.messages import message_type
 from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.drops import Drop, Reason
+from lupin_twin.core.parameters import FARTHEST_M
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Scan
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.ros import convert, message_limits
@@ -52,8 +53,6 @@ ValueT = TypeVar("ValueT", Position, Plan, Battery)
 MAX_POSES: Final = 5_000
 # What is shown of it: a frame holds it whole.
 SHOWN_POINTS: Final = 60
-# Farther is no greenhouse, m.
-FARTHEST_M: Final = 1e6
 
 # CDR (OMG DDS-XTypes, 7.4): four bytes say how, numbers lie at multiples of their size behind them.
 _CDR_HEADER_BYTES: Final = 4
@@ -247,10 +246,8 @@ def _stamp_ns(message: Any, now_ns: int | None) -> int | Drop:
 
 
 def _position(topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Position | Drop:
-    at = message
     assert topic.how is not None
-    for part in POSES[topic.how[0]].split("."):
-        at = getattr(at, part)
+    at = POSES[topic.how[0]](message)
     x, y, turned = at.position.x, at.position.y, at.orientation
     if not _is_near(x, y):
         return Drop(Reason.POSE, f"its position is ({x:g}, {y:g}) m")

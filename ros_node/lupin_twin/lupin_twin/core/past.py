@@ -267,8 +267,6 @@ class WritesRequest:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be answered."""
-        if self.after < 0 or self.reach_count < 0:
-            raise PastRefused(f"after or reach_count is {min(self.after, self.reach_count)}, not 0")
         if self.after > MAX_NUMBER:
             raise PastRefused(f"after is {self.after}, the limit is {MAX_NUMBER}")
         if not 0.0 <= self.reach_s <= 1e9:

@@ -12,6 +12,7 @@ from lupin_msgs.srv import GetEstimate, GetEstimateReport
 
 from lupin_twin.core.diagnostics import OK, WARN, Finding, shown
 from lupin_twin.core.interfaces import GET_ESTIMATE, GET_ESTIMATE_REPORT
+from lupin_twin.core.past import check_moment
 from lupin_twin.core.state import TwinStore
 from lupin_twin.estimate.engine import (
     MAX_TAGS,
@@ -95,11 +96,11 @@ class EstimateService:
         """What is to be done for an estimate.
 
         Raises:
-            FieldRefused: a bad request.
+            FieldRefused, PastRefused: a bad request.
 
         """
         now_ns, day_s = self.now_ns(), self.day_length_s
-        request.check(now_ns, self.max_grid_cells)
+        check_moment(request.at_ns, now_ns)
         cost = AS_OF * cost_s(request, min(MAX_TAGS, self.store.size[0]), self.max_grid_cells)
 
         def make(found: Sequence[TagPast], should_stop: ShouldStop) -> Estimate:

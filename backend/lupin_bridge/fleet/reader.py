@@ -180,10 +180,9 @@ class ArchiveRecall(Recall):
                 self._idle.append(connection)
                 raise
         except ArchiveError as error:
-            raise NotRemembered(str(error), is_lasting=False) from error
+            raise NotRemembered(str(error)) from error
         except DamagedFile as error:
-            why = f"rows of the site cannot be read: {error}"
-            raise NotRemembered(why, is_lasting=False) from error
+            raise NotRemembered(f"rows of the site cannot be read: {error}") from error
         self._idle.append(connection)
         return answer
 

@@ -25,7 +25,7 @@ from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.notes import Note, NotesUnwritable
 from lupin_twin.core.parameters import TwinParameters, World
-from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.past import NotFound, NotRemembered
 from lupin_twin.core.state import same_tags
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
@@ -299,7 +299,7 @@ class SiteTwin(TwinSource):
 
     async def estimate_report(self, request: ReportRequest) -> Report:  # noqa: ARG002  # none
         """None: how right estimates were is counted by the twin."""
-        raise NotRemembered(_NO_REPORT, is_lasting=True)
+        raise NotFound(_NO_REPORT)
 
     writes_notes = True
 

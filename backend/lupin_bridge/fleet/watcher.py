@@ -351,7 +351,7 @@ class WatchChild(Child):
             if self._watcher is not None:
                 self._watcher.connection.close()
                 self._watcher = None
-            raise NotRemembered(str(error), is_lasting=False) from error
+            raise NotRemembered(str(error)) from error
 
 
 class _WithoutJournal(Recall):

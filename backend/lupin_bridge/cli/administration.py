@@ -66,7 +66,7 @@ from lupin_bridge.settings import (
     variable,
 )
 from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
-from lupin_twin.runtime.process import INTERRUPTED, USAGE_ERROR
+from lupin_twin.runtime.process import USAGE_ERROR
 
 ARCHIVE_ACTIONS: Final[Mapping[str, str]] = {
     "init": "make its tables and roles, in a database that has none of them",
@@ -120,8 +120,6 @@ def run_archive(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
         if options.role == "forward":
             return _forward(options, environ, url)
         return _archive(options, url)
-    except KeyboardInterrupt:
-        return INTERRUPTED
     except UsageError as error:
         say(str(error))
         return USAGE_ERROR
@@ -263,8 +261,6 @@ def run_people(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
         if options.action == "add":
             return _add(path, options)
         return _remove(path, options) if options.action != "list" else _list(path, options)
-    except KeyboardInterrupt:
-        return INTERRUPTED
     except BrokenPipeError:
         return 0
     except (AccountError, SettingError, CannotWrite) as error:

@@ -41,7 +41,6 @@ from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock, Run, runs, span_at
 from lupin_twin.journal.schema import FILE_ERRORS, open_named
-from lupin_twin.runtime.process import INTERRUPTED
 
 _REPORT_EVERY: Final = 20_000
 # Characters of a line; a field of the csv module has 131,072 at most.
@@ -318,8 +317,6 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     """Look through the file, and with `--write` import it; returns the process's exit code."""
     try:
         return _run(options, path_of(options, environ, may_be_new=True))
-    except KeyboardInterrupt:
-        return INTERRUPTED
     except ConfigError as error:
         return fail(f"{options.columns}: {error}")
     except (UnicodeDecodeError, csv.Error) as error:

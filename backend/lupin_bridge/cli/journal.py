@@ -159,8 +159,6 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
             code = {"info": _info, "check": _check, "vacuum": _vacuum}[options.action](path)
     except BrokenPipeError:  # the reader has closed it
         return FAILED
-    except KeyboardInterrupt:
-        return INTERRUPTED
     except SHOWN as error:
         return fail(str(error))
     except (*FILE_ERRORS, OSError) as error:

@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing, suppress
 from pathlib import Path
-from typing import Final, TextIO, TypeAlias
+from typing import Any, Final, TextIO, TypeAlias
 
 from lupin_twin.runtime.process import discard_output
 
@@ -80,9 +80,9 @@ FAILED: Final = 1
 Roles: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # noqa: SLF001
 
 
-def add_role(roles: Roles, role: str, text: str) -> argparse.ArgumentParser:
+def add_role(roles: Roles, role: str, text: str, **more: Any) -> argparse.ArgumentParser:
     """Add a role without abbreviations: what one means would change with the next option."""
-    return roles.add_parser(role, help=text, description=text, allow_abbrev=False)
+    return roles.add_parser(role, help=text, description=text, allow_abbrev=False, **more)
 
 
 def add_actions(

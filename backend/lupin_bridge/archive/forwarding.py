@@ -37,7 +37,7 @@ from lupin_bridge.archive.database import (
 )
 from lupin_bridge.archive.source import Batch, Epoch, Row, Source, arrival_of
 from lupin_bridge.feed.shared_work import end
-from lupin_bridge.settings import SettingError, Settings, option, variable
+from lupin_bridge.settings import Settings, option, variable
 from lupin_twin.journal.retention import DAY_NS, RECORD
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, SiteLog
 
@@ -313,12 +313,11 @@ def check(settings: Settings, role: str) -> None:
     given = [name for name in ("site", "archive_url") if getattr(settings, name)]
     if not given:
         return
-    called = settings.called(given[0])
     if role == "web":
-        raise SettingError(f"{called} is for the twin, not for lupin-twin web")
+        raise settings.wrong(given[0], "is for the twin, not for lupin-twin web")
     if len(given) == 1:
         (other,) = {"site", "archive_url"} - {*given}
-        raise SettingError(f"{called} is given without {option(other)}, an archive needs both")
+        raise settings.wrong(given[0], f"is given without {option(other)}, an archive needs both")
     check_site(settings.site)
     check_url(settings.archive_url)
 

@@ -254,7 +254,7 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
 def run_people(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     """Run the action; returns the process's exit code."""
     try:
-        given = {} if options.accounts is None else {"accounts": options.accounts}
+        given = {"accounts": options.accounts}
         path = accounts_path(settings_from(given, environ, options.config))
         if options.role == "audit":
             return _audit(path)

@@ -248,11 +248,7 @@ def _play_args(options: argparse.Namespace) -> list[str]:
 
 def _settings_from(options: argparse.Namespace) -> Settings:
     given = {spec.name: getattr(options, spec.name) for spec in table()}
-    return settings_from(
-        {name: value for name, value in given.items() if value is not None},
-        os.environ,
-        options.config,
-    )
+    return settings_from(given, os.environ, options.config)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -287,10 +283,7 @@ def parser() -> argparse.ArgumentParser:
                     f"(default: {spec.default or 'none'})",
                 )
     for role, text in ROLES.items():
-        # No abbreviations: what one means would change with the next setting.
-        own = roles.add_parser(
-            role, parents=[common], help=text, description=text, allow_abbrev=False
-        )
+        own = add_role(roles, role, text, parents=[common])
         if role == "demo":
             for name, (kind, help_text) in PATROL_OPTIONS.items():
                 own.add_argument(f"--{name}", type=kind, metavar=name.upper(), help=help_text)

@@ -333,7 +333,7 @@ def _export(path: Path, options: argparse.Namespace, environ: Mapping[str, str])
         raise JournalError(f"--to is {seconds(end_ns)}, before --from, {seconds(start_ns)}")
     if options.recording is not None:
         return _record(path, options, start_ns, end_ns)
-    given = {} if options.sensors is None else {"sensors": options.sensors}
+    given = {"sensors": options.sensors}
     sensors = Criteria.of(settings_from(given, environ, options.config)).sensors
     with closing(_reader(path)) as connection:
         lots = rows(connection, start_ns, end_ns, options.tag, options.sensor)

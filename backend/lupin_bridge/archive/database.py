@@ -67,7 +67,7 @@ class UsageError(ArchiveError, SettingError):
     """Asked for in a way that can never work: no later try helps."""
 
 
-def check_site(site: str) -> None:
+def check_site(called: str, site: str) -> None:
     """Whether it may be a site's name, which its user in the database has too.
 
     Raises:
@@ -76,7 +76,7 @@ def check_site(site: str) -> None:
     """
     if not _SITE.fullmatch(site):
         raise UsageError(
-            f"--site is {site[:64]!r}, expected a-z, 0-9, _ and - after a letter, 63 at most"
+            f"{called} is {site[:64]!r}, expected a-z, 0-9, _ and - after a letter, 63 at most"
         )
 
 

@@ -234,7 +234,7 @@ class Forwarder:
     def __init__(
         self, url: str, site: str, path: Callable[[], Path], say: Callable[[str], None]
     ) -> None:
-        check_site(site)
+        check_site("--site", site)
         check_url(url)
         self._url = url
         self._site = site
@@ -318,7 +318,7 @@ def check(settings: Settings, role: str) -> None:
     if len(given) == 1:
         (other,) = {"site", "archive_url"} - {*given}
         raise settings.wrong(given[0], f"is given without {option(other)}, an archive needs both")
-    check_site(settings.site)
+    check_site(settings.called("site"), settings.site)
     check_url(settings.archive_url)
 
 

@@ -20,7 +20,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, Final
 
-from lupin_bridge.access.accounts import Accounts, accounts_path, digest, make_file
+from lupin_bridge.access.accounts import Accounts, accounts_path, make_file
 from lupin_bridge.access.credentials import (
     ROLES,
     TOKEN_ROLES,
@@ -28,13 +28,14 @@ from lupin_bridge.access.credentials import (
     Kind,
     check_name,
     check_password,
-    check_site,
+    digest,
 )
 from lupin_bridge.access.people import hashed
 from lupin_bridge.archive.database import (
     ArchiveError,
     UsageError,
     check,
+    check_site,
     check_version,
     connect,
     explaining,
@@ -270,7 +271,7 @@ def run_people(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
 def _add(path: Path, options: argparse.Namespace) -> int:
     check_name(options.name)
     for site in options.for_site:
-        check_site(site)
+        check_site("--for-site", site)
     kind, token = _WHAT[options.role], ""
     if options.role == "token":
         token = secrets.token_urlsafe(32)

@@ -17,6 +17,7 @@ from datetime import UTC, datetime, timedelta
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
+from lupin_bridge.console import CommandError
 from lupin_bridge.settings import SettingError, variable
 from lupin_twin.journal.schema import POSTGRESQL_TABLES
 
@@ -59,8 +60,8 @@ _MAX_MS: Final = 10_000
 _SITE: Final = re.compile(r"[a-z][a-z0-9_-]{0,62}")
 
 
-class ArchiveError(Exception):
-    """What cannot be done with the archive; the message is the one line that says why."""
+class ArchiveError(CommandError):
+    """What cannot be done with the archive."""
 
 
 class UsageError(ArchiveError, SettingError):

@@ -36,6 +36,7 @@ from lupin_bridge.archive.database import (
     place_of,
 )
 from lupin_bridge.archive.source import Batch, Epoch, Row, Source, arrival_of
+from lupin_bridge.console import CommandError
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.settings import Settings, option, variable
 from lupin_twin.journal.retention import DAY_NS, RECORD
@@ -264,7 +265,7 @@ class Forwarder:
                 raise ArchiveError(f"the journal {path} cannot be forwarded: {error}") from error
         except UsageError:
             raise
-        except ArchiveError as error:
+        except CommandError as error:
             if str(error) != self._told:
                 self._told = str(error)
                 again = "" if once else "; it will be retried"

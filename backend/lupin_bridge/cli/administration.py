@@ -17,6 +17,7 @@ import threading
 import time
 from collections.abc import Mapping
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -32,7 +33,6 @@ from lupin_bridge.access.credentials import (
 )
 from lupin_bridge.access.people import hashed
 from lupin_bridge.archive.database import (
-    ArchiveError,
     UsageError,
     check,
     check_site,
@@ -49,7 +49,7 @@ from lupin_bridge.archive.forwarding import Forwarder
 from lupin_bridge.cli import journal
 from lupin_bridge.console import (
     FAILED,
-    CannotWrite,
+    CommandError,
     Roles,
     add_actions,
     add_role,
@@ -124,7 +124,7 @@ def run_archive(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     except UsageError as error:
         say(str(error))
         return USAGE_ERROR
-    except ArchiveError as error:
+    except CommandError as error:
         return journal.fail(str(error))
 
 
@@ -175,13 +175,8 @@ def _forward(options: argparse.Namespace, environ: Mapping[str, str], url: str) 
         os.nice(_NICENESS)
         threading.Thread(target=_end_with_input, name="end", daemon=True).start()
 
-    def path() -> Path:
-        # It may be about to be made.
-        try:
-            return journal.path_of(options, environ)
-        except journal.JournalError as error:
-            raise ArchiveError(str(error)) from error
-
+    # Looked for each time: it may be about to be made.
+    path = partial(journal.path_of, options, environ)
     forwarder = Forwarder(url, _given(options, environ, "site"), path, say)
     return 0 if forwarder.run(once=options.once) else FAILED
 
@@ -264,7 +259,7 @@ def run_people(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
         return _remove(path, options) if options.action != "list" else _list(path, options)
     except BrokenPipeError:
         return 0
-    except (AccountError, SettingError, CannotWrite) as error:
+    except (AccountError, SettingError, CommandError) as error:
         return journal.fail(str(error))
 
 

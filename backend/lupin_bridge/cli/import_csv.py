@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any, Final, TextIO
 from zoneinfo import ZoneInfo
 
-from lupin_bridge.cli.journal import SHOWN, JournalError, add_which, fail, path_of
-from lupin_bridge.console import Progress, Roles, add_role, say, tell
+from lupin_bridge.cli.journal import SHOWN, add_which, fail, path_of
+from lupin_bridge.console import CommandError, Progress, Roles, add_role, say, tell
 from lupin_bridge.judge.judging import zone_of
 from lupin_twin.adapt.config import place_of, read_yaml
 from lupin_twin.adapt.table import (
@@ -395,7 +395,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
             known = runs(connection.execute)
             placed = {tag for (tag,) in connection.execute("SELECT DISTINCT tag FROM place")}
         if any(run.begun.is_simulated for run in known):
-            raise JournalError(f"the journal {path} is of a simulation: import into another")
+            raise CommandError(f"the journal {path} is of a simulation: import into another")
         while batch := list(islice(found, _BATCH)):
             count += len(batch)
             if not known:
@@ -418,7 +418,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
             written, refused = file.append(rows)
             new += written
             if refused:
-                raise JournalError(f"{refused} rows could not be written into {path}")
+                raise CommandError(f"{refused} rows could not be written into {path}")
         for run in known[-1:]:
             # A tag's place holds from before its first reading on, and the first one stays.
             file.append(

@@ -104,12 +104,10 @@ class Watching:
         self._ahead_ns = news.now_ns - time.monotonic_ns()
         if not self.archive.is_reachable:
             log.info("the archive is read")
-        elif not (news.sites or news.gone):
+        elif not news.changed and len(news.names) == len(self.sites):
             return
-        known = {} if news.is_whole else self.sites
-        sites = {name: site for name, site in known.items() if name not in news.gone}
-        sites |= {site.site: site for site in news.sites}
-        self.sites = dict(sorted(sites.items()))
+        known = {**self.sites, **{site.site: site for site in news.changed}}
+        self.sites = {name: known[name] for name in sorted(news.names)}
         self.archive = Archive(is_reachable=True)
         self._on_news()
 

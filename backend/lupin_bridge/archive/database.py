@@ -125,14 +125,10 @@ def connect(url: str, name: str, session: str = "read-write") -> psycopg.Connect
     """
     said = check_url(url)
     import psycopg  # noqa: PLC0415
-    from psycopg import conninfo  # noqa: PLC0415
 
     with explaining():
         connection = psycopg.connect(
-            conninfo.make_conninfo(
-                "",
-                **{**_LINK, "target_session_attrs": session, "application_name": name, **said},
-            ),
+            **{**_LINK, "target_session_attrs": session, "application_name": name, **said},
             autocommit=True,
         )
         connection.execute(_SESSION)

@@ -172,19 +172,17 @@ class ArchiveRecall(Recall):
             connection = self._connection()
             try:
                 with explaining(), connection.transaction():
-                    answer = question(connection, is_abandoned)
+                    return question(connection, is_abandoned)
             except ArchiveError:
                 connection.close()
                 raise
-            except BaseException:
-                self._idle.append(connection)
-                raise
+            finally:
+                if not connection.closed:
+                    self._idle.append(connection)
         except ArchiveError as error:
             raise NotRemembered(str(error)) from error
         except DamagedFile as error:
             raise NotRemembered(f"rows of the site cannot be read: {error}") from error
-        self._idle.append(connection)
-        return answer
 
     def _connection(self) -> Any:
         with suppress(IndexError):  # there is none

@@ -259,7 +259,7 @@ class SiteTwin(TwinSource):
             # Of what was read: the same in all replicas.
             f"{self.site}-{self._seq}-{self._map_hash}",
             occupancy_map=self._map,
-            journal=self._condition(reported),
+            journal=self.journal(),
             rules=self.rules,
             origin=reported.world.origin,
             input_problems=(problem,) if problem else (),
@@ -273,9 +273,11 @@ class SiteTwin(TwinSource):
         goes_on = reported.is_walls or self._is_live
         return reported.snapshot.stamp_ns + (passed_ns if goes_on else 0)
 
-    def _condition(self, reported: Reported | None) -> Condition:
-        """As a journal's; its path is the site."""
-        site = self._site
+    # --- see `TwinSource` ---------------------------------------------------------------------
+
+    def journal(self) -> Condition:
+        """The site's log, whose path is the site."""
+        site, reported = self._site, self._reported
         complete_ns = None
         if reported is not None:
             complete_ns = site.heard_ns if reported.is_walls else reported.snapshot.stamp_ns
@@ -288,12 +290,6 @@ class SiteTwin(TwinSource):
             kept_ns=() if reported is None else reported.kept_ns,
             journal_id=self.site,
         )
-
-    # --- see `TwinSource` ---------------------------------------------------------------------
-
-    def journal(self) -> Condition:
-        """The site's log."""
-        return self._condition(self._reported)
 
     async def estimate_report(self, request: ReportRequest) -> Report:  # noqa: ARG002  # none
         """None: how right estimates were is counted by the twin."""
@@ -315,10 +311,10 @@ class SiteTwin(TwinSource):
         if reported is None:
             raise TwinUnavailableError(f"the site has not been read yet. {self._problem}".strip())
         now_ns = self._now_ns(reported)
-        return Now(now_ns, self._parameters.frame_id, self._condition(reported))
+        return Now(now_ns, self._parameters.frame_id, self.journal())
 
     async def _reading(self, question: Any) -> Any:
-        about = Now(0, self._parameters.frame_id, self._condition(None))
+        about = Now(0, self._parameters.frame_id, self.journal())
         return await self.past.ask(question, about, 0.0)
 
 

@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from lupin_bridge.access.accounts import Accounts, accounts_path, make_file
 from lupin_bridge.access.credentials import (
@@ -138,36 +138,31 @@ def _given(options: argparse.Namespace, environ: Mapping[str, str], name: str) -
 
 
 def _archive(options: argparse.Namespace, url: str) -> int:
-    name = f"lupin-twin archive {options.action}"
-    with closing(connect(url, name)) as connection, explaining():
-        return _act(options, connection, place_of(url))
-
-
-def _act(options: argparse.Namespace, connection: Any, place: str) -> int:
-    action = options.action
-    if action == "init":
-        init(connection)
-        tell(f"{place}: the archive is made")
-        return 0
-    if action == "migrate":
-        migrate(connection)
-        tell(f"{place}: the archive is up to date")
-        return 0
-    check_version(connection)
-    if action == "info":
-        tell(*overview(connection))
-        return 0
-    if action == "retain":
-        if not 0 < options.days <= MAX_JOURNAL_DAYS:
-            raise UsageError(
-                f"--days is {options.days:g}, expected more than 0, {MAX_JOURNAL_DAYS:g} at most"
-            )
-        gone = list(retain(connection, options.days, options.site))
-        tell(*(f"deleted {line}" for line in gone or ["nothing"]))
-        return 0
-    wrong = check(connection)
-    tell(*wrong, f"{place} is {'wrong as stated above' if wrong else 'whole'}")
-    return FAILED if wrong else 0
+    action, place = options.action, place_of(url)
+    if action == "retain" and not 0 < options.days <= MAX_JOURNAL_DAYS:
+        raise UsageError(
+            f"--days is {options.days:g}, expected more than 0, {MAX_JOURNAL_DAYS:g} at most"
+        )
+    with closing(connect(url, f"lupin-twin archive {action}")) as connection, explaining():
+        if action == "init":
+            init(connection)
+            tell(f"{place}: the archive is made")
+            return 0
+        if action == "migrate":
+            migrate(connection)
+            tell(f"{place}: the archive is up to date")
+            return 0
+        check_version(connection)
+        if action == "info":
+            tell(*overview(connection))
+            return 0
+        if action == "retain":
+            gone = list(retain(connection, options.days, options.site))
+            tell(*(f"deleted {line}" for line in gone or ["nothing"]))
+            return 0
+        wrong = check(connection)
+        tell(*wrong, f"{place} is {'wrong as stated above' if wrong else 'whole'}")
+        return FAILED if wrong else 0
 
 
 def _forward(options: argparse.Namespace, environ: Mapping[str, str], url: str) -> int:

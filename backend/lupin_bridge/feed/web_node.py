@@ -291,4 +291,4 @@ def check_ok(response: Any) -> None:
     error = error_of(response.error_message)
     if isinstance(error, PastRefused):
         raise FieldRefused(str(error))
-    raise error if error.is_lasting else TwinUnavailableError(str(error))
+    raise TwinUnavailableError(str(error))

@@ -27,7 +27,7 @@ from lupin_bridge.query_string import Name, OfPeriod, OfReport, Parameters, need
 from lupin_bridge.serving.admission import Answer, json_answer
 from lupin_bridge.stream.state_json import note_json, stamp
 from lupin_twin.core.notes import WITHDRAW, WITHDRAWN, Note
-from lupin_twin.core.past import HOUR_NS, Event, Grid, NotRemembered, PastRefused, grid, seconds
+from lupin_twin.core.past import HOUR_NS, Event, Grid, NotFound, PastRefused, grid, seconds
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
 MAX_SITES: Final = 50
@@ -136,7 +136,7 @@ def compare(
     """The query of `/api/compare`; `known` has the names of all sites.
 
     Raises:
-        NotRemembered: see `chosen`.
+        NotFound: see `chosen`.
         PastRefused: see `OfPeriod.span`; too many sites, too long a period, a derived quantity.
 
     """
@@ -163,7 +163,7 @@ def chosen(text: str | None, known: Mapping[str, object]) -> list[str]:
     """The sites that are named with commas between them; all, if none is.
 
     Raises:
-        NotRemembered: one is not in the archive.
+        NotFound: one is not in the archive.
 
     """
     if text is None:
@@ -172,7 +172,7 @@ def chosen(text: str | None, known: Mapping[str, object]) -> list[str]:
     for name in names:
         if name not in known:
             why = f"there is no site {name[:64]!r} in the archive ({len(known)} others are)"
-            raise NotRemembered(why, is_lasting=True)
+            raise NotFound(why)
     return names
 
 
@@ -298,7 +298,7 @@ def sites_report(parameters: Parameters, known: Mapping[str, Any], now_ns: int) 
     """The query of `/api/report`; `known` has all sites.
 
     Raises:
-        NotRemembered: see `chosen`.
+        NotFound: see `chosen`.
         PastRefused: see `query_string.report`.
 
     """

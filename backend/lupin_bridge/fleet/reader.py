@@ -172,20 +172,17 @@ class ArchiveRecall(Recall):
             connection = self._connection()
             try:
                 with explaining(), connection.transaction():
-                    answer = question(connection, is_abandoned)
+                    return question(connection, is_abandoned)
             except ArchiveError:
                 connection.close()
                 raise
-            except BaseException:
-                self._idle.append(connection)
-                raise
+            finally:
+                if not connection.closed:
+                    self._idle.append(connection)
         except ArchiveError as error:
-            raise NotRemembered(str(error), is_lasting=False) from error
+            raise NotRemembered(str(error)) from error
         except DamagedFile as error:
-            why = f"rows of the site cannot be read: {error}"
-            raise NotRemembered(why, is_lasting=False) from error
-        self._idle.append(connection)
-        return answer
+            raise NotRemembered(f"rows of the site cannot be read: {error}") from error
 
     def _connection(self) -> Any:
         with suppress(IndexError):  # there is none

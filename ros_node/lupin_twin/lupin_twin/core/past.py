@@ -12,17 +12,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from lupin_twin.core.drops import too_long
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, value
 
 # How a message ends of what may be answered a little later, if it is requested again.
 ASK_AGAIN: Final = "ask again later"
-# How one begins of what stays so until a setting of the twin is changed.
-NOT_REMEMBERED: Final = "not remembered: "
-
 
 DEFAULT_POINTS: Final = 500
 MAX_POINTS: Final = 5_000
@@ -53,20 +49,18 @@ class PastRefused(ValueError):
 
 
 class NotRemembered(RuntimeError):
-    """Nobody remembers that far back; the message says why.
+    """The past cannot be read now; the message says why.
 
-    `is_lasting`: until a setting is changed (there is no journal); else it may pass (the file
-    cannot be read now). `damage` is what is wrong with the file, if something is.
+    `damage` is what is wrong with the file, if something is.
     """
 
-    def __init__(self, why: str, *, is_lasting: bool, damage: str = "") -> None:
+    def __init__(self, why: str, *, damage: str = "") -> None:
         super().__init__(why)
-        self.is_lasting = is_lasting
         self.damage = damage
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """So that another process may say it."""
-        return partial(NotRemembered, is_lasting=self.is_lasting, damage=self.damage), self.args
+
+class NotFound(NotRemembered):
+    """What is asked for is not there, however often it is asked for."""
 
 
 def check_moment(at_ns: int, now_ns: int) -> None:
@@ -90,24 +84,17 @@ def seconds(stamp_ns: int) -> str:
 
 def message_of(error: Exception) -> str:
     """Why there is no answer, as a service's `error_message` that `error_of` reads again."""
+    why = str(error)
     if isinstance(error, PastRefused):
-        return str(error)
-    if isinstance(error, NotRemembered):
-        why = str(error)
-        if error.is_lasting:
-            return NOT_REMEMBERED + why
-    else:
-        why = f"the twin failed to answer: {error}"
+        return why
+    if not isinstance(error, NotRemembered):
+        why = f"the twin failed to answer: {why}"
     return why if why.endswith(ASK_AGAIN) else f"{why}: {ASK_AGAIN}"
 
 
 def error_of(message: str) -> PastRefused | NotRemembered:
     """What a service's `error_message` says: the other direction of `message_of`."""
-    if message.startswith(NOT_REMEMBERED):
-        return NotRemembered(message.removeprefix(NOT_REMEMBERED), is_lasting=True)
-    if message.endswith(ASK_AGAIN):
-        return NotRemembered(message, is_lasting=False)
-    return PastRefused(message)
+    return NotRemembered(message) if message.endswith(ASK_AGAIN) else PastRefused(message)
 
 
 @dataclass(frozen=True, slots=True)

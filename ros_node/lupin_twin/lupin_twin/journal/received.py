@@ -268,7 +268,7 @@ class Export:
         horizon_ns = deleted_ns(log, span.run.id)
         if horizon_ns >= start_ns and horizon_ns > self._deleted_ns[span.run.id]:
             why = "scans that come next were deleted while others were taken: begin again"
-            raise NotRemembered(why, is_lasting=False)
+            raise NotRemembered(why)
         while True:
             until_ns = min(start_ns + self._length_ns, span.end_ns)
             # Of one stamp there are as many scans as there are.

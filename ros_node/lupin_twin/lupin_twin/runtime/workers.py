@@ -266,9 +266,7 @@ class JobQueue:
         lane = self._lane(query)
         lane.waiting = deque(it for it in lane.waiting if it.is_wanted())
         if lane.count >= MAX_QUERIES:
-            raise NotRemembered(
-                f"{MAX_QUERIES} requests wait, which is the limit", is_lasting=False
-            )
+            raise NotRemembered(f"{MAX_QUERIES} requests wait, which is the limit")
         lane.waiting.append(query)
         self._begin(lane)
 

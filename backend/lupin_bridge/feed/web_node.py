@@ -97,7 +97,6 @@ class WebNode(AdjustableNode):
         self.utilities = NodeUtilities(self)
         self.parameters = declare(self, SHARED_PARAMETERS)
         self.rules = FieldRules.of(self.parameters)
-        self.adjust_by(self._adjust)
         self.twins = TwinCount()
         self.occupancy_map: OccupancyMap | None = None
         self.digest = ""
@@ -266,8 +265,8 @@ class WebNode(AdjustableNode):
             self._report = self_report(said)
             self._reported_s = time.monotonic()
 
-    def _adjust(self, now: TwinParameters) -> None:
-        # A twin's own are not on the wire: they are set here as there.
+    def adjust(self, now: TwinParameters) -> None:
+        """See `AdjustableNode`. A twin's own are not on the wire: they are set here as there."""
         self.rules = FieldRules.of(now)
         self._changes += 1
         self._on_map()

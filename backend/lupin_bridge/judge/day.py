@@ -19,8 +19,8 @@ from functools import cache
 from operator import itemgetter
 from typing import Final, Literal, TypeVar
 
-from lupin_bridge.judge.quantities import DAILY, DAY_NS, Course, IsDay, Sensors
-from lupin_twin.core.past import PastWrite
+from lupin_bridge.judge.quantities import DAILY, Course, IsDay, Sensors
+from lupin_twin.core.past import DAY_NS, PastWrite
 from lupin_twin.core.state import Reading
 
 # The sensor that tells, by its name.

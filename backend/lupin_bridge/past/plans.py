@@ -20,13 +20,14 @@ from lupin_bridge.feed.query import Find
 from lupin_bridge.field import matches
 from lupin_bridge.judge.day import SINCE_NS, days_of
 from lupin_bridge.judge.judging import Criteria, judge_once
-from lupin_bridge.judge.quantities import DAILY, DAY_NS, DERIVED, Daily, Derived, IsDay, Sensors
+from lupin_bridge.judge.quantities import DAILY, DERIVED, Daily, Derived, IsDay, Sensors
 from lupin_bridge.past import bodies
 from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
 from lupin_bridge.stream.state_json import StateJson, history, judgement
 from lupin_twin.core.diagnostics import Condition
 from lupin_twin.core.history import LatestRequest, tag_history
 from lupin_twin.core.past import (
+    DAY_NS,
     DEFAULT_POINTS,
     EVERY_TAG,
     HOUR_NS,

@@ -13,6 +13,7 @@ from typing import Final
 
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
+from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import Write
 from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
@@ -31,15 +32,7 @@ from lupin_twin.journal.retention import (
     unmet_limit,
 )
 from lupin_twin.journal.rows import last_rows
-from lupin_twin.journal.runs import (
-    CORRECTION_NS,
-    FOREVER_NS,
-    Clock,
-    Run,
-    put_run,
-    runs,
-    simulation_goes_on,
-)
+from lupin_twin.journal.runs import CORRECTION_NS, Clock, Run, put_run, runs, simulation_goes_on
 from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import (
     DAY_LENGTH,

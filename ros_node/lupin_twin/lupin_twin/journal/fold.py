@@ -15,6 +15,7 @@ from itertools import repeat
 from typing import Any, Final
 
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
+from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import (
     NO_FLOWER,
     Attempt,
@@ -35,7 +36,7 @@ from lupin_twin.journal.rows import (
     listed_rows,
     named_numbers,
 )
-from lupin_twin.journal.runs import FOREVER_NS, Run, runs, since_seq, span_at
+from lupin_twin.journal.runs import Run, runs, since_seq, span_at
 from lupin_twin.journal.schema import LOCAL_SITE
 
 # What a state takes, about, seconds of one core for each tag.

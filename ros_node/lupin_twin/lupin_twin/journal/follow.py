@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from lupin_twin.core.parameters import World
-from lupin_twin.core.past import HOUR_NS, Event
+from lupin_twin.core.past import FOREVER_NS, HOUR_NS, Event
 from lupin_twin.journal.appending import PURGED_SEQ, Stretch, simulated
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, TALLIED, count_rows
 from lupin_twin.journal.received import id_behind, number_of
@@ -31,7 +31,7 @@ from lupin_twin.journal.retention import (
     outermost,
     records,
 )
-from lupin_twin.journal.runs import FOREVER_NS, world_of
+from lupin_twin.journal.runs import world_of
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
     LOCAL_SITE,

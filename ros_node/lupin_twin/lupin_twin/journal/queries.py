@@ -17,6 +17,7 @@ from typing import Any, Final
 
 from lupin_twin.core.past import (
     EVERY_TAG,
+    FOREVER_NS,
     HOUR_NS,
     MAX_POINTS,
     Event,
@@ -34,7 +35,7 @@ from lupin_twin.journal.hours import (
     silence_over,
 )
 from lupin_twin.journal.rows import KIND_READING, named_numbers, sensor_names
-from lupin_twin.journal.runs import FOREVER_NS, Run, Span, cut, runs, spans, spans_within
+from lupin_twin.journal.runs import Run, Span, cut, runs, spans, spans_within
 from lupin_twin.journal.schema import SiteLog
 
 # What an answer costs, about, s; the second for events of the whole site, each tag.

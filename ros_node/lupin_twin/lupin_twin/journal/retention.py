@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.core.past import HOUR_NS
+from lupin_twin.core.past import DAY_NS, FOREVER_NS, HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ, Appender
 from lupin_twin.journal.beside import writing_alone
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, deleted_ns, extent
-from lupin_twin.journal.runs import FOREVER_NS, runs, spans
+from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
     WRITTEN,
@@ -27,8 +27,6 @@ from lupin_twin.journal.schema import (
     set_meta,
     transaction,
 )
-
-DAY_NS: Final = 24 * HOUR_NS
 
 # What one step deletes or moves: some ten milliseconds, for observations wait behind it.
 _ROWS: Final = 300

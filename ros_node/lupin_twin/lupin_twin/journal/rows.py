@@ -11,8 +11,9 @@ from typing import Any, Final
 
 from lupin_twin.core import history, state
 from lupin_twin.core.history import LatestRequest
+from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import Bloom, Flower, Inspection, Reading, Scan, Write
-from lupin_twin.journal.runs import FOREVER_NS, Run, runs, span_at
+from lupin_twin.journal.runs import Run, runs, span_at
 from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
 
 KIND_READING = history.KIND_TAG_READING

@@ -18,14 +18,13 @@ from typing import Any, Final
 
 from lupin_twin.core.diagnostics import origin_of
 from lupin_twin.core.parameters import World
+from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.journal.schema import DAY_LENGTH, LOCAL_SITE, ORIGIN, SiteLog
 
 # A wall clock that is set back by no more is the same clock, corrected.
 CORRECTION_NS: Final = 300 * 1_000_000_000
 # How much faster than before a simulation may go on.
 _FASTER: Final = 2.0
-# Later than any stamp.
-FOREVER_NS: Final = 2**63 - 1
 
 # `execute` of a connection to either engine.
 Execute = Callable[..., Any]

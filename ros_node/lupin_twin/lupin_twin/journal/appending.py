@@ -15,16 +15,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from lupin_twin.core.history import KNOWN_BY_NOTHING, kind_of
+from lupin_twin.core.history import KIND_FLOWER, KNOWN_BY_NOTHING, kind_of
 from lupin_twin.core.state import Flower, Inspection, Pin, Scan, Write
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.hours import count_rows
 from lupin_twin.journal.received import last_number
-from lupin_twin.journal.rows import (
-    KIND_FLOWER,
-    sensor_names,
-    weight,
-)
+from lupin_twin.journal.rows import sensor_names, weight
 from lupin_twin.journal.runs import Clock, Run, put_run
 from lupin_twin.journal.schema import (
     LOCAL_SITE,

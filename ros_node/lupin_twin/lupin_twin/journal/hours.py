@@ -13,8 +13,10 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
+from lupin_twin.core.history import KIND_TAG_READING
 from lupin_twin.core.past import HOUR_NS, Event
-from lupin_twin.journal.rows import KIND_READING, STATUS_OK, numbers_of
+from lupin_twin.core.state import STATUS_OK
+from lupin_twin.journal.rows import numbers_of
 from lupin_twin.journal.schema import DamagedFile, SiteLog, json_text
 
 # Shorter stretches without an attempt are no silence, whatever is usual.
@@ -61,7 +63,7 @@ def count_rows(
         hour = stamp_ns // HOUR_NS
         if status != STATUS_OK:
             _tally(tallies, (run, Event.FAILURES, hour), status, stamp_ns)
-        elif kind == KIND_READING:
+        elif kind == KIND_TAG_READING:
             _tally(tallies, (run, Event.SCANS, hour), len(values), stamp_ns)
         if values:
             hours.setdefault((series, hour), []).append(values)

@@ -15,6 +15,7 @@ from itertools import pairwise
 from statistics import median
 from typing import Any, Final
 
+from lupin_twin.core.history import KIND_TAG_READING
 from lupin_twin.core.past import (
     EVERY_TAG,
     FOREVER_NS,
@@ -34,7 +35,7 @@ from lupin_twin.journal.hours import (
     is_counted,
     silence_over,
 )
-from lupin_twin.journal.rows import KIND_READING, named_numbers, sensor_names
+from lupin_twin.journal.rows import named_numbers, sensor_names
 from lupin_twin.journal.runs import Run, Span, cut, runs, spans, spans_within
 from lupin_twin.journal.schema import SiteLog
 
@@ -123,7 +124,7 @@ def newest(
 def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> list[Part]:
     found = []
     for span in spans_within(runs(log.execute), start_ns, end_ns):
-        of_run = {"run": span.run.id, "tag": request.tag_id, "kind": KIND_READING}
+        of_run = {"run": span.run.id, "tag": request.tag_id, "kind": KIND_TAG_READING}
         for number, text in log.execute(
             "SELECT series, sensors FROM series WHERE site = :site AND run = :run AND tag = :tag"
             " AND kind = :kind ORDER BY series",

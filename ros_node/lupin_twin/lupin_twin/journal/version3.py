@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any, Final, NamedTuple
 
+from lupin_twin.core.history import KIND_FLOWER
 from lupin_twin.core.past import HOUR_NS, SLOT_NS, Event
 from lupin_twin.core.state import (
     STATUS_OK,
@@ -29,7 +30,7 @@ from lupin_twin.core.state import (
     Write,
 )
 from lupin_twin.journal.hours import SILENCE_NS
-from lupin_twin.journal.rows import KIND_FLOWER, sensor_names
+from lupin_twin.journal.rows import sensor_names
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.salvage import readable
 from lupin_twin.journal.schema import DamagedFile, is_damage_error

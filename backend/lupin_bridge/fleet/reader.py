@@ -141,13 +141,12 @@ def _latest(log: SiteLog, asked: Latest, frame_id: str) -> Reported:
         now_ns = (stamp_ns or 0) + max(0, now_ns - (arrival_ns or now_ns))
     # Also what a robot's clock, a little ahead of this one, has stamped: it was received.
     known = state_at(journal, FOREVER_NS, frame_id)
-    found = simulated(journal)
     return Reported(
         Snapshot(max(now_ns, stamp_ns or 0), frame_id, known.tags),
         is_walls,
         world_of(log),
         kept(journal),
-        None if found is None else (found.start_ns, found.end_ns),
+        simulated(journal),
         *_newer_map(log, asked.map_hash),
     )
 

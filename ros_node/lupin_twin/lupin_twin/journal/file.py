@@ -15,7 +15,7 @@ from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import Write
-from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
+from lupin_twin.journal.appending import Appender, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
 from lupin_twin.journal.checking import find_damage, size_of
 from lupin_twin.journal.fold import Restored, copies, fold
@@ -87,7 +87,7 @@ class JournalFile:
     """
 
     def __init__(self, path: Path, limits: Limits, *, is_sound: bool | None) -> None:
-        self.simulated: Stretch | None = None
+        self.simulated: tuple[int, int] | None = None
         # The limit that is exceeded although nothing more can be deleted, in words.
         self.unmet_limit = ""
         self._path = path

@@ -20,7 +20,7 @@ from typing import Any, Final, NamedTuple
 
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import FOREVER_NS, HOUR_NS, Event
-from lupin_twin.journal.appending import PURGED_SEQ, Stretch, simulated
+from lupin_twin.journal.appending import PURGED_SEQ, simulated
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, TALLIED, count_rows
 from lupin_twin.journal.received import id_behind, number_of
 from lupin_twin.journal.retention import (
@@ -138,7 +138,7 @@ class Followed:
     world: World
     complete_ns: int
     kept_ns: Stretches
-    simulated_ns: Stretch | None
+    simulated_ns: tuple[int, int] | None
 
 
 class NotALotError(ValueError):

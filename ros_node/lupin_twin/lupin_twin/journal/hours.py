@@ -29,7 +29,6 @@ FORGOTTEN: Final = "counted_ns:"
 TALLIED: Final = (Event.SCANS, Event.FAILURES, Event.INSPECTIONS)
 # A sum of larger readings could be beyond any number, which PostgreSQL refuses.
 _LARGEST: Final = 1e290
-_NOTHING: Final[Mapping[int, int]] = {}
 
 
 def is_counted(value: float) -> bool:
@@ -37,9 +36,7 @@ def is_counted(value: float) -> bool:
     return -_LARGEST < value < _LARGEST
 
 
-def count_rows(
-    log: SiteLog, after: int, until: int, counted_ns: Mapping[int, int] = _NOTHING
-) -> None:
+def count_rows(log: SiteLog, after: int, until: int, counted_ns: Mapping[int, int]) -> None:
     """Count the rows that have a number behind one, up to another; each once, whatever its stamp.
 
     `counted_ns`: of some runs, up to when everything is counted already.

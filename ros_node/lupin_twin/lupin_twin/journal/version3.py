@@ -120,10 +120,6 @@ class Version3:
         found = self._all("SELECT max(id) FROM scan UNION SELECT max(id) FROM look", ())
         return max(1, *(number or 0 for (number,) in found))
 
-    def purged_ns(self, run: int) -> int:
-        """The last stamp of a run of which something was deleted by age or size; -1: nothing."""
-        return self.meta(f"purged_ns:{run}", -1)
-
     def hours(self, run: int, until: int) -> Iterator[OldHour]:
         """What was counted of the readings up to an hour, for each series by itself."""
         # Tags in the order in which they were first received.

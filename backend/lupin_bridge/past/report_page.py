@@ -20,8 +20,9 @@ from lupin_bridge.judge.episodes import SITE
 from lupin_bridge.judge.judging import Criteria, unix_s
 from lupin_bridge.judge.quantities import Span
 from lupin_bridge.judge.verdict import derive
-from lupin_bridge.past.plans import Plan
-from lupin_bridge.past.report import Report, planned
+from lupin_bridge.past.plans import Plan, of_content
+from lupin_bridge.past.report import Report
+from lupin_bridge.serving.admission import content_answer
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import TagState
 
@@ -88,7 +89,8 @@ class ReportPage(Report):
         """See `Report`."""
         words = _Page(self.lang, self.criteria, self.zone, tags)
         page = words.page(body, self.origin, self.site, self.unknown_zone)
-        return planned(page.encode("utf-8", "replace"), HTML_TYPE, self, PAGE_HEADERS)
+        headers = {**self._headers(), **PAGE_HEADERS}
+        return of_content(content_answer(page.encode("utf-8", "replace"), HTML_TYPE, headers))
 
 
 def refused_page(reason: str, lang: str) -> str:

@@ -10,7 +10,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import time
 from importlib.resources import files
 from itertools import islice
@@ -21,7 +21,6 @@ from zoneinfo import ZoneInfo
 from lupin_bridge.judge.day import COUNTS_NS, ClockDay, Day, judge_day
 from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.judge.scans import (
-    NO_PATROL,
     SHORTEST_NS,
     Patrol,
     RecentScans,
@@ -31,7 +30,6 @@ from lupin_bridge.judge.scans import (
 )
 from lupin_bridge.judge.verdict import (
     FORGOTTEN_NS,
-    NOTHING_CHANGED,
     Health,
     Reason,
     Verdict,
@@ -160,7 +158,7 @@ class Judged:
     tags: Mapping[str, Health]
     day: Day
     number: int = 0
-    patrol: Patrol = NO_PATROL
+    patrol: Patrol = field(default_factory=Patrol)
 
 
 NOTHING_JUDGED: Final = Judged(_UNKNOWN, {}, Day(True, "assumed"))
@@ -357,7 +355,7 @@ class Judge:
             by.sensors,
             recent,
             holds_ns=holds,
-            changed=self._changed.get(tag_id, NOTHING_CHANGED),
+            changed=self._changed.get(tag_id, {}),
             days=self._days.get(tag_id, ()),
         )
         kept.until_ns = min(

@@ -65,13 +65,8 @@ class Patrol:
     overdue: int = 0
 
 
-NO_PATROL: Final = Patrol()
-
-
 class Scans:
     """When tags were scanned of late; several at one time are one."""
-
-    __slots__ = ("_scans_ns",)
 
     def __init__(self) -> None:
         self._scans_ns: deque[int] = deque(maxlen=LAP_INTERVALS + 1)

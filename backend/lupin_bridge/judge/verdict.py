@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from types import MappingProxyType
 from typing import Final
 
 from lupin_bridge.judge.day import COUNTS_NS
@@ -36,7 +35,6 @@ class Verdict(StrEnum):
     HEALTHY = "healthy"
 
 
-NOTHING_CHANGED: Final[Mapping[str, int]] = MappingProxyType({})
 ORDER: Final = {verdict: index for index, verdict in enumerate(Verdict)}
 
 
@@ -93,8 +91,8 @@ def judge_tag(
     recent: Recent,
     *,
     holds_ns: int,
-    changed: Mapping[str, int] = NOTHING_CHANGED,
-    days: Sequence[Reading] = (),
+    changed: Mapping[str, int],
+    days: Sequence[Reading],
 ) -> Health:
     """What is to be said of a tag at `now_ns`, where its readings hold for `holds_ns`.
 

@@ -34,6 +34,7 @@ _POLICY: Final = (
 PAGE_HEADERS: Final = {"Content-Security-Policy": _POLICY}
 # Of all languages but English.
 _COMMA: Final = str.maketrans(".,", ",.")
+_EXTREMES: Final = ("sensor", "low*", "where", "mean*", "high*", "where", "count*", "bad*")
 # Alarms in one notification.
 MAX_PUSHED: Final = 4
 Words = Mapping[str, Any]
@@ -153,7 +154,7 @@ class _Page:
             f'<p class="note">{escape(" ".join(known) or say("unknown"))}</p>',
             self._counts(body["counts"]),
             self._alarms(body),
-            self._extremes(body),
+            self._table(body, "extremes", "sensors", _EXTREMES, self._sensor),
             self._table(
                 body, "notes", "notes", ("time", "name", "said", "about"), self._note(body)
             ),
@@ -249,10 +250,6 @@ class _Page:
                     if span is not None and reason["limit"] in {span.low, span.high}:
                         return span
         return None
-
-    def _extremes(self, body: Entry) -> str:
-        columns = ("sensor", "low*", "where", "mean*", "high*", "where", "count*", "bad*")
-        return self._table(body, "extremes", "sensors", columns, self._sensor)
 
     def _sensor(self, of: Entry) -> Iterable[str]:
         number = partial(self._number, sensor=of["sensor_type"])

@@ -27,6 +27,7 @@ from lupin_twin.journal.retention import (
     RECORD,
     Stretches,
     delete_recorded,
+    delete_up_to,
     kept,
     outermost,
     records,
@@ -309,11 +310,7 @@ def _put(connection: sqlite3.Connection, lot: Lot) -> None:
     # Then the rest: whether pests are new in it is known by what was before.
     counted_ns = {run: (hour + 1) * HOUR_NS - 1 for run, hour in _purged(connection).items()}
     count_rows(log, after, lot.last, counted_ns)
-    for table in WRITTEN:
-        connection.execute(
-            f"DELETE FROM {table} WHERE site = ? AND seq <= ?",
-            (LOCAL_SITE, _purged_seq(connection)),
-        )
+    delete_up_to(connection, _purged_seq(connection))
 
 
 def _insert(connection: sqlite3.Connection, table: str, row: list[Any], *, replaces: bool) -> None:

@@ -133,14 +133,17 @@ def purge_step(
     if not last:
         return False
     _write_horizons(connection, last)
-    for table in WRITTEN:
-        connection.execute(
-            f"DELETE FROM {table} WHERE site = ? AND seq <= ?",  # noqa: S608  # constants
-            (LOCAL_SITE, last),
-        )
+    delete_up_to(connection, last)
     # The numbers go on when everything is gone.
     set_meta(connection, PURGED_SEQ, last)
     return True
+
+
+def delete_up_to(connection: sqlite3.Connection, last: int) -> None:
+    """Delete the scans and inspections up to a number."""
+    for table in WRITTEN:
+        text = f"DELETE FROM {table} WHERE site = ? AND seq <= ?"  # noqa: S608  # constants
+        connection.execute(text, (LOCAL_SITE, last))
 
 
 def unmet_limit(connection: sqlite3.Connection, limits: Limits, before_ns: int) -> str:

@@ -157,7 +157,7 @@ class TwinNode(AdjustableNode):
 
     def _connect(self) -> None:
         p, group = self.parameters, self._group
-        responses = Responses(self.utilities.warn, self.utilities.drain)
+        responses = Responses(self.utilities)
         for topic, shape, on_message in (
             (interfaces.OBSERVATIONS, message_limits.OBSERVATION, self._on_observation),
             (interfaces.DISCOVERED_TAGS, message_limits.DISCOVERED_TAGS, self._on_discovered_tags),

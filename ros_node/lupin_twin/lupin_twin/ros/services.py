@@ -233,10 +233,6 @@ class Responses:
         self._unsent: deque[_Unsent] = deque()  # the first is tried next
         warnings.filterwarnings("error", re.escape(UNSENT), RuntimeWarning)
 
-    def __len__(self) -> int:
-        """How many responses wait to be sent again."""
-        return len(self._unsent)
-
     def watch(self, service: Any) -> None:
         """Let the callback of an rclpy Service return a `Future`; retry what cannot be sent."""
         send_now: Send = service.send_response

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Final
 
 import orjson
@@ -46,6 +47,8 @@ _WRITE_CELL_S: Final = 50e-9
 _JUDGE_TAG_S: Final = 20e-6
 # Of a field too large to estimate, or one that will be refused.
 _LARGE_S: Final = 1.0
+# Of the map in use: many fields are of the same one.
+_digest_of: Final = lru_cache(maxsize=1)(digest_of)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +122,7 @@ class Field(StateQuery):
 
         def content_etag(kind: str, *content: object) -> str:
             # By content: the revision of a map is one process's own.
-            digest = None if self.occupancy is None else digest_of(self.occupancy)
+            digest = None if self.occupancy is None else _digest_of(self.occupancy)
             built_from = (request, samples, *content, far_off, self.rules, digest, sensors.text)
             return etag_of(kind, built_from)
 

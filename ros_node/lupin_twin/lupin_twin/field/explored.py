@@ -10,7 +10,6 @@ import json
 import math
 import zlib
 from dataclasses import dataclass
-from functools import lru_cache
 from hashlib import blake2b
 from typing import Any, Final
 
@@ -96,7 +95,6 @@ class OccupancyMap:
         return self.place == other.place and np.array_equal(self.cells, other.cells)
 
 
-@lru_cache(maxsize=1)
 def digest_of(occupancy: OccupancyMap) -> int:
     """Of place and cells: the same in all replicas, and for each copy that shows the same.
 

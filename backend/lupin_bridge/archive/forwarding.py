@@ -39,7 +39,8 @@ from lupin_bridge.archive.source import Batch, Epoch, Row, Source, arrival_of
 from lupin_bridge.console import CommandError
 from lupin_bridge.feed.shared_work import end
 from lupin_bridge.settings import Settings, option, variable
-from lupin_twin.journal.retention import DAY_NS, RECORD
+from lupin_twin.core.past import DAY_NS
+from lupin_twin.journal.retention import RECORD
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, SiteLog
 
 # Where the tables that are in parts by month have the stamp.

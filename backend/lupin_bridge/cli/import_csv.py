@@ -388,7 +388,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
     path.parent.mkdir(parents=True, exist_ok=True)
     new = count = 0
     with (
-        Lock(path, "lupin-twin import"),
+        closing(Lock(path, "lupin-twin import")),
         closing(JournalFile(path, _NO_LIMITS, is_sound=None)) as file,
     ):
         with closing(open_named(path)) as connection:

@@ -71,7 +71,7 @@ from lupin_bridge.serving.admission import (
     Answer,
     AnswerCache,
     Limits,
-    json_answer,
+    content_answer,
 )
 from lupin_bridge.serving.http_protocol import PieceByPiece
 from lupin_bridge.settings import Settings
@@ -373,7 +373,7 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
         async def compute() -> Answer:
             with fleet.admission.computing(client_of(request)):
                 body = alarms_json((watching.sites[name] for name in names), watching.archive)
-                answer = json_answer(orjson.dumps(body))
+                answer = content_answer(orjson.dumps(body))
             fleet.cache.put(key, answer)
             return answer
 

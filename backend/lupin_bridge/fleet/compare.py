@@ -24,7 +24,7 @@ from lupin_bridge import query_string
 from lupin_bridge.fleet.overview import MAX_LISTED
 from lupin_bridge.judge.quantities import DAILY, DERIVED, Sensors
 from lupin_bridge.query_string import Name, OfPeriod, OfReport, Parameters, needed, parameter, read
-from lupin_bridge.serving.admission import Answer, json_answer
+from lupin_bridge.serving.admission import Answer, content_answer
 from lupin_bridge.stream.state_json import note_json, stamp
 from lupin_twin.core.notes import WITHDRAW, WITHDRAWN, Note
 from lupin_twin.core.past import HOUR_NS, Event, Grid, NotFound, PastRefused, grid, seconds
@@ -93,7 +93,7 @@ class Compare:
             "width": steps.bucket_ns // HOUR_NS,
         }
         found = connection.execute(_HOURS, query).fetchall()
-        return json_answer(orjson.dumps(self._body(_means(self, found))))
+        return content_answer(orjson.dumps(self._body(_means(self, found))))
 
     def _body(self, means: Mapping[str, np.ndarray[Any, np.dtype[np.float64]]]) -> dict[str, Any]:
         steps = self.steps
@@ -291,7 +291,7 @@ class SitesReport:
             "sites": rows,
             "notes": notes,
         }
-        return json_answer(orjson.dumps(body))
+        return content_answer(orjson.dumps(body))
 
 
 def sites_report(parameters: Parameters, known: Mapping[str, Any], now_ns: int) -> SitesReport:

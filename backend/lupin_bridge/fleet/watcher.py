@@ -34,11 +34,11 @@ from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import alarm_json
 from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note, NotesRequest
-from lupin_twin.core.past import NotRemembered, RecentRequest, WritesRequest
+from lupin_twin.core.past import FOREVER_NS, NotRemembered, RecentRequest, WritesRequest
 from lupin_twin.core.state import Snapshot, same_tags
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.received import notes, recent, writes
-from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
+from lupin_twin.journal.runs import runs, span_at
 from lupin_twin.journal.schema import ORIGIN, DamagedFile, SiteLog
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop

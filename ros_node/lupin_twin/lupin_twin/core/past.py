@@ -28,6 +28,9 @@ MAX_READINGS: Final = 8 * MAX_POINTS
 SLOT_NS: Final = 300 * 1_000_000_000
 # What is counted as it is written.
 HOUR_NS: Final = 3_600 * 1_000_000_000
+DAY_NS: Final = 24 * HOUR_NS
+# Later than any stamp; the largest that SQLite counts to.
+FOREVER_NS: Final = 2**63 - 1
 # The `tag_id` of a query for events of the whole site.
 EVERY_TAG: Final = "*"
 
@@ -225,12 +228,10 @@ class PastRow:
 
 DEFAULT_WRITES: Final = 1_000
 MAX_WRITES: Final = 2_000
-# The largest that SQLite counts to.
-MAX_NUMBER: Final = 2**63 - 1
 # Of each tag, what is recent at a moment: its last scans and inspections, so many of each, and no
 # older.
 RECENT_COUNT: Final = 9
-RECENT_NS: Final = 3 * 86_400 * 1_000_000_000
+RECENT_NS: Final = 3 * DAY_NS
 # Scans of one answer: some seconds of one core.
 MAX_SCANS: Final = 200_000
 
@@ -254,8 +255,8 @@ class WritesRequest:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be answered."""
-        if self.after > MAX_NUMBER:
-            raise PastRefused(f"after is {self.after}, the limit is {MAX_NUMBER}")
+        if self.after > FOREVER_NS:
+            raise PastRefused(f"after is {self.after}, the limit is {FOREVER_NS}")
         if not 0.0 <= self.reach_s <= 1e9:
             raise PastRefused(f"reach_s is {self.reach_s}, the limits are 0 and 1e9 s")
         if not 1 <= self.max_count <= MAX_WRITES:

@@ -95,7 +95,9 @@ class Recall:
         def should_stop() -> bool:
             return is_abandoned() or time.monotonic() > until_s
 
-        condition = self._readable()
+        condition = self._condition()
+        if condition.state is JournalState.IN_USE:
+            raise NotRemembered(f"{condition.detail}: ask that twin")
         path = Path(condition.path)
         try:
             answer = self._run(path, condition.inode, search, should_stop)
@@ -110,12 +112,6 @@ class Recall:
         if is_abandoned():
             raise CancelledError
         raise NotRemembered(f"the journal did not answer within {self._max_s:g} s; ask for less")
-
-    def _readable(self) -> Condition:
-        condition = self._condition()
-        if condition.state is JournalState.IN_USE:
-            raise NotRemembered(f"{condition.detail}: ask that twin")
-        return condition
 
     def _run(
         self, path: Path, inode: int, search: Search[AnswerT], should_stop: ShouldStop

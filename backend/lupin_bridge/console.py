@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, closing, suppress
 from pathlib import Path
-from typing import Final, TextIO, TypeAlias
+from typing import Any, Final, TextIO, TypeAlias
 
 from lupin_twin.runtime.process import discard_output
 
@@ -77,12 +77,18 @@ def _written(stream: TextIO | None, text: str) -> Exception | None:
 # --- what commands share: their actions, and where they write -------------------------------------
 
 FAILED: Final = 1
+
+
+class CommandError(Exception):
+    """It cannot be done; the message is the one line that says why."""
+
+
 Roles: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # noqa: SLF001
 
 
-def add_role(roles: Roles, role: str, text: str) -> argparse.ArgumentParser:
+def add_role(roles: Roles, role: str, text: str, **more: Any) -> argparse.ArgumentParser:
     """Add a role without abbreviations: what one means would change with the next option."""
-    return roles.add_parser(role, help=text, description=text, allow_abbrev=False)
+    return roles.add_parser(role, help=text, description=text, allow_abbrev=False, **more)
 
 
 def add_actions(
@@ -121,7 +127,7 @@ def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], 
     `report` gets the share that is copied.
 
     Raises:
-        CannotWrite: there is such a file, or it cannot be made or written.
+        CommandError: there is such a file, or it cannot be made or written.
         sqlite3.Error: the journal cannot be read.
 
     """
@@ -131,9 +137,9 @@ def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], 
     try:
         target.open("xb").close()
     except FileExistsError as error:
-        raise CannotWrite(f"{target} is there already, and nothing is overwritten") from error
+        raise CommandError(f"{target} is there already, and nothing is overwritten") from error
     except OSError as error:
-        raise CannotWrite(f"cannot write {target}: {error.strerror}") from error
+        raise CommandError(f"cannot write {target}: {error.strerror}") from error
     # Half of a copy looks like all of it: whatever ends this, Ctrl-C too, removes it.
     with ExitStack() as if_unfinished:
         if_unfinished.callback(target.unlink)
@@ -146,21 +152,17 @@ def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], 
                 )
         except sqlite3.Error as error:
             if getattr(error, "sqlite_errorcode", None) in _NOT_WRITTEN:
-                raise CannotWrite(f"cannot write {target}: {error}") from error
+                raise CommandError(f"cannot write {target}: {error}") from error
             raise
         if_unfinished.pop_all()
     return target.stat().st_size
-
-
-class CannotWrite(Exception):
-    """The output cannot be written; the message is the one line that says why."""
 
 
 def standard(data: bytes) -> None:
     """Write to the standard output, at once.
 
     Raises:
-        CannotWrite: it does not take it.
+        CommandError: it does not take it.
         BrokenPipeError: who read it has gone.
 
     """
@@ -171,4 +173,4 @@ def standard(data: bytes) -> None:
         discard_output(sys.stdout)
         if isinstance(error, BrokenPipeError):
             raise
-        raise CannotWrite(f"cannot write to the standard output: {error.strerror}") from error
+        raise CommandError(f"cannot write to the standard output: {error.strerror}") from error

@@ -258,8 +258,8 @@ def settings_from(
 ) -> Settings:
     """The settings, each from the first place that has it.
 
-    `options` are those that were given on the command line, as text, by their names; `config` is
-    --config's.
+    `options` are those of the command line, as text, by their names, None where not given; `config`
+    is --config's.
 
     Raises:
         SettingError: a value that cannot be, a key that is no setting, a file that cannot be read.
@@ -279,13 +279,12 @@ def settings_from(
 
     take(() if path is None else _of_file(path, called), is_text=False)
     take(_of_environment(environment), is_text=True)
-    take(((name, option(name), value) for name, value in options.items()), is_text=True)
+    given = ((name, value) for name, value in options.items() if value is not None)
+    take(((name, option(name), value) for name, value in given), is_text=True)
     settings = Settings(**values, given_as=given_as)
     if bool(settings.tls_cert) != bool(settings.tls_key):
-        given, other = ("tls_cert", "tls_key") if settings.tls_cert else ("tls_key", "tls_cert")
-        raise SettingError(
-            f"{settings.called(given)} is given without {option(other)}, TLS needs both"
-        )
+        one, other = ("tls_cert", "tls_key") if settings.tls_cert else ("tls_key", "tls_cert")
+        raise settings.wrong(one, f"is given without {option(other)}, TLS needs both")
     return settings
 
 

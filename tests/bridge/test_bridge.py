@@ -57,7 +57,7 @@ class Script:
         self.workers.close()
 
     async def ask(self, *_: object) -> tuple[PastWrite, ...]:
-        raise NotRemembered("nothing", is_lasting=True)
+        raise NotRemembered("nothing")
 
     def journal(self) -> Condition:
         return UNKNOWN_JOURNAL
@@ -231,7 +231,7 @@ async def test_a_memory_that_is_busy_at_the_start_is_asked_again(
     monkeypatch.setattr("lupin_bridge.alarms.feed.LEARN_AGAIN_S", 0.01)
     hour_ns = 3_600 * 10**9
     async with Stage() as stage:
-        answers = iter([NotRemembered("busy", is_lasting=False), TwinUnavailableError("gone")])
+        answers = iter([NotRemembered("busy"), TwinUnavailableError("gone")])
         tag_id = f"t{4 * hour_ns}"
 
         async def ask(*_: object) -> tuple[PastWrite, ...]:

@@ -164,13 +164,12 @@ def of_the_docs(browser: Browser, url: str) -> None:
         ("wall", (1280, 720), "dark", "/?kiosk=1", "body"),
         ("map", (1280, 800), "light", "/", ".map-panel"),
         ("table", (1280, 800), "light", "/", ".tags-panel"),
-        ("alarms", (1280, 800), "light", "/", ".tags-panel"),
+        ("alarms", (1280, 800), "light", "/#list=alarms", ".tags-panel"),
     ):
         page = opened(browser, url, size, scheme, path)
         if "tag=" in path:
             expect(page.get_by_test_id("plot").last.locator("canvas")).to_be_visible()
         if name == "alarms":
-            page.get_by_role("button", name="Alarms").first.click()
             expect(page.locator("[data-alarm]").first).to_be_visible()
         # The time bar and the charts have what they asked for.
         page.wait_for_load_state("networkidle")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_patrol.cli import parse
+from lupin_patrol.cli import parser
 from tests.support.domains import ros_env
 from tests.support.processes import Process
 from tests.support.waiting import wait_for
@@ -33,7 +33,7 @@ def test_a_bad_value_is_refused_in_one_line_with_option_value_and_limits(
     capsys: pytest.CaptureFixture[str], option: str, value: str, limits: str
 ) -> None:
     with pytest.raises(SystemExit) as refusal:
-        parse([option, value])
+        parser().parse_args([option, value])
     assert refusal.value.code == 2
     [line] = capsys.readouterr().err.splitlines()
     assert line.startswith(f"patrol_node: error: argument {option}: {value!r} is ")
@@ -45,7 +45,7 @@ def test_an_unknown_option_is_refused_and_named(
     capsys: pytest.CaptureFixture[str], arguments: list[str]
 ) -> None:
     with pytest.raises(SystemExit) as refusal:
-        parse(arguments)
+        parser().parse_args(arguments)
     assert refusal.value.code == 2
     [line] = capsys.readouterr().err.splitlines()
     assert arguments[0] in line

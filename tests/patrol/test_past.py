@@ -6,7 +6,7 @@ from statistics import fmean
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
-from lupin_patrol.cli import fill_past, parse
+from lupin_patrol.cli import fill_past, parser
 from lupin_patrol.greenhouse import read_greenhouse
 from lupin_patrol.mission import DAYS, PAST_SOURCE, START_OF_DAY_S, past
 from lupin_twin.core.state import Pin, Scan, Write
@@ -18,7 +18,7 @@ SHORT = ["--speed=50"]
 
 
 def made(*options: str) -> list[Write]:
-    patrol = parse(options)
+    patrol = parser().parse_args(options)
     return list(past(GreenhouseSimulator(), patrol.seed, patrol.day_speed, patrol.speed, NOW))
 
 
@@ -107,7 +107,7 @@ def test_where_the_day_stands_still_there_is_no_past() -> None:
 
 def test_it_fills_a_journal_that_is_new_and_leaves_somebody_s(tmp_path: Path) -> None:
     path = tmp_path / "demo.sqlite"
-    assert fill_past(path, parse(SHORT)) == 0
+    assert fill_past(path, parser().parse_args(SHORT)) == 0
     made_of = select(
         path, "SELECT DISTINCT source, is_copy FROM scan UNION SELECT source, is_copy FROM look"
     )
@@ -115,11 +115,11 @@ def test_it_fills_a_journal_that_is_new_and_leaves_somebody_s(tmp_path: Path) ->
     assert select(path, "SELECT count(*) > 3 FROM look") == [(1,)]
     theirs = tmp_path / "theirs.sqlite"
     kept(theirs, [scan()])
-    assert fill_past(theirs, parse(SHORT)) == 0
+    assert fill_past(theirs, parser().parse_args(SHORT)) == 0
     assert select(theirs, "SELECT count(*) FROM scan") == [(1,)]
 
 
 def test_what_hinders_it_ends_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "no").write_text("a file where a folder should be")
-    assert fill_past(tmp_path / "no" / "demo.sqlite", parse(SHORT)) == 2
+    assert fill_past(tmp_path / "no" / "demo.sqlite", parser().parse_args(SHORT)) == 2
     assert "File exists" in capsys.readouterr().err

@@ -62,7 +62,7 @@ class MadeUp:
         if isinstance(need, NotesRequest):
             return PastNotes("", 0, ())  # nobody has said anything
         if isinstance(need, WritesRequest):
-            raise NotRemembered("what was heard is asked of the journal", is_lasting=True)
+            raise NotRemembered("what was heard is asked of the journal")
         return self.state_at(need)
 
     def state_at(self, at_ns: int) -> Snapshot:

@@ -14,8 +14,8 @@ from argon2 import PasswordHasher
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from lupin_bridge.access.accounts import Accounts, digest, make_file
-from lupin_bridge.access.credentials import Kind, Role
+from lupin_bridge.access.accounts import Accounts, make_file
+from lupin_bridge.access.credentials import Kind, Role, digest
 from lupin_bridge.stream.routes_schema import Note, Notes
 from tests.support.waiting import PATIENCE_S
 

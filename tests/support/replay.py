@@ -9,7 +9,7 @@ from typing import TypeGuard
 
 from hypothesis import strategies as st
 
-from lupin_twin.core.history import kind_of
+from lupin_twin.core.history import KIND_FLOWER, kind_of
 from lupin_twin.core.state import (
     Flower,
     Inspection,
@@ -22,7 +22,6 @@ from lupin_twin.core.state import (
     Write,
 )
 from lupin_twin.journal.file import JournalFile
-from lupin_twin.journal.rows import KIND_FLOWER
 from lupin_twin.journal.runs import CORRECTION_NS, Clock, Run
 
 

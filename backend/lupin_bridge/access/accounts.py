@@ -12,7 +12,6 @@ import secrets
 import sqlite3
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
-from hashlib import sha256
 from pathlib import Path
 from typing import Final, NamedTuple
 from urllib.parse import quote
@@ -23,6 +22,7 @@ from lupin_bridge.access.credentials import (
     Person,
     Role,
     check_name,
+    digest,
 )
 from lupin_bridge.settings import Settings
 from lupin_twin.journal.beside import state_folder
@@ -380,11 +380,6 @@ class Accounts:
 
 def _lines(text: str) -> tuple[str, ...]:
     return tuple(text.split("\n")) if text else ()
-
-
-def digest(secret: str) -> str:
-    """As which a token or a session's cookie is kept."""
-    return sha256(secret.encode()).hexdigest()
 
 
 def _audit(connection: sqlite3.Connection, done: Audited) -> None:

@@ -80,17 +80,6 @@ def check_name(name: str) -> None:
         )
 
 
-def check_site(site: str) -> None:
-    """Refuse what can be no site's name in the archive.
-
-    Raises:
-        AccountError: it cannot.
-
-    """
-    if not site or len(site) > 64 or not site.isprintable():
-        raise AccountError(f"the site is {site[:80]!r}, must be 1 to 64 characters")
-
-
 def check_password(password: str) -> None:
     """Refuse what is too short or too long.
 
@@ -135,7 +124,7 @@ class Credentials:
                 f"{called} holds a character that no bearer token may: use letters, digits and "
                 "-._~+/ (RFC 6750)"
             )
-        self._digest = _digest(token)
+        self._digest = digest(token)
         # Slow on purpose: a stolen cookie must not reveal a weak token.
         key = hashlib.scrypt(token.encode(), salt=b"lupin-twin session", n=2**14, r=8, p=1)
         self._signer = Signer(key, salt=b"session", digest_method=hashlib.sha256)
@@ -147,7 +136,7 @@ class Credentials:
     def accepts(self, token: str) -> bool:
         """Whether this is the token."""
         # Digests, so that not even the token's length shows in the time taken.
-        return hmac.compare_digest(_digest(token), self._digest)
+        return hmac.compare_digest(digest(token), self._digest)
 
     def cookie(self, now_s: float) -> str:
         """The cookie of a new session from `now_s` on, s since the epoch."""
@@ -170,18 +159,16 @@ class Credentials:
             person.ends_at_s > now_s and person.session not in self._signed_out
         )
 
-    def sign_out(self, person: Person, now_s: float) -> None:
+    def sign_out(self, person: Person) -> None:
         """End a session, in this process."""
         if len(self._signed_out) >= MAX_SIGNED_OUT:
-            lasting = {name: ends_s for name, ends_s in self._signed_out.items() if ends_s > now_s}
-            if len(lasting) >= MAX_SIGNED_OUT:
-                del lasting[min(lasting, key=lasting.__getitem__)]
-            self._signed_out = lasting
+            del self._signed_out[min(self._signed_out, key=self._signed_out.__getitem__)]
         self._signed_out[person.session] = person.ends_at_s
 
 
-def _digest(secret: str) -> bytes:
-    return hashlib.sha256(secret.encode()).digest()
+def digest(secret: str) -> str:
+    """As which a token or a session's cookie is kept."""
+    return hashlib.sha256(secret.encode()).hexdigest()
 
 
 # --- our own cookie, out of a request's headers ---------------------------------------------------

@@ -1,6 +1,6 @@
 """Access control: every request passes policy and credentials here, and only reads.
 
-Outside is `AccessControl` (403, 401, 429, 414), inside of it `ReadOnly` (405, security headers).
+Outside is `AccessControl` (403, 401, 429, 414, security headers), inside of it `ReadOnly` (405).
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ _SECURITY_HEADERS: Final = {
 
 
 class ReadOnly:
-    """ASGI middleware: reads only, but for sign-in, notes and observations, and headers on all."""
+    """ASGI middleware: reads only, but for sign-in, notes and observations."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -93,7 +93,6 @@ class ReadOnly:
             await self._app(scope, receive, send)
             return
 
-        send = with_security_headers(send)
         method, path = scope["method"], path_of(scope)
         methods = ("DELETE",) if path.startswith(f"{NOTES}/") else _METHODS.get(path, _READS)
         if method not in methods:
@@ -109,7 +108,7 @@ class ReadOnly:
             await self._app(scope, receive, send)
 
 
-def with_security_headers(send: Send) -> Send:
+def _with_security_headers(send: Send) -> Send:
     """`send`, with the headers above on every answer that does not have its own."""
 
     async def send_with_headers(message: Message) -> None:
@@ -204,7 +203,7 @@ class Access:
 class AccessControl:
     """ASGI middleware: 403 for foreign hosts and pages, 401 and 429 without the token.
 
-    And 414 for an address that is far too long.
+    And 414 for an address that is far too long, and security headers on all.
     """
 
     def __init__(self, app: ASGIApp, access: Access) -> None:
@@ -217,6 +216,7 @@ class AccessControl:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
+        send = _with_security_headers(send)
         length = len(scope.get("raw_path") or b"") + len(scope["query_string"])
         if length > MAX_TARGET_BYTES:
             detail = f"the address has {length} bytes, the limit is {MAX_TARGET_BYTES}"
@@ -340,7 +340,6 @@ def _refusal(status: int, detail: str, headers: Mapping[str, str] | None = None)
 
 async def deny(response: Response, scope: Scope, receive: Receive, send: Send) -> None:
     """Answer in the application's stead."""
-    send = with_security_headers(send)
     if scope["type"] == "websocket":
         await WebSocket(scope, receive, send).send_denial_response(response)
     else:

@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final, TypeVar
 
-from lupin_bridge.access.accounts import SESSION_S, Accounts, digest
+from lupin_bridge.access.accounts import SESSION_S, Accounts
 from lupin_bridge.access.credentials import (
     SHARED,
     SHARED_SESSION_S,
@@ -27,6 +27,7 @@ from lupin_bridge.access.credentials import (
     Credentials,
     Person,
     cookies_of,
+    digest,
     is_name,
 )
 from lupin_bridge.serving.admission import ClientLimitError, RateLimit
@@ -205,7 +206,7 @@ class People:
 
         """
         if self.shared is not None and person.by == "shared token":
-            self.shared.sign_out(person, time.time())
+            self.shared.sign_out(person)
             return self.shared.cookie_name
         await self.write(lambda it, now_s: it.end_session(person, address, now_s))
         return self._cookie_name()

@@ -299,7 +299,7 @@ class AccessPolicy:
         if host is None:
             return f"Host is {hosts[0][:128]!r}, expected a host and a port"
         # RFC 6761, section 6.3: localhost and what is below it never leave the machine.
-        is_local = host == "localhost" or host.endswith(".localhost") or _is_ip(host)
+        is_local = host == "localhost" or host.endswith(".localhost") or _address(host)
         if not is_local and host not in self._hosts:
             return (
                 f"this bridge is not known by the name {host[:128]!r}: use its IP address, or "
@@ -325,7 +325,8 @@ class AccessPolicy:
 
 def exposure(address: str, *, has_token: bool, has_tls: bool) -> list[str]:
     """What an operator should know about listening on `address`, as warnings."""
-    if _is_ip(address) and ip_address(address).is_loopback:
+    ip = _address(address)
+    if ip is not None and ip.is_loopback:
         return []
     warnings = []
     if not has_token:
@@ -339,11 +340,3 @@ def exposure(address: str, *, has_token: bool, has_tls: bool) -> list[str]:
             f"along{', the token too' if has_token else ''}"
         )
     return warnings
-
-
-def _is_ip(host: str) -> bool:
-    try:
-        ip_address(host)
-    except ValueError:
-        return False
-    return True

@@ -30,6 +30,8 @@ from lupin_bridge.judge.judging import Criteria, Judge
 from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
 from lupin_twin.core.past import (
+    DAY_NS,
+    FOREVER_NS,
     NotRemembered,
     PastRefused,
     PastWrite,
@@ -39,7 +41,6 @@ from lupin_twin.core.past import (
     WritesRequest,
 )
 from lupin_twin.core.state import (
-    NANOSECONDS_PER_SECOND,
     STATUS_OK,
     Reading,
     Snapshot,
@@ -99,7 +100,6 @@ def _of_tag(before: TagState, tag: TagState) -> list[PastWrite]:
 
 log = logging.getLogger(__name__)
 
-DAY_NS: Final = 86_400 * NANOSECONDS_PER_SECOND
 # Writes that are read at once: some tens of milliseconds of a worker.
 LOT: Final = 500
 LOT_S: Final = 0.05
@@ -116,7 +116,7 @@ UNANSWERED_S: Final = 30.0
 _NOT_RECORDED: Final = frozenset({JournalState.FAILING, JournalState.IN_USE, JournalState.FOREIGN})
 # Numbers of what is heard here: beyond those of any journal.
 _FIRST_RECEIVED: Final = 2**62
-_ALL_TIME: Final = (RunSpan(RUN, 0, 2**63 - 1),)
+_ALL_TIME: Final = (RunSpan(RUN, 0, FOREVER_NS),)
 _SILENCES: Final = 100
 
 # What a board is of: alarms of the log, those beside them, and the moment from which they are kept.
@@ -154,7 +154,7 @@ class AlarmFeed:
         self._last = 0
         self._written = 0
         self._since_ns: int | None = None
-        self._due_ns = 2**63 - 1
+        self._due_ns = FOREVER_NS
         self._is_caught_up = False
         self._generation = 0
         self.missed = 0

@@ -17,6 +17,7 @@ from datetime import UTC, datetime, timedelta
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
+from lupin_bridge.console import CommandError
 from lupin_bridge.settings import SettingError, variable
 from lupin_twin.journal.schema import POSTGRESQL_TABLES
 
@@ -59,15 +60,15 @@ _MAX_MS: Final = 10_000
 _SITE: Final = re.compile(r"[a-z][a-z0-9_-]{0,62}")
 
 
-class ArchiveError(Exception):
-    """What cannot be done with the archive; the message is the one line that says why."""
+class ArchiveError(CommandError):
+    """What cannot be done with the archive."""
 
 
 class UsageError(ArchiveError, SettingError):
     """Asked for in a way that can never work: no later try helps."""
 
 
-def check_site(site: str) -> None:
+def check_site(called: str, site: str) -> None:
     """Whether it may be a site's name, which its user in the database has too.
 
     Raises:
@@ -76,7 +77,7 @@ def check_site(site: str) -> None:
     """
     if not _SITE.fullmatch(site):
         raise UsageError(
-            f"--site is {site[:64]!r}, expected a-z, 0-9, _ and - after a letter, 63 at most"
+            f"{called} is {site[:64]!r}, expected a-z, 0-9, _ and - after a letter, 63 at most"
         )
 
 
@@ -124,14 +125,10 @@ def connect(url: str, name: str, session: str = "read-write") -> psycopg.Connect
     """
     said = check_url(url)
     import psycopg  # noqa: PLC0415
-    from psycopg import conninfo  # noqa: PLC0415
 
     with explaining():
         connection = psycopg.connect(
-            conninfo.make_conninfo(
-                "",
-                **{**_LINK, "target_session_attrs": session, "application_name": name, **said},
-            ),
+            **{**_LINK, "target_session_attrs": session, "application_name": name, **said},
             autocommit=True,
         )
         connection.execute(_SESSION)

@@ -36,9 +36,11 @@ from lupin_bridge.archive.database import (
     place_of,
 )
 from lupin_bridge.archive.source import Batch, Epoch, Row, Source, arrival_of
+from lupin_bridge.console import CommandError
 from lupin_bridge.feed.shared_work import end
-from lupin_bridge.settings import SettingError, Settings, option, variable
-from lupin_twin.journal.retention import DAY_NS, RECORD
+from lupin_bridge.settings import Settings, option, variable
+from lupin_twin.core.past import DAY_NS
+from lupin_twin.journal.retention import RECORD
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, SiteLog
 
 # Where the tables that are in parts by month have the stamp.
@@ -234,7 +236,7 @@ class Forwarder:
     def __init__(
         self, url: str, site: str, path: Callable[[], Path], say: Callable[[str], None]
     ) -> None:
-        check_site(site)
+        check_site("--site", site)
         check_url(url)
         self._url = url
         self._site = site
@@ -264,7 +266,7 @@ class Forwarder:
                 raise ArchiveError(f"the journal {path} cannot be forwarded: {error}") from error
         except UsageError:
             raise
-        except ArchiveError as error:
+        except CommandError as error:
             if str(error) != self._told:
                 self._told = str(error)
                 again = "" if once else "; it will be retried"
@@ -313,13 +315,12 @@ def check(settings: Settings, role: str) -> None:
     given = [name for name in ("site", "archive_url") if getattr(settings, name)]
     if not given:
         return
-    called = settings.called(given[0])
     if role == "web":
-        raise SettingError(f"{called} is for the twin, not for lupin-twin web")
+        raise settings.wrong(given[0], "is for the twin, not for lupin-twin web")
     if len(given) == 1:
         (other,) = {"site", "archive_url"} - {*given}
-        raise SettingError(f"{called} is given without {option(other)}, an archive needs both")
-    check_site(settings.site)
+        raise settings.wrong(given[0], f"is given without {option(other)}, an archive needs both")
+    check_site(settings.called("site"), settings.site)
     check_url(settings.archive_url)
 
 

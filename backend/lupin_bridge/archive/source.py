@@ -317,19 +317,14 @@ class Source:
     def _see_events(self, found: Batch, asked: Mapping[str, Any]) -> None:
         """Events change where rows come late, so they are sent once all rows are."""
         since = self._events_since
-        touched: dict[int, int] = (
-            dict(self._rows(_TOUCHED_SINCE, asked)) if found.upto > asked["after"] else {}
-        )
-        if since is None:
-            if found.is_full:
-                return
-            runs = self._connection.execute("SELECT run FROM run WHERE site = ?", (LOCAL_SITE,))
-            since = dict.fromkeys((run for (run,) in runs), 0)
-        else:
-            for run, stamp_ns in touched.items():
+        if since is not None and found.upto > asked["after"]:
+            for run, stamp_ns in self._rows(_TOUCHED_SINCE, asked):
                 since[run] = min(stamp_ns, since.get(run, stamp_ns))
         if found.is_full:
             return
+        if since is None:
+            runs = self._connection.execute("SELECT run FROM run WHERE site = ?", (LOCAL_SITE,))
+            since = dict.fromkeys((run for (run,) in runs), 0)
         for run, stamp_ns in since.items():
             within = {**asked, "run": run, "since": stamp_ns, "event": Event.SILENCES}
             (over_ns,) = self._rows(_EVENT_OVER, within)[0]

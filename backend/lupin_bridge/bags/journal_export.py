@@ -27,7 +27,7 @@ from lupin_bridge.feed.relay import ENCODING, schema_text
 from lupin_twin.core.interfaces import CLOCK, DISCOVERED_TAGS, OBSERVATIONS, Topic
 from lupin_twin.core.state import Pin, Pose, Write
 from lupin_twin.journal.rows import listed_rows
-from lupin_twin.journal.runs import Run, runs, spans_within
+from lupin_twin.journal.runs import Run, cut, runs, spans
 from lupin_twin.journal.schema import LOCAL_SITE, one_view
 from lupin_twin.ros.convert import observation_message, pose_message, time_msg
 
@@ -74,7 +74,7 @@ class JournalRows:
         self._connection = connection
         self._period = {"site": LOCAL_SITE, "start": start_ns, "end": end_ns, "lot": LOT}
         with one_view(connection):
-            self._spans = spans_within(runs(connection.execute), start_ns, end_ns)
+            self._spans = cut(spans(runs(connection.execute)), start_ns, end_ns)
             self.runs: dict[int, Run] = {span.run.id: span.run for span in self._spans}
             self.places = self._places_before(start_ns)
 

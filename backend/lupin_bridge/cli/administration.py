@@ -17,10 +17,11 @@ import threading
 import time
 from collections.abc import Mapping
 from contextlib import closing
+from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from lupin_bridge.access.accounts import Accounts, accounts_path, digest, make_file
+from lupin_bridge.access.accounts import Accounts, accounts_path, make_file
 from lupin_bridge.access.credentials import (
     ROLES,
     TOKEN_ROLES,
@@ -28,13 +29,13 @@ from lupin_bridge.access.credentials import (
     Kind,
     check_name,
     check_password,
-    check_site,
+    digest,
 )
 from lupin_bridge.access.people import hashed
 from lupin_bridge.archive.database import (
-    ArchiveError,
     UsageError,
     check,
+    check_site,
     check_version,
     connect,
     explaining,
@@ -48,7 +49,7 @@ from lupin_bridge.archive.forwarding import Forwarder
 from lupin_bridge.cli import journal
 from lupin_bridge.console import (
     FAILED,
-    CannotWrite,
+    CommandError,
     Roles,
     add_actions,
     add_role,
@@ -66,7 +67,7 @@ from lupin_bridge.settings import (
     variable,
 )
 from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
-from lupin_twin.runtime.process import INTERRUPTED, USAGE_ERROR
+from lupin_twin.runtime.process import USAGE_ERROR
 
 ARCHIVE_ACTIONS: Final[Mapping[str, str]] = {
     "init": "make its tables and roles, in a database that has none of them",
@@ -120,12 +121,10 @@ def run_archive(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
         if options.role == "forward":
             return _forward(options, environ, url)
         return _archive(options, url)
-    except KeyboardInterrupt:
-        return INTERRUPTED
     except UsageError as error:
         say(str(error))
         return USAGE_ERROR
-    except ArchiveError as error:
+    except CommandError as error:
         return journal.fail(str(error))
 
 
@@ -139,36 +138,31 @@ def _given(options: argparse.Namespace, environ: Mapping[str, str], name: str) -
 
 
 def _archive(options: argparse.Namespace, url: str) -> int:
-    name = f"lupin-twin archive {options.action}"
-    with closing(connect(url, name)) as connection, explaining():
-        return _act(options, connection, place_of(url))
-
-
-def _act(options: argparse.Namespace, connection: Any, place: str) -> int:
-    action = options.action
-    if action == "init":
-        init(connection)
-        tell(f"{place}: the archive is made")
-        return 0
-    if action == "migrate":
-        migrate(connection)
-        tell(f"{place}: the archive is up to date")
-        return 0
-    check_version(connection)
-    if action == "info":
-        tell(*overview(connection))
-        return 0
-    if action == "retain":
-        if not 0 < options.days <= MAX_JOURNAL_DAYS:
-            raise UsageError(
-                f"--days is {options.days:g}, expected more than 0, {MAX_JOURNAL_DAYS:g} at most"
-            )
-        gone = list(retain(connection, options.days, options.site))
-        tell(*(f"deleted {line}" for line in gone or ["nothing"]))
-        return 0
-    wrong = check(connection)
-    tell(*wrong, f"{place} is {'wrong as stated above' if wrong else 'whole'}")
-    return FAILED if wrong else 0
+    action, place = options.action, place_of(url)
+    if action == "retain" and not 0 < options.days <= MAX_JOURNAL_DAYS:
+        raise UsageError(
+            f"--days is {options.days:g}, expected more than 0, {MAX_JOURNAL_DAYS:g} at most"
+        )
+    with closing(connect(url, f"lupin-twin archive {action}")) as connection, explaining():
+        if action == "init":
+            init(connection)
+            tell(f"{place}: the archive is made")
+            return 0
+        if action == "migrate":
+            migrate(connection)
+            tell(f"{place}: the archive is up to date")
+            return 0
+        check_version(connection)
+        if action == "info":
+            tell(*overview(connection))
+            return 0
+        if action == "retain":
+            gone = list(retain(connection, options.days, options.site))
+            tell(*(f"deleted {line}" for line in gone or ["nothing"]))
+            return 0
+        wrong = check(connection)
+        tell(*wrong, f"{place} is {'wrong as stated above' if wrong else 'whole'}")
+        return FAILED if wrong else 0
 
 
 def _forward(options: argparse.Namespace, environ: Mapping[str, str], url: str) -> int:
@@ -176,13 +170,8 @@ def _forward(options: argparse.Namespace, environ: Mapping[str, str], url: str) 
         os.nice(_NICENESS)
         threading.Thread(target=_end_with_input, name="end", daemon=True).start()
 
-    def path() -> Path:
-        # It may be about to be made.
-        try:
-            return journal.path_of(options, environ)
-        except journal.JournalError as error:
-            raise ArchiveError(str(error)) from error
-
+    # Looked for each time: it may be about to be made.
+    path = partial(journal.path_of, options, environ)
     forwarder = Forwarder(url, _given(options, environ, "site"), path, say)
     return 0 if forwarder.run(once=options.once) else FAILED
 
@@ -256,25 +245,23 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
 def run_people(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     """Run the action; returns the process's exit code."""
     try:
-        given = {} if options.accounts is None else {"accounts": options.accounts}
+        given = {"accounts": options.accounts}
         path = accounts_path(settings_from(given, environ, options.config))
         if options.role == "audit":
             return _audit(path)
         if options.action == "add":
             return _add(path, options)
         return _remove(path, options) if options.action != "list" else _list(path, options)
-    except KeyboardInterrupt:
-        return INTERRUPTED
     except BrokenPipeError:
         return 0
-    except (AccountError, SettingError, CannotWrite) as error:
+    except (AccountError, SettingError, CommandError) as error:
         return journal.fail(str(error))
 
 
 def _add(path: Path, options: argparse.Namespace) -> int:
     check_name(options.name)
     for site in options.for_site:
-        check_site(site)
+        check_site("--for-site", site)
     kind, token = _WHAT[options.role], ""
     if options.role == "token":
         token = secrets.token_urlsafe(32)

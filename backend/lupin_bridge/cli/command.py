@@ -94,7 +94,8 @@ class OnceInAWhile(logging.Filter):
         text = record.getMessage() if record.msg == "%s" else str(record.msg)
         error = record.exc_info[0] if record.exc_info else None
         kind = (record.name, record.levelno, _NUMBER.sub("#", text[:200].partition("\n")[0]), error)
-        kinds = self._ours if is_ours(record.name) else self._libraries
+        # A library's errors come with a page of trace each.
+        kinds = self._ours if record.name.startswith("lupin") else self._libraries
         if kinds.take(kind, now_s) or self._loggers.take(record.name, now_s):
             if len(self._held_back) < MAX_KINDS:
                 self._held_back[kind] += 1
@@ -105,11 +106,6 @@ class OnceInAWhile(logging.Filter):
         if held_back:
             record.msg = f"{record.msg} ({held_back} more since the last time)"
         return True
-
-
-def is_ours(logger: str) -> bool:
-    """Whether a logger is the project's; a library's errors come with a page of trace each."""
-    return logger.startswith("lupin")
 
 
 def set_up_log(log_format: str, level: str = "info") -> None:
@@ -248,11 +244,7 @@ def _play_args(options: argparse.Namespace) -> list[str]:
 
 def _settings_from(options: argparse.Namespace) -> Settings:
     given = {spec.name: getattr(options, spec.name) for spec in table()}
-    return settings_from(
-        {name: value for name, value in given.items() if value is not None},
-        os.environ,
-        options.config,
-    )
+    return settings_from(given, os.environ, options.config)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -287,10 +279,7 @@ def parser() -> argparse.ArgumentParser:
                     f"(default: {spec.default or 'none'})",
                 )
     for role, text in ROLES.items():
-        # No abbreviations: what one means would change with the next setting.
-        own = roles.add_parser(
-            role, parents=[common], help=text, description=text, allow_abbrev=False
-        )
+        own = add_role(roles, role, text, parents=[common])
         if role == "demo":
             for name, (kind, help_text) in PATROL_OPTIONS.items():
                 own.add_argument(f"--{name}", type=kind, metavar=name.upper(), help=help_text)

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any, Final, TextIO
 from zoneinfo import ZoneInfo
 
-from lupin_bridge.cli.journal import SHOWN, JournalError, add_which, fail, path_of
-from lupin_bridge.console import Progress, Roles, add_role, say, tell
+from lupin_bridge.cli.journal import SHOWN, add_which, fail, path_of
+from lupin_bridge.console import CommandError, Progress, Roles, add_role, say, tell
 from lupin_bridge.judge.judging import zone_of
 from lupin_twin.adapt.config import place_of, read_yaml
 from lupin_twin.adapt.table import (
@@ -41,7 +41,6 @@ from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock, Run, runs, span_at
 from lupin_twin.journal.schema import FILE_ERRORS, open_named
-from lupin_twin.runtime.process import INTERRUPTED
 
 _REPORT_EVERY: Final = 20_000
 # Characters of a line; a field of the csv module has 131,072 at most.
@@ -318,8 +317,6 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     """Look through the file, and with `--write` import it; returns the process's exit code."""
     try:
         return _run(options, path_of(options, environ, may_be_new=True))
-    except KeyboardInterrupt:
-        return INTERRUPTED
     except ConfigError as error:
         return fail(f"{options.columns}: {error}")
     except (UnicodeDecodeError, csv.Error) as error:
@@ -391,14 +388,14 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
     path.parent.mkdir(parents=True, exist_ok=True)
     new = count = 0
     with (
-        Lock(path, "lupin-twin import"),
+        closing(Lock(path, "lupin-twin import")),
         closing(JournalFile(path, _NO_LIMITS, is_sound=None)) as file,
     ):
         with closing(open_named(path)) as connection:
             known = runs(connection.execute)
             placed = {tag for (tag,) in connection.execute("SELECT DISTINCT tag FROM place")}
         if any(run.begun.is_simulated for run in known):
-            raise JournalError(f"the journal {path} is of a simulation: import into another")
+            raise CommandError(f"the journal {path} is of a simulation: import into another")
         while batch := list(islice(found, _BATCH)):
             count += len(batch)
             if not known:
@@ -421,7 +418,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
             written, refused = file.append(rows)
             new += written
             if refused:
-                raise JournalError(f"{refused} rows could not be written into {path}")
+                raise CommandError(f"{refused} rows could not be written into {path}")
         for run in known[-1:]:
             # A tag's place holds from before its first reading on, and the first one stays.
             file.append(

@@ -17,7 +17,7 @@ from typing import Any, Final
 from lupin_bridge.bags.recording import SUFFIX
 from lupin_bridge.console import (
     FAILED,
-    CannotWrite,
+    CommandError,
     Progress,
     Roles,
     add_actions,
@@ -77,14 +77,9 @@ _END_NS: Final = (MAX_SECONDS + 1) * 10**9  # past every stamp
 SERVICE_FOLDER: Final = Path("/var/lib/lupin-twin")
 
 
-class JournalError(Exception):
-    """It cannot be done; the message is the one line that says why."""
-
-
 # Errors whose text is the message.
 SHOWN: Final = (
-    JournalError,
-    CannotWrite,
+    CommandError,
     PastRefused,
     NotRemembered,
     InUse,
@@ -159,8 +154,6 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
             code = {"info": _info, "check": _check, "vacuum": _vacuum}[options.action](path)
     except BrokenPipeError:  # the reader has closed it
         return FAILED
-    except KeyboardInterrupt:
-        return INTERRUPTED
     except SHOWN as error:
         return fail(str(error))
     except (*FILE_ERRORS, OSError) as error:
@@ -180,12 +173,12 @@ def path_of(
     """The journal that the options name; with `may_be_new`, one that is to be made too.
 
     Raises:
-        JournalError: there is none.
+        CommandError: there is none.
 
     """
     named = f"--demo {options.demo}" if options.demo is not None else options.journal
     if named and options.domain is not None:
-        raise JournalError(f"--domain {options.domain} is for a twin's own file, not with {named}")
+        raise CommandError(f"--domain {options.domain} is for a twin's own file, not with {named}")
     path: Path | None
     try:
         if options.demo is not None:
@@ -194,20 +187,20 @@ def path_of(
             domain = 0 if named else _domain(options, environ)
             path = journal_path(options.journal or "", environ, domain, options.namespace)
     except RuntimeError as error:
-        raise JournalError(f"there is no home to look for a journal in: {error}") from error
+        raise CommandError(f"there is no home to look for a journal in: {error}") from error
     if path is None:
-        raise JournalError("--journal is 'off', must be a file")
+        raise CommandError("--journal is 'off', must be a file")
     for file in (path,) if named else (path, SERVICE_FOLDER / path.name):
         try:
             if file.is_file():
                 return file
         except OSError as error:
-            raise JournalError(f"cannot look for the journal {file}: {error.strerror}") from error
+            raise CommandError(f"cannot look for the journal {file}: {error.strerror}") from error
     if may_be_new:
         return path
     others = sorted(file.name for file in path.parent.glob("*.sqlite"))
     there = f"; in its folder there are {', '.join(others[:9])}" if others else ""
-    raise JournalError(f"there is no journal {path}{there}")
+    raise CommandError(f"there is no journal {path}{there}")
 
 
 def _domain(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
@@ -218,9 +211,9 @@ def _domain(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     elif given.isdecimal():
         domain = int(given)
     else:
-        raise JournalError(f"ROS_DOMAIN_ID is {given!r}, must be a whole number")
+        raise CommandError(f"ROS_DOMAIN_ID is {given!r}, must be a whole number")
     if not 0 <= domain <= _MAX_DOMAIN:
-        raise JournalError(f"{what} is {domain}, must be from 0 to {_MAX_DOMAIN}")
+        raise CommandError(f"{what} is {domain}, must be from 0 to {_MAX_DOMAIN}")
     return int(domain)
 
 
@@ -332,10 +325,10 @@ def _export(path: Path, options: argparse.Namespace, environ: Mapping[str, str])
     start_ns = 0 if options.start is None else moment("--from", options.start)
     end_ns = _END_NS if options.end is None else moment("--to", options.end)
     if end_ns < start_ns:
-        raise JournalError(f"--to is {seconds(end_ns)}, before --from, {seconds(start_ns)}")
+        raise CommandError(f"--to is {seconds(end_ns)}, before --from, {seconds(start_ns)}")
     if options.recording is not None:
         return _record(path, options, start_ns, end_ns)
-    given = {} if options.sensors is None else {"sensors": options.sensors}
+    given = {"sensors": options.sensors}
     sensors = Criteria.of(settings_from(given, environ, options.config)).sensors
     with closing(_reader(path)) as connection:
         lots = rows(connection, start_ns, end_ns, options.tag, options.sensor)
@@ -349,9 +342,9 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
     target: Path = options.recording
     for name in ("tag", "sensor"):
         if getattr(options, name) is not None:
-            raise JournalError(f"--{name} is for CSV: {target} has whole observations")
+            raise CommandError(f"--{name} is for CSV: {target} has whole observations")
     if target.suffix != SUFFIX:
-        raise JournalError(f"{target} does not end in {SUFFIX}: that is how its form is known")
+        raise CommandError(f"{target} does not end in {SUFFIX}: that is how its form is known")
     try:
         # Here, where it is needed: it knows ROS.
         from lupin_bridge.bags.journal_export import export  # noqa: PLC0415
@@ -359,12 +352,12 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
         with closing(_reader(path)) as connection:
             observations, tags = export(connection, target, start_ns, end_ns, options.namespace)
     except FileExistsError as error:
-        raise JournalError(f"{target} is there already, and nothing is overwritten") from error
+        raise CommandError(f"{target} is there already, and nothing is overwritten") from error
     except (OSError, LookupError) as error:
         why = getattr(error, "strerror", None) or str(error)
-        raise JournalError(f"cannot make {target}: {why}") from error
+        raise CommandError(f"cannot make {target}: {why}") from error
     if not observations + tags:
-        raise JournalError(f"the journal {path} holds nothing of that period")
+        raise CommandError(f"the journal {path} holds nothing of that period")
     _say(f"{observations:,} observations and {tags:,} messages of discovered tags are in {target}")
     return 0
 

@@ -162,7 +162,8 @@ def with_past(feed: Feed) -> Feed:
         log.warning("the demo starts without a past: %s", error)
     if past is None:
         return feed
-    since_s = since_morning_s(past.end_ns, feed.patrol_args, time.time_ns())
+    _, past_ns = past
+    since_s = since_morning_s(past_ns, feed.patrol_args, time.time_ns())
     module, *words = feed.command
     return replace(feed, command=[module, f"--since-morning={since_s!r}", *words])
 

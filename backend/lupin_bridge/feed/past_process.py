@@ -69,9 +69,9 @@ class PastProcess:
 
         """
         if self.why_down:
-            raise _passing(self.why_down)
+            raise NotRemembered(self.why_down)
         if len(self.asked) >= MAX_PENDING:
-            raise _passing(f"{MAX_PENDING} requests about the past are under way, the limit")
+            raise NotRemembered(f"{MAX_PENDING} requests about the past are under way, the limit")
         packer = _Packer()
         packer.dump((question, now, cost_s))
         number = next(self._numbers)
@@ -103,7 +103,7 @@ class PastProcess:
     def _refuse_all(self) -> None:
         for answer in self.asked.values():
             if not answer.done():
-                answer.set_exception(_passing(self.why_down))
+                answer.set_exception(NotRemembered(self.why_down))
 
     # --- its life -------------------------------------------------------------------------------
 
@@ -174,10 +174,6 @@ class _Packer(pickle.Pickler):
             return None
         self.map = value
         return "map"
-
-
-def _passing(why: str) -> NotRemembered:
-    return NotRemembered(why, is_lasting=False)
 
 
 def _exit_text(code: int) -> str:

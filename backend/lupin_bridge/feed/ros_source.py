@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from struct import Struct
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Final, Generic
 
 from builtin_interfaces.msg import Time
 from lupin_msgs.msg import Observation
@@ -21,6 +21,7 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.context import Context
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from std_msgs.msg import Header
 
 from lupin_bridge.feed.past_process import PastProcess
@@ -34,27 +35,25 @@ from lupin_bridge.feed.source import (
     Robot,
     TwinSource,
     TwinUpdate,
+    ValueT,
 )
 from lupin_twin.adapt.config import POSES
 from lupin_twin.adapt.messages import message_type
 from lupin_twin.core import ingest, interfaces
 from lupin_twin.core.drops import Drop, Reason
 from lupin_twin.core.interfaces import Topic
+from lupin_twin.core.parameters import FARTHEST_M
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Scan
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import latched, qos_of, read_message
-from lupin_twin.ros.message_limits import MalformedError, MessageShape, TooManyError
+from lupin_twin.ros.message_limits import MessageShape
 from lupin_twin.runtime.workers import Workers
-
-ValueT = TypeVar("ValueT", Position, Plan, Battery)
 
 # A way of 250 m by Nav2's planners; of more, reading it would take too long.
 MAX_POSES: Final = 5_000
 # What is shown of it: a frame holds it whole.
 SHOWN_POINTS: Final = 60
-# Farther is no greenhouse, m.
-FARTHEST_M: Final = 1e6
 
 # CDR (OMG DDS-XTypes, 7.4): four bytes say how, numbers lie at multiples of their size behind them.
 _CDR_HEADER_BYTES: Final = 4
@@ -118,9 +117,9 @@ class RobotTopics:
         message = self._take(node, topic)
         if message is None:
             return None
+        value: ValueT | Drop | None = message if isinstance(message, Drop) else None
         # Of a battery, the frame says where in the robot it is.
-        value: ValueT | Drop | None = None
-        if topic is not self._battery:
+        if value is None and topic is not self._battery:
             value = ingest.wrong_frame(message.header.frame_id, node.parameters.frame_id)
         if value is None:
             stamp_ns = _stamp_ns(message, now_ns)
@@ -139,12 +138,8 @@ class RobotTopics:
             taken = handle.take_message(topic.subscription.msg_type, True)
         if taken is None:
             return None
-        read = _read_path if topic is self._plan else read_message
-        message = read(taken[0], topic.shape)
-        if isinstance(message, Drop):
-            node.utilities.drop(message, topic.subscription.topic_name)
-            return None
-        return message
+        read = _read_path if topic is self._plan else deserialize_message
+        return read_message(taken[0], topic.shape, read)
 
     def _subscribe(self, node: Any, topic: _ReceivedTopic) -> None:
         """Subscribe as the topic is published; again where that has changed."""
@@ -200,13 +195,8 @@ class _Path:
     points: list[tuple[float, float]]
 
 
-def _read_path(data: bytes, shape: MessageShape) -> _Path | Drop:
+def _read_path(data: bytes, _: Any) -> _Path:
     """Read it from its bytes: rclpy makes eight objects of each pose, 70 ms of work a thousand."""
-    try:
-        shape.check(data)
-    except MalformedError as error:
-        reason = Reason.SIZE if isinstance(error, TooManyError) else Reason.UNREADABLE
-        return Drop(reason, str(error))
     order = "<" if data[1] & 1 else ">"
     length_at, place_at = Struct(f"{order}I").unpack_from, Struct(f"{order}dd").unpack_from
     body = data[_CDR_HEADER_BYTES:]
@@ -248,10 +238,8 @@ def _stamp_ns(message: Any, now_ns: int | None) -> int | Drop:
 
 
 def _position(topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Position | Drop:
-    at = message
     assert topic.how is not None
-    for part in POSES[topic.how[0]].split("."):
-        at = getattr(at, part)
+    at = POSES[topic.how[0]](message)
     x, y, turned = at.position.x, at.position.y, at.orientation
     if not _is_near(x, y):
         return Drop(Reason.POSE, f"its position is ({x:g}, {y:g}) m")

@@ -22,7 +22,7 @@ from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, Origin
 from lupin_twin.core.drops import Counts, Recent
 from lupin_twin.core.notes import Note, NotesRequest, NotesUnwritable, PastNotes
 from lupin_twin.core.parameters import World
-from lupin_twin.core.past import NotRemembered, PastRow, PastWrites, WritesRequest
+from lupin_twin.core.past import FOREVER_NS, NotRemembered, PastRow, PastWrites, WritesRequest
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Scan, Snapshot
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
@@ -40,7 +40,6 @@ TRAIL_POINTS: Final = 720
 # A plan that nobody repeats is none any more after so long, or once the robot is where it ends.
 PLAN_NS: Final = 600 * NANOSECONDS_PER_SECOND
 ARRIVED_M: Final = 0.5
-_FOREVER_NS: Final = 2**63 - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +96,7 @@ class RobotLog:
         unknown that would be of the future.
         """
         before = self.now
-        future_ns = _FOREVER_NS if now_ns is None else now_ns + MAX_AHEAD_NS
+        future_ns = FOREVER_NS if now_ns is None else now_ns + MAX_AHEAD_NS
         if now_ns is not None:
             past_ns = now_ns - TRAIL_NS
             self.trail = [it for it in self.trail if past_ns <= it.at_ns <= future_ns]

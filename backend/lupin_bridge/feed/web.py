@@ -119,7 +119,7 @@ class FollowedLog:
         if error.damage:
             await self._on_worker(lambda: _delete(path))
         why = f"{path}, the copy of the twin's journal, cannot be read; it is made anew"
-        return NotRemembered(f"{why} as soon as the twin answers", is_lasting=False)
+        return NotRemembered(f"{why} as soon as the twin answers")
 
     async def wait(self) -> None:
         """Return once a log is known; wait no longer than it usually takes."""

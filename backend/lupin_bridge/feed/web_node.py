@@ -21,7 +21,7 @@ from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.past import PastRefused, error_of
 from lupin_twin.core.state import Snapshot, TagState
 from lupin_twin.field.engine import FieldRefused, FieldRules
-from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.field.explored import OccupancyMap, digest_of
 from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
 from lupin_twin.ros.convert import findings_of
@@ -60,16 +60,6 @@ SHARED_PARAMETERS: Final = (
 )
 
 
-def _digest_of_map(occupancy: OccupancyMap) -> int:
-    """A map's revision: the same in all replicas, and for each copy of a map that has not changed.
-
-    SLAM publishes it anew every few seconds, with another stamp each time.
-    """
-    digest = blake2b(repr(occupancy.place).encode("utf-8", "surrogatepass"), digest_size=6)
-    digest.update(occupancy.cells.data)
-    return int.from_bytes(digest.digest())
-
-
 class WebNode(AdjustableNode):
     """Follows `/twin/state` with its `/twin/times`, and `/map`, and asks the twin's services.
 
@@ -97,7 +87,6 @@ class WebNode(AdjustableNode):
         self.utilities = NodeUtilities(self)
         self.parameters = declare(self, SHARED_PARAMETERS)
         self.rules = FieldRules.of(self.parameters)
-        self.adjust_by(self._adjust)
         self.twins = TwinCount()
         self.occupancy_map: OccupancyMap | None = None
         self.digest = ""
@@ -256,7 +245,7 @@ class WebNode(AdjustableNode):
         topic, frame_id = self._topics["map_topic"], self.parameters.frame_id
         new = self.utilities.new_map(msg, topic, frame_id, self.occupancy_map)
         if new is not None:
-            self.occupancy_map = replace(new, revision=_digest_of_map(new))
+            self.occupancy_map = replace(new, revision=digest_of(new))
             self._on_map()
 
     def _take_diagnostics(self, msg: Any) -> None:
@@ -266,8 +255,8 @@ class WebNode(AdjustableNode):
             self._report = self_report(said)
             self._reported_s = time.monotonic()
 
-    def _adjust(self, now: TwinParameters) -> None:
-        # A twin's own are not on the wire: they are set here as there.
+    def adjust(self, now: TwinParameters) -> None:
+        """See `AdjustableNode`. A twin's own are not on the wire: they are set here as there."""
         self.rules = FieldRules.of(now)
         self._changes += 1
         self._on_map()
@@ -291,4 +280,4 @@ def check_ok(response: Any) -> None:
     error = error_of(response.error_message)
     if isinstance(error, PastRefused):
         raise FieldRefused(str(error))
-    raise error if error.is_lasting else TwinUnavailableError(str(error))
+    raise TwinUnavailableError(str(error))

@@ -9,7 +9,6 @@ from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable, Itera
 from contextlib import aclosing
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any, Final, cast
 
 import orjson
@@ -72,7 +71,7 @@ from lupin_bridge.serving.admission import (
     Answer,
     AnswerCache,
     Limits,
-    json_answer,
+    content_answer,
 )
 from lupin_bridge.serving.http_protocol import PieceByPiece
 from lupin_bridge.settings import Settings
@@ -164,14 +163,6 @@ class Fleet:
 
     # --- the overview -------------------------------------------------------------------------
 
-    def body(self, sites: Mapping[str, Site]) -> bytes:
-        """`/api/sites`, of these."""
-        watching = self.watching
-        now_ns = watching.now_ns
-        return orjson.dumps(
-            {"sites": [site_json(site, watching.archive, now_ns) for site in sites.values()]}
-        )
-
     def sites_for(self, request: HTTPConnection) -> Mapping[str, Site]:
         """The sites that whoever makes a request may read."""
         person, sites = person_of(request), self.watching.sites
@@ -203,13 +194,6 @@ class Fleet:
         watching = self.watching
         self._frame = SitesFrame(watching.sites, watching.archive, watching.now_ns, self._frame)
         self.hub.publish(self._frame, now_s)  # type: ignore[arg-type]  # all that the hub needs of one
-
-    # --- several sites ------------------------------------------------------------------------
-
-    async def compare(self, query: Compare | SitesReport) -> Answer:
-        """The answer of `/api/compare` or `/api/report`."""
-        answer: Answer = await self.past.ask(query, Now(0, "", UNKNOWN_JOURNAL), COMPARE_S)  # type: ignore[arg-type]  # see `reader`
-        return answer
 
     async def _tidy(self) -> None:
         now_s = time.monotonic()
@@ -284,7 +268,6 @@ def create_fleet_app(
     fleet: Fleet,
     access: Access,
     proxies: Proxies,
-    static_folder: Path = STATIC_FOLDER,
 ) -> FastAPI:
     """The application around a fleet that its caller starts and stops."""
     app = FastAPI(title="lupin-twin fleet", version=__version__, openapi_url=None)
@@ -299,10 +282,10 @@ def create_fleet_app(
     # The last one added is the first to be asked.
     app.add_middleware(PieceByPiece)
     app.add_middleware(ReadOnly)
-    app.add_middleware(Sites, pages=fleet.pages, page=SitePage(static_folder))
+    app.add_middleware(Sites, pages=fleet.pages, page=SitePage(STATIC_FOLDER))
     app.add_middleware(AccessControl, access=access)
     app.add_middleware(BehindProxies, proxies=proxies)
-    page = static_folder / "fleet.html"
+    page = STATIC_FOLDER / "fleet.html"
 
     @app.get("/", include_in_schema=False)
     async def overview() -> Response:
@@ -312,11 +295,11 @@ def create_fleet_app(
 
     @app.get("/lupin.svg", include_in_schema=False)
     async def icon() -> Response:
-        return FileResponse(static_folder / "lupin.svg")
+        return FileResponse(STATIC_FOLDER / "lupin.svg")
 
     # Not all of the folder: beside it is the page of one greenhouse.
     if page.is_file():
-        app.mount("/assets", StaticFiles(directory=static_folder / "assets"), name="assets")
+        app.mount("/assets", StaticFiles(directory=STATIC_FOLDER / "assets"), name="assets")
     app.add_exception_handler(404, _not_found)
     return app
 
@@ -337,11 +320,13 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
     @app.api_route("/api/sites", methods=["GET", "HEAD"])
     async def overview(request: Request) -> Response:
         """Every site of the archive, by name."""
-        sites = fleet.sites_for(request)
-        tag = etag(sites, fleet.watching.archive)
+        sites, archive = fleet.sites_for(request), fleet.watching.archive
+        tag = etag(sites, archive)
         if has_etag(request, tag.removeprefix("W/")):
             return not_modified(tag)
-        return json_response(fleet.body(sites), 200, {"ETag": tag, **REVALIDATE})
+        now_ns = fleet.watching.now_ns
+        entries = [site_json(site, archive, now_ns) for site in sites.values()]
+        return json_response(orjson.dumps({"sites": entries}), 200, {"ETag": tag, **REVALIDATE})
 
     @app.api_route("/api/sites/{name}/map.svg", methods=["GET", "HEAD"])
     async def site_map(request: Request, name: str) -> Response:
@@ -388,7 +373,7 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
         async def compute() -> Answer:
             with fleet.admission.computing(client_of(request)):
                 body = alarms_json((watching.sites[name] for name in names), watching.archive)
-                answer = json_answer(orjson.dumps(body))
+                answer = content_answer(orjson.dumps(body))
             fleet.cache.put(key, answer)
             return answer
 
@@ -411,9 +396,12 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
         return await over_sites(request, sites_report(parameters, fleet.sites_for(request), now_ns))
 
     async def over_sites(request: Request, query: Compare | SitesReport) -> Response:
+        about = Now(0, "", UNKNOWN_JOURNAL)
+        asked: Any = query  # see `reader`
+
         async def compute() -> Answer:
             with fleet.admission.computing(client_of(request), is_large=True):
-                return await fleet.compare(query)
+                return cast("Answer", await fleet.past.ask(asked, about, COMPARE_S))
 
         return await respond(request, query, compute)
 

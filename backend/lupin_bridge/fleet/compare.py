@@ -24,10 +24,10 @@ from lupin_bridge import query_string
 from lupin_bridge.fleet.overview import MAX_LISTED
 from lupin_bridge.judge.quantities import DAILY, DERIVED, Sensors
 from lupin_bridge.query_string import Name, OfPeriod, OfReport, Parameters, needed, parameter, read
-from lupin_bridge.serving.admission import Answer, json_answer
+from lupin_bridge.serving.admission import Answer, content_answer
 from lupin_bridge.stream.state_json import note_json, stamp
 from lupin_twin.core.notes import WITHDRAW, WITHDRAWN, Note
-from lupin_twin.core.past import HOUR_NS, Event, Grid, NotRemembered, PastRefused, grid, seconds
+from lupin_twin.core.past import HOUR_NS, Event, Grid, NotFound, PastRefused, grid, seconds
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 
 MAX_SITES: Final = 50
@@ -93,7 +93,7 @@ class Compare:
             "width": steps.bucket_ns // HOUR_NS,
         }
         found = connection.execute(_HOURS, query).fetchall()
-        return json_answer(orjson.dumps(self._body(_means(self, found))))
+        return content_answer(orjson.dumps(self._body(_means(self, found))))
 
     def _body(self, means: Mapping[str, np.ndarray[Any, np.dtype[np.float64]]]) -> dict[str, Any]:
         steps = self.steps
@@ -136,7 +136,7 @@ def compare(
     """The query of `/api/compare`; `known` has the names of all sites.
 
     Raises:
-        NotRemembered: see `chosen`.
+        NotFound: see `chosen`.
         PastRefused: see `OfPeriod.span`; too many sites, too long a period, a derived quantity.
 
     """
@@ -163,7 +163,7 @@ def chosen(text: str | None, known: Mapping[str, object]) -> list[str]:
     """The sites that are named with commas between them; all, if none is.
 
     Raises:
-        NotRemembered: one is not in the archive.
+        NotFound: one is not in the archive.
 
     """
     if text is None:
@@ -172,7 +172,7 @@ def chosen(text: str | None, known: Mapping[str, object]) -> list[str]:
     for name in names:
         if name not in known:
             why = f"there is no site {name[:64]!r} in the archive ({len(known)} others are)"
-            raise NotRemembered(why, is_lasting=True)
+            raise NotFound(why)
     return names
 
 
@@ -291,14 +291,14 @@ class SitesReport:
             "sites": rows,
             "notes": notes,
         }
-        return json_answer(orjson.dumps(body))
+        return content_answer(orjson.dumps(body))
 
 
 def sites_report(parameters: Parameters, known: Mapping[str, Any], now_ns: int) -> SitesReport:
     """The query of `/api/report`; `known` has all sites.
 
     Raises:
-        NotRemembered: see `chosen`.
+        NotFound: see `chosen`.
         PastRefused: see `query_string.report`.
 
     """

@@ -20,7 +20,7 @@ from fastapi import Request, Response
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from lupin_bridge.access.middleware import client_of, deny, with_security_headers
+from lupin_bridge.access.middleware import client_of, deny
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.fleet.source import SiteTwin
 from lupin_bridge.routes.answers import error_response, has_etag, not_modified
@@ -166,8 +166,6 @@ class Sites:
         if scope["type"] not in ("http", "websocket") or not path.startswith(_PREFIX):
             await self._app(scope, receive, send)
             return
-        if scope["type"] == "http":
-            send = with_security_headers(send)
         name, slash, rest = path[len(_PREFIX) :].partition("/")
         client = client_of(HTTPConnection(scope))
         found = self._pages.page_of(name, client)

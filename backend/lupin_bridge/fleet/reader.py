@@ -27,14 +27,14 @@ from lupin_bridge.feed.query import Child, Now, PastQuery, Search
 from lupin_bridge.fleet.compare import Compare, SitesReport
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
-from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.past import FOREVER_NS, NotRemembered
 from lupin_twin.core.state import Snapshot
 from lupin_twin.field.explored import OccupancyMap, map_of
 from lupin_twin.journal.appending import simulated
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.received import last_number, put_note
 from lupin_twin.journal.retention import Stretches, kept
-from lupin_twin.journal.runs import FOREVER_NS, runs, span_at, world_of
+from lupin_twin.journal.runs import runs, span_at, world_of
 from lupin_twin.journal.schema import MAP, DamagedFile, SiteLog
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
@@ -141,13 +141,12 @@ def _latest(log: SiteLog, asked: Latest, frame_id: str) -> Reported:
         now_ns = (stamp_ns or 0) + max(0, now_ns - (arrival_ns or now_ns))
     # Also what a robot's clock, a little ahead of this one, has stamped: it was received.
     known = state_at(journal, FOREVER_NS, frame_id)
-    found = simulated(journal)
     return Reported(
         Snapshot(max(now_ns, stamp_ns or 0), frame_id, known.tags),
         is_walls,
         world_of(log),
         kept(journal),
-        None if found is None else (found.start_ns, found.end_ns),
+        simulated(journal),
         *_newer_map(log, asked.map_hash),
     )
 
@@ -172,20 +171,17 @@ class ArchiveRecall(Recall):
             connection = self._connection()
             try:
                 with explaining(), connection.transaction():
-                    answer = question(connection, is_abandoned)
+                    return question(connection, is_abandoned)
             except ArchiveError:
                 connection.close()
                 raise
-            except BaseException:
-                self._idle.append(connection)
-                raise
+            finally:
+                if not connection.closed:
+                    self._idle.append(connection)
         except ArchiveError as error:
-            raise NotRemembered(str(error), is_lasting=False) from error
+            raise NotRemembered(str(error)) from error
         except DamagedFile as error:
-            why = f"rows of the site cannot be read: {error}"
-            raise NotRemembered(why, is_lasting=False) from error
-        self._idle.append(connection)
-        return answer
+            raise NotRemembered(f"rows of the site cannot be read: {error}") from error
 
     def _connection(self) -> Any:
         with suppress(IndexError):  # there is none

@@ -25,7 +25,7 @@ from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.notes import Note, NotesUnwritable
 from lupin_twin.core.parameters import TwinParameters, World
-from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.past import NotFound, NotRemembered
 from lupin_twin.core.state import same_tags
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
@@ -104,12 +104,10 @@ class Watching:
         self._ahead_ns = news.now_ns - time.monotonic_ns()
         if not self.archive.is_reachable:
             log.info("the archive is read")
-        elif not (news.sites or news.gone):
+        elif not news.changed and len(news.names) == len(self.sites):
             return
-        known = {} if news.is_whole else self.sites
-        sites = {name: site for name, site in known.items() if name not in news.gone}
-        sites |= {site.site: site for site in news.sites}
-        self.sites = dict(sorted(sites.items()))
+        known = {**self.sites, **{site.site: site for site in news.changed}}
+        self.sites = {name: known[name] for name in sorted(news.names)}
         self.archive = Archive(is_reachable=True)
         self._on_news()
 
@@ -261,7 +259,7 @@ class SiteTwin(TwinSource):
             # Of what was read: the same in all replicas.
             f"{self.site}-{self._seq}-{self._map_hash}",
             occupancy_map=self._map,
-            journal=self._condition(reported),
+            journal=self.journal(),
             rules=self.rules,
             origin=reported.world.origin,
             input_problems=(problem,) if problem else (),
@@ -275,9 +273,11 @@ class SiteTwin(TwinSource):
         goes_on = reported.is_walls or self._is_live
         return reported.snapshot.stamp_ns + (passed_ns if goes_on else 0)
 
-    def _condition(self, reported: Reported | None) -> Condition:
-        """As a journal's; its path is the site."""
-        site = self._site
+    # --- see `TwinSource` ---------------------------------------------------------------------
+
+    def journal(self) -> Condition:
+        """The site's log, whose path is the site."""
+        site, reported = self._site, self._reported
         complete_ns = None
         if reported is not None:
             complete_ns = site.heard_ns if reported.is_walls else reported.snapshot.stamp_ns
@@ -291,15 +291,9 @@ class SiteTwin(TwinSource):
             journal_id=self.site,
         )
 
-    # --- see `TwinSource` ---------------------------------------------------------------------
-
-    def journal(self) -> Condition:
-        """The site's log."""
-        return self._condition(self._reported)
-
     async def estimate_report(self, request: ReportRequest) -> Report:  # noqa: ARG002  # none
         """None: how right estimates were is counted by the twin."""
-        raise NotRemembered(_NO_REPORT, is_lasting=True)
+        raise NotFound(_NO_REPORT)
 
     writes_notes = True
 
@@ -317,10 +311,10 @@ class SiteTwin(TwinSource):
         if reported is None:
             raise TwinUnavailableError(f"the site has not been read yet. {self._problem}".strip())
         now_ns = self._now_ns(reported)
-        return Now(now_ns, self._parameters.frame_id, self._condition(reported))
+        return Now(now_ns, self._parameters.frame_id, self.journal())
 
     async def _reading(self, question: Any) -> Any:
-        about = Now(0, self._parameters.frame_id, self._condition(None))
+        about = Now(0, self._parameters.frame_id, self.journal())
         return await self.past.ask(question, about, 0.0)
 
 

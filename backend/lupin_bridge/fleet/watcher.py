@@ -12,7 +12,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar
 
 from lupin_bridge.alarms.board import notes_of_alarms, worst_first
@@ -34,11 +34,11 @@ from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import alarm_json
 from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note, NotesRequest
-from lupin_twin.core.past import NotRemembered, RecentRequest, WritesRequest
+from lupin_twin.core.past import FOREVER_NS, NotRemembered, RecentRequest, WritesRequest
 from lupin_twin.core.state import Snapshot, same_tags
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.received import notes, recent, writes
-from lupin_twin.journal.runs import FOREVER_NS, runs, span_at
+from lupin_twin.journal.runs import runs, span_at
 from lupin_twin.journal.schema import ORIGIN, DamagedFile, SiteLog
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
@@ -101,12 +101,12 @@ class _Judged:
     seq: int = -1
     is_caught_up: bool = False
     is_failing: bool = False
-    judged_s: float = field(default_factory=time.monotonic)
+    judged_s: float = 0.0
 
 
-def _origin(name: str, judged: _Judged | None) -> Origin:
+def _origin(name: str, judged: _Judged) -> Origin:
     """By a clock that is simulated no robot works; which clock it is, is known of a judged site."""
-    if judged is None or judged.snapshot is None:
+    if judged.snapshot is None:
         return "unknown" if name == "robot" else origin_of(name, is_simulated=False)
     return origin_of(name, is_simulated=judged.is_simulated)
 
@@ -136,18 +136,13 @@ class Watcher:
                 if time.monotonic() >= until_s:
                     break
         else:
-            if self._reported is not None and not self._has_more():
+            if self._reported is not None and not any(map(self._is_due, self.sites)):
                 self._wait()
             self._now_ns = self._see()
         self._is_judging = not self._is_judging
-        before, self._reported = self._reported, dict(self.sites)
-        known = before or {}
-        return News(
-            self._now_ns,
-            before is None,
-            [site for name, site in self.sites.items() if known.get(name) != site],
-            [name for name in known if name not in self.sites],
-        )
+        known, self._reported = self._reported or {}, dict(self.sites)
+        changed = [site for name, site in self.sites.items() if known.get(name) != site]
+        return News(self._now_ns, tuple(self.sites), changed)
 
     def _wait(self) -> None:
         """Until somebody says that there is something new, or it is time to look."""
@@ -163,16 +158,17 @@ class Watcher:
         execute = self.connection.execute
         ((now_ns,),) = execute(_NOW).fetchall()
         before, self.sites = self.sites, {}
+        judged, self._judged = self._judged, {}
         for site, *facts in execute(_FACTS, (LIVE_S, ORIGIN)).fetchall():
             name, heard_ns, is_live, seqs, origin, note_count = facts
-            known = before.get(site, Site(site))
+            self._judged[site] = judged.get(site) or _Judged(Judge(self._criteria))
             self.sites[site] = replace(
-                known,
+                before.get(site, Site(site)),
                 name=name,
                 heard_ns=heard_ns,
                 is_live=is_live,
                 last_seq=sum(seqs or ()),
-                origin=_origin(origin or "", self._judged.get(site)),
+                origin=_origin(origin or "", self._judged[site]),
                 notes=note_count,
             )
         grown = [
@@ -183,33 +179,18 @@ class Watcher:
         if grown:
             for name, received_ns in execute(_RECEIVED, (grown,)).fetchall():
                 self.sites[name] = replace(self.sites[name], last_received_ns=received_ns)
-        self._judged = {name: it for name, it in self._judged.items() if name in self.sites}
         return int(now_ns)
 
     def _judge_due(self, now_ns: int) -> Iterator[str]:
         """Judge the sites whose turn it is, the longest ago first; gives each name when done."""
-        for name in sorted(self.sites, key=self._turn):
-            judged = self._judged.get(name)
-            if judged is None:
-                judged = self._judged[name] = _Judged(Judge(self._criteria))
-            elif not self._is_due(name, judged):
-                continue
-            self._judge_safely(name, judged, now_ns)
-            yield name
+        for name in sorted(self.sites, key=lambda name: self._judged[name].judged_s):
+            if self._is_due(name):
+                self._judge_safely(name, now_ns)
+                yield name
 
-    def _has_more(self) -> bool:
-        """Whether somebody's turn has come."""
-        return any(
-            name not in self._judged or self._is_due(name, self._judged[name])
-            for name in self.sites
-        )
-
-    def _turn(self, name: str) -> float:
-        judged = self._judged.get(name)
-        return 0.0 if judged is None else judged.judged_s
-
-    def _is_due(self, name: str, judged: _Judged) -> bool:
-        site = self.sites[name]
+    def _is_due(self, name: str) -> bool:
+        """Whether a site's turn has come."""
+        site, judged = self.sites[name], self._judged[name]
         is_behind = (
             judged.seq != site.last_seq
             or not judged.is_caught_up
@@ -218,10 +199,11 @@ class Watcher:
         )
         return (is_behind and not judged.is_failing) or time.monotonic() - judged.judged_s >= _AGE_S
 
-    def _judge_safely(self, name: str, judged: _Judged, now_ns: int) -> None:
+    def _judge_safely(self, name: str, now_ns: int) -> None:
         """Judge a site; one that cannot be judged is unknown, and costs no other its status."""
         import psycopg  # noqa: PLC0415  # the extra `fleet`
 
+        judged = self._judged[name]
         try:
             self._judge(name, judged, now_ns)
         except Exception as error:  # whatever is in its rows, or how long they take
@@ -232,7 +214,9 @@ class Watcher:
                 why = "site %s cannot be judged: its status is unknown: %s"
                 log.warning(why, name, error, exc_info=not is_known)
             # Tried again from its first row on, when others are judged for their age.
-            self._judged[name] = _Judged(Judge(self._criteria), is_failing=True)
+            self._judged[name] = _Judged(
+                Judge(self._criteria), is_failing=True, judged_s=time.monotonic()
+            )
             self.sites[name] = replace(
                 self.sites[name], verdict=None, active_alarms=None, alarms=(), dots=""
             )
@@ -251,8 +235,7 @@ class Watcher:
             if judged.note_count != site.notes:
                 judged.notes = notes(log, NotesRequest()).notes or ()
                 judged.note_count = site.notes
-        if judged.snapshot is None:
-            return
+        assert judged.snapshot is not None  # it has been read above, at the latest
         newest_ns = judged.snapshot.stamp_ns
         # A simulation's time stands between two looks.
         now_ns = newest_ns if judged.is_simulated else now_ns
@@ -322,12 +305,11 @@ def _alarms(site: Site, judged: _Judged, moment_ns: int) -> list[Alarm]:
 
 @dataclass(frozen=True, slots=True)
 class News:
-    """`sites` are those that are new or not as before, all of them if `is_whole`."""
+    """`names` are those of all sites, `changed` the sites that are new or not as before."""
 
     now_ns: int
-    is_whole: bool
-    sites: Sequence[Site]
-    gone: Sequence[str]
+    names: tuple[str, ...]
+    changed: Sequence[Site]
 
 
 class WatchChild(Child):
@@ -351,7 +333,7 @@ class WatchChild(Child):
             if self._watcher is not None:
                 self._watcher.connection.close()
                 self._watcher = None
-            raise NotRemembered(str(error), is_lasting=False) from error
+            raise NotRemembered(str(error)) from error
 
 
 class _WithoutJournal(Recall):

@@ -18,14 +18,13 @@ from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.scans import LONGEST_NS, SHORTEST_NS, Stretches
 from lupin_bridge.judge.tag_log import Gap, TagPast, is_long
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
-from lupin_twin.core.past import PastWrite, RunSpan
+from lupin_twin.core.past import FOREVER_NS, HOUR_NS, PastWrite, RunSpan
 from lupin_twin.core.state import Reading
 
 # Writes that are kept, of all tags about; of a tag its share of these.
 KEPT: Final = 100_000
 # What is over and not reported any more is dropped as often as that.
-FORGET_EVERY_NS: Final = 3600 * 1_000_000_000
-_NEVER: Final = 2**63 - 1
+FORGET_EVERY_NS: Final = HOUR_NS
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +36,7 @@ class Found:
     """
 
     alarms: tuple[Alarm, ...]
-    due_ns: int = _NEVER
+    due_ns: int = FOREVER_NS
     days: Mapping[str, Sequence[Reading]] = field(default_factory=dict)
 
 
@@ -116,7 +115,7 @@ class Follower:
         """
         if since_ns > self._forgotten_ns + FORGET_EVERY_NS:
             self._forget(since_ns)
-        due_ns = _NEVER
+        due_ns = FOREVER_NS
         newest = self.spans[-1].run if self.spans else None
         for number, run in self._runs.items():
             is_on = number == newest
@@ -154,11 +153,11 @@ class Follower:
 
     def _settle(self, run: _Run) -> None:
         """Work out what each tag's news say of the day, and forget what there is no room for."""
-        changed_ns = _NEVER
+        changed_ns = FOREVER_NS
         for tag_id in run.news:
             at_ns = run.days.put(tag_id, run.tags[tag_id].trail.turns)
             changed_ns = changed_ns if at_ns is None else min(changed_ns, at_ns)
-        if changed_ns != _NEVER:
+        if changed_ns != FOREVER_NS:
             for tag_id, tag in run.tags.items():
                 if tag.last_ns >= changed_ns:
                     run.news[tag_id] = None
@@ -245,7 +244,7 @@ class Follower:
     def _stops(self, run: _Run, now_ns: int | None, since_ns: int) -> tuple[tuple[Alarm, ...], int]:
         """When nothing was tried anywhere for longer than the tags' own scan intervals allow."""
         found: list[Alarm] = []
-        due_ns = _NEVER
+        due_ns = FOREVER_NS
         last_ns = run.stretches.newest_ns
         pauses: list[tuple[int, int | None]] = [*run.stretches.pauses(since_ns - 1)]
         if last_ns is not None and now_ns is not None:

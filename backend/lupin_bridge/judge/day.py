@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, time, timedelta, tzinfo
@@ -19,8 +18,8 @@ from functools import cache
 from operator import itemgetter
 from typing import Final, Literal, TypeVar
 
-from lupin_bridge.judge.quantities import DAILY, DAY_NS, Course, IsDay, Sensors
-from lupin_twin.core.past import PastWrite
+from lupin_bridge.judge.quantities import DAILY, Course, IsDay, Sensors
+from lupin_twin.core.past import DAY_NS, PastWrite
 from lupin_twin.core.state import Reading
 
 # The sensor that tells, by its name.
@@ -81,19 +80,26 @@ class ClockDay:
         return wall.toordinal() - (wall.time() < self.begins)
 
 
+def says_day(light_lx: float | None) -> bool | None:
+    """What a sensor's reading says; None or not finite: nothing."""
+    if light_lx is None or not math.isfinite(light_lx):
+        return None
+    return light_lx >= DAY_FROM_LX
+
+
 class Light:
-    """The light of all tags, by tag: the finite readings, and how many of them are of day."""
+    """The light of all tags, by tag: what each says, and how many say that it is day."""
 
     def __init__(self) -> None:
         self._is_bright: dict[str, bool] = {}
         self._bright = 0
 
-    def put(self, tag_id: str, light_lx: float | None) -> None:
-        """What a tag's sensor reads now; None or not finite: it says nothing."""
+    def put(self, tag_id: str, says: bool | None) -> None:
+        """What a tag's sensor says now; None: nothing."""
         self._bright -= self._is_bright.pop(tag_id, False)
-        if light_lx is not None and light_lx - light_lx == 0.0:
-            self._is_bright[tag_id] = light_lx >= DAY_FROM_LX
-            self._bright += self._is_bright[tag_id]
+        if says is not None:
+            self._is_bright[tag_id] = says
+            self._bright += says
 
     @property
     def is_day(self) -> bool | None:
@@ -119,8 +125,7 @@ class DayLine:
 
     def __init__(self) -> None:
         self._turns: dict[str, tuple[Turn, ...]] = {}
-        self._says: dict[str, bool | None] = {}
-        self._counts = Counter[bool | None]()
+        self._light = Light()
         self._newest_ns = -1
         self._since_ns = 0
         self._at: list[int] = []
@@ -153,7 +158,7 @@ class DayLine:
 
     def _rebuild(self) -> int | None:
         before = self._line()
-        self._says, self._counts, self._newest_ns = {}, Counter(), -1
+        self._light, self._newest_ns = Light(), -1
         self._at, self._is_day = [], []
         every = [(at_ns, tag_id, says) for tag_id, of in self._turns.items() for at_ns, says in of]
         for at_ns, tag_id, says in sorted(every, key=itemgetter(0, 1)):
@@ -175,12 +180,8 @@ class DayLine:
     def _turn(self, tag_id: str, turn: Turn) -> None:
         at_ns, says = turn
         self._newest_ns = max(self._newest_ns, at_ns)
-        if tag_id in self._says:
-            self._counts[self._says[tag_id]] -= 1
-        self._says[tag_id] = says
-        self._counts[says] += 1
-        day, night = self._counts[True], self._counts[False]
-        is_day = 2 * day >= day + night if day + night else None
+        self._light.put(tag_id, says)
+        is_day = self._light.is_day
         if self._at and self._at[-1] == at_ns:
             self._at.pop()
             self._is_day.pop()

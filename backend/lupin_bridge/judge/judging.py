@@ -10,7 +10,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import time
 from importlib.resources import files
 from itertools import islice
@@ -19,9 +19,8 @@ from typing import Final
 from zoneinfo import ZoneInfo
 
 from lupin_bridge.judge.day import COUNTS_NS, ClockDay, Day, judge_day
-from lupin_bridge.judge.quantities import DAY_NS, Sensors
+from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.judge.scans import (
-    NO_PATROL,
     SHORTEST_NS,
     Patrol,
     RecentScans,
@@ -31,7 +30,6 @@ from lupin_bridge.judge.scans import (
 )
 from lupin_bridge.judge.verdict import (
     FORGOTTEN_NS,
-    NOTHING_CHANGED,
     Health,
     Reason,
     Verdict,
@@ -41,7 +39,7 @@ from lupin_bridge.judge.verdict import (
     stopped,
 )
 from lupin_bridge.settings import SettingError, Settings, read_text
-from lupin_twin.core.past import PastWrite
+from lupin_twin.core.past import DAY_NS, FOREVER_NS, PastWrite
 from lupin_twin.core.state import Reading, Snapshot, TagState
 
 # Nobody writes this much.
@@ -144,7 +142,6 @@ def unix_s(stamp_ns: int) -> float | None:
 
 # --- snapshot by snapshot -------------------------------------------------------------------------
 
-_NEVER: Final = 2**63 - 1
 # Readings that are judged at once, a tag counting as one more: some 20 ms.
 MAX_AT_ONCE: Final = 6_000
 _UNKNOWN: Final = Health(Verdict.UNKNOWN)
@@ -161,7 +158,7 @@ class Judged:
     tags: Mapping[str, Health]
     day: Day
     number: int = 0
-    patrol: Patrol = NO_PATROL
+    patrol: Patrol = field(default_factory=Patrol)
 
 
 NOTHING_JUDGED: Final = Judged(_UNKNOWN, {}, Day(True, "assumed"))
@@ -201,7 +198,7 @@ class _Tag:
 
     state: TagState
     holds_ns: int = SHORTEST_NS
-    until_ns: int = _NEVER
+    until_ns: int = FOREVER_NS
     # It was scanned once, and nothing says how long that holds.
     is_once: bool = False
 
@@ -226,7 +223,7 @@ class Judge:
         self._recent = RecentScans(criteria.day)
         self._seen: tuple[TagState, ...] = ()
         # Before that, what was said of each tag holds.
-        self._first_until_ns = _NEVER
+        self._first_until_ns = FOREVER_NS
         self._now_ns: int | None = None
         # The last time that was known: a simulation that is started anew stops its clock before.
         self._known_ns = 0
@@ -340,7 +337,7 @@ class Judge:
         if now_ns is None or now_ns < self._first_until_ns:
             return {}
         untils = [(kept.until_ns, tag_id) for tag_id, kept in self._tags.items()]
-        self._first_until_ns = min((it for it, _ in untils if it > now_ns), default=_NEVER)
+        self._first_until_ns = min((it for it, _ in untils if it > now_ns), default=FOREVER_NS)
         return {tag_id: None for until_ns, tag_id in untils if until_ns <= now_ns}
 
     def _judge(self, tag_id: str, now_ns: int | None) -> Health:
@@ -358,7 +355,7 @@ class Judge:
             by.sensors,
             recent,
             holds_ns=holds,
-            changed=self._changed.get(tag_id, NOTHING_CHANGED),
+            changed=self._changed.get(tag_id, {}),
             days=self._days.get(tag_id, ()),
         )
         kept.until_ns = min(
@@ -373,7 +370,7 @@ class Judge:
                 for limit in limits
                 if reading.observed_at_ns + limit >= now_ns
             ),
-            default=_NEVER,
+            default=FOREVER_NS,
         )
         self._first_until_ns = min(self._first_until_ns, kept.until_ns)
         return _since(self._judged.tags.get(tag_id, _UNKNOWN), health)

@@ -32,6 +32,8 @@ from math import ceil, log10
 from operator import itemgetter
 from typing import Final
 
+from lupin_twin.core.past import DAY_NS, HOUR_NS
+
 _A: Final = 17.27
 _B_C: Final = 237.3
 _E0_KPA: Final = 0.6108
@@ -95,8 +97,7 @@ DERIVED: Final[Mapping[str, Derived]] = {
 }
 
 
-DAY_NS: Final = 86_400 * 1_000_000_000
-MAX_GAP_NS: Final = 3 * 3600 * 1_000_000_000
+MAX_GAP_NS: Final = 3 * HOUR_NS
 LEAST_COVERED: Final = 0.9
 LX_PER_UMOL: Final = 54.0
 BASE_C: Final = 10.0
@@ -105,7 +106,6 @@ BASE_C: Final = 10.0
 Readings = Sequence[tuple[int, float]]
 # Whether it is day at a moment of ROS time, ns.
 IsDay = Callable[[int], bool]
-_HOUR_NS: Final = 3600 * 1_000_000_000
 # So long are the pieces that a line from day to night is cut to.
 _PIECE_NS: Final = 600 * 1_000_000_000
 
@@ -208,7 +208,7 @@ DAILY: Final[Mapping[str, Daily]] = {
             "°C·d",
             lambda it: max(0.0, (it.high + it.low) / 2.0 - BASE_C),
         ),
-        Daily("co2_dose", "co2", "ppm·h", lambda it: it.sums[True] / _HOUR_NS),
+        Daily("co2_dose", "co2", "ppm·h", lambda it: it.sums[True] / HOUR_NS),
     )
 }
 

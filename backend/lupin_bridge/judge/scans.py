@@ -19,7 +19,7 @@ from operator import attrgetter, itemgetter
 from statistics import median
 from typing import Final
 
-from lupin_bridge.judge.day import LEFT_OUT_NS, LIGHT, Day, Light
+from lupin_bridge.judge.day import LEFT_OUT_NS, LIGHT, Day, Light, says_day
 from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import TagState, sure_species
 
@@ -65,13 +65,8 @@ class Patrol:
     overdue: int = 0
 
 
-NO_PATROL: Final = Patrol()
-
-
 class Scans:
     """When tags were scanned of late; several at one time are one."""
-
-    __slots__ = ("_scans_ns",)
 
     def __init__(self) -> None:
         self._scans_ns: deque[int] = deque(maxlen=LAP_INTERVALS + 1)
@@ -234,14 +229,14 @@ class Recent:
                 return True
         return False
 
-    def light_at(self, at_ns: int) -> float | None:
-        """What the light read at a moment; None: it was left out for long, or never told."""
+    def day_at(self, at_ns: int) -> bool | None:
+        """What the light said at a moment; None: it was left out for long, or never told."""
         by_then = self.scans[: bisect_right(self.scans, at_ns, key=_stamp_ns)]
         for scan in reversed(by_then):
             if by_then[-1].stamp_ns - scan.stamp_ns > LEFT_OUT_NS:
                 break
             if LIGHT in scan.values:
-                return scan.values[LIGHT]
+                return says_day(scan.values[LIGHT])
         return None
 
     def news(self, tag: TagState) -> dict[int, dict[str, float]]:
@@ -335,7 +330,7 @@ class RecentScans:
             for _, tag, values in taken:
                 recent = self.tag(tag.tag_id)
                 recent.put(tag, at_ns, values)
-                self._light.put(tag.tag_id, recent.light_at(recent.scans[-1].stamp_ns))
+                self._light.put(tag.tag_id, recent.day_at(recent.scans[-1].stamp_ns))
             if at_ns > self._newest_ns:
                 self._newest_ns = at_ns
                 is_day = self.day(at_ns).is_day
@@ -363,7 +358,7 @@ class RecentScans:
         for stamp_ns in stamps:
             light = Light()
             for tag_id, recent in self._tags.items():
-                light.put(tag_id, recent.light_at(stamp_ns))
+                light.put(tag_id, recent.day_at(stamp_ns))
             is_day = self._day_of(light.is_day, stamp_ns).is_day
             others |= {
                 tag_id

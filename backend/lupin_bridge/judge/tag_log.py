@@ -6,7 +6,6 @@ is worked out again. What the log has no room for any more is kept as what it le
 
 from __future__ import annotations
 
-import math
 from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
@@ -14,7 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Final, Generic, TypeVar
 
-from lupin_bridge.judge.day import DAY_FROM_LX, LEFT_OUT_NS, LIGHT, Turn
+from lupin_bridge.judge.day import LEFT_OUT_NS, LIGHT, Turn, says_day
 from lupin_bridge.judge.episodes import TagEpisodes, readings_of
 from lupin_bridge.judge.quantities import IsDay
 from lupin_bridge.judge.scans import INTERVALS, SHORTEST_NS
@@ -66,7 +65,7 @@ class Trail:
         said, light_ns = turns[-1][1] if turns else None, self.light_ns
         light = next((reading.value for reading in readings if reading.name == LIGHT), None)
         if light is not None:
-            says, light_ns = light >= DAY_FROM_LX if math.isfinite(light) else None, stamp_ns
+            says, light_ns = says_day(light), stamp_ns
         else:
             says = None if stamp_ns - light_ns > LEFT_OUT_NS else said
         if says is not said:

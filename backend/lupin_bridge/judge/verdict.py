@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from types import MappingProxyType
 from typing import Final
 
 from lupin_bridge.judge.day import COUNTS_NS
@@ -36,7 +35,6 @@ class Verdict(StrEnum):
     HEALTHY = "healthy"
 
 
-NOTHING_CHANGED: Final[Mapping[str, int]] = MappingProxyType({})
 ORDER: Final = {verdict: index for index, verdict in enumerate(Verdict)}
 
 
@@ -93,8 +91,8 @@ def judge_tag(
     recent: Recent,
     *,
     holds_ns: int,
-    changed: Mapping[str, int] = NOTHING_CHANGED,
-    days: Sequence[Reading] = (),
+    changed: Mapping[str, int],
+    days: Sequence[Reading],
 ) -> Health:
     """What is to be said of a tag at `now_ns`, where its readings hold for `holds_ns`.
 
@@ -141,16 +139,14 @@ def judge_tag(
 
 def failed(reading: Reading, sensor: Sensor) -> Reason:
     """That a sensor gives no number, or one that cannot be and the limit of what can."""
-    value, span = reading.value, sensor.plausible
-    is_number = math.isfinite(value) and span is not None
-    limit = None
-    if is_number and span is not None:
+    value, span, limit = reading.value, sensor.plausible, None
+    if math.isfinite(value) and span is not None:
         limit = span.low if value < span.low else span.high
     return Reason(
         Kind.READING_FAILED,
         Verdict.STRESSED,
         reading.name,
-        value if is_number else None,
+        None if limit is None else value,
         limit,
         reading.observed_at_ns,
     )
@@ -216,10 +212,8 @@ def _value_of(scan: Scanned, name: str) -> float | None:
     """What a scan says of a sensor, measured or derived."""
     if name in scan.values or name not in DERIVED:
         return scan.values.get(name)
-    values = [scan.values.get(source) for source in DERIVED[name].sources]
-    if None in values:
-        return None
-    return DERIVED[name].formula(*(value for value in values if value is not None))
+    first, second = (scan.values.get(source) for source in DERIVED[name].sources)
+    return None if first is None or second is None else DERIVED[name].formula(first, second)
 
 
 def judge_value(reading: Reading, ranges: Ranges) -> Reason | None:

@@ -99,27 +99,20 @@ def _pack_columns(rows: Sequence[PastRow], sensors: Sensors, site: str | None = 
     return pickle.dumps(columns, 5)
 
 
-class _Sink(io.RawIOBase):
+class _Sink(io.BytesIO):
     """Takes what pyarrow writes until that is sent."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._blocks: list[bytes] = []
-        self._size = 0
-
-    def writable(self) -> bool:
-        return True
-
-    def write(self, block: Any) -> int:
-        self._blocks.append(bytes(block))
-        self._size += len(self._blocks[-1])
-        return len(self._blocks[-1])
+    _sent = 0
 
     def tell(self) -> int:
-        return self._size
+        """How much was written in all: by that pyarrow finds its columns again."""
+        return self._sent + super().tell()
 
     def take(self) -> bytes:
-        taken, self._blocks = b"".join(self._blocks), []
+        taken = self.getvalue()
+        self._sent += len(taken)
+        self.seek(0)
+        self.truncate()
         return taken
 
 

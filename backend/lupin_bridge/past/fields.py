@@ -9,7 +9,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from hashlib import blake2b
 from typing import Final
 
 import orjson
@@ -37,7 +36,7 @@ from lupin_twin.field.engine import (
     leave_one_out,
     painted_share,
 )
-from lupin_twin.field.explored import OccupancyMap
+from lupin_twin.field.explored import OccupancyMap, digest_of
 from lupin_twin.field.grid import FieldGrid, far_off_tags
 from lupin_twin.journal.queries import NEWEST_S_PER_TAG
 from lupin_twin.runtime.estimates import AS_OF, estimate_at, readings_at
@@ -48,6 +47,8 @@ _WRITE_CELL_S: Final = 50e-9
 _JUDGE_TAG_S: Final = 20e-6
 # Of a field too large to estimate, or one that will be refused.
 _LARGE_S: Final = 1.0
+# Of the map in use: many fields are of the same one.
+_digest_of: Final = lru_cache(maxsize=1)(digest_of)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +122,7 @@ class Field(StateQuery):
 
         def content_etag(kind: str, *content: object) -> str:
             # By content: the revision of a map is one process's own.
-            digest = None if self.occupancy is None else _digest_of_map(self.occupancy)
+            digest = None if self.occupancy is None else _digest_of(self.occupancy)
             built_from = (request, samples, *content, far_off, self.rules, digest, sensors.text)
             return etag_of(kind, built_from)
 
@@ -202,11 +203,6 @@ def _quality(
             "far_off_tags": far_off_tags(tags),
         }
     )
-
-
-@lru_cache(maxsize=1)
-def _digest_of_map(occupancy: OccupancyMap) -> str:
-    return blake2b(occupancy.cells.data, digest_size=12).hexdigest() + repr(occupancy.place)
 
 
 # --- estimates -----------------------------------------------------------------------------------

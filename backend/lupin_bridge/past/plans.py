@@ -20,13 +20,14 @@ from lupin_bridge.feed.query import Find
 from lupin_bridge.field import matches
 from lupin_bridge.judge.day import SINCE_NS, days_of
 from lupin_bridge.judge.judging import Criteria, judge_once
-from lupin_bridge.judge.quantities import DAILY, DAY_NS, DERIVED, Daily, Derived, IsDay, Sensors
+from lupin_bridge.judge.quantities import DAILY, DERIVED, Daily, Derived, IsDay, Sensors
 from lupin_bridge.past import bodies
-from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
+from lupin_bridge.serving.admission import REVALIDATE, Answer, content_answer
 from lupin_bridge.stream.state_json import StateJson, history, judgement
 from lupin_twin.core.diagnostics import Condition
 from lupin_twin.core.history import LatestRequest, tag_history
 from lupin_twin.core.past import (
+    DAY_NS,
     DEFAULT_POINTS,
     EVERY_TAG,
     HOUR_NS,
@@ -55,7 +56,6 @@ from lupin_twin.journal.fold import STATE_S_PER_TAG
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG
 from lupin_twin.runtime.workers import ShouldStop
 
-JSON_TYPE: Final = "application/json"
 # Costs, s of one core, at worst: to plan an answer and to write it, for each tag or scan; to judge
 # a tag with its scans of three days; to write a reading or a bucket.
 PLAN_TAG_S: Final = 10e-6
@@ -217,7 +217,7 @@ class History:
         sensors = self.criteria.sensors
         past = derived_series(self.request, sensors, self.criteria.is_day, find)
         nights = self.criteria.nights(past.start_ns, past.end_ns) if self.has_nights else None
-        return of_content(
+        return of_json(
             bodies.history_body(
                 self.request, past, self.now_ns, sensors, self.journal, nights=nights
             )
@@ -257,7 +257,7 @@ class Timeline:
         silences: SeriesPast = find(
             SeriesRequest(self.tag_id, Event.SILENCES, period.start_ns, until_ns, MAX_POINTS)
         )
-        return of_content(bodies.timeline_body(runs, period, counted, silences, self.journal))
+        return of_json(bodies.timeline_body(runs, period, counted, silences, self.journal))
 
     def _counted(self, find: Find, start_ns: int, end_ns: int) -> dict[Event, SeriesPast]:
         points = self.points
@@ -285,7 +285,7 @@ class LatestOfTag:
     def look(self, find: Find) -> Plan:
         """See `Query`."""
         found: list[Scan | Inspection] = find(LatestRequest(self.tag_id, self.count))
-        return of_content(history(self.tag_id, tag_history(found, self.newest, self.count)))
+        return of_json(history(self.tag_id, tag_history(found, self.newest, self.count)))
 
 
 def series_s(tag_id: str, points: int, tags: int) -> float:
@@ -297,13 +297,17 @@ def series_s(tag_id: str, points: int, tags: int) -> float:
 def plan_of(etag: str, write: Callable[[ShouldStop], bytes]) -> Plan:
     """The plan of a JSON answer that is written when it is wanted."""
     headers = {"ETag": etag, **REVALIDATE}
-    return Plan(etag, lambda stop: Answer(write(stop), JSON_TYPE, headers))
+    return Plan(etag, lambda stop: Answer(write(stop), "application/json", headers))
 
 
-def of_content(body: Mapping[str, Any]) -> Plan:
-    """The plan of a JSON answer that is there already."""
-    answer = json_answer(orjson.dumps(body))
+def of_content(answer: Answer) -> Plan:
+    """The plan of an answer that is there already."""
     return Plan(answer.headers["ETag"], lambda _: answer)
+
+
+def of_json(body: Mapping[str, Any]) -> Plan:
+    """The plan of a JSON answer that is there already."""
+    return of_content(content_answer(orjson.dumps(body)))
 
 
 def etag_of(kind: str, content: object) -> str:

@@ -10,9 +10,8 @@ import heapq
 from array import array
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from hashlib import blake2b
 from itertools import accumulate, pairwise
 from statistics import median
 from typing import Any, Final
@@ -27,8 +26,8 @@ from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.scans import SHORTEST_NS, TIMES_MEDIAN
 from lupin_bridge.judge.verdict import Verdict, derive
 from lupin_bridge.past import bodies
-from lupin_bridge.past.plans import JSON_TYPE, Plan
-from lupin_bridge.serving.admission import REVALIDATE, Answer
+from lupin_bridge.past.plans import Plan, of_content
+from lupin_bridge.serving.admission import content_answer
 from lupin_bridge.stream.state_json import alarm_json, note_json, stamp
 from lupin_twin.core.diagnostics import Condition
 from lupin_twin.core.history import KIND_FLOWER
@@ -101,7 +100,10 @@ class Report:
 
     def plan(self, body: dict[str, Any], tags: Sequence[TagState]) -> Plan:  # noqa: ARG002
         """The plan of the answer; `tags` as they were at the end."""
-        return planned(orjson.dumps(body), JSON_TYPE, self)
+        return of_content(content_answer(orjson.dumps(body), headers=self._headers()))
+
+    def _headers(self) -> dict[str, str]:
+        return bodies.period_headers(self.journal, self.start_ns, self.end_ns)
 
     def _per_hour(self, find: Find) -> Counter[int]:
         """How much was observed in each hour, of the lead and the period; keys are ns."""
@@ -130,16 +132,6 @@ class Report:
                 return from_ns
             from_ns = min(from_ns, at_ns)
         return max(0, self.start_ns - LEAD_NS)
-
-
-def planned(
-    body: bytes, media_type: str, of: Report, headers: Mapping[str, str] | None = None
-) -> Plan:
-    """The plan of a body, with an ETag of its content."""
-    etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
-    known = bodies.period_headers(of.journal, of.start_ns, of.end_ns)
-    answer = Answer(body, media_type, {"ETag": etag, **REVALIDATE, **known, **(headers or {})})
-    return Plan(etag, lambda _: answer)
 
 
 def _stretches(hours: Counter[int], start_ns: int, end_ns: int) -> Iterator[Stretch]:

@@ -20,8 +20,9 @@ from lupin_bridge.judge.episodes import SITE
 from lupin_bridge.judge.judging import Criteria, unix_s
 from lupin_bridge.judge.quantities import Span
 from lupin_bridge.judge.verdict import derive
-from lupin_bridge.past.plans import Plan
-from lupin_bridge.past.report import Report, planned
+from lupin_bridge.past.plans import Plan, of_content
+from lupin_bridge.past.report import Report
+from lupin_bridge.serving.admission import content_answer
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import TagState
 
@@ -33,6 +34,7 @@ _POLICY: Final = (
 PAGE_HEADERS: Final = {"Content-Security-Policy": _POLICY}
 # Of all languages but English.
 _COMMA: Final = str.maketrans(".,", ",.")
+_EXTREMES: Final = ("sensor", "low*", "where", "mean*", "high*", "where", "count*", "bad*")
 # Alarms in one notification.
 MAX_PUSHED: Final = 4
 Words = Mapping[str, Any]
@@ -88,7 +90,8 @@ class ReportPage(Report):
         """See `Report`."""
         words = _Page(self.lang, self.criteria, self.zone, tags)
         page = words.page(body, self.origin, self.site, self.unknown_zone)
-        return planned(page.encode("utf-8", "replace"), HTML_TYPE, self, PAGE_HEADERS)
+        headers = {**self._headers(), **PAGE_HEADERS}
+        return of_content(content_answer(page.encode("utf-8", "replace"), HTML_TYPE, headers))
 
 
 def refused_page(reason: str, lang: str) -> str:
@@ -151,7 +154,7 @@ class _Page:
             f'<p class="note">{escape(" ".join(known) or say("unknown"))}</p>',
             self._counts(body["counts"]),
             self._alarms(body),
-            self._extremes(body),
+            self._table(body, "extremes", "sensors", _EXTREMES, self._sensor),
             self._table(
                 body, "notes", "notes", ("time", "name", "said", "about"), self._note(body)
             ),
@@ -247,10 +250,6 @@ class _Page:
                     if span is not None and reason["limit"] in {span.low, span.high}:
                         return span
         return None
-
-    def _extremes(self, body: Entry) -> str:
-        columns = ("sensor", "low*", "where", "mean*", "high*", "where", "count*", "bad*")
-        return self._table(body, "extremes", "sensors", columns, self._sensor)
 
     def _sensor(self, of: Entry) -> Iterable[str]:
         number = partial(self._number, sensor=of["sensor_type"])

@@ -30,7 +30,7 @@ from lupin_bridge.past.plans import PLAN_TAG_S, Answered, NoSuchTag, Query, Stat
 from lupin_bridge.serving.admission import REVALIDATE, AdmissionError, Answer, BusyError, Limits
 from lupin_bridge.stream import schema
 from lupin_twin.core.notes import NotesUnwritable
-from lupin_twin.core.past import NotRemembered, PastRefused
+from lupin_twin.core.past import NotFound, NotRemembered, PastRefused
 from lupin_twin.core.state import Snapshot
 from lupin_twin.runtime.workers import SMALL_S, ShouldStop
 
@@ -186,17 +186,13 @@ def refusal(error: Exception) -> Response:
     match error:
         case AdmissionError():
             status, headers = (503 if isinstance(error, BusyError) else 429), error.headers
-        case NotRemembered():
-            status, headers = (404, None) if error.is_lasting else (503, retry)
-        case NoSuchTag():
+        case NotFound() | NoSuchTag():
             status = 404
         case Refused():
             status, headers = error.status, error.headers
-        case AccountError() | NotesUnwritable():
-            status, headers = 503, retry
         case TwinTimeoutError():
             status = 504
-        case TwinUnavailableError():
+        case AccountError() | NotesUnwritable() | NotRemembered() | TwinUnavailableError():
             status, headers = 503, retry
     return error_response(str(error), status, headers)
 

@@ -35,7 +35,7 @@ from lupin_bridge.routes.answers import (
     respond_newest,
     respond_past,
 )
-from lupin_bridge.serving.admission import Answer, ClientLimitError, json_answer
+from lupin_bridge.serving.admission import Answer, ClientLimitError, content_answer
 from lupin_bridge.stream import followers, schema
 from lupin_bridge.stream.followers import sensors_of
 from lupin_twin.core.past import PastRefused
@@ -315,6 +315,6 @@ async def _report(request: Request, kind: type[QueryT], body: Body[QueryT]) -> R
 
     async def compute() -> Answer:
         with bridge.admission.computing(client_of(request), is_large=True):
-            return json_answer(await body(bridge, query))
+            return content_answer(await body(bridge, query))
 
     return await respond(request, query, compute)

@@ -35,7 +35,7 @@ from lupin_bridge.routes.answers import (
     respond,
     respond_as_of,
 )
-from lupin_bridge.serving.admission import REVALIDATE, Answer, json_answer
+from lupin_bridge.serving.admission import REVALIDATE, Answer, content_answer
 from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.followers import robot_body
 from lupin_bridge.stream.state_json import alarms_body, header, judgement, pose, stamp
@@ -214,7 +214,7 @@ async def health(request: Request) -> Response:
 )
 async def sensors(request: Request) -> Response:
     """`sensors.json`, or the file that the operator gave instead, as it stands."""
-    answer = json_answer(bridge_of(request).criteria.sensors.text.encode())
+    answer = content_answer(bridge_of(request).criteria.sensors.text.encode())
     if has_etag(request, etag := answer.headers["ETag"]):
         return not_modified(etag)
     return json_response(answer.body, headers=answer.headers)

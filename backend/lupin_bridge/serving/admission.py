@@ -308,10 +308,12 @@ class Answer:
     headers: Mapping[str, str] = field(default_factory=dict)
 
 
-def json_answer(body: bytes) -> Answer:
-    """A JSON body whose ETag is that of its content."""
+def content_answer(
+    body: bytes, media_type: str = "application/json", headers: Mapping[str, str] | None = None
+) -> Answer:
+    """A body whose ETag is that of its content."""
     etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
-    return Answer(body, "application/json", {"ETag": etag, **REVALIDATE})
+    return Answer(body, media_type, {"ETag": etag, **REVALIDATE, **(headers or {})})
 
 
 @dataclass(slots=True, eq=False)

@@ -146,6 +146,7 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         # What is left of large messages, for as long as the socket does not take it.
         self._pieces: deque[Piece] = deque()
         self._is_full = False
+        self._opening: asyncio.TimerHandle
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Stop at the first bytes that the socket does not take: what is queued is one frame.
@@ -164,14 +165,16 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         if self.transport.get_write_buffer_size() > 0:
             self.pause_writing()
         # Until it is taken, the handshake has no answer, and the client no place with us.
-        self.loop.call_later(self.config.timeout_keep_alive, self._end_unless_open)
+        timeout_s = self.config.timeout_keep_alive
+        self._opening = self.loop.call_later(timeout_s, self._end_unless_open)
 
     def _end_unless_open(self) -> None:
         if not self.handshake_complete:
             tear_down(self.transport)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forget the connection."""
+        """Forget the connection, which the timer would keep."""
+        self._opening.cancel()
         self._pieces.clear()
         super().connection_lost(exc)
 

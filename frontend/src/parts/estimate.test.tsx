@@ -106,7 +106,7 @@ describe('legend', () => {
     showField(estimated([22.4], [0.5]));
     render(<Legend kiosk={false} />);
     expect((await screen.findByTestId('foretold')).textContent).toBe(
-      '9 of 10 scans were within the predicted range',
+      '9 of 10 scans within the predicted range',
     );
     expect(text('estimate-key')).toContain(`less certain than ±1.6${NBSP}°C`);
     expect(text('legend')).toContain(
@@ -125,7 +125,7 @@ describe('legend', () => {
     showField(estimated([22.4], [0.5]));
     render(<EstimateFacts />);
     const told = await screen.findByTestId('foretold');
-    expect(told.textContent).toBe('7 of 9 scans were within the predicted range');
+    expect(told.textContent).toBe('7 of 9 scans within the predicted range');
   });
 
   test('warns where too few scans lay inside', async () => {

@@ -5,16 +5,11 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
 from lupin_twin.runtime import process
-
-SPEED_LIMITS = (0.1, 50.0)
-DAY_SPEED_LIMITS = (0.0, 3600.0)
-SEED_LIMITS = (0, 2**32 - 1)
-SINCE_MORNING_LIMITS = (0.0, 86_400.0)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -23,13 +18,8 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: error: {message}\n")
 
 
-def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """Parse the options, ROS arguments already removed; exits with 2 on a bad one."""
-    return parser().parse_args(arguments)
-
-
 def parser() -> argparse.ArgumentParser:
-    """The options."""
+    """The options, ROS arguments already removed; it exits with 2 on a bad one."""
     made = _Parser(
         prog="patrol_node",
         description="A robot on patrol in the simulated greenhouse, as the twin sees it.",
@@ -38,25 +28,25 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument(
         "--speed",
-        type=_number(float, "a number", *SPEED_LIMITS),
+        type=_number(float, "a number", 0.1, 50.0),
         default=1.0,
         help="patrol seconds per second (default 1: the whole greenhouse within a minute)",
     )
     made.add_argument(
         "--day-speed",
-        type=_number(float, "a number", *DAY_SPEED_LIMITS),
+        type=_number(float, "a number", 0.0, 3600.0),
         default=60.0,
         help="simulated seconds per patrol second (default 60: a day takes 24 minutes)",
     )
     made.add_argument(
         "--seed",
-        type=_number(int, "a whole number", *SEED_LIMITS),
+        type=_number(int, "a whole number", 0, 2**32 - 1),
         default=0,
         help="the same seed gives the same patrol (default 0)",
     )
     made.add_argument(
         "--since-morning",
-        type=_number(float, "a number", *SINCE_MORNING_LIMITS),
+        type=_number(float, "a number", 0.0, 86_400.0),
         default=0.0,
         help="patrol seconds since nine o'clock, when it begins (default 0)",
     )
@@ -77,7 +67,7 @@ def main() -> int:
     """Run the node until it is stopped or done; returns the exit code."""
     process.block()  # before anything slow is imported
     own, _ = process.split_ros_args(sys.argv[1:])
-    options = parse(own)
+    options = parser().parse_args(own)
     try:
         from greenhouse_sim.simulator import GreenhouseSimulator  # noqa: PLC0415  # see above
     except ModuleNotFoundError as error:

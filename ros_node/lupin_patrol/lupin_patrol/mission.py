@@ -27,12 +27,12 @@ from lupin_patrol.greenhouse import (
 )
 from lupin_patrol.perception import (
     SECONDS_PER_DAY,
-    Climate,
     Exploration,
     Grid,
     Plants,
     Sighting,
     TagDetector,
+    readings_at,
     stream,
 )
 from lupin_twin.core.state import Inspection, Pin, Pose, Reading, Scan, Write
@@ -153,7 +153,7 @@ class Mission:
         first_pass: int = 0,
     ) -> None:
         self.greenhouse = read_greenhouse(simulator)
-        self._climate = Climate(simulator)
+        self._sensors = simulator.sensor_registry
         self._plants = Plants(self.greenhouse, seed, first_pass)
         self._roadmap = Roadmap(self.greenhouse)
         self._exploration = Exploration(self.greenhouse)
@@ -234,7 +234,7 @@ class Mission:
             # The first pass builds the map and so defines where the tags are: it is exact. The
             # later ones localise themselves in it.
             pose = _locate(tag, 0.0 if pass_index == self._first_pass else 1.0, chance)
-            readings = self._climate.read(tag.sensors, tag.position, time_of_day_s, chance)
+            readings = readings_at(self._sensors, tag.sensors, tag.position, time_of_day_s, chance)
         scan = Scan(tag.tag_id, 0, readings, pose, status, _DETAILS[status])
         yield Visited(self._now_s, pass_index, time_of_day_s, scan)
         if pose is not None:

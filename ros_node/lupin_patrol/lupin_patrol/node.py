@@ -105,10 +105,10 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
                     f" tags without a successful scan: {', '.join(event.failed) or 'none'}"
                 )
 
-    def wait_for_delivery(self, timeout_s: float) -> bool:
-        """Wait until every subscriber has acknowledged everything; False when time runs out."""
+    def is_delivered(self) -> bool:
+        """Whether every subscriber has acknowledged everything."""
         return all(
-            publisher.wait_for_all_acked(Duration(seconds=timeout_s))
+            publisher.wait_for_all_acked(Duration())
             for publisher in (self.observations, self._discovered_tags, self._map)
         )
 
@@ -142,7 +142,7 @@ def play(
                 node.publish(event)
                 if once and isinstance(event, PassCompleted):
                     break
-            _stopped_before(stop, lambda: node.wait_for_delivery(0.0), _DELIVERY_S)
+            _stopped_before(stop, node.is_delivered, _DELIVERY_S)
 
 
 def _stopped_before(stop: Flag, condition: Callable[[], bool], timeout_s: float) -> bool:

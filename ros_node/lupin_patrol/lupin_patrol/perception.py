@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import ceil, cos, dist, radians
 from random import Random
@@ -54,24 +53,16 @@ class Plants:
     def __init__(self, greenhouse: Greenhouse, seed: int, first_pass: int = 0) -> None:
         self._seed = seed
         self._first_pass = first_pass
-        self._tag_ids = [tag.tag_id for tag in greenhouse.tags]
-        self._boxes = {
-            tag.tag_id: tuple((x, y, 0.0) for x, y in tag.table.rect.corners)
-            for tag in greenhouse.tags
-        }
-        self._blooms: dict[str, list[Bloom]] = {tag_id: [] for tag_id in self._tag_ids}
-        self._species: dict[str, str] = {}
+        self._tags = {tag.tag_id: tag for tag in greenhouse.tags}
+        self._blooms: dict[str, list[Bloom]] = {tag_id: [] for tag_id in self._tags}
         for table in greenhouse.tables:
             tags = [tag for tag in greenhouse.tags if tag.table == table]
-            species = stream(seed, "species", table.name).choice(SPECIES)
-            for tag in tags:
-                self._species[tag.tag_id] = species
-            for bloom in _grow(table, species, seed) if tags else ():
+            for bloom in _grow(table, self.species(tags[0].tag_id), seed) if tags else ():
                 self._blooms[_nearest(tags, (bloom.x, bloom.y)).tag_id].append(bloom)
 
     def species(self, tag_id: str) -> str:
         """Return what grows at a tag."""
-        return self._species[tag_id]
+        return stream(self._seed, "species", self._tags[tag_id].table.name).choice(SPECIES)
 
     def bugs(self, tag_id: str, pass_index: int) -> int:
         """How many pests sit at a tag during one pass; 0: none.
@@ -85,7 +76,7 @@ class Plants:
         ):
             chance = stream(self._seed, "outbreak", start)
             breaks_out = chance.random() < _OUTBREAK or start == self._first_pass
-            where = chance.choice(self._tag_ids)
+            where = chance.choice(list(self._tags))
             passes = chance.randint(1, _LONGEST_OUTBREAK)
             at_first = chance.randint(3, 12)
             if breaks_out and where == tag_id and pass_index < start + passes:
@@ -114,7 +105,7 @@ class Plants:
             flower_count=len(seen),
             bug_count=bugs,
             blooms=seen,
-            footprint=self._boxes[tag_id],
+            footprint=tuple((x, y, 0.0) for x, y in self._tags[tag_id].table.rect.corners),
         )
 
 
@@ -150,43 +141,23 @@ SECONDS_PER_DAY = 86_400.0
 _TO_CONTRACT_UNIT = {"soil_moisture": 100.0}
 
 
-class Climate:
-    """The climate of one greenhouse, anywhere on its floor and at any time of day."""
+def readings_at(
+    registry: Any, sensors: Sequence[str], position: Point, time_of_day_s: float, chance: Random
+) -> tuple[Reading, ...]:
+    """Read sensors at a place (m, map) and time (s since midnight), noise from `chance` included.
 
-    def __init__(self, simulator: Any) -> None:
-        self._registry = simulator.sensor_registry
-
-    def read(
-        self,
-        sensors: Sequence[str],
-        position: Point,
-        time_of_day_s: float,
-        chance: random.Random,
-    ) -> tuple[Reading, ...]:
-        """Read sensors at a place (m, map) and time (s since midnight), noise included."""
-        with _as_global_random(chance):
-            return tuple(
-                Reading(name, value_of(self._registry, name, position, time_of_day_s))
-                for name in sensors
-            )
+    The simulator draws from the process's own stream, which goes on from there.
+    """
+    random.setstate(chance.getstate())
+    return tuple(
+        Reading(name, value_of(registry, name, position, time_of_day_s)) for name in sensors
+    )
 
 
 def value_of(registry: Any, sensor: str, position: Point, time_of_day_s: float) -> float:
     """A sensor's value at a place (m, map) and time (s since midnight), in the contract's unit."""
     value = registry.get_sensor(sensor).retrieve_data(position, time_of_day_s % SECONDS_PER_DAY)
     return float(value) * _TO_CONTRACT_UNIT.get(sensor, 1.0)
-
-
-@contextmanager
-def _as_global_random(chance: random.Random) -> Iterator[None]:
-    """Let the simulator, which draws from the process's global stream, draw from `chance`."""
-    outer = random.getstate()
-    random.setstate(chance.getstate())
-    try:
-        yield
-    finally:
-        chance.setstate(random.getstate())
-        random.setstate(outer)
 
 
 TAG_RANGE_M = 1.2

@@ -10,8 +10,8 @@ import pytest
 from argon2 import PasswordHasher
 
 from lupin_bridge.access import people as people_module
-from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, Device, digest
-from lupin_bridge.access.credentials import AccountError, Person, check_password
+from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, Device
+from lupin_bridge.access.credentials import AccountError, Person, check_password, digest
 from lupin_bridge.access.people import ATTEMPT_BURST, MAX_WAITING, People
 from lupin_bridge.serving.admission import ClientLimitError
 from tests.support.people import PASSWORD, TOKEN, add, changing, remove

@@ -71,7 +71,7 @@ def test_so_many_are_remembered_as_signed_out_and_those_that_last_longest_are(
     for cookie in cookies[:3]:
         session = ours.session_of(cookie, NOW_S)
         assert session is not None
-        ours.sign_out(session, NOW_S)
+        ours.sign_out(session)
         assert not ours.still(session, NOW_S)
     assert [ours.session_of(cookie, NOW_S) is not None for cookie in cookies] == [
         *(True, False, False, True)

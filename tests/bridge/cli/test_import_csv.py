@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -248,7 +249,7 @@ def test_what_cannot_be_imported_at_all_is_one_line(
 
 
 def test_a_journal_that_a_twin_writes_is_in_use(importing: Import) -> None:
-    with Lock(importing.journal, "/lupin_twin"):
+    with closing(Lock(importing.journal, "/lupin_twin")):
         done = importing.given(WIDE, ROWS).run("--write")
     assert done.returncode == 1
     assert "is in use by /lupin_twin" in done.stderr

@@ -9,8 +9,8 @@ from subprocess import CompletedProcess
 
 import pytest
 
-from lupin_bridge.access.accounts import Accounts, digest
-from lupin_bridge.access.credentials import Person
+from lupin_bridge.access.accounts import Accounts
+from lupin_bridge.access.credentials import Person, digest
 from lupin_bridge.access.people import verify
 from tests.support.people import PASSWORD
 from tests.support.processes import said

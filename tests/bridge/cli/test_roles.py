@@ -11,7 +11,7 @@ import pytest
 
 from lupin_bridge.cli.roles import DAY_S, Feed, patrolled, since_morning_s, with_past
 from lupin_bridge.serving.server import listen
-from lupin_patrol.cli import parse as patrol_options
+from lupin_patrol.cli import parser as patrol_parser
 from lupin_patrol.perception import SECONDS_PER_DAY
 from lupin_twin.core.parameters import World
 from tests.support.journal import CLOCK, is_whole, kept, select
@@ -166,7 +166,7 @@ def test_a_demo_keeps_a_journal_of_its_own_by_seed() -> None:
 
 @pytest.mark.parametrize("patrol_args", [[], ["--speed=1"], ["--speed=50"], ["--speed=0.5"]])
 def test_a_demo_s_twin_knows_how_long_its_patrol_s_day_takes(patrol_args: list[str]) -> None:
-    patrol = patrol_options(patrol_args)
+    patrol = patrol_parser().parse_args(patrol_args)
     day_s = SECONDS_PER_DAY / patrol.day_speed / patrol.speed
     assert patrolled(ENV, patrol_args, []).world == World("simulated", day_s)
 
@@ -208,7 +208,7 @@ def test_started_again_it_goes_on_with_the_day(tmp_path: Path) -> None:
     module, since, *words = again.command
     assert [module, *words] == feed.command
     assert again == replace(feed, command=again.command)
-    assert 0.0 <= patrol_options([since]).since_morning < DAY_S
+    assert 0.0 <= patrol_parser().parse_args([since]).since_morning < DAY_S
 
 
 def test_somebody_s_journal_is_left(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

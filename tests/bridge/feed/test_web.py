@@ -224,7 +224,7 @@ def left_after_start(folder: Path) -> tuple[str | None, list[Path]]:
 
     async def test() -> str | None:
         async def query(_after: int) -> Lot:
-            raise NotRemembered("nobody is there", is_lasting=False)
+            raise NotRemembered("nobody is there")
 
         log = FollowedLog(query, Workers("test"))
         await log.start(folder)
@@ -254,7 +254,7 @@ def test_a_file_that_is_named_is_read_before_its_twin_is_heard(tmp_path: Path) -
 
     async def test() -> None:
         async def query(_after: int) -> Lot:
-            raise NotRemembered("nobody is there", is_lasting=False)
+            raise NotRemembered("nobody is there")
 
         log = FollowedLog(query, Workers("test"), journal)
         await log.start(tmp_path / "copies")

@@ -52,8 +52,8 @@ class Stage:
         snapshot = Snapshot(self.stamp_s * S, "map", tags)
         peer.publish("/twin/times", convert.StateMessages().times(snapshot), depth=1)
         peer.publish("/twin/state", convert.StateMessages().build(snapshot), depth=1)
-        if not self.told_of(self.stamp_s * S).has_times:  # it came before its own
-            self.until(lambda: self.told[-1].has_times, "its times")
+        if not has_times(self.told_of(self.stamp_s * S)):  # it came before its own
+            self.until(lambda: has_times(self.told[-1]), "its times")
         return self.told[-1]
 
     def told_of(self, stamp_ns: int) -> Snapshot:
@@ -81,6 +81,10 @@ def peer(domain: int) -> Iterator[Peer]:
 def stage(domain: int) -> Iterator[Stage]:
     with stage_in(domain) as made:
         yield made
+
+
+def has_times(snapshot: Snapshot) -> bool:
+    return snapshot.tags[0].readings[0].observed_at_ns is not None
 
 
 def tag(
@@ -162,13 +166,13 @@ def test_a_state_waits_for_its_times_and_for_no_others(stage: Stage, peer: Peer)
     late = Snapshot(90 * S, "map", (tag(value=7.0, at_s=80),))
     peer.publish("/twin/state", convert.StateMessages().build(late), depth=1)
     alone = stage.told_of(90 * S)
-    assert not alone.has_times
+    assert not has_times(alone)
     assert alone.tags[0].readings[0] == Reading("co2", 7.0)
     assert len(stage.told) == count + 1
     # And with them as soon as they come.
     times = convert.StateMessages().times(late)
     peer.publish("/twin/times", times, depth=1)
-    stage.until(lambda: stage.told[-1].has_times, "the times")
+    stage.until(lambda: has_times(stage.told[-1]), "the times")
     assert stage.told[-1].tags[0].readings[0].observed_at_ns == 80 * S
 
 

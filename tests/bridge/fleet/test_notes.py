@@ -10,7 +10,7 @@ import httpx
 import psycopg
 import pytest
 
-from lupin_bridge.access.accounts import digest
+from lupin_bridge.access.credentials import digest
 from tests.support.access import served
 from tests.support.archive import Archive, forward_once, rows_of
 from tests.support.fleet import Page, fleet, forward, scans_lately

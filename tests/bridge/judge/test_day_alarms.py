@@ -12,9 +12,9 @@ from lupin_bridge.judge.alarm_fold import Follower
 from lupin_bridge.judge.day import COUNTS_NS, SINCE_NS, ClockDay, Day, days_of
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria, own_sensors
-from lupin_bridge.judge.quantities import DAILY, DAY_NS
+from lupin_bridge.judge.quantities import DAILY
 from lupin_bridge.judge.verdict import Verdict
-from lupin_twin.core.past import PastWrite, RunSpan
+from lupin_twin.core.past import DAY_NS, PastWrite, RunSpan
 from lupin_twin.core.state import Reading
 
 HOUR = 3600 * 10**9

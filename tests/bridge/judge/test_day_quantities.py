@@ -3,7 +3,8 @@ from collections.abc import Callable
 
 import pytest
 
-from lupin_bridge.judge.quantities import BASE_C, DAILY, DAY_NS, LX_PER_UMOL, MAX_GAP_NS
+from lupin_bridge.judge.quantities import BASE_C, DAILY, LX_PER_UMOL, MAX_GAP_NS
+from lupin_twin.core.past import DAY_NS
 
 HOUR = 3600 * 10**9
 AT = 100 * DAY_NS

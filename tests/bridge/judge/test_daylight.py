@@ -2,7 +2,7 @@ from datetime import UTC, datetime, time, timedelta, timezone
 
 import pytest
 
-from lupin_bridge.judge.day import DAY_FROM_LX, ClockDay, Day, Light, judge_day
+from lupin_bridge.judge.day import DAY_FROM_LX, ClockDay, Day, Light, judge_day, says_day
 
 NOON_S = datetime(2026, 6, 1, 12, tzinfo=UTC).timestamp()
 MIDNIGHT_S = datetime(2026, 6, 1, tzinfo=UTC).timestamp()
@@ -12,7 +12,7 @@ CLOCK = ClockDay(UTC)
 def light_of(*readings_lx: float) -> bool | None:
     light = Light()
     for number, reading in enumerate(readings_lx):
-        light.put(f"tag_{number}", reading)
+        light.put(f"tag_{number}", says_day(reading))
     return light.is_day
 
 

@@ -51,7 +51,7 @@ def judge(case: dict[str, Any], now_ns: int = NOW_NS) -> Health:
         return Day(case.get("is_day", True), "light")
 
     recent = RecentScans.of([tag], (), day_of).tag(tag.tag_id)
-    return judge_tag(tag, now_ns, SENSORS, recent, holds_ns=HOLDS_NS)
+    return judge_tag(tag, now_ns, SENSORS, recent, holds_ns=HOLDS_NS, changed={}, days=())
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case["name"] for case in CASES])

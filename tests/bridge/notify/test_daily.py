@@ -232,7 +232,7 @@ async def test_it_waits_for_the_log_and_says_why_there_is_none(
         house.ros_time_ns = ns("2026-05-02T06:00:05Z")
         await looks(house)
         assert at.posted == []
-        house.error = NotRemembered("the disk is gone", is_lasting=False)
+        house.error = NotRemembered("the disk is gone")
         house.ros_time_ns = ns("2026-05-02T06:00:20Z")
         await until(lambda: "not sent by webhook: the disk is gone" in caplog.text, "why")
         house.error = None

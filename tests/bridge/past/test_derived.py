@@ -6,10 +6,11 @@ from dataclasses import replace
 import pytest
 
 from lupin_bridge.judge.judging import own_sensors
-from lupin_bridge.judge.quantities import DAILY, DAY_NS
+from lupin_bridge.judge.quantities import DAILY
 from lupin_bridge.judge.quantities import vapour_pressure_deficit_kpa as vpd
 from lupin_bridge.past import plans as derived
 from lupin_twin.core.past import (
+    DAY_NS,
     MAX_POINTS,
     MAX_READINGS,
     PastRefused,

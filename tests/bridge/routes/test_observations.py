@@ -10,7 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
-from lupin_bridge.access.accounts import digest
+from lupin_bridge.access.credentials import digest
 from lupin_bridge.cli.command import main
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.http_protocol import MAX_BODY_BYTES

@@ -12,7 +12,15 @@ from lupin_bridge.feed.query import PastQuery
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.stream import routes_schema
-from lupin_twin.core.past import Event, NotRemembered, PastRefused, SeriesPast, SeriesRequest, grid
+from lupin_twin.core.past import (
+    Event,
+    NotFound,
+    NotRemembered,
+    PastRefused,
+    SeriesPast,
+    SeriesRequest,
+    grid,
+)
 from tests.support.inprocess import Running, running
 from tests.support.past import NS, MadeUp, look_up
 from tests.support.waiting import until
@@ -116,8 +124,8 @@ async def test_events_that_come_in_five_minutes_share_one_grid_with_those_that_c
     ("error", "status", "retry_after"),
     [
         (PastRefused("points is 7, the limit is 6"), 400, None),
-        (NotRemembered("no journal is kept", is_lasting=True), 404, None),
-        (NotRemembered("the disk is away", is_lasting=False), 503, "3"),
+        (NotFound("nobody counts it here"), 404, None),
+        (NotRemembered("the disk is away"), 503, "3"),
         (TwinTimeoutError("it took too long"), 504, None),
         (TwinUnavailableError("nobody is there"), 503, "3"),
     ],

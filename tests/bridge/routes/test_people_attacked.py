@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
-from lupin_bridge.access.accounts import digest
+from lupin_bridge.access.credentials import digest
 from lupin_bridge.routes.written import MAX_LISTED
 from lupin_twin.core.notes import COMMENT
 from tests.support import raw_http

@@ -81,9 +81,8 @@ def test_a_moment_has_to_have_passed(at_ns: int, says: str) -> None:
     ("error", "message"),
     [
         (PastRefused("at is 3 s"), "at is 3 s"),
-        (NotRemembered("no journal", is_lasting=True), "not remembered: no journal"),
-        (NotRemembered("the file is busy", is_lasting=False), "the file is busy: ask again later"),
-        (NotRemembered("32 wait: ask again later", is_lasting=False), "32 wait: ask again later"),
+        (NotRemembered("the file is busy"), "the file is busy: ask again later"),
+        (NotRemembered("32 wait: ask again later"), "32 wait: ask again later"),
     ],
 )
 def test_why_there_is_no_answer_is_told_in_words_and_read_again(
@@ -93,8 +92,6 @@ def test_why_there_is_no_answer_is_told_in_words_and_read_again(
     read = error_of(message)
     assert type(read) is type(error)
     assert message_of(read) == message
-    if isinstance(error, NotRemembered) and isinstance(read, NotRemembered):
-        assert read.is_lasting is error.is_lasting
 
 
 @pytest.mark.parametrize(
@@ -123,6 +120,5 @@ def test_buckets_cover_a_period_and_long_ones_begin_on_the_full_hour(
 
 
 def test_what_is_not_remembered_can_be_told_by_another_process() -> None:
-    for is_lasting in (True, False):
-        told = pickle.loads(pickle.dumps(NotRemembered("gone", is_lasting=is_lasting)))
-        assert (str(told), told.is_lasting) == ("gone", is_lasting)
+    told = pickle.loads(pickle.dumps(NotRemembered("gone", damage="a page")))
+    assert (str(told), told.damage) == ("gone", "a page")

@@ -11,8 +11,6 @@ def test_limits_are_allowed() -> None:
 @pytest.mark.parametrize(
     ("wrong", "says"),
     [
-        ({"after": -1}, "after or reach_count is -1"),
-        ({"reach_count": -2}, "after or reach_count is -2"),
         ({"reach_s": -0.1}, "reach_s is -0.1"),
         ({"reach_s": 1.1e9}, "reach_s is 1100000000"),
         ({"reach_s": float("nan")}, "reach_s is nan"),

@@ -4,16 +4,12 @@ import pytest
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.estimate.cholesky import MAX_EXACT, PER_TAG
-from lupin_twin.estimate.engine import MAX_TAGS, EstimateRequest, TagPast, moment_of, readings_of
+from lupin_twin.estimate.engine import MAX_TAGS, TagPast, moment_of, readings_of
 from lupin_twin.estimate.kernel import MAX_PER_TAG
-from lupin_twin.field.engine import FieldRefused, FieldRequest
+from lupin_twin.field.engine import FieldRefused
 from tests.support.estimates import DAY_S
 
 S = NANOSECONDS_PER_SECOND
-
-
-def box(sensor: str = "temperature", resolution: float = 0.5) -> FieldRequest:
-    return FieldRequest(sensor, resolution, 0.0, 0.0, 4.0, 8.0)
 
 
 def tag_past(index: int, *hours: float) -> TagPast:
@@ -52,10 +48,3 @@ def test_an_estimate_of_now_is_one_of_the_last_minute_or_of_the_newest_reading()
     late = [TagPast("late", 0.0, 0.0, ((hour_ns + 7 * S, 20.0), (2 * hour_ns, 20.0)))]
     assert moment_of(late, hour_ns + 59 * S, DAY_S) == hour_ns + 7 * S
     assert moment_of([], 25 * S, 1440.0) == 25 * S, "a minute of that day is a second"
-
-
-@pytest.mark.parametrize("at_ns", [-1, 11 * S])
-def test_a_moment_that_has_not_come_is_refused(at_ns: int) -> None:
-    EstimateRequest(box(), 10 * S).check(10 * S, 1_000)
-    with pytest.raises(FieldRefused, match=r"at is .* s, the limits are 0 and now, 10.0 s"):
-        EstimateRequest(box(), at_ns).check(10 * S, 1_000)

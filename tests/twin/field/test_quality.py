@@ -39,7 +39,7 @@ def quality_of(spots: Sequence[Spot], **changes: Any) -> FieldQuality:
 
 def test_nothing_can_be_said_about_lonely_tags() -> None:
     for spots in ([], [(0.0, 0.0, 10.0)], [(0.0, 0.0, 10.0), (9.0, 0.0, 10.0)]):
-        assert quality_of(spots) == FieldQuality("temperature", 0, len(spots), None, None)
+        assert quality_of(spots) == FieldQuality(0, len(spots), None, None)
 
 
 def test_only_pinned_tags_with_a_finite_reading_of_the_sensor_take_part() -> None:
@@ -50,7 +50,7 @@ def test_only_pinned_tags_with_a_finite_reading_of_the_sensor_take_part() -> Non
     ]
     quality = leave_one_out(tags, "temperature", **RULES)
     assert (quality.judged, quality.unjudged, quality.rmse) == (2, 0, 2.0)
-    assert leave_one_out(tags, "light", **RULES) == FieldQuality("light", 0, 0, None, None)
+    assert leave_one_out(tags, "light", **RULES) == FieldQuality(0, 0, None, None)
 
 
 @settings(max_examples=150)

@@ -175,7 +175,7 @@ def check_counts(life: Life, archive: SiteLog, random: Any) -> None:
     numbers = list(range(1, 1 + Appender(life.connection).last_seq))
     random.shuffle(numbers)
     for number in numbers:
-        count_rows(archive, number - 1, number)
+        count_rows(archive, number - 1, number, {})
     *there, there_sums = derived(archive)
     assert there == here
     for one, other in zip(there_sums, here_sums, strict=True):

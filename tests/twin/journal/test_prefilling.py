@@ -5,7 +5,7 @@ import pytest
 
 from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.state import Write
-from lupin_twin.journal.appending import Stretch, prefill, simulated
+from lupin_twin.journal.appending import prefill, simulated
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from tests.support.journal import (
@@ -38,7 +38,7 @@ def filled(path: Path) -> bool:
     return prefill(path, "a test", PAST, NOW)
 
 
-def mark(path: Path) -> Stretch | None:
+def mark(path: Path) -> tuple[int, int] | None:
     with closing(open_reader(path)) as connection:
         return simulated(connection)
 

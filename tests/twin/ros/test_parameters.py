@@ -50,7 +50,7 @@ def test_a_change_is_told_once_with_all_parameters(domain: int) -> None:
     told: list[TwinParameters] = []
     with node_with(domain, made=AdjustableNode) as node:
         node.parameters = declare(node)
-        node.adjust_by(told.append)
+        node.adjust = told.append
         wanted = [Parameter("idw_power", value=3), Parameter("idw_max_distance_m", value=2.5)]
         assert node.set_parameters_atomically(wanted).successful
         assert node.set_parameters_atomically(wanted).successful, "and nothing is new"
@@ -79,7 +79,7 @@ def test_a_refused_change_changes_nothing_and_names_parameter_value_and_limit(
 ) -> None:
     with node_with(domain, made=AdjustableNode) as node:
         node.parameters = declare(node)
-        node.adjust_by(lambda _: pytest.fail("it was told"))
+        node.adjust = lambda _: pytest.fail("it was told")
         good = Parameter("idw_max_distance_m", value=9.0)
         result = node.set_parameters_atomically([good, Parameter(name, value=value)])
         assert not result.successful

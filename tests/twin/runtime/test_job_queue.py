@@ -63,7 +63,7 @@ def made() -> Iterator[Stage]:
 
 
 def test_what_cannot_be_looked_up_is_answered_and_holds_up_nobody(made: Stage) -> None:
-    error = NotRemembered("no journal", is_lasting=True)
+    error = NotRemembered("no journal")
 
     def look_up() -> Future[int]:
         raise error
@@ -151,9 +151,7 @@ def test_so_many_queries_wait_and_one_more_is_told_to_come_again(
     searches = [made.ask(cost_s=cost_s) for _ in range(MAX_QUERIES)]
     with pytest.raises(NotRemembered, match=rf"{MAX_QUERIES} requests .* the limit") as refused:
         made.ask(cost_s=cost_s)
-    told = error_of(message_of(refused.value))
-    assert isinstance(told, NotRemembered)
-    assert not told.is_lasting
+    assert isinstance(error_of(message_of(refused.value)), NotRemembered)
     searches[0].set_result(0)
     made.delivered()
     made.ask(cost_s=cost_s)

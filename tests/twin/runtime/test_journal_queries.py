@@ -51,10 +51,9 @@ def is_answer(recall: Recall, expected: int) -> bool:
     return answer(recall) == expected
 
 
-def why_not(recall: Recall, *, is_lasting: bool = False) -> str:
+def why_not(recall: Recall) -> str:
     with pytest.raises(NotRemembered) as caught:
         answer(recall)
-    assert caught.value.is_lasting is is_lasting
     return str(caught.value)
 
 

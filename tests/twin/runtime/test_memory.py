@@ -50,7 +50,7 @@ def test_a_file_that_takes_the_place_of_the_journal_is_read_once_the_twin_has_op
     tmp_path: Path,
 ) -> None:
     path, other = tmp_path / "j.sqlite", tmp_path / "other.sqlite"
-    refusals: list[tuple[str, bool]] = []
+    refusals: list[str] = []
 
     def how_many(connection: sqlite3.Connection, _: ShouldStop) -> int:
         return len(connection.execute("SELECT readings FROM scan").fetchall())
@@ -59,7 +59,7 @@ def test_a_file_that_takes_the_place_of_the_journal_is_read_once_the_twin_has_op
         try:
             return memory.recall.query(how_many).result(20.0) == count
         except NotRemembered as error:
-            refusals.append((str(error), error.is_lasting))
+            refusals.append(str(error))
             return False
 
     with twin(path, wall(0)) as (memory, _):
@@ -76,7 +76,7 @@ def test_a_file_that_takes_the_place_of_the_journal_is_read_once_the_twin_has_op
         with pytest.raises(NotRemembered, match="name another file"):
             memory.recall.query(how_many).result(20.0)
     why = "was replaced; the twin opens the new one within seconds"
-    assert (f"the journal {path} {why}", False) in refusals
+    assert f"the journal {path} {why}" in refusals
 
 
 def test_damage_that_somebody_meets_has_the_file_set_aside_while_the_twin_records(

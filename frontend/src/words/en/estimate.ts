@@ -16,7 +16,7 @@ export const ESTIMATE = {
   /** Beside the colours of the error. */
   error: 'Uncertainty of the estimate',
   foretold: (inside: number, scans: number): string =>
-    `${whole(inside)} of ${counted(scans, 'scan', 'scans')} were within the predicted range`,
+    `${whole(inside)} of ${counted(scans, 'scan', 'scans')} within the predicted range`,
   foretoldNone: 'No scan has been compared with it yet',
   foretoldDay: (inside: number, scans: number): string =>
     `Last day: ${whole(inside)} of ${counted(scans, 'scan', 'scans')}`,

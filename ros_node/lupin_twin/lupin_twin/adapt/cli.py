@@ -95,7 +95,7 @@ def _check(config: Config, seconds: float) -> int:
     lines = list(report(node, seconds))
     node.destroy_node()
     for _, line in lines:
-        _say(line, sys.stdout)
+        sys.stdout.write(f"{line}\n")
     return 0 if all(is_right for is_right, _ in lines) else WRONG
 
 
@@ -105,14 +105,14 @@ def _suggest(seconds: float) -> int:
     listener = Listener()
     _listen(listener, seconds)
     for why in listener.missing.values():
-        _say(why, sys.stderr)
+        sys.stderr.write(f"{why}\n")
     if not any(source.received for source in listener.sources.values()):
         topics = ", ".join(sorted(name for name, _ in listener.get_topic_names_and_types()))
         return refuse(
             "adapt", f"nothing was received that is a reading or a pose; topics: {topics or 'none'}"
         )
-    _say("# Where each tag is, [x, y] in m, is for you to fill in.", sys.stdout)
-    _say(suggestion(listener).rstrip(), sys.stdout)
+    sys.stdout.write("# Where each tag is, [x, y] in m, is for you to fill in.\n")
+    sys.stdout.write(suggestion(listener))
     return 0
 
 
@@ -121,17 +121,12 @@ def _listen(node: Any, seconds: float) -> None:
     from rclpy.executors import SingleThreadedExecutor  # noqa: PLC0415  # see `run`
 
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
-    _say(f"listening for {seconds:g} s ...", sys.stderr)
+    sys.stderr.write(f"listening for {seconds:g} s ...\n")
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     until_s = time.monotonic() + seconds
     while (left_s := until_s - time.monotonic()) > 0:
         executor.spin_once(timeout_sec=left_s)
-
-
-def _say(text: str, to: Any) -> None:
-    to.write(f"{text}\n")
-    to.flush()
 
 
 if __name__ == "__main__":

@@ -6,8 +6,9 @@ Every complaint names the key as it stands in the file, its value, and what is e
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,11 +24,10 @@ from lupin_twin.adapt.table import (
     value_of,
 )
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
+from lupin_twin.core.parameters import FARTHEST_M
 from lupin_twin.core.state import Pose
 
 MAX_FILE_BYTES: Final = 4_000_000
-# As a place that is posted: nobody's greenhouse is farther from its map's origin.
-MAX_M: Final = 1e6
 _TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Za-z][A-Za-z0-9]*")
 _FIELD: Final = re.compile(r"[a-z]\w*(\[\d{1,9}\])?(\.[a-z]\w*(\[\d{1,9}\])?)*")
 
@@ -43,11 +43,11 @@ STANDARD: Final[Mapping[str, tuple[str, Value]]] = {
 }
 # What apriltag_ros calls a tag's frame, unless its parameter `tag.frames` says otherwise.
 TAG_FRAME: Final = "{family}:{id}"
-# Where the pose is in a message that has a header.
-POSES: Final[Mapping[str, str]] = {
-    "geometry_msgs/msg/PoseWithCovarianceStamped": "pose.pose",
-    "geometry_msgs/msg/PoseStamped": "pose",
-    "nav_msgs/msg/Odometry": "pose.pose",
+# What takes the pose out of a message that has a header.
+POSES: Final[Mapping[str, Callable[[Any], Any]]] = {
+    "geometry_msgs/msg/PoseWithCovarianceStamped": attrgetter("pose.pose"),
+    "geometry_msgs/msg/PoseStamped": attrgetter("pose"),
+    "nav_msgs/msg/Odometry": attrgetter("pose.pose"),
 }
 
 
@@ -210,10 +210,11 @@ def place_of(what: str, at: Any, otherwise: str = "") -> Pose:
     if (
         not isinstance(at, list)
         or len(at) not in (2, 3)
-        or not all(is_number(each) and abs(each) <= MAX_M for each in at)
+        or not all(is_number(each) and abs(each) <= FARTHEST_M for each in at)
     ):
         raise ConfigError(
-            f"{what} is {shown(at)}, expected [x, y] or [x, y, z] in m up to {MAX_M:.0f}{otherwise}"
+            f"{what} is {shown(at)}, expected [x, y] or [x, y, z] in m up to {FARTHEST_M:.0f}"
+            f"{otherwise}"
         )
     return Pose.at(*at)
 

@@ -40,6 +40,7 @@ from lupin_twin.adapt.table import ConfigError, number_of
 from lupin_twin.core import interfaces
 from lupin_twin.core.diagnostics import OK, WARN, Finding
 from lupin_twin.core.drops import Drop, Reason, Rejected
+from lupin_twin.core.parameters import FARTHEST_M
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pose, Scan
 from lupin_twin.ros import convert
 from lupin_twin.ros.base_node import NodeUtilities, latched, qos_of, waker
@@ -175,11 +176,9 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             return
         if self._stamp_ns(topic, message) is None:
             return
-        at = message
-        for part in POSES[self._config.robot.type_name].split("."):  # type: ignore[union-attr]
-            at = getattr(at, part)
-        x, y = at.position.x, at.position.y
-        if not (abs(x) < 1e6 and abs(y) < 1e6):  # NaN is neither
+        pose = POSES[self._config.robot.type_name](message)  # type: ignore[union-attr]
+        x, y = pose.position.x, pose.position.y
+        if not (abs(x) < FARTHEST_M and abs(y) < FARTHEST_M):  # NaN is neither
             self._drop(Reason.POSE, topic, f"its position is ({x:g}, {y:g}) m")
             return
         self._moved_s = now_s

@@ -16,12 +16,11 @@ from typing import Final
 
 from lupin_twin.adapt.config import Config
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH
-from lupin_twin.core.state import STATUS_OK, Pose, Reading, Scan
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, STATUS_OK, Pose, Reading, Scan
 
 LEAVES: Final = 1.1
 # Who was at a tag for so long and read nothing has failed; one that passed by has not.
 STAYED_NS: Final = 2_000_000_000
-NS: Final = 1_000_000_000
 
 
 # Of a robot's visit, and of a sensor that stands at its tag.
@@ -136,13 +135,13 @@ class Scans:
         if now_ns < self._now_ns:  # the clock has gone back: another world
             self.tag, self._visit, self._fixed = None, None, {}
         self._now_ns = now_ns
-        window_ns = int(self._config.window_s * NS)
+        window_ns = int(self._config.window_s * NANOSECONDS_PER_SECOND)
         for tag_id, window in tuple(self._fixed.items()):
             if now_ns - window.begun_ns >= window_ns:
                 del self._fixed[tag_id]
                 yield self._scan(tag_id, window, is_fixed=True)
         robot = self._config.robot
-        if robot is not None and now_ns - self._seen_ns > robot.max_age_s * NS:
+        if robot is not None and now_ns - self._seen_ns > robot.max_age_s * NANOSECONDS_PER_SECOND:
             yield from self._be_at(None, now_ns)
         elif self._visit is not None and now_ns - self._visit.begun_ns >= window_ns:
             yield from self._ended(now_ns)
@@ -162,7 +161,7 @@ class Scans:
         if window.means:
             yield self._scan(tag_id, window)
         elif now_ns - window.begun_ns >= STAYED_NS:
-            stayed_s = (now_ns - window.begun_ns) / NS
+            stayed_s = (now_ns - window.begun_ns) / NANOSECONDS_PER_SECOND
             yield self.failed(tag_id, f"no reading in {stayed_s:.0f} s here", now_ns)
 
     def _scan(self, tag_id: str, window: _Window, *, is_fixed: bool = False) -> Scan:

@@ -12,17 +12,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from lupin_twin.core.drops import too_long
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, value
 
 # How a message ends of what may be answered a little later, if it is requested again.
 ASK_AGAIN: Final = "ask again later"
-# How one begins of what stays so until a setting of the twin is changed.
-NOT_REMEMBERED: Final = "not remembered: "
-
 
 DEFAULT_POINTS: Final = 500
 MAX_POINTS: Final = 5_000
@@ -32,6 +28,9 @@ MAX_READINGS: Final = 8 * MAX_POINTS
 SLOT_NS: Final = 300 * 1_000_000_000
 # What is counted as it is written.
 HOUR_NS: Final = 3_600 * 1_000_000_000
+DAY_NS: Final = 24 * HOUR_NS
+# Later than any stamp; the largest that SQLite counts to.
+FOREVER_NS: Final = 2**63 - 1
 # The `tag_id` of a query for events of the whole site.
 EVERY_TAG: Final = "*"
 
@@ -53,20 +52,18 @@ class PastRefused(ValueError):
 
 
 class NotRemembered(RuntimeError):
-    """Nobody remembers that far back; the message says why.
+    """The past cannot be read now; the message says why.
 
-    `is_lasting`: until a setting is changed (there is no journal); else it may pass (the file
-    cannot be read now). `damage` is what is wrong with the file, if something is.
+    `damage` is what is wrong with the file, if something is.
     """
 
-    def __init__(self, why: str, *, is_lasting: bool, damage: str = "") -> None:
+    def __init__(self, why: str, *, damage: str = "") -> None:
         super().__init__(why)
-        self.is_lasting = is_lasting
         self.damage = damage
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """So that another process may say it."""
-        return partial(NotRemembered, is_lasting=self.is_lasting, damage=self.damage), self.args
+
+class NotFound(NotRemembered):
+    """What is asked for is not there, however often it is asked for."""
 
 
 def check_moment(at_ns: int, now_ns: int) -> None:
@@ -90,24 +87,17 @@ def seconds(stamp_ns: int) -> str:
 
 def message_of(error: Exception) -> str:
     """Why there is no answer, as a service's `error_message` that `error_of` reads again."""
+    why = str(error)
     if isinstance(error, PastRefused):
-        return str(error)
-    if isinstance(error, NotRemembered):
-        why = str(error)
-        if error.is_lasting:
-            return NOT_REMEMBERED + why
-    else:
-        why = f"the twin failed to answer: {error}"
+        return why
+    if not isinstance(error, NotRemembered):
+        why = f"the twin failed to answer: {why}"
     return why if why.endswith(ASK_AGAIN) else f"{why}: {ASK_AGAIN}"
 
 
 def error_of(message: str) -> PastRefused | NotRemembered:
     """What a service's `error_message` says: the other direction of `message_of`."""
-    if message.startswith(NOT_REMEMBERED):
-        return NotRemembered(message.removeprefix(NOT_REMEMBERED), is_lasting=True)
-    if message.endswith(ASK_AGAIN):
-        return NotRemembered(message, is_lasting=False)
-    return PastRefused(message)
+    return NotRemembered(message) if message.endswith(ASK_AGAIN) else PastRefused(message)
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,12 +228,10 @@ class PastRow:
 
 DEFAULT_WRITES: Final = 1_000
 MAX_WRITES: Final = 2_000
-# The largest that SQLite counts to.
-MAX_NUMBER: Final = 2**63 - 1
 # Of each tag, what is recent at a moment: its last scans and inspections, so many of each, and no
 # older.
 RECENT_COUNT: Final = 9
-RECENT_NS: Final = 3 * 86_400 * 1_000_000_000
+RECENT_NS: Final = 3 * DAY_NS
 # Scans of one answer: some seconds of one core.
 MAX_SCANS: Final = 200_000
 
@@ -267,10 +255,8 @@ class WritesRequest:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be answered."""
-        if self.after < 0 or self.reach_count < 0:
-            raise PastRefused(f"after or reach_count is {min(self.after, self.reach_count)}, not 0")
-        if self.after > MAX_NUMBER:
-            raise PastRefused(f"after is {self.after}, the limit is {MAX_NUMBER}")
+        if self.after > FOREVER_NS:
+            raise PastRefused(f"after is {self.after}, the limit is {FOREVER_NS}")
         if not 0.0 <= self.reach_s <= 1e9:
             raise PastRefused(f"reach_s is {self.reach_s}, the limits are 0 and 1e9 s")
         if not 1 <= self.max_count <= MAX_WRITES:

@@ -232,15 +232,11 @@ ClockState = Literal["running", "paused", "stopped", "none", "doubted"]
 
 @value
 class Snapshot:
-    """Every tag at one moment, in the order in which the tags were first seen.
-
-    Without `has_times`, only each tag's last observation has a known time.
-    """
+    """Every tag at one moment, in the order in which the tags were first seen."""
 
     stamp_ns: int
     frame_id: str
     tags: tuple[TagState, ...]
-    has_times: bool = True
     clock: ClockState = "running"
 
     @property
@@ -312,8 +308,8 @@ class TwinStore:
         tag = replace(tag, pose=tag.pose or inspection.pose)
         self._store_attempt(tag, inspection, brought=flower is not None)
 
-    def pin(self, tag_id: str, pose: Pose) -> bool:
-        """Give a discovered tag its place; False, and nothing changed, if it has one already.
+    def pin(self, tag_id: str, pose: Pose) -> None:
+        """Give a discovered tag its place, unless it has one already.
 
         Raises:
             Rejected: a text past its bound, or one tag too many.
@@ -321,10 +317,8 @@ class TwinStore:
         """
         check_texts(tag_id)
         tag = self._tag(tag_id)
-        if tag.pose is not None:
-            return False
-        self._store(replace(tag, pose=pose))
-        return True
+        if tag.pose is None:
+            self._store(replace(tag, pose=pose))
 
     def hold_to(self, now_ns: int) -> bool:
         """Follow a clock that has gone back: whatever was observed after `now_ns` was, now.

@@ -37,18 +37,6 @@ class EstimateRequest:
     box: FieldRequest
     at_ns: int = 0
 
-    def check(self, now_ns: int, max_grid_cells: int) -> None:
-        """Refuse what cannot be answered.
-
-        Raises:
-            FieldRefused: names the field, the value and the limit.
-
-        """
-        check_request(self.box, max_grid_cells)
-        if self.at_ns < 0 or self.at_ns > now_ns:
-            at_s, now_s = self.at_ns / NANOSECONDS_PER_SECOND, now_ns / NANOSECONDS_PER_SECOND
-            raise FieldRefused(f"at is {at_s} s, the limits are 0 and now, {now_s} s")
-
 
 @dataclass(frozen=True, slots=True)
 class TagPast:

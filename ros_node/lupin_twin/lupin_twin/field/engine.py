@@ -294,7 +294,6 @@ class FieldQuality:
     worst is the first.
     """
 
-    sensor_type: str
     judged: int
     unjudged: int
     rmse: float | None
@@ -327,12 +326,11 @@ def leave_one_out(
     predicted = _predictions(x, y, measured, idw, should_stop)
     judged = np.flatnonzero(~np.isnan(predicted))
     if judged.size == 0:
-        return FieldQuality(sensor_type, judged=0, unjudged=len(samples), rmse=None, worst=None)
+        return FieldQuality(judged=0, unjudged=len(samples), rmse=None, worst=None)
     errors = predicted[judged] - measured[judged]
     worst = int(np.abs(errors).argmax())
     index = int(judged[worst])
     return FieldQuality(
-        sensor_type=sensor_type,
         judged=judged.size,
         unjudged=len(samples) - judged.size,
         rmse=math.hypot(*errors.tolist()) / math.sqrt(judged.size),

@@ -10,6 +10,7 @@ import json
 import math
 import zlib
 from dataclasses import dataclass
+from hashlib import blake2b
 from typing import Any, Final
 
 import numpy as np
@@ -92,6 +93,16 @@ class OccupancyMap:
     def shows_the_same_as(self, other: OccupancyMap) -> bool:
         """Whether place and cells are the same, whenever and however often it was published."""
         return self.place == other.place and np.array_equal(self.cells, other.cells)
+
+
+def digest_of(occupancy: OccupancyMap) -> int:
+    """Of place and cells: the same in all replicas, and for each copy that shows the same.
+
+    SLAM publishes a map anew every few seconds, with another stamp each time.
+    """
+    digest = blake2b(repr(occupancy.place).encode("utf-8", "surrogatepass"), digest_size=6)
+    digest.update(occupancy.cells.data)
+    return int.from_bytes(digest.digest())
 
 
 def explored_mask(

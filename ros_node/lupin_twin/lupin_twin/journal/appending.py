@@ -13,18 +13,14 @@ from collections.abc import Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
-from lupin_twin.core.history import KNOWN_BY_NOTHING, kind_of
+from lupin_twin.core.history import KIND_FLOWER, KNOWN_BY_NOTHING, kind_of
 from lupin_twin.core.state import Flower, Inspection, Pin, Scan, Write
 from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.hours import count_rows
 from lupin_twin.journal.received import last_number
-from lupin_twin.journal.rows import (
-    KIND_FLOWER,
-    sensor_names,
-    weight,
-)
+from lupin_twin.journal.rows import sensor_names, weight
 from lupin_twin.journal.runs import Clock, Run, put_run
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
@@ -339,13 +335,6 @@ _UNTIL: Final = "simulated_until_ns"
 _LOT: Final = 1_000
 
 
-class Stretch(NamedTuple):
-    """From one moment of ROS time to another, ns."""
-
-    start_ns: int
-    end_ns: int
-
-
 def is_empty(connection: sqlite3.Connection) -> bool:
     """Whether nothing was ever observed into a journal."""
     return not Appender(connection).last_seq
@@ -365,7 +354,7 @@ def prefill(path: Path, holder: str, rows: Sequence[Write], until_ns: int) -> bo
     if not rows:
         return False
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    with Lock(path, holder), closing(open_writer(path)) as connection:
+    with closing(Lock(path, holder)), closing(open_writer(path)) as connection:
         if not is_empty(connection):
             return False
         first = rows[0]
@@ -383,7 +372,7 @@ def prefill(path: Path, holder: str, rows: Sequence[Write], until_ns: int) -> bo
     return True
 
 
-def simulated(connection: sqlite3.Connection) -> Stretch | None:
-    """The stretch of a journal that was filled in, None if nothing was."""
+def simulated(connection: sqlite3.Connection) -> tuple[int, int] | None:
+    """The stretch of a journal that was filled in, ns of ROS time; None if nothing was."""
     start_ns, end_ns = get_meta(connection, _FROM), get_meta(connection, _UNTIL)
-    return Stretch(int(start_ns), int(end_ns)) if start_ns and end_ns else None
+    return (int(start_ns), int(end_ns)) if start_ns and end_ns else None

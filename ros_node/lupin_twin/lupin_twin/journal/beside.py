@@ -10,7 +10,7 @@ import threading
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Final, Self
+from typing import Final
 
 from lupin_twin.journal.schema import open_named, open_writer, sync
 
@@ -64,7 +64,7 @@ class InUse(Exception):
 
 
 class Lock:
-    """Held from construction to `release`.
+    """Held from construction to `close`.
 
     Raises:
         InUse: another process holds it.
@@ -90,15 +90,9 @@ class Lock:
         except OSError:
             pass
 
-    def release(self) -> None:
+    def close(self) -> None:
         """Let others write."""
         os.close(self._descriptor)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.release()
 
 
 def holder_of(journal: Path) -> str | None:
@@ -137,7 +131,7 @@ def writing_alone(journal: Path, holder: str) -> Iterator[sqlite3.Connection]:
         lock = Lock(journal, holder)
     except InUse as error:
         raise InUse(f"{error}: stop the twin first") from error
-    with lock, closing(open_writer(journal)) as connection:
+    with closing(lock), closing(open_writer(journal)) as connection:
         yield connection
 
 

@@ -90,7 +90,7 @@ class Part:
     def fill(self, buckets: Buckets) -> None:
         """Add them to buckets."""
         steps, rest = buckets.grid, [self.span]
-        if self._table.hours and buckets.are_hours():
+        if self._table.hours and steps.bucket_ns >= HOUR_NS:
             hours, rest = whole_hours(self.span, self._deleted_ns)
             n, total, low, high = self._table.sums
             for index, count, *numbers in self.ask(
@@ -143,10 +143,6 @@ class Buckets:
     def __init__(self, steps: Grid) -> None:
         self.grid = steps
         self._found: dict[int, list[float]] = {}
-
-    def are_hours(self) -> bool:
-        """Whether each has whole hours."""
-        return self.grid.bucket_ns % HOUR_NS == 0 and self.grid.start_ns % HOUR_NS == 0
 
     def add(self, index: int, n: int, total: float, low: float, high: float) -> None:
         """Add some to a bucket."""

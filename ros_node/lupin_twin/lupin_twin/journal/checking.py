@@ -10,7 +10,6 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
-from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -85,13 +84,11 @@ def find_all_damage(connection: sqlite3.Connection, report: Progress) -> Generat
 
     """
     report("structure", 0.0)
-    parts: dict[str, Callable[[], Iterator[str]]] = {
-        "structure": partial(_structure, connection),
-        **{table: partial(_rows, connection, table, report) for table in _WRONG},
-    }
-    for what, read in parts.items():
+    parts = [("structure", _structure(connection))]
+    parts += [(table, _rows(connection, table, report)) for table in _WRONG]
+    for what, found in parts:
         try:
-            yield from read()
+            yield from found
         except FILE_ERRORS as error:
             if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT:
                 raise

@@ -13,8 +13,9 @@ from typing import Final
 
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
+from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import Write
-from lupin_twin.journal.appending import Appender, Stretch, copy_known, simulated
+from lupin_twin.journal.appending import Appender, copy_known, simulated
 from lupin_twin.journal.beside import Syncing, forwarded_seq
 from lupin_twin.journal.checking import find_damage, size_of
 from lupin_twin.journal.fold import Restored, copies, fold
@@ -31,15 +32,7 @@ from lupin_twin.journal.retention import (
     unmet_limit,
 )
 from lupin_twin.journal.rows import last_rows
-from lupin_twin.journal.runs import (
-    CORRECTION_NS,
-    FOREVER_NS,
-    Clock,
-    Run,
-    put_run,
-    runs,
-    simulation_goes_on,
-)
+from lupin_twin.journal.runs import CORRECTION_NS, Clock, Run, put_run, runs, simulation_goes_on
 from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
@@ -94,7 +87,7 @@ class JournalFile:
     """
 
     def __init__(self, path: Path, limits: Limits, *, is_sound: bool | None) -> None:
-        self.simulated: Stretch | None = None
+        self.simulated: tuple[int, int] | None = None
         # The limit that is exceeded although nothing more can be deleted, in words.
         self.unmet_limit = ""
         self._path = path

@@ -15,8 +15,11 @@ from itertools import repeat
 from typing import Any, Final
 
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
+from lupin_twin.core.history import KIND_TAG_READING
+from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import (
     NO_FLOWER,
+    STATUS_OK,
     Attempt,
     Flower,
     Inspection,
@@ -28,14 +31,8 @@ from lupin_twin.core.state import (
     TagState,
     Write,
 )
-from lupin_twin.journal.rows import (
-    KIND_READING,
-    STATUS_OK,
-    flower_of,
-    listed_rows,
-    named_numbers,
-)
-from lupin_twin.journal.runs import FOREVER_NS, Run, runs, since_seq, span_at
+from lupin_twin.journal.rows import flower_of, listed_rows, named_numbers
+from lupin_twin.journal.runs import Run, runs, since_seq, span_at
 from lupin_twin.journal.schema import LOCAL_SITE
 
 # What a state takes, about, seconds of one core for each tag.
@@ -142,7 +139,7 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> Known:
     scans.sort()
     # Of series without sensors the newest may be a failure, and an attempt before it none.
     succeeded = _NEWEST.format(but=f"AND status = {STATUS_OK} AND readings = '[]' ")
-    which = f"AND s.kind = {KIND_READING} AND s.sensors = '[]'"
+    which = f"AND s.kind = {KIND_TAG_READING} AND s.sensors = '[]'"
     scans += execute(_SCANS.format(newest=succeeded, which=which), query).fetchall()
     for row, readings in zip(scans, _readings(scans), strict=True):
         series, tag, kind, _, seq, stamp_ns, status, detail, _ = row
@@ -150,7 +147,7 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> Known:
         last = tried.get(tag)
         if last is None or (stamp_ns, seq) >= last[:2]:
             tried[tag] = (stamp_ns, seq, status, detail)
-        if readings or (kind == KIND_READING and status == STATUS_OK):
+        if readings or (kind == KIND_TAG_READING and status == STATUS_OK):
             if stamp_ns > observed.get(tag, -1):
                 observed[tag] = stamp_ns
             found.setdefault(tag, []).append((stamp_ns, seq, readings))

@@ -19,19 +19,20 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from lupin_twin.core.parameters import World
-from lupin_twin.core.past import HOUR_NS, Event
-from lupin_twin.journal.appending import PURGED_SEQ, Stretch, simulated
+from lupin_twin.core.past import FOREVER_NS, HOUR_NS, Event
+from lupin_twin.journal.appending import PURGED_SEQ, simulated
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, TALLIED, count_rows
 from lupin_twin.journal.received import id_behind, number_of
 from lupin_twin.journal.retention import (
     RECORD,
     Stretches,
     delete_recorded,
+    delete_up_to,
     kept,
     outermost,
     records,
 )
-from lupin_twin.journal.runs import FOREVER_NS, world_of
+from lupin_twin.journal.runs import world_of
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
     LOCAL_SITE,
@@ -138,7 +139,7 @@ class Followed:
     world: World
     complete_ns: int
     kept_ns: Stretches
-    simulated_ns: Stretch | None
+    simulated_ns: tuple[int, int] | None
 
 
 class NotALotError(ValueError):
@@ -309,11 +310,7 @@ def _put(connection: sqlite3.Connection, lot: Lot) -> None:
     # Then the rest: whether pests are new in it is known by what was before.
     counted_ns = {run: (hour + 1) * HOUR_NS - 1 for run, hour in _purged(connection).items()}
     count_rows(log, after, lot.last, counted_ns)
-    for table in WRITTEN:
-        connection.execute(
-            f"DELETE FROM {table} WHERE site = ? AND seq <= ?",
-            (LOCAL_SITE, _purged_seq(connection)),
-        )
+    delete_up_to(connection, _purged_seq(connection))
 
 
 def _insert(connection: sqlite3.Connection, table: str, row: list[Any], *, replaces: bool) -> None:

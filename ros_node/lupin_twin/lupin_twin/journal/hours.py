@@ -13,8 +13,10 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
+from lupin_twin.core.history import KIND_TAG_READING
 from lupin_twin.core.past import HOUR_NS, Event
-from lupin_twin.journal.rows import KIND_READING, STATUS_OK, numbers_of
+from lupin_twin.core.state import STATUS_OK
+from lupin_twin.journal.rows import numbers_of
 from lupin_twin.journal.schema import DamagedFile, SiteLog, json_text
 
 # Shorter stretches without an attempt are no silence, whatever is usual.
@@ -27,7 +29,6 @@ FORGOTTEN: Final = "counted_ns:"
 TALLIED: Final = (Event.SCANS, Event.FAILURES, Event.INSPECTIONS)
 # A sum of larger readings could be beyond any number, which PostgreSQL refuses.
 _LARGEST: Final = 1e290
-_NOTHING: Final[Mapping[int, int]] = {}
 
 
 def is_counted(value: float) -> bool:
@@ -35,9 +36,7 @@ def is_counted(value: float) -> bool:
     return -_LARGEST < value < _LARGEST
 
 
-def count_rows(
-    log: SiteLog, after: int, until: int, counted_ns: Mapping[int, int] = _NOTHING
-) -> None:
+def count_rows(log: SiteLog, after: int, until: int, counted_ns: Mapping[int, int]) -> None:
     """Count the rows that have a number behind one, up to another; each once, whatever its stamp.
 
     `counted_ns`: of some runs, up to when everything is counted already.
@@ -61,7 +60,7 @@ def count_rows(
         hour = stamp_ns // HOUR_NS
         if status != STATUS_OK:
             _tally(tallies, (run, Event.FAILURES, hour), status, stamp_ns)
-        elif kind == KIND_READING:
+        elif kind == KIND_TAG_READING:
             _tally(tallies, (run, Event.SCANS, hour), len(values), stamp_ns)
         if values:
             hours.setdefault((series, hour), []).append(values)

@@ -15,8 +15,10 @@ from itertools import pairwise
 from statistics import median
 from typing import Any, Final
 
+from lupin_twin.core.history import KIND_TAG_READING
 from lupin_twin.core.past import (
     EVERY_TAG,
+    FOREVER_NS,
     HOUR_NS,
     MAX_POINTS,
     Event,
@@ -33,8 +35,8 @@ from lupin_twin.journal.hours import (
     is_counted,
     silence_over,
 )
-from lupin_twin.journal.rows import KIND_READING, named_numbers, sensor_names
-from lupin_twin.journal.runs import FOREVER_NS, Run, Span, cut, runs, spans, spans_within
+from lupin_twin.journal.rows import named_numbers, sensor_names
+from lupin_twin.journal.runs import Run, Span, cut, runs, spans
 from lupin_twin.journal.schema import SiteLog
 
 # What an answer costs, about, s; the second for events of the whole site, each tag.
@@ -100,7 +102,7 @@ def newest(
     """
     log = SiteLog(connection)
     found: dict[str, list[Entry]] = {}
-    for span in spans_within(runs(log.execute), start_ns, end_ns):
+    for span in cut(spans(runs(log.execute)), start_ns, end_ns):
         within = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
         for (text,) in log.execute(_SETS, within).fetchall():
             names = sensor_names(text)
@@ -121,8 +123,8 @@ def newest(
 
 def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> list[Part]:
     found = []
-    for span in spans_within(runs(log.execute), start_ns, end_ns):
-        of_run = {"run": span.run.id, "tag": request.tag_id, "kind": KIND_READING}
+    for span in cut(spans(runs(log.execute)), start_ns, end_ns):
+        of_run = {"run": span.run.id, "tag": request.tag_id, "kind": KIND_TAG_READING}
         for number, text in log.execute(
             "SELECT series, sensors FROM series WHERE site = :site AND run = :run AND tag = :tag"
             " AND kind = :kind ORDER BY series",

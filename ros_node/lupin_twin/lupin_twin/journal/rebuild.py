@@ -176,7 +176,8 @@ class _Upgrade:
         run = Run(old.id, old.begun, self._appender.last_seq + 1, None, old.ended_ns)
         self._begun[old.id] = run
         put_run(self._target, run)
-        if (purged_ns := self._old.purged_ns(run.id)) >= 0:
+        # The last stamp of what was deleted by age or size.
+        if (purged_ns := self._old.meta(f"purged_ns:{run.id}", -1)) >= 0:
             self._carry_counts(run.id, purged_ns)
         before = None if old.follows is None else self._begun.get(old.follows)
         if before is not None:

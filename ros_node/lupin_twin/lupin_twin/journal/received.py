@@ -18,6 +18,7 @@ from concurrent.futures import Future
 from dataclasses import asdict, replace
 from typing import Any, Final
 
+from lupin_twin.core.history import KIND_FLOWER
 from lupin_twin.core.notes import MAX_NOTES, Note, NotesRequest, NotesUnwritable, PastNotes
 from lupin_twin.core.past import (
     MAX_SCANS,
@@ -33,11 +34,11 @@ from lupin_twin.core.past import (
     WritesRequest,
     recent_of,
 )
-from lupin_twin.core.state import sure_species
+from lupin_twin.core.state import STATUS_OK, sure_species
 from lupin_twin.journal.hours import deleted_ns
 from lupin_twin.journal.queries import FROM_SCAN
-from lupin_twin.journal.rows import KIND_FLOWER, STATUS_OK, named_numbers, sensor_names
-from lupin_twin.journal.runs import Run, Span, cut, runs, span_at, spans, spans_within
+from lupin_twin.journal.rows import named_numbers, sensor_names
+from lupin_twin.journal.runs import Run, Span, cut, runs, span_at, spans
 from lupin_twin.journal.schema import WRITTEN, SiteLog, one_view
 
 # What an answer of so many writes takes, about, s.
@@ -254,7 +255,7 @@ class Export:
         """
         log = SiteLog(connection)
         if self._spans is None:
-            self._spans = deque(spans_within(runs(log.execute), *self._period))
+            self._spans = deque(cut(spans(runs(log.execute)), *self._period))
         if not self._has_begun:
             self._deleted_ns = {s.run.id: deleted_ns(log, s.run.id) for s in self._spans}
         while self._spans and self._spans[0].end_ns <= self._at_ns:
@@ -268,7 +269,7 @@ class Export:
         horizon_ns = deleted_ns(log, span.run.id)
         if horizon_ns >= start_ns and horizon_ns > self._deleted_ns[span.run.id]:
             why = "scans that come next were deleted while others were taken: begin again"
-            raise NotRemembered(why, is_lasting=False)
+            raise NotRemembered(why)
         while True:
             until_ns = min(start_ns + self._length_ns, span.end_ns)
             # Of one stamp there are as many scans as there are.

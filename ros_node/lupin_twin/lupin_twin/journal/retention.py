@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.core.past import HOUR_NS
+from lupin_twin.core.past import DAY_NS, FOREVER_NS, HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ, Appender
 from lupin_twin.journal.beside import writing_alone
 from lupin_twin.journal.hours import DELETED, FORGOTTEN, deleted_ns, extent
-from lupin_twin.journal.runs import FOREVER_NS, runs, spans
+from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
     WRITTEN,
@@ -27,8 +27,6 @@ from lupin_twin.journal.schema import (
     set_meta,
     transaction,
 )
-
-DAY_NS: Final = 24 * HOUR_NS
 
 # What one step deletes or moves: some ten milliseconds, for observations wait behind it.
 _ROWS: Final = 300
@@ -135,14 +133,17 @@ def purge_step(
     if not last:
         return False
     _write_horizons(connection, last)
-    for table in WRITTEN:
-        connection.execute(
-            f"DELETE FROM {table} WHERE site = ? AND seq <= ?",  # noqa: S608  # constants
-            (LOCAL_SITE, last),
-        )
+    delete_up_to(connection, last)
     # The numbers go on when everything is gone.
     set_meta(connection, PURGED_SEQ, last)
     return True
+
+
+def delete_up_to(connection: sqlite3.Connection, last: int) -> None:
+    """Delete the scans and inspections up to a number."""
+    for table in WRITTEN:
+        text = f"DELETE FROM {table} WHERE site = ? AND seq <= ?"  # noqa: S608  # constants
+        connection.execute(text, (LOCAL_SITE, last))
 
 
 def unmet_limit(connection: sqlite3.Connection, limits: Limits, before_ns: int) -> str:

@@ -9,15 +9,11 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any, Final
 
-from lupin_twin.core import history, state
-from lupin_twin.core.history import LatestRequest
-from lupin_twin.core.state import Bloom, Flower, Inspection, Reading, Scan, Write
-from lupin_twin.journal.runs import FOREVER_NS, Run, runs, span_at
+from lupin_twin.core.history import KIND_FLOWER, LatestRequest
+from lupin_twin.core.past import FOREVER_NS
+from lupin_twin.core.state import STATUS_OK, Bloom, Flower, Inspection, Reading, Scan, Write
+from lupin_twin.journal.runs import Run, runs, span_at
 from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
-
-KIND_READING = history.KIND_TAG_READING
-KIND_FLOWER = history.KIND_FLOWER
-STATUS_OK = state.STATUS_OK
 
 
 def weight(write: Write) -> int:

@@ -18,17 +18,13 @@ from typing import Any, Final
 
 from lupin_twin.core.diagnostics import origin_of
 from lupin_twin.core.parameters import World
+from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.journal.schema import DAY_LENGTH, LOCAL_SITE, ORIGIN, SiteLog
 
 # A wall clock that is set back by no more is the same clock, corrected.
 CORRECTION_NS: Final = 300 * 1_000_000_000
 # How much faster than before a simulation may go on.
 _FASTER: Final = 2.0
-# Later than any stamp.
-FOREVER_NS: Final = 2**63 - 1
-
-# `execute` of a connection to either engine.
-Execute = Callable[..., Any]
 
 
 class Turn(Enum):
@@ -78,8 +74,8 @@ class Span:
     end_ns: int
 
 
-def runs(execute: Execute) -> list[Run]:
-    """Every run and step, in the order in which they began."""
+def runs(execute: Callable[..., Any]) -> list[Run]:
+    """Every run and step, in the order in which they began; of a connection to either engine."""
     return [
         Run(row[0], Clock(row[2], row[3], bool(row[1])), row[4], row[5], row[6])
         for row in execute(
@@ -158,11 +154,6 @@ def cut(axis: Iterable[Span], start_ns: int, end_ns: int) -> list[Span]:
         for span in axis
         if max(span.start_ns, start_ns) < min(span.end_ns, end_ns)
     ]
-
-
-def spans_within(every: Iterable[Run], start_ns: int, end_ns: int) -> list[Span]:
-    """Which run holds in each part of a period."""
-    return cut(spans(every), start_ns, end_ns)
 
 
 def put_run(connection: Any, run: Run) -> None:

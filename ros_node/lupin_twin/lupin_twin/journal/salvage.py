@@ -211,18 +211,18 @@ def _mend(aside: Path, mended: Path) -> None:
 
 
 def _copy(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> None:
-    put = {table: _Table(new, table) for table in _TABLES}
     with transaction(new):
-        for table in put:
+        for table in _TABLES:
             new.execute(f"DELETE FROM {table}")
         purged = _copy_facts(old, new, size)
         for table, by in _SMALL.items():
-            put[table](_both_ends(old, _ALL.format(table), by))
-        put["series"](_both_ends(old, _SERIES_OF, "run"))
+            _put(new, table, _both_ends(old, _ALL.format(table), by))
+        _put(new, "series", _both_ends(old, _SERIES_OF, "run"))
         if purged:
             for table, (by, which) in _COUNTED.items():
                 within = {"at": max(purged.values())}
-                put[table](_both_ends(old, f"{_ALL.format(table)} AND {which}", by, within))
+                select = f"{_ALL.format(table)} AND {which}"
+                _put(new, table, _both_ends(old, select, by, within))
         for table, is_meaningless in _MEANINGLESS.items():
             new.execute(f"DELETE FROM {table} WHERE {is_meaningless}")
         for (run,) in new.execute("SELECT run FROM run").fetchall():
@@ -234,7 +234,7 @@ def _copy(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> None:
         for lot in filter(None, readable(old, select, "seq")):
             last = max(row[0] for row in lot)
             with transaction(new):
-                put[table](row[1:] for row in lot)
+                _put(new, table, (row[1:] for row in lot))
                 delete_wrong(new, table, behind, last)
                 count_rows(SiteLog(new), behind, last, purged)
             behind = last
@@ -273,20 +273,12 @@ def _copy_facts(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> 
     return purged
 
 
-class _Table:
-    """Puts rows into a table of the new file, if each column is of its type."""
-
-    def __init__(self, new: sqlite3.Connection, name: str) -> None:
-        self._new = new
-        columns = new.execute(f"PRAGMA table_info({name})").fetchall()
-        self._types = [
-            _TYPES[kind] if is_needed else (*_TYPES[kind], NoneType)
-            for _, _, kind, is_needed, *_ in columns
-        ]
-        self._insert = f"INSERT OR IGNORE INTO {name} VALUES ({', '.join('?' * len(columns))})"
-
-    def __call__(self, rows: Iterable[Record]) -> None:
-        fitting = [
-            row for row in rows if row[0] == LOCAL_SITE and all(map(isinstance, row, self._types))
-        ]
-        self._new.executemany(self._insert, fitting)
+def _put(new: sqlite3.Connection, table: str, rows: Iterable[Record]) -> None:
+    """Put rows into a table of the new file, if each column is of its type."""
+    types = [
+        _TYPES[kind] if is_needed else (*_TYPES[kind], NoneType)
+        for _, _, kind, is_needed, *_ in new.execute(f"PRAGMA table_info({table})").fetchall()
+    ]
+    fitting = [row for row in rows if row[0] == LOCAL_SITE and all(map(isinstance, row, types))]
+    marks = ", ".join("?" * len(types))
+    new.executemany(f"INSERT OR IGNORE INTO {table} VALUES ({marks})", fitting)

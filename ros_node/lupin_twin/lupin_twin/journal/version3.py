@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any, Final, NamedTuple
 
+from lupin_twin.core.history import KIND_FLOWER
 from lupin_twin.core.past import HOUR_NS, SLOT_NS, Event
 from lupin_twin.core.state import (
     STATUS_OK,
@@ -29,7 +30,7 @@ from lupin_twin.core.state import (
     Write,
 )
 from lupin_twin.journal.hours import SILENCE_NS
-from lupin_twin.journal.rows import KIND_FLOWER, sensor_names
+from lupin_twin.journal.rows import sensor_names
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.salvage import readable
 from lupin_twin.journal.schema import DamagedFile, is_damage_error
@@ -118,10 +119,6 @@ class Version3:
         """The number of the last write, about."""
         found = self._all("SELECT max(id) FROM scan UNION SELECT max(id) FROM look", ())
         return max(1, *(number or 0 for (number,) in found))
-
-    def purged_ns(self, run: int) -> int:
-        """The last stamp of a run of which something was deleted by age or size; -1: nothing."""
-        return self.meta(f"purged_ns:{run}", -1)
 
     def hours(self, run: int, until: int) -> Iterator[OldHour]:
         """What was counted of the readings up to an hour, for each series by itself."""

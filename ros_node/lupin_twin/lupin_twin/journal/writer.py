@@ -288,7 +288,7 @@ class Journal:
             self._stop.wait(wait_s)
             self._failures += 1
         if self._lock is not None:
-            self._lock.release()
+            self._lock.close()
 
     def _record(self) -> None:
         """Open the file and write until it fails or the twin ends."""

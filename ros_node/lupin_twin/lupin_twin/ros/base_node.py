@@ -85,14 +85,16 @@ def qos_of(topic: Topic) -> QoSProfile:
     return QoSProfile(depth=topic.depth, reliability=reliability)
 
 
-def read_message(data: bytes, shape: MessageShape) -> Any | Drop:
+def read_message(
+    data: bytes, shape: MessageShape, read: Callable[[bytes, Any], Any] = deserialize_message
+) -> Any | Drop:
     """The message that `data` holds, serialised; a drop, where it is too large or none.
 
     Its lengths are checked first: ROS would make room for whatever they claim.
     """
     try:
         shape.check(data)
-        return deserialize_message(data, shape.message_type)
+        return read(data, shape.message_type)
     except TooManyError as error:
         return Drop(Reason.SIZE, str(error))
     except Exception as error:  # noqa: BLE001  # rclpy raises several kinds

@@ -251,7 +251,6 @@ def snapshot_of(msg: Any, before: Snapshot | None = None, times: Any = None) -> 
         nanoseconds(msg.header.stamp),
         msg.header.frame_id,
         same_tags(before, tags),
-        has_times=times is not None,
     )
 
 

@@ -12,6 +12,7 @@ from lupin_msgs.srv import GetEstimate, GetEstimateReport
 
 from lupin_twin.core.diagnostics import OK, WARN, Finding, shown
 from lupin_twin.core.interfaces import GET_ESTIMATE, GET_ESTIMATE_REPORT
+from lupin_twin.core.past import check_moment
 from lupin_twin.core.state import TwinStore
 from lupin_twin.estimate.engine import (
     MAX_TAGS,
@@ -95,20 +96,24 @@ class EstimateService:
         """What is to be done for an estimate.
 
         Raises:
-            FieldRefused: a bad request.
+            FieldRefused, PastRefused: a bad request.
 
         """
         now_ns, day_s = self.now_ns(), self.day_length_s
-        request.check(now_ns, self.max_grid_cells)
+        check_moment(request.at_ns, now_ns)
         cost = AS_OF * cost_s(request, min(MAX_TAGS, self.store.size[0]), self.max_grid_cells)
 
         def make(found: Sequence[TagPast], should_stop: ShouldStop) -> Estimate:
             at_ns = request.at_ns or moment_of(found, now_ns, day_s)
             return estimate_at(replace(request, at_ns=at_ns), found, day_s, should_stop)
 
-        return Task(
-            cost, self._from_journal(request.box.sensor_type, request.at_ns or now_ns), make
-        )
+        def look_up() -> Future[Sequence[TagPast]]:
+            sensor, at_ns = request.box.sensor_type, request.at_ns or now_ns
+            return self.recall.query(
+                lambda log, _: readings_at(log, sensor, at_ns, day_s), self._search_s
+            )
+
+        return Task(cost, look_up, make)
 
     def report(self, request: ReportRequest) -> Future[Report]:
         """The report to come."""
@@ -214,11 +219,6 @@ class EstimateService:
     def _report(self, request: Any, reply: Callable[[Any], None]) -> Query:
         wanted = convert_services.report_request_of(request)
         return self._query(wanted, reply, convert_services.report_response)
-
-    def _from_journal(self, sensor: str, at_ns: int) -> Callable[[], Future[Sequence[TagPast]]]:
-        return lambda: self.recall.query(
-            lambda log, _: readings_at(log, sensor, at_ns, self.day_length_s), self._search_s
-        )
 
     @property
     def _search_s(self) -> float:

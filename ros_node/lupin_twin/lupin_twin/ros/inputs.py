@@ -115,8 +115,9 @@ class Input:
 
     def check(self, publishers: Sequence[Any], domain: int, now_s: float) -> Iterator[str]:
         """What is wrong with the publishers, rclpy's TopicEndpointInfo, and the remedy."""
-        before, self._publishers = self._publishers, frozenset(_id(one) for one in publishers)
-        if before != self._publishers:
+        ids = frozenset(bytes(one.endpoint_gid) for one in publishers)
+        if ids != self._publishers:
+            self._publishers = ids
             self._since_s = now_s
             self.gaps.unsettle()
         unlike = [one for one in publishers if _faults(one)]
@@ -163,10 +164,6 @@ def _faults(publisher: Any) -> list[tuple[str, str]]:
     if offered.reliability == ReliabilityPolicy.BEST_EFFORT:
         faults.append(("BEST_EFFORT, so what is lost on the way is not sent again", "RELIABLE"))
     return faults
-
-
-def _id(publisher: Any) -> bytes:
-    return bytes(publisher.endpoint_gid)
 
 
 def name_of(publisher: Any) -> str:

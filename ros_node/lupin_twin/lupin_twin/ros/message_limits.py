@@ -159,10 +159,7 @@ def _fixed(size: int, count: int) -> _Part:
     """So many numbers of `size` bytes one behind the other."""
     # Aligned from behind the header, which has half the size of the largest number.
     return _of_steps(
-        tuple(
-            (_HEADER_BYTES - begin) % size + size * count if count else 0
-            for begin in range(_ALIGNMENTS)
-        ),
+        tuple((_HEADER_BYTES - begin) % size + size * count for begin in range(_ALIGNMENTS)),
         size * count,
     )
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Final
 
@@ -52,15 +52,9 @@ class TwinNode(AdjustableNode):
 
     """
 
-    def __init__(
-        self,
-        *,
-        context: Any = None,
-        cli_args: Sequence[str] | None = None,
-        world: World = World(),
-    ) -> None:
+    def __init__(self, *, context: Any = None, world: World = World()) -> None:
         with naming_own_parameters():
-            super().__init__(NODE_NAME, context=context, cli_args=cli_args)
+            super().__init__(NODE_NAME, context=context)
         self.utilities = NodeUtilities(self)
         self.parameters = declare(self)
         self._world = world
@@ -163,7 +157,7 @@ class TwinNode(AdjustableNode):
 
     def _connect(self) -> None:
         p, group = self.parameters, self._group
-        responses = Responses(self.utilities.warn, self.utilities.drain)
+        responses = Responses(self.utilities)
         for topic, shape, on_message in (
             (interfaces.OBSERVATIONS, message_limits.OBSERVATION, self._on_observation),
             (interfaces.DISCOVERED_TAGS, message_limits.DISCOVERED_TAGS, self._on_discovered_tags),
@@ -199,7 +193,6 @@ class TwinNode(AdjustableNode):
         ):
             self.utilities.every(group, period_s, f"{what} timer", callback)
         self._state_timer = self._publish_at(p.state_publish_rate_hz)
-        self.adjust_by(self._adjust)
 
     def _log_start(self) -> None:
         # Names and domain: a mistake in one of them is why a twin receives nothing.
@@ -213,7 +206,8 @@ class TwinNode(AdjustableNode):
     def _publish_at(self, rate_hz: float) -> Any:
         return self.utilities.every(self._group, 1.0 / rate_hz, "state timer", self._publish_state)
 
-    def _adjust(self, now: TwinParameters) -> None:
+    def adjust(self, now: TwinParameters) -> None:
+        """See `AdjustableNode`."""
         if self._state_timer.timer_period_ns != int(1e9 / now.state_publish_rate_hz):
             self.destroy_timer(self._state_timer)
             self._state_timer = self._publish_at(now.state_publish_rate_hz)

@@ -5,7 +5,7 @@ For the twin's node, and for whoever else reads some of the twin's parameters.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields
 from typing import Any, Final
@@ -87,11 +87,9 @@ class AdjustableNode(Node):  # type: ignore[misc]  # rclpy is not typed
     """
 
     parameters = TwinParameters()
-    _on_change: Callable[[TwinParameters], None] | None = None
 
-    def adjust_by(self, on_change: Callable[[TwinParameters], None]) -> None:
-        """Have `on_change(parameters)` called after each change; `declare` comes before."""
-        self._on_change = on_change
+    def adjust(self, now: TwinParameters) -> None:
+        """Go by other parameters; called after each change of those that were declared."""
 
     def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
         """One after the other."""
@@ -107,8 +105,7 @@ class AdjustableNode(Node):  # type: ignore[misc]  # rclpy is not typed
         result = super().set_parameters_atomically(parameter_list)
         if result.successful and new != self.parameters:
             self.parameters = new
-            if self._on_change is not None:
-                self._on_change(new)
+            self.adjust(new)
         return result
 
 

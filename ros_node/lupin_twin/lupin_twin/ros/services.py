@@ -175,11 +175,11 @@ def offer(
     for kind, name, plan in services:
 
         def answer(request: Any, _: Any, kind: Any = kind, plan: Any = plan) -> Any:
-            later = Later()
+            later: Future[Any] = Future()
 
             def reply(found: Any) -> None:
                 is_error = isinstance(found, Exception)
-                later.answer(refusal(kind, found, report) if is_error else found)
+                later.set_result(refusal(kind, found, report) if is_error else found)
 
             try:
                 if (query := plan(request, reply)) is not None:
@@ -204,27 +204,6 @@ MAX_ATTEMPT_S: Final = 0.5
 Send = Callable[[Any, Any], None]
 
 
-class Later:
-    """What a callback returns in place of its response. Belongs to the executor's thread."""
-
-    def __init__(self) -> None:
-        self._send: Callable[[Any], None] | None = None
-        self._response: Any = None
-
-    def answer(self, response: Any) -> None:
-        """Send the response: now, or as soon as rclpy has named the client."""
-        if self._send is None:
-            self._response = response
-        else:
-            self._send(response)
-
-    def goes_to(self, send: Callable[[Any], None]) -> None:
-        """Have the response sent by `send(response)`."""
-        self._send = send
-        if self._response is not None:
-            send(self._response)
-
-
 def refusal(kind: Any, error: Exception, report: Report) -> Any:
     """A response of a service that is empty but for why; what nobody expected is reported."""
     if isinstance(error, FieldRefused):
@@ -245,24 +224,17 @@ class _Unsent(NamedTuple):
 class Responses:
     """Sends the responses of one node's services; belongs to the node's thread.
 
-    `warn(key, text)` reports a response that was given up; `drain()` takes the messages that came
+    The node's utilities warn of a response that was given up, and take the messages that came
     during an attempt: observations must not be lost for a client that is never found.
     """
 
-    def __init__(
-        self, warn: Callable[[tuple[str, object], str], None], drain: Callable[[], None]
-    ) -> None:
-        self._warn = warn
-        self._drain = drain
+    def __init__(self, utilities: NodeUtilities) -> None:
+        self._utilities = utilities
         self._unsent: deque[_Unsent] = deque()  # the first is tried next
         warnings.filterwarnings("error", re.escape(UNSENT), RuntimeWarning)
 
-    def __len__(self) -> int:
-        """How many responses wait to be sent again."""
-        return len(self._unsent)
-
     def watch(self, service: Any) -> None:
-        """Let the callback of an rclpy Service return a `Later`; retry what cannot be sent."""
+        """Let the callback of an rclpy Service return a `Future`; retry what cannot be sent."""
         send_now: Send = service.send_response
 
         def send(response: Any, header: Any) -> None:
@@ -270,11 +242,15 @@ class Responses:
             if not _was_sent(send_now, response, header):
                 unsent = _Unsent(service.service_name, send_now, response, header, began_s)
                 self._retain(unsent, time.monotonic() - began_s)
-                self._drain()
+                self._utilities.drain()
 
         def send_response(response: Any, header: Any) -> None:
-            if isinstance(response, Later):
-                response.goes_to(lambda answer: send(answer, header))
+            if isinstance(response, Future):
+                response.add_done_callback(
+                    self._utilities.guarded(
+                        service.service_name, lambda done: send(done.result(), header)
+                    )
+                )
             else:
                 send(response, header)
 
@@ -292,7 +268,7 @@ class Responses:
                 self._give_up(one, f"for {PATIENCE_S:g} s DDS has found no reader for it")
             elif not _was_sent(one.send, one.response, one.header):
                 self._unsent.append(one)
-                self._drain()
+                self._utilities.drain()
                 return
 
     def _retain(self, new: _Unsent, took_s: float) -> None:
@@ -304,7 +280,7 @@ class Responses:
             self._give_up(self._unsent.pop(), "too much else waits to be sent again")
 
     def _give_up(self, unsent: _Unsent, why: str) -> None:
-        self._warn(
+        self._utilities.warn(
             ("unsent", unsent.name),
             f"gave up a response of {unsent.name}: {why}; is the QoS of a client another than the "
             "default of services?",

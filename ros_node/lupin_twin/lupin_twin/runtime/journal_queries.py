@@ -74,7 +74,7 @@ class Recall:
             return self._workers.submit(lambda stop: self._answer(search, stop), cost_s)
         except RuntimeError:
             refused: Future[AnswerT] = Future()
-            refused.set_exception(NotRemembered("the twin is ending", is_lasting=False))
+            refused.set_exception(NotRemembered("the twin is ending"))
             return refused
 
     def close(self) -> None:
@@ -95,7 +95,9 @@ class Recall:
         def should_stop() -> bool:
             return is_abandoned() or time.monotonic() > until_s
 
-        condition = self._readable()
+        condition = self._condition()
+        if condition.state is JournalState.IN_USE:
+            raise NotRemembered(f"{condition.detail}: ask that twin")
         path = Path(condition.path)
         try:
             answer = self._run(path, condition.inode, search, should_stop)
@@ -109,15 +111,7 @@ class Recall:
                 return answer
         if is_abandoned():
             raise CancelledError
-        raise NotRemembered(
-            f"the journal did not answer within {self._max_s:g} s; ask for less", is_lasting=False
-        )
-
-    def _readable(self) -> Condition:
-        condition = self._condition()
-        if condition.state is JournalState.IN_USE:
-            raise NotRemembered(f"{condition.detail}: ask that twin", is_lasting=False)
-        return condition
+        raise NotRemembered(f"the journal did not answer within {self._max_s:g} s; ask for less")
 
     def _run(
         self, path: Path, inode: int, search: Search[AnswerT], should_stop: ShouldStop
@@ -145,8 +139,7 @@ class Recall:
             # Its index is found by name, `-shm`. SQLite would begin it anew under the writer, which
             # has it in its memory for the other file: SIGBUS.
             raise NotRemembered(
-                f"the journal {path} was replaced; the twin opens the new one within seconds",
-                is_lasting=False,
+                f"the journal {path} was replaced; the twin opens the new one within seconds"
             )
         file = (status.st_dev, status.st_ino)
         while True:
@@ -182,9 +175,9 @@ def _why_not(path: Path, error: Exception) -> Exception:
             f"the journal {path} is damaged ({error}); the twin quarantines it and retains what"
             " can be read of it, but once a day: else restart the twin"
         )
-        return NotRemembered(why, is_lasting=False, damage=str(error))
+        return NotRemembered(why, damage=str(error))
     elif getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_ERROR:
         return error
     else:
         why = f"the journal {path} cannot be read now: {error}"
-    return NotRemembered(why, is_lasting=False)
+    return NotRemembered(why)

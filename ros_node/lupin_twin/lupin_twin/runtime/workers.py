@@ -56,11 +56,6 @@ class Job(Future[ResultT], Generic[ResultT]):
         self._on_cancel = on_cancel
         self._is_abandoned = False
 
-    @property
-    def is_small(self) -> bool:
-        """Whether the threads for small jobs take it too."""
-        return self.cost_s <= SMALL_S
-
     def should_stop(self) -> bool:
         """Whether nobody waits for the result any more; any thread may ask."""
         return self._is_abandoned
@@ -169,7 +164,7 @@ class Workers:
     def _take(self, only_small: bool) -> Job[object] | None:
         with self._changed:
             while not self._is_closed:
-                mine = [job for job in self._waiting if job.is_small or not only_small]
+                mine = [job for job in self._waiting if job.cost_s <= SMALL_S or not only_small]
                 if mine:
                     job = min(mine, key=lambda job: job.due_s)  # of equals, the first that came
                     self._waiting.remove(job)
@@ -266,9 +261,7 @@ class JobQueue:
         lane = self._lane(query)
         lane.waiting = deque(it for it in lane.waiting if it.is_wanted())
         if lane.count >= MAX_QUERIES:
-            raise NotRemembered(
-                f"{MAX_QUERIES} requests wait, which is the limit", is_lasting=False
-            )
+            raise NotRemembered(f"{MAX_QUERIES} requests wait, which is the limit")
         lane.waiting.append(query)
         self._begin(lane)
 

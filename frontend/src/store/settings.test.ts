@@ -28,9 +28,12 @@ test('what was kept comes back', () => {
   expect(readSettings(storage(kept))).toEqual(settings);
 });
 
-test.each([null, '', '{', 'null', '7'])('%j counts as nothing kept', (text) => {
-  expect(readSettings(storage(text))).toEqual(DEFAULT_SETTINGS);
-});
+test.each([null, '', '{', 'null', '7', '[]', '{"hidden":5}', '{"hidden":null}'])(
+  '%j counts as nothing kept',
+  (text) => {
+    expect(readSettings(storage(text))).toEqual(DEFAULT_SETTINGS);
+  },
+);
 
 test('a column is hidden and shown again; that of the tag stays', () => {
   const hidden = withColumn(withColumn([], 'pest', false), 'tag', false);

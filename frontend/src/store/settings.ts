@@ -41,7 +41,9 @@ const KEY = 'lupin-twin.settings';
 export function readSettings(storage: Pick<Storage, 'getItem'>): Settings {
   try {
     const kept = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<Settings>;
-    return { ...DEFAULT_SETTINGS, ...kept };
+    // The first thing that looks for a column in no list would leave the page blank for good.
+    const hidden = Array.isArray(kept.hidden) ? kept.hidden : [];
+    return { ...DEFAULT_SETTINGS, ...kept, hidden };
   } catch {
     return DEFAULT_SETTINGS;
   }

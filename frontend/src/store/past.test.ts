@@ -230,6 +230,15 @@ test('how far off the field is, is asked for once the moment stays', async () =>
   await asked.at(-1)?.answer();
   expect(selectShown(store.get()).quality).toMatchObject({ rmse: 40 });
   expect(shown()).toEqual([40, 40, 40]);
+  // What comes anew, on another connection, has none yet.
+  const { connection } = store.get().twin;
+  receive(withConnection({ ...connection, epoch: 9 }, performance.now()));
+  await pass(100);
+  await answerAll(40);
+  expect(selectShown(store.get()).quality).toBeNull();
+  await pass(400);
+  await asked.at(-1)?.answer();
+  expect(selectShown(store.get()).quality).toMatchObject({ rmse: 40 });
 });
 
 test('an estimate that is chosen goes the same way: with its state, the newest first, two at once', async () => {

@@ -89,11 +89,12 @@ export function startPast(): () => void {
   };
 }
 
-/** An estimate tells its own error. */
+/** For a field that has come without it; an estimate tells its own error. */
 function qualityWish(state: AppState): Wish<FieldQuality> | null {
   const past = selectPast(state);
   const field = past?.house.field.value;
-  if (!past || !field || field.sureness || past.at !== state.view.moment) return null;
+  if (!past || !field || field.sureness || past.house.quality) return null;
+  if (past.at !== state.view.moment) return null;
   const key = `${past.at}|${field.sensor}`;
   return {
     key,

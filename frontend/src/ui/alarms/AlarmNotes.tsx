@@ -55,7 +55,7 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
   const isLast = useApp(selectIsCut) && takenAt !== null;
   return (
     <div className="alarm-notes">
-      {moment !== null && <p data-note="now">{S.alarmsOfNow(rosText(moment))}</p>}
+      {moment !== null && !isLast && <p data-note="now">{S.alarmsOfNow(rosText(moment))}</p>}
       {isLast && <p data-note="lost">{S.alarmsLost(minuteText(epochOf(takenAt)))}</p>}
       {isStarting && <p data-note="starting">{S.alarmsStarting}</p>}
       {isEmpty && !isLast && (

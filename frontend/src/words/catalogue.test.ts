@@ -214,6 +214,8 @@ describe.each([
     // Of whatever sensor: a word that agrees with one noun disagrees with another.
     const tooMuch = [words.tooLow, words.tooHigh].map((text) => text(null));
     expect(tooMuch.filter((text) => /(baj|alt)[oa]$/.test(text))).toEqual([]);
+    // Of one alarm and, behind a number, of many.
+    expect(words.alarmBack).not.toMatch(/ad[oa]$/);
   });
 
   test('shortens no name that a site has given a sensor', () => {

@@ -32,7 +32,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   },
   alarmFirst: (reading) => `al inicio ${reading}`,
   alarmStatus: { critical: 'crítico', healthy: 'dentro del rango' },
-  alarmBack: 'Normalizada',
+  alarmBack: 'Ya en orden',
   alarmShow: 'Mostrar este punto ahora',
   alarmStart: 'Ir al inicio',
   alarmActionsOf: (what) => `Acciones: ${what}`,

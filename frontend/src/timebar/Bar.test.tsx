@@ -29,10 +29,14 @@ test('scans stand upwards and failures hang downwards, from one line', () => {
   expect(boxesOf(bar, 'failures')[0]?.[1]).toBe(39);
 });
 
-test('of a pest and one that is gone, who needs somebody is on top', () => {
+test('a pest is no ring, one that is gone is; who needs somebody is on top', () => {
   const both = { ...NOTHING, start: 150, pests_seen: 1, pests_cleared: 1 };
-  expect(marks(drawn({ buckets: [both] }))).toEqual(['pest']);
-  expect(marks(drawn({ buckets: [{ ...both, pests_seen: 0 }] }))).toEqual(['cleared']);
+  const seen = drawn({ buckets: [both] });
+  expect(marks(seen)).toEqual(['pest']);
+  expect(seen.querySelector('circle')).toBeNull();
+  const cleared = drawn({ buckets: [{ ...both, pests_seen: 0 }] });
+  expect(marks(cleared)).toEqual(['cleared']);
+  expect(cleared.querySelector('circle')).not.toBeNull();
   // Beside it without room, before it or behind.
   const close = [
     { ...NOTHING, start: 149.4, pests_cleared: 1 },
@@ -54,8 +58,11 @@ test('silence and what is not remembered are hatched, each in its own way', () =
     [900, 14, 100, 32],
   ]);
   expect(boxesOf(bar, 'silence')).toEqual([[200, 14, 100, 32]]);
-  const lines = [...bar.querySelectorAll('pattern path')].map((each) => each.getAttribute('d'));
-  expect(new Set(lines).size).toBe(2);
+  const lines = ['unknown', 'silence'].map((mark) => {
+    const fill = bar.querySelector(`[data-mark='${mark}']`)?.getAttribute('fill') ?? '';
+    return bar.querySelector(`${fill.slice(4, -1)} path`)?.getAttribute('d');
+  });
+  expect(new Set([...lines, undefined]).size).toBe(3);
 });
 
 test('a clock that began anew is a line of its own', () => {
@@ -67,12 +74,15 @@ test('a clock that began anew is a line of its own', () => {
   expect(marks(drawn({}))).toEqual([]);
 });
 
-test('times stand never upon each other', () => {
-  const axis = { from: 1.8e9, to: 1.8e9 + 3_600, width: 300 };
+test('times stand beside their dates, and never upon each other, however large the text is', () => {
+  document.documentElement.style.fontSize = '32px';
+  const axis = { from: 1.8e9, to: 1.8e9 + 3_600, width: 400 };
   const { container } = render(<Bar axis={axis} timeline={null} columns={[]} />);
+  document.documentElement.style.fontSize = '';
   const texts = [...container.querySelectorAll('text')];
+  expect(texts[0]?.textContent).toMatch(/^\d+ \w+ \d\d:\d\d$/);
   expect(texts.length).toBeGreaterThan(1);
-  const ends = texts.map((each) => Number(each.getAttribute('x')) + each.textContent.length * 6.4);
+  const ends = texts.map((each) => Number(each.getAttribute('x')) + each.textContent.length * 12.8);
   texts.slice(1).forEach((each, index) => {
     expect(Number(each.getAttribute('x'))).toBeGreaterThan(ends[index] ?? Infinity);
   });

@@ -346,9 +346,6 @@ test('it is of now, and says so while another moment is shown', () => {
   expect(notes()).toEqual(['now']);
   expect(screen.getByText(/current alarms.*sim 00:00:50/)).toBeTruthy();
   expect(group('active')).toHaveLength(1);
-  // Cut off, nobody knows those of now.
-  flush(goLost);
-  expect(notes()).toEqual(['lost']);
 });
 
 test('many of one cause are one heading, which is acknowledged as one and names the worst', () => {

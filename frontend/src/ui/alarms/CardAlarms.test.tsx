@@ -3,13 +3,15 @@ import { afterEach, beforeEach, expect, test } from 'vitest';
 
 import { acknowledgeAlarms, NOTHING_KEPT, own, shelveAlarm } from '../../alarms/own';
 import { alarmList, startAlarms } from '../../alarms/watch';
-import { act } from '../../store/app';
+import { act, receive } from '../../store/app';
 import { person } from '../../store/create';
+import { NO_HOUSE, withPast } from '../../store/twin';
 import { alarm, tellAlarms } from '../../testing/alarms';
 import { held, judgement, reason } from '../../testing/health';
 import { goLost, showTags } from '../../testing/page';
 import { readings, wireTag } from '../../testing/tags';
 import { Reasons } from '../Reasons';
+import { AlarmNotes } from './AlarmNotes';
 import { AlarmsLabel } from './ListChoice';
 import { CardAlarms } from './CardAlarms';
 
@@ -144,4 +146,19 @@ test('the count of alarms is of all behind the sign of the worst, and none of no
   expect([sign(), count()]).toEqual([undefined, '(now 3)']);
   flush(goLost);
   expect(screen.queryByTestId('alarm-count')).toBeNull();
+});
+
+test('the alarms of a page that looks back are the current ones, as long as anybody knows those', () => {
+  render(<AlarmNotes isEmpty={false} />);
+  const notes = (): unknown[] =>
+    [...document.querySelectorAll<HTMLElement>('[data-note]')].map(
+      ({ dataset }) => dataset['note'],
+    );
+  flush(() => {
+    act({ moment: 10 });
+    receive(withPast({ at: 10, house: NO_HOUSE }));
+  });
+  expect(notes()).toEqual(['now']);
+  flush(goLost);
+  expect(notes()).toEqual(['lost']);
 });

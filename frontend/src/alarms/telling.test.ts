@@ -6,7 +6,7 @@ import { act, receive, store } from '../store/app';
 import { announce } from '../store/create';
 import { NO_HOUSE, withPast } from '../store/twin';
 import { alarm, tellAlarms } from '../testing/alarms';
-import { showTags } from '../testing/page';
+import { goLive, goLost, showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import {
   badgeOf,
@@ -66,7 +66,15 @@ describe('title', () => {
     tellAlarms();
     expect(document.title).toBe('sim 00:00:50 (past) · Lupin twin');
     expect(titleOf(0, null)).toBe('Lupin twin');
-    expect(titleOf(2, null, true)).toBe('(2) Recording · Lupin twin');
+    expect(titleOf(2, null, 'Recording')).toBe('(2) Recording · Lupin twin');
+  });
+
+  test('without a connection does not pass for one that has no alarms', () => {
+    start(startTitle);
+    goLost();
+    expect(document.title).toBe('Reconnecting · Lupin twin');
+    goLive();
+    expect(document.title).toBe('Lupin twin');
   });
 });
 

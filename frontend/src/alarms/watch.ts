@@ -5,9 +5,9 @@
 import { now, timeOfDay } from '../clock';
 import type { Alarms } from '../contract/types';
 import { rosText } from '../domain/time';
-import { onChange, store } from '../store/app';
+import { type AppState, onChange, store } from '../store/app';
 import { announce, createStore, createVoice } from '../store/create';
-import { rosNow, selectIsRecorded, selectShown } from '../store/moment';
+import { rosNow, selectIsCut, selectIsRecorded, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { nextEnd, own, pruned, startOwn } from './own';
 import {
@@ -109,19 +109,27 @@ export function startMeanwhile(): () => void {
   };
 }
 
-/** The name of the page's tab: how many alarms are active, and which moment is shown. */
-export const titleOf = (count: number, moment: number | null, isRecorded = false): string => {
+/** The name of the page's tab: how many alarms are active, what else is to be known, and which moment is shown. */
+export const titleOf = (count: number, moment: number | null, note = ''): string => {
   const shown = moment === null ? S.product : S.pastTitle(rosText(moment));
-  const title = isRecorded ? `${S.origin.recorded} · ${shown}` : shown;
+  const title = note === '' ? shown : `${note} · ${shown}`;
   return count === 0 ? title : `(${count}) ${title}`;
 };
+
+/** Behind other tabs, one that is cut off would pass for one that has no alarms. */
+const noteOf = (state: AppState): string | undefined =>
+  selectIsCut(state)
+    ? S.phase[state.twin.phase]
+    : selectIsRecorded(state)
+      ? S.origin.recorded
+      : undefined;
 
 /** Keeps the tab's name so; returns the way to stop. */
 export function startTitle(): () => void {
   const update = (): void => {
     const state = store.get();
     const { moment } = selectShown(state);
-    const title = titleOf(alarmList.get().active.length, moment, selectIsRecorded(state));
+    const title = titleOf(alarmList.get().active.length, moment, noteOf(state));
     if (document.title !== title) document.title = title;
   };
   update();

@@ -8,7 +8,7 @@ import { person } from '../../store/create';
 import { NO_HOUSE, withPast } from '../../store/twin';
 import { alarm, tellAlarms } from '../../testing/alarms';
 import { held, judgement, reason } from '../../testing/health';
-import { goLost, showTags } from '../../testing/page';
+import { goLive, goLost, showTags } from '../../testing/page';
 import { readings, wireTag } from '../../testing/tags';
 import { Reasons } from '../Reasons';
 import { AlarmNotes } from './AlarmNotes';
@@ -146,6 +146,14 @@ test('the count of alarms is of all behind the sign of the worst, and none of no
   expect([sign(), count()]).toEqual([undefined, '(now 3)']);
   flush(goLost);
   expect(screen.queryByTestId('alarm-count')).toBeNull();
+  // Of a list that was empty nobody knows whether it still is.
+  flush(() => {
+    act({ moment: null });
+    tellAlarms();
+  });
+  expect(container.textContent).toBe('Alarms');
+  flush(goLive);
+  expect(container.textContent).toBe('Alarms, none active');
 });
 
 test('the alarms of a page that looks back are the current ones, as long as anybody knows those', () => {

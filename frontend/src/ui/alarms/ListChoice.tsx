@@ -64,7 +64,9 @@ export function AlarmsLabel(): JSX.Element {
           </span>
         )}
       </span>
-      {isKnown && <span className="unseen">, {S.alarmsCount(unacknowledged.length, length)}</span>}
+      {isKnown && (length > 0 || !isCut) && (
+        <span className="unseen">, {S.alarmsCount(unacknowledged.length, length)}</span>
+      )}
     </>
   );
 }

@@ -34,7 +34,10 @@ test('paper is light, and the screen is dark again after it', () => {
   prefer({ theme: 'dark' });
   fire('beforeprint');
   expect([isDark(), isPrinting(), root['theme']]).toEqual([false, true, 'light']);
+  // Nor has it the colours that a system forces upon the screen.
+  expect(root['printing']).toBe('');
   fire('afterprint');
+  expect(root['printing']).toBeUndefined();
   expect([isDark(), isPrinting(), root['theme']]).toEqual([true, false, 'dark']);
 });
 

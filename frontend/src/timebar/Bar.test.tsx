@@ -1,4 +1,5 @@
 import { render } from '@testing-library/react';
+import type { JSX } from 'react';
 import { expect, test } from 'vitest';
 
 import type { Timeline } from '../domain/timeline';
@@ -72,6 +73,14 @@ test('a clock that began anew is a line of its own', () => {
   ];
   expect(marks(drawn({ runs }))).toEqual(['run']);
   expect(marks(drawn({}))).toEqual([]);
+  // Nor does one stay of a bar that had no width yet.
+  const timeline = timelineWith({ runs: [...runs, { from: 180, to: 200 }] });
+  const bar = (width: number): JSX.Element => (
+    <Bar axis={{ ...AXIS, width }} timeline={timeline} columns={[]} />
+  );
+  const { container, rerender } = render(bar(0));
+  rerender(bar(1_000));
+  expect(marks(container)).toEqual(['run', 'run']);
 });
 
 test('times stand beside their dates, and never upon each other, however large the text is', () => {

@@ -61,8 +61,8 @@ export const Bar = memo(function Bar({
           <circle key={at} cx={at} cy={MARKS_PX / 2} r={4} data-mark={kind} />
         ),
       )}
-      {(timeline ? runStarts(timeline, axis) : []).map((x) => (
-        <path key={x} d={`M${x} 0V${FLOOR_PX}`} data-mark="run" />
+      {(timeline ? runStarts(timeline, axis) : []).map((x, index) => (
+        <path key={index} d={`M${x} 0V${FLOOR_PX}`} data-mark="run" />
       ))}
     </svg>
   );

@@ -124,8 +124,8 @@ test('the worst cause first, then what nobody has seen to, then what most have',
   const further = { value: 99, limit: 35, verdict: 'stressed' } as const;
   const hots = many(hot, 5).map((each) => ({ ...each, reason: { ...each.reason, ...further } }));
   const all = [...hots, ...many(dry, 7), worst];
-  const order = (kept: Kept) => {
-    const items = listOf(all, kept, null, AT).active;
+  const order = (kept: Kept, alarms = all) => {
+    const items = listOf(alarms, kept, null, AT).active;
     return arranged(
       causesFirst(items, (item) => item.alarm.reason, speech),
       'cause',
@@ -135,6 +135,8 @@ test('the worst cause first, then what nobody has seen to, then what most have',
   expect(order(NOTHING_KEPT)).toEqual(['worst 1', 'dry 7', 'hot 5']);
   const seen = many(dry, 7).map((each) => ({ alarm: each, verdict: 'stressed' }) as const);
   expect(order(acknowledge(NOTHING_KEPT, seen, AT))).toEqual(['worst 1', 'hot 5', 'dry 7']);
+  // Few are no block: the worst of all of them is first.
+  expect(order(NOTHING_KEPT, [...many(dry, 2), ...hots.slice(0, 1)])).toEqual(['hot 3']);
 });
 
 test('a word that is exactly the id of a tag finds that tag, and no other', () => {

@@ -95,8 +95,8 @@ const byName = ({ alarm: a }: Item, { alarm: b }: Item): number =>
   compareIds(a.tag_id, b.tag_id) || (a.id < b.id ? -1 : 1);
 
 /**
- * By how bad the worst alarm of a block is, then whether that is not acknowledged (both are the whole part
- * of `severity`), then by how many they are; in a block as `inOrder`.
+ * By how bad each is, then whether it is not acknowledged (both are the whole part of `severity`), then by
+ * how many its block has: a block stands where the first of it does. In a block as `inOrder`.
  */
 export function causesFirst(
   items: readonly Item[],
@@ -109,13 +109,12 @@ export function causesFirst(
     cause: causeOf(item.alarm, speech),
   }));
   const causes = groupedBy(ranked, ({ cause }) => cause);
+  const countOf = ({ cause }: (typeof ranked)[number]): number => {
+    const count = causes.get(cause)?.length ?? 0;
+    return count > MOST_LOOSE ? count : 1;
+  };
   return ranked
-    .map((each) => {
-      const own = causes.get(each.cause) ?? [];
-      const [first = each] = own.length > MOST_LOOSE ? own : [];
-      return { ...each, urgency: first.urgency, count: own.length > MOST_LOOSE ? own.length : 1 };
-    })
-    .sort((a, b) => b.urgency - a.urgency || b.count - a.count)
+    .sort((a, b) => b.urgency - a.urgency || countOf(b) - countOf(a))
     .map(({ item }) => item);
 }
 

@@ -1,3 +1,6 @@
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+
 import { act as flush, fireEvent, render, screen, within } from '@testing-library/react';
 import { beforeAll, beforeEach, describe, expect, test, vi } from 'vitest';
 
@@ -8,7 +11,7 @@ import { NO_HOUSE, withPast } from '../store/twin';
 import { S } from '../strings';
 import { judgement, reason } from '../testing/health';
 import { fieldWith } from '../testing/field';
-import { goLost, showField, showTags } from '../testing/page';
+import { goLive, goLost, showField, showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { App } from './App';
 import { loadParts } from './later';
@@ -37,6 +40,10 @@ beforeEach(() => {
 });
 
 const app = (): HTMLElement => screen.getByTestId('app');
+const goBack = (): void => {
+  act({ moment: 500 });
+  receive(withPast({ at: 500, house: NO_HOUSE }));
+};
 
 describe('page', () => {
   test('carries the connection’s state for style sheets and tests', () => {
@@ -50,12 +57,26 @@ describe('page', () => {
     expect(app().dataset).toMatchObject({ connectionState: 'reconnecting', fresh: 'false' });
   });
 
+  test('cut off, alarms do not look current, whatever moment the rest shows', () => {
+    const style = document.head.appendChild(document.createElement('style'));
+    style.textContent = readFileSync(join(import.meta.dirname, '../styles/frozen.css'), 'utf8');
+    render(<App kiosk={false} />);
+    const list = app().appendChild(document.createElement('ul'));
+    list.className = 'alarms';
+    const row = list.appendChild(document.createElement('li'));
+    const looks: string[] = [];
+    for (const change of [goLost, goBack, goLive]) {
+      flush(change);
+      looks.push(getComputedStyle(row).filter);
+    }
+    expect(looks).toEqual(['grayscale(1)', 'grayscale(1)', '']);
+    list.remove();
+    style.remove();
+  });
+
   test('while a moment loads nothing is counted or judged, and no alarm before it is known', () => {
     render(<App kiosk={false} />);
-    flush(() => {
-      act({ moment: 500 });
-      receive(withPast({ at: 500, house: NO_HOUSE }));
-    });
+    flush(goBack);
     expect(screen.getByTestId('row-count').textContent).toBe('');
     expect(screen.getByTestId('sample-count').textContent).toBe(S.legendFetching);
     const tabs = screen.getByRole('navigation', { name: /Map/ });

@@ -20,8 +20,11 @@ from lupin_bridge.alarms.board import Change, board_of
 from lupin_bridge.bridge import ALARMS_REST_S, Bridge
 from lupin_bridge.feed.relay import Relay
 from lupin_bridge.feed.source import ThreadState, TwinUnavailableError, TwinUpdate
+from lupin_bridge.notify.channels import Channels
+from lupin_bridge.notify.destinations import Targets
+from lupin_bridge.notify.webhook import Webhook
 from lupin_bridge.serving.admission import Limits
-from lupin_bridge.settings import Settings
+from lupin_bridge.settings import Secrets, Settings
 from lupin_bridge.stream.hub import Client
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition
 from lupin_twin.core.parameters import World
@@ -323,6 +326,21 @@ async def test_alarms_are_told_at_once_and_those_right_behind_once_a_second() ->
         await until(lambda: told()[-1] == 5, "the newest")
         assert told() == [1, 5]
         assert loop.time() - first_s > 0.8 * ALARMS_REST_S
+
+
+async def test_a_channel_that_an_alarm_breaks_costs_the_page_no_alarms(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    hook = Settings(webhook_url="http://127.0.0.1:9/hook")
+    stage = Stage()
+    stage.bridge.outward = Channels(Targets.of(hook, Secrets(webhook_secret="s" * 16)))
+    async with stage:
+        await stage.bridge._alarm_feed.stop()  # these are the test's alone
+        stage.script.tell(state(1))
+        monkeypatch.setattr(Webhook, "on_alarms", lambda *_: 1 / 0)
+        stage.bridge.alarms.put(board_of([alarm("a")]), Change(()), "heard", 1)
+        await until(lambda: any(it.get("alarms") for it in stage.ear.heard), "the alarm")
+    assert "webhook met an error in alarms that have changed" in caplog.text
 
 
 # --- a silent twin ------------------------------------------------------------------------------

@@ -210,8 +210,12 @@ class Channels:
     def on_alarms(self, change: Change) -> None:
         """Alarms have changed: those that notify of each change do."""
         for channel in self._running:
-            if not isinstance(channel, Mqtt):
+            if isinstance(channel, Mqtt):
+                continue
+            try:
                 channel.on_alarms(change)
+            except Exception:  # whatever it is: the page and the other channels get them
+                log.exception("%s met an error in alarms that have changed", channel.name)
 
     async def stop(self) -> None:
         """Stop all at once."""

@@ -64,7 +64,6 @@ NOT_REMEMBERED: Final[Documented] = {
     **refusing(
         {
             400: "refused; detail has the reason",
-            404: "there is no journal, so no past",
             429: "too many requests from this client",
             503: "it cannot be read now, or too much is",
             504: "it took too long",

@@ -68,7 +68,6 @@ class InFormats:
             304: {"description": "the ETag still holds"},
             400: {"model": self.model, "description": "refused; error_message has the reason"},
             429: {"model": self.model, "description": "too many requests from this client"},
-            404: NOT_REMEMBERED[404],
             **refusing(
                 {503: "the twin is not there, or busy", 504: "the twin did not answer in time"}
             ),
@@ -244,6 +243,8 @@ class AdviceQuery(TagsQuery):
 
 QueryT = TypeVar("QueryT", QualityQuery, TagsQuery, AdviceQuery)
 
+_REPORTED: Final = {**NOT_REMEMBERED, **refusing({404: "only the site's own twin counts it"})}
+
 # What writing a tag takes.
 _WRITE_TAG_S: Final = 10e-6
 
@@ -252,7 +253,7 @@ _WRITE_TAG_S: Final = 10e-6
     router,
     "/api/estimate/quality",
     summary="How often the estimates of each sensor were right",
-    responses={**NOT_REMEMBERED, 200: {"model": followers.EstimateQualities}},
+    responses={**_REPORTED, 200: {"model": followers.EstimateQualities}},
     openapi_extra={"parameters": parameters_of(QualityQuery)},
 )
 async def quality(request: Request) -> Response:
@@ -274,7 +275,7 @@ async def quality(request: Request) -> Response:
     router,
     "/api/estimate/tags",
     summary="What was expected of each tag's newest reading, and which tags have changed",
-    responses={**NOT_REMEMBERED, 200: {"model": followers.ExpectedTags}},
+    responses={**_REPORTED, 200: {"model": followers.ExpectedTags}},
     openapi_extra={"parameters": parameters_of(TagsQuery)},
 )
 async def tags(request: Request) -> Response:
@@ -293,7 +294,7 @@ async def tags(request: Request) -> Response:
     router,
     "/api/estimate/advice",
     summary="Where another tag helps the estimate most",
-    responses={**NOT_REMEMBERED, 200: {"model": followers.Advice}},
+    responses={**_REPORTED, 200: {"model": followers.Advice}},
     openapi_extra={"parameters": parameters_of(AdviceQuery)},
 )
 async def advice(request: Request) -> Response:

@@ -12,6 +12,7 @@ its own first, so however many it opens, it evicts none but itself.
 from __future__ import annotations
 
 import asyncio
+import errno
 import heapq
 import logging
 import resource
@@ -159,6 +160,8 @@ EVICTED_SHARE: Final = 1 / 16
 TLS_BUFFER_BYTES: Final = 32 * 1024
 RETRY_S: Final = 0.25
 WARNING_PERIOD_S: Final = 30.0
+# What room helps against: no files, no memory.
+_NO_ROOM: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
 
 
 def room_for_connections() -> int:
@@ -247,7 +250,8 @@ class Acceptor:
                 return
             except OSError as error:
                 self._warn("no new connections for now: %s", error.strerror)
-                self._make_room()
+                if error.errno in _NO_ROOM:
+                    self._make_room()
                 self._pause()
                 return
             connection.setblocking(False)

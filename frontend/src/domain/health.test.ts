@@ -146,18 +146,18 @@ describe('a reason in words', () => {
       // Within the ideal range of 18 to 26, and not by enough.
       { verdict: 'stressed', value: 18.1, limit: 18, ...held(18.4) } as const,
       null,
-      `Temperature 18.1${NBSP}°C, was below 18.0; stays stressed until 18.4`,
+      `Temperature 18.1${NBSP}°C, stressed until 18.4`,
     ],
     [
       { verdict: 'stressed', value: 26, limit: 26, ...held(25.6) } as const,
       null,
-      `Temperature 26.0${NBSP}°C, was above 26.0; stays stressed until 25.6`,
+      `Temperature 26.0${NBSP}°C, stressed until 25.6`,
     ],
     [
       // Within the critical range of 10, by less: of the ideal one it is far off.
       { value: 10.39, limit: 10, ...held(10.4) } as const,
       null,
-      `Temperature just below 10.4${NBSP}°C, was below 10.0; stays critical until 10.4`,
+      `Temperature just below 10.4${NBSP}°C, critical until 10.4`,
     ],
     [
       { sensor: 'vpd', value: 1.68, limit: 1.3, verdict: 'stressed' } as const,

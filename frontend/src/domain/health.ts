@@ -136,11 +136,12 @@ export function reasonText(
   if (isOfRange(reason)) {
     const edge = reason.release ?? reason.limit;
     const reading = beyondLimitText(sensor, reason.value, edge, unit);
-    const isHeld = reason.release !== undefined;
+    const held = heldText(reason, (each) => valueText(sensor, each, unit));
     // "Just below 350" names the limit itself.
-    const isNear = !isHeld && reading !== readingText(sensor, reason.value, unit);
-    const limit = limitText(reason, (each) => valueText(sensor, each, unit));
-    const isRated = reason.verdict === 'critical' && !isMarked && !isHeld;
+    const isNear = !held && reading !== readingText(sensor, reason.value, unit);
+    const side = S.reasons.sides[sideOf(reason)];
+    const limit = held ?? `${side} ${valueText(sensor, reason.limit, unit)}`;
+    const isRated = reason.verdict === 'critical' && !isMarked && !held;
     const rated = isRated ? ` (${S.alarmStatus.critical})` : '';
     return `${label} ${reading}${isNear ? '' : `, ${limit}`}${rated}`;
   }
@@ -179,19 +180,22 @@ export function reasonText(
 export const isBack = ({ release, verdict }: HealthReason): boolean =>
   release !== undefined && verdict === 'stressed';
 
-function limitText(reason: OfRange, text: (value: number) => string): string {
-  const { limit, release = null, verdict } = reason;
-  const side = S.reasons.sides[sideOf(reason)];
-  return release === null
-    ? `${side} ${text(limit)}`
-    : S.reasons.wasBeyond(side, text(limit), S.health[verdict].toLowerCase(), text(release));
-}
+/** Of a value that is back in its range, how far it has to go; null: it is beyond its limit. */
+const heldText = (
+  { release = null, verdict }: OfRange,
+  text: (value: number) => string,
+): string | null =>
+  release === null ? null : S.reasons.heldUntil(S.health[verdict].toLowerCase(), text(release));
 
 /** What lies on which side of which limit, without the value: that changes. */
 export function beyondText(sensors: Catalogue, reason: OfRange, unit: TemperatureUnit): string {
   const sensor = sensors.named(reason.sensor);
-  const limit = limitText(reason, (value) => readingText(sensor, value, unit));
-  return `${shown(sensor.label, LONGEST_NAME)} ${limit}`;
+  const text = (value: number): string => readingText(sensor, value, unit);
+  const side = S.reasons.sides[sideOf(reason)];
+  const held = heldText(reason, text);
+  const limit = text(reason.limit);
+  const said = held ? `${S.reasons.wasBeyond(side, limit)}; ${held}` : `${side} ${limit}`;
+  return `${shown(sensor.label, LONGEST_NAME)} ${said}`;
 }
 
 /**

@@ -151,7 +151,7 @@ test('of what is back in its range nothing is ordered', () => {
   render(<HealthSummary kiosk={false} />);
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect(todo.textContent.trim()).toBe(
-    'StressedTag 5: Temperature 18.1\u00a0°C, was below 18.0; stays stressed until 18.5',
+    'StressedTag 5: Temperature 18.1\u00a0°C, stressed until 18.5',
   );
 });
 

@@ -119,7 +119,7 @@ const SAME: Readonly<Record<string, readonly string[]>> = {
     ...['phase.live', 'timebarLive', 'keys.time.3.1', 'menu', 'tried.ok', 'sensors', 'alarmCount'],
     ...['rangeAuto', 'saveCsvShort', 'trend', 'legendMore', 'robotLayer', 'robotAt'],
     ...['keys.global.12.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
-    ...['speciesNames.gerbera', 'densities.compact', 'phase.offline'],
+    ...['speciesNames.gerbera', 'densities.compact', 'phase.offline', 'reasons.wasBeyond'],
   ],
   es: [
     ...['robotLayer', 'robotAt', 'tried.ok', 'sensors', 'rangeAuto', 'saveCsvShort'],

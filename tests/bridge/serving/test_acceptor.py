@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -167,6 +168,21 @@ async def test_nobody_is_turned_out_before_somebody_else_comes() -> None:
         await door.wait_closed()
         stack.close()
         await until(lambda: not guests, "their end")
+
+
+async def test_an_error_that_room_does_not_mend_evicts_nobody(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    gone: list[bool] = []
+    guest = SimpleNamespace(address="", waiting_since_s=0.0, abort=lambda: gone.append(True))
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))  # it does not listen, so nothing can be accepted
+        listener.setblocking(False)
+        door = Acceptor(listener, asyncio.Protocol, [guest], room=9, tls=None, timeout_s=PATIENCE_S)
+        await until(lambda: "no new connections for now: Invalid arg" in caplog.text, "the line")
+        door.close()
+    assert not gone
+    assert "evicted" not in caplog.text
 
 
 async def test_who_never_agrees_on_tls_makes_room_too(tmp_path: Path) -> None:

@@ -118,8 +118,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'unter', above: 'über' },
-    wasBeyond: (side, limit, status, until) =>
-      `war ${side} ${limit}; bleibt ${status} bis ${until}`,
+    wasBeyond: (side, limit) => `war ${side} ${limit}`,
+    heldUntil: (status, until) => `${status} bis ${until}`,
     just: {
       below: (limit) => `knapp unter ${limit}`,
       above: (limit) => `knapp über ${limit}`,

@@ -127,9 +127,9 @@ export const HEALTH = {
   /** Why a tag or the house has its verdict. */
   reasons: {
     sides: { below: 'below', above: 'above' },
+    wasBeyond: (side: string, limit: string): string => `was ${side} ${limit}`,
     /** What was out of its range counts as that until it is well within. */
-    wasBeyond: (side: string, limit: string, status: string, until: string): string =>
-      `was ${side} ${limit}; stays ${status} until ${until}`,
+    heldUntil: (status: string, until: string): string => `${status} until ${until}`,
     /** Of a value that reads like the limit that it is beyond. */
     just: {
       below: (limit: string): string => `just below ${limit}`,

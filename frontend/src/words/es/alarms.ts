@@ -122,8 +122,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   },
   reasons: {
     sides: { below: 'inferior a', above: 'superior a' },
-    wasBeyond: (side, limit, status, until) =>
-      `ha sido ${side} ${limit}; sigue ${status} hasta ${until}`,
+    wasBeyond: (side, limit) => `ha sido ${side} ${limit}`,
+    heldUntil: (status, until) => `${status} hasta ${until}`,
     just: {
       below: (limit) => `justo por debajo de ${limit}`,
       above: (limit) => `justo por encima de ${limit}`,

@@ -115,8 +115,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'onder', above: 'boven' },
-    wasBeyond: (side, limit, status, until) =>
-      `was ${side} ${limit}; blijft ${status} tot ${until}`,
+    wasBeyond: (side, limit) => `was ${side} ${limit}`,
+    heldUntil: (status, until) => `${status} tot ${until}`,
     just: {
       below: (limit) => `net onder ${limit}`,
       above: (limit) => `net boven ${limit}`,

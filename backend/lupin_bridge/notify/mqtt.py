@@ -406,6 +406,10 @@ class Mqtt:
             max_queued_incoming_messages=WINDOW,
         )
         client.pending_calls_threshold = 2 * WINDOW
+        # Looked at here: who waits for an answer does not, and asyncio would complain of that.
+        client._disconnected.add_done_callback(  # noqa: SLF001
+            lambda end: end.cancelled() or end.exception()
+        )
         _take_no_more_than(client, MAX_PACKET_BYTES)
         return client
 

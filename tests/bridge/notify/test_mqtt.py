@@ -1,6 +1,7 @@
 """MQTT and a real mosquitto: absent, refusing, hanging, killed, and then told everything."""
 
 import asyncio
+import gc
 import socket
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, suppress
@@ -154,7 +155,9 @@ async def test_a_flood_of_good_byes_and_births_is_answered_once_in_a_while(
             assert channel.condition.sent <= 3 * sent
 
 
-async def test_a_broker_that_sends_a_packet_of_256_mb_is_left_before_it_is_read() -> None:
+async def test_a_broker_that_sends_a_packet_of_256_mb_is_left_before_it_is_read(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     """As none does that was asked for less; before the connection is over, it is in no memory."""
     taken: list[int] = []
 
@@ -175,6 +178,8 @@ async def test_a_broker_that_sends_a_packet_of_256_mb_is_left_before_it_is_read(
             await until(lambda: channel.condition.failed, "the end of the connection")
         await serving
     assert taken[0] < 32_000_000, "what the sockets of the two hold, and no more"
+    gc.collect()
+    assert "never retrieved" not in caplog.text
 
 
 async def test_two_bridges_of_one_prefix_do_not_throw_each_other_out(shared: Broker) -> None:

@@ -215,7 +215,9 @@ async def test_who_leaves_while_a_lot_is_being_read_ends_the_reading(
     assert [record for record in caplog.records if record.levelname == "ERROR"] == []
 
 
-async def test_a_lot_that_does_not_come_in_time_breaks_it_off(domain: int) -> None:
+async def test_a_lot_that_does_not_come_in_time_breaks_it_off_and_is_one_line_of_the_log(
+    domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
     async def lots(*_: object) -> AsyncIterator[bytes]:
         yield b"a lot\r\n"
         await asyncio.Event().wait()
@@ -224,6 +226,9 @@ async def test_a_lot_that_does_not_come_in_time_breaks_it_off(domain: int) -> No
         it.twin.rows = lots  # type: ignore[assignment]
         with pytest.raises(httpx.TransportError):
             await it.http.get(PATH)
+        await until(lambda: it.bridge.admission.exporting == 0, "its place")
+    assert "an export ended before its end: the answer was not there within 1 s" in caplog.text
+    assert "Traceback" not in caplog.text
 
 
 async def test_a_bridge_that_ends_breaks_it_off(domain: int) -> None:

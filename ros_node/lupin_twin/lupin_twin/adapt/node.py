@@ -311,14 +311,17 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         assert self._config.broker is not None
         for message in self._mqtt.take():
             self._sources[MQTT].received += 1
-            if len(message.topic) > MAX_TOPIC_LENGTH:
-                why = (
-                    f"its topic has {len(message.topic)} characters, the limit: {MAX_TOPIC_LENGTH}"
-                )
-                self._drop(Reason.SIZE, f"MQTT {message.topic[:80]}", why, case="topic")
+            try:
+                topic = message.topic
+            except UnicodeDecodeError as error:  # some brokers let it pass
+                self._drop(Reason.UNREADABLE, MQTT, f"its topic is no UTF-8: {error}", case="topic")
+                continue
+            if len(topic) > MAX_TOPIC_LENGTH:
+                why = f"its topic has {len(topic)} characters, the limit: {MAX_TOPIC_LENGTH}"
+                self._drop(Reason.SIZE, f"MQTT {topic[:80]}", why, case="topic")
                 continue
             for pattern in self._config.broker.patterns:
-                found = pattern.match(message.topic)
+                found = pattern.match(topic)
                 if found is not None:
                     self._on_measured(pattern, *found, message)
 

@@ -15,6 +15,7 @@ from starlette.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 
 from lupin_bridge.access.middleware import client_of
+from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.past import bodies
 from lupin_bridge.past.export import Csv, MissingPackageError, Parquet
@@ -33,7 +34,7 @@ from lupin_bridge.routes.answers import (
 )
 from lupin_bridge.serving.admission import Admission, Export, Limits
 from lupin_bridge.serving.http_protocol import CONNECTION_KEY, HttpConnection
-from lupin_twin.core.past import PastRow
+from lupin_twin.core.past import NotRemembered, PastRefused, PastRow
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.runtime.workers import Workers
 
@@ -219,7 +220,8 @@ class ExportResponse(StreamingResponse):
         try:
             await while_client_waits(request, self.stream_response(send))
         except Exception as error:
-            log.warning("an export ended before its end: %s", error, exc_info=True)
+            is_known = isinstance(error, (NotRemembered, PastRefused, TwinUnavailableError))
+            log.warning("an export ended before its end: %s", error, exc_info=not is_known)
             connection: HttpConnection = scope["state"][CONNECTION_KEY]
             connection.break_off()
             await client_left(request)  # or the server would complain of an answer without an end

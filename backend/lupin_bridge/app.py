@@ -62,7 +62,7 @@ def create_app(
         version=__version__,
         summary="Digital twin of a greenhouse: every tag's state, and fields of every sensor.",
         description=_DESCRIPTION,
-        openapi_url=None,  # also turns off FastAPI's docs page, which loads scripts from the internet
+        openapi_url=None,  # also no docs page of FastAPI, which loads scripts from the internet
     )
     app.state.bridge = bridge
     app.state.access = access

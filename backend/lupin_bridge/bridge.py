@@ -173,7 +173,7 @@ class Bridge:
 
     @property
     def origin(self) -> Origin:
-        """Where observations come from, as reported by the twin or, before it is received, its log."""
+        """Where observations come from, as reported by the twin or, before it is seen, its log."""
         return self.status.update.origin
 
     @property

@@ -103,7 +103,7 @@ _TOKEN: Final = re.compile(r"[A-Za-z0-9._~+/-]+=*")
 SHARED_SESSION_S: Final = 7 * 24 * 3600
 # Signed-out sessions that are remembered; only who has the token can make more.
 MAX_SIGNED_OUT: Final = 10_000
-# Whoever has the shared token, without a name.
+# Anybody with the shared token, without a name.
 SHARED: Final = Person("", "viewer", by="shared token")
 
 
@@ -173,8 +173,8 @@ def digest(secret: str) -> str:
 
 # --- our own cookie, out of a request's headers ---------------------------------------------------
 
-# The standard library's parser undoes quotes and escapes, before Python 3.11.10 and 3.12.6 in a
-# time that grows with the square of the length (CVE-2024-7592): 40 kB of backslashes held up
+# Not by the standard library's parser, which undoes quotes and escapes. Before Python 3.11.10 and
+# 3.12.6, its time grows with the square of the length (CVE-2024-7592): 40 kB of backslashes held up
 # everybody for two seconds. Our cookie is never quoted, and no other is parsed.
 
 # What a browser keeps for one host may be more, but no WebSocket handshake with a longer line gets

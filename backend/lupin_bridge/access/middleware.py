@@ -48,8 +48,8 @@ log = logging.getLogger(__name__)
 
 _READS: Final = ("GET", "HEAD")
 # Routes that begin or end a session, or write. A form, a link or a picture on a foreign page can
-# send requests to them too, with the browser's cookie, but not with a header of its own: for that,
-# a script needs a CORS preflight, which is refused.
+# send requests to them too, with the browser's cookie. But it cannot add a header: for that, a
+# script needs a CORS preflight, which is refused.
 SIGN_IN: Final = "/api/signin"
 NOTES: Final = "/api/notes"
 PUSH: Final = "/api/push"

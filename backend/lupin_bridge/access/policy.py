@@ -2,7 +2,7 @@
 
 Anybody may send X-Forwarded-For and X-Forwarded-Proto, so they are believed only from a proxy that
 the operator has named. They replace `client` and `scheme` of the scope, and so count for limits,
-logs, wrong tokens and the check of origins. uvicorn's own middleware takes an address with a port,
+logs, wrong tokens and the check of origins. The middleware of uvicorn takes an address with a port,
 as some proxies write it, for a new client each time. It also knows no IPv4 address on a socket that
 listens for IPv6, and reads only the last of several lines.
 

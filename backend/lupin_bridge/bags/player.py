@@ -33,7 +33,7 @@ from lupin_twin.runtime import process
 
 NODE_NAME: Final = "lupin_player"
 _BEAT_S: Final = 0.02
-# Messages per beat, which makes 100 a second. 50 may wait at a twin, so none is lost while its
+# Messages per beat, which makes 100 a second. A twin's queue holds 50, so none is lost while its
 # thread is busy for half a second. DDS acknowledges what waits there, taken or not.
 _MAX_A_BEAT: Final = 2
 # How far messages follow behind the clock, s: before the twin knows that time, their stamps would

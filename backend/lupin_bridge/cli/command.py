@@ -162,8 +162,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     play_args = _play_args(options)
     try:
         settings = _settings_from(options)
-        # Before anything slow is imported, and before the first thread: Ctrl-C and SIGTERM wait
-        # until the server unblocks them, so that neither can end in a traceback.
+        # Before any slow import, and before the first thread. Ctrl-C and SIGTERM wait until the
+        # server unblocks them, so that neither can end in a traceback.
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
         _prepare_process()
         set_up_log(settings.log_format, settings.log_level)

@@ -49,7 +49,7 @@ POLL_S: Final = 0.3
 RETRY_S: Final = 1.0
 # Longest wait for a log: a live twin reports within a second where its journal is.
 FOUND_S: Final = 3.0
-# A copy that was not written for so long is deleted at the start, unless it is the newest.
+# A copy that was not written for this long is deleted at the start, unless it is the newest.
 RETAINED_S: Final = 90 * 86_400.0
 # Estimated time to write a lot into the file, s.
 _WRITE_S: Final = 0.05

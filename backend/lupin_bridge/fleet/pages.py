@@ -115,7 +115,7 @@ class SitePages:
         """The site to close for one of a client's; None: there is none.
 
         It is one that nobody reads. If all are read, the client that reads the most loses the
-        newest that it alone reads, to a client that reads at least two fewer.
+        newest that it alone reads. It does so only to a client that reads at least two fewer.
         """
         idle = [it for it in self._open.items() if not it[1].users]
         if idle:

@@ -1,7 +1,7 @@
 """The process that watches the archive, and judges each site.
 
-It answers each query with the sites that have changed. If a site's last number has changed, its
-verdict and alarms are computed from the rows since then, by the same judge that a bridge has.
+It answers each query with the sites that have changed. When a site's last number has changed, the
+new rows give its verdict and alarms, by the same judge that a bridge has.
 """
 
 from __future__ import annotations

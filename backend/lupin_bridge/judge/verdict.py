@@ -363,8 +363,8 @@ def pest(bug_count: int, since_ns: int | None) -> Reason:
 def stopped(last_scan_ns: int | None, now_ns: int | None, once: int, tags: int) -> Reason | None:
     """The reason that scanning has stopped, if more than half of the tags were scanned only once.
 
-    `once` is their number. Such a tag has no scan interval, and its readings are valid for a day,
-    so it is not known when it should be scanned again. Tags with intervals become overdue.
+    `once` is their number. When such a tag should be scanned again is not known: it has no scan
+    interval, and its readings are valid for a day. Tags with intervals become overdue.
     """
     if last_scan_ns is None or now_ns is None or 2 * once <= tags:
         return None

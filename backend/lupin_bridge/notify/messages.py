@@ -1,6 +1,6 @@
 """MQTT topics, payloads, and Home Assistant's discovery; and what all channels share. Pure.
 
-A level of a topic has only letters, digits, `-` and `_`: `/`, `+` and `#` are special to a broker,
+A level of a topic has only letters, digits, `-` and `_`. `/`, `+` and `#` are special to a broker,
 and Home Assistant's discovery takes no other characters. A payload has moments instead of ages, so
 it does not change while nothing happens, and is not sent again. Discovery has one device for each
 tag and one for the greenhouse, and a message for each entity:

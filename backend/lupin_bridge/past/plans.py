@@ -88,7 +88,7 @@ class Query(Protocol):
     """A query of the past. Equal ones share one answer while it is made. It can be pickled."""
 
     def cost_s(self, tags: int) -> float:
-        """The cost of the lookups and of the answer with so many tags, s of one core."""
+        """The cost of the lookups and of the answer with this many tags, s of one core."""
 
     def look(self, find: Find) -> Plan:
         """Look up what is needed of the log, and plan the answer."""
@@ -123,7 +123,7 @@ class StateQuery:
         return tags * (STATE_S_PER_TAG + PLAN_TAG_S) + self.write_s(tags)
 
     def write_s(self, tags: int) -> float:
-        """The cost of writing the answer with so many tags, s of one core."""
+        """The cost of writing the answer with this many tags, s of one core."""
         return tags * _WRITE_TAG_S
 
     def look(self, find: Find) -> Plan:

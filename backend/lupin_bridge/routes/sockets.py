@@ -6,8 +6,8 @@ answer to its last message.
 
 A roslib client reads the twin as it would through rosbridge. A connection may have `MAX_OPEN_CALLS`
 calls open, of which `MAX_RUNNING_CALLS` run at once; others wait. A call ends with `result` false
-if it takes longer than `Limits.answer_timeout_s` or its own `timeout`, or exceeds the limits of
-computed answers, which it shares with HTTP.
+if it takes longer than `Limits.answer_timeout_s` or its own `timeout`. So does one past the limits
+of computed answers, which it shares with HTTP.
 
 A client that takes nothing for `Limits.client_timeout_s` is closed.
 """

@@ -70,8 +70,8 @@ class Limits:
     `client_timeout_s`: a client that requests, or takes, nothing for this long is cut off.
     `answer_timeout_s`: a computed answer that takes longer ends in 504, and its work is cancelled.
     `answers_per_s` may be computed for one client, and two seconds' worth at once. A page that is
-    dragged through the past requests ten moments a second, each with a state and a field or two,
-    and two such pages may share an address. `concurrency` of them may be under way for one client
+    dragged through the past requests ten moments a second, each with a state and a field or two.
+    Two such pages may share an address. `concurrency` of them may be under way for one client
     (a browser has six at once), `total_concurrency` for all clients; large ones may take three
     quarters of that. `frames_per_s` is the mean rate of state frames at most. One token may post
     `observations_per_s`, and `observation_burst` at once: DDS keeps 50 for a busy twin. Alarms are

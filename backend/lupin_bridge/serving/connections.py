@@ -1,8 +1,8 @@
 """Accepts, evicts, bounds and tears down connections, below their protocols.
 
 Connections are accepted as long as there are file descriptors for them. asyncio's own server has no
-limit: out of descriptors, it logs an error for each entry in its backlog and retries all of them a
-second later, 97 MB of log in half a minute.
+limit. Out of descriptors, it logs an error for each entry in its backlog, and retries all of them a
+second later: 97 MB of log in half a minute.
 
 A connection that has requested nothing yet, or does not take what it requested, is evicted before
 any new one is refused. The address with the most connections loses its own first, so however many

@@ -1,6 +1,6 @@
 """Floor plan of the simulated greenhouse (walls, planter tables, tags) and paths through it.
 
-Read from the simulator's own configuration. Metres, map frame: the origin is the corner of the
+Read from the simulator's own configuration. Metres, map frame. The origin is the corner of the
 greenhouse inside the walls; x runs along the short side (right), y along the long side (up). The
 shortest path among rectangles bends only at their corners (visibility graph). The tables are
 first grown by the robot's clearance, so a path never touches one.

@@ -1,6 +1,6 @@
 """Simulated camera and sensors: plants, pests, climate, tags, and the map of the floor.
 
-Plants and climate follow from the seed, the pass and the time of day, and hold no state: an
+Plants and climate follow from the seed, the pass and the time of day, and hold no state. So an
 inspection of one tag never depends on the others. Sensors have the units of
 `lupin_msgs/SensorReading`: temperature °C, humidity % relative, co2 ppm, light lx, soil_moisture %.
 

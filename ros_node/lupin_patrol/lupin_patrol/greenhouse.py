@@ -307,7 +307,7 @@ def tour(roadmap: Roadmap, start: Point, stops: Sequence[Point]) -> list[int]:
 
 
 def _untangle(order: list[int], length: NDArray[np.float64]) -> bool:
-    """Reverse the first stretch whose reversal shortens the round trip; returns if one was."""
+    """Reverse the first stretch whose reversal shortens the trip; returns whether there was one."""
     for i in range(1, len(order) - 2):
         for j in range(i + 1, len(order) - 1):
             before, first, last, after = order[i - 1], order[i], order[j], order[j + 1]

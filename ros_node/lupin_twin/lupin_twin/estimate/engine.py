@@ -170,7 +170,7 @@ class Grades:
     _hours: dict[int, Tally] = field(default_factory=dict)
 
     def add(self, graded: Tally, now_ns: int) -> None:
-        """Add scans that were compared now. Later hours, from before a clock went back, go."""
+        """Add scans that were compared now; drops later hours, from before a clock went back."""
         if not graded.scans:
             return
         hour = self._hour(now_ns)

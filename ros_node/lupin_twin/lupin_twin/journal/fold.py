@@ -119,7 +119,7 @@ def fold(connection: sqlite3.Connection, run: int, at_ns: int, since: int) -> Kn
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Pause garbage collection: it would run a hundred times in 90,000 new values, all alive."""
+    """Pause garbage collection, which would run a hundred times for 90,000 new, live values."""
     gc.disable()
     try:
         yield

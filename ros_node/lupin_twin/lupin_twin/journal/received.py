@@ -378,7 +378,7 @@ def notes(connection: Any, request: NotesRequest) -> PastNotes:
     return PastNotes(journal, count, tuple(found))
 
 
-# More than people write while a disk is slow.
+# Notes that may wait: more than people write while a disk is slow.
 _MAX_WAITING: Final = 100
 
 

@@ -260,7 +260,7 @@ class Responses:
         """Retry responses until an attempt fails; to be called every `RETRY_S`.
 
         An attempt that fails blocks the node's thread for 0.1 s. The latest response is first, and
-        a failed one goes to the end: one that can be sent does not wait long behind hopeless ones.
+        a failed one goes to the end. So one that can be sent does not wait long behind others.
         """
         while self._unsent:
             one = self._unsent.popleft()

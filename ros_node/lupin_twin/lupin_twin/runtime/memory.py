@@ -55,7 +55,7 @@ class _Early(NamedTuple):
 
 
 class _Doubt(NamedTuple):
-    """A wall clock that contradicts the journal from `clock` on; its last arrival is `last_ns`."""
+    """A wall clock that contradicts the journal from `clock` on; `last_ns`: its last arrival."""
 
     clock: Clock
     since_ns: int

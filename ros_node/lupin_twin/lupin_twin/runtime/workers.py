@@ -193,7 +193,7 @@ def in_turns(
             begun_s = clock()
 
 
-# Small, or large, queries without an answer yet, and those that are processed at once.
+# Limits of small, and of large, queries: those without an answer, and those processed at once.
 MAX_QUERIES: Final = 32
 LARGE_AT_ONCE: Final = 1
 SMALL_AT_ONCE: Final = 4

@@ -248,6 +248,10 @@ def test_high_contrast_still_tells_what_is_chosen_and_what_a_colour_means(
     swatches = [colours(swatch) for swatch in hmi.page.locator(".sensors .swatch").all()]
     assert len({frozenset(each) for each in swatches}) == len(swatches)
     assert len(colours(hmi.page.locator(".ideal-bar").first)) > 50
+    # Of the time bar, what needs somebody stands out from scans that failed.
+    marks = [hmi.page.locator(f".timebar-picture [data-mark={it}]") for it in ("pest", "failures")]
+    pest, failed = (mark.first.evaluate("e => getComputedStyle(e).fill") for mark in marks)
+    assert pest != failed
 
 
 def test_an_empty_house_says_what_to_do_beside_the_controls_and_in_the_table(

@@ -240,7 +240,7 @@ class LeftOut:
         return result
 
     def newest(self, tag: int, *, without: FloatArray | IntArray) -> Off:
-        """Deviation of a tag's latest reading, predicted without the tags `without` (and its own)."""
+        """Deviation of a tag's latest reading, predicted without its tag and the tags `without`."""
         block = np.flatnonzero(np.isin(self.readings.tag, without))
         return self._off(block, self._own(tag)[-1])
 

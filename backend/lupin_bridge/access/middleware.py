@@ -328,7 +328,7 @@ class AccessControl:
 
 
 def client_of(request: HTTPConnection) -> str:
-    """The client that limits are counted for: who is connected, or whom a trusted proxy names."""
+    """The client that limits count for: the peer, or the one that a trusted proxy names."""
     return client_key(request.client.host if request.client is not None else "")
 
 

@@ -246,7 +246,7 @@ class Forwarder:
         self._wait_s = FIRST_WAIT_S
 
     def run(self, *, once: bool = False) -> bool:
-        """Forward for ever, or `once` what is there; returns whether that was done."""
+        """Forward for ever, or `once` what is there; returns whether that succeeded."""
         while True:
             wrong = self._try(once=once)
             if once:

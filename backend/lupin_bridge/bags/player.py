@@ -43,7 +43,7 @@ _LAG_S: Final = 0.1
 _MAX_STEP_S: Final = 0.25
 # Longer silences than this, s of waiting, are announced.
 _LONG_S: Final = 60.0
-# How long the twin is waited for: DDS finds who is there within 3 s, a busy machine takes longer.
+# Longest wait for the twin: discovery by DDS takes up to 3 s, and longer on a busy machine.
 _TWIN_S: Final = 30.0
 _POLL_S: Final = 1.0
 # Before a loop begins again, DDS delivers what was published.
@@ -84,7 +84,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
-    """Publishes the recorded topics and `/clock`, and looks who subscribes."""
+    """Publishes the recorded topics and `/clock`, and knows whether they have subscribers."""
 
     def __init__(self, inputs: Mapping[str, str]) -> None:
         super().__init__(NODE_NAME)

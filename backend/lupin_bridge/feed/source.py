@@ -150,7 +150,7 @@ def _newest(known: ValueT | None, heard: ValueT | None, future_ns: int) -> Value
     return known
 
 
-# --- what the routes need of a twin ---------------------------------------------------------------
+# --- the interface to a twin ----------------------------------------------------------------------
 
 ResultT = TypeVar("ResultT")
 

@@ -1,4 +1,4 @@
-"""The ROS side of `lupin-twin web`: a consumer of a twin elsewhere, over its ROS contracts."""
+"""The ROS node of `lupin-twin web`, which follows a twin elsewhere by its ROS contracts."""
 
 from __future__ import annotations
 

@@ -229,7 +229,7 @@ class OfSitesExport(OfExport):
 
 
 async def respond_sites(fleet: Fleet, kind: Format, request: Request) -> Response:
-    """Every row of a period of the sites that are named, or of all."""
+    """Every row of a period, of the named sites or of all."""
     given = read(OfSitesExport, request.query_params.multi_items())
     known = fleet.sites_for(request)
     named = [known[name] for name in chosen(given.sites, known)]
@@ -269,7 +269,7 @@ def create_fleet_app(
     access: Access,
     proxies: Proxies,
 ) -> FastAPI:
-    """The application around a fleet that its caller starts and stops."""
+    """Build the application for a fleet; the caller starts and stops the fleet."""
     app = FastAPI(title="lupin-twin fleet", version=__version__, openapi_url=None)
     app.state.access = access
     app.state.bridge = fleet

@@ -38,7 +38,7 @@ _STYLE: Final = (
 def dots(tags: Iterable[TagState], healths: Mapping[str, Health]) -> str:
     """A path for each verdict, the worst on top; empty: no tag has a pose.
 
-    A tag that is far off the others is left out, or these would be one dot.
+    A tag that is far off the others is left out, or the others would become one dot.
     """
     every = [
         (pose.x, pose.y, healths[tag.tag_id].verdict)

@@ -187,5 +187,5 @@ class Sites:
             await (page or found.app)(own, receive, send)
         finally:
             found.users[client] -= 1
-            found.users += Counter()  # without those who read no more
+            found.users += Counter()  # drops clients that read no more
             found.used_s = time.monotonic()

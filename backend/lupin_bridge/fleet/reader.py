@@ -52,7 +52,7 @@ _NEWER_MAP: Final = (
     "SELECT value, hashtextextended(value, 0) FROM meta WHERE site = :site AND key = :key"
     " AND hashtextextended(value, 0) <> :known"
 )
-# The number up to which the site's journal has come, by which its own notes are known.
+# The last forwarded number of the site's journal, after which notes from here are numbered.
 _FORWARDED: Final = "SELECT forwarded_seq FROM epoch WHERE site = :site ORDER BY epoch DESC LIMIT 1"
 _WRITE_MS: Final = 5_000
 logger = logging.getLogger(__name__)

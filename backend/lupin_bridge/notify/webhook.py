@@ -105,7 +105,7 @@ class AlarmNews:
         before = self._sent.get(alarm.id)
         now = (alarm.cleared_at_ns, alarm.is_worse)
         if before == now:
-            return  # a new worst value alone is nothing that anybody has to be called for
+            return  # a new worst value alone is not worth a call
         self._sent[alarm.id] = now
         self._sent.move_to_end(alarm.id)
         if len(self._sent) > MAX_KNOWN:

@@ -69,7 +69,7 @@ class NoSuchTag(LookupError):
 
 
 def tag_of(snapshot: Snapshot, tag_id: str) -> TagState:
-    """One tag of a snapshot, which may raise `NoSuchTag`."""
+    """One tag of a snapshot; raises `NoSuchTag` if it is not known."""
     for tag in snapshot.tags:
         if tag.tag_id == tag_id:
             return tag

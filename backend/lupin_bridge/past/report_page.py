@@ -142,7 +142,7 @@ class _Page:
         known = [
             say(word, at=at(body[name]))
             for word, name in (("kept", "kept_from"), ("complete", "complete_to"))
-            # Where the log begins before the period, it is `from`.
+            # If the log begins before the period, `kept_from` equals `from`.
             if body[name] is not None and (name != "kept_from" or body[name] != body["from"])
         ]
         parts = [

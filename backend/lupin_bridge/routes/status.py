@@ -190,7 +190,7 @@ async def health(request: Request) -> Response:
     """The verdicts, as in the frames of `/ws/state`, with the reasons for each.
 
     With `at`, what was known then is judged by the current ranges, and by the scans of each tag up
-    to then; a reason's `since` is then the last observation that shows it.
+    to then. A reason's `since` is the last observation that shows it, not the first.
     """
     bridge = bridge_of(request)
     at_ns = query_string.at(request.query_params.multi_items(), bridge.ros_time_ns)

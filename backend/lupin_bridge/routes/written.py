@@ -145,7 +145,7 @@ async def withdraw_note(request: Request, note_id: str) -> Response:
     return json_response(orjson.dumps(note_json(note, gone)))
 
 
-# --- who may, and what ------------------------------------------------------------------------
+# --- who may write, and what ------------------------------------------------------------------
 
 
 def _writer(request: Request, bridge: Bridge) -> Person:

@@ -222,7 +222,7 @@ class BridgeServer(uvicorn.Server):
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:  # noqa: ARG002
         """Begin the shutdown; the process then ends soon, even if the event loop is stuck."""
         process.must_end()
-        # At a second SIGINT uvicorn would cancel all that goes on, each with a trace in the log.
+        # At a second SIGINT uvicorn would cancel all requests, each with a trace in the log.
         super().handle_exit(signal.SIGTERM, frame)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
@@ -291,7 +291,7 @@ def _locked(folder: Path) -> Iterator[None]:
 
 
 def _remove_left(path: Path) -> None:
-    """Remove the socket of a process that has ended: nobody could listen there again."""
+    """Remove the socket of a process that has ended, which would block the address."""
     with socket.socket(socket.AF_UNIX) as probe, suppress(OSError):
         probe.settimeout(1.0)
         try:

@@ -229,7 +229,7 @@ def changed_of(known: Mapping[str, Report]) -> Changed:
     return changed
 
 
-# --- what the robot says of itself ----------------------------------------------------------------
+# --- the robot ------------------------------------------------------------------------------------
 
 
 def robot_body(known: RobotLog) -> bytes:

@@ -278,7 +278,7 @@ class Session:
 
 
 def _errors(errors: list[str]) -> tuple[bytes, ...]:
-    # One for all: the answer is never longer than the request.
+    # One message for all errors: the answer is never longer than the request.
     return (status(ERROR, "; ".join(errors)),) if errors else ()
 
 

@@ -406,7 +406,7 @@ class Mqtt:
             max_queued_incoming_messages=WINDOW,
         )
         client.pending_calls_threshold = 2 * WINDOW
-        # Retrieved here, as nobody else may do so, which asyncio would log.
+        # Retrieve the exception: nobody else may do so, and asyncio would log that.
         client._disconnected.add_done_callback(  # noqa: SLF001
             lambda end: end.cancelled() or end.exception()
         )

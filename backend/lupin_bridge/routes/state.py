@@ -75,7 +75,7 @@ class ListenQuery:
 
 router = APIRouter()
 
-# How long the ages of an answer are good enough: they are shown in seconds.
+# How long the ages of an answer may be reused: they are shown in seconds.
 AGES_HOLD_S: Final = 0.2
 
 _NO_TAG = refusing({404: "no such tag"})

@@ -163,7 +163,7 @@ def _quality(report: Report) -> dict[str, Any]:
 
 log = logging.getLogger(__name__)
 
-# The twin makes a new report every 30 s at most (`estimate_service.REST_S`).
+# The twin makes a new report at most every 30 s (`estimate_service.REST_S`).
 PERIOD_S: Final = 15.0
 # A greenhouse has a handful of sensors; past this limit, the alphabetically first ones are taken.
 MAX_SENSORS: Final = 32

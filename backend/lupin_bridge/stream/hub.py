@@ -76,7 +76,7 @@ LARGE_BYTES: Final = 131_072
 # and a browser that receives nothing for seconds considers the connection dead.
 REMINDED_AFTER_S: Final = 1.0
 
-# How early a frame may come, as a share of the interval.
+# Lateness of a frame that does not delay the next one, as a share of the interval.
 BEAT_SLACK: Final = 0.1
 
 

@@ -225,7 +225,7 @@ class Fleet:
 class OfSitesExport(OfExport):
     """The parameters of an export of many sites."""
 
-    sites: str | None = parameter("names of sites, with a comma between; default: all")
+    sites: str | None = parameter("names of sites, separated by commas; default: all")
 
 
 async def respond_sites(fleet: Fleet, kind: Format, request: Request) -> Response:

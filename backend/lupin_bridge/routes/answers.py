@@ -60,13 +60,13 @@ def taking(body: type[BaseModel]) -> dict[str, Any]:
 
 # The responses that `add_refusals` makes of refusals, for the OpenAPI document.
 NOT_REMEMBERED: Final[Documented] = {
-    304: {"description": "the ETag still holds"},
+    304: {"description": "not modified: the ETag is still current"},
     **refusing(
         {
             400: "refused; detail has the reason",
             429: "too many requests from this client",
-            503: "it cannot be read now, or too much is",
-            504: "it took too long",
+            503: "not readable at the moment, or the server is overloaded",
+            504: "the answer took too long",
         }
     ),
 }

@@ -75,9 +75,9 @@ def _content(media_type: str) -> dict[str, Any]:
     openapi_extra={"parameters": parameters_of(OfExport)},
 )
 async def csv_route(request: Request) -> Response:
-    """A row for each reading, and one without a sensor for each attempt that brought no reading.
+    """One row for each reading, and one without a sensor for each attempt that got no reading.
 
-    The answer is streamed: without HTTP's last chunk, it is incomplete.
+    The answer is streamed: without the final HTTP chunk, it is incomplete.
     """
     return await _of_site(request, Csv)
 
@@ -85,7 +85,7 @@ async def csv_route(request: Request) -> Response:
 @read_route(
     router,
     "/api/export.parquet",
-    summary="The same as Parquet, with units and coordinates",
+    summary="The same rows as Parquet, with units and coordinates",
     responses={
         200: _content(Parquet.media_type),
         **_ANSWERS,
@@ -94,7 +94,7 @@ async def csv_route(request: Request) -> Response:
     openapi_extra={"parameters": parameters_of(OfExport)},
 )
 async def parquet_route(request: Request) -> Response:
-    """The columns of the CSV; `time` is a timestamp. Fields and file have attributes."""
+    """The columns of the CSV; `time` is a timestamp. Columns and file carry metadata."""
     return await _of_site(request, Parquet)
 
 

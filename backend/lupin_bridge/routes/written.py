@@ -63,11 +63,11 @@ _SLACK_S: Final = 10
 _WRITE_ANSWERS: Final = refusing(
     {
         400: "refused; detail has the reason",
-        403: "it takes an account with the role operator",
+        403: "requires an account with the role operator",
         404: "there is no such alarm, tag or note",
-        405: "this bridge only reads the log",
+        405: "this bridge cannot write notes",
         429: "too many requests from this client",
-        503: "it was not written",
+        503: "the note was not written",
     }
 )
 
@@ -80,7 +80,7 @@ _WRITE_ANSWERS: Final = refusing(
     openapi_extra={"parameters": parameters_of(OfNotes)},
 )
 async def notes_route(request: Request) -> Response:
-    """The newest first and 2,000 at most, withdrawn ones too; the same in every replica."""
+    """Newest first, at most 2,000, including withdrawn ones; the same in every replica."""
     bridge = bridge_of(request)
     given = read(OfNotes, request.query_params.multi_items())
     start_ns, end_ns = given.span(bridge.ros_time_ns)
@@ -111,7 +111,7 @@ async def notes_route(request: Request) -> Response:
     openapi_extra=taking(routes_schema.NoteDraft),
 )
 async def write_note(request: Request) -> Response:
-    """It takes the role operator. Of two notes of one kind on an alarm, the later one counts."""
+    """Requires the role operator. Of two notes of one kind on an alarm, the later one counts."""
     bridge = bridge_of(request)
     person = _writer(request, bridge)
     draft = await read_body(request, routes_schema.NoteDraft)
@@ -125,11 +125,11 @@ async def write_note(request: Request) -> Response:
 
 @router.delete(
     "/api/notes/{note_id}",
-    summary="Withdraw a note: it is kept, with who withdrew it and when",
+    summary="Withdraw a note; it is kept, with who withdrew it and when",
     responses={200: {"model": routes_schema.Note}, **_WRITE_ANSWERS},
 )
 async def withdraw_note(request: Request, note_id: str) -> Response:
-    """Its author, or an admin, may withdraw it."""
+    """The author or an admin may withdraw a note."""
     bridge = bridge_of(request)
     person = _writer(request, bridge)
     notes = _known(bridge)
@@ -262,11 +262,11 @@ async def _write(request: Request, bridge: Bridge, note: Note) -> Note:
     summary="Who signed in, and who changed what",
     responses={
         200: {"model": routes_schema.Audit},
-        **refusing({403: "it takes the role admin", 503: "the accounts cannot be read"}),
+        **refusing({403: "requires the role admin", 503: "the accounts cannot be read"}),
     },
 )
 async def audit_route(request: Request) -> Response:
-    """The newest first and 2,000 at most; all of it: `lupin-twin audit`."""
+    """Newest first, at most 2,000 entries; `lupin-twin audit` prints all of them."""
     access, person = request.app.state.access, person_of(request)
     if person is None or not person.may("admin") or access.people is None:
         raise Refused("the audit trail is for the role admin", 403)
@@ -282,14 +282,14 @@ MAX_AHEAD_S: Final = 10
 
 @router.post(
     OBSERVATIONS,
-    summary="Post the readings of one tag: they reach the twin over ROS, as a robot's do",
+    summary="Post the readings of one tag, which reach the twin over ROS, as a robot's do",
     status_code=202,
     responses={
         202: {"model": routes_schema.PublishedObservation, "description": "published over ROS"},
         **refusing(
             {
                 400: "refused; detail has the reason",
-                403: "it takes a token of the role writer, and a bridge with "
+                403: "requires a token with the role writer, and a bridge with "
                 "--http-observations on",
                 429: "too many requests from this client",
                 503: "the twin is silent",
@@ -299,9 +299,9 @@ MAX_AHEAD_S: Final = 10
     openapi_extra=taking(routes_schema.ObservationDraft),
 )
 async def post_observation(request: Request) -> Response:
-    """It takes a token of the role writer. The same tag at the same `observed_at` counts once.
+    """Requires a token with the role writer. The same tag at the same `observed_at` counts once.
 
-    The twin applies its own rules: it reports what it drops on `/diagnostics`.
+    The twin applies its own rules, and reports on `/diagnostics` what it drops.
     """
     bridge, person = bridge_of(request), person_of(request)
     if person is None or person.role != WRITER:
@@ -354,11 +354,11 @@ def _stamp_ns(observed_at: str | float | None, now_ns: int) -> int:
 @read_route(
     router,
     PUSH,
-    summary="The key that a browser subscribes to notifications with",
+    summary="The key with which a browser subscribes to notifications",
     responses={200: {"model": routes_schema.PushKey}},
 )
 async def key_route(request: Request) -> Response:
-    """There is a key for people with an account, if the bridge has `--push-contact`."""
+    """Only people with an account get a key, and only if the bridge has `--push-contact`."""
     push, person = bridge_of(request).outward.push, person_of(request)
     key = None
     if push is not None and person is not None and _has_account(request, person):
@@ -368,15 +368,15 @@ async def key_route(request: Request) -> Response:
 
 @router.post(
     PUSH,
-    summary="Have a browser notified of critical alarms, or not any more",
+    summary="Turn notifications of critical alarms on or off for a browser",
     status_code=204,
     responses={
         204: {"description": "done"},
         **refusing(
             {
                 400: "refused; detail has the reason",
-                403: "it takes an account",
-                404: "this bridge has no Web Push",
+                403: "requires an account",
+                404: "Web Push is not set up on this bridge",
                 429: "too many requests from this client",
             }
         ),
@@ -384,7 +384,7 @@ async def key_route(request: Request) -> Response:
     openapi_extra=taking(routes_schema.PushSubscription),
 )
 async def subscribe(request: Request) -> Response:
-    """An account may have ten browsers: one more replaces the oldest."""
+    """An account may have ten browsers; an eleventh replaces the oldest."""
     push, person = bridge_of(request).outward.push, person_of(request)
     access: Access = request.app.state.access
     if push is None or access.people is None:

@@ -296,7 +296,7 @@ _NO_LIMITS: Final = Limits(days=MAX_JOURNAL_DAYS, max_bytes=2**62)
 
 def add_parser(roles: Roles) -> None:
     """Add `import` to the command's options."""
-    text = "readings of before, from CSV, into a journal; without --write, what would be imported"
+    text = "import past readings from CSV into a journal; without --write, only report on them"
     parser = add_role(roles, "import", text)
     parser.add_argument("file", metavar="FILE.csv", type=Path)
     parser.add_argument(
@@ -305,10 +305,12 @@ def add_parser(roles: Roles) -> None:
         metavar="FILE.yaml",
         type=Path,
         required=True,
-        help="which column is what",
+        help="what each column of the CSV is",
     )
     parser.add_argument(
-        "--write", action="store_true", help="write it into the journal, whose twin is stopped"
+        "--write",
+        action="store_true",
+        help="write the readings into the journal; stop its twin first",
     )
     add_which(parser)
 
@@ -320,7 +322,7 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     except ConfigError as error:
         return fail(f"{options.columns}: {error}")
     except (UnicodeDecodeError, csv.Error) as error:
-        return fail(f"{options.file} is no CSV in UTF-8: {error}")
+        return fail(f"{options.file} is not CSV in UTF-8: {error}")
     except (*SHOWN, *FILE_ERRORS, OSError) as error:
         return fail(str(error))
 

@@ -118,4 +118,4 @@ def test_a_second_twin_ends_the_player_for_its_journal_would_keep_what_is_played
     path = write_bag(tmp_path / "run.mcap", [seen("a", 5_000.0)])
     with twin_node(domain), demo_of(domain, path) as (demo, _):
         demo.wait_for_output("several twins run in ROS domain")
-        demo.wait_for_output("the player has ended with code 1")
+        demo.wait_for_output("the player ended with exit code 1")

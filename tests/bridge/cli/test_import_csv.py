@@ -233,8 +233,8 @@ def test_a_time_without_offset_is_in_the_zone_that_is_given_and_an_hour_may_come
         (WIDE | {"sensor": "a", "value": "b"}, ROWS, "expected sensors, or sensor and value"),
         (WIDE | {"sensors": {"t": 5}}, ROWS, "sensors.t is 5, expected keys and values"),
         (WIDE | {"places": {"A": [1, "x"]}}, ROWS, "places.A is [1, 'x'], expected [x, y] or"),
-        (WIDE, b"\xff\xfe\x00", "is no CSV in UTF-8"),
-        (WIDE, 'at,bench,t,rh\n"' + "x" * 200_000, "is no CSV in UTF-8: field larger than"),
+        (WIDE, b"\xff\xfe\x00", "is not CSV in UTF-8"),
+        (WIDE, 'at,bench,t,rh\n"' + "x" * 200_000, "is not CSV in UTF-8: field larger than"),
         (WIDE, "at,bench,t,rh\n" + "," * 1_000_001, "line 2 has 1,000,000 characters or more"),
     ],
 )

@@ -350,7 +350,7 @@ def test_a_sites_clock_that_is_wrong_by_a_year(archive: Archive, tmp_path: Path)
     [
         ((), "--archive-url is missing, or LUPIN_ARCHIVE_URL"),
         (("--archive-url", "postgresql://a@b/c", "--site", "gh1"), "--site is for a twin, not for"),
-        (("--ros-args", "-p", "a:=1"), "fleet takes no arguments of ROS"),
+        (("--ros-args", "-p", "a:=1"), "fleet takes no ROS arguments"),
     ],
 )
 def test_what_can_never_work_ends_it(args: tuple[str, ...], said: str) -> None:

@@ -280,7 +280,7 @@ async def test_the_watch_outlives_an_error(
 
         monkeypatch.setattr(stage.bridge.hub, "dismiss_stuck", fail)
         await until(lambda: looks >= 2, "a second look")
-        assert "the watch met an error and goes on" in caplog.text
+        assert "the watch had an error and continues" in caplog.text
 
 
 async def test_who_asked_for_a_low_rate_gets_the_newest_although_nothing_more_happens() -> None:

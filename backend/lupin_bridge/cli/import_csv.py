@@ -128,8 +128,8 @@ class Summary:
             yield f"refused: {count}: {reason} (line {', '.join(map(str, examples))})"
         if self.repeated:
             yield (
-                f"refused: {self.repeated}: the sensor has another reading of that moment; "
-                "where clocks are set back in autumn, times need an offset"
+                f"refused: {self.repeated}: the sensor has another reading at that moment; "
+                "where clocks go back in autumn, times need an offset"
             )
 
 
@@ -162,9 +162,9 @@ def columns_of(content: Any) -> Columns:
     )
     table.end()
     if bool(columns.tag) == bool(columns.tag_id):
-        raise ConfigError("expected tag, a column, or tag_id, every row's tag; one of them")
+        raise ConfigError("expected either tag, a column, or tag_id, the tag of every row")
     if bool(columns.sensors) == bool(columns.sensor and columns.value):
-        raise ConfigError("expected sensors, or sensor and value; one of them")
+        raise ConfigError("expected either sensors, or sensor and value")
     return columns
 
 
@@ -280,7 +280,7 @@ def _number(name: str, text: str, column: Value) -> float:
 def _moment_ns(text: str, zone: ZoneInfo | None) -> int:
     seconds = seconds_of(text, zone)
     if seconds > time.time():
-        raise ValueError("the time is ahead of now")
+        raise ValueError("the time is in the future")
     return int(seconds * 1e6) * 1000
 
 
@@ -308,9 +308,7 @@ def add_parser(roles: Roles) -> None:
         help="what each column of the CSV is",
     )
     parser.add_argument(
-        "--write",
-        action="store_true",
-        help="write the readings into the journal; stop its twin first",
+        "--write", action="store_true", help="write into the journal; stop its twin first"
     )
     add_which(parser)
 
@@ -398,7 +396,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
             known = runs(connection.execute)
             placed = {tag for (tag,) in connection.execute("SELECT DISTINCT tag FROM place")}
         if any(run.begun.is_simulated for run in known):
-            raise CommandError(f"the journal {path} is of a simulation: import into another")
+            raise CommandError(f"the journal {path} is a simulation's: import into another one")
         while batch := list(islice(found, _BATCH)):
             count += len(batch)
             if not known:

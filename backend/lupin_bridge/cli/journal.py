@@ -116,9 +116,7 @@ def add_parser(roles: Roles) -> None:
             own.add_argument("--tag", metavar="ID", help="this tag only")
             own.add_argument("--sensor", metavar="NAME", help="this sensor only")
             own.add_argument(
-                "--sensors",
-                metavar="FILE",
-                help=f"sensors file with the units of the CSV (default: {variable('sensors')})",
+                "--sensors", metavar="FILE", help=f"sensors file (default: {variable('sensors')})"
             )
             own.add_argument(
                 "--config", metavar="FILE", help=f"settings file (default: {variable('config')})"
@@ -346,9 +344,7 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
     target: Path = options.recording
     for name in ("tag", "sensor"):
         if getattr(options, name) is not None:
-            raise CommandError(
-                f"--{name} is for CSV: {target} is a recording of whole observations"
-            )
+            raise CommandError(f"--{name} is for CSV: {target} holds whole observations")
     if target.suffix != SUFFIX:
         raise CommandError(f"{target} does not end in {SUFFIX}, as a recording must")
     try:

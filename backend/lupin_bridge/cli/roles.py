@@ -156,11 +156,9 @@ def with_past(feed: Feed) -> Feed:
             )
     except subprocess.CalledProcessError as error:
         why = (error.stderr.splitlines() or [str(error)])[-1]
-        log.warning(
-            "the demo starts without past data: %s", why.removeprefix("patrol_node: error: ")
-        )
+        log.warning("the demo starts without history: %s", why.removeprefix("patrol_node: error: "))
     except (Foreign, subprocess.TimeoutExpired, OSError, *FILE_ERRORS) as error:
-        log.warning("the demo starts without past data: %s", error)
+        log.warning("the demo starts without history: %s", error)
     if past is None:
         return feed
     _, past_ns = past

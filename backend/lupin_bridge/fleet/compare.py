@@ -145,7 +145,7 @@ def compare(
     start_ns, end_ns = given.span(now_ns)
     if given.sensor_type in DERIVED or given.sensor_type in DAILY:
         raise PastRefused(
-            f"sensor_type is {given.sensor_type!r}, which is derived: measured ones are compared"
+            f"sensor_type is {given.sensor_type!r}, which is derived: expected a measured one"
         )
     names = chosen(given.sites, known)
     if len(names) > MAX_SITES:

@@ -145,7 +145,7 @@ async def respond_export(
     client, connection = client_of(request), request.scope["state"][CONNECTION_KEY]
 
     def evict() -> None:
-        log.warning("the export of %s is slow and makes place for another one", client)
+        log.warning("the export of %s is slow and is ended for another one", client)
         connection.break_off()
 
     facts = {"title": "lupin-twin: readings and failed attempts", **_facts(known, given, now_ns)}
@@ -221,7 +221,7 @@ class ExportResponse(StreamingResponse):
             await while_client_waits(request, self.stream_response(send))
         except Exception as error:
             is_known = isinstance(error, (NotRemembered, PastRefused, TwinUnavailableError))
-            log.warning("an export ended before its end: %s", error, exc_info=not is_known)
+            log.warning("an export ended early: %s", error, exc_info=not is_known)
             connection: HttpConnection = scope["state"][CONNECTION_KEY]
             connection.break_off()
             await client_left(request)  # or the server would log an answer without an end

@@ -242,10 +242,7 @@ class AdviceQuery(TagsQuery):
 
 QueryT = TypeVar("QueryT", QualityQuery, TagsQuery, AdviceQuery)
 
-_REPORTED: Final = {
-    **NOT_REMEMBERED,
-    **refusing({404: "not available here, only from the greenhouse's own twin"}),
-}
+_REPORTED: Final = {**NOT_REMEMBERED, **refusing({404: "only the site's own twin has it"})}
 
 # Rough time to write a tag, s.
 _WRITE_TAG_S: Final = 10e-6

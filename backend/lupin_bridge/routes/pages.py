@@ -264,7 +264,7 @@ async def sign_in(request: Request) -> Response:
         )
         ends_others = given.ends_others
     if person is None:
-        return error_response("there is no such account, or the password is another", 401)
+        return error_response("there is no such account, or the password is wrong", 401)
     begun = await while_client_waits(
         request, people.sign_in(person, address, ends_others=ends_others)
     )

@@ -134,7 +134,7 @@ async def _map(request: Request, kind: str) -> Response:
     bridge = bridge_of(request)
     occupancy = bridge.source.occupancy_map()
     if occupancy is None:
-        return error_response("no map has come yet on the twin's map_topic", 404)
+        return error_response("no map has been received yet on the twin's map_topic", 404)
     # A replica that started later has the same map with a later stamp, which is in the JSON.
     which = occupancy.stamp_ns if kind == "json" else kind
     etag = f'"{bridge.source.identity}-{occupancy.revision}-{which}"'

@@ -137,7 +137,7 @@ async def withdraw_note(request: Request, note_id: str) -> Response:
     if note is None or note.kind == WITHDRAW:
         raise Refused(f"there is no note {note_id[:64]!r}", 404)
     if note.by != person.name and not person.may("admin"):
-        raise Refused(f"the note is by {note.by}: they withdraw it, or an admin", 403)
+        raise Refused(f"the note is by {note.by}: only they or an admin may withdraw it", 403)
     gone = withdrawals(notes)
     if note.id not in gone:
         draft = Note("", _now_ns(bridge), person.name, WITHDRAW, f"{WITHDRAWN}{note.id}")
@@ -158,7 +158,7 @@ def _writer(request: Request, bridge: Bridge) -> Person:
             403,
         )
     if not person.may("operator"):
-        raise Refused(f"{person.name} is a {person.role}, notes take an operator", 403)
+        raise Refused(f"{person.name} is a {person.role}, notes require an operator", 403)
     if not bridge.source.writes_notes:
         raise Refused(ELSEWHERE, 405, {"Allow": "GET, HEAD", **NEVER_STORE})
     return person
@@ -197,7 +197,7 @@ def _checked(draft: routes_schema.NoteDraft, person: Person, bridge: Bridge) -> 
     if draft.kind != COMMENT and kind != "alarm":
         raise Refused(f"kind is {draft.kind!r}, which is for alarms: expected comment")
     if draft.kind == COMMENT and not draft.text:
-        raise Refused("text is empty, a comment has one")
+        raise Refused("text is empty, a comment must have one")
     until_ns = _until(draft, now_ns, is_critical=is_critical)
     return Note("", now_ns, person.name, draft.kind, draft.subject, draft.text, until_ns)
 
@@ -205,19 +205,19 @@ def _checked(draft: routes_schema.NoteDraft, person: Person, bridge: Bridge) -> 
 def _until(draft: routes_schema.NoteDraft, now_ns: int, *, is_critical: bool) -> int | None:
     """When shelving ends, or the moment of a comment, ns; None: it ends now, or is about now."""
     if draft.kind == SHELVE and "until" not in draft.model_fields_set:
-        raise Refused("until is missing: a moment, or null where it is not shelved any more")
+        raise Refused("until is missing, expected a moment, or null to unshelve")
     if draft.until is None:
         return None
     until_ns = moment("until", draft.until)
     left_s = (until_ns - now_ns) / NANOSECONDS_PER_SECOND
     if draft.kind == COMMENT:
         if left_s > _SLACK_S:
-            raise Refused(f"until is in {left_s:.0f} s, a comment is about a moment until now")
+            raise Refused(f"until is in {left_s:.0f} s, a comment cannot be about a later moment")
         return until_ns
     if draft.kind != SHELVE:
         raise Refused("until is for the kinds shelve and comment")
     if is_critical and not draft.text:
-        raise Refused("text is empty: to shelve a critical alarm takes a reason")
+        raise Refused("text is empty: shelving a critical alarm requires a reason")
     longest_s = CRITICAL_SHELF_S if is_critical else SHELF_S
     if not 0.0 < left_s <= longest_s + _SLACK_S:
         what = "a critical alarm" if is_critical else "an alarm"
@@ -306,7 +306,7 @@ async def post_observation(request: Request) -> Response:
     bridge, person = bridge_of(request), person_of(request)
     if person is None or person.role != WRITER:
         raise Refused(
-            f"observations take a token of the role {WRITER} "
+            f"observations require a token of the role {WRITER} "
             f"(`lupin-twin token add NAME --role {WRITER}`), as Authorization: Bearer",
             403,
         )
@@ -344,7 +344,7 @@ def _stamp_ns(observed_at: str | float | None, now_ns: int) -> int:
             f"{MAX_AHEAD_S} s: is a clock wrong?"
         )
     if not stamp_ns:
-        raise Refused("observed_at is 0, which is no moment: leave it out for now")
+        raise Refused("observed_at is 0, which is not a moment: omit it for the current time")
     return min(stamp_ns, now_ns)
 
 
@@ -390,7 +390,7 @@ async def subscribe(request: Request) -> Response:
     if push is None or access.people is None:
         raise Refused("this bridge has no Web Push: start it with --push-contact", 404)
     if person is None or not _has_account(request, person):
-        raise Refused("notifications take an account: sign in by name", 403)
+        raise Refused("notifications require an account: sign in by name", 403)
     _paced(bridge_of(request).notes.pace, person.name, _TOO_MANY_NOTES)
     given = await read_body(request, routes_schema.PushSubscription)
     if given.keys is None:

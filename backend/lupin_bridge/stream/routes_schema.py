@@ -41,10 +41,8 @@ class SignIn(_Given):
 
 
 class _Keys(_Given):
-    p256dh: str = Field(
-        max_length=100, description="the browser's public key, base64url (RFC 8291)"
-    )
-    auth: str = Field(max_length=30, description="the browser's secret, base64url (RFC 8291)")
+    p256dh: str = Field(max_length=100, description="browser's public key, base64url (RFC 8291)")
+    auth: str = Field(max_length=30, description="browser's secret, base64url (RFC 8291)")
 
 
 class PushSubscription(_Given):

@@ -121,9 +121,7 @@ class TwinTagState(Contract):
         description="of the last attempt, as in lupin_msgs/Observation: 0 OK, 1 unreachable, 2 "
         "scan failed, 3 skipped; null: as for last_try",
     )
-    last_try_detail: str = Field(
-        default_factory=str, description="why it was not OK, for a person to read"
-    )
+    last_try_detail: str = Field(default_factory=str, description="why it was not OK")
 
 
 class TwinState(Contract):
@@ -155,8 +153,7 @@ class HealthReason(Contract):
         description="ROS time of the observation that began it; for old: the last one; null: none"
     )
     release: float | None = Field(
-        default_factory=lambda: None,
-        description="value at which it ends; only while the deadband holds it",
+        default_factory=lambda: None, description="end value; only while the deadband holds it"
     )
 
 
@@ -328,16 +325,12 @@ class StatusFrame(Contract):
     state_age_seconds: float | None = Field(
         description="s since the bridge received its last state, by its own clock; null: never"
     )
-    has_map: bool = Field(
-        description="false: no map has been received yet, and /api/map answers 404"
-    )
+    has_map: bool = Field(description="false: no map received yet, and /api/map answers 404")
     origin: Origin = Field(
         description="the origin of the observations, as the twin reports it; sim_time: the twin "
         "follows /clock, so they come from a simulation or a recording"
     )
-    twin_count: int = Field(
-        description="twins that publish the state; if more than one, it is a mixture"
-    )
+    twin_count: int = Field(description="twins that publish the state; of several, a mixture")
     input_problems: list[str] = Field(description="why the twin misses messages, with the remedy")
     day_length_s: float = Field(description="length of a day in s of ROS time; shorter in a demo")
     drops: list[RecentDrop] = Field(description="what the twin has recently dropped, by reason")
@@ -435,9 +428,8 @@ class TagHistory(Contract):
 
     tag_id: str
     source: str | None = Field(
-        description="source of the newest observation that names one, as in "
-        "lupin_msgs/Observation: adapt/fixed is a fixed sensor, adapt a robot's visit, http/NAME a "
-        "program; null: none does"
+        description="as in lupin_msgs/Observation, from the newest one with a source: adapt/fixed "
+        "is a fixed sensor, adapt a robot's visit, http/NAME a program; null: none has one"
     )
     sensors: list[SensorHistory]
     tries: list[PastAttempt] = Field(description="oldest first")

@@ -302,9 +302,9 @@ def test_what_is_wrong_is_said_in_one_line(archive: Archive, journal: Path) -> N
     kept(journal, scans(0, 5))
     for given, code, said in (
         ({"site": "GH 1"}, 2, "--site is 'GH 1', expected a-z"),
-        ({"archive_url": "nonsense"}, 2, "--archive-url is no address of a PostgreSQL"),
+        ({"archive_url": "nonsense"}, 2, "--archive-url is not a PostgreSQL address"),
         ({"archive_url": "postgresql://gh1@127.0.0.1:1/x"}, 1, "failed: Connection refused\n"),
-        ({"site": "gh2"}, 1, "a forwarder needs a user in lupin_forwarder that is named as"),
+        ({"site": "gh2"}, 1, "a forwarder needs a user in the role lupin_forwarder with"),
         ({"journal": "/nowhere/journal.sqlite"}, 1, "there is no journal /nowhere"),
         ({"journal": __file__}, 1, "is no journal"),
     ):

@@ -144,8 +144,8 @@ def test_somebody_else_s_file_is_left_and_named(tmp_path: Path) -> None:
     empty.touch()
     for path, named in (
         (foreign, "is a database, but not a journal of lupin-twin"),
-        (recorded, f"{recorded} is no journal: it does not begin as SQLite's files do\n"),
-        (empty, "is empty: a journal that is just being made, or none"),
+        (recorded, f"{recorded} is not a journal: it does not begin as an SQLite file\n"),
+        (empty, "is empty: a journal that is just being created, or none"),
     ):
         before = path.read_bytes()
         for action in ACTIONS:

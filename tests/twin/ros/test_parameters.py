@@ -105,7 +105,7 @@ def test_complaints_name_the_parameter(domain: int) -> None:
     ):
         node.create_subscription(Time, "a b", lambda _: None, 1)
     with (
-        pytest.raises(ParameterError, match=r"parameter use_sim_time is no bool: .*'5'"),
+        pytest.raises(ParameterError, match=r"parameter use_sim_time is not a bool: .*'5'"),
         naming_own_parameters(),
         node_with(domain, "use_sim_time:=5"),
     ):

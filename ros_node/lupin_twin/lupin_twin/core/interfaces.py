@@ -98,7 +98,7 @@ STATE: Final = Topic(
 )
 TIMES: Final = Topic(
     "lupin_msgs/msg/TwinTimes",
-    "when each value of the state was observed; published right behind it, with the same stamp",
+    "when each value of the state was observed; published right after it, with the same stamp",
     "twin/times",
 )
 LAYERS: Final = Topic(

@@ -33,8 +33,8 @@ export interface Urgent {
 }
 
 /**
-  * Tags that need attention, with reasons, most severe first; values back in range come last.
-  * Old readings do not count: they wait for the robot's next visit.
+ * Tags that need attention, with reasons, most severe first; values back in range come last.
+ * Old readings do not count: they wait for the robot's next visit.
  */
 export function useUrgent(): readonly Urgent[] {
   const tags = useApp(selectTags);
@@ -68,8 +68,8 @@ export function useUrgent(): readonly Urgent[] {
 }
 
 /**
-  * Text: how long a reason's alarm has been active, that it is acknowledged, or that there is none yet.
-  * Null: unknown, a past moment is shown, or the banner already dates the data.
+ * Text: how long a reason's alarm has been active, that it is acknowledged, or that there is none yet.
+ * Null: unknown, a past moment is shown, or the banner already dates the data.
  */
 export function useSince(tagId: string, reason: HealthReason): string | null {
   const isNow = useApp((state) => selectShown(state).moment === null);
@@ -223,9 +223,9 @@ export function Overall({
 }): JSX.Element | null {
   const [own] = health.reasons;
   const reason = useReasonText(own ?? null);
-    // The alarm list is always live.
-    const isNow = useApp((state) => selectShown(state).moment === null);
-    const active = useSelected(alarmList, (list) => list.active.length);
+  // The alarm list is always live.
+  const isNow = useApp((state) => selectShown(state).moment === null);
+  const active = useSelected(alarmList, (list) => list.active.length);
   const shelved = useSelected(alarmList, (list) => list.shelved.length);
   const text = own ? reason : overallText(health, isNow ? active + shelved : 0);
   const isHere = useApp(selectIsHere);
@@ -241,9 +241,9 @@ export function Overall({
 /** Number of shelved alarms, shown while something is wrong: shelved ones have no line of their own. */
 export function ShelvedCount({ disabled = false }: { disabled?: boolean }): JSX.Element | null {
   const isWrong = useApp((state) => isBad(selectHealth(state).verdict));
-    // The alarm list is always live.
-    const isNow = useApp((state) => selectShown(state).moment === null);
-    const count = useSelected(alarmList, (list) => list.shelved.length);
+  // The alarm list is always live.
+  const isNow = useApp((state) => selectShown(state).moment === null);
+  const count = useSelected(alarmList, (list) => list.shelved.length);
   if (!isWrong || !isNow || count === 0) return null;
   return (
     <button

@@ -257,8 +257,8 @@ function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
 }
 
 /**
-  * Chooses how the heat map is computed; part of the permalink. It is in the layers menu on a narrow
-  * screen, elsewhere in the legend.
+ * Chooses how the heat map is computed; part of the permalink. It is in the layers menu on a narrow
+ * screen, elsewhere in the legend.
  */
 export function HeatControl({ place }: { place: 'legend' | 'layers' }): JSX.Element {
   const heat = useApp((state) => state.view.heat);

@@ -83,9 +83,9 @@ export function startingRange({ ideal }: Sensor, range: Range | null): Range {
 }
 
 /**
-  * One end of a fixed range. Enter or leaving the field applies a valid input; an invalid one shows
-  * the reason. After leaving, the field shows the applied value again: it never shows a number that
-  * the map does not use.
+ * One end of a fixed range. Enter or leaving the field applies a valid input; an invalid one shows
+ * the reason. After leaving, the field shows the applied value again: it never shows a number that
+ * the map does not use.
  */
 export function Bound({
   label,

@@ -1,6 +1,6 @@
 /**
-  * What the first view does not need, as one chunk loaded right after it: cards, lists and tools that
-  * open on request. Only `later.tsx` loads it.
+ * What the first view does not need, as one chunk loaded right after it: cards, lists and tools that
+ * open on request. Only `later.tsx` loads it.
  */
 import '../styles/card.css';
 import '../styles/hover.css';

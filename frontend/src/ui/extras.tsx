@@ -59,8 +59,8 @@ const MOST_READINGS = 8;
 const MOST_REASONS = 3;
 
 /**
-  * A tag in short, beside the pin under the mouse. Hidden from screen readers, because card and table
-  * have the same; it takes no pointer events, so that it never blocks the mouse.
+ * A tag in short, beside the pin under the mouse. Hidden from screen readers, because card and table
+ * have the same; it takes no pointer events, so that it never blocks the mouse.
  */
 export function HoverCard(): JSX.Element | null {
   const pin = useSelected(pinUnderMouse);

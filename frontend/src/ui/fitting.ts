@@ -2,8 +2,8 @@
 import { useLayoutEffect, useState, type RefObject } from 'react';
 
 /**
-  * `bottoms`: bottom edge of each laid-out entry, pixels from the top; `all` may count more entries.
-  * If not all fit, the line that counts the rest needs room too.
+ * `bottoms`: bottom edge of each laid-out entry, pixels from the top; `all` may count more entries.
+ * If not all fit, the line that counts the rest needs room too.
  */
 export function fitting(
   bottoms: readonly number[],

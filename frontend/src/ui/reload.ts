@@ -16,9 +16,9 @@ interface Kept {
 type Session = Pick<Storage, 'getItem' | 'setItem'>;
 
 /**
-  * Records a failure and returns the pause before the reload, ms. It doubles with each failure in a
-  * row, up to five minutes; half of it is random, so that a greenhouse's screens do not all reload at
-  * once. Without storage, every pause is the longest.
+ * Records a failure and returns the pause before the reload, ms. It doubles with each failure in a
+ * row, up to five minutes; half of it is random, so that a greenhouse's screens do not all reload at
+ * once. Without storage, every pause is the longest.
  *
  * @param random from 0 to 1
  */
@@ -63,8 +63,8 @@ function openSession(): Session {
 }
 
 /**
-  * Reloads the page after the due pause, but only once its server answers: the browser's own error
-  * page would stay for ever.
+ * Reloads the page after the due pause, but only once its server answers: the browser's own error
+ * page would stay for ever.
  */
 export function reloadByItself(
   session: Session = openSession(),

@@ -128,9 +128,9 @@ export function usePaper(): boolean {
 }
 
 /**
-  * Scrolls the selected row into view once its card is laid out, and again once rows are measured:
-  * thousands may be above it. It stays in view as the frame's height changes (a chart loads into the
-  * card later), and as `place` changes (rows are sorted again).
+ * Scrolls the selected row into view once its card is laid out, and again once rows are measured:
+ * thousands may be above it. It stays in view as the frame's height changes (a chart loads into the
+ * card later), and as `place` changes (rows are sorted again).
  */
 export function useChosenInSight(
   body: RefObject<Element | null>,

@@ -49,8 +49,8 @@ const isTag = (id: string): boolean => selectNewestTag(store.get(), id) !== unde
 /** The current alarms, beside the map: active, shelved and resolved. */
 export function AlarmPanel(): JSX.Element {
   const listed = useSelected(alarmList);
-    // As text: states that keep the order do not re-render.
-    const ids = useApp((state) =>
+  // As text: states that keep the order do not re-render.
+  const ids = useApp((state) =>
     worstNowFirst(state, listed.active)
       .map(({ alarm }) => alarm.id)
       .join('\n'),
@@ -279,8 +279,8 @@ function CauseHeading({
   const speech = useApp(selectSpeech);
   // While the order is held, alarms that left the group are still listed.
   const own = items.filter((item) => groupOf(item) === group);
-    // As text: states that do not change it do not re-render.
-    const facts = useApp((state) =>
+  // As text: states that do not change it do not re-render.
+  const facts = useApp((state) =>
     causeFacts(own, speech, (alarm) => selectNow(state, alarm)).join('\n'),
   );
   const [counts, current, worst] = facts.split('\n');

@@ -271,8 +271,8 @@ const SAME_PLACE_PX = 5;
 let last = { at: -Infinity, x: 0, y: 0 };
 
 /**
-  * Ignores the second click of a double click: it would undo the first, or hit whatever has moved
-  * there since.
+ * Ignores the second click of a double click: it would undo the first, or hit whatever has moved
+ * there since.
  */
 export const once =
   (act: () => void) =>

@@ -38,8 +38,8 @@ export function ListChoice(): JSX.Element {
 }
 
 /**
-  * "Alarms (7)": the number of active alarms, after the worst verdict's mark until all are acknowledged.
-  * While a past moment is shown, it says that the number is of now, if that is known.
+ * "Alarms (7)": the number of active alarms, after the worst verdict's mark until all are acknowledged.
+ * While a past moment is shown, it says that the number is of now, if that is known.
  */
 export function AlarmsLabel(): JSX.Element {
   const list = useSelected(alarmList);

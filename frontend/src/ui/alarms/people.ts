@@ -1,6 +1,6 @@
 /**
-  * Syncs acknowledgements and shelves with the bridge, in both directions. `own` mirrors them, so that
-  * the list, its sound and its counts see them. Without a signed-in user, `own` stays in this browser.
+ * Syncs acknowledgements and shelves with the bridge, in both directions. `own` mirrors them, so that
+ * the list, its sound and its counts see them. Without a signed-in user, `own` stays in this browser.
  */
 import { now, timeOfDay } from '../../clock';
 import { fetchSession, postNote, withdrawNote } from '../../contract/people';

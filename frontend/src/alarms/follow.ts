@@ -11,8 +11,8 @@ import type { ViewState } from '../store/view';
 const LEAD = 0.1;
 
 /**
- * A period that contains the moment and some time before it: the current one, else the last hour, else
- * the shortest one that reaches to now. All times in ROS seconds.
+ * A period that contains the moment and some time before it. The current one if it does, else the last
+ * hour, else the shortest one that reaches to now. All times in ROS seconds.
  */
 export function periodWith(
   period: Period,
@@ -30,7 +30,7 @@ export function periodWith(
   );
 }
 
-/** Shows the tag live; its card covers the list until it closes. */
+/** Shows the tag live; on a narrow screen, its card covers the list until closed. */
 export const showAlarm = (alarm: Alarm): void => {
   look(alarm, { moment: null, ...(alarm.tag_id === '' && { pane: 'map' }) });
 };

@@ -95,8 +95,8 @@ const byName = ({ alarm: a }: Item, { alarm: b }: Item): number =>
   compareIds(a.tag_id, b.tag_id) || (a.id < b.id ? -1 : 1);
 
 /**
- * Sorted by verdict and acknowledgement (together the integer part of `severity`), then by the size of
- * the cause's block, which stands at its first alarm's place. Within a block, as `inOrder`.
+ * Sorted by verdict and acknowledgement (the integer part of `severity`), then by size of the cause's
+ * block. A block takes the place of its first alarm. Within a block, as `inOrder`.
  */
 export function causesFirst(
   items: readonly Item[],

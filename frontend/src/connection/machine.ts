@@ -183,9 +183,9 @@ const CROWDED_MS = 10_000;
 export const TRY_AGAIN_LATER = 1013;
 
 /**
- * Pause before the next attempt, ms: doubled with each failure up to 15 s, then scaled by 0.5 to 1 at
- * random, so that a hundred screens do not all return to a restarted server at once. `failures` in a
- * row, from 1; `random` from 0 to 1.
+ * Pause before the next attempt, ms: doubled with each failure up to 15 s. A random factor of 0.5 to 1
+ * keeps a hundred screens from returning to a restarted server all at once. `failures` in a row, from
+ * 1; `random` from 0 to 1.
  */
 export function backoffMs(failures: number, random: number, closeCode: number | null): number {
   const doubled = FIRST_MS * 2 ** Math.min(failures - 1, 10);

@@ -153,8 +153,8 @@ export function EstimateReadout({
 export const NEAR_M = 2.5;
 
 /**
- * Number of tags with a reading within `NEAR_M`, without those that the estimate leaves out, and the
- * time of the oldest such reading; "never": there is none.
+ * Number of tags with a reading within `NEAR_M`, and the time of the oldest one; "never": there is none.
+ * Readings left out of the estimate do not count.
  */
 export function nearTo(
   point: MapPoint,

@@ -44,7 +44,7 @@ import { Reasons } from './Reasons';
 // Charts and their library load after the first paint.
 const CardChart = inTime(async () => (await import('../charts/CardChart')).default);
 
-/** Everything about one tag, over the map. */
+/** Everything about the selected tag. */
 export function TagCard({ tagId }: { tagId: string }): JSX.Element {
   const tag = useApp((state) => selectTag(state, tagId));
   const health = useApp((state) => selectHealth(state).byTag.get(tagId));

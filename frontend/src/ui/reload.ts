@@ -17,7 +17,7 @@ type Session = Pick<Storage, 'getItem' | 'setItem'>;
 
 /**
  * Records a failure and returns the pause before the reload, ms. It doubles with each failure in a
- * row, up to five minutes; half of it is random, so that a greenhouse's screens do not all reload at
+ * row, up to five minutes. Half of it is random, to keep a greenhouse's screens from reloading at
  * once. Without storage, every pause is the longest.
  *
  * @param random from 0 to 1

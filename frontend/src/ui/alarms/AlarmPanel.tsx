@@ -97,7 +97,7 @@ export function AlarmPanel(): JSX.Element {
             onKeyDown={(event) => {
               if (event.key !== 'Escape' || filter === '') return;
               setFilter('');
-              // Handled here: it must not close the card over the map too.
+              // Handled here: it must not close charts or the tag card too.
               event.preventDefault();
             }}
           />

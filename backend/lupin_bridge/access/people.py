@@ -60,6 +60,7 @@ class People:
         self._is_proxied = is_proxied
         self._accounts: Accounts | None = None
         self._inode = 0
+        self._has_file = _may_be_there(path)
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="accounts")
         self._waiting = 0
         self._attempts = RateLimit(ATTEMPTS_PER_MINUTE / 60.0, ATTEMPT_BURST)
@@ -72,7 +73,8 @@ class People:
     @property
     def has_file(self) -> bool:
         """Whether anybody can sign in here."""
-        return self._accounts is not None or self._path.exists()
+        self._has_file = self._has_file or _may_be_there(self._path)
+        return self._has_file
 
     def by_cookies(self, headers: Iterable[tuple[bytes, bytes]]) -> Person | None:
         """Whose session it is, by the cookies of a request.
@@ -258,6 +260,17 @@ class People:
                 self._accounts.close()
             self._accounts, self._inode = found, inode
         return self._accounts
+
+
+def _may_be_there(path: Path) -> bool:
+    """Where it cannot be looked for, nobody is let in."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def hashed(password: str) -> str:

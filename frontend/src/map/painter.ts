@@ -102,7 +102,6 @@ export class Painter {
   /** Where labels found their places when the map last came to rest, and at which scale. */
   #room: RoomAt | null = null;
   readonly #keptRoom = keeping<RoomAt>(equal);
-  #lastScene: Scene | null = null;
   #paintedScene: Scene | null = null;
   readonly #hatching = new Hatching();
   readonly #stillBuffer = new PanBuffer();
@@ -282,10 +281,9 @@ export class Painter {
   }
 
   readonly #sceneInput = keeping<SceneInput>();
-  readonly #scene = memoOne((input: SceneInput) => {
-    this.#lastScene = buildScene(input, this.#lastScene);
-    return this.#lastScene;
-  });
+  /** The very same where nothing looks otherwise: labels stay in their places then. */
+  readonly #keptScene = keeping<Scene>(equal);
+  readonly #scene = memoOne((input: SceneInput) => this.#keptScene(buildScene(input)));
 
   readonly #labels = memoLast(
     (

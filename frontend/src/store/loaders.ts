@@ -8,7 +8,7 @@ import { act, type AppState, keepFetched, onChange, receive, store } from './app
 import { withField, withLatest } from './twin';
 import { sourceOf } from './derived';
 import { failed, NOTHING, ready, type Wish } from './fetcher';
-import { boundsOfPins, fetchHeat, fieldResolution } from './heat';
+import { boxOfPins, fetchHeat, fieldResolution } from './heat';
 import { selectNewest } from './moment';
 import { DEFAULT_VIEW } from './view';
 
@@ -81,7 +81,7 @@ function fieldWish(state: AppState): Wish<Field> | null {
   const { sensor } = state.view;
   const { snapshot } = selectNewest(state);
   const base = baseKey(state);
-  if (base === null || !boundsOfPins(snapshot)) return null;
+  if (base === null || !boxOfPins(snapshot)) return null;
   const source = sourceOf(state);
   const isEstimate = source === 'estimate';
   const resolution = fieldResolution(snapshot);
@@ -99,7 +99,7 @@ function forgetOld(): void {
   const state = store.get();
   const { field, map, snapshot } = selectNewest(state);
   if (baseKey(state) === null) return;
-  if (field.value && !boundsOfPins(snapshot)) receive(withField(NOTHING));
+  if (field.value && !boxOfPins(snapshot)) receive(withField(NOTHING));
   if (map.value && !state.twin.lastStatus?.has_map) receive(withLatest({ map: NOTHING }));
 }
 

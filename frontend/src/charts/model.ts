@@ -128,8 +128,10 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
   return [toShown(sensor, low - room, unit), toShown(sensor, high + room, unit)];
 }
 
-/** A limit that is named at the picture's edge, and where its line lies. */
-/** Those of the end of the span: the ideal range's, of one out of sight the nearer, and critical ones in sight. */
+/**
+ * The limits that are named at the picture's edge, and where their lines lie. Those of the end of the
+ * span: the ideal range's, of one out of sight the nearer, and critical ones in sight.
+ */
 export function limitsOf(model: PlotModel) {
   const { ideal, critical } = model.bands.at(-1)?.ranges ?? {};
   const [low, high] = valueRange(model);

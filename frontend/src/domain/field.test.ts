@@ -157,7 +157,7 @@ describe('how sure a cell is', () => {
 
 describe('the field of an estimate', () => {
   const grid = { width: 3, height: 1, originX: 0, originY: 0, resolution: 1 };
-  const counts = { sdKnown: 1, sampleCount: 3, readingCount: 40 };
+  const counts = { sdKnown: 1, sampleCount: 3 };
 
   test('what is too unsure is not known, and has no say in the range', () => {
     const mean = Float32Array.of(20, 22, 90);

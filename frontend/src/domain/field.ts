@@ -190,7 +190,7 @@ export const errorShade =
 
 /** A field of an estimate as it came: what is too unsure is not known. Pure. */
 export function estimatedField(sensor: string, estimate: Estimate): Field {
-  const { mean, sd, sdKnown, readingCount, ...grid } = estimate;
+  const { mean, sd, sdKnown, ...grid } = estimate;
   const values = mean.map((value, cell) =>
     stepOf(sd[cell] ?? NaN, sdKnown) < NOT_KNOWN_STEP ? value : NaN,
   );
@@ -201,7 +201,7 @@ export function estimatedField(sensor: string, estimate: Estimate): Field {
     valueMin: known?.low ?? 0,
     valueMax: known?.high ?? 0,
     values,
-    sureness: { sd, sdKnown, readingCount },
+    sureness: { sd, sdKnown },
   };
 }
 

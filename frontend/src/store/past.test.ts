@@ -254,7 +254,7 @@ test('an estimate that is chosen goes the same way: with its state, the newest f
   const { at = 0 } = estimates.at(-1) ?? {};
   await answerAll(at);
   expect(shown()).toEqual([at, at, at]);
-  expect(selectShown(store.get()).field.value?.sureness?.readingCount).toBe(40);
+  expect(selectShown(store.get()).field.value?.sureness?.sdKnown).toBe(1);
   await pass(2_000);
   // How far off the nearest readings are is of no interest.
   expect(asked.some(({ path }) => path.endsWith('field/quality'))).toBe(false);

@@ -31,9 +31,7 @@ export function timelineOf(wire: WireTimeline, nowS: number) {
   };
 }
 
-/** The parts of a period that an answer does not vouch for: nobody may take them for silence. */
-
-/** A stretch of which something may have been received that the answer does not have. */
+/** A stretch of which something may have been received that the answer does not have; it is no silence. */
 export interface Missing extends Span {
   readonly why: 'not_kept' | 'not_recorded';
 }

@@ -3,10 +3,9 @@
 Lag: from the arrival of a scan at its twin until the archive has committed it. Journals, forwarders
 and PostgreSQL (fsync on) share this machine; forwarders are threads of a few processes, which run
 the code of `lupin-twin forward`. Growth: rows as forwarders write them, made by SQL, five sensors,
-a scan of each of 30 tags every two minutes. `--quick`: a few sites, few days.
+a scan of each of 30 tags every two minutes.
 """
 
-import argparse
 import json
 import random
 import sqlite3
@@ -128,14 +127,7 @@ def lag(sites: int) -> None:
         processes = []
         for n in range(PROCESSES):
             urls = [archive.url(name) for name in names[n::PROCESSES]]
-            words = [
-                sys.executable,
-                "-m",
-                "tests.bench.bench_fleet",
-                "--forward",
-                str(folder),
-                *urls,
-            ]
+            words = [sys.executable, "-m", "tests.bench.bench_fleet", str(folder), *urls]
             processes.append(
                 stack.enter_context(
                     subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
@@ -216,17 +208,16 @@ def measure(archive: Archive, sites: int, days: int) -> None:
     )
 
 
-def growth(*, quick: bool) -> None:
+def growth() -> None:
     """Print how the archive grows with days and with sites; of a sensor the least time too, ms."""
     print(
         "sites  days       scans       MB  B/scan  state ms: least, median  a sensor, all days",
         flush=True,
     )
-    few, many = (2, 5) if quick else (10, 100)
     with server(fsync=True) as postgresql, tempfile.TemporaryDirectory() as folder:
         for of_days in (True, False):
             archive, done = Archive(postgresql, "gh0"), 0
-            for count in (1, few, many):
+            for count in (1, 10, 100):
                 for number in range(done, count):
                     site = "gh0" if of_days else f"gh{number}"
                     if number == 0 or not of_days:
@@ -249,22 +240,11 @@ def begin(archive: Archive, site: str, journal: Path) -> None:
     assert Forwarder(own.url(), site, lambda: journal, lambda _: None).run(once=True)
 
 
-def main(arguments: Sequence[str] = ()) -> None:
+def main() -> None:
     """Print the figures."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--lag", action="store_true", help="this alone")
-    parser.add_argument("--growth", action="store_true", help="this alone")
-    parser.add_argument("--forward", nargs="+", help=argparse.SUPPRESS)
-    options = parser.parse_args(arguments)
-    if options.forward:
-        forward(Path(options.forward[0]), options.forward[1:])
-        return
-    if not options.growth:
-        lag(20 if options.quick else 200)
-    if not options.lag:
-        growth(quick=options.quick)
+    lag(200)
+    growth()
 
 
-if __name__ == "__main__":
-    main(sys.argv[1:])
+if __name__ == "__main__":  # in a process of its own
+    forward(Path(sys.argv[1]), sys.argv[2:])

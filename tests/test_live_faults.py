@@ -9,14 +9,13 @@ from lupin_bridge.stream.frames import STALE_AFTER_S
 from tests.support.domains import own_domain
 from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan
-from tests.support.processes import OFTEN, constants, limits, lupin_twin, twin_node
+from tests.support.processes import OFTEN, constants, faults, limits, lupin_twin, twin_node
 from tests.support.ros import Peer
-from tests.support.sabotage import sabotaged
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, Frame, Listener, listener, tag_ids
 
 # Errors are counted with each heartbeat.
-CLI = ("tests.support.limited", *constants(**{"lupin_bridge.feed.ros_thread:BEAT_PERIOD_S": 0.1}))
+BEATS = constants(**{"lupin_bridge.feed.ros_thread:BEAT_PERIOD_S": 0.1})
 FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5}
 
 
@@ -176,7 +175,8 @@ def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
 
 @pytest.fixture(scope="module")
 def sabotaged_serve() -> Iterator[Bridge]:
-    faults = (
+    failing = faults(
+        "--raise",
         "lupin_twin.core.state:TwinStore.record:boom-scan",
         "lupin_twin.core.state:TwinStore.record_inspection:boom-look",
         "lupin_twin.core.state:TwinStore.pin:boom-find",
@@ -186,11 +186,10 @@ def sabotaged_serve() -> Iterator[Bridge]:
         # Called for listeners, by the heartbeat and by the state's timer.
         "lupin_twin.core.state:TwinStore.snapshot:boom-snapshot:3",
     )
-    options = [part for fault in faults for part in ("--raise", fault)]
     with (
         own_domain() as domain,
         # The few states that are lost make no silence.
-        sabotaged(domain, options, *CLI, "serve", "--port", "0", *OFTEN) as process,
+        lupin_twin(domain, "serve", *failing, *BEATS, *OFTEN) as process,
         Peer(domain) as robot,
         attached(process, robot) as live,
     ):
@@ -200,16 +199,16 @@ def sabotaged_serve() -> Iterator[Bridge]:
 
 @pytest.fixture(scope="module")
 def sabotaged_web() -> Iterator[Bridge]:
-    faults = (
+    failing = faults(
+        "--raise",
         "lupin_twin.ros.convert:snapshot_of:boom-web",
         "lupin_twin.ros.convert:map_of:width=13",
     )
-    options = [part for fault in faults for part in ("--raise", fault)]
     with (
         own_domain() as domain,
         # The one state that is lost makes no silence.
         twin_node(domain, *OFTEN),
-        sabotaged(domain, options, *CLI, "web", "--port", "0") as process,
+        lupin_twin(domain, "web", *failing, *BEATS) as process,
         Peer(domain) as robot,
         attached(process, robot) as live,
     ):

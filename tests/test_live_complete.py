@@ -77,6 +77,9 @@ def test_with_a_full_disk_answers_say_up_to_when_they_are_complete(tmp_path: Pat
         serve.peer.observe(scan("a", {"co2": 999.0}))
         for live in lives:
             wait_for(lambda live=live: journal_of(live) == "failing", "the full disk")  # type: ignore[misc]
+            assert "\nlupin_journal_recording 0.0" in live.get("/metrics").text
+            # What is observed now is shown whatever the journal does.
+            live.tag("a", lambda tag: tag["readings"][0]["value"] == 999.0)
         at_s = wait_for(lambda: at if (at := now_s(serve)) > before_s + 3.0 else None, "3 s later")
         assert at_s is not None
         for live in lives:

@@ -74,6 +74,14 @@ def test_two_houses_in_one_domain_do_not_mix(domain: int) -> None:
         theirs, field = answers(second, "two")
         assert (theirs, field["value_max"]) == (["two"], 900.0)
         assert viewed(web, "/gh1") == ("one", [0, 0, 0, 0])
+        # What a twin dropped its own `web` knows, from `/diagnostics`.
+        robot.publish("/gh1/floranova/observations", scan("nowhere", frame_id="odom"))
+        with httpx.Client(base_url=url_of(web), timeout=PATIENCE_S) as http:
+            drops = wait_for(lambda: http.get("/readyz").json()["drops"], "what was dropped")
+            assert [(drop["reason"], drop["count"]) for drop in drops] == [("frame", 1)]
+            metrics = http.get("/metrics").text
+        assert '\nlupin_dropped_total{reason="frame"} 1.0' in metrics
+        assert '\nlupin_web_dropped_total{reason="frame"} 0.0' in metrics
         # What it hears and tells is the first that a twin says.
         first.wait_for_output("/gh1/lupin_twin in ROS domain")
         for name in ("/gh1/floranova/observations", "/gh1/perception/discovered_tags", "/gh1/map"):

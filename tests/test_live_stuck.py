@@ -181,19 +181,6 @@ def test_gone_after_the_timeout_is_a_request_that_comes_byte_by_byte(
         wait_reading(healthy, lambda: all(map(is_removed, every)), "their end")
 
 
-def test_gone_after_the_timeout_is_who_asks_again_and_again_and_does_not_read(
-    server: Server, healthy: Listener
-) -> None:
-    # A socket and its buffers hold one answer of 60 kB, and not twenty. It is kept: who asks while
-    # it is made is refused, and twenty refusals fit.
-    document = "/openapi.json"
-    wait_for(lambda: httpx.get(url(server) + document, **PATIENT).is_success, "the document")
-    with gone_in_the_end(server, healthy) as stack:
-        paths = [document] * 20
-        deaf = [stack.enter_context(deaf_client(url(server), *paths)) for _ in range(CLIENTS)]
-        wait_reading(healthy, lambda: all(map(is_over, deaf)), "the end of their connections")
-
-
 def wait_for_the_answer(client: socket.socket) -> None:
     """Wait until the WebSocket is there; a client must not send before that."""
     assert client.recv(1) == b"H"

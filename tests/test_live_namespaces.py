@@ -4,6 +4,7 @@ import base64
 
 import httpx
 
+from lupin_twin.core.interfaces import SERVICES
 from tests.bridge.routes.test_foxglove import play
 from tests.support.foxglove import reader_of
 from tests.support.messages import look, occupancy_grid, scan
@@ -91,6 +92,8 @@ def test_two_houses_in_one_domain_do_not_mix(domain: int) -> None:
         graph = dict(robot.node.get_topic_names_and_types())
         assert {"/gh1/twin/state", "/gh1/twin/times", "/gh2/twin/state"} <= graph.keys()
         assert "/twin/state" not in graph
+        services = dict(robot.node.get_service_names_and_types())
+        assert {f"/gh1/{service.name}" for service in SERVICES} <= services.keys()
 
 
 def test_the_demo_below_a_namespace_takes_its_patrol_along(domain: int) -> None:

@@ -6,6 +6,7 @@ import signal
 import socket
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -125,7 +126,7 @@ def test_a_callback_that_hangs_is_told_to_health_checks_and_ends_the_watchdogs_w
     domain: int, listening: Manager
 ) -> None:
     hangs = faults("--hang", "lupin_twin.core.state:TwinStore.record:hang me")
-    env = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "1500000"}
+    env: Any = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "1500000"}
     soon = constants(**{"lupin_bridge.feed.source:STUCK_AFTER_S": 2.0})
     with lupin_twin(domain, "serve", *hangs, *soon, **env) as process, Peer(domain) as peer:
         url = url_of(process)

@@ -77,14 +77,8 @@ def test_a_tag_that_a_lost_robot_pinned_far_away_is_left_out_and_named() -> None
     assert (found["origin_x"], found["width"], found["value_min"]) == (-1.5, 40, 400.0)
     assert written.headers["X-Field-Far-Off-Count"] == "1"
     assert body(field_of(lost, asked()))["far_off_tags"] == ["lost"]
-    box: dict[str, Any] = {
-        "bbox_min_x": 4_999,
-        "bbox_min_y": -1,
-        "bbox_max_x": 5_001,
-        "bbox_max_y": 1,
-    }
-    of_its_own = body(field_of(lost, asked(resolution=0.5, **box), JSON))
-    assert set(of_its_own["values"]) == {40.0}
+    there = asked(resolution=0.5, bbox_min_x=4_999, bbox_min_y=-1, bbox_max_x=5_001, bbox_max_y=1)
+    assert set(body(field_of(lost, there, JSON))["values"]) == {40.0}
 
 
 def test_a_broken_sensor_is_no_part_of_a_field() -> None:

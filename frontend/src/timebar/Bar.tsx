@@ -122,8 +122,9 @@ function timesOf(axis: Axis, ticks: readonly Tick[]) {
   let free = 0;
   return ticks.map((tick) => {
     const x = Math.round(xOf(axis, tick.at)) + 0.5;
-    // The date stands beside the first time of a day.
-    const text = tick.text.split('\n').reverse().join(' ');
+    // Before the first time of a day its date, behind the first date of a year that.
+    const parts = tick.text.split('\n');
+    const text = (tick.text.includes(':') ? parts.reverse() : parts).join(' ');
     const width = text.length * letterPx;
     const left = Math.min(axis.width - width, Math.max(0, x - width / 2));
     if (left < free) return { at: tick.at, x, text, left: null };

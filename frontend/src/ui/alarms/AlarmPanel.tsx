@@ -301,7 +301,7 @@ function CauseHeading({
         )}
         <span className="alarm-text">
           <span>
-            <strong>{cause}</strong> ·{' '}
+            <strong>{cause}</strong>{' '}
             <span className="alarm-many">
               {S.alarmCount(own.length)} <Icon name="chevron" />
             </span>

@@ -43,11 +43,14 @@ test('of many of one cause five, then a hundred more at a time', () => {
   expect(group('active')).toHaveLength(150);
 });
 
-test('many of one cause that are resolved have nothing to do, and no time in common', () => {
-  tell(...Array.from({ length: 5 }, (_, at) => alarm(`a${at}`, { tag_id: `${at}`, cleared: 950 })));
+test('many of one cause that are resolved have nothing to do, and say when the last was', () => {
+  tell(
+    ...Array.from({ length: 5 }, (_, at) => alarm(`a${at}`, { tag_id: `${at}`, cleared: 950 + at })),
+  );
   fireEvent.click(screen.getByText('Resolved in the last 24 h (5)'));
   const heading = screen.getByRole('button', { name: /Temperature too low 5 alarms/ });
   expect(heading.querySelector('.alarm-do, [data-fact=since]')).toBeNull();
+  expect(heading.querySelector('small')?.textContent).toBe('resolved sim 00:15:54');
   // The place of what is to press is kept, for the columns.
   expect(heading.parentElement?.querySelector('.alarm-tools')?.children).toHaveLength(0);
 });

@@ -66,6 +66,11 @@ export function AlarmTimes({
   );
 }
 
+export function ResolvedNote({ alarm }: { alarm: Alarm }): JSX.Element {
+  const note = useTicking((at) => timesOf(alarm, rosNow(store.get(), at), true).note);
+  return <small className="faint">{note}</small>;
+}
+
 /** How it is now, and how it was at worst: a column each. */
 export function AlarmFacts({
   item: { alarm, verdict },

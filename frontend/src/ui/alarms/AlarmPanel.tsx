@@ -34,7 +34,7 @@ import { S } from '../../strings';
 import { Disclosure, Icon, Select } from '../../widgets/controls';
 import { HealthMark } from '../HealthMark';
 import { useChosenInSight, usePaper } from '../visibleRows';
-import { AlarmTimes } from './AlarmFacts';
+import { AlarmTimes, ResolvedNote } from './AlarmFacts';
 import { AlarmNotes, AlarmsWait, DoneLine, TellMe, WhoseWord } from './AlarmNotes';
 import { Acknowledge, AlarmRow, once } from './AlarmRow';
 import { ALARMS_ID, ListChoice } from './ListChoice';
@@ -297,7 +297,11 @@ function CauseHeading({
         {oldest ? (
           <AlarmTimes alarm={oldest} first={null} verdict={verdict} />
         ) : (
-          <HealthMark verdict={verdict} />
+          <span className="alarm-times">
+            <HealthMark verdict={verdict} />
+            {/* What was resolved last stands first. */}
+            {shown[0] && <ResolvedNote alarm={shown[0].alarm} />}
+          </span>
         )}
         <span className="alarm-text">
           <span>

@@ -45,7 +45,9 @@ test('of many of one cause five, then a hundred more at a time', () => {
 
 test('many of one cause that are resolved have nothing to do, and say when the last was', () => {
   tell(
-    ...Array.from({ length: 5 }, (_, at) => alarm(`a${at}`, { tag_id: `${at}`, cleared: 950 + at })),
+    ...Array.from({ length: 5 }, (_, at) =>
+      alarm(`a${at}`, { tag_id: `${at}`, cleared: 950 + at }),
+    ),
   );
   fireEvent.click(screen.getByText('Resolved in the last 24 h (5)'));
   const heading = screen.getByRole('button', { name: /Temperature too low 5 alarms/ });

@@ -1,6 +1,7 @@
 import { act, fireEvent, render, screen } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test } from 'vitest';
 
+import { acknowledge, NOTHING_KEPT, own } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
 import type { Alarm } from '../../contract/types';
 import { alarm, tellAlarms } from '../../testing/alarms';
@@ -10,6 +11,7 @@ import { AlarmPanel } from './AlarmPanel';
 
 let stop: () => void;
 beforeEach(() => {
+  own.set(NOTHING_KEPT);
   showTags([wireTag()]);
   stop = startAlarms();
   render(<AlarmPanel />);
@@ -41,6 +43,26 @@ test('of many of one cause five, then a hundred more at a time', () => {
   expect(group('active')).toHaveLength(105);
   fireEvent.click(screen.getByText('+ 45 more'));
   expect(group('active')).toHaveLength(150);
+});
+
+test('many of one cause that one person has acknowledged say who, and when the last was', () => {
+  const saidBy = (...names: readonly string[]): void => {
+    const list = names.map((acknowledged_by, at) => {
+      const acknowledged_at = { sec: 1_000 + at, nanosec: 0 };
+      return alarm(`a${at}`, { tag_id: `${at}`, acknowledged_by, acknowledged_at });
+    });
+    tell(...list);
+    act(() => {
+      const items = list.map((each) => ({ alarm: each, verdict: each.reason.verdict }));
+      own.set(acknowledge(NOTHING_KEPT, items, 0));
+    });
+  };
+  const status = (): string | null | undefined =>
+    document.querySelector('.alarm-status')?.textContent;
+  saidBy('anna', 'anna', 'anna', 'anna', 'anna');
+  expect(status()).toBe('acknowledged by anna, sim 00:16:44');
+  saidBy('anna', 'anna', 'anna', 'anna', 'ben');
+  expect(status()).toBe('acknowledged');
 });
 
 test('many of one cause that are resolved have nothing to do, and say when the last was', () => {

@@ -25,6 +25,8 @@ import { acknowledgeAlarms } from '../../alarms/own';
 import { selectNow, selectSpeech, todoNow, worstNow, worstNowFirst } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { timeOfDay } from '../../clock';
+import type { Alarm } from '../../contract/types';
+import { secondsOf } from '../../domain/time';
 import { saveCsv } from '../../export/save';
 import { store, useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
@@ -38,7 +40,7 @@ import { AlarmTimes, ResolvedNote } from './AlarmFacts';
 import { AlarmNotes, AlarmsWait, DoneLine, TellMe, WhoseWord } from './AlarmNotes';
 import { Acknowledge, AlarmRow, once } from './AlarmRow';
 import { ALARMS_ID, ListChoice } from './ListChoice';
-import { useIsRefused } from './people';
+import { useIsRefused, useWhoAcknowledged } from './people';
 
 /** Rows of one cause at first; of others, and with each wish for more, as many as a page draws at once. */
 const MOST_OF_CAUSE = 5;
@@ -287,6 +289,7 @@ function CauseHeading({
   const shown = own.length > 0 ? own : items;
   const verdict = useApp((state) => worstNow(state, shown));
   const todo = useApp((state) => todoNow(state, shown));
+  const who = useWhoAcknowledged(lastOfOne(own.map(({ alarm }) => alarm)));
   if (!verdict) return null;
   const waiting = unacknowledged(own);
   const oldest = group === 'resolved' ? undefined : oldestOf(shown);
@@ -324,7 +327,11 @@ function CauseHeading({
             label={S.alarmAcknowledgeOf(cause)}
             text={S.alarmAcknowledgeAll(waiting.length)}
             status={
-              waiting.length > 0 ? null : own.length > 0 ? S.healthAcknowledged : S.alarmCount(0)
+              waiting.length > 0
+                ? null
+                : own.length > 0
+                  ? (who ?? S.healthAcknowledged)
+                  : S.alarmCount(0)
             }
             onAcknowledge={() => {
               acknowledgeAlarms(waiting);
@@ -334,6 +341,13 @@ function CauseHeading({
       </div>
     </div>
   );
+}
+
+/** Of alarms that one person has acknowledged, the last; null: they are not. */
+function lastOfOne(alarms: readonly Alarm[]): Alarm | null {
+  const at = ({ acknowledged_at: time }: Alarm): number => (time ? secondsOf(time) : Infinity);
+  const [last = null] = [...alarms].sort((a, b) => at(b) - at(a));
+  return alarms.every((alarm) => alarm.acknowledged_by === last?.acknowledged_by) ? last : null;
 }
 
 interface HeldOrder extends HeldList {

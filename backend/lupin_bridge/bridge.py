@@ -376,12 +376,11 @@ class Bridge:
         status = self.status
         if not status.is_news_after(self._published):
             return
-        is_one = status.is_live and status.update.twin_count <= 1
-        is_good = is_one or status.reason == "shutting_down"
-        first = self._published is None
-        if (first and not is_good) or (
-            self._published and status.has_more_detail_than(self._published)
-        ):
+        is_good = status.is_live and status.update.twin_count <= 1
+        before = self._published
+        # A fleet closes pages that nobody reads any more: nothing to log.
+        is_end = status.reason == "shutting_down"
+        if not is_end and (status.has_more_detail_than(before) if before else not is_good):
             # A fleet has many bridges.
             message = f"site {self.site}: {status.message}" if self.site else status.message
             log.log(logging.INFO if is_good else logging.WARNING, "%s", message)

@@ -124,6 +124,14 @@ def test_on_a_phone_a_wide_table_scrolls_and_the_page_does_not(
         assert left[0] == left[2] < left[1] == left[3], "two in a row"
 
 
+def test_on_a_phone_an_alarm_has_room(house: Bridge, browser: Browser) -> None:
+    with browser.new_context(viewport={"width": 390, "height": 844}) as context:
+        page = context.new_page()
+        page.goto(f"{house.url}/api/report.html?lang=nl")
+        hidden = "table => table.scrollWidth - table.clientWidth"
+        assert [it.evaluate(hidden) for it in page.locator("table.alarms").all()] == [0]
+
+
 def test_in_the_dark_it_is_light(troubled: Bridge, browser: Browser) -> None:
     with browser.new_context(color_scheme="dark") as context:
         page = context.new_page()

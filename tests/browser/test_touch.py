@@ -89,7 +89,11 @@ def test_most_of_the_height_is_for_what_is_looked_at(phone: Hmi) -> None:
     assert frame + card >= tall
 
 
-def test_charts_of_several_tags_have_one_line_of_tools_and_the_whole_width(phone: Hmi) -> None:
+def test_charts_have_one_line_of_tools_and_the_whole_width(phone: Hmi) -> None:
+    phone.go("chart.tag=10&tag=10", "?lang=nl")
+    expect(phone.page.get_by_role("radio", name="Meetpunt 10")).to_be_checked()
+    [head] = places(phone, ".chart-view > header")
+    assert head.bottom - head.top < 60
     phone.turn("chart.sensor=1&chart.sensor=10&sensor=dew_point")
     expect(phone.page.locator(".chart-tags li")).to_have_count(2)
     expect(phone.page.locator(".u-over")).to_be_visible()

@@ -270,7 +270,7 @@ class AccessControl:
         scope = {**scope, "headers": [line for line in scope["headers"] if line[0] != b"cookie"]}
         if person is not None:
             scope["state"] = {**scope.get("state", {}), PERSON_KEY: person}
-        if person is None or person == SHARED or scope["type"] == "http":
+        if person == SHARED or scope["type"] == "http":
             await self._app(scope, receive, send)
             return
         looking = asyncio.create_task(self._end_with(person, scope["state"][CONNECTION_KEY]))
@@ -279,13 +279,16 @@ class AccessControl:
         finally:
             looking.cancel()
 
-    async def _end_with(self, person: Person, connection: Connection) -> None:
+    async def _end_with(self, person: Person | None, connection: Connection) -> None:
+        """Close the connection when the session ends; without a person, at the first account."""
         people = self._access.people
+        if people is None:
+            return
         try:
-            while people is not None and people.still(person):
+            while not people.is_on if person is None else people.still(person):
                 await asyncio.sleep(_POLL_S)
         except AccountError as error:
-            log.warning("%s: the open connections of %s are closed", error, person.name)
+            log.warning("%s: the open connections of %s are closed", error, person and person.name)
         connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")
 
     def _check_credentials(self, request: HTTPConnection) -> Response | Person | None:

@@ -61,6 +61,7 @@ class People:
         self._is_proxied = is_proxied
         self._accounts: Accounts | None = None
         self._inode = 0
+        self._has_file = _may_be_there(path)
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="accounts")
         self._waiting = 0
         self._attempts = RateLimit(ATTEMPTS_PER_MINUTE / 60.0, ATTEMPT_BURST)
@@ -73,7 +74,8 @@ class People:
     @property
     def has_file(self) -> bool:
         """Whether there is an accounts file, so that people can sign in."""
-        return self._accounts is not None or self._path.exists()
+        self._has_file = self._has_file or _may_be_there(self._path)
+        return self._has_file
 
     def by_cookies(self, headers: Iterable[tuple[bytes, bytes]]) -> Person | None:
         """The person of a session, by the cookies of a request; None: none is valid.
@@ -259,6 +261,17 @@ class People:
                 self._accounts.close()
             self._accounts, self._inode = found, inode
         return self._accounts
+
+
+def _may_be_there(path: Path) -> bool:
+    """Whether there may be a file; if that cannot be seen, nobody is let in without a right."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def hashed(password: str) -> str:

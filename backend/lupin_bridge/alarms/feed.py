@@ -261,7 +261,10 @@ class AlarmFeed:
                     log.info("the alarms stay unchanged: %s", error)
                 why = str(error)
                 self._ask_again(RETRY_S)
-                await self._publish_silence(loop.time() - answered_s)
+                try:
+                    await self._publish_silence(loop.time() - answered_s)
+                except Exception:  # as above
+                    log.exception("alarms are as they were, and are worked out anew")
             else:
                 why, answered_s = "", loop.time()
             await asyncio.sleep(REST_S)

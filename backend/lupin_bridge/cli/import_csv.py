@@ -169,19 +169,17 @@ def columns_of(content: Any) -> Columns:
 
 
 def counted(file: TextIO, report_every: Callable[[int], None]) -> Iterator[str]:
-    """Yield the lines of a file; reports now and then how many characters were read.
+    """Yield the lines of a file; reports now and then how many bytes were read.
 
     Raises:
         csv.Error: a line is too long.
 
     """
-    at = 0
     for number, line in enumerate(iter(partial(file.readline, _MAX_LINE), "")):
         if len(line) == _MAX_LINE:
             raise csv.Error(f"line {number + 1} has {_MAX_LINE:,} characters or more")
-        at += len(line)
         if number % _REPORT_EVERY == 0:
-            report_every(at)
+            report_every(file.buffer.tell())
         # InfluxDB's annotations
         yield "\n" if line.startswith("#") else line
 

@@ -172,7 +172,7 @@ def chosen(text: str | None, known: Mapping[str, object]) -> list[str]:
     names = list(dict.fromkeys(text.split(",")))
     for name in names:
         if name not in known:
-            why = f"there is no site {name[:64]!r} in the archive ({len(known)} others are)"
+            why = f"there is no site {name[:64]!r} in the archive, which has {len(known)}"
             raise NotFound(why)
     return names
 

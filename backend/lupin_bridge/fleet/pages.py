@@ -102,7 +102,7 @@ class SitePages:
         if opened is None:
             if name not in self.sites():
                 known = len(self.sites())
-                return f"there is no site {name[:64]!r} in the archive ({known} others are)"
+                return f"there is no site {name[:64]!r} in the archive, which has {known}"
             if len(self._open) >= self._limit:
                 least = self._least_needed(client)
                 if least is None:

@@ -262,8 +262,6 @@ class Mqtt:
     def start(self, source: Source) -> None:
         """Publish from now on."""
         self._look = source.seen
-        self._see()
-        self._count()
         self._task = asyncio.create_task(self._run(), name="mqtt")
 
     @property
@@ -292,6 +290,9 @@ class Mqtt:
     async def _run(self) -> None:
         while True:
             try:
+                # What changes without a connection is seen to wait.
+                self._see()
+                self._count()
                 await self._one_connection()
             except MqttError as error:
                 self._failed(str(error))
@@ -427,9 +428,6 @@ class Mqtt:
         problem = self.condition.detail
         if problem != before:
             log.warning("MQTT: %s; it will be retried", problem)
-        # So that changes meanwhile count as waiting.
-        self._see()
-        self._count()
 
 
 def _take_no_more_than(client: Client, most: int) -> None:

@@ -7,6 +7,7 @@ import { wireTag } from '../testing/tags';
 import {
   acknowledgeAlarms,
   done,
+  FORGET_MS,
   NOTHING_KEPT,
   own,
   shelveAlarm,
@@ -107,6 +108,19 @@ test('acknowledged holds after a reload, and what is done here is no news', () =
   expect(told).toEqual([]);
 });
 
+test('acknowledged long ago, a lasting alarm stays so while the list is not there yet', () => {
+  tellAlarms(alarm('a'));
+  acknowledgeAlarms([item('a')]);
+  stop();
+  vi.setSystemTime(Date.now() + FORGET_MS);
+  own.set(NOTHING_KEPT);
+  receive({ alarms: null });
+  start();
+  receive({ alarms: alarms([], { source: 'starting', since: null }) });
+  tellAlarms(alarm('a'));
+  expect(ids()).toEqual([]);
+});
+
 test('what was shelved comes back by itself when its time is over, and is told', () => {
   tellAlarms(alarm('a'));
   shelveAlarm(item('a'), 15, 'x');
@@ -130,7 +144,7 @@ test('each action can be undone for a while; another tab’s word ends that', ()
   shelveAlarm(item('b'), 15, 'x');
   expect(last()).toEqual(['shelve', 1]);
   undo();
-  // The last alone: what was done before it stands.
+  // Only the last action is undone; earlier ones stand.
   expect(ids()).toEqual(['b']);
   unacknowledgeAlarm(item('a').alarm);
   expect(ids()).toEqual(['a', 'b']);

@@ -20,10 +20,6 @@ beforeAll(() => loadParts());
 
 beforeEach(() => {
   vi.stubGlobal('fetch', () => Promise.reject(new Error('no server')));
-  Object.defineProperty(document, 'fonts', {
-    configurable: true,
-    value: new EventTarget(),
-  });
   showTags(
     [
       wireTag({ tag_id: '1', readings: readings({ temperature: 20 }) }),
@@ -61,16 +57,15 @@ describe('page', () => {
     const style = document.head.appendChild(document.createElement('style'));
     style.textContent = readFileSync(join(import.meta.dirname, '../styles/frozen.css'), 'utf8');
     render(<App kiosk={false} />);
-    const list = app().appendChild(document.createElement('ul'));
-    list.className = 'alarms';
-    const row = list.appendChild(document.createElement('li'));
+    const row = app().appendChild(document.createElement('button'));
+    row.className = 'alarm-go';
     const looks: string[] = [];
     for (const change of [goLost, goBack, goLive]) {
       flush(change);
       looks.push(getComputedStyle(row).filter);
     }
     expect(looks).toEqual(['grayscale(1)', 'grayscale(1)', '']);
-    list.remove();
+    row.remove();
     style.remove();
   });
 
@@ -89,7 +84,7 @@ describe('page', () => {
     const sensors = screen.getByRole('group', { name: 'Sensor' });
     fireEvent.click(within(sensors).getByRole('radio', { name: /CO₂/ }));
     expect(store.get().view.sensor).toBe('co2');
-    // Nobody measures it.
+    // No tag measures humidity.
     expect(within(sensors).queryByRole('radio', { name: /Humidity/ })).toBeNull();
   });
 

@@ -209,7 +209,7 @@ def test_a_broken_new_pair_is_told_once_and_the_old_one_goes_on(tmp_path: Path) 
                 assert is_trusted(live, ours.trust)
             live.process.wait_for_output(said)
             assert live.process.output.count(said) == 1
-        assert live.process.output.count("is refused, the old one goes on: --tls-key") == 3
+        assert live.process.output.count("is refused, the old one stays: --tls-key") == 3
         put(ours.key, key)
         live.process.wait_for_output("new connections use the renewed TLS certificate")
         assert is_trusted(live, ours.trust)

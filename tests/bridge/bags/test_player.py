@@ -96,7 +96,7 @@ def test_a_clock_that_tells_no_time_is_named_with_its_file(tmp_path: Path) -> No
     path.write_bytes(path.read_bytes().replace(told, b"\xff\xff" + told[2:]))
     with (
         Recording([path]) as recording,
-        pytest.raises(RecordingError, match=f"^cannot read {path}: a message of /clock is no "),
+        pytest.raises(RecordingError, match=f"^cannot read {path}: a message on /clock is not a "),
     ):
         Player(recording, None, parser().parse_args([str(path), "--start", "1"]))  # type: ignore[arg-type]  # it comes to no node
 

@@ -263,7 +263,7 @@ def test_a_journal_of_a_simulation_is_left_alone(importing: Import) -> None:
     kept(importing.journal, [scan("A", 5 * SECOND)], Clock(5 * SECOND, NOW, is_simulated=True))
     done = importing.given(WIDE, ROWS).run("--write")
     assert done.returncode == 1
-    assert "is a simulation.s: import into another one" in done.stderr
+    assert "is a simulation's: import into another one" in done.stderr
 
 
 def test_the_page_has_what_was_imported(domain: int, importing: Import) -> None:

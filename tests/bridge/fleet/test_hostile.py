@@ -54,6 +54,7 @@ def page(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iter
         wait_for(lambda: {*running.sites()} == {*SITES}, "all sites")
         yield running
         assert "Traceback" not in running.process.output
+        assert "shutting down" not in running.process.output
         assert running.process.exit_code is None
 
 
@@ -261,7 +262,7 @@ def test_rows_that_cannot_be_read_are_said_on_their_sites_page(
         wait_for(lambda: "cannot be read" in problem(), "the site's page to say so")
         looks = running.metric("lupin_fleet_looks")
         wait_for(lambda: running.metric("lupin_fleet_looks") > looks + 1, "it to be tried again")
-        assert running.process.output.count("site gh1 is as it was: rows of the site") == 1
+        assert running.process.output.count("site gh1 is unchanged: rows of the site") == 1
         # What was last known stays.
         assert len(running.http.get("/sites/gh1/api/state").json()["tags"]) == 5
         assert running.http.get("/readyz").status_code == 200

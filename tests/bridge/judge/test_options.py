@@ -40,7 +40,7 @@ def test_a_file_that_is_not_there_or_no_text_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match="Is a directory"):
         criteria(sensors=str(tmp_path))
     (tmp_path / "latin").write_bytes(b'{"\xb0C": 1}')
-    with pytest.raises(SettingError, match=r"latin is no text \(UTF-8\)"):
+    with pytest.raises(SettingError, match=r"latin is not UTF-8 text"):
         criteria(sensors=str(tmp_path / "latin"))
 
 

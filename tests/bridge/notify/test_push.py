@@ -183,7 +183,7 @@ async def test_while_the_accounts_cannot_be_read_a_message_waits(
         on.subscribe(on.phone("one"))
         accounts.rename(aside)
         on.board.show([alarm("7")])
-        await until(lambda: "was not taken: the file of accounts" in caplog.text, "why")
+        await until(lambda: "was not accepted: the file of accounts" in caplog.text, "why")
         aside.rename(accounts)
         await until(lambda: on.service.posted, "the first attempt")
         await until(lambda: "will be retried: the file of accounts" in caplog.text, "why")

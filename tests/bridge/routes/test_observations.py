@@ -180,7 +180,7 @@ def test_a_writer_posts_and_does_nothing_else(live: Bridge) -> None:
     for path in ("/", "/api/state", "/api/session", "/api/audit", "/metrics", "/docs"):
         answer = live.get(path, writer)
         assert answer.status_code == 403, path
-        assert "esp is a writer: it posts to /api/observations, and no more" in answer.text
+        assert "esp is a writer: it may only post to /api/observations" in answer.text
     note = {"kind": "comment", "subject": "site", "text": "x"}
     assert live.http.post("/api/notes", json=note, headers={**writer, **OWN}).status_code == 403
     assert live.http.post("/api/signin", headers={**writer, **OWN}).status_code == 403

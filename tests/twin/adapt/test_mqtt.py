@@ -150,7 +150,11 @@ def test_who_the_broker_is(tmp_path: Path) -> None:
         ("A/j", b"[1]", "it has none of t"),
         ("A/j", b'{"t": true}', "t is True, expected a number"),
         ("A/j", b'{"t": {}}', "t is {}, expected a number"),
-        ("A/j", b'{"t": 1, "at": "yesterday"}', "its time is 'yesterday': the time is no ISO 8601"),
+        (
+            "A/j",
+            b'{"t": 1, "at": "yesterday"}',
+            "its time is 'yesterday': the time is neither ISO 8601",
+        ),
         ("A/j", b'{"t": 1, "at": -5}', "its time is -5"),
         ("A/j", b'{"t": 1, "at": 1e999}', "its time is inf"),
         ("A/j", b'{"t": 1, "at": true}', "its time is True"),

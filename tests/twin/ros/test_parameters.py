@@ -111,7 +111,9 @@ def test_complaints_name_the_parameter(domain: int) -> None:
     ):
         pass
     with (
-        pytest.raises(ParameterError, match="parameter start_type_description_service is no bool"),
+        pytest.raises(
+            ParameterError, match="parameter start_type_description_service is not a bool"
+        ),
         naming_own_parameters(),
         node_with(domain, "start_type_description_service:=5"),
     ):

@@ -1,6 +1,7 @@
 import { act, fireEvent, render, screen } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test } from 'vitest';
 
+import { acknowledge, NOTHING_KEPT, own } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
 import type { Alarm } from '../../contract/types';
 import { alarm, tellAlarms } from '../../testing/alarms';
@@ -10,6 +11,7 @@ import { AlarmPanel } from './AlarmPanel';
 
 let stop: () => void;
 beforeEach(() => {
+  own.set(NOTHING_KEPT);
   showTags([wireTag()]);
   stop = startAlarms();
   render(<AlarmPanel />);
@@ -29,7 +31,7 @@ const group = (name: string): Element[] => [
 
 test('of many of one cause five, then a hundred more at a time', () => {
   tell(...Array.from({ length: 150 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) })));
-  // By their text: to look for a role among hundreds of buttons takes seconds here.
+  // By text: a role query over hundreds of buttons takes seconds.
   expect(screen.getByText('Active (150)')).toBeTruthy();
   expect(group('active')).toHaveLength(0);
   fireEvent.click(screen.getByText(/150 alarms/));
@@ -43,11 +45,36 @@ test('of many of one cause five, then a hundred more at a time', () => {
   expect(group('active')).toHaveLength(150);
 });
 
-test('many of one cause that are resolved have nothing to do, and no time in common', () => {
-  tell(...Array.from({ length: 5 }, (_, at) => alarm(`a${at}`, { tag_id: `${at}`, cleared: 950 })));
+test('many of one cause that one person has acknowledged say who, and when the last was', () => {
+  const saidBy = (...names: readonly string[]): void => {
+    const list = names.map((acknowledged_by, at) => {
+      const acknowledged_at = { sec: 1_000 + at, nanosec: 0 };
+      return alarm(`a${at}`, { tag_id: `${at}`, acknowledged_by, acknowledged_at });
+    });
+    tell(...list);
+    act(() => {
+      const items = list.map((each) => ({ alarm: each, verdict: each.reason.verdict }));
+      own.set(acknowledge(NOTHING_KEPT, items, 0));
+    });
+  };
+  const status = (): string | null | undefined =>
+    document.querySelector('.alarm-status')?.textContent;
+  saidBy('anna', 'anna', 'anna', 'anna', 'anna');
+  expect(status()).toBe('acknowledged by anna, sim 00:16:44');
+  saidBy('anna', 'anna', 'anna', 'anna', 'ben');
+  expect(status()).toBe('acknowledged');
+});
+
+test('many of one cause that are resolved have nothing to do, and say when the last was', () => {
+  tell(
+    ...Array.from({ length: 5 }, (_, at) =>
+      alarm(`a${at}`, { tag_id: `${at}`, cleared: 950 + at }),
+    ),
+  );
   fireEvent.click(screen.getByText('Resolved in the last 24 h (5)'));
-  const heading = screen.getByRole('button', { name: /Temperature too low · 5 alarms/ });
+  const heading = screen.getByRole('button', { name: /Temperature too low 5 alarms/ });
   expect(heading.querySelector('.alarm-do, [data-fact=since]')).toBeNull();
-  // The place of what is to press is kept, for the columns.
+  expect(heading.querySelector('small')?.textContent).toBe('resolved sim 00:15:54');
+  // The empty tools cell stays, to align the columns.
   expect(heading.parentElement?.querySelector('.alarm-tools')?.children).toHaveLength(0);
 });

@@ -82,7 +82,7 @@ def _run(config: Config) -> int:
 
     node = AdaptNode(config)
     node.get_logger().info(
-        f"adapting {len(config.sensors)} sensors for {len(config.tags)} tags; "
+        f"adapting sensors for {len(config.tags)} tags; "
         "/diagnostics shows what arrives and what is dropped"
     )
     return run_until_signal(node)

@@ -267,7 +267,7 @@ def _number(name: str, text: str, column: Value) -> float:
     except ValueError:
         if text in ("unknown", "unavailable"):  # a sensor of Home Assistant that is offline
             raise ValueError(f"{name} is {text}") from None
-        raise ValueError(f"{name} is no number") from None
+        raise ValueError(f"{name} is not a number") from None
     if not column.low <= value <= column.high or math.isinf(value):
         raise ValueError(f"{name} is not from {column.low:g} to {column.high:g}")
     return value

@@ -190,7 +190,7 @@ def test_what_came_before_a_twin_is_in_its_past(importing: Import) -> None:
         ("-5,A,1,", "the time is not a moment since 1970"),
         ("1714558200,,1,", "no tag, or one of more than 256 characters"),
         ("1714558200,A,,", "no reading"),
-        ("1714558200,A,warm,", "temperature is no number"),
+        ("1714558200,A,warm,", "temperature is not a number"),
         ("1714558200,A,nan,", "temperature is not from -inf to inf"),
         ("1714558200,A,1,1.01", "humidity is not from -inf to 100"),
         ("1714558200,A", "too few columns"),

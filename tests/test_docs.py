@@ -199,7 +199,7 @@ def test_every_make_target_that_a_page_names_is_there(page: Path) -> None:
     [
         *pages(),
         *(ROOT / name for name in ("CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")),
-        *(ROOT / name / "README.md" for name in ("backend", "ros_node", "tests")),
+        *(ROOT / name / "README.md" for name in ("backend", "frontend", "ros_node", "tests")),
     ],
     ids=name_of,
 )

@@ -13,6 +13,7 @@ MORE = (
     "SECURITY.md",
     "CONTRIBUTING.md",
     "backend/README.md",
+    "frontend/README.md",
     "ros_node/README.md",
     "tests/README.md",
 )

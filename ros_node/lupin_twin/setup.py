@@ -13,7 +13,7 @@ setup(
     # The messages come from lupin_msgs, rclpy from ROS (apt) or the ROS wheels (PyPI): naming
     # them here would make pip look for what colcon has already built.
     install_requires=["numpy>=1.26,<3", "PyYAML>=6,<7"],
-    extras_require={"test": ["pytest"]},  # by which colcon knows how to test it
+    extras_require={"test": ["pytest"]},  # tells colcon to test with pytest
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/lupin_twin"]),
         ("share/lupin_twin", ["package.xml"]),

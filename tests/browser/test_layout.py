@@ -248,6 +248,10 @@ def test_high_contrast_still_tells_what_is_chosen_and_what_a_colour_means(
     swatches = [colours(swatch) for swatch in hmi.page.locator(".sensors .swatch").all()]
     assert len({frozenset(each) for each in swatches}) == len(swatches)
     assert len(colours(hmi.page.locator(".ideal-bar").first)) > 50
+    # Of the time bar, what needs somebody stands out from scans that failed.
+    marks = [hmi.page.locator(f".timebar-picture [data-mark={it}]") for it in ("pest", "failures")]
+    pest, failed = (mark.first.evaluate("e => getComputedStyle(e).fill") for mark in marks)
+    assert pest != failed
 
 
 def test_an_empty_house_says_what_to_do_beside_the_controls_and_in_the_table(
@@ -353,6 +357,11 @@ _LINES = f"(e) => {{ {_RECTS} return new Set([...range.getClientRects()].map((r)
 _CUT_REASONS = """() => [...document.querySelectorAll('tbody .cell-health > div')]
   .filter((e) => e.scrollHeight > e.clientHeight + 1).map((e) => e.textContent)"""
 
+# Of what has to be done the parts that are left out.
+_CUT_TODO = """() => [...document.querySelectorAll('.health .do-what > *')]
+  .filter((e) => e.offsetTop >= e.parentElement.offsetTop + e.parentElement.offsetHeight)
+  .map((e) => e.textContent)"""
+
 # What a phone says in each, and how it writes a number.
 LANGUAGES = {
     "en": ("tags contribute", "20.0"),
@@ -393,6 +402,8 @@ def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) 
         for width in (PHONE["width"], 1100, 1280, 1440):
             hmi.resize(width, 800)
             assert hmi.page.evaluate(_CUT_REASONS) == [], (language, width)
+            if width >= 1100:
+                assert hmi.page.evaluate(_CUT_TODO) == [], (language, width)
             assert hmi.row("failed").locator(".row-button bdi").evaluate(_LINES) == 1, width
             health = hmi.page.locator("thead [data-column=health] button > span").first
             assert health.evaluate(_LINES) == 1, (language, width)

@@ -157,7 +157,7 @@ def with_past(feed: Feed) -> Feed:
             )
     except subprocess.CalledProcessError as error:
         why = (error.stderr.splitlines() or [str(error)])[-1]
-        log.warning("the demo starts without a past: %s", why)
+        log.warning("the demo starts without a past: %s", why.removeprefix("patrol_node: error: "))
     except (Foreign, subprocess.TimeoutExpired, OSError, *FILE_ERRORS) as error:
         log.warning("the demo starts without a past: %s", error)
     if past is None:

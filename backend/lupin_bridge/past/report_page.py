@@ -241,14 +241,18 @@ class _Page:
         }
 
     def _span(self, reason: Entry, tag: TagState | None) -> Span | None:
-        """The range whose limit was passed; None: no range of today has it."""
+        """The range of its status whose limit, or the ideal one's, was passed at the start.
+
+        None: no range of today has that limit.
+        """
         sensor = self._criteria.sensors.named(reason["sensor"])
+        is_critical = reason["verdict"] == "critical"
         for species in ("" if tag is None else tag.flower.species, ""):
             for is_day in (True, False):
                 ranges = sensor.ranges(is_day=is_day, species=species)
                 for span in (ranges.ideal, ranges.critical):
                     if span is not None and reason["limit"] in {span.low, span.high}:
-                        return span
+                        return ranges.critical or span if is_critical else span
         return None
 
     def _sensor(self, of: Entry) -> Iterable[str]:

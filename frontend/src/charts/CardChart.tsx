@@ -35,30 +35,24 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
           chosenSensor.set({ name, inView });
         }}
       />
-      {state === 'missing' ? (
-        <p className="faint">{S.chartMissingShort}</p>
-      ) : (
+      {model && model.lines.length > 0 ? (
         <>
-          {model && model.lines.length > 0 ? (
-            <>
-              <PlotView key={sensor} model={model} height={HEIGHT} />
-              <MarksKey marks={[...lines.marks.values()].flat()} />
-            </>
-          ) : (
-            <ChartState asked={asked} hasLines={false} lacks={null} />
-          )}
-          <button
-            type="button"
-            className="text-button"
-            onClick={() => {
-              act(withChart({ by: 'tag', tagIds: [tagId] }));
-            }}
-          >
-            <Icon name="chart" size={16} />
-            {S.charts}
-          </button>
+          <PlotView key={sensor} model={model} height={HEIGHT} />
+          <MarksKey marks={[...lines.marks.values()].flat()} />
         </>
+      ) : (
+        <ChartState asked={asked} hasLines={false} lacks={null} />
       )}
+      <button
+        type="button"
+        className="text-button"
+        onClick={() => {
+          act(withChart({ by: 'tag', tagIds: [tagId] }));
+        }}
+      >
+        <Icon name="chart" size={16} />
+        {S.charts}
+      </button>
     </div>
   );
 }

@@ -15,7 +15,7 @@ import { pointedBy, pointedTime, useSelected } from '../store/create';
 import { selectCatalogue } from '../store/derived';
 import { onThemeChange } from '../store/theme';
 import { S } from '../strings';
-import { More, Select } from '../widgets/controls';
+import { Select } from '../widgets/controls';
 import { isStroked, lookOf, markerPath } from './layers';
 import type { Line, PlotModel } from './model';
 import { type PlotHandlers, usePlot } from './plot';
@@ -185,16 +185,6 @@ export function ChartState({
   /** What there is nothing of to chart; null: there is something. */
   lacks: string | null;
 }): JSX.Element | null {
-  if (state === 'missing') {
-    return (
-      <div className="chart-state" role="status" data-state="missing">
-        <strong>{S.chartMissing}</strong>
-        <p>{S.chartMissingHint}</p>
-        <More label={S.more} text={S.chartMissingMore} />
-        {message && <p className="faint">{shown(message, 300)}</p>}
-      </div>
-    );
-  }
   const text =
     lacks ??
     (span === null

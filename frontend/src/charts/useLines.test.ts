@@ -187,22 +187,11 @@ describe('the server is asked anew', () => {
 });
 
 describe('where there is nothing', () => {
-  test('a twin without a past is told from one that cannot answer now', async () => {
-    refuse = Response.json({ detail: 'too many' }, { status: 503 });
-    const shown = show();
-    await passed(100);
-    expect(shown.current).toMatchObject({ state: 'failed', message: 'too many' });
-    flush(() => {
-      const message = 'no journal is kept';
-      receive({ remembered: { value: null, state: 'off', message } });
-    });
-    expect(shown.current).toMatchObject({ state: 'missing', message: 'no journal is kept' });
-  });
-
   test('a failure heals by itself', async () => {
     refuse = Response.json({ detail: 'busy' }, { status: 503 });
     const shown = show();
     await passed(100);
+    expect(shown.current).toMatchObject({ state: 'failed', message: 'busy' });
     refuse = null;
     await passed(5_000);
     expect(shown.current).toMatchObject({ state: 'ready', message: '' });

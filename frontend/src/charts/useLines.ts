@@ -26,19 +26,18 @@ export type Asked = ReturnType<typeof useLines>;
  */
 export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = false) {
   const period = useApp((state) => state.view.period);
-  const remembered = useApp((state) => state.twin.remembered);
+  const reach = useApp((state) => state.twin.remembered.value?.reach);
   const epoch = useApp((state) => state.twin.connection.epoch);
   const isOpen = useApp((state) => state.twin.connection.socket.kind === 'open');
   const dayS = useApp((state) => (hasDayBefore ? selectDayS(state) : null));
   const nowS = rosNow(store.get(), useNow());
   const visits = useVisits(pairs);
   const answered = useRef('');
-  const isOff = remembered.state === 'off';
-  const oldest = period.kind === 'all' ? (remembered.value?.reach?.from ?? null) : null;
+  const oldest = period.kind === 'all' ? (reach?.from ?? null) : null;
   const span = nowS === null ? null : spanOf(period, nowS, oldest);
   const group = [JSON.stringify(period), points, dayS, ...pairs.map(pairKey)].join('\u0001');
   const fetched = useFetched<Lines>(
-    nowS === null || isOff || !isOpen || points === 0
+    nowS === null || !isOpen || points === 0
       ? null
       : {
           key: [group, epoch, oldest, turnOf(period, nowS), visits].join('\u0001'),
@@ -62,9 +61,9 @@ export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = 
     span,
     /** The time of the twin, ROS seconds. */
     nowS,
-    /** "missing": this twin keeps no past. While it is fetched again, what was there stays. */
-    state: isOff ? ('missing' as const) : fetched.state,
-    message: isOff ? remembered.message : fetched.message,
+    /** While it is fetched again, what was there stays. */
+    state: fetched.state,
+    message: fetched.message,
   };
 }
 

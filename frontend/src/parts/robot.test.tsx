@@ -2,7 +2,7 @@ import { render, act as rendered, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { robotFrame } from '../store/create';
-import { showTags } from '../testing/page';
+import { goLive, goLost, nextStamp, showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import {
   extended,
@@ -50,6 +50,25 @@ test('a robot is marked on the map where it said that it is', () => {
     robotFrame.set({ type: 'robot', ...robot });
   });
   expect(screen.getByTestId('robot-mark')).toBeTruthy();
+});
+
+test.each([
+  ['a robot that is old says how old', 12, goLive, '12 s ago'],
+  ['cut off, the banner says how old one is that was live', 0, goLost, undefined],
+  ['cut off, one that was old by then says how old', 12, goLost, '12 s ago'],
+])('%s', (_, age, then, said) => {
+  document.body.innerHTML = '<div id="map-view"></div>';
+  const sec = nextStamp();
+  showTags([wireTag()]);
+  render(<RobotLayer />);
+  rendered(() => {
+    const position = { ...robot.position, observed_at: time(sec - age) };
+    robotFrame.set({ type: 'robot', ...robot, position });
+    then();
+  });
+  const { textContent } = screen.getByTestId('robot-mark');
+  expect(textContent.replaceAll('\u00a0', ' ') || undefined).toBe(said);
+  expect(screen.getByTestId('robot').dataset['looks']).toBe('old');
 });
 
 const at = (x: number, seconds: number): TrailPoint => ({ x, y: 0, at: seconds });

@@ -11,7 +11,7 @@ import { mapPoint, toCanvas } from '../geometry/coordinates';
 import { act, type AppState, keepFetched, store, useApp } from '../store/app';
 import { withLayer } from '../store/view';
 import { robotFrame, useSelected } from '../store/create';
-import { isHeardNow, rosNow, selectShown } from '../store/moment';
+import { isHeardNow, rosNow, selectIsCut, selectNewest, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { Check } from '../widgets/controls';
 import { useTicking } from '../widgets/useNow';
@@ -32,7 +32,11 @@ export function RobotLayer(): ReactPortal | null {
     const known = ageAt(now);
     return known === null ? null : ageText(known);
   });
-  const isLive = useTicking((now) => ((ageAt(now) ?? LIVE_S) < LIVE_S ? 'live' : 'old'));
+  const cutAt = useApp((state) =>
+    selectIsCut(state) ? selectNewest(state).snapshot?.takenAt : undefined,
+  );
+  // Cut off, the banner says how old all is: only what was old by then has more to say.
+  const isLive = useTicking((now) => ((ageAt(cutAt ?? now) ?? LIVE_S) < LIVE_S ? 'live' : 'old'));
   const time = useTicking((now) => {
     const known = timeOf(store.get(), now);
     return known === null ? null : String(Math.floor(known / FADE_S) * FADE_S);
@@ -74,7 +78,7 @@ export function RobotLayer(): ReactPortal | null {
                 transform={`rotate(${(-position.heading * 180) / Math.PI})`}
               />
             )}
-            {looks === 'old' && (
+            {isLive === 'old' && (
               <text className="robot-age" x="16" y="4">
                 {age === null ? S.ageUnknown : S.agoSuffix(age)}
               </text>

@@ -109,20 +109,6 @@ test('after a reconnect the gap is refilled', async () => {
   expect(asked.length).toBeGreaterThan(before);
 });
 
-test('a twin that keeps nothing says so, and is not asked again', async () => {
-  answer = () => Response.json({ detail: 'no journal is kept' }, { status: 404 });
-  act({ period: { kind: 'week' } });
-  await pass(0);
-  const count = asked.length;
-  expect(store.get().twin.remembered).toEqual({
-    value: null,
-    state: 'off',
-    message: 'no journal is kept',
-  });
-  await pass(120_000);
-  expect(asked).toHaveLength(count);
-});
-
 test('what fails for now leaves what there was', async () => {
   await pass(0);
   answer = () => Response.json({ detail: 'busy' }, { status: 503 });

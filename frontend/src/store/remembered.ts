@@ -1,13 +1,11 @@
 /** Keeps what is remembered of the period in view up to date, calmly. */
 import { now } from '../clock';
-import { Refusal } from '../contract/api';
 import { fetchTimeline } from '../contract/past';
 import { endsNow, type Period, type Span, spanOf } from '../domain/time';
-import { timelineOf } from '../domain/timeline';
+import { type Timeline, timelineOf } from '../domain/timeline';
 import { act, keepFetched, receive, store } from './app';
-import { NOTHING } from './fetcher';
+import { failed, NOTHING, ready } from './fetcher';
 import { rosNow, selectNewest } from './moment';
-import type { Remembered } from './twin';
 import { DEFAULT_VIEW, SHORT_PERIOD } from './view';
 
 /** Enough for the widest bar: a bucket is two or three pixels there. */
@@ -39,9 +37,7 @@ export function turnOf(period: Period, nowS: number): number {
 export function startRemembered(): () => void {
   let asked = '';
   let changes = 0;
-  /** The connection whose server keeps nothing. */
-  let offSince = -1;
-  return keepFetched<Remembered>(
+  return keepFetched<Timeline>(
     {
       paceMs: INTERVAL_MS,
       everyMs: INTERVAL_MS,
@@ -50,18 +46,17 @@ export function startRemembered(): () => void {
         state.twin.connection.epoch,
         selectNewest(state).snapshot === null,
       ],
-      onValue: (remembered) => {
-        receive({ remembered });
+      onValue: (value) => {
+        receive({ remembered: ready(value) });
       },
       onError: (message) => {
-        const { value } = store.get().twin.remembered;
-        receive({ remembered: { value, state: 'failed', message } });
+        receive({ remembered: failed(message, store.get().twin.remembered.value) });
       },
     },
     (state) => {
       const { epoch, socket, status } = state.twin.connection;
       const nowS = rosNow(state, now());
-      if (socket.kind !== 'open' || status === null || nowS === null || epoch === offSince) {
+      if (socket.kind !== 'open' || status === null || nowS === null) {
         return undefined;
       }
       const { period } = state.view;
@@ -78,13 +73,8 @@ export function startRemembered(): () => void {
         key: `${epoch}|${turnOf(period, nowS)}`,
         group: String(changes),
         run: (signal) =>
-          fetchTimeline(askedSpan(period, nowS), BUCKETS, signal).then(
-            (wire): Remembered => ({ value: timelineOf(wire, nowS), state: 'ready', message: '' }),
-            (error: unknown): Remembered => {
-              if (!(error instanceof Refusal) || error.status !== 404) throw error;
-              offSince = epoch;
-              return { value: null, state: 'off', message: error.message };
-            },
+          fetchTimeline(askedSpan(period, nowS), BUCKETS, signal).then((wire) =>
+            timelineOf(wire, nowS),
           ),
       };
     },

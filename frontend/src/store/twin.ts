@@ -52,11 +52,6 @@ interface PastFault {
   readonly isLasting: boolean;
 }
 
-/** What is remembered of the period in view; "off": this twin remembers nothing. */
-export interface Remembered extends Omit<Fetched<Timeline>, 'state'> {
-  readonly state: Fetched<Timeline>['state'] | 'off';
-}
-
 export interface Difference {
   /** Null: nothing is known of the other moment. */
   readonly field: Field | null;
@@ -81,7 +76,8 @@ export interface TwinState {
   /** As it was at the last moment in the past that has come; null: nobody looks back. */
   readonly past: Past | null;
   readonly pastFault: PastFault | null;
-  readonly remembered: Remembered;
+  /** What is remembered of the period in view. */
+  readonly remembered: Fetched<Timeline>;
   readonly difference: Fetched<Difference>;
   readonly sensors: Fetched<Catalogues>;
 }

@@ -30,6 +30,19 @@ test('scans stand upwards and failures hang downwards, from one line', () => {
   expect(boxesOf(bar, 'failures')[0]?.[1]).toBe(39);
 });
 
+test('failures side by side are one low mark', () => {
+  const failed = { ...NOTHING, scans: 9, failures: 1 };
+  const bar = drawn({
+    buckets: [
+      { ...failed, start: 150 },
+      { ...failed, start: 151 },
+    ],
+  });
+  const [[x = 0, , width = 0, height] = [], [next] = []] = boxesOf(bar, 'failures');
+  expect(x + width).toBe(next);
+  expect(height).toBe(3);
+});
+
 test('a pest is no ring, one that is gone is; who needs somebody is on top', () => {
   const both = { ...NOTHING, start: 150, pests_seen: 1, pests_cleared: 1 };
   const seen = drawn({ buckets: [both] });

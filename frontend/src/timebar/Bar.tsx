@@ -77,11 +77,15 @@ const hatching = (kind: 'unknown' | 'silence', lines: string): JSX.Element => (
 function Counts({ column }: { column: Column }): JSX.Element {
   const scans = column.scanHeight * (SCANS_PX - 2);
   const failures = column.failureHeight && Math.max(3, column.failureHeight * (FAILURES_PX - 1));
-  const place = { x: column.x, width: Math.max(1, column.width - 1) };
+  const { x, width } = column;
+  const bar = { x, width: Math.max(1, width - 1) };
   return (
     <>
-      {scans > 0 && <rect {...place} y={BASE_PX - scans} height={scans} data-mark="scans" />}
-      {failures > 0 && <rect {...place} y={BASE_PX + 1} height={failures} data-mark="failures" />}
+      {scans > 0 && <rect {...bar} y={BASE_PX - scans} height={scans} data-mark="scans" />}
+      {/* Without a gap: side by side they are one low mark, and no row of teeth. */}
+      {failures > 0 && (
+        <rect {...{ x, width }} y={BASE_PX + 1} height={failures} data-mark="failures" />
+      )}
     </>
   );
 }

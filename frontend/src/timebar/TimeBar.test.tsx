@@ -210,16 +210,6 @@ describe('the period', () => {
   });
 });
 
-test('a twin that remembers nothing says so, and how to change it', () => {
-  receive({ remembered: { value: null, state: 'off', message: 'no journal is kept' } });
-  render(<TimeBar />);
-  const bar = screen.getByTestId('timebar');
-  expect(bar.textContent).toContain('this twin records nothing');
-  // Plain words: neither a parameter nor what the bridge said.
-  expect(bar.textContent).not.toMatch(/journal/);
-  expect(screen.queryByRole('slider')).toBeNull();
-});
-
 test('what could not be loaded is told, beside what is known', () => {
   const { remembered } = store.get().twin;
   receive({ remembered: { ...remembered, state: 'failed', message: 'too busy' } });

@@ -22,15 +22,6 @@ export function TimeBar(): JSX.Element | null {
   const tick = useNow();
   const nowS = rosNow(store.get(), tick);
   if (nowS === null) return null;
-  if (remembered.state === 'off') {
-    return (
-      <section className="timebar" aria-label={S.timebar} data-testid="timebar" data-state="off">
-        <p className="timebar-note">
-          <strong>{S.timebarOff}</strong> {S.timebarOffHint}
-        </p>
-      </section>
-    );
-  }
   const span = barSpan(store.get(), nowS);
   return (
     <section

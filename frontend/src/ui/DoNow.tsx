@@ -3,9 +3,8 @@ import { Fragment, useMemo, type JSX } from 'react';
 import { whenText } from '../alarms/words';
 import { alarmOf, isAwaited, type Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
-import { epochOf, now } from '../clock';
+import { now } from '../clock';
 import type { HealthReason, Verdict } from '../contract/types';
-import { minuteText } from '../domain/format';
 import { type HouseHealth, isBad, isSilent, severity, todoText, VERDICTS } from '../domain/health';
 import { secondsOf } from '../domain/time';
 import { rowsOf } from '../domain/table';
@@ -14,7 +13,7 @@ import { act, store, useApp } from '../store/app';
 import { withList, withTag } from '../store/view';
 import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
-import { rosNow, selectIsHere, selectNewest, selectShown, selectTags } from '../store/moment';
+import { rosNow, selectIsHere, selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { selectAreAlarmsKnown, useReasonText } from './Reasons';
@@ -70,17 +69,14 @@ export function useUrgent(): readonly Urgent[] {
 
 /**
  * Since when the alarm of a reason is active, that somebody has acknowledged it, or that there is none
- * yet; of a twin that is not heard, when that was so. Null: nobody knows, or another moment is shown.
+ * yet. Null: nobody knows, another moment is shown, or the banner says of when all this is.
  */
 export function useSince(tagId: string, reason: HealthReason): string | null {
   const isNow = useApp((state) => selectShown(state).moment === null);
   const found = useSelected(alarmList, ({ active }) => alarmOf(active, tagId, reason));
   const isKnown = useApp(selectAreAlarmsKnown);
-  const takenAt = useApp((state) =>
-    isSilent(selectHealth(state)) ? selectNewest(state).snapshot?.takenAt : undefined,
-  );
-  if (!isNow) return null;
-  if (takenAt !== undefined) return S.asOf(minuteText(epochOf(takenAt)));
+  const isLast = useApp((state) => isSilent(selectHealth(state)));
+  if (!isNow || isLast) return null;
   if (!found) return isKnown && isAwaited(reason) ? S.alarmNotYet : null;
   if (found.isAcknowledged) return S.healthAcknowledged;
   return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
@@ -99,7 +95,7 @@ export function DoNow({
   const urgent = useUrgent();
   const isNow = useApp((state) => selectShown(state).moment === null);
   const hasOwn = health.reasons.length > 0;
-  // Of a twin that is not heard, what had to be done stays, with its time.
+  // Of a twin that is not heard, what had to be done stays.
   const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict) || isSilent(health));
   const count = hasOwn && most > 1 ? most - 1 : most;
   const lines = (isNow ? byTodo(urgent) : urgent.map((each) => [each] as const)).slice(0, count);

@@ -1,4 +1,4 @@
-"""The messages as they were built: every file is listed, generated and usable from Python."""
+"""Tests of the built messages: every file is listed, generated and usable from Python."""
 
 from __future__ import annotations
 

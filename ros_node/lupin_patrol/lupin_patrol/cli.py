@@ -1,4 +1,4 @@
-"""The command `patrol_node`: options, then the node. `--ros-args` is passed through to ROS."""
+"""The command `patrol_node`: parses its options and runs the node; `--ros-args` goes to ROS."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from lupin_twin.runtime import process
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong in one line, without the usage."""
+        """Print the error in one line, without the usage."""
         self.exit(2, f"{self.prog}: error: {message}\n")
 
 
 def parser() -> argparse.ArgumentParser:
-    """The options, ROS arguments already removed; it exits with 2 on a bad one."""
+    """Return the parser of the options, ROS arguments excluded; it exits with 2 on a bad one."""
     made = _Parser(
         prog="patrol_node",
         description="A robot on patrol in the simulated greenhouse, as the twin sees it.",
@@ -58,7 +58,7 @@ def parser() -> argparse.ArgumentParser:
         action="store_true",
         help="end when the process that started this one does, even by kill -9 (Linux)",
     )
-    # Of a demo without a memory: for the twin that is about to start.
+    # For `lupin-twin demo`: fills a new journal before the twin starts.
     made.add_argument("--fill-past", metavar="JOURNAL", type=Path, help=argparse.SUPPRESS)
     return made
 
@@ -71,7 +71,7 @@ def main() -> int:
     try:
         from greenhouse_sim.simulator import GreenhouseSimulator  # noqa: PLC0415  # see above
     except ModuleNotFoundError as error:
-        # colcon and apt know nothing of it: on a robot, nobody has installed it yet.
+        # Neither colcon nor apt installs the simulator, so a robot usually lacks it.
         return process.refuse(
             "patrol_node: error",
             f"the simulator is missing ({error}): python3 -m pip install mdp-greenhouse, on a "
@@ -121,7 +121,7 @@ def fill_past(journal: Path, options: argparse.Namespace) -> int:
 def _number(
     convert: Callable[[str], float], kind: str, lowest: float, highest: float
 ) -> Callable[[str], float]:
-    """Make an argparse type for numbers within closed limits (NaN is in none)."""
+    """Make an argparse type for numbers within closed limits; it refuses NaN."""
     limits = f"expected {kind} from {lowest:.15g} to {highest:.15g}"
 
     def read(text: str) -> float:

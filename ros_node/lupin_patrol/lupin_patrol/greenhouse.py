@@ -1,9 +1,9 @@
-"""The greenhouse's floor plan: walls, planter tables, tags, aisles, and the ways through them.
+"""Floor plan of the simulated greenhouse (walls, planter tables, tags) and paths through it.
 
-Read from the simulator's own configuration. Metres, map frame: the origin is the corner of the
-greenhouse inside the walls, x along the short side (right), y along the long one (up). The
-shortest way between two points among rectangles bends only at their corners (visibility graph).
-The tables are grown by the robot's clearance first, so a way never touches one.
+Read from the simulator's own configuration. Metres, map frame. The origin is the corner of the
+greenhouse inside the walls; x runs along the short side (right), y along the long side (up). The
+shortest path among rectangles bends only at their corners (visibility graph). The tables are
+first grown by the robot's clearance, so a path never touches one.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def length_of(points: Sequence[Point]) -> float:
 
 
 def walk(points: Sequence[Point], step_m: float, length_m: float) -> Iterator[tuple[Point, float]]:
-    """Yield positions along a polyline and the way since the last one, at most `step_m` apart.
+    """Yield positions along a polyline, each with its distance from the last, at most `step_m`.
 
     Ends after `length_m`, or at the polyline's end if that comes first; yields at least one.
     """
@@ -114,14 +114,14 @@ def walk(points: Sequence[Point], step_m: float, length_m: float) -> Iterator[tu
             return
 
 
-# Half the width of the robot (0.3 m) and a hand's breadth: its centre keeps this far from tables
-# and walls. The narrowest aisle of the default greenhouse is 0.45 m.
+# The robot's centre keeps this far from tables and walls: half its width of 0.3 m, plus a margin.
+# The narrowest aisle of the default greenhouse is 0.45 m.
 CLEARANCE_M = 0.2
-# Where the robot's centre stands to read a tag, measured from the table's edge: as far as the
-# aisle allows, because the camera then sees all of the planter.
+# Distances from the table's edge at which the robot's centre may stop to read a tag. The farthest
+# that fits into the aisle is used, because the camera then sees the whole planter.
 STAND_OFFS_M = (0.4, 0.35, 0.3, 0.25, 0.2)
 
-# Heights above the floor: of the soil in the planters, and of the tags on the tables' edges.
+# Heights above the floor: the soil in the planters, and the tags on the tables' edges.
 TABLE_HEIGHT_M = 0.35
 TAG_HEIGHT_M = 0.3
 
@@ -138,8 +138,8 @@ class Table:
 class Tag:
     """An AprilTag with its climate sensors.
 
-    `edge` is the point of its table's outline nearest to it, `facing` the unit vector from there
-    into the aisle, `stop` where the robot's centre stands to read it.
+    `edge` is the point of the table's outline nearest to the tag. `facing` is the unit vector from
+    there into the aisle. `stop` is where the robot's centre stands to read the tag.
     """
 
     tag_id: str
@@ -158,7 +158,7 @@ class Tag:
 
 @dataclass(frozen=True, slots=True)
 class Greenhouse:
-    """Everything that stands still."""
+    """The static layout: interior, tables and tags."""
 
     interior: Rect
     tables: tuple[Table, ...]
@@ -196,7 +196,7 @@ def _place_tag(
     interior: Rect,
     tables: tuple[Table, ...],
 ) -> Tag:
-    """Put a tag on the side of its table that it is nearest to; at a corner, the roomier one."""
+    """Put a tag on the nearest side of its table; at a corner, on the side with the wider aisle."""
     table = min(tables, key=lambda candidate: dist(position, candidate.rect.nearest(position)))
     sides = []
     for order, (edge, facing) in enumerate(_sides(table.rect, position)):
@@ -234,7 +234,7 @@ def _is_free(point: Point, interior: Rect, tables: tuple[Table, ...]) -> bool:
 
 
 class Roadmap:
-    """Shortest ways between any two free points of a greenhouse."""
+    """Shortest paths between any two free points of a greenhouse."""
 
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._obstacles = [table.rect.grown(CLEARANCE_M) for table in greenhouse.tables]
@@ -249,9 +249,9 @@ class Roadmap:
         self._length, self._next = self._shortest_between_corners()
 
     def way(self, start: Point, goal: Point) -> list[Point]:
-        """Return the shortest way as a polyline from start to goal, both included.
+        """Return the shortest path as a polyline from start to goal, both included.
 
-        Raises ValueError when no way leads there.
+        Raises ValueError when there is no path.
         """
         if not crossings(start, np.array([goal]), self._obstacles).any():
             return [start, goal]
@@ -269,13 +269,13 @@ class Roadmap:
         return [start, *((float(x), float(y)) for x, y in self._corners[bends]), goal]
 
     def _straight(self, point: Point) -> NDArray[np.float64]:
-        """Distance from a point to each corner in a straight line, infinite where one is hidden."""
+        """Straight-line distance from a point to each corner; infinite if the corner is hidden."""
         away: NDArray[np.float64] = np.hypot(*(self._corners - np.asarray(point)).T)
         away[crossings(point, self._corners, self._obstacles).any(axis=1)] = np.inf
         return away
 
     def _shortest_between_corners(self) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-        """Floyd and Warshall: lengths between all corners, and the next corner on each way."""
+        """Floyd-Warshall: path lengths between all corners, and the next corner on each path."""
         count = len(self._corners)
         length = np.array([self._straight((x, y)) for x, y in self._corners]).reshape(count, count)
         following = np.tile(np.arange(count), (count, 1))
@@ -290,8 +290,8 @@ class Roadmap:
 def tour(roadmap: Roadmap, start: Point, stops: Sequence[Point]) -> list[int]:
     """Order the stops into a short round trip from `start`; returns their indices.
 
-    Nearest neighbour, then 2-opt until nothing gets shorter: for some dozens of stops that is
-    within a few percent of the best and takes milliseconds.
+    Nearest neighbour, then 2-opt until nothing gets shorter. For a few dozen stops, the result is
+    within a few percent of the optimum and takes milliseconds.
     """
     places = [start, *stops]
     length = np.array([[length_of(roadmap.way(a, b)) for b in places] for a in places])
@@ -307,7 +307,7 @@ def tour(roadmap: Roadmap, start: Point, stops: Sequence[Point]) -> list[int]:
 
 
 def _untangle(order: list[int], length: NDArray[np.float64]) -> bool:
-    """Reverse the first stretch of the round trip whose reversal makes it shorter."""
+    """Reverse the first stretch whose reversal shortens the trip; returns whether there was one."""
     for i in range(1, len(order) - 2):
         for j in range(i + 1, len(order) - 1):
             before, first, last, after = order[i - 1], order[i], order[j], order[j + 1]

@@ -1,8 +1,8 @@
-"""The patrol itself: an endless, repeatable sequence of events, as plain data.
+"""The simulated patrol: an endless, repeatable sequence of events, as plain data.
 
-Patrol time is the mission's own: the node plays it faster or slower. The robot is brisker than
-hardware, so that a demo shows the whole greenhouse within a minute. `at_s` is seconds since the
-start; positions are metres in the map frame, times of day seconds since simulated midnight.
+`at_s` is patrol time, in seconds since the start; the node plays it faster or slower. Positions are
+metres in the map frame, times of day are seconds since simulated midnight. The robot is faster
+than real ones, so that a demo shows the whole greenhouse within a minute.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ class ScanStatus(IntEnum):
 
 
 def pose_of(position: Point, yaw: float) -> Pose:
-    """Where a tag is located; `yaw` (rad, from x towards y) points from it into the aisle."""
+    """Return a tag's pose; `yaw` (rad, from x towards y) points from the tag into the aisle."""
     return Pose(*position, TAG_HEIGHT_M, 0.0, 0.0, sin(yaw / 2), cos(yaw / 2))
 
 
 @dataclass(frozen=True, slots=True)
 class MapGrown:
-    """The map shows more than before."""
+    """More cells of the map have become known."""
 
     at_s: float
     grid: Grid
@@ -61,7 +61,7 @@ class MapGrown:
 
 @dataclass(frozen=True, slots=True)
 class TagsDiscovered:
-    """Perception's whole list, after it got longer or at the end of a pass."""
+    """Perception's complete list of tags, sent when it grows and at the end of each pass."""
 
     at_s: float
     sightings: tuple[Sighting, ...]
@@ -69,10 +69,10 @@ class TagsDiscovered:
 
 @dataclass(frozen=True, slots=True)
 class Visited:
-    """One attempt at a tag's sensors, or one inspection of the plants around it; without its times.
+    """One attempt to scan a tag, or one inspection of its plants; the node adds the stamps.
 
-    A scan without success has neither readings nor a pose. The footprint of an inspection is the
-    outline of the plants' table.
+    A failed scan has neither readings nor a pose. The footprint of an inspection is the outline of
+    the plants' table.
     """
 
     at_s: float
@@ -83,7 +83,7 @@ class Visited:
 
 @dataclass(frozen=True, slots=True)
 class PassCompleted:
-    """Every tag was visited, and those that failed were tried again."""
+    """Every tag was visited, and failed ones were retried; `failed` lists those without a scan."""
 
     at_s: float
     pass_index: int
@@ -92,7 +92,7 @@ class PassCompleted:
 
 @dataclass(frozen=True, slots=True)
 class WayPlanned:
-    """The robot sets out, and means to take this way; the last point is where it will stop."""
+    """The robot sets out along this planned path; the last point is its goal."""
 
     at_s: float
     way: tuple[Point, ...]
@@ -100,7 +100,7 @@ class WayPlanned:
 
 @dataclass(frozen=True, slots=True)
 class RobotMoved:
-    """Where the robot is, and how full its battery is, 0 to 1; `yaw` is rad from x towards y."""
+    """The robot's pose and its battery level, 0 to 1; `yaw` is rad from x towards y."""
 
     at_s: float
     position: Point
@@ -120,7 +120,7 @@ _MAP_PERIOD_S = 1.0
 _READ_S = 0.3
 _PICTURE_S = 0.2
 _BLOCKED_SHORT_M = 0.1
-# A full battery lasts for so long a way; the robot gets a full one at its dock.
+# Range of a full battery; the dock recharges it completely.
 _BATTERY_M = 400.0
 
 _POSE_NOISE_M = 0.01
@@ -139,7 +139,7 @@ class Mission:
     """One robot on patrol in the simulator's greenhouse.
 
     `day_speed` is how many simulated seconds pass in one second of patrol time. The robot leaves
-    its dock at `begin_s`; time of day and plants are as if it had at 0. Passes count from
+    its dock at `begin_s`, but it is always nine o'clock at patrol time 0. Passes count from
     `first_pass`, and no two passes are alike.
     """
 
@@ -172,7 +172,7 @@ class Mission:
         self._tour = [self.greenhouse.tags[index] for index in order]
 
     def events(self) -> Iterator[Event]:
-        """Patrol for ever. To be called once: a mission is one robot's life."""
+        """Patrol forever. Call it once: the mission holds the state of one robot."""
         yield from self._observe(self._first_pass)
         for pass_index in count(self._first_pass):
             yield from self._patrol(pass_index)
@@ -180,7 +180,7 @@ class Mission:
             self._battery_m = _BATTERY_M
 
     def visits(self) -> Iterator[Visited]:
-        """The visits of `events`, a tenth of the work: nobody looks around on the way."""
+        """Yield only the visits of `events`, at a tenth of the work: no observing on the way."""
         self._is_observing = False
         for event in self.events():
             if isinstance(event, Visited):
@@ -209,13 +209,13 @@ class Mission:
         yield PassCompleted(self._now_s, pass_index, tuple(lost))
 
     def _planned_failures(self, pass_index: int) -> dict[str, ScanStatus]:
-        """Choose the tags whose first try fails: in every pass some do, in both ways."""
+        """Choose the tags whose first attempt fails: in every pass, one for each failed status."""
         chance = stream(self._seed, "failures", pass_index)
         tags = chance.sample([tag.tag_id for tag in self.greenhouse.tags], _FAILURES_A_PASS)
         return dict(zip(tags, (ScanStatus.UNREACHABLE, ScanStatus.SCAN_FAILED), strict=True))
 
     def _retry_status(self, tag: Tag, pass_index: int) -> ScanStatus:
-        """Decide a retry. It succeeds in the first pass, so that a demo shows every tag."""
+        """Decide how a retry ends. In the first pass it succeeds, so a demo shows every tag."""
         chance = stream(self._seed, "retry", tag.tag_id, pass_index)
         fails = pass_index > self._first_pass and chance.random() < _RETRY_FAILS
         return ScanStatus.SCAN_FAILED if fails else ScanStatus.OK
@@ -231,8 +231,8 @@ class Mission:
         readings: tuple[Reading, ...] = ()
         if status is ScanStatus.OK:
             chance = stream(self._seed, "scan", tag.tag_id, pass_index, attempt)
-            # The first pass builds the map and so defines where the tags are: it is exact. The
-            # later ones localise themselves in it.
+            # The first pass builds the map and so defines where the tags are: it is exact. Later
+            # passes localise in that map, with noise.
             pose = _locate(tag, 0.0 if pass_index == self._first_pass else 1.0, chance)
             readings = readings_at(self._sensors, tag.sensors, tag.position, time_of_day_s, chance)
         scan = Scan(tag.tag_id, 0, readings, pose, status, _DETAILS[status])
@@ -244,7 +244,7 @@ class Mission:
             yield Visited(self._now_s, pass_index, time_of_day_s, seen)
 
     def _drive(self, goal: Point, pass_index: int, short_m: float = 0.0) -> Iterator[Event]:
-        """Drive to a goal, or stop a little before it, and look around on the way."""
+        """Drive to a goal, or stop `short_m` before it, and observe on the way."""
         way = self._roadmap.way(self._position, goal)
         if self._is_observing:
             yield WayPlanned(self._now_s, tuple(way))
@@ -278,24 +278,24 @@ class Mission:
 
 
 def _locate(tag: Tag, noise: float, chance: Random) -> Pose:
-    """Say where a tag is, to about a centimetre times `noise`."""
+    """Return a tag's measured pose, with an error of about 1 cm times `noise`."""
     x, y = (at + noise * chance.gauss(0.0, _POSE_NOISE_M) for at in tag.position)
     return pose_of((x, y), tag.yaw + noise * chance.gauss(0.0, _YAW_NOISE_RAD))
 
 
-# --- what it would have observed until now: three simulated days ----------------------------------
+# --- the past: what the patrol would have observed in the last three simulated days ---------------
 
 PAST_SOURCE: Final = "lupin_patrol (simulated past)"
 DAYS: Final = 3
-# So far before the patrol's own passes that none of them is alike.
+# Far below the patrol's own pass numbers: no simulated past pass repeats one of them.
 _FIRST_PASS: Final = -1_000_000
 
 
 def past(simulator: Any, seed: int, day_speed: float, speed: float, now_ns: int) -> Iterator[Write]:
-    """What a twin would have written, the oldest first; nothing where the day stands still.
+    """Yield what a twin would have written until now, oldest first; nothing if `day_speed` is 0.
 
-    Places, plants and climate are those of the patrol with the same seed, and so is the time of
-    day: where the past ends, now, the patrol begins.
+    Positions, plants, climate and time of day match the patrol with the same seed. The past ends
+    at `now_ns`, where that patrol begins.
     """
     if day_speed <= 0.0:
         return

@@ -1,9 +1,9 @@
-"""The ROS node: plays a mission's events on the topics of DESIGN.md.
+"""The patrol's ROS node: publishes a mission's events on the twin's input topics.
 
-Stamps are ROS time (`use_sim_time` included); the pace is the process's steady clock. Signals are
-waited for in a thread, never handled asynchronously: whoever calls `play` has blocked them before
-the first other thread was started. Every number of a message is written as `float(...)` or
-`int(...)`: rclpy does not check fields by default and serialises a wrong type as garbage.
+Stamps are ROS time (`use_sim_time` included); the pace follows the steady clock. A thread waits for
+signals, and no handler runs asynchronously: the caller of `play` has to block them before it starts
+any thread. Numbers in messages are written as `float(...)` or `int(...)`: by default rclpy does
+not check fields, and serialises a wrong type as garbage.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ from lupin_twin.ros.convert import nanoseconds, observation_message, pose_messag
 from lupin_twin.ros.parameters import declare, naming, naming_own_parameters
 from lupin_twin.runtime import process
 
-# A twin that already runs is discovered within this time. Without the wait the first observations
-# of a fast patrol would have left the latch before anyone could hear them.
+# A running twin is discovered within this time. Without the wait, a fast patrol's first
+# observations would drop out of the latch before any subscriber could receive them.
 _SUBSCRIBERS_S = 3.0
 # How long a finished patrol waits until its last messages are acknowledged.
 _DELIVERY_S = 5.0
@@ -53,7 +53,7 @@ _POLL_S = 0.05
 
 
 class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
-    """Publishes observations, discovered tags, the map, and the robot's own, all latched."""
+    """Publishes observations, tags, map, and the robot's pose, plan and battery, all latched."""
 
     def __init__(self) -> None:
         with naming_own_parameters():
@@ -62,12 +62,12 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
         names = ("frame_id", "observations_topic", "discovered_tags_topic", "map_topic")
         self._parameters = declare(self, names)
         self._frame_id = self._parameters.frame_id
-        # One pass makes more observations than are latched (two for each of 29 tags), so a twin
-        # that starts late misses the oldest ones; the next pass brings them.
+        # One pass makes more observations (two for each of 29 tags) than are latched. A twin that
+        # starts late misses the oldest ones, until the next pass visits those tags.
         self.observations = self._latched(
             Observation, "observations_topic", interfaces.OBSERVATIONS.depth
         )
-        # Each message holds all that came before, so the newest alone is worth keeping.
+        # Each message repeats all earlier content, so only the latest is latched.
         self._discovered_tags = self._latched(DiscoveredTags, "discovered_tags_topic", 1)
         self._map = self._latched(OccupancyGrid, "map_topic", 1)
         self._pose, self._plan, self._battery = (
@@ -80,7 +80,7 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
         )
 
     def publish(self, event: Event) -> None:
-        """Tell the world what happened, now."""
+        """Publish an event, stamped with the current ROS time."""
         stamp = self.get_clock().now().to_msg()
         match event:
             case MapGrown():
@@ -123,9 +123,9 @@ def play(
 ) -> None:
     """Play events until a stop signal comes or, with `once`, the first pass is completed.
 
-    The first is due at `begin_s`, patrol seconds as in `at_s`, or later. `speed` is patrol seconds
-    per second. `ros_arguments` is the whole command line.
-    Raises ParameterError, before anything was published.
+    Playing starts at the patrol time `begin_s`; no event is earlier. `speed` is patrol seconds per
+    second. `ros_arguments` is the whole command line.
+    Raises ParameterError before anything is published.
     """
     stop = process.stop_flag()
     with running_ros(ros_arguments):
@@ -146,7 +146,7 @@ def play(
 
 
 def _stopped_before(stop: Flag, condition: Callable[[], bool], timeout_s: float) -> bool:
-    """Wait for a condition, no longer than the time-out; returns whether a stop signal came."""
+    """Wait for a condition, at most `timeout_s`; returns whether a stop signal came."""
     deadline = monotonic() + timeout_s
     while not condition() and monotonic() < deadline:
         if stop.wait(_POLL_S):
@@ -158,7 +158,7 @@ SOURCE = "lupin_patrol"
 
 
 def observation(event: Visited, stamp_ns: int, frame_id: str) -> Observation:
-    """Return a scan or an inspection."""
+    """Return the message of a scan or an inspection."""
     mission = f"patrol-{event.pass_index + 1:04d}"
     write = replace(event.write, stamp_ns=stamp_ns, source=SOURCE, mission=mission)
     message = observation_message(write, frame_id)
@@ -188,21 +188,21 @@ def occupancy_grid(event: MapGrown, stamp: Time, frame_id: str) -> OccupancyGrid
 
 
 def robot_pose(event: RobotMoved, stamp: Time, frame_id: str) -> PoseWithCovarianceStamped:
-    """Return where the robot is, as AMCL publishes it; the simulated robot knows it exactly."""
+    """Return the robot's pose, as AMCL publishes it; the simulated pose is exact."""
     message = PoseWithCovarianceStamped(header=Header(stamp=stamp, frame_id=frame_id))
     message.pose.pose = _on_floor(event.position, event.yaw)
     return message
 
 
 def path(event: WayPlanned, stamp: Time, frame_id: str) -> Path:
-    """Return the way ahead, as Nav2's planner publishes it."""
+    """Return the planned path, as Nav2's planner publishes it."""
     header = Header(stamp=stamp, frame_id=frame_id)
     poses = [PoseStamped(header=header, pose=_on_floor(point, 0.0)) for point in event.way]
     return Path(header=header, poses=poses)
 
 
 def battery_state(event: RobotMoved, stamp: Time) -> BatteryState:
-    """Return the battery; what is not simulated is NaN, as the message's definition has it."""
+    """Return the battery state; quantities that are not simulated are NaN, as BatteryState asks."""
     message = BatteryState(header=Header(stamp=stamp), percentage=float(event.battery))
     for name in ("voltage", "temperature", "current", "charge", "capacity", "design_capacity"):
         setattr(message, name, float("nan"))

@@ -1,12 +1,12 @@
-"""What camera and sensors show of the greenhouse: plants, pests and climate, tags, and the floor.
+"""Simulated camera and sensors: plants, pests, climate, tags, and the map of the floor.
 
-Plants and climate are a function of the seed: nothing of them changes while the patrol runs, so an
+Plants and climate follow from the seed, the pass and the time of day, and hold no state. So an
 inspection of one tag never depends on the others. Sensors have the units of
 `lupin_msgs/SensorReading`: temperature °C, humidity % relative, co2 ppm, light lx, soil_moisture %.
 
-The list of tags and the occupancy grid grow. A tag is discovered when it first comes into view. The
-grid is row-major with row 0 at the smallest y, as nav_msgs/OccupancyGrid has it; -1 unknown, 0
-free, 100 occupied. The outermost ring of cells is the greenhouse's wall.
+The list of tags and the occupancy grid only grow. A tag is discovered when it first comes into
+view. The grid is row-major with row 0 at the smallest y, as in nav_msgs/OccupancyGrid: -1 unknown,
+0 free, 100 occupied. The outermost ring of cells is the greenhouse's wall.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from lupin_twin.core.state import Bloom, Flower, Reading
 def stream(seed: int, *occasion: str | int) -> random.Random:
     """Return the random stream of one occasion, such as `stream(seed, "look", tag_id, pass)`.
 
-    The same seed and occasion give the same numbers in every process, whatever was drawn
-    elsewhere before: an event does not depend on the order in which the others were made.
-    A text as seed is hashed with SHA-512 by the standard library, not by the process's `hash`.
+    The same seed and occasion give the same numbers in every process, whatever was drawn before.
+    So an event does not depend on the order in which the others were generated. The standard
+    library hashes a text seed with SHA-512, not with the process's randomised `hash`.
     """
     text = "/".join(str(part) for part in (seed, *occasion))
     return random.Random(text)  # noqa: S311  # a simulation, not a secret
@@ -42,7 +42,7 @@ _PLANT_SPACING_M = 0.09
 _IN_FLOWER = 0.75
 _POSITION_NOISE_M = 0.01
 _OVERLOOKED = 0.06
-# How likely a pest breaks out in a pass, and after how many passes at most it is gone.
+# Probability of a pest outbreak per pass, and its longest duration in passes.
 _OUTBREAK = 0.2
 _LONGEST_OUTBREAK = 2
 
@@ -61,14 +61,14 @@ class Plants:
                 self._blooms[_nearest(tags, (bloom.x, bloom.y)).tag_id].append(bloom)
 
     def species(self, tag_id: str) -> str:
-        """Return what grows at a tag."""
+        """Return the species that grows at a tag."""
         return stream(self._seed, "species", self._tags[tag_id].table.name).choice(SPECIES)
 
     def bugs(self, tag_id: str, pass_index: int) -> int:
-        """How many pests sit at a tag during one pass; 0: none.
+        """Number of pests at a tag during one pass.
 
-        A pest breaks out in one pass at one tag, gets fewer, and is gone after at most
-        _LONGEST_OUTBREAK passes. There is one in the very first pass, so that a demo shows it.
+        An outbreak begins in one pass at one tag, shrinks, and is gone after at most
+        _LONGEST_OUTBREAK passes. The very first pass always has one, so that a demo shows it.
         """
         bugs = 0
         for start in range(
@@ -84,7 +84,7 @@ class Plants:
         return bugs
 
     def inspect(self, tag_id: str, pass_index: int, attempt: int) -> Flower:
-        """Look at the plants of a tag: some flowers are overlooked, the others placed to 1 cm."""
+        """Inspect the plants of a tag: some flowers are missed, the others are located to 1 cm."""
         chance = stream(self._seed, "look", tag_id, pass_index, attempt)
         bugs = self.bugs(tag_id, pass_index)
         blooms = self._blooms[tag_id]
@@ -110,7 +110,7 @@ class Plants:
 
 
 def _grow(table: Table, species: str, seed: int) -> Iterator[Bloom]:
-    """Plant a table in rows that leave room for the looks' noise, and let most plants flower."""
+    """Plant a table in rows, spaced wider than the position noise; most plants flower."""
     chance = stream(seed, "grow", table.name)
     rect = table.rect
     columns = max(1, round((rect.x1 - rect.x0) / _PLANT_SPACING_M))
@@ -146,7 +146,7 @@ def readings_at(
 ) -> tuple[Reading, ...]:
     """Read sensors at a place (m, map) and time (s since midnight), noise from `chance` included.
 
-    The simulator draws from the process's own stream, which goes on from there.
+    The simulator draws from the global `random`, whose state is therefore replaced.
     """
     random.setstate(chance.getstate())
     return tuple(
@@ -161,7 +161,7 @@ def value_of(registry: Any, sensor: str, position: Point, time_of_day_s: float) 
 
 
 TAG_RANGE_M = 1.2
-# An AprilTag seen at a flatter angle than this is not decoded.
+# An AprilTag is not decoded when seen at more than 70° from its normal.
 _STEEPEST = cos(radians(70.0))
 _GUESSED_RIGHT = 0.9
 # The tag stands proud of its table by this much, so the table's own edge does not hide it.
@@ -266,10 +266,10 @@ class Exploration:
         self._cells = np.full(rows * columns, UNKNOWN, dtype=np.int8)
 
     def observe_from(self, position: Point) -> bool:
-        """Add what is in view from there; returns whether anything was new.
+        """Add the cells in view from a position; returns whether any of them was new.
 
-        A cell is in view within VIEW_RADIUS_M unless a table stands before it. A table does not
-        hide itself: the camera looks down on it, while the next one hides behind its plants.
+        A cell is in view within VIEW_RADIUS_M unless a table hides it. A table does not hide its
+        own cells, because the camera looks down on it; its plants hide the table behind it.
         """
         unknown = np.flatnonzero(self._cells == UNKNOWN)
         offset = self._centres[unknown] - np.asarray(position)
@@ -280,6 +280,6 @@ class Exploration:
         return seen.size > 0
 
     def snapshot(self) -> Grid:
-        """Return the map as it is now; it does not change any more."""
+        """Return an immutable copy of the current map."""
         rows, columns = self._shape
         return Grid(columns, rows, RESOLUTION_M, self._origin, self._cells.tobytes())

@@ -1,4 +1,4 @@
-"""The patrol as it was built and installed: its geometry, and that its messages can be made."""
+"""Smoke test of the installed patrol package: its geometry and its messages."""
 
 from __future__ import annotations
 

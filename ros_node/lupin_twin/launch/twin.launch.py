@@ -1,6 +1,6 @@
 """Start the twin: `ros2 launch lupin_twin twin.launch.py [namespace:=gh1] [use_sim_time:=true]`.
 
-`ros2 launch lupin_twin twin.launch.py --show-args` lists what can be given.
+`ros2 launch lupin_twin twin.launch.py --show-args` lists the arguments.
 """
 
 from pathlib import Path
@@ -16,7 +16,7 @@ from lupin_twin.core.parameters import ARGUMENTS, overrides, params_file
 
 
 def generate_launch_description() -> LaunchDescription:
-    """One node, its parameters from a file, and what of them is given here."""
+    """Describe one node, with parameters from a file and from launch arguments."""
     return LaunchDescription(
         [
             *(
@@ -34,12 +34,12 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def twin(context: LaunchContext) -> list[Node]:
-    """The node. What stands after the file overrides it, so only what was given stands there."""
+    """Return the node. Its parameters are the file's, overridden by the given arguments."""
     given = {a.name: LaunchConfiguration(a.name).perform(context) for a in ARGUMENTS}
     default = Path(get_package_share_directory("lupin_twin")) / "config" / "twin.yaml"
     parameters = [params_file(given, str(default), lambda path: Path(path).is_file())]
     if changed := overrides(given):
-        # With their types: launch would read a text as YAML, and `off` as false.
+        # With their types: launch would parse a text as YAML, and turn `off` into false.
         parameters.append({name: typed(value) for name, value in changed.items()})
     return [
         Node(
@@ -54,6 +54,6 @@ def twin(context: LaunchContext) -> list[Node]:
     ]
 
 
-def typed(value: bool | str | list[str]) -> ParameterValue:  # a value
-    """The value as it is."""
+def typed(value: bool | str | list[str]) -> ParameterValue:
+    """Wrap a value with its type, so that launch does not parse it as YAML."""
     return ParameterValue(value, value_type=list[str] if isinstance(value, list) else type(value))

@@ -1,4 +1,4 @@
-"""The command `twin_node`: the twin alone, from its first moment to a clean end."""
+"""The command `twin_node`: runs the twin alone, until a signal ends it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def command() -> NoReturn:
-    """`main` as a process of its own."""
+    """Run `main` as the whole process, and exit with its code."""
     process.exit_after(main)
 
 

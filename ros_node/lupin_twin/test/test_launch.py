@@ -1,4 +1,4 @@
-"""The launch file: through `launch` itself where that is installed, as it is on a robot."""
+"""Tests of the launch file, through `launch` itself where it is installed, as on a robot."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def declared() -> dict[str, str]:
 
 
 def declared_in_the_text() -> dict[str, str]:
-    """The same, as far as the text tells: it declares every one of the table, and no other."""
+    """The same from the source text: its only declaration goes over the entries of ARGUMENTS."""
     calls = [
         node
         for node in ast.walk(ast.parse(FILE.read_text(encoding="utf-8")))

@@ -1,4 +1,4 @@
-"""The twin as it was built and installed: its core, and that its node has what it imports."""
+"""Smoke test of the installed twin package: its core, and the imports of its node."""
 
 from __future__ import annotations
 

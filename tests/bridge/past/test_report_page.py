@@ -186,6 +186,7 @@ def test_what_is_handed_over_comes_first_with_its_value_and_both_limits() -> Non
     }
     dry = {"verdict": "stressed", "kind": "range", "sensor": "vpd", "value": 1.5, "limit": 1.3}
     orchid = {**cold, "value": 12.0, "limit": 13.0}
+    warm = {**cold, "verdict": "stressed", "limit": 26.0}
     tags = [
         TagState("7", readings=(Reading("temperature", 9.5, 1), Reading("humidity", 30.0, 1))),
         TagState("8", readings=(Reading("temperature", 12.5, 1),), flower=Flower("Orchid", 0.9)),
@@ -196,7 +197,9 @@ def test_what_is_handed_over_comes_first_with_its_value_and_both_limits() -> Non
         alarm(tag_id="8", reason=orchid, worst=11.0),
         # Of a night, of before its species was known, and at what the twin computes.
         alarm(tag_id="9", reason={**cold, "value": 31.0, "limit": 30.0}, worst=31.0),
-        alarm(tag_id="8", reason={**cold, "value": 27.0, "limit": 26.0}, worst=27.0),
+        alarm(tag_id="8", reason={**warm, "value": 27.0}, worst=27.0),
+        # Critical since, with the limit that it began at.
+        alarm(tag_id="8", reason={**warm, "verdict": "critical", "value": 36.0}, worst=36.0),
         alarm(tag_id="7", reason=dry, worst=1.5),
         alarm(tag_id="9", reason=cold, worst=8.0),
         alarm(tag_id="7", reason=dry, worst=1.6, cleared_at=at(60 + 78 * 60)),
@@ -209,6 +212,7 @@ def test_what_is_handed_over_comes_first_with_its_value_and_both_limits() -> Non
     assert "8 06:01 12.5 °C 11.0 °C 13.0–35.0 °C" in active
     assert "9 06:01 10.0 °C 31.0 °C 8.0–30.0 °C" in active
     assert "8 06:01 12.5 °C 27.0 °C 18.0–26.0 °C" in active
+    assert "8 06:01 12.5 °C 36.0 °C 10.0–35.0 °C" in active
     assert "7 06:01 0.83 kPa 1.50 kPa 0.20–1.30 kPa" in active
     assert "9 06:01 just below 10.0 °C 8.0 °C 10.0–35.0 °C" in active
     assert "7 06:01 07:19 1 h 18 min 1.60 kPa 0.20–1.30 kPa" in resolved

@@ -12,8 +12,6 @@ import {
 import { done, own, undo } from '../../alarms/own';
 import { textNow } from '../../alarms/speech';
 import { alarmList, meanwhile } from '../../alarms/watch';
-import { epochOf } from '../../clock';
-import { minuteText } from '../../domain/format';
 import { shown } from '../../domain/text';
 import { rosText, secondsOf } from '../../domain/time';
 import { act, useApp, type AppState } from '../../store/app';
@@ -49,14 +47,14 @@ const selectIsKnown = (state: AppState): boolean =>
 export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
   const alarms = useApp((state) => state.twin.alarms);
   const moment = useApp((state) => selectShown(state).moment);
-  const takenAt = useApp((state) => selectNewest(state).snapshot?.takenAt ?? null);
   const isStarting = alarms?.source === 'starting';
   const isKnown = useApp(selectIsKnown);
-  const isLast = useApp(selectIsCut) && takenAt !== null;
+  // Of when, the banner says.
+  const isLast = useApp((state) => selectIsCut(state) && selectNewest(state).snapshot !== null);
   return (
     <div className="alarm-notes">
       {moment !== null && !isLast && <p data-note="now">{S.alarmsOfNow(rosText(moment))}</p>}
-      {isLast && <p data-note="lost">{S.alarmsLost(minuteText(epochOf(takenAt)))}</p>}
+      {isLast && <p data-note="lost">{S.alarmsLost}</p>}
       {isStarting && <p data-note="starting">{S.alarmsStarting}</p>}
       {isEmpty && !isLast && (
         <p className="alarm-none" data-note={isKnown ? 'none' : 'unknown'}>

@@ -131,7 +131,6 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
   const root = useRef<HTMLDivElement>(null);
   const who = useSelected(person);
   const isRefused = useIsRefused();
-  const canLookBack = useApp((state) => state.twin.remembered.state !== 'off');
   useLayoutEffect(() => {
     root.current?.scrollIntoView({ block: 'nearest' });
   }, [form]);
@@ -154,7 +153,7 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
       )}
       {form === null && (
         <ul className="menu-list">
-          {act(S.alarmStart, then(goToStart), canLookBack)}
+          {act(S.alarmStart, then(goToStart), true)}
           {mayAct(who) && (
             <>
               {isAcknowledged && act(S.alarmUnacknowledge, then(unacknowledgeAlarm))}

@@ -169,4 +169,6 @@ test('the alarms of a page that looks back are the current ones, as long as anyb
   expect(notes()).toEqual(['now']);
   flush(goLost);
   expect(notes()).toEqual(['lost']);
+  // Of when that is, the banner says.
+  expect(screen.queryByText(/\d\d:\d\d/)).toBeNull();
 });

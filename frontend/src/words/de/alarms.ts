@@ -81,7 +81,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmsNotYet: 'Warten auf die Liste der Alarme',
   alarmsStarting: 'Die Aufzeichnung wird noch gelesen: Weitere Alarme können folgen.',
   alarmsHeard: (since) => `Es wird nichts aufgezeichnet; Alarme vor ${since} sind nicht bekannt.`,
-  alarmsLost: (clock) => `Zuletzt empfangen um ${clock}. Spätere Ereignisse sind nicht bekannt.`,
+  alarmsLost: 'Letzter empfangener Stand. Spätere Ereignisse sind nicht bekannt.',
   alarmsOfNow: (moment) => `Das sind die aktuellen Alarme. Der Rest der Seite zeigt ${moment}.`,
   alarmsMine: '„Quittiert“ und „zurückgestellt“ gelten nur in diesem Browser.',
 

@@ -223,11 +223,6 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   chartLoading: 'Frühere Daten werden geladen',
   chartFailed: (reason) =>
     `Frühere Daten konnten nicht geladen werden; die Seite versucht es weiter. ${reason}`,
-  chartMissing: 'Dieser Zwilling zeichnet nichts auf.',
-  chartMissingHint: 'Ohne Aufzeichnung gibt es keine Verläufe, nur die letzten Messungen.',
-  chartMissingMore:
-    'Den Zwilling ohne „journal:=off“ starten oder im Parameter „journal“ eine Datei nennen.',
-  chartMissingShort: 'Kein Verlauf: Dieser Zwilling zeichnet nichts auf.',
   chartNoTime: 'Der Zwilling kennt noch keine Uhrzeit; es gibt noch keine früheren Daten.',
   chartIdealsDiffer: 'Idealbereiche je nach Art verschieden',
   chartNoSensors: 'Dieser Messpunkt hat keinen Sensor.',

@@ -279,6 +279,4 @@ export const PAST: In<typeof EN.PAST> = {
       ...(seen > 0 ? [counted(seen, 'Schädlingsfund', 'Schädlingsfunde')] : []),
       ...(cleared > 0 ? [counted(cleared, 'Schädling weg', 'Schädlinge weg')] : []),
     ].join(', '),
-  timebarOff: 'Keine früheren Daten: Dieser Zwilling zeichnet nichts auf.',
-  timebarOffHint: 'Die Aufzeichnung wird beim Start des Zwillings eingeschaltet.',
 };

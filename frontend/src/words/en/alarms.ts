@@ -84,7 +84,7 @@ export const ALARMS = {
   alarmsStarting: 'Recorded data is still being read: more alarms may follow.',
   alarmsHeard: (since: string): string =>
     `Nothing is recorded, so alarms before ${since} are unknown.`,
-  alarmsLost: (clock: string): string => `As last received at ${clock}. Later events are unknown.`,
+  alarmsLost: 'As last received. Later events are unknown.',
   alarmsOfNow: (moment: string): string =>
     `These are the current alarms. The rest of the page shows ${moment}.`,
   alarmsMine: '“Acknowledged” and “shelved” apply in this browser only.',

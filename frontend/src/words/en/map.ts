@@ -229,11 +229,6 @@ export const CHARTS = {
   chartLoading: 'Loading history',
   chartFailed: (reason: string): string =>
     `History could not be loaded; the page keeps trying. ${reason}`,
-  chartMissing: 'This twin records nothing.',
-  chartMissingHint: 'Without a recording, the card shows only the last scans.',
-  chartMissingMore:
-    'Start the twin without “journal:=off”, or name a file in the parameter “journal”.',
-  chartMissingShort: 'No chart: this twin records nothing.',
   chartNoTime: 'The twin has no time yet, so there is no history.',
   chartIdealsDiffer: 'Ideal ranges differ by species',
   chartNoSensors: 'This tag has no sensor.',

@@ -276,6 +276,4 @@ export const PAST = {
       ...(seen > 0 ? [counted(seen, 'pest seen', 'pests seen')] : []),
       ...(cleared > 0 ? [counted(cleared, 'pest gone', 'pests gone')] : []),
     ].join(', '),
-  timebarOff: 'No history: this twin records nothing.',
-  timebarOffHint: 'Recording is turned on when the twin is started.',
 } as const;

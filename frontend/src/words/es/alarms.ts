@@ -80,7 +80,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmsNotYet: 'Esperando la lista de alarmas',
   alarmsStarting: 'Todavía se está leyendo el registro: pueden aparecer más alarmas.',
   alarmsHeard: (since) => `No se registra nada: se desconocen las alarmas anteriores a ${since}.`,
-  alarmsLost: (clock) => `Último dato recibido a las ${clock}. Se desconoce lo ocurrido después.`,
+  alarmsLost: 'Últimos datos recibidos. Se desconoce lo ocurrido después.',
   alarmsOfNow: (moment) =>
     `Estas son las alarmas actuales. El resto de la página muestra ${moment}.`,
   alarmsMine: '«Reconocida» y «aplazada» solo valen en este navegador.',

@@ -221,11 +221,6 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   chartLoading: 'Cargando el histórico',
   chartFailed: (reason) =>
     `No se pudo cargar el histórico; la página lo sigue intentando. ${reason}`,
-  chartMissing: 'Este gemelo no registra nada.',
-  chartMissingHint: 'Sin registro no hay gráficas: la ficha solo muestra las últimas mediciones.',
-  chartMissingMore:
-    'Inicie el gemelo sin «journal:=off» o indique un archivo en el parámetro «journal».',
-  chartMissingShort: 'Sin gráfica: este gemelo no registra nada.',
   chartNoTime: 'El gemelo aún no tiene hora: todavía no hay histórico.',
   chartIdealsDiffer: 'El rango ideal depende de la especie',
   chartNoSensors: 'Este punto no tiene sensores.',

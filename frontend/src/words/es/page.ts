@@ -274,6 +274,4 @@ export const PAST: In<typeof EN.PAST> = {
       ...(seen > 0 ? [counted(seen, 'plaga detectada', 'plagas detectadas')] : []),
       ...(cleared > 0 ? [counted(cleared, 'plaga desaparecida', 'plagas desaparecidas')] : []),
     ].join(', '),
-  timebarOff: 'Sin histórico: este gemelo no registra nada.',
-  timebarOffHint: 'El registro se activa al iniciar el gemelo.',
 };

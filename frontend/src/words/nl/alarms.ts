@@ -77,7 +77,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmsNotYet: 'Wachten op de lijst met alarmen',
   alarmsStarting: 'De vastgelegde gegevens worden nog gelezen: er kunnen alarmen bijkomen.',
   alarmsHeard: (since) => `Er wordt niets vastgelegd; alarmen van vóór ${since} zijn niet bekend.`,
-  alarmsLost: (clock) => `Laatst ontvangen om ${clock}. Latere gebeurtenissen zijn niet bekend.`,
+  alarmsLost: 'Laatst ontvangen stand. Latere gebeurtenissen zijn niet bekend.',
   alarmsOfNow: (moment) => `Dit zijn de huidige alarmen. De rest van de pagina toont ${moment}.`,
   alarmsMine: '“Bevestigd” en “uitgesteld” gelden alleen in deze browser.',
 

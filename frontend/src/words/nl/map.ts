@@ -221,12 +221,6 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   chartLoading: 'De historie wordt geladen',
   chartFailed: (reason) =>
     `De historie kon niet worden geladen; de pagina blijft het proberen. ${reason}`,
-  chartMissing: 'Deze digital twin legt niets vast.',
-  chartMissingHint:
-    'Zonder vastgelegde gegevens zijn er geen grafieken, alleen de laatste metingen.',
-  chartMissingMore:
-    'Start de digital twin zonder “journal:=off”, of geef een bestand op in de parameter “journal”.',
-  chartMissingShort: 'Geen grafiek: deze digital twin legt niets vast.',
   chartNoTime: 'De digital twin heeft nog geen tijd; er is nog geen historie.',
   chartIdealsDiffer: 'Ideaal bereik verschilt per soort',
   chartNoSensors: 'Dit meetpunt heeft geen sensor.',

@@ -278,6 +278,4 @@ export const PAST: In<typeof EN.PAST> = {
       ...(seen > 0 ? [counted(seen, 'plaag gezien', 'plagen gezien')] : []),
       ...(cleared > 0 ? [counted(cleared, 'plaag weg', 'plagen weg')] : []),
     ].join(', '),
-  timebarOff: 'Geen historie: deze digital twin legt niets vast.',
-  timebarOffHint: 'Vastleggen zet u aan bij het starten van de digital twin.',
 };

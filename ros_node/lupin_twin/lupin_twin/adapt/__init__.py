@@ -1,1 +1,1 @@
-"""Observations made of what any robot publishes: standard messages, poses, fixed sensors."""
+"""Adapter: makes observations from any robot's standard messages, and from fixed sensors."""

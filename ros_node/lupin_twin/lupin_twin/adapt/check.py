@@ -1,4 +1,4 @@
-"""`adapt --check`: what a configuration would take and drop, or one to start from."""
+"""`adapt --check`: reports what a configuration would accept and drop, or suggests one."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from lupin_twin.core.diagnostics import OK
 
 POLL_S: Final = 0.2
 _KNOWN: Final = frozenset({*STANDARD, *POSES, TF_TYPE, DETECTIONS_TYPE})
-# REP 105, and what navigation often has instead.
+# Frames of the robot's base: REP 105's name, and a common alternative.
 _BASES: Final = ("base_link", "base_footprint")
 
 
 def report(node: AdaptNode, seconds: float) -> Iterator[tuple[bool, str]]:
-    """A line a source of the configuration, each with whether it is as it has to be."""
+    """Yield a line for each source of the configuration, and whether that source is all right."""
     for finding in node.findings(seconds):
         is_right = finding.level == OK
         values = ", ".join(f"{key} {value}" for key, value in finding.values.items())
@@ -45,7 +45,7 @@ class Listener(Node):  # type: ignore[misc]  # rclpy is not typed
     def __init__(self) -> None:
         super().__init__("lupin_adapt_check")
         self.sources: dict[str, Source] = {}
-        # Types that were seen, and why they cannot be read here.
+        # Types that were seen but cannot be read here, with the reason.
         self.missing: dict[str, str] = {}
         self.frames = Frames()
         self.create_timer(POLL_S, self._look)
@@ -77,7 +77,7 @@ class Listener(Node):  # type: ignore[misc]  # rclpy is not typed
 
 
 def suggestion(listener: Listener) -> str:
-    """A configuration to start from, of what was received, as YAML."""
+    """Return a configuration to start from, as YAML, based on what was received."""
     poses = [topic for topic, source in listener.sources.items() if source.type_name in POSES]
     sensors: dict[str, Any] = {}
     for topic, source in sorted(listener.sources.items()):

@@ -1,4 +1,4 @@
-"""The command `adapt`: observations of any robot's own topics, until a signal ends it."""
+"""The command `adapt`: makes observations from any robot's topics, until a signal ends it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HELP = "make observations of a robot's own topics, or of sensors at an MQTT brok
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """The command's own options; ROS's come behind `--ros-args`."""
+    """Add the command's own options; those of ROS follow `--ros-args`."""
     parser.add_argument("--config", type=Path, metavar="FILE", help="YAML: topics, tags, sensors")
     parser.add_argument(
         "--check",
@@ -37,7 +37,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The executable of the ROS package; see `run`."""
+    """Entry point of the ROS package's executable; see `run`."""
     own, ros_args = process.split_ros_args(sys.argv[1:] if argv is None else argv)
     made = argparse.ArgumentParser(prog="adapt", description=HELP, allow_abbrev=False)
     add_options(made)
@@ -45,9 +45,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def run(options: argparse.Namespace, ros_args: Sequence[str]) -> int:
-    """Run it until a signal ends it.
+    """Run the adapter until a signal ends it, or the check.
 
-    Returns the exit code: 2 for a wrong configuration, 1 where --check found a fault.
+    Returns the exit code: 2 for an invalid configuration, 1 if --check found a fault.
     """
     if options.config is None and not options.check:
         return refuse("adapt", "--config FILE is missing; --check prints one to start from")
@@ -70,7 +70,7 @@ def run(options: argparse.Namespace, ros_args: Sequence[str]) -> int:
 
 
 def command() -> NoReturn:
-    """`main` as a process of its own."""
+    """Run `main` as the whole process, and exit with its code."""
     exit_after(main)
 
 
@@ -117,7 +117,7 @@ def _suggest(seconds: float) -> int:
 
 
 def _listen(node: Any, seconds: float) -> None:
-    """Spin for so long; a signal ends it."""
+    """Spin the node for `seconds`; a signal ends the process."""
     from rclpy.executors import SingleThreadedExecutor  # noqa: PLC0415  # see `run`
 
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})

@@ -1,6 +1,6 @@
-"""What `adapt` is told: which topics, which number of a message, where tags are. Pure.
+"""The configuration of `adapt`: topics, message fields, and tag positions. Pure.
 
-Every complaint names the key as it stands in the file, its value, and what is expected.
+Every error names the key as in the file, its value, and what is expected.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ _TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Za-z][A-Za-z0-9]*")
 _FIELD: Final = re.compile(r"[a-z]\w*(\[\d{1,9}\])?(\.[a-z]\w*(\[\d{1,9}\])?)*")
 
 
-# What a standard message measures, and how its number becomes our unit: a ratio %, Pa hPa.
+# Message type → sensor (empty: the topic names it), and where its number is. The factor converts
+# to our unit: ratio to %, Pa to hPa.
 STANDARD: Final[Mapping[str, tuple[str, Value]]] = {
     "sensor_msgs/msg/Temperature": ("temperature", Value("temperature")),
     "sensor_msgs/msg/RelativeHumidity": ("humidity", Value("relative_humidity", 100.0)),
@@ -41,9 +42,9 @@ STANDARD: Final[Mapping[str, tuple[str, Value]]] = {
     "std_msgs/msg/Float32": ("", Value("data")),
     "std_msgs/msg/Float64": ("", Value("data")),
 }
-# What apriltag_ros calls a tag's frame, unless its parameter `tag.frames` says otherwise.
+# Name that apriltag_ros gives to a tag's frame, unless its parameter `tag.frames` sets another.
 TAG_FRAME: Final = "{family}:{id}"
-# What takes the pose out of a message that has a header.
+# Message type → function that returns its pose. All of them have a header.
 POSES: Final[Mapping[str, Callable[[Any], Any]]] = {
     "geometry_msgs/msg/PoseWithCovarianceStamped": attrgetter("pose.pose"),
     "geometry_msgs/msg/PoseStamped": attrgetter("pose"),
@@ -53,9 +54,9 @@ POSES: Final[Mapping[str, Callable[[Any], Any]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """Where the robot says that it is: by a topic, or as the frame `tf` of TF.
+    """Source of the robot's pose: a topic, or the TF frame `tf`.
 
-    A pose holds for `max_age_s`: localisation may publish nothing while the robot stands still.
+    A pose is valid for `max_age_s`: localisation may publish nothing while the robot stands still.
     """
 
     topic: str = ""
@@ -66,7 +67,7 @@ class Robot:
 
 @dataclass(frozen=True, slots=True)
 class Detections:
-    """The topic of apriltag_ros, whose tags are frames of TF; `name` is what a tag is called."""
+    """The topic of apriltag_ros, whose tags are TF frames; `name` is the pattern of a tag's id."""
 
     topic: str
     name: str = TAG_FRAME
@@ -78,7 +79,7 @@ class Detections:
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """One number of one topic. `tag`: it is fixed at this tag; empty: it is the robot's."""
+    """One number in one topic's messages. `tag`: where the sensor is fixed; empty: on the robot."""
 
     name: str
     topic: str
@@ -89,12 +90,12 @@ class Sensor:
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """All of it. Lengths are metres in `frame_id`, times seconds.
+    """The whole configuration. Lengths are metres in `frame_id`, times are seconds.
 
-    `frames`: of the tags that are frames of TF, which.
-    `reach_m`: the robot scans a tag while it is within this distance. `window_s`: readings of one
-    tag are averaged for so long, or until the robot leaves. `cell_m`: where no tag is in reach, a
-    cell of this size is one; 0: readings between tags are not used.
+    `frames`: tag id → TF frame, for tags without a fixed position.
+    `reach_m`: the robot scans a tag within this distance. `window_s`: readings of one tag are
+    averaged over this time, or until the robot leaves. `cell_m`: where no tag is in reach, a grid
+    cell of this size serves as a tag; 0: readings between tags are not used.
     """
 
     sensors: tuple[Sensor, ...]
@@ -110,17 +111,17 @@ class Config:
 
 
 def read_config(path: Path) -> Config:
-    """The configuration in a YAML file; `tags` may name another file, beside it.
+    """Read the configuration from a YAML file; `tags` may name a second file in its folder.
 
     Raises:
-        ConfigError: it cannot be read, or says what cannot be.
+        ConfigError: it cannot be read, or is invalid.
 
     """
     return config_of(read_yaml(path), path.parent)
 
 
 def config_of(content: Any, folder: Path = Path()) -> Config:
-    """The same of what the file holds; see `read_config`."""
+    """Make the configuration from a file's parsed content; see `read_config`."""
     table = Table("", content)
     robot = _robot(Table("robot", table.take("robot"))) if table.has("robot") else None
     tags = dict(_tags(table.take("tags", {}), folder))
@@ -190,7 +191,7 @@ def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Pose | str]]:
     if len(table.content) > MAX_TAGS:
         raise ConfigError(f"tags: {len(table.content)}, the limit is {MAX_TAGS}")
     for key in tuple(table.content):
-        # 12 without quotes is a number in YAML, and the name of a tag nevertheless.
+        # An unquoted 12 is a number in YAML, but a valid tag name all the same.
         name = str(key) if isinstance(key, int) and not isinstance(key, bool) else key
         check_text("tags", name)
         at = table.take(key)
@@ -201,10 +202,10 @@ def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Pose | str]]:
 
 
 def place_of(what: str, at: Any, otherwise: str = "") -> Pose:
-    """A place, m; `otherwise` is what else might stand there.
+    """Return a position, m. `otherwise` ends the error message: what else is allowed there.
 
     Raises:
-        ConfigError: it is none.
+        ConfigError: it is not a position.
 
     """
     if (
@@ -243,7 +244,7 @@ def _sensor(name: str, table: Table) -> Sensor:
         raise ConfigError(
             f"{table.name}.field is {shown(field)}, expected a path such as data or axes[2].value"
         )
-    # The factor is that of the standard field: another number of the message is in its own unit.
+    # The factor belongs to the standard field; another field of the message has its own unit.
     factor = known.factor if field == known.path else 1.0
     sensor = Sensor(
         name,
@@ -257,16 +258,16 @@ def _sensor(name: str, table: Table) -> Sensor:
 
 
 def read_yaml(path: Path) -> Any:
-    """What a YAML file holds.
+    """Return the content of a YAML file.
 
     Raises:
-        ConfigError: it cannot be read, is too large, or is no YAML.
+        ConfigError: it cannot be read, is too large, or is not YAML.
 
     """
-    import yaml  # noqa: PLC0415  # commands that read none start without
+    import yaml  # noqa: PLC0415  # commands that read no YAML start without it
 
     class Loader(yaml.SafeLoader):
-        """Without aliases: a few lines of them stand for more than any memory holds."""
+        """Refuses aliases: a few lines of them can expand to more than any memory holds."""
 
         def compose_node(self, parent: Any, index: Any) -> Any:
             if self.check_event(yaml.AliasEvent):
@@ -285,6 +286,6 @@ def read_yaml(path: Path) -> Any:
         raise ConfigError(f"{path} has more than {MAX_FILE_BYTES} bytes, the limit")
     try:
         return yaml.load(content, Loader)  # noqa: S506  # it is a SafeLoader
-    # It lets through what Python says of text, of numbers of thousands of digits, and of [[[[[...
+    # PyYAML passes on Python's errors about encoding, numbers of thousands of digits, and [[[[[...
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ConfigError(f"{path} is no YAML: {' '.join(str(error).split())[:200]}") from None

@@ -1,8 +1,8 @@
-"""Messages of `adapt`: types by their names, TF, what is said of a source.
+"""ROS messages that `adapt` reads: message types by name, TF, and the diagnostics of a source.
 
-Where a frame is in another is by the newest transform of each step between them. tf2 interpolates
-to the moment of a measurement. At 0.5 m/s and 0.1 s of delay the newest is 5 cm off: less than a
-tag's reach, and none while the robot stands at a tag.
+A position in another frame uses the latest transform of each step between the two; tf2 would
+interpolate to the time of the measurement. At 0.5 m/s and 0.1 s of delay, the latest is 5 cm off.
+That is less than a tag's reach, and there is no error while the robot stands at a tag.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from lupin_twin.core.diagnostics import OK, WARN, Finding
 from lupin_twin.core.drops import Tally
 
 MAX_FRAMES: Final = 1_000
-# From a tag over camera, arm, base and odometry to the map; a longer chain is a circle.
+# A chain goes from a tag over camera, arm, base and odometry to the map; a longer one is a loop.
 MAX_STEPS: Final = 32
 MAX_NAME: Final = 256
-# Whose clock is ahead, or who dates a transform for later, as AMCL does, by at most this.
+# A stamp may be this far in the future: a clock may be ahead, and AMCL post-dates its transforms.
 _AHEAD_NS: Final = 10_000_000_000
 # How long a detection waits for its transform.
 WAIT_NS: Final = 2_000_000_000
 
 
 class FrameError(ValueError):
-    """A transform that is none, or a place that is not known; the message says why."""
+    """A transform is invalid, or a position is unknown; the message gives the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class Transform:
-    """Where a frame is in its parent: m, and a rotation as a quaternion of any length but 0.
+    """Pose of a frame in its parent: `move` in m, `turn` a quaternion of any length but 0.
 
-    `stamp_ns` is None for a static one, which holds for ever.
+    `stamp_ns` is None for a static transform, which is valid forever.
     """
 
     parent: str
@@ -44,7 +44,7 @@ class Transform:
     turn: tuple[float, float, float, float]
 
     def apply(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """A point of the frame, in its parent's coordinates."""
+        """Convert a point of the frame into its parent's coordinates."""
         qx, qy, qz, qw = self.turn
         scale = 2.0 / (qx * qx + qy * qy + qz * qz + qw * qw)
         # v + 2 q × (q × v + w v): two cross products (Rodrigues).
@@ -57,7 +57,7 @@ class Transform:
 
 
 class Frames:
-    """The newest transform of each frame."""
+    """The latest transform of each frame."""
 
     def __init__(self) -> None:
         self._of: dict[str, Transform] = {}
@@ -66,10 +66,10 @@ class Frames:
         return frame in self._of
 
     def put(self, frame: str, transform: Transform) -> None:
-        """Take a transform in the place of the frame's last one.
+        """Store a transform as the frame's latest.
 
         Raises:
-            FrameError: it is not finite, turns by nothing that is a rotation, or is one too many.
+            FrameError: it is not finite, has no rotation or a bad name, or is one frame too many.
 
         """
         numbers = (*transform.move, *transform.turn)
@@ -83,14 +83,14 @@ class Frames:
         self._of[frame] = transform
 
     def stamp_ns(self, frame: str) -> int | None:
-        """Of what moment the frame's own transform is; None: there is none, or it is static."""
+        """Stamp of the frame's own transform; None if there is none, or it is static."""
         found = self._of.get(frame)
         return None if found is None else found.stamp_ns
 
     def place(
         self, frame: str, inside: str, now_ns: int, max_age_ns: int
     ) -> tuple[float, float, float]:
-        """Where the frame's origin is in the frame `inside`, m.
+        """Position of the frame's origin in the frame `inside`, m.
 
         Raises:
             FrameError: no chain leads there, or one of its transforms is older than `max_age_ns`.
@@ -116,19 +116,19 @@ class Frames:
 
 
 class Sightings:
-    """Tags that were detected, until their transforms come: those are published right behind."""
+    """Detected tags that wait for their transforms, which are published just after a detection."""
 
     def __init__(self) -> None:
         self._waiting: dict[str, tuple[str, int, int]] = {}
 
     def see(self, frame: str, tag_id: str, stamp_ns: int, now_ns: int) -> None:
-        """A tag was detected, at `stamp_ns`; its transform is that of `frame`."""
+        """Add a tag that was detected at `stamp_ns`; its transform is that of `frame`."""
         if len(self._waiting) < MAX_FRAMES:
             begun_ns = self._waiting.get(frame, ("", 0, now_ns))[2]
             self._waiting[frame] = (tag_id, stamp_ns, begun_ns)
 
     def come(self, frames: Frames) -> list[tuple[str, str]]:
-        """Tag and frame of those whose transform is here."""
+        """Tag and frame of each detection whose transform has arrived."""
         return [
             (tag_id, frame)
             for frame, (tag_id, stamp_ns, _) in self._waiting.items()
@@ -136,11 +136,11 @@ class Sightings:
         ]
 
     def end(self, frame: str) -> None:
-        """It is known where that tag is."""
+        """Remove a frame's tag: its position is now known."""
         self._waiting.pop(frame, None)
 
     def missed(self, now_ns: int) -> list[str]:
-        """Frames whose places are not known a while after their tags were detected."""
+        """Remove and return the frames whose transform did not arrive within WAIT_NS."""
         gone = [
             frame
             for frame, (_, _, begun_ns) in self._waiting.items()
@@ -151,7 +151,7 @@ class Sightings:
         return gone
 
 
-# Their packages have no wheels: they are looked up when they are wanted.
+# The packages of these types have no wheels, so they are imported only when needed.
 TF_TYPE: Final = "tf2_msgs/msg/TFMessage"
 DETECTIONS_TYPE: Final = "apriltag_msgs/msg/AprilTagDetectionArray"
 TF: Final = "/tf"
@@ -178,9 +178,9 @@ def message_type(name: str) -> Any:
 
 
 def transform_of(message: Any, stamp_ns: int | None) -> tuple[str, Transform]:
-    """A geometry_msgs/TransformStamped: the frame, and where it is in its parent."""
+    """Return the frame and the transform of a geometry_msgs/TransformStamped."""
     at, turn = message.transform.translation, message.transform.rotation
-    # tf2 takes no slash at the beginning, and ROS 1 had one.
+    # ROS 1 names had a leading slash; tf2 allows none.
     return message.child_frame_id.removeprefix("/"), Transform(
         message.header.frame_id.removeprefix("/"),
         stamp_ns,
@@ -189,17 +189,16 @@ def transform_of(message: Any, stamp_ns: int | None) -> tuple[str, Transform]:
     )
 
 
-# The source that all topics of the broker are.
+# All topics of the broker count as one source of this name.
 MQTT: Final = "MQTT"
 
 
 @dataclass(slots=True)
 class Source:
-    """What came, what of it is in a scan, and what was dropped.
+    """Statistics of one source: messages received, used in a scan, and dropped.
 
-    `problem` is what is wrong with it now, `shown` what it said last. `dropped` counts by case:
-    what is wrong with one sensor must not hide what is wrong with another. `name` is the topic's
-    in ROS.
+    `name` is the ROS topic, `problem` the current fault, `shown` the last values to display.
+    `dropped` counts each case separately: a fault of one sensor must not hide that of another.
     """
 
     name: str
@@ -212,7 +211,7 @@ class Source:
     dropped: Tally = field(default_factory=Tally)
 
     def finding(self, topic: str) -> Finding:
-        """The same for `/diagnostics`."""
+        """Return the statistics as an entry of `/diagnostics`."""
         counts = self.dropped.value(time.monotonic())
         wrong = [self.problem] if self.problem else []
         wrong += [recent.message for recent in counts.recent]

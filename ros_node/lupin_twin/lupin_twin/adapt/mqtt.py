@@ -1,6 +1,6 @@
-"""MQTT in: which topics, what stands where in a payload, what it says of which tag; the client.
+"""MQTT input of `adapt`: topic patterns, payload parsing, and the client.
 
-A thread of paho's hands over what comes, the node's thread takes it.
+paho's thread queues the messages, and the node's thread takes them.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from lupin_twin.core.drops import Rejected, check_texts
 PORTS: Final = {"mqtt": 1883, "mqtts": 8883}
 MAX_TOPICS: Final = 100
 MAX_PAYLOAD_BYTES: Final = 65_536
-# In 2001. A device whose clock was never set begins in 1970.
+# A moment in 2001. A device whose clock was never set starts in 1970.
 _EARLIEST_S: Final = 1e9
 _PLACEHOLDER: Final = re.compile(r"\{(tag|sensor)\}|(\+)")
 
 
-# What Zigbee2MQTT calls it: https://www.zigbee2mqtt.io/guide/usage/exposes.html
+# Zigbee2MQTT's keys: https://www.zigbee2mqtt.io/guide/usage/exposes.html
 _ZIGBEE: Final = {
     "temperature": Value("temperature"),
     "humidity": Value("humidity", low=0.0, high=100.0),
@@ -46,7 +46,7 @@ _ZIGBEE: Final = {
     "light": Value("illuminance", low=0.0),
     "co2": Value("co2", low=0.0),
 }
-# What Home Assistant's statestream has behind the last underscore of an entity:
+# Suffix of an entity in Home Assistant's statestream → sensor:
 # https://www.home-assistant.io/integrations/mqtt_statestream/
 _HOME_ASSISTANT: Final = {
     "temperature": "temperature",
@@ -57,18 +57,18 @@ _HOME_ASSISTANT: Final = {
     "soil_moisture": "soil_moisture",
     "moisture": "soil_moisture",
 }
-# And how it says that the sensor is away, or has not said anything yet.
+# Home Assistant's payloads for a sensor that is offline, or has not reported yet.
 _AWAY, _UNKNOWN = b"unavailable", b"unknown"
 PRESETS: Final = ("zigbee2mqtt", "homeassistant")
 
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """One line of the configuration: a topic, and what its payloads mean.
+    """One configured topic pattern, and how to read its payloads.
 
-    `values` by sensor; without any, the payload is one number, of the sensor in the topic. `names`
-    are what the topic may call a sensor, by what it is here. `time` is where a payload says when it
-    was measured. With `is_availability`, the payload says whether the tag's sensor is there.
+    `values` are by sensor; if empty, the payload is one number, of `sensor` or of the topic's.
+    `names` maps the topic's name of a sensor to ours. `time` is the path of the measurement time.
+    With `is_availability`, the payload tells whether the tag's sensor is online.
     """
 
     topic: str
@@ -82,12 +82,12 @@ class Pattern:
 
     @property
     def filter(self) -> str:
-        """What to subscribe to: a level with a placeholder is any."""
+        """The topic filter to subscribe to: a level with a placeholder becomes `+`."""
         levels = self.topic.split("/")
         return "/".join("+" if _PLACEHOLDER.search(level) else level for level in levels)
 
     def match(self, topic: str) -> tuple[str, str] | None:
-        """Tag and sensor of a topic, each empty where it says none; None: it is another's."""
+        """Tag and sensor of a topic, each empty if unknown; None if the topic does not match."""
         found = _regex(self.topic, tuple(self.names)).fullmatch(topic)
         if found is None:
             return None
@@ -98,7 +98,7 @@ class Pattern:
 
 @dataclass(frozen=True, slots=True)
 class Broker:
-    """Where the broker is, who we are to it, and what is listened to there."""
+    """A broker's address, our credentials, and the topic patterns to subscribe to."""
 
     host: str
     port: int
@@ -111,9 +111,9 @@ class Broker:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What one message says: readings of a tag, or that its sensor is not there.
+    """Content of one message: readings of a tag, or that its sensor is offline.
 
-    `stamp_s` is seconds since the epoch, None: the payload does not say.
+    `stamp_s` is seconds since the epoch; None if the payload has no time.
     """
 
     tag: str
@@ -123,10 +123,10 @@ class Measured:
 
 
 def measured(pattern: Pattern, tag: str, sensor: str, payload: bytes) -> Measured:
-    """What a payload says.
+    """Parse a payload.
 
     Raises:
-        Rejected: it has no number where one was expected, or one out of range; a name is too long.
+        Rejected: a number is missing or out of range, or a name or the payload is too long.
 
     """
     check_texts(tag, sensor)
@@ -145,7 +145,7 @@ def measured(pattern: Pattern, tag: str, sensor: str, payload: bytes) -> Measure
     readings = []
     for name, value in pattern.values.items():
         found = _at(content, value.path)
-        if found is not None:  # a device says what it has
+        if found is not None:  # a device may lack some sensors
             readings.append((name, value.reading(found, value.path)))
     if not readings:
         paths = ", ".join(value.path for value in pattern.values.values())
@@ -155,10 +155,10 @@ def measured(pattern: Pattern, tag: str, sensor: str, payload: bytes) -> Measure
 
 
 def broker_of(table: Table, folder: Path) -> Broker:
-    """The broker of the configuration.
+    """Read the broker from the configuration's table `mqtt`.
 
     Raises:
-        ConfigError: a key that cannot be.
+        ConfigError: a key is invalid.
 
     """
     text = table.text("url")
@@ -239,8 +239,8 @@ def _patterns(table: Table) -> Iterator[Pattern]:
 
 @lru_cache(maxsize=2 * MAX_TOPICS)
 def _regex(topic: str, sensors: tuple[str, ...]) -> re.Pattern[str]:
-    """A topic's pattern; a sensor is one of those names, where there are any."""
-    # A tag is as short as can be, so the longest sensor is found: `soil_moisture`, not `moisture`.
+    """Compile a topic's pattern; `sensors` limits the names that {sensor} matches, if not empty."""
+    # A tag matches as little as possible, so that the sensor is `soil_moisture`, not `moisture`.
     known = "|".join(map(re.escape, sensors))
     parts, at = [], 0
     for found in _PLACEHOLDER.finditer(topic):
@@ -273,16 +273,16 @@ def _seconds(stamp: Any) -> float:
     return seconds
 
 
-# Messages that wait for the node's thread; of more, the oldest is lost and counted. All of them
-# at their largest take 65 MB.
+# Messages queued for the node's thread; beyond that, the oldest is lost and counted. At their
+# largest, they take 65 MB.
 MAX_WAITING: Final = 1_000
 RETRY_S: Final = (1, 60)
 
 
 class MqttClient:
-    """Listens to a broker; it connects, and connects again, by itself.
+    """Subscribes to a broker's topics, and reconnects by itself.
 
-    `wake` is called from paho's thread when something waits.
+    `wake` is called from paho's thread when a message is queued.
 
     Raises:
         ConfigError: the library is not installed, or a certificate cannot be read.
@@ -291,7 +291,7 @@ class MqttClient:
 
     def __init__(self, broker: Broker, wake: Callable[[], None]) -> None:
         try:
-            from paho.mqtt.client import Client  # noqa: PLC0415  # for who has a broker
+            from paho.mqtt.client import Client  # noqa: PLC0415  # needed only with a broker
             from paho.mqtt.enums import CallbackAPIVersion  # noqa: PLC0415
         except ImportError:
             raise ConfigError(
@@ -320,7 +320,7 @@ class MqttClient:
         self._client.on_message = self._on_message
 
     def start(self) -> None:
-        """Connect, in a thread of its own."""
+        """Start a thread that connects."""
         self._client.connect_async(self._broker.host, self._broker.port)
         self._client.loop_start()
 
@@ -330,7 +330,7 @@ class MqttClient:
         self._client.loop_stop()
 
     def take(self) -> list[Any]:
-        """What has come since the last call, in order: messages as paho has them."""
+        """Return paho's messages received since the last call, in order."""
         return [self._waiting.popleft() for _ in range(len(self._waiting))]
 
     def _on_connect(
@@ -353,7 +353,7 @@ class MqttClient:
     def _on_message(self, _client: Any, _data: Any, message: Any) -> None:
         if len(self._waiting) == MAX_WAITING:
             self.lost += 1
-        # One byte more than is taken: `measured` refuses it.
+        # One byte more than the limit is kept, so that `measured` refuses the payload.
         message.payload = bytes(message.payload[: MAX_PAYLOAD_BYTES + 1])
         self._waiting.append(message)
         self._wake()

@@ -1,6 +1,6 @@
-"""The ROS node of `adapt`: subscribes to what is configured, publishes observations of it.
+"""The ROS node of `adapt`: subscribes to the configured topics, and publishes observations.
 
-The twin's rules stay the twin's: what is made here is `lupin_msgs/Observation`, as from any robot.
+It applies none of the twin's rules: it publishes `lupin_msgs/Observation`, as any robot does.
 """
 
 from __future__ import annotations
@@ -45,29 +45,29 @@ from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pose, Scan
 from lupin_twin.ros import convert
 from lupin_twin.ros.base_node import NodeUtilities, latched, qos_of, waker
 
-# Patterns take as many steps as a topic has characters, or its square.
+# Matching a pattern takes time linear or quadratic in the length of the topic.
 MAX_TOPIC_LENGTH: Final = 1_000
-# Matches every publisher, also those that drop messages rather than wait.
+# Matches every publisher, also BEST_EFFORT ones.
 ANY_PUBLISHER: Final = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
-# One that claims as many elements as it has bytes takes 45 MB of memory before it is refused.
+# A message of this size that claims one element per byte takes 45 MB before it is refused.
 MAX_MESSAGE_BYTES: Final = 200_000
-# A reading whose stamp is farther from now was stamped by a clock that is wrong.
+# A stamp that is farther than this from now comes from a wrong clock.
 MAX_SKEW_S: Final = 10.0
-# Odometry comes a hundred times a second: tags are looked for as often as anybody can drive.
+# Odometry arrives at 100 Hz; the nearest tag is searched only as often as a robot can reach one.
 POSE_PERIOD_S: Final = 0.05
-# Of each of several publishers its latched message comes.
+# Each of several publishers sends its latched message.
 TF_STATIC_QOS: Final = latched(100)
-# A topic that says nothing for so long is named on `/diagnostics`.
+# A topic without messages for this long is reported on `/diagnostics`.
 SILENT_S: Final = 10.0
 
 
 class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
-    """Readings in, observations out. Belongs to the thread that spins it.
+    """Makes observations from readings. Belongs to the thread that spins it.
 
-    With `is_check`, nothing goes out: `findings` say what would come of it.
+    With `is_check`, it publishes nothing; `findings` report what it would publish.
 
     Raises:
-        ConfigError: a topic that ROS does not take, or a message type that is not installed.
+        ConfigError: a topic's name is invalid, or a message type is not installed.
 
     """
 
@@ -79,9 +79,9 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self._scans = Scans(config)
         self._frames = Frames()
         self._sightings = Sightings()
-        # Where the robot is, m; None: not known.
+        # The robot's position, m; None if unknown.
         self._at: tuple[float, float] | None = None
-        # By topic as it is configured, or MQTT.
+        # By topic as configured, or `MQTT`.
         self._sources: dict[str, Source] = {}
         self._built = 0
         self._moved_s = 0.0
@@ -154,7 +154,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
     def _drop(self, reason: Reason, topic: str, why: str, case: str = "") -> None:
         drop = Drop(reason, why, case=case)
-        # Of a broker's topics there may be any number: one warning a period for all of them.
+        # A broker may have any number of topics, so all of them share one warning per period.
         known = topic if topic in self._sources else MQTT
         self.utilities.warn((reason, (known, case)), drop.on(topic))
         self._sources[known].dropped.add(case or reason.value, drop.on(topic), time.monotonic())
@@ -237,7 +237,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for each in message.detections:
             tag_id = self._config.detections.tag_id(each.family, each.id)  # type: ignore[union-attr]
             seen.append(tag_id)
-            # Corrected bits make tags of shadows, and a tag's first place stays.
+            # Bit correction turns shadows into tags, and a tag's first position is final.
             if each.hamming == 0 and tag_id not in self._scans.places:
                 frame = TAG_FRAME.format(family=each.family, id=each.id)
                 self._sightings.see(frame, tag_id, stamp_ns, self._now_ns())
@@ -250,7 +250,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for tag_id, frame in self._sightings.come(self._frames):
             try:
                 place = Pose.at(*self._place(frame))
-            except FrameError:  # of another frame in between, which may come too
+            except FrameError:  # a frame in between is missing, but may still arrive
                 continue
             self._sightings.end(frame)
             if self._at is not None:
@@ -262,7 +262,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self._publish_tags()
 
     def _frames_to_find(self) -> list[tuple[str, str]]:
-        """Tag and frame of those of the configuration whose place TF did not say yet."""
+        """Tag and frame of each tag configured by frame whose position is not known yet."""
         frames, places = self._config.frames, self._scans.places
         return [(tag_id, frame) for tag_id, frame in frames.items() if tag_id not in places]
 
@@ -282,7 +282,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 self._sources[topic].used += 1
 
     def _stamp_ns(self, topic: str, message: Any) -> int | None:
-        """When it was measured: by its header, or now; None, counted: its clock is wrong."""
+        """Time of measurement: the header's, or now; None (counted as a drop): wrong clock."""
         now_ns = self._now_ns()
         header = getattr(message, "header", None)
         stamp_ns = 0 if header is None else convert.nanoseconds(header.stamp)
@@ -301,7 +301,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         return min(stamp_ns, now_ns)
 
     def destroy_node(self) -> None:
-        """End the connection to the broker, too."""
+        """Destroy the node, and close the connection to the broker."""
         if self._mqtt is not None:
             self._mqtt.stop()
         super().destroy_node()
@@ -373,9 +373,9 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         )
 
     def findings(self, silent_s: float) -> list[Finding]:
-        """Of each source what came and what is wrong with it, and of the observations made.
+        """Report each source's messages and faults, and the number of observations made.
 
-        A topic on which nothing came for `silent_s` is silent.
+        A topic without messages for `silent_s` is silent.
         """
         for topic, source in self._sources.items():
             if topic == TF:
@@ -385,7 +385,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 source.shown["lost"] = str(self._mqtt.lost)
             else:
                 source.problem = self._why_silent(source, silent_s)
-            # A robot that stands, or a slow sensor, is nothing to be logged.
+            # A standing robot or a slow sensor is not worth a log entry.
             if source.problem and (source.received == 0 or topic in (MQTT, TF)):
                 self.utilities.warn(("problem", topic), f"{topic}: {source.problem}")
         errors = self.utilities.callback_errors
@@ -410,7 +410,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             return ""
         publishers = self.get_publishers_info_by_topic(source.name)
         is_static = source.name == TF_STATIC
-        # Static frames come once, and a robot may have none.
+        # Static frames are sent once, and a robot may have none.
         if is_static and (source.received or not publishers):
             return ""
         if not publishers:

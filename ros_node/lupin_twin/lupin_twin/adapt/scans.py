@@ -1,10 +1,10 @@
-"""Readings become scans: which tag a reading belongs to, and the mean over a stop. Pure.
+"""Makes scans from readings: assigns readings to tags, and averages them over a stop. Pure.
 
-A scan has each sensor's mean, of the moment of the newest reading, and its detail says how far they
-were spread. Without a reading it is a failed attempt, and the detail says why.
+A scan holds each sensor's mean, stamped with the latest reading; its detail states the spread.
+Without readings it is a failed attempt, and its detail gives the reason.
 
-All times are ROS time, ns. The robot is at a tag while that is the nearest, within the reach; it
-leaves beyond 1.1 times the reach, or the jitter of a localisation would make many scans of one.
+All times are ROS time, ns. The robot is at the nearest tag within its reach. It leaves only beyond
+1.1 times the reach; otherwise, localisation jitter would split one stop into many scans.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, STATUS_OK, Pose, Reading, Scan
 
 LEAVES: Final = 1.1
-# Who was at a tag for so long and read nothing has failed; one that passed by has not.
+# A stop of at least this long without a reading is a failed scan; a shorter one just passed by.
 STAYED_NS: Final = 2_000_000_000
 
 
-# Of a robot's visit, and of a sensor that stands at its tag.
+# Source of a scan: a robot's visit, or a sensor fixed at its tag.
 VISIT_SOURCE: Final = "adapt"
 FIXED_SOURCE: Final = "adapt/fixed"
 # lupin_msgs/Observation
@@ -32,7 +32,7 @@ SCAN_FAILED: Final = 2
 
 @dataclass(slots=True)
 class _Mean:
-    """Mean and spread, one by one (Welford 1962)."""
+    """Running mean and spread (Welford 1962)."""
 
     number: int = 0
     mean: float = 0.0
@@ -46,13 +46,13 @@ class _Mean:
 
     @property
     def spread(self) -> float:
-        """Standard deviation of the readings; 0 of one."""
+        """Standard deviation of the readings; 0 for a single one."""
         return math.sqrt(self.squares / (self.number - 1)) if self.number > 1 else 0.0
 
 
 @dataclass(slots=True)
 class _Window:
-    """What has been read at one tag since `begun_ns`."""
+    """Readings at one tag since `begun_ns`."""
 
     begun_ns: int
     newest_ns: int = 0
@@ -67,15 +67,15 @@ class _Window:
 
 
 class Scans:
-    """Where the robot is, and what was read there so far. Of fixed sensors, what each tag's say."""
+    """Holds the robot's current stop with its readings, and those of each tag's fixed sensors."""
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        # Where tags are.
+        # Position of each tag.
         self.places: dict[str, Pose] = dict(config.tags)
-        # The tag that the robot is at; None: at none, or not known.
+        # The tag, or cell, where the robot is; None: at none, or unknown.
         self.tag: str | None = None
-        # Where that is, if it is a cell.
+        # Position of `tag`, if it is a cell.
         self._cell: Pose | None = None
         self._seen_ns = 0
         self._visit: _Window | None = None
@@ -83,7 +83,7 @@ class Scans:
         self._now_ns = 0
 
     def move(self, x: float, y: float, now_ns: int) -> Iterator[Scan]:
-        """The robot is here, m; yields the scan that ends by it."""
+        """Move the robot to (x, y), m; yields the scans that end with that."""
         yield from self.due(now_ns)
         self._seen_ns = now_ns
         tag_id = self._nearest(x, y)
@@ -96,14 +96,14 @@ class Scans:
             yield from self._be_at(tag_id, now_ns)
 
     def lose(self, now_ns: int) -> Iterator[Scan]:
-        """Nobody knows where the robot is; yields the scan that ends by it."""
+        """Note that the robot's position is unknown; yields the scans that end with that."""
         yield from self.due(now_ns)
         yield from self._be_at(None, now_ns)
 
     def discover(self, tag_id: str, place: Pose, x: float, y: float) -> bool:
-        """Whether a tag that is seen from (x, y), m, is new and in reach; if so, it is there.
+        """Add a tag seen from (x, y), m, if it is new and in reach; returns whether it was added.
 
-        The first place stays, as in the twin: from then on it is a tag as a surveyed one.
+        Its first position is final, as in the twin: from then on it is like a surveyed tag.
         """
         is_new = tag_id not in self.places and len(self.places) < MAX_TAGS
         if is_new and _distance_m(place, x, y) <= self._config.reach_m:
@@ -112,13 +112,13 @@ class Scans:
         return False
 
     def failed(self, tag_id: str, detail: str, now_ns: int, *, is_fixed: bool = False) -> Scan:
-        """A failed attempt at a tag."""
+        """Return a failed attempt at a tag."""
         return self._built(tag_id, now_ns, (), detail, is_fixed=is_fixed)
 
     def take(self, sensor: str, tag: str, value: float, stamp_ns: int, now_ns: int) -> bool:
-        """A reading, in the sensor's unit; returns whether it belongs to a tag, and has room there.
+        """Add a reading, in the sensor's unit; returns False if there is no tag or no room for it.
 
-        `tag` is where the sensor is fixed; empty: it is the robot's.
+        `tag` is where the sensor is fixed; empty: on the robot.
         """
         if tag:
             if tag not in self._fixed and len(self._fixed) >= MAX_TAGS:
@@ -131,8 +131,8 @@ class Scans:
         return window.add(sensor, value, stamp_ns)
 
     def due(self, now_ns: int) -> Iterator[Scan]:
-        """Scans whose time is over; to be called once a second, and before the robot is moved."""
-        if now_ns < self._now_ns:  # the clock has gone back: another world
+        """Yield the scans whose window is over; call it once a second, and before each move."""
+        if now_ns < self._now_ns:  # the clock went back: a new run
             self.tag, self._visit, self._fixed = None, None, {}
         self._now_ns = now_ns
         window_ns = int(self._config.window_s * NANOSECONDS_PER_SECOND)
@@ -198,7 +198,7 @@ class Scans:
             default=(math.inf, ""),
         )
         if found[0] <= reach_m:
-            # The other has to be nearer by as much as makes the robot leave.
+            # Hysteresis: another tag has to be nearer by the same margin as for leaving.
             stays = here is not None and (
                 _distance_m(self.places.get(here), x, y) - found[0] <= (LEAVES - 1.0) * reach_m
             )

@@ -1,6 +1,6 @@
-"""A file's mappings, taken key by key; a number or a moment of a source as a reading. Pure.
+"""Checked access to a configuration file's mappings, and parsing of numbers and times. Pure.
 
-Every complaint names the key, its value and the limit.
+Every error names the key, its value and the limit.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TEXT_LENGTH, Rejected
 
 
 class ConfigError(ValueError):
-    """A configuration that cannot be; the message names the key, the value and the limit."""
+    """The configuration is invalid; the message names the key, the value and the limit."""
 
 
 class Table:
-    """A mapping of the file, taken key by key; what is left at the end is a mistake."""
+    """A mapping of the file, consumed key by key; a key that is left at the end is an error."""
 
     def __init__(self, name: str, content: Any) -> None:
         if not isinstance(content, dict):
@@ -36,20 +36,20 @@ class Table:
         return key in self.content
 
     def take(self, key: Any, *default: Any) -> Any:
-        """The value as it is; without a default, one has to be given."""
+        """Remove and return the value, unchecked; without a default, the key is required."""
         self._known.append(key)
         if key not in self.content and not default:
             raise ConfigError(f"{self._called(key)} is missing")
         return self.content.pop(key, *default)
 
     def text(self, key: str, default: str | None = None) -> str:
-        """A text that is not empty; the default may be."""
+        """Take a text that is not empty; only the default may be empty."""
         if not self.has(key) and default is not None:
             return default
         return check_text(self._called(key), self.take(key))
 
     def one_of(self, key: str, names: Collection[str]) -> str:
-        """One of these."""
+        """Take a value that is one of `names`."""
         value = self.take(key)
         if value not in names:
             raise ConfigError(
@@ -60,7 +60,7 @@ class Table:
     def number(
         self, key: str, default: float, low: float = -math.inf, high: float = math.inf
     ) -> float:
-        """A number in a range."""
+        """Take a number from `low` to `high`."""
         value = self.take(key, default)
         if value is not default and not is_number(value):
             raise ConfigError(f"{self._called(key)} is {shown(value)}, expected a number")
@@ -71,7 +71,7 @@ class Table:
         return float(value)
 
     def end(self) -> None:
-        """All has been taken: what is left is a mistake."""
+        """Raise ConfigError if a key was not taken."""
         known = ", ".join(dict.fromkeys(self._known))
         for key in self.content:
             raise ConfigError(f"{self._called(shown(key))} is not known, expected one of {known}")
@@ -81,7 +81,7 @@ class Table:
 
 
 def check_text(what: str, value: Any) -> str:
-    """The value, where it is a printable text that is neither empty nor too long."""
+    """Return the value, or raise ConfigError unless it is printable text of a valid length."""
     if (
         not isinstance(value, str)
         or not 0 < len(value) <= MAX_TEXT_LENGTH
@@ -109,7 +109,7 @@ _SHORT.maxstring = 80
 
 
 def shown(value: Any) -> str:
-    """The value as a complaint repeats it: its beginning, of text and of what is nested."""
+    """The value for an error message; long text and nested content are cut."""
     try:
         text = _SHORT.repr(value)
     except ValueError:  # an integer of thousands of digits
@@ -119,9 +119,9 @@ def shown(value: Any) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """Where a source has a sensor's number, and how that becomes our unit.
+    """Where a sensor's number is in a source's data, and how to convert it to our unit.
 
-    The number is value * factor + offset; what is then below `low` or above `high` is no reading.
+    A reading is raw * factor + offset; one below `low` or above `high` is rejected.
     """
 
     path: str = ""
@@ -131,14 +131,14 @@ class Value:
     high: float = math.inf
 
     def reading(self, raw: Any, what: str) -> float:
-        """The number in the sensor's unit, also of one that is written as text.
+        """Convert a number, or its text, to the sensor's unit.
 
         Raises:
-            Rejected: it is none, or out of range; `what` is its name.
+            Rejected: it is not a number, or out of range; `what` names it in the message.
 
         """
         try:
-            # true is a number to Python, and none to who reads a temperature.
+            # In Python, true is a number; as a temperature, it is not.
             number = float("" if isinstance(raw, bool) else raw) * self.factor + self.offset
         except (TypeError, ValueError, OverflowError):
             raise Rejected(f"{what} is {shown(raw)}, expected a number") from None
@@ -155,16 +155,16 @@ _MILLISECONDS: Final = 1e11
 
 
 def seconds_of(stamp: Any, zone: tzinfo | None) -> float:
-    """A moment in seconds since 1970: of ISO 8601, or of such a number, or of ms, µs or ns.
+    """Parse a time, given as ISO 8601 or in s, ms, µs or ns since 1970; returns s since 1970.
 
-    What has no offset is in `zone`.
+    ISO 8601 without an offset is in `zone`.
 
     Raises:
-        Rejected: it is none.
+        Rejected: it is not a time since 1970, or needs a `zone`.
 
     """
     number = None
-    # Most are dates: to find by an error that they are no numbers is slow.
+    # Most stamps are dates; failing to parse each as a number first would be slow.
     if not isinstance(stamp, bool) and not (isinstance(stamp, str) and stamp[4:5] == "-"):
         with suppress(TypeError, ValueError, OverflowError):
             number = float(stamp)
@@ -189,10 +189,10 @@ def seconds_of(stamp: Any, zone: tzinfo | None) -> float:
 
 
 def number_of(message: object, path: str) -> float:
-    """The number at a field's path of a message, such as `data` or `axes[2].value`.
+    """Return the number at a path in a message, such as `data` or `axes[2].value`.
 
     Raises:
-        Rejected: there is none.
+        Rejected: there is no number.
 
     """
     value: Any = message
@@ -210,10 +210,10 @@ def number_of(message: object, path: str) -> float:
 
 
 def value_of(table: Table, path: str = "", factor: float = 1.0) -> Value:
-    """The keys `factor`, `offset`, `min` and `max` of a table.
+    """Read the keys `factor`, `offset`, `min` and `max` of a table.
 
     Raises:
-        ConfigError: one of them cannot be.
+        ConfigError: one of them is invalid.
 
     """
     value = Value(
@@ -229,10 +229,10 @@ def value_of(table: Table, path: str = "", factor: float = 1.0) -> Value:
 
 
 def values_of(table: Table, key: str) -> dict[str, Value]:
-    """By sensor its path alone, or a table with the path under `key`.
+    """Read the values by sensor, each a path alone or a table with the path under `key`.
 
     Raises:
-        ConfigError: there are too many, or one of them cannot be.
+        ConfigError: there are too many, or one of them is invalid.
 
     """
     if len(table.content) > MAX_SENSORS_PER_TAG:

@@ -1,1 +1,1 @@
-"""What the twin knows, and the rules by which it takes in more: values in, values out. Pure."""
+"""The twin's state, and the rules for updating it: values in, values out. Pure."""

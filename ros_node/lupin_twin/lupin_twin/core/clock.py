@@ -1,16 +1,16 @@
-"""Whether ROS time runs, and whether producers' stamps follow it. Pure.
+"""Detects whether ROS time runs, and whether producers' stamps keep up with it. Pure.
 
-Ages by a clock that does not run are no ages: an observation of an hour ago would look new for as
-long as nobody moves the clock. So nothing shows an age without this.
+An age means something only while the clock runs: with a stopped clock, an observation of an hour
+ago would look new. So nothing shows an age without this check.
 
-A producer whose stamps stay behind its own earlier ones has a clock that has gone back. What it
-sends is ignored until that has caught up, for what is newer stays; that must not happen in silence.
-A little out of order is normal, and so are:
+A producer whose stamps stay behind its own earlier ones has a clock that went back. Its
+observations do not change the state until that clock has caught up; the operator has to know.
+Slight disorder is normal, and is not reported:
 
-- a message that overtakes a few others, or a slow one: the next in order ends the run;
-- inspections from a slow pipeline behind later scans: each kind has its own order;
-- latched messages of a second producer of the same name, received as one of them is found: they
-  come at once, long after they were published. Such a burst counts as one message.
+- a message that overtakes a few others, or is slow: the next one in order ends the run;
+- inspections from a slow pipeline that arrive after later scans: each kind has its own order;
+- latched messages of a second producer of the same name: they arrive in a burst when it is
+  discovered, long after they were published. Such a burst counts as one message.
 
 Stamps are nanoseconds of ROS time; `now_s` is seconds of a clock that never jumps.
 """
@@ -24,11 +24,11 @@ from typing import Final
 
 from lupin_twin.core.state import ClockState
 
-# A clock that has not moved for so long, s of steady time, does not run.
+# A clock that has not moved for this long, s of steady time, is not running.
 STANDS_AFTER_S: Final = 3.0
-# What a twin says of its clock, once a second, is true of so long ago, s, with room for a slow one.
+# Maximum age of a twin's report on its clock, s: it comes once a second, or later from a slow twin.
 REPORT_LAG_S: Final = 2.0
-# From here on it is worth listening whether `/clock` still comes.
+# After standing for this long, s, it is worth subscribing to see whether `/clock` is still sent.
 SUBSCRIBE_AFTER_S: Final = 1.0
 
 
@@ -43,14 +43,14 @@ class ClockWatch:
         self._message_s: float | None = None
 
     def add_message(self, now_s: float) -> None:
-        """A message came on `/clock`, whatever it says."""
+        """Note that a message arrived on `/clock`, whatever its time is."""
         self._message_s = now_s
 
     def update(self, ros_ns: int, now_s: float, *, is_simulated: bool) -> ClockState:
         """Note the time; returns the state of the clock.
 
-        A clock that is not simulated is the system's, and runs. One that is simulated and was never
-        set is at 0.
+        A clock that is not simulated is the system's, and always runs. A simulated clock that was
+        never set is at 0.
         """
         if ros_ns != self._last_ns:
             self._last_ns, self._moved_s = ros_ns, now_s
@@ -69,10 +69,10 @@ class ClockWatch:
 
 
 class StampWatch:
-    """The state of a twin's clock, for a process that receives its states.
+    """Infers the state of a twin's clock in another process, which receives the twin's states.
 
-    A stamp that stands may be that of a clock that is paused, and then only the twin itself knows.
-    Where it does not say so, the clock has stopped: a guess never means that all is well.
+    If stamps stand still, the clock may be paused, which only the twin knows. Unless the twin
+    reports that, the clock counts as stopped: a guess never means that all is well.
     """
 
     def __init__(self) -> None:
@@ -88,10 +88,10 @@ class StampWatch:
         ages_are_known: bool,
         reported: ClockState | None = None,
     ) -> ClockState:
-        """Note a state's stamp; `ages_are_known`: the twin gave no age as NaN.
+        """Note a state's stamp; `ages_are_known`: none of its ages is NaN.
 
-        `reported` is what the twin reported of its clock, up to `REPORT_LAG_S` behind what its
-        states say; None: nothing.
+        `reported` is the twin's last report on its clock, up to `REPORT_LAG_S` older than its
+        state; None if there is none.
         """
         if stamp_ns != self._last_ns:
             self._has_moved = self._last_ns is not None
@@ -107,23 +107,23 @@ class StampWatch:
         return "running" if standing_s < STANDS_AFTER_S + lag_s else "stopped"
 
 
-# So many in a row may be behind before anything is reported.
+# Up to this many late observations in a row are not reported.
 FEW: Final = 5
-# What was published so long before it was received comes out of a publisher's latch.
+# A message received this long after it was published comes from a publisher's latch.
 LATCHED_AFTER_S: Final = 0.5
-# Messages out of a latch count again only after so long.
+# Latched messages within this time count as one.
 APART_S: Final = 2.0
-# A broken producer may call itself something else each time: the rest is counted together.
+# A broken producer may change its name with each message; further names are counted together.
 MAX_SOURCES: Final = 64
 OTHERS: Final = "(others)"
 
 
 @dataclass(frozen=True, slots=True)
 class Late:
-    """More than a few in a row that are behind: how many, and by how much the last of them, s.
+    """A run of late observations: its length, and by how many s the last one is behind.
 
-    `counted_as` is one of few names: that of the source, or `OTHERS`. `news` is how many have been
-    counted just now: the first time, the whole run.
+    `counted_as` is the name it is counted under: the source's, or `OTHERS`. `news` is how many
+    were just added to the count: the first time, the whole run.
     """
 
     source: str
@@ -149,7 +149,7 @@ class _Stream:
 
 
 class Lateness:
-    """Follows the stamps of each source and kind; `counts` is what was late, by source."""
+    """Follows the stamps of each source and kind; `counts` are the late observations by source."""
 
     def __init__(self) -> None:
         self.counts: dict[str, int] = {}
@@ -158,7 +158,7 @@ class Lateness:
     def see(
         self, source: str, kind: int, stamp_ns: int, *, was_latched: bool, now_s: float
     ) -> Late | None:
-        """Note an observation that was not received before; returns what is wrong with its source.
+        """Note a new observation; returns the run of late ones that it belongs to, if it is long.
 
         `was_latched`: it was published well before it was received.
         """
@@ -180,7 +180,7 @@ class Lateness:
         return Late(source, stream.run, (stream.newest_ns - stamp_ns) / 1e9, name, news)
 
     def hold_to(self, now_ns: int) -> None:
-        """Follow a clock that has gone back for all, and nobody is late by it."""
+        """Follow ROS time that went back for everybody: no source is late because of it."""
         for stream in self._streams.values():
             stream.newest_ns, stream.run = min(stream.newest_ns, now_ns), 0
 

@@ -1,6 +1,6 @@
-"""What a twin reports on `/diagnostics`: its state, what it received, lost and dropped. Pure.
+"""A twin's report on `/diagnostics`: clock, inputs, drops, losses and journal. Pure.
 
-Also what a consumer reads of it again. Times are seconds.
+`findings` makes the report, and `self_report` reads it in a consumer. Times are seconds.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import Final, Literal, get_args
 from lupin_twin.core.drops import LATE, LOST, Counts, Reason, Recent
 from lupin_twin.core.state import ClockState
 
-# What a source calls itself is its own affair, and so is how long that is.
+# Longer texts are cut: a source's name, for example, may have any length.
 MAX_SHOWN: Final = 500
 
-# Under this key a twin names the state it publishes: by it a consumer knows its own twin. Not by
-# the node's name, which DDS sends once: after a gap in the link longer than its lease, never again.
+# Key of the twin's state topic, by which a consumer recognises its twin. The node's name would not
+# do: DDS sends it only once, and not again after a gap in the link longer than its lease.
 STATE_TOPIC: Final = "state topic"
 
 _REASONS: Final = (*(reason.value for reason in Reason), LOST, LATE)
@@ -27,7 +27,7 @@ _LAST: Final = "last: "
 _ERRORS: Final = "callback errors"
 _MAX_DIGITS: Final = 15
 _PROBLEM: Final = "problem "
-# Of what is wrong with inputs no more is reported: a broken network may have any number.
+# At most this many input problems are reported: a broken network may have any number.
 MAX_PROBLEMS: Final = 8
 
 # diagnostic_msgs/DiagnosticStatus
@@ -45,7 +45,7 @@ CLOCK: Final[Mapping[ClockState, tuple[int, str]]] = {
 }
 
 
-# Where observations come from, as far as a twin says. sim_time: it goes by `/clock`, and so they
+# Where observations come from, as the twin reports it. sim_time: the twin follows `/clock`, so they
 # come from a simulation or from a recording that is played.
 Origin = Literal["unknown", "robot", "simulated", "recorded", "sim_time"]
 _ORIGIN: Final[Mapping[Origin, str]] = {
@@ -58,40 +58,40 @@ _ORIGIN: Final[Mapping[Origin, str]] = {
 
 
 def origin_of(name: str, *, is_simulated: bool) -> Origin:
-    """The origin of that name; and by a clock that is simulated (`is_simulated`) no robot works."""
+    """The origin of that name; with a simulated clock, `robot` becomes `sim_time`."""
     origin: Origin = next((one for one in get_args(Origin) if one == name), "unknown")
     return "sim_time" if is_simulated and origin == "robot" else origin
 
 
 class JournalState(StrEnum):
-    """What the journal is at. Only in `recording` is everything stored as promised."""
+    """State of the journal. Only `recording` means that everything is stored as promised."""
 
-    UNKNOWN = "unknown"  # the twin is elsewhere, and does not say
-    OFF = "off"  # recorded into a temporary file, which goes at the end
+    UNKNOWN = "unknown"  # the twin runs elsewhere, and does not report it
+    OFF = "off"  # recorded into a temporary file, which is deleted at the end
     STARTING = "starting"
-    UPGRADING = "upgrading"  # the file is of an older version; nothing is known before it is done
+    UPGRADING = "upgrading"  # the file has an older version; nothing is known before it is upgraded
     RECORDING = "recording"
-    SLOW = "slow"  # the disk does not keep up: what is waiting is not safe yet
-    FAILING = "failing"  # nothing can be written; tried again and again
+    SLOW = "slow"  # the disk does not keep up: waiting rows are not safe yet
+    FAILING = "failing"  # nothing can be written; retried again and again
     DOUBTING = "doubting"  # the clock contradicts the journal: nothing is written until it agrees
     IN_USE = "in_use"  # another process writes this file
-    FOREIGN = "foreign"  # the file is somebody else's, or of a newer version
+    FOREIGN = "foreign"  # the file belongs to another program, or has a newer version
 
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """The state, a sentence about it, and counts since the twin started.
+    """The journal's state, a sentence about it, and counts since the twin started.
 
-    `waiting` rows are handed over and not written yet, the oldest of them for `behind_s`. `lost`
-    rows were given up because too many were waiting, `refused` rows could not be written by
-    their own fault, `repeated` ones were there already. `set_aside` names the last damaged file.
-    `simulated_ns` is the stretch of ROS time, start and end, that a simulation filled in and no
-    robot observed, None if there is none.
+    `waiting` rows are queued but not written yet, the oldest of them for `behind_s`. `lost` rows
+    were discarded because too many were waiting. `refused` rows were invalid themselves, and
+    `repeated` rows were already stored. `set_aside` names the last quarantined file.
+    `simulated_ns` is the period of ROS time, start and end, that a simulation filled in and no
+    robot observed; None if there is none.
 
-    All that was received up to `complete_ns`, ROS time, is written; None: it is not known. Within
-    `kept_ns`, stretches of ROS time in their order, all of that is still there: what lies before
-    was deleted, or nobody recorded. `journal_id` identifies the file, and `inode` which of that
-    `path` is written; 0: none, or it is not known.
+    Everything received up to `complete_ns`, ROS time, is written; None if that is unknown.
+    `kept_ns` are the periods of ROS time, in order, of which all rows still exist. The rest was
+    deleted, or was not recorded. `journal_id` identifies the file. `inode` tells which file at
+    `path` is being written; 0: none, or unknown.
     """
 
     state: JournalState
@@ -137,12 +137,12 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """What is looked at. `inputs` is how many publish on each topic that is listened to.
+    """What the report is made from. `inputs` is the number of publishers of each input topic.
 
-    `input_problems` says why not all of what they publish is received, with the remedy.
-    `observed_ago_s` is how long ago the last observation was taken in; None: none was. `late` is
-    how many observations each source gave behind its own earlier ones. `others` is what parts of
-    the twin say of themselves.
+    `input_problems` say why some of their messages are not received, with the remedy.
+    `observed_ago_s` is how long ago the last observation was accepted; None if there was none.
+    `late` is how many observations of each source were behind its own earlier ones. `others` are
+    findings from other parts of the twin.
     """
 
     clock: ClockState
@@ -162,7 +162,7 @@ class Health:
 
 
 def findings(health: Health) -> Iterator[Finding]:
-    """All that is reported, one by one."""
+    """Yield the findings of the report."""
     level, message = CLOCK[health.clock]
     yield Finding("clock", level, message, {"state": health.clock})
     yield Finding("origin", OK, _ORIGIN[health.origin], {"origin": health.origin})
@@ -216,7 +216,7 @@ def findings(health: Health) -> Iterator[Finding]:
             "lost": str(journal.lost),
             "refused": str(journal.refused),
             "set aside": journal.set_aside,
-            # Start and end of what no robot observed, ns of ROS time; so are those that follow.
+            # Start and end of the simulated past. This and the next two are ns of ROS time.
             "simulated": _stretches((journal.simulated_ns,) if journal.simulated_ns else ()),
             "complete to": "" if journal.complete_ns is None else str(journal.complete_ns),
             "kept": _stretches(journal.kept_ns),
@@ -258,19 +258,19 @@ def _recent_readings(recent: Iterable[Recent]) -> dict[str, str]:
 
 
 def shown(text: str) -> str:
-    """The text, or of a long one its beginning."""
+    """The text, cut to `MAX_SHOWN` characters."""
     return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 1] + "…"
 
 
-# --- read again -----------------------------------------------------------------------------
+# --- reading the report ---------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class SelfReport:
-    """How a twin's clock does, and what it dropped, lost and met; None: it does not say.
+    """A twin's own report: its clock, and what it dropped and lost; None if not reported.
 
-    `origin` is where its observations come from; `journal` has of its counts those that are
-    published; `input_problems` is why it does not receive all.
+    `origin` is where its observations come from. `journal` has only the counts that are published.
+    `input_problems` say why the twin does not receive everything.
     """
 
     clock: ClockState | None = None
@@ -281,7 +281,7 @@ class SelfReport:
 
 
 def self_report(reported: Iterable[Finding]) -> SelfReport:
-    """What `findings` reported, as far as it can be read; unknown reasons are left out."""
+    """Read the report made by `findings`, as far as possible; unknown reasons are left out."""
     by_name = {finding.name: finding for finding in reported}
     values = {name: finding.values for name, finding in by_name.items()}
     journal = _journal(by_name["journal"]) if "journal" in by_name else UNKNOWN_JOURNAL
@@ -336,7 +336,7 @@ def _stretches(stretches: Iterable[tuple[int, int]]) -> str:
 
 
 def _read_stretches(text: str) -> tuple[tuple[int, int], ...]:
-    """Pairs of stamps; none where the text is anything else."""
+    """Parse pairs of stamps; empty if the text is anything else."""
     words = text.split(" ") if len(text) <= MAX_SHOWN * 2 else []
     if len(words) % 2 or not _are_stamps(*words):
         return ()
@@ -345,11 +345,11 @@ def _read_stretches(text: str) -> tuple[tuple[int, int], ...]:
 
 
 def _are_stamps(*texts: str) -> bool:
-    # As of numbers below: no stamp has more digits.
+    # As in `_number`. No stamp has more digits.
     return all(text.isascii() and text.isdigit() and len(text) <= 19 for text in texts)
 
 
 def _number(values: Mapping[str, str], key: str) -> int:
     text = values.get(key, "")
-    # No count has more digits; and of some texts that are digits int() makes nothing.
+    # No count has more digits. isascii(): isdigit() also accepts characters that int() refuses.
     return int(text) if text.isascii() and text.isdigit() and len(text) <= _MAX_DIGITS else 0

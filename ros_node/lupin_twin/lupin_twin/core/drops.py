@@ -1,7 +1,7 @@
-"""What is not taken in: bounds on what one robot may make us keep, reasons, counts, warnings.
+"""Dropped input: the limits on what a robot can make us store, reasons, counts and warnings. Pure.
 
-A greenhouse compartment has hundreds of tags and a tag carries a handful of sensors; the bounds are
-far above that and keep memory finite when a producer is broken or hostile. Pure.
+A greenhouse compartment has hundreds of tags, each with a handful of sensors. The limits are far
+above that; they bound memory when a producer is broken or hostile.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ MAX_SENSORS_PER_TAG = 64
 MAX_TEXT_LENGTH = 256
 MAX_BLOOMS_PER_TAG = 2_000
 MAX_FOOTPRINT_POINTS = 64
-# And on all of it together, for those multiply: each reading, flower and footprint point counted,
-# 20,000 tags with ten sensors and forty flowers. A reading with its name is some hundred bytes.
+# Limit on readings, flowers and footprint points together, because the limits above multiply. It
+# allows 20,000 tags with ten sensors and forty flowers. A reading with its name takes about 100 B.
 MAX_ITEMS = 1_000_000
 
 
@@ -35,19 +35,19 @@ def check_texts(*texts: str) -> None:
 
 
 def too_long(what: str, text: str) -> str:
-    """What is wrong with a text that no store takes; empty: nothing."""
+    """Say why a text is too long to be stored; empty if it is not."""
     if len(text) <= MAX_TEXT_LENGTH:
         return ""
     return f"{what} {text[:24]!r}… has {len(text)} characters, the limit is {MAX_TEXT_LENGTH}"
 
 
 def check_length(what: str, length: int, limit: int) -> None:
-    """Raise `Rejected` where `length` of `what` is past `limit`."""
+    """Raise `Rejected` if the `length` of `what` is above `limit`."""
     if length > limit:
         raise Rejected(f"{what}: {length}, the limit is {limit}")
 
 
-# What is reported to an operator as recent, s.
+# How long a drop is reported to the operator as recent, s.
 RECENT_S: Final = 300.0
 _BUCKET_S: Final = 10.0
 LOST: Final = "lost"
@@ -56,7 +56,7 @@ LATE: Final = "late_stamp"
 
 @dataclass(frozen=True, slots=True)
 class Recent:
-    """How often one reason came up recently, and what it was the last time, for a person."""
+    """How often one reason occurred recently; `message` describes its last case to a person."""
 
     reason: str
     message: str
@@ -65,7 +65,7 @@ class Recent:
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """Everything counted since the start, immutable: it crosses between threads as it is."""
+    """All counts since the start; immutable, so threads can share them."""
 
     dropped: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     callback_errors: int = 0
@@ -73,17 +73,17 @@ class Counts:
 
 
 class Tally:
-    """Counts; belongs to one thread."""
+    """Counts drops and errors; belongs to one thread."""
 
     def __init__(self) -> None:
         self.callback_errors = 0
         self._dropped: dict[str, int] = {}
         self._texts: dict[str, str] = {}
-        # By reason, (when the bucket began, how many): 30 buckets at most.
+        # By reason, (start of the bucket in s, count): at most 30 buckets.
         self._buckets: dict[str, deque[tuple[float, int]]] = {}
 
     def value(self, now_s: float) -> Counts:
-        """The counts now."""
+        """Return the current counts."""
         return Counts(
             MappingProxyType(dict(self._dropped)),
             self.callback_errors,
@@ -118,7 +118,7 @@ class Tally:
 
 
 class Reason(StrEnum):
-    """Why a message, or an entry of one, was dropped. What is counted is counted by these."""
+    """Why a message, or an entry of one, was dropped. Drops are counted by reason."""
 
     KIND = "kind"
     FRAME = "frame"
@@ -132,9 +132,9 @@ class Reason(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Drop:
-    """One thing that was dropped: `what` it was, and `why` in words that name the value.
+    """A dropped message or entry: `what` it was, and `why`, in words that name the value.
 
-    `case` tells cases of one reason apart that should not hide each other; it is of a small set.
+    `case` separates cases of one reason that must not hide each other; it is of a small set.
     """
 
     reason: Reason
@@ -150,8 +150,8 @@ class Drop:
 class Throttle:
     """Lets one message per key through in each period; pure, the time is an argument.
 
-    rclpy's own throttle goes by the line of code that logs, so that two different reasons logged
-    by one line would hide each other. Keys have to come from a small set: they stay.
+    rclpy's own throttle works per line of code, so that two different reasons logged by one line
+    would hide each other. Keys have to come from a small set: they are never removed.
     """
 
     def __init__(self, period_s: float) -> None:
@@ -160,7 +160,7 @@ class Throttle:
         self._held_back: dict[Hashable, int] = {}
 
     def allow(self, key: Hashable, now_s: float) -> int | None:
-        """How many were held back since the last time, or None: hold this one back too.
+        """Return how many were held back since the last message; None: hold this one back too.
 
         `now_s` is seconds of a clock that never jumps.
         """

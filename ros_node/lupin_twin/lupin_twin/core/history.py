@@ -1,10 +1,10 @@
-"""What was observed at a tag before; and what was received before, which is nothing new again.
+"""A tag's history, and the detection of observations that were received before.
 
 Pure: no clock, no ROS, no lock. Times are nanoseconds of ROS time.
 
-An observation is known by its kind, the stamp that its producer gave it, and its source: received
-again, it is nothing new (`journal.appending` has the same rule). Readings that come in parts, with
-one stamp, are one scan.
+An observation is identified by its kind, its producer's stamp, and its source. Received again, it
+is ignored (`journal.appending` has the same rule). Readings that arrive in parts, with one stamp,
+are one scan.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from lupin_twin.core.state import STATUS_OK, Attempt, Inspection, Reading, Scan,
 KIND_TAG_READING: Final = 0
 KIND_FLOWER: Final = 1
 
-# In the place of the stamp that was sent: what a clock that went back has moved, and no observation
-# that is received again is taken for.
+# Replaces the producer's stamp of an observation that was moved when the clock went back. No
+# observation received later is recognised as the same.
 KNOWN_BY_NOTHING: Final = -1
-# What an observation is known by: its kind, its producer's stamp (ns), its source.
+# Identity of an observation: its kind, its producer's stamp (ns), its source.
 Key = tuple[int, int, str]
 
 
 def kind_of(write: Scan | Inspection) -> int:
-    """The kind of observation that it is, as in lupin_msgs/Observation."""
+    """The kind of the observation, as in lupin_msgs/Observation."""
     return KIND_TAG_READING if isinstance(write, Scan) else KIND_FLOWER
 
 
@@ -35,23 +35,23 @@ def _key(write: Scan | Inspection) -> Key:
     return kind_of(write), write.own_stamp_ns or write.stamp_ns, write.source
 
 
-# Observations that are known of each tag, more than a publisher latches; and of all tags together.
+# Observations remembered per tag (more than a publisher latches), and for all tags together.
 KNOWN_PER_TAG: Final = 64
 MAX_KNOWN: Final = 1_000_000
 
 
 class Repeats:
-    """What was received last of each tag: when by ROS time, and the sensors that it brought."""
+    """Remembers each tag's latest observations, with their time and sensors, to detect repeats."""
 
     def __init__(self) -> None:
         self._tags: dict[str, dict[Key, tuple[int, frozenset[str]]]] = {}
 
     def news(self, write: Scan | Inspection) -> Scan | Inspection | None:
-        """What of an observation was not received before, as far as that is known; None: nothing.
+        """Return the part of an observation that was not received before; None if there is none.
 
-        It was made when it was first received, if that was earlier than it seems now: a stamp from
-        the future counts as made on its first arrival. A sensor that is known of it has its value
-        already; others are further parts of the same scan.
+        The earliest of its times counts: one with a stamp from the future was made when it was
+        first received. Sensors that are already known are removed; others are further parts of
+        the same scan.
         """
         known = self._tags.get(write.tag_id, {}).get(_key(write))
         if known is None:
@@ -64,7 +64,7 @@ class Repeats:
         return replace(write, stamp_ns=stamp_ns, readings=readings) if readings else None
 
     def add(self, write: Scan | Inspection) -> None:
-        """Know an observation from now on, or more of its sensors; a tag's oldest make room."""
+        """Remember an observation, or more of its sensors; a tag's oldest ones make room."""
         if write.own_stamp_ns == KNOWN_BY_NOTHING:
             return
         tag, key = self._tags.setdefault(write.tag_id, {}), _key(write)
@@ -77,9 +77,9 @@ class Repeats:
             del tag[next(iter(tag))]
 
     def hold_to(self, now_ns: int, *, retains_keys: bool) -> None:
-        """Follow a clock that has gone back, see `TwinStore.hold_to`.
+        """Follow a clock that went back, see `TwinStore.hold_to`.
 
-        `retains_keys`: what was later is still the same, received again; else it comes as new.
+        `retains_keys`: later observations, received again, still count as repeats; else as new.
         """
         for tag_id, tag in self._tags.items():
             self._tags[tag_id] = {
@@ -94,7 +94,7 @@ class Repeats:
 
 @dataclass(frozen=True, slots=True)
 class PastScan:
-    """Readings of one moment, each sensor once, by name; their own stamps are that of the scan."""
+    """Readings of one moment, each sensor once, sorted by name; `stamp_ns` is that of them all."""
 
     stamp_ns: int
     readings: tuple[Reading, ...]
@@ -102,30 +102,30 @@ class PastScan:
 
 @dataclass(frozen=True, slots=True)
 class PastAttempt:
-    """An attempt and its kind, None where it is not known: of a failed one it is not published."""
+    """An attempt and its kind; None if unknown: a state does not hold the kind of a failed one."""
 
     what: Attempt
     kind: int | None
 
     @property
     def stamp_ns(self) -> int:
-        """When it was."""
+        """Time of the attempt."""
         return self.what.stamp_ns
 
 
 @dataclass(frozen=True, slots=True)
 class TagHistory:
-    """What is known of one tag, oldest first; of equal stamps, in the order of arrival."""
+    """One tag's past scans and attempts, oldest first; equal stamps are in order of arrival."""
 
     scans: tuple[PastScan, ...] = ()
     attempts: tuple[PastAttempt, ...] = ()
-    # Of its newest observation that names one; empty: none does.
+    # Of the tag's latest observation that names one; empty if none does.
     source: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class LatestRequest:
-    """A tag's last scans and inspections in the log, so many of each series."""
+    """Request for a tag's last scans and inspections in the journal, `count` of each series."""
 
     tag_id: str
     count: int
@@ -134,9 +134,9 @@ class LatestRequest:
 def tag_history(
     writes: Iterable[Scan | Inspection], newest: TagState | None, count: int
 ) -> TagHistory:
-    """The last `count` scans that brought readings, and as many attempts, of what was received.
+    """Return a tag's last `count` scans with readings, and as many attempts.
 
-    `newest` is the tag's state: it may show what `writes`, of the log, do not have yet.
+    `newest` is the tag's state; it may hold what `writes`, read from the journal, lack so far.
     """
     scans: dict[object, PastScan] = {}
     attempts: dict[object, PastAttempt] = {}
@@ -177,7 +177,7 @@ def _with(scan: PastScan, readings: Iterable[Reading]) -> PastScan:
 
 
 def _attempts_of(tag: TagState) -> list[PastAttempt]:
-    """The attempts that a state proves: the last one, and the last inspection that saw flowers."""
+    """The attempts known from a state: the last one, and the last inspection that saw flowers."""
     last, attempts = tag.last_try, []
     if tag.looked_at_ns is not None and (last is None or tag.looked_at_ns != last.stamp_ns):
         attempts.append(PastAttempt(Attempt(tag.looked_at_ns), KIND_FLOWER))

@@ -1,6 +1,6 @@
-"""The rules of ingestion: what was received, as plain values, becomes a write or is dropped.
+"""The rules of ingestion: each received value becomes a write to the store, or is dropped.
 
-Pure. `convert` makes the values out of messages; what comes out of here is applied to the store.
+Pure. `convert` makes the values from messages; `apply` puts the writes into the store.
 Times are nanoseconds of ROS time, positions metres in the map frame.
 """
 
@@ -26,19 +26,19 @@ from lupin_twin.core.state import (
 # lupin_msgs/Observation; the other kinds are in `history`.
 KIND_ANOMALY: Final = 2
 
-# The `w` of half a turn, which is 0, distinct from the 0 that stands for no pose.
+# Replaces the `w` of a half turn, which is 0, because 0 stands for no pose.
 HALF_TURN_W: Final = 1e-9
 
-# What a warning quotes of a producer's own text.
+# How many characters of a producer's text a warning quotes.
 _QUOTED: Final = 64
 
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """An observation as it was sent: pose and stamps too, of which not all may count.
+    """An observation as it was sent; its pose and stamps may be invalid.
 
-    `sent` is None where its kind is not a tag's. `stamp_ns` of a scan is when the sensors were
-    read, `own_stamp_ns` what the header says.
+    `sent` is None if the kind is not about a tag. `stamp_ns` of a scan is when the sensors were
+    read, `own_stamp_ns` is the header's stamp.
     """
 
     kind: int
@@ -46,13 +46,13 @@ class Received:
     sent: Scan | Inspection | None
 
 
-# Discovered tags, each with what makes its pose, as it was sent: a producer publishes all tags
-# again and again, and no pose is made before it is needed.
+# Discovered tags, each with a function that makes its pose as sent. A producer publishes all tags
+# again and again, so a pose is made only when it is needed.
 ReceivedTags = Iterable[tuple[str, Callable[[], Pose]]]
 
 
 def observation(received: Received, frame_id: str, now_ns: int) -> Scan | Inspection | Drop:
-    """What an observation writes at `now_ns`, where poses have to be in `frame_id`."""
+    """Return what an observation writes at `now_ns`; it has to be in the frame `frame_id`."""
     sent = received.sent
     if sent is None:
         name = "KIND_ANOMALY" if received.kind == KIND_ANOMALY else "an unknown kind"
@@ -60,11 +60,11 @@ def observation(received: Received, frame_id: str, now_ns: int) -> Scan | Inspec
         return Drop(Reason.KIND, why, "an observation", case=str(received.kind))
     if dropped := wrong_frame(received.frame_id, frame_id) or no_tag_id(sent.tag_id):
         return dropped
-    # Without a stamp in the header a scan was made when the sensors were read.
+    # Without a stamp in the header, a scan's time is when the sensors were read.
     own_stamp_ns = sent.own_stamp_ns or sent.stamp_ns
     succeeded = sent.status == STATUS_OK
     if isinstance(sent, Inspection) and not succeeded:
-        # The payload of one that failed holds defaults, not a result: it would clear a pest unseen.
+        # A failed inspection's payload holds defaults, not a result: it would clear a pest unseen.
         sent = replace(sent, flower=None)
     return replace(
         sent,
@@ -78,14 +78,14 @@ def observation(received: Received, frame_id: str, now_ns: int) -> Scan | Inspec
 
 
 def _cut(text: str) -> str:
-    """A producer's text, no longer than any that is stored: nothing is dropped for it."""
+    """Cut a producer's text to what can be stored, so that nothing is dropped because of it."""
     return text if len(text) <= MAX_TEXT_LENGTH else f"{text[: MAX_TEXT_LENGTH - 1]}…"
 
 
 def discoveries(
     received: ReceivedTags, own_frame_id: str, frame_id: str, is_pinned: Callable[[str], bool]
 ) -> Iterator[Pin | Drop]:
-    """What discovered tags write, one by one: a pin each that `is_pinned` does not know by then."""
+    """Yield what discovered tags write: a pin for each that `is_pinned` does not know by then."""
     if dropped := wrong_frame(own_frame_id, frame_id):
         yield dropped
         return
@@ -102,9 +102,9 @@ def discoveries(
 
 
 def apply(write: Write, store: TwinStore, repeats: Repeats) -> Drop | None:
-    """Write what is now; returns what the store refused.
+    """Apply a write to the store; returns a drop if the store refuses it.
 
-    What was received before is nothing new, but for a place that its tag does not have yet.
+    A repeated observation only adds its pose, if the tag has none yet.
     """
     try:
         if isinstance(write, Pin):
@@ -126,9 +126,9 @@ def apply(write: Write, store: TwinStore, repeats: Repeats) -> Drop | None:
 
 
 def near(write: Write | Drop, max_pose_m: float) -> tuple[Write | None, Drop | None]:
-    """What is left of a write, and what is dropped of it: a pose with a coordinate past the limit.
+    """Drop a pose with a coordinate past the limit; returns the rest of the write, and the drop.
 
-    A robot that is lost still reads its sensors: what else an observation brought stays.
+    A robot that is lost still reads its sensors, so the rest of its observation is kept.
     """
     if isinstance(write, Drop):
         return None, write
@@ -145,24 +145,24 @@ def near(write: Write | Drop, max_pose_m: float) -> tuple[Write | None, Drop | N
 
 
 def wrong_frame(frame_id: str, expected: str) -> Drop | None:
-    """A drop, where the frame is another than the expected one; an empty one counts as that."""
+    """Return a drop if the frame is not the expected one; an empty frame counts as expected."""
     if frame_id in ("", expected):
         return None
     return Drop(Reason.FRAME, f"its frame is {frame_id[:_QUOTED]!r}, expected {expected!r}")
 
 
 def no_tag_id(tag_id: str) -> Drop | None:
-    """A drop, where there is no id."""
+    """Return a drop if the id is empty."""
     return None if tag_id else Drop(Reason.TAG_ID, "its tag_id is empty", "an entry")
 
 
 def observed_at(stamp_ns: int, now_ns: int) -> int:
-    """When an observation was made: its own stamp, or now where it has none or is ahead of now.
+    """When an observation was made: its own stamp, or now if that is missing or ahead of now.
 
-    An observation that was latched before the twin started is as old as it says, not as young as
-    its arrival. A stamp from the future (a robot's clock that runs ahead) cannot be older than
-    now. While simulated time has not started (now is 0), the stamp is all there is; without one it
-    was at the first moment of that time, for 0 stands for never.
+    An observation that was latched before the twin started has the age of its stamp, not of its
+    arrival. One with a stamp from the future (a robot's clock runs ahead) counts as made now.
+    While simulated time has not started (now is 0), any stamp counts as it is. Without one, the
+    observation was made at 1 ns, because 0 stands for never.
     """
     if stamp_ns > 0 and (stamp_ns <= now_ns or now_ns == 0):
         return stamp_ns
@@ -170,16 +170,16 @@ def observed_at(stamp_ns: int, now_ns: int) -> int:
 
 
 def scanned_pose(pose: Pose) -> Pose | None:
-    """The pose of a scan; None where `qw` is 0 or any coordinate is not finite."""
+    """The pose of a scan; None if `qw` is 0 or any coordinate is not finite."""
     return pose if pose.qw != 0.0 and pose.is_finite else None
 
 
 def discovered_pose(pose: Pose) -> Pose | None:
-    """The pose of a discovery; None where a coordinate is not finite.
+    """The pose of a discovery; None if a coordinate is not finite.
 
-    `qw == 0` is taken as 1 where nothing else of the orientation is set. Where something is, it is
-    half a turn; published as it is it would mean "no pose", so its `qw` becomes the next to nothing
-    that differs from 0, and the pose is 2e-9 rad from what was sent.
+    `qw == 0` becomes 1 if the whole orientation is 0. Otherwise it is a half turn, which unchanged
+    would mean "no pose" when published. So `qw` becomes `HALF_TURN_W`, which turns the pose by
+    2e-9 rad.
     """
     if not pose.is_finite:
         return None

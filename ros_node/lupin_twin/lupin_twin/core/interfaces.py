@@ -1,7 +1,7 @@
 """Every topic and service of a twin: name, type, QoS and meaning, in one table. Pure.
 
-The nodes publish, subscribe and serve by it; the reference and the SROS 2 policy are generated from
-it. Names are relative to the node's namespace, but for those that ROS itself gives to everybody.
+The nodes publish, subscribe and serve by this table; the reference and the SROS 2 policy are
+generated from it. Names are relative to the node's namespace, except for ROS's own global ones.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from typing import Final
 
 from lupin_twin.core.parameters import TwinParameters
 
-# Requests that may wait for a service, of all clients together, and answers that may wait in a
-# client, where those to all other clients come along: of more, DDS loses the oldest without a word.
+# Queue depth for the requests of all clients at a service, and for responses at a client. A client
+# receives the responses to all other clients too. Beyond the depth, DDS silently drops the oldest.
 # ROS's default is 10.
 SERVICE_DEPTH: Final = 50
 
@@ -24,7 +24,7 @@ _DEFAULTS: Final = TwinParameters()
 class Service:
     """A service, reliable and volatile; `type_name` such as `lupin_msgs/srv/GetField`.
 
-    `parameter` names the twin's parameter that gives its name; empty: only remapping changes it.
+    `parameter` is the twin's parameter that sets the name; empty: only remapping changes it.
     """
 
     type_name: str
@@ -33,7 +33,7 @@ class Service:
     parameter: str = ""
 
     def __post_init__(self) -> None:
-        """The name that the parameter has by default."""
+        """Take the name from the parameter's default."""
         if not self.name:
             object.__setattr__(self, "name", getattr(_DEFAULTS, self.parameter))
 
@@ -43,16 +43,16 @@ class Topic(Service):
     """A topic and its QoS; `type_name` such as `lupin_msgs/msg/TwinState`.
 
     `is_latched`: TRANSIENT_LOCAL, so that a late subscriber gets the last `depth` messages. The
-    bridge holds so many of them too, and `max_bytes` in all at most.
+    bridge caches as many of them, within `max_bytes` in all.
     """
 
     depth: int = 1
     is_latched: bool = True
     is_reliable: bool = True
-    max_bytes: int = 64_000_000  # the largest that a twin itself takes in, see `message_limits`
+    max_bytes: int = 64_000_000  # the largest that a twin itself accepts, see `message_limits`
 
 
-# Below it each layer's name is made of its sensor's, see `layers.topic_of`.
+# Prefix of each layer's topic; the rest is made from the sensor's name, see `layers.topic_of`.
 LAYERS_BELOW: Final = "twin/field/"
 
 OBSERVATIONS: Final = Topic(
@@ -81,7 +81,7 @@ CLOCK: Final = Topic(
 )
 SUBSCRIBED: Final = (OBSERVATIONS, DISCOVERED_TAGS, MAP, CLOCK)
 
-# What a robot says of itself. The twin itself never asks for it: the bridge shows it.
+# What a robot publishes about itself. The bridge shows it; the twin does not subscribe to it.
 ROBOT_POSE: Final = Topic(
     "geometry_msgs/msg/PoseWithCovarianceStamped",
     "where the robot is; also as geometry_msgs/msg/PoseStamped or nav_msgs/msg/Odometry",
@@ -153,7 +153,7 @@ SERVICES: Final = (
     *(GET_FIELD, GET_ESTIMATE, GET_ESTIMATE_REPORT),
     *(GET_STATE_AT, GET_HISTORY, GET_WRITES),
 )
-# Those that rclpy gives to each node, below its own name.
+# Services that rclpy adds to each node, below the node's name.
 OF_EVERY_NODE: Final = (
     *("describe_parameters", "get_parameter_types", "get_parameters", "get_type_description"),
     *("list_parameters", "set_parameters", "set_parameters_atomically"),

@@ -1,8 +1,8 @@
-"""What people say of alarms, tags and the greenhouse: rows of the log, and what of them stands.
+"""Notes by people on alarms, tags and the greenhouse, and which of them are in force. Pure.
 
-A note is never changed. Who takes one back writes another of the kind `withdraw`, so that both are
-kept; of two words on one subject the one that was written later stands.
-Times are ns of ROS time. Pure.
+A note never changes. To take one back, a person writes another of the kind `withdraw`, so that both
+stay in the journal. Of two notes on one subject, the one written later is in force.
+Times are ns of ROS time.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ COMMENT: Final = "comment"
 # Its subject is `note:ID`.
 WITHDRAW: Final = "withdraw"
 WITHDRAWN: Final = "note:"
-# Notes that are known of a log at most, the newest.
+# At most this many notes of a journal are read: the latest.
 MAX_NOTES: Final = 5_000
 
 
@@ -27,10 +27,10 @@ class NotesUnwritable(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """One word. `until_ns` of `shelve` is its end, None: the alarm is not shelved any more.
+    """A person's note. `until_ns` of `shelve` is when it ends; None: the alarm is unshelved.
 
-    Of `comment` it is the moment that it is about, None: that at which it was made.
-    `id` is given when it is written, and ascends in that order.
+    Of `comment`, `until_ns` is the time that it is about; None: the time at which it was made.
+    `id` is assigned when the note is written, and ascends in that order.
     """
 
     id: str
@@ -43,14 +43,14 @@ class Note:
 
     @property
     def about_ns(self) -> int:
-        """The moment that it is about."""
+        """The time that the note is about."""
         is_of_then = self.kind == COMMENT and self.until_ns is not None
         return self.until_ns or 0 if is_of_then else self.made_at_ns
 
 
 @dataclass(frozen=True, slots=True)
 class NotesRequest:
-    """All notes, unless the log is still this one, with so many: notes only ever come."""
+    """Request for all notes, unless `journal` still has `count`: notes are never removed."""
 
     journal: str = ""
     count: int = -1
@@ -58,9 +58,9 @@ class NotesRequest:
 
 @dataclass(frozen=True, slots=True)
 class PastNotes:
-    """The newest `MAX_NOTES` in the order in which they were written; None: as the request says.
+    """The latest `MAX_NOTES` notes in the order of writing; None: unchanged since the request.
 
-    `journal` identifies their log, which has `count` of them in all.
+    `journal` identifies the journal, which has `count` notes in all.
     """
 
     journal: str
@@ -69,7 +69,7 @@ class PastNotes:
 
 
 def withdrawals(notes: Iterable[Note]) -> dict[str, Note]:
-    """By the id of each note that was taken back, the note that did so first."""
+    """Map the id of each withdrawn note to the first note that withdrew it."""
     found: dict[str, Note] = {}
     for note in notes:
         if note.kind == WITHDRAW:
@@ -78,9 +78,10 @@ def withdrawals(notes: Iterable[Note]) -> dict[str, Note]:
 
 
 def standing(notes: Iterable[Note], now_ns: int) -> dict[tuple[str, str], Note]:
-    """By subject and kind, the last note that nobody took back.
+    """Map subject and kind to the last note that was not withdrawn.
 
-    What a clock that went back has not come to again is left out: a shelf ends in its time.
+    Notes from after `now_ns`, which exist once a clock went back, are left out: a shelving ends
+    when it should.
     """
     every = tuple(notes)
     gone = withdrawals(every)

@@ -1,7 +1,7 @@
 """The node's parameters: names, defaults, ranges and meaning, in one table. Pure.
 
-And what the launch file takes, and what it makes of that: it stands here so that it can be tested
-without `launch`, which PyPI does not have.
+Also the launch file's arguments, and the parameters that they set. They are here so that tests do
+not need `launch`, which is not on PyPI.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from typing import Any, Final
 
 from lupin_twin.core.diagnostics import Origin
 
-# The greatest `max_pose_m`: what is beyond is far off, wherever the others are.
+# Largest allowed `max_pose_m`: a pose beyond it is far off in any greenhouse.
 FARTHEST_M: Final = 1_000_000.0
-# Of a parameter that is a list.
+# Names in a parameter that is a list.
 MAX_NAMES: Final = 16
 # A century.
 MAX_JOURNAL_DAYS: Final = 36_500.0
-# Characters of a value that a complaint repeats.
+# Characters of a value that an error message repeats.
 MAX_SHOWN: Final = 80
 
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """What is observed: a robot's greenhouse, or what a demo makes of one. No user chooses it.
+    """The observed world: a real greenhouse, or a demo's simulated one. It is no user setting.
 
-    `day_length_s` is how long a day takes, s of ROS time: what comes daily is estimated by it.
+    `day_length_s` is the length of a day, s of ROS time; the estimate's daily course depends on it.
     """
 
     origin: Origin = "robot"
@@ -50,7 +50,7 @@ class Described:
 
     @property
     def range(self) -> str:
-        """The allowed range in words; empty, where there is none."""
+        """The allowed range in words; empty if there is none."""
         return "" if self.low is None else f"{self.low} to {self.high}"
 
 
@@ -59,7 +59,7 @@ def _parameter(default: Any, description: str, *limits: float, **more: Any) -> A
     return field(default=default, metadata={"as": described})
 
 
-# Why a parameter is read at the start and never again.
+# Reasons why a parameter is read only at the start.
 _NAMED: Final = "what others have found under this name cannot follow: start the twin anew"
 _MEANING: Final = "what is known already was taken in by it: start the twin anew"
 _MADE: Final = "room was made by it as the twin started: start the twin anew"
@@ -69,8 +69,8 @@ _MADE: Final = "room was made by it as the twin started: start the twin anew"
 class TwinParameters:
     """Every parameter of `lupin_twin`, checked at construction.
 
-    Lengths are metres, rates hertz. Ranges are closed; a name must not be empty. Of a list, which
-    ROS cannot distinguish from nothing when it is empty, empty names do not count. Those that are
+    Lengths are metres, rates hertz. Ranges are closed; a name must not be empty. In a list, empty
+    names are ignored, because ROS cannot tell an empty list from an unset one. Parameters that are
     not `fixed` may be changed while the twin runs.
 
     Raises:
@@ -149,11 +149,10 @@ def _checked(name: str, value: object, default: object, described: Described) ->
     if isinstance(default, tuple):
         return _names(name, value)
     expected: Final = type(default)
-    # YAML and the command line read 2 as an integer; where a number is meant, so it is a number.
     if name == "journal" and value is False:
-        value = "off"  # what YAML makes of a plain off
+        value = "off"  # YAML reads an unquoted off as False
     if expected is float and type(value) is int:
-        value = float(value)
+        value = float(value)  # YAML and the command line read 2 as an integer
     if type(value) is not expected:
         raise ParameterError(
             f"parameter {name} is {_shown(value)} ({type(value).__name__}), "
@@ -181,22 +180,22 @@ def _names(name: str, value: object) -> tuple[str, ...]:
 
 
 def _shown(value: object) -> str:
-    """What was given, and of what is long its beginning: a reason goes back to who set it."""
+    """The value, cut if it is long: the error message is returned to the client that set it."""
     text = repr(value)
     return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
 
 
 def describe(name: str) -> Described:
-    """What `ros2 param describe` and the docs show of a parameter."""
+    """Return what `ros2 param describe` and the docs show about a parameter."""
     described: Described = TwinParameters.__dataclass_fields__[name].metadata["as"]
     return described
 
 
 def changed(now: TwinParameters, wanted: Mapping[str, object]) -> TwinParameters:
-    """The parameters with some changed while the twin runs.
+    """Return the parameters with some changed while the twin runs.
 
     Raises:
-        ParameterError: one that is fixed, or a value that the twin could not start with either.
+        ParameterError: a parameter is fixed, or its value is invalid.
 
     """
     for name, value in wanted.items():
@@ -212,7 +211,7 @@ def changed(now: TwinParameters, wanted: Mapping[str, object]) -> TwinParameters
 
 
 class LaunchError(ValueError):
-    """An argument that starts no twin; the message names it, its value and what was expected."""
+    """A launch argument is invalid; the message names it, its value and what was expected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,7 +250,7 @@ ARGUMENTS: Final = (
 
 
 def overrides(given: Mapping[str, str]) -> dict[str, bool | str | list[str]]:
-    """The parameters that arguments set: only what was given, for they override the file."""
+    """Return the parameters that given arguments set; these override the file."""
     values: dict[str, bool | str | list[str]] = {}
     if given["use_sim_time"]:
         values["use_sim_time"] = given["use_sim_time"] == "true"
@@ -263,7 +262,7 @@ def overrides(given: Mapping[str, str]) -> dict[str, bool | str | list[str]]:
 
 
 def params_file(given: Mapping[str, str], default: str, is_file: Callable[[str], bool]) -> str:
-    """The file of parameters; `default` is the package's own.
+    """Return the path of the parameter file; `default` is the package's own.
 
     Raises:
         LaunchError: there is no such file; launch alone would only warn, and start with defaults.

@@ -1,10 +1,10 @@
 """Queries about the past: what may be requested, and the answers. Pure.
 
-Times are nanoseconds of ROS time, intervals `start <= stamp < end`. Where the clock has gone
-back, a moment belongs to the newest run that holds it.
+Times are nanoseconds of ROS time, intervals `start <= stamp < end`. If the clock went back, a
+moment belongs to the latest run that contains it.
 
-Followers of a log ask for what was received, write by write, in that order: with the number of the
-last one they get what has come since, late observations too, and nothing twice.
+A follower of a journal requests the writes in the order in which they were received. With the
+number of the last one, it gets all that followed, late observations included, and none twice.
 """
 
 from __future__ import annotations
@@ -17,26 +17,26 @@ from typing import Final
 from lupin_twin.core.drops import too_long
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, value
 
-# How a message ends of what may be answered a little later, if it is requested again.
+# Ending of an error message if the same request may succeed a little later.
 ASK_AGAIN: Final = "ask again later"
 
 DEFAULT_POINTS: Final = 500
 MAX_POINTS: Final = 5_000
-# What is derived of a series is made of so many of its readings at most: four weeks, one a minute.
+# A derived series is made from at most this many readings: four weeks, one a minute.
 MAX_READINGS: Final = 8 * MAX_POINTS
-# Longer buckets begin on whole ones.
+# Buckets from this length on start at multiples of it.
 SLOT_NS: Final = 300 * 1_000_000_000
-# What is counted as it is written.
+# The journal counts by the hour while it writes.
 HOUR_NS: Final = 3_600 * 1_000_000_000
 DAY_NS: Final = 24 * HOUR_NS
-# Later than any stamp; the largest that SQLite counts to.
+# Later than any stamp: the largest integer of SQLite.
 FOREVER_NS: Final = 2**63 - 1
 # The `tag_id` of a query for events of the whole site.
 EVERY_TAG: Final = "*"
 
 
 class Event(StrEnum):
-    """Requested like a sensor; units and values stand in GetHistory.srv."""
+    """Events, which are requested like a sensor; their units and values are in GetHistory.srv."""
 
     SCANS = "~scans"
     FAILURES = "~failures"
@@ -48,13 +48,13 @@ class Event(StrEnum):
 
 
 class PastRefused(ValueError):
-    """A question that cannot be answered; the message names the field, the value and the limit."""
+    """A request is invalid; the message names the field, the value and the limit."""
 
 
 class NotRemembered(RuntimeError):
     """The past cannot be read now; the message says why.
 
-    `damage` is what is wrong with the file, if something is.
+    `damage` tells what is wrong with the file; empty if nothing is.
     """
 
     def __init__(self, why: str, *, damage: str = "") -> None:
@@ -63,14 +63,14 @@ class NotRemembered(RuntimeError):
 
 
 class NotFound(NotRemembered):
-    """What is asked for is not there, however often it is asked for."""
+    """The requested data does not exist; repeating the request does not help."""
 
 
 def check_moment(at_ns: int, now_ns: int) -> None:
-    """Refuse a moment that has not come yet, by ROS time, or that no clock can show.
+    """Check a moment of ROS time.
 
     Raises:
-        PastRefused: see above.
+        PastRefused: it is later than now, or before 0.
 
     """
     if at_ns < 0:
@@ -80,13 +80,13 @@ def check_moment(at_ns: int, now_ns: int) -> None:
 
 
 def seconds(stamp_ns: int) -> str:
-    """A moment in seconds of ROS time, every digit of it."""
+    """A stamp in seconds, as text with all nine decimals."""
     whole, part = divmod(abs(stamp_ns), NANOSECONDS_PER_SECOND)
     return f"{'-' if stamp_ns < 0 else ''}{whole}.{part:09d}"
 
 
 def message_of(error: Exception) -> str:
-    """Why there is no answer, as a service's `error_message` that `error_of` reads again."""
+    """Make a service's `error_message`, which `error_of` reads, from an error."""
     why = str(error)
     if isinstance(error, PastRefused):
         return why
@@ -96,16 +96,16 @@ def message_of(error: Exception) -> str:
 
 
 def error_of(message: str) -> PastRefused | NotRemembered:
-    """What a service's `error_message` says: the other direction of `message_of`."""
+    """Make an error from a service's `error_message`: the inverse of `message_of`."""
     return NotRemembered(message) if message.endswith(ASK_AGAIN) else PastRefused(message)
 
 
 @dataclass(frozen=True, slots=True)
 class SeriesRequest:
-    """One sensor of one tag, or one event, see GetHistory.srv: `end_ns` 0 is now, `start_ns` 0 all.
+    """Request for a tag's sensor or event; `start_ns` 0: from the beginning, `end_ns` 0: to now.
 
     Raises:
-        PastRefused: an empty name, an interval that is inverted, more points than are given.
+        PastRefused: a name is empty, the interval is inverted, or `max_points` is out of range.
 
     """
 
@@ -165,11 +165,11 @@ class Grid:
 
 
 def grid(start_ns: int, end_ns: int, max_points: int, least_ns: int = 0) -> Grid:
-    """At most `max_points` buckets of at least `least_ns` over a period.
+    """Cover a period with at most `max_points` buckets of at least `least_ns`.
 
-    Up to five minutes they begin at `start_ns` and are as short as they can be. Longer ones are of
-    whole five minutes, beyond an hour of whole hours, and the period is widened to those: what is
-    counted already is not read again.
+    Buckets below five minutes begin at `start_ns` and are as short as possible. Longer ones are
+    whole multiples of five minutes, from an hour on of an hour, and the period is widened to fit.
+    So the journal's hourly counts can be used instead of its rows.
     """
     needed_ns = max(1, -(-(end_ns - start_ns) // max_points))
     if max(needed_ns, least_ns) < SLOT_NS:
@@ -188,9 +188,9 @@ def grid(start_ns: int, end_ns: int, max_points: int, least_ns: int = 0) -> Grid
 class SeriesPast:
     """Readings, or buckets of `bucket_ns` from `start_ns` on; all tuples have one length.
 
-    Of a reading the count is 1, and mean, minimum and maximum are its value, which may be NaN. A
-    bucket counts finite readings; one without any is absent. Stamps ascend. The period of buckets
-    is that of their `grid`: it may begin earlier and end later than what was requested.
+    A reading has the count 1, and its value, which may be NaN, as mean, minimum and maximum. A
+    bucket counts finite readings; one without any is absent. Stamps ascend. Buckets cover the
+    period of their `grid`, which may be wider than requested.
     """
 
     start_ns: int
@@ -210,10 +210,10 @@ class SeriesPast:
 
 @value
 class PastRow:
-    """One reading, or one try that brought none (`sensor` is empty, `value` NaN), for an export.
+    """A row of an export: a reading, or an attempt without one (`sensor` is empty, `value` NaN).
 
-    `x` and `y` are m in the map frame, NaN for a tag without a place. `status` and `source` as in
-    lupin_msgs/Observation; `source` is empty where it is not known.
+    `x` and `y` are m in the map frame, NaN for a tag without a position. `status` and `source` are
+    as in lupin_msgs/Observation; `source` is empty if unknown.
     """
 
     stamp_ns: int
@@ -228,23 +228,23 @@ class PastRow:
 
 DEFAULT_WRITES: Final = 1_000
 MAX_WRITES: Final = 2_000
-# Of each tag, what is recent at a moment: its last scans and inspections, so many of each, and no
-# older.
+# A tag's recent writes at a moment: its last scans and inspections, at most this many of each, and
+# none older than `RECENT_NS`.
 RECENT_COUNT: Final = 9
 RECENT_NS: Final = 3 * DAY_NS
-# Scans of one answer: some seconds of one core.
+# Scans in one answer: they take some seconds of one core.
 MAX_SCANS: Final = 200_000
 
 
 @dataclass(frozen=True, slots=True)
 class WritesRequest:
-    """Writes with a number above `after`, at most `max_count`; 0: from the beginning.
+    """Request for at most `max_count` writes numbered above `after`; 0: from the beginning.
 
-    From the beginning, what was received more than `reach_s` before now is left out, and all but
-    the newest `reach_count` writes; 0: nothing is.
+    From the beginning, writes received more than `reach_s` ago are left out, and all but the latest
+    `reach_count`; 0: no limit.
 
     Raises:
-        PastRefused: a number that cannot be, or more than is given.
+        PastRefused: a number is out of its range.
 
     """
 
@@ -265,10 +265,11 @@ class WritesRequest:
 
 @dataclass(frozen=True, slots=True)
 class RecentRequest:
-    """What was recent at a moment, ns of ROS time: see `RECENT_COUNT`.
+    """Request for the writes that were recent at a moment, ns of ROS time: see `RECENT_COUNT`.
 
-    Of the run that has the moment, without the copies that a run begins with. The answer is a tuple
-    of `PastWrite`, by stamp and number: scans with readings, inspections that saw flowers.
+    They are of the run that contains the moment, without the copies that a run begins with. The
+    answer is a tuple of `PastWrite`, by stamp and number: scans with readings, and inspections
+    that saw flowers.
     """
 
     at_ns: int
@@ -276,10 +277,10 @@ class RecentRequest:
 
 @dataclass(frozen=True, slots=True)
 class ScansRequest:
-    """All scans of one of `sensors` from `since_ns` to `at_ns`, both included, ns of ROS time.
+    """Request for all scans with one of `sensors`, from `since_ns` to `at_ns`, both included.
 
-    Of the run that has `at_ns`, without copies. The answer is a tuple of `PastWrite`, by stamp and
-    number; it is empty if there are more than `MAX_SCANS`.
+    They are of the run that contains `at_ns`, without copies. The answer is a tuple of `PastWrite`,
+    by stamp and number; it is empty if there are more than `MAX_SCANS`.
     """
 
     since_ns: int
@@ -289,9 +290,9 @@ class ScansRequest:
 
 @dataclass(frozen=True, slots=True)
 class PeriodRequest:
-    """All that was observed in `start_ns <= stamp < end_ns`, by stamp and number, without copies.
+    """Request for all writes in `start_ns <= stamp < end_ns`, by stamp and number, without copies.
 
-    The answer is `PastWrites`. Who requests it knows that it is not too much at once.
+    The answer is `PastWrites`. The caller has to choose a period that is not too much at once.
     """
 
     start_ns: int
@@ -302,8 +303,8 @@ class PeriodRequest:
 class PastWrite:
     """One scan or inspection, or an attempt; `kind` and `status` as in lupin_msgs/Observation.
 
-    `sensors` and `values` have one length. `has_seen`: it saw the flowers; the last three
-    are what it saw. A species that the camera was not sure of is left out.
+    `sensors` and `values` have one length. `has_seen`: it saw flowers, which the last three fields
+    describe. A species that the camera was not sure of is left out.
     """
 
     number: int
@@ -322,7 +323,7 @@ class PastWrite:
 
 @dataclass(frozen=True, slots=True)
 class RunSpan:
-    """A stretch of the axis of time, `start_ns <= stamp < end_ns`, and the run that has it."""
+    """A period of the time axis, `start_ns <= stamp < end_ns`, and the run that it belongs to."""
 
     run: int
     start_ns: int
@@ -330,7 +331,7 @@ class RunSpan:
 
 
 def recent_of(writes: Iterable[PastWrite], at_ns: int) -> tuple[PastWrite, ...]:
-    """What is recent at a moment, of writes of one run in any order."""
+    """Select the writes that are recent at a moment, from those of one run in any order."""
     by_tag: dict[tuple[str, int], list[PastWrite]] = {}
     for write in writes:
         is_in_time = at_ns - RECENT_NS <= write.stamp_ns <= at_ns
@@ -350,9 +351,9 @@ def _in_time(write: PastWrite) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class PastWrites:
-    """Some writes, in the order of their numbers; ask on after `last`, until `is_all`.
+    """Some writes, in the order of their numbers; request more after `last`, until `is_all`.
 
-    `journal` identifies the file: numbers of two are not comparable.
+    `journal` identifies the file: numbers of different files are not comparable.
     """
 
     journal: str

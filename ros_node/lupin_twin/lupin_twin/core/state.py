@@ -1,8 +1,8 @@
-"""Per-tag store: the latest of what the robot has seen at each AprilTag, and when it was seen.
+"""The twin's store: for each AprilTag, the latest that was observed there, and when.
 
 Pure: no clock, no ROS, no lock. Time is an argument, nanoseconds of ROS time. Positions are metres
-in the map frame (x right, y up, z above the floor), orientations are unit quaternions. Every value
-handed out is immutable, so a snapshot can cross threads. The store belongs to one.
+in the map frame (x right, y up, z above the floor), orientations are unit quaternions. Returned
+values are immutable, so threads can share a snapshot. The store itself belongs to one thread.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from lupin_twin.core.drops import (
 
 NANOSECONDS_PER_SECOND = 1_000_000_000
 
-# lupin_msgs/Observation: the status of an attempt that brought what it should; others say why not.
+# lupin_msgs/Observation: the status of a successful attempt; the others tell why one failed.
 STATUS_OK = 0
 
 # x, y (m) and a value, in the sensor's unit.
@@ -38,10 +38,10 @@ T = TypeVar("T")
 
 @dataclass_transform(frozen_default=True)
 def value(cls: type[T]) -> type[T]:
-    """A dataclass whose fields nobody sets once it is made.
+    """Decorator for a dataclass whose fields must not be set after construction.
 
-    mypy holds that, not Python: a frozen dataclass takes five times as long to make, and a
-    question about 10,000 tags makes 80,000 values.
+    mypy enforces that, not Python: a frozen dataclass takes five times as long to construct, and a
+    query about 10,000 tags makes 80,000 values.
     """
     return dataclass(slots=True, unsafe_hash=True)(cls)
 
@@ -60,7 +60,7 @@ class Pose:
 
     @classmethod
     def at(cls, x: float, y: float, z: float = 0.0) -> Self:
-        """A place, m, turned by nothing."""
+        """A position, m, without rotation."""
         return cls(float(x), float(y), float(z), 0.0, 0.0, 0.0, 1.0)
 
     @property
@@ -74,7 +74,7 @@ class Pose:
 class Reading:
     """One sensor's value, in the sensor's own unit (°C, %, ppm, lx); may be NaN or infinite.
 
-    `observed_at_ns` is None in a scan, which has one stamp for all, and where it is not known.
+    `observed_at_ns` is None in a scan, which has one stamp for all readings, and if unknown.
     """
 
     name: str
@@ -97,7 +97,7 @@ class Bloom:
 
 @value
 class Flower:
-    """What the camera made of the plants at a tag; `footprint` is (x, y, z) in m, map frame."""
+    """What the camera recognised at a tag; `footprint` is (x, y, z) in m, map frame."""
 
     species: str = ""
     confidence: float = 0.0
@@ -112,17 +112,16 @@ NO_FLOWER = Flower()
 
 
 def sure_species(species: str, confidence: float | None) -> str:
-    """The species where the camera was at least half sure of it, else an empty text."""
+    """The species if the camera's confidence was at least 0.5, else an empty text."""
     return species if confidence is not None and confidence >= 0.5 else ""
 
 
 @value
 class Scan:
-    """One scan of a tag's sensors, or an attempt.
+    """One scan of a tag's sensors, or a failed attempt, which has no pose; see `status`.
 
-    `stamp_ns` is never later than now; `own_stamp_ns` is what the producer sent, 0 for nothing, by
-    which a message that is received again is known. `arrival_ns` is wall time. An attempt that
-    failed (`status`) has no pose.
+    `stamp_ns` is never later than now. `own_stamp_ns` is the producer's stamp, 0 if there is none;
+    a message that is received again is recognised by it. `arrival_ns` is wall time.
     """
 
     tag_id: str
@@ -139,7 +138,7 @@ class Scan:
 
 @value
 class Inspection:
-    """One inspection of a tag's flowers, or an attempt (`flower` None); else as `Scan`."""
+    """One inspection of a tag's flowers, or a failed attempt (`flower` None); else as `Scan`."""
 
     tag_id: str
     stamp_ns: int
@@ -155,7 +154,7 @@ class Inspection:
 
 @value
 class Pin:
-    """A tag gets its place, by a scan, an inspection or a discovery; times as in `Scan`."""
+    """Gives a tag its pose, from a scan, an inspection or a discovery; times as in `Scan`."""
 
     tag_id: str
     pose: Pose
@@ -168,7 +167,7 @@ Write = Scan | Inspection | Pin
 
 @value
 class Attempt:
-    """That a tag was tried, and how it went: scan or inspection, with success or without."""
+    """An attempt at a tag, and its result: a scan or an inspection, successful or not."""
 
     stamp_ns: int
     status: int = STATUS_OK
@@ -180,7 +179,7 @@ class TagState:
     """Everything known about one tag. Replaced as a whole on every write, never changed.
 
     `pose` is None until the tag is pinned. `last_observed_ns` is None for a tag that was only
-    discovered; it leaves out attempts that brought nothing, unless there is nothing else.
+    discovered; it ignores attempts without a result, unless there is nothing else.
     `looked_at_ns` is when its flowers were last seen, `last_try` the latest attempt of any kind.
     """
 
@@ -193,13 +192,13 @@ class TagState:
     last_try: Attempt | None = None
 
     def stale_seconds(self, now_ns: int | None) -> float:
-        """Seconds since the last observation, 0 at least; infinite: never; NaN: now is unknown."""
+        """Seconds since the last observation, >= 0; infinite if never, NaN if now is unknown."""
         if self.last_observed_ns is None:
             return math.inf
         return math.nan if now_ns is None else age_seconds(self.last_observed_ns, now_ns)
 
     def shows_the_same_as(self, other: TagState) -> bool:
-        """Whether a field and the state's message show the same of both."""
+        """Whether both look the same in a field and in the state's message."""
         return (
             self.pose == other.pose
             and self.last_observed_ns == other.last_observed_ns
@@ -209,7 +208,7 @@ class TagState:
         )
 
     def held_to(self, now_ns: int) -> TagState:
-        """The tag, with nothing in it that is later than `now_ns`."""
+        """The tag with no stamp later than `now_ns`."""
 
         def held(stamp_ns: int | None) -> int | None:
             return None if stamp_ns is None else min(stamp_ns, now_ns)
@@ -226,7 +225,8 @@ class TagState:
         )
 
 
-# Paused: it stands, and is published; stopped: it stands, and is not; none: never started.
+# Paused: `/clock` is published, but stands; stopped: it is not published any more; none: it never
+# was; doubted: it contradicts the journal.
 ClockState = Literal["running", "paused", "stopped", "none", "doubted"]
 
 
@@ -241,12 +241,12 @@ class Snapshot:
 
     @property
     def now_ns(self) -> int | None:
-        """The moment that ages count from; None: the clock does not run, and they are not known."""
+        """The moment from which ages count; None: ages are unknown, as the clock does not run."""
         return self.stamp_ns if self.clock in ("running", "paused") else None
 
 
 def same_tags(before: Snapshot | None, tags: Iterable[TagState]) -> tuple[TagState, ...]:
-    """The tags, each the very same value as before if it has not changed: identities tell."""
+    """The tags, each the same object as before if it has not changed: callers compare identity."""
     known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
     return tuple(
         old if (old := known.get(tag.tag_id)) is not None and old == tag else tag for tag in tags
@@ -255,7 +255,7 @@ def same_tags(before: Snapshot | None, tags: Iterable[TagState]) -> tuple[TagSta
 
 @dataclass(slots=True)
 class TwinStore:
-    """The latest of everything, per tag: what has the latest stamp; of equal ones, what came later.
+    """Holds each tag's latest values: the latest stamp wins; if equal, the one received later.
 
     `observation_count` grows with each write that changes what a field or the state shows.
     """
@@ -269,11 +269,11 @@ class TwinStore:
     def record(self, scan: Scan) -> None:
         """Store a scan: its readings (latest per name), its time, its pose if the tag has none.
 
-        One that failed and brought nothing is the tag's last attempt; its time counts as
+        A failed scan without readings is the tag's last attempt. Its time counts as
         `last_observed_ns` only as long as nothing else was observed at the tag.
 
         Raises:
-            Rejected: a text or a list past its bound; nothing is stored then.
+            Rejected: a text or a list is over its limit; nothing is stored then.
 
         """
         check_texts(scan.tag_id, *(reading.name for reading in scan.readings))
@@ -292,7 +292,7 @@ class TwinStore:
         """Store an inspection: it replaces an earlier one, unless it failed; readings stay.
 
         Raises:
-            Rejected: a text or a list past its bound; nothing is stored then.
+            Rejected: a text or a list is over its limit; nothing is stored then.
 
         """
         flower = inspection.flower
@@ -309,10 +309,10 @@ class TwinStore:
         self._store_attempt(tag, inspection, brought=flower is not None)
 
     def pin(self, tag_id: str, pose: Pose) -> None:
-        """Give a discovered tag its place, unless it has one already.
+        """Give a discovered tag its pose, unless it has one already.
 
         Raises:
-            Rejected: a text past its bound, or one tag too many.
+            Rejected: a text is over its limit, or there is one tag too many.
 
         """
         check_texts(tag_id)
@@ -321,10 +321,10 @@ class TwinStore:
             self._store(replace(tag, pose=pose))
 
     def hold_to(self, now_ns: int) -> bool:
-        """Follow a clock that has gone back: whatever was observed after `now_ns` was, now.
+        """Follow a clock that went back: observations after `now_ns` count as made at `now_ns`.
 
-        It ages from here on, and new observations count as new. Returns whether there was anything
-        like that. 0 is a simulated clock that has not started.
+        They age from then on, and new observations count as new. Returns whether there were any.
+        0 is a simulated clock that has not started.
         """
         if not 0 < now_ns < self._newest_ns:
             return False
@@ -336,24 +336,24 @@ class TwinStore:
         return True
 
     def restore(self, tags: Iterable[TagState], observed: Container[str]) -> None:
-        """Begin with what was known before; at tags not `observed` attempts alone were made."""
+        """Start from an earlier state; tags that are not in `observed` had only failed attempts."""
         self._tags, self._observed, self._newest_ns, self._items = {}, {}, 0, 0
         for tag in tags:
             try:
                 self._tag(tag.tag_id)
                 self._store(tag)
-            except Rejected:  # past a bound that was wider
+            except Rejected:  # over a limit that was higher before
                 continue
             if tag.tag_id in observed and tag.last_observed_ns is not None:
                 self._observed[tag.tag_id] = tag.last_observed_ns
 
     @property
     def size(self) -> tuple[int, int]:
-        """How many tags, and how many readings, flowers and footprint points of theirs."""
+        """Number of tags, and number of their readings, flowers and footprint points."""
         return len(self._tags), self._items
 
     def tag(self, tag_id: str) -> TagState | None:
-        """A tag as it is now; None: it is not known."""
+        """The current state of a tag; None if the tag is unknown."""
         return self._tags.get(tag_id)
 
     def is_pinned(self, tag_id: str) -> bool:
@@ -377,7 +377,7 @@ class TwinStore:
         return TagState(tag_id=tag_id)
 
     def _store_attempt(self, tag: TagState, tried: Scan | Inspection, brought: bool) -> None:
-        """Keep a tag with the times of what was tried; `brought`: something was observed."""
+        """Store a tag with the times of an attempt; `brought`: something was observed."""
         at_ns, observed_ns = tried.stamp_ns, self._observed.get(tag.tag_id)
         if brought:
             observed_ns = max(observed_ns or 0, at_ns)
@@ -392,7 +392,7 @@ class TwinStore:
             self._observed[tag.tag_id] = observed_ns
 
     def _store(self, tag: TagState) -> None:
-        """Put a tag in the place of what it was, if there is room for what it grew by."""
+        """Replace a tag's state, if there is room for its growth."""
         known = self._tags.get(tag.tag_id)
         if known is not None and known == tag:
             return  # the very same value stays: change detection compares identities
@@ -420,7 +420,7 @@ def _is_later(one_ns: int | None, other_ns: int) -> bool:
 
 
 def _is_same(one: Reading, other: Reading) -> bool:
-    # Of one time too: readings of different scans derive no VPD.
+    # Times have to match too: VPD is not derived from readings of different scans.
     is_same = one.value == other.value or (math.isnan(one.value) and math.isnan(other.value))
     return is_same and (one.name, one.observed_at_ns) == (other.name, other.observed_at_ns)
 
@@ -430,9 +430,9 @@ def _items_of(tag: TagState) -> int:
 
 
 def samples_of(tags: Iterable[TagState], sensor_type: str) -> tuple[Sample, ...]:
-    """(x, y, value), m and the sensor's unit, of tags with a pose and a reading that is finite.
+    """(x, y, value), m and the sensor's unit, of tags with a pose and a finite reading.
 
-    In the field's own type: a NaN, or a number past float32, would poison a neighbourhood.
+    Values beyond float32, the field's type, are left out like NaN: they would spoil all cells near.
     """
     return tuple(
         (tag.pose.x, tag.pose.y, reading.value)

@@ -1,1 +1,1 @@
-"""A field with its error, in space and time, from all readings of a day. Pure."""
+"""The estimate: a field in space and time, with its error, from a day of readings. Pure."""

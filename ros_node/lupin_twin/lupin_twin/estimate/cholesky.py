@@ -1,20 +1,20 @@
-"""Readings solved, by one Cholesky factor or neighbours; left out in turn; where a tag helps.
+"""Solves the Gaussian process, checks readings by leaving them out, and finds places for tags.
 
-Pure, standardised units. Of a place, phi = [1, R(x, tag_1 .. T)]: mean = phi w, variance = prior -
-phi Q phi', with w = B K^-1 y, Q = B K^-1 B', and B what a reading has in common with now, summed by
-tag. However many readings there are, a place costs T tags. Q and the variance are float64: they are
-small differences.
+Pure, standardised units. For a place, phi = [1, R(x, tag_1 .. T)]: mean = phi w, variance = prior -
+phi Q phi', with w = B K^-1 y, Q = B K^-1 B'. B is the covariance of the readings with now, summed
+by tag. The cost of a place depends on the number T of tags, not on that of readings. Q and the
+variance are float64, because they are small differences.
 
-Of more readings, a nearest-neighbour Gaussian process (Vecchia, "Estimation and model
-identification for continuous spatial processes", 1988): each place is estimated from the readings
-of the tags nearest to it, and from some of the whole greenhouse, for its course in time. Places
-between the same few tags share their neighbours.
+More readings than `MAX_EXACT` need a nearest-neighbour Gaussian process (Vecchia, "Estimation and
+model identification for continuous spatial processes", 1988). Each place is estimated from the
+readings of its nearest tags, and from some of the whole greenhouse, which show the course in time.
+Places between the same few tags share their neighbours.
 
-Readings are left out together (Rasmussen and Williams, 2006, 5.12): with A the inverse of all
-readings' covariance and a = A y, those of a block are off by A_bb^-1 a_b, with the covariance
-A_bb^-1. An offset that they have in common is estimated from that by least squares. What another
-reading helps does not depend on its value: at a place p it takes c(t, p)^2 / (c(p, p) + noise) off
-the variance at t, c being the covariance of what is true now.
+Readings are left out in blocks (Rasmussen and Williams, 2006, 5.12). With A the inverse of all
+readings' covariance and a = A y, the residuals of a block are A_bb^-1 a_b, with the covariance
+A_bb^-1. The block's common offset is their least-squares estimate. The benefit of another reading
+does not depend on its value. At a place p it reduces the variance at t by
+c(t, p)^2 / (c(p, p) + noise), where c is the posterior covariance of the true values now.
 """
 
 from __future__ import annotations
@@ -31,7 +31,10 @@ from lupin_twin.field.grid import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solved:
-    """What is true now, by tags at `xy` (T, 2): `mean_of` (1 + T,) is w, `known_of` Q."""
+    """Posterior of the true values now, by tags at `xy` (T, 2): `mean_of` (1 + T,) is w.
+
+    `known_of` (1 + T, 1 + T) is Q.
+    """
 
     hyper: Hyper
     xy: FloatArray
@@ -45,7 +48,7 @@ class Solved:
         return result
 
     def near_grid(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """The same of a grid's places, row by row: a product of one along x and one along y."""
+        """The phi of a grid's places, row by row: a product of R along x and R along y."""
         along_x = nearness(x, self.xy[:, 0], self.hyper.l)
         along_y = nearness(y, self.xy[:, 1], self.hyper.l)
         result = np.ones((len(y), len(x), 1 + len(self.xy)))
@@ -58,13 +61,13 @@ class Solved:
         return nearness(x, other_x, length) * nearness(y, other_y, length)
 
     def moments(self, phi: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance (k,) of what is true, now, at places."""
+        """Mean and variance (k,) of the true values now, at places given by `phi`."""
         known = np.einsum("ki,ki->k", phi @ self.known_of, phi)
         prior = self.hyper.common_variance + self.hyper.local_variance
         return phi @ self.mean_of, np.maximum(prior - known, 0.0)
 
     def shared(self, phi: FloatArray, other: FloatArray, between: FloatArray) -> FloatArray:
-        """The covariance (k, m) of what is true now at places, whose R is `between` (k, m)."""
+        """Covariance (k, m) of the true values now, between places whose R is `between` (k, m)."""
         h = self.hyper
         result: FloatArray = h.common_variance + h.local_variance * between
         result -= phi @ self.known_of @ other.T
@@ -73,7 +76,7 @@ class Solved:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Factor:
-    """Readings by tag and their covariance: `root` (n, n) with root' root its inverse."""
+    """Readings sorted by tag, and their inverse covariance root' root; `root` is (n, n)."""
 
     readings: Readings
     root: FloatArray
@@ -81,10 +84,10 @@ class Factor:
 
     @classmethod
     def of(cls, h: Hyper, readings: Readings, y: FloatArray, day_length_s: float) -> Factor:
-        """Of standardised readings `y`; `readings` are by tag, each tag has some.
+        """Factorise readings with standardised values `y`; sorted by tag, and each tag has some.
 
         Raises:
-            numpy.linalg.LinAlgError: their covariance is singular, as far as floats can tell.
+            numpy.linalg.LinAlgError: their covariance is numerically singular.
 
         """
         covariance = Pairs(readings, day_length_s).covariance(h)
@@ -92,7 +95,7 @@ class Factor:
         return cls(readings, root, root.T @ (root @ y))
 
     def solved(self, h: Hyper, at_s: float, day_length_s: float) -> Solved:
-        """What it says of the moment `at_s`, s."""
+        """Return the posterior as of the moment `at_s`, s."""
         ages_h = (at_s - self.readings.time_s) * (HOURS / day_length_s)
         common, place = in_time(h, ages_h)
         tag = self.readings.tag
@@ -104,21 +107,21 @@ class Factor:
         return Solved(h, self.readings.xy, w, rooted.T @ rooted)
 
 
-# All readings of so many are solved at once.
+# Up to this many readings are solved at once.
 MAX_EXACT: Final = 1_024
-# Of so many more tags, so many readings each count.
+# If there are too many tags for that, this many readings of each tag count.
 PER_TAG: Final = 6
-# Tags nearest to a place, and readings of the whole greenhouse.
+# Neighbours of a place: its nearest tags, and readings of the whole greenhouse.
 NEAREST: Final = 32
 EVERYWHERE: Final = 64
-# Places between so many tags share their neighbours.
+# Places between this many tags share their neighbours.
 _TOGETHER: Final = 12
 
 
 def shared_out(xy: FloatArray, places: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:
-    """Tags (T, 2) and places (k, 2), halved across the tags' longer side until the tags are few.
+    """Halve tags (T, 2) and places (k, 2) across the tags' longer side until the tags are few.
 
-    Rows of tags, and of the places that lie between these.
+    Yields the rows of a group of tags, and of the places that lie between them.
     """
 
     def halved(tags: IntArray, those: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
@@ -136,20 +139,20 @@ def shared_out(xy: FloatArray, places: FloatArray) -> Iterator[tuple[IntArray, I
 
 
 class Neighbours:
-    """Readings by tag, each tag with some, ready to be looked up by place."""
+    """Finds the readings near a place. Readings are sorted by tag, and each tag has some."""
 
     def __init__(self, readings: Readings) -> None:
         self._readings = readings
         tags = len(readings.xy)
         self._ends = np.searchsorted(readings.tag, np.arange(tags + 1))
-        # Whole tags: what one of them reads tells the course however different its place is.
+        # Whole tags: all readings of one tag show the course in time, wherever the tag is.
         wanted = max(EVERYWHERE * tags // len(readings), 1)
         self._everywhere = self._of(np.linspace(0, tags - 1, wanted).astype(int))[:EVERYWHERE]
 
     def around(self, tags: IntArray) -> tuple[Readings, IntArray]:
-        """The readings of these few tags, of the nearest to them, and some of everywhere.
+        """Return the readings of a few tags, of those nearest to them, and some from everywhere.
 
-        And which tags the rows of their `xy` are.
+        Also returns which tags the rows of their `xy` are.
         """
         of = self._readings
         far = np.square(of.xy - of.xy[tags].mean(axis=0)).sum(axis=1)
@@ -163,23 +166,23 @@ class Neighbours:
         return np.concatenate(rows)
 
 
-# A tag has changed if its readings since some moment, at least so many, are off by so many sds
-# together, and in multiples of how far the other tags are; and the newest alone by as many.
+# A tag has changed if its readings since some moment are together off by `CHANGE_Z` sds, and by
+# that multiple of what is typical for other tags. The latest alone must be off by `NEWEST_Z` sds.
 LEAST_READINGS: Final = 2
 CHANGE_Z: Final = 3.0
 NEWEST_Z: Final = 2.0
-# Left out of an unchanged tag, to say what was expected of the newest.
+# Readings of an unchanged tag that are left out to predict its latest one.
 _LAST: Final = 4
-# Of a normal distribution: its sd, as a multiple of the median of what lies off its mean.
+# sd of a normal distribution, as a multiple of its median absolute deviation.
 _SD_OF_MEDIAN: Final = 1.4826
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """How far a tag's last readings are off what all the others say of them.
+    """How far a tag's last readings are off what all the other readings predict.
 
-    `z` is in sds; `offset`, and `expected` and `expected_sd` of its newest reading, are in the
-    sensor's unit. `since_s` is the time of the first reading of a changed sensor; None: it has not.
+    `z` is in sds; `offset`, and `expected` and `expected_sd` of its latest reading, are in the
+    sensor's unit. `since_s` is the time of the first reading after a change; None: no change.
     """
 
     z: float
@@ -191,7 +194,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Off:
-    """How far a reading is off (`off`), and how far it may be (`variance`, its noise included)."""
+    """A reading's deviation from its prediction, `off`, and the `variance` of that, with noise."""
 
     off: float
     variance: float
@@ -199,7 +202,7 @@ class Off:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeftOut:
-    """Readings by tag, for any of them to be left out.
+    """Predicts any of the readings, sorted by tag, from the others.
 
     `wider` is the inflation of sds; `precision` (n, n) and `alpha` (n,) are A and a.
     """
@@ -211,14 +214,14 @@ class LeftOut:
 
     @classmethod
     def of(cls, factor: Factor, wider: float) -> LeftOut:
-        """Of readings that were solved."""
+        """Prepare readings that were factorised."""
         return cls(factor.readings, wider, factor.root.T @ factor.root, factor.alpha)
 
     def changed(self) -> dict[int, tuple[float, float, float | None]]:
-        """Of each tag: z, offset, and since when it has changed, s.
+        """Map each tag to z, offset, and the time since when it has changed, s; None: unchanged.
 
-        The clearest first; those that are left are judged without what it has read since then.
-        Where most are off, by their median none has changed: it is the model that does not fit.
+        The clearest change comes first; the other tags are judged without its readings since then.
+        If most tags are off, none has changed, because of the median: the model does not fit.
         """
         result: dict[int, tuple[float, float, float | None]] = {}
         rest, left = self, np.unique(self.readings.tag).tolist()
@@ -237,12 +240,12 @@ class LeftOut:
         return result
 
     def newest(self, tag: int, *, without: FloatArray | IntArray) -> Off:
-        """A tag's newest reading, with all readings of the tags `without` left out: its own too."""
+        """Deviation of a tag's latest reading, predicted without its tag and the tags `without`."""
         block = np.flatnonzero(np.isin(self.readings.tag, without))
         return self._off(block, self._own(tag)[-1])
 
     def last(self, tag: int, since_s: float | None) -> Off:
-        """A tag's newest reading, its last ones left out: all since it has changed, or four."""
+        """Deviation of a tag's latest reading, without its last four, or those since its change."""
         own = self._own(tag)
         if since_s is None:
             return self._off(own[-_LAST:], own[-1])
@@ -257,13 +260,13 @@ class LeftOut:
         return Off(float(covariance[at] @ self.alpha[block]), float(covariance[at, at]))
 
     def _onset(self, tag: int) -> tuple[float, float, int | None]:
-        """z, offset and the first of a tag's last readings that are farthest off, in sds."""
+        """z, offset and first index of the last readings of a tag that are farthest off, in sds."""
         own = self._own(tag)
-        # Sums over the last one, the last two, ..: those before them count, those after are off.
+        # Sums over the last reading, the last two, ..: the candidates for readings that are off.
         a = self.alpha[own][::-1].cumsum()
         weight = np.diagonal(self.precision[np.ix_(own, own)][::-1, ::-1].cumsum(0).cumsum(1))
         z = a / np.sqrt(weight) / self.wider
-        # Before a change it was another: not all of them are off.
+        # A change needs a reading before it, so never all of them are off.
         best = 1 + int(np.argmax(np.abs(z[: max(len(own) - 1, 1)])))
         first: int | None = len(own) - best
         newest = self._off(own[first:], own[-1])
@@ -273,7 +276,7 @@ class LeftOut:
         return float(z[best - 1]), float(a[best - 1] / weight[best - 1]), first
 
     def _without(self, block: IntArray) -> LeftOut:
-        """The other readings, as if these had never been."""
+        """The other readings, as if those of `block` had never been made."""
         rest = np.setdiff1d(np.arange(len(self.readings)), block)
         across = self.precision[np.ix_(rest, block)]
         lost = np.linalg.solve(self.precision[np.ix_(block, block)], across.T)
@@ -286,7 +289,7 @@ class LeftOut:
 
 
 def gap_of(xy: FloatArray) -> float:
-    """How far from the nearest tag (T, 2) half of the floor between them lies, m."""
+    """Median distance from the floor between tags (T, 2) to the nearest tag, m."""
     low, high = xy.min(axis=0), xy.max(axis=0)
     x, y = (np.linspace(*ends, 12) for ends in zip(low, high, strict=True))
     floor = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
@@ -297,9 +300,9 @@ def gap_of(xy: FloatArray) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where another tag helps: m, map frame.
+    """A position where another tag helps: m, map frame.
 
-    `error_ratio` is the error with it, and with those before it, as a share of that without any.
+    `error_ratio` is the error with it and with those before it, divided by that without any.
     """
 
     x: float
@@ -308,7 +311,7 @@ class Place:
 
 
 class Gain:
-    """What readings that were solved together say of candidates (k, 2) and targets (m, 2), m."""
+    """The benefit of readings at candidates (k, 2) for the variance at targets (m, 2), m."""
 
     def __init__(self, solved: Solved, candidates: FloatArray, targets: FloatArray) -> None:
         near, near_targets = solved.near(candidates), solved.near(targets)
@@ -320,13 +323,13 @@ class Gain:
         self.error = float(solved.moments(near_targets)[1].sum())
 
     def helps(self) -> FloatArray:
-        """(k,): by how much a reading at each candidate lessens `error`."""
+        """(k,): by how much a reading at each candidate reduces `error`."""
         spread = np.maximum(np.diagonal(self._own), 0.0) + self._noise
         result: FloatArray = np.square(self._reach).sum(axis=1) / spread
         return result
 
     def take(self, chosen: int) -> None:
-        """There is a reading at a candidate from now on."""
+        """Add a reading at a candidate."""
         self.error = max(self.error - float(self.helps()[chosen]), 0.0)
         own, reach = self._own[chosen].copy(), self._reach[chosen].copy()
         spread = max(float(own[chosen]), 0.0) + self._noise
@@ -335,9 +338,9 @@ class Gain:
 
 
 def best_places(gains: Sequence[Gain], count: int) -> list[Place]:
-    """The `count` candidates that leave the least error at all targets, the best first.
+    """Choose `count` candidates that leave the least error at all targets, the best first.
 
-    One after the other, each with those before it. The error is the root of the mean variance.
+    Greedy: each is chosen given those before it. The error is the root of the mean variance.
     """
     at_first = sum(gain.error for gain in gains)
     free = [np.ones(len(gain.candidates), dtype=bool) for gain in gains]

@@ -1,8 +1,8 @@
 """GetEstimate without ROS: which readings count, what an answer is, and whether it is calibrated.
 
-Of what estimates predicted, how much lay in their intervals is counted by the hour, a 24th of a day
-of the greenhouse's own length, over the last day and week. Pure. Metres in the map frame, times ns
-of ROS time.
+Calibration is the share of predicted readings that lay in their intervals, over the last day and
+week. It is counted by the hour, a 24th of the greenhouse's own day. Pure. Metres in the map frame,
+times ns of ROS time.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from lupin_twin.estimate.posterior import EstimateGrid
 from lupin_twin.field.engine import FieldRefused, FieldRequest, check_request
 
 MAX_TAGS: Final = 10_000
-# An estimate of now is one of the last whole minute of a day of so many, or of the newest reading.
+# An estimate of now is made for the last whole minute, or for the latest reading if that is later.
 MINUTES_A_DAY: Final = 1_440
-# What answers take, roughly and at worst, s of one core: for each pair of readings or, of many
-# tags, for each of these; and for each cell.
+# Rough worst-case cost of an answer, s of one core: for each cell, and for each pair of readings
+# or, with many tags, for each tag.
 _PAIR_S: Final = 0.3e-6
 _TAG_S: Final = 500e-6
 _CELL_S: Final = 0.1e-6
@@ -40,7 +40,7 @@ class EstimateRequest:
 
 @dataclass(frozen=True, slots=True)
 class TagPast:
-    """A tag's place, and its readings of one sensor: (ns, value), in any order."""
+    """A tag's position, and its readings of one sensor: (ns, value), in any order."""
 
     tag_id: str
     x: float
@@ -50,7 +50,7 @@ class TagPast:
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """An answer: the grid, and how many tags and readings it was made of."""
+    """An answer: the grid, and how many tags and readings it was made from."""
 
     grid: EstimateGrid
     sample_count: int
@@ -58,10 +58,10 @@ class Estimate:
 
 
 def moment_of(tags: Sequence[TagPast], now_ns: int, day_length_s: float) -> int:
-    """The moment that an estimate of now is made for, not later than `now_ns`.
+    """The moment for which an estimate of now is made, not later than `now_ns`.
 
-    A minute of the day changes nothing that anybody could see; but of the same readings the same
-    estimate is made throughout it, to the last bit.
+    Rounding to a minute changes nothing visible, and for a whole minute the same readings give the
+    same estimate, to the last bit.
     """
     minute_ns = int(day_length_s / MINUTES_A_DAY * NANOSECONDS_PER_SECOND)
     stamps_ns = (ns for tag in tags for ns, _ in tag.readings if ns <= now_ns)
@@ -69,12 +69,12 @@ def moment_of(tags: Sequence[TagPast], now_ns: int, day_length_s: float) -> int:
 
 
 def readings_of(tags: Sequence[TagPast], at_ns: int, day_length_s: float) -> Readings:
-    """Those that count as of `at_ns`, by seconds from then on (they are not greater than 0).
+    """Select the readings that count as of `at_ns`; their times are s from then, at most 0.
 
-    A day's, as many of each tag as all tags together may have; tag numbers are those of `tags`.
+    They are those of a day, see `thinned`; tag numbers are indices of `tags`.
 
     Raises:
-        FieldRefused: no reading within a day, or more tags than can be computed with.
+        FieldRefused: there is no reading within a day, or there are too many tags.
 
     """
     all_of = Readings(
@@ -95,7 +95,7 @@ def readings_of(tags: Sequence[TagPast], at_ns: int, day_length_s: float) -> Rea
 
 
 def thinned(readings: Readings, at_s: float, day_length_s: float) -> Readings:
-    """Those of a day that count: as many of each tag as can be solved at once, or a few of each."""
+    """Select a day's readings: as many of each tag as can be solved at once, or a few of each."""
     age_s = at_s - readings.time_s
     tags = len(np.unique(readings.tag[(age_s >= 0.0) & (age_s <= day_length_s)]))
     per_tag = max(MAX_EXACT // max(tags, 1), PER_TAG)
@@ -103,7 +103,7 @@ def thinned(readings: Readings, at_s: float, day_length_s: float) -> Readings:
 
 
 def unchanged(tags: Sequence[TagPast], changed: Mapping[str, int]) -> list[TagPast]:
-    """The same tags without what was read since their sensor has changed, ns."""
+    """The tags without their readings since the sensor changed (tag id → ns)."""
     return [
         replace(
             tag,
@@ -116,39 +116,39 @@ def unchanged(tags: Sequence[TagPast], changed: Mapping[str, int]) -> list[TagPa
 
 
 def cost_s(request: EstimateRequest, tags: int, max_grid_cells: int) -> float:
-    """About how long an estimate of so many tags takes, s of one core."""
+    """Approximate cost of an estimate from `tags` tags, s of one core."""
     width, height = check_request(request.box, max_grid_cells)
     readings = min(MAX_EXACT, MAX_PER_TAG * tags)
     is_exact = tags * PER_TAG <= MAX_EXACT
     return (readings**2 * _PAIR_S if is_exact else tags * _TAG_S) + width * height * _CELL_S
 
 
-# The interval predicted: 9 of 10 are to lie within mean +- so many sds.
+# Half of the predicted interval, in sds: 9 of 10 readings should lie inside.
 HALF_WIDTH_SDS: Final = 1.645
 HOURS_A_DAY: Final = 24
 HOURS_A_WEEK: Final = 7 * HOURS_A_DAY
-# What may be of a share that is to be 0.9; a model that is wrong is soon farther off.
+# Lowest share that is accepted where 0.9 is expected; that of a wrong model soon falls below.
 LEAST_SHARE: Final = 0.8
-# Scans of one hour hang together: fewer prove nothing.
+# Scans of one hour are correlated: fewer than this prove nothing.
 LEAST_SCANS: Final = 40
 
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """Scans that were predicted without their tag and its neighbours, and those that lay inside."""
+    """Scans predicted without their tag and its neighbours, and how many lay in the interval."""
 
     scans: int = 0
     inside: int = 0
 
     @property
     def share(self) -> float | None:
-        """Inside; None: nothing was predicted."""
+        """Share of the scans inside; None if none was predicted."""
         return self.inside / self.scans if self.scans else None
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """How a sensor's estimates have done; `since_ns` is when the first was compared."""
+    """Calibration of a sensor's estimates; `since_ns` is when the first one was compared."""
 
     since_ns: int | None
     day: Tally
@@ -156,21 +156,21 @@ class Record:
 
     @property
     def is_trusted(self) -> bool | None:
-        """Whether day and week lay inside often enough; None: too few scans to say."""
+        """Whether enough scans of the day and the week lay inside; None if there are too few."""
         enough = [one for one in (self.day, self.week) if one.scans >= LEAST_SCANS]
         return all(one.inside >= LEAST_SHARE * one.scans for one in enough) if enough else None
 
 
 @dataclass(slots=True)
 class Grades:
-    """One sensor's, by the hour; `day_length_s` is a day of the greenhouse, s of ROS time."""
+    """Counts of one sensor by the hour; `day_length_s` is a greenhouse's day, s of ROS time."""
 
     day_length_s: float
     _since_ns: int | None = None
     _hours: dict[int, Tally] = field(default_factory=dict)
 
     def add(self, graded: Tally, now_ns: int) -> None:
-        """So many were compared now; nothing is later, whatever a clock showed before."""
+        """Add scans that were compared now; drops later hours, from before a clock went back."""
         if not graded.scans:
             return
         hour = self._hour(now_ns)
@@ -182,7 +182,7 @@ class Grades:
         self._since_ns = now_ns if self._since_ns is None else min(self._since_ns, now_ns)
 
     def record(self, now_ns: int) -> Record:
-        """As of now."""
+        """Return the calibration as of now."""
         hour = self._hour(now_ns)
         return Record(self._since_ns, self._sum(hour, HOURS_A_DAY), self._sum(hour, HOURS_A_WEEK))
 

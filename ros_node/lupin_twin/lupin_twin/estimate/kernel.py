@@ -1,10 +1,11 @@
 """The readings of one sensor, and the covariance of any two in space and time, with its gradient.
 
-Pure. Readings: s of ROS time, m in the map frame, the sensor's own unit. The kernel: standardised
-units, m, and hours of a day of 24, whatever the day's length.
+Pure. Readings are in s of ROS time, m in the map frame, and the sensor's own unit. The kernel is in
+standardised units, m, and hours: a day has 24 of them, whatever its length in seconds.
 
 A product-sum kernel (De Iaco, Myers, Posa, "Space-time analysis using a general product-sum
-model", 2001): what the whole greenhouse does, and what differs by place, always, now, and daily::
+model", 2001). One part is common to the whole greenhouse, and one differs by place. Each has a
+constant, a passing and a daily term::
 
     k = 100 + sg^2 M(dt; lg) + sp^2 D(dt)
       + R [ sa^2 + sh^2 M(dt; lh) + sq^2 D(dt) ]
@@ -13,7 +14,7 @@ model", 2001): what the whole greenhouse does, and what differs by place, always
     D(dt) = cos(2 pi dt / 24) + half^2 cos(4 pi dt / 24)   (a day is no pure sinusoid)
     R = M(|dx|; l) M(|dy|; l)
 
-The 100 makes it ordinary kriging: the mean is not known.
+The 100 makes it ordinary kriging: the mean is unknown.
 """
 
 from __future__ import annotations
@@ -28,9 +29,10 @@ from lupin_twin.field.grid import FloatArray
 
 IntArray = npt.NDArray[np.int64]
 
-# So many readings of a tag count; more say little that these do not.
+# At most this many readings of a tag count; more would add little.
 MAX_PER_TAG: Final = 32
-# So many readings weigh as much as what is thought beforehand in saying how far values spread.
+# In the spread of values, the prior weighs as much as this many readings. The readings themselves
+# weigh at most `_MAX_WEIGHT`.
 _PRIOR_WEIGHT: Final = 4.0
 _MAX_WEIGHT: Final = 20.0
 
@@ -55,15 +57,15 @@ class Readings:
     def recent(
         self, at_s: float, *, day_length_s: float = 86_400.0, per_tag: int = MAX_PER_TAG
     ) -> Readings:
-        """Those up to `at_s` that are not older than a day, at most `per_tag` of each tag.
+        """Select readings up to `at_s` that are at most a day old, at most `per_tag` of each tag.
 
-        Of more, the newest quarter counts, and of as many equal parts of the time before as are
-        left the newest of each: what the next hours bring, yesterday's readings show better than
-        many of the last hour.
+        If a tag has more, a quarter of them are its latest. The rest are the latest ones of equal
+        parts of the time before. For the next hours, yesterday's readings predict better than many
+        readings of the last hour.
         """
         age_s = at_s - self.time_s
         chosen = np.flatnonzero((age_s >= 0.0) & (age_s <= day_length_s))
-        # By tag, the newest first; of equal stamps the later in order counts as the newer.
+        # By tag, the latest first; of equal stamps, the later in order counts as the later.
         order = chosen[np.lexsort((-chosen, age_s[chosen], self.tag[chosen]))]
         tag = self.tag[order]
         _, starts, counts = np.unique(tag, return_index=True, return_counts=True)
@@ -81,11 +83,11 @@ class Readings:
         return self.take(np.sort(order[taken]))
 
     def take(self, chosen: npt.NDArray[np.int64] | npt.NDArray[np.bool_]) -> Readings:
-        """Some of them, at the same places."""
+        """Return the chosen readings, with the same `xy`."""
         return Readings(self.time_s[chosen], self.tag[chosen], self.value[chosen], self.xy)
 
     def of_present(self) -> Readings:
-        """The same by tag and time, at the places of tags with readings alone."""
+        """Sort by tag and time, and remove tags without readings from `xy`."""
         order = np.lexsort((self.time_s, self.tag))
         present, row = np.unique(self.tag[order], return_inverse=True)
         return Readings(self.time_s[order], row.ravel(), self.value[order], self.xy[present])
@@ -99,21 +101,21 @@ class Scale:
     spread: float
 
     def standardised(self, values: FloatArray) -> FloatArray:
-        """What the model reckons with."""
+        """The values in standardised units."""
         result: FloatArray = (values - self.centre) / self.spread
         return result
 
 
 def scale_of(values: FloatArray) -> Scale:
-    """The median, and a spread between what is thought beforehand and that of the readings.
+    """The median, and a spread that is weighted between a prior and that of the readings.
 
-    Few readings spread by chance, so what is thought counts as much as four of them do: a tenth of
-    the median.
+    The spread of few readings is accidental, so the prior, a tenth of the median, weighs as much as
+    four of them.
     """
     centre = float(np.median(values))
     thought = abs(centre) / 10.0
     weight = min(float(len(values)), _MAX_WEIGHT)
-    # What is to be squared is taken by its largest: it may be near the end of what floats hold.
+    # Divided by the largest before squaring: the squares of very large floats would overflow.
     off = values - centre
     largest = max(float(np.abs(off).max()), thought) or 1.0
     variance = float(np.mean((off / largest) ** 2))
@@ -125,14 +127,14 @@ HOURS: Final = 24.0
 UNKNOWN_MEAN: Final = 100.0
 JITTER: Final = 0.02**2
 _SQRT3: Final = 3.0**0.5
-# As good as infinitely far; and 0 times infinity is no number.
+# Practically infinite; with infinity itself, 0 * inf would be NaN.
 _FAR: Final = 700.0
 
 
 class Hyper(NamedTuple):
     """The kernel's parameters, all > 0. `sg` .. `tau` are sds, `lg`, `lh` h, `l` m.
 
-    `half` is the share of the second harmonic in what comes daily.
+    `half` is the share of the second harmonic in the daily terms.
     """
 
     sg: float
@@ -148,25 +150,25 @@ class Hyper(NamedTuple):
 
     @property
     def common_variance(self) -> float:
-        """Of what the whole greenhouse does, before any reading."""
+        """Prior variance of the part that is common to the greenhouse."""
         return UNKNOWN_MEAN + self.sg**2 + self.sp**2 * (1.0 + self.half**2)
 
     @property
     def local_variance(self) -> float:
-        """Of what differs by place, before any reading."""
+        """Prior variance of the part that differs by place."""
         return self.sa**2 + self.sh**2 + self.sq**2 * (1.0 + self.half**2)
 
     @property
     def noise(self) -> float:
-        """The variance of a reading about what is true."""
+        """Variance of a reading around the true value."""
         return self.tau**2 + JITTER
 
 
-# Log-normal: these are the medians, and the sds of the logarithms. The day's swing (sp) is taken to
-# be more than readings spread by: the first hours show a part of it. What moves beside the day, the
-# greenhouse as a whole (sg) or one place (sh, sq), may be next to nothing: its sds are wide. It
-# passes in hours (lg): what lasts for half a day cannot be told from the day itself, and would make
-# outages seem worse than they are.
+# Log-normal priors: the medians, and the sds of the logarithms. The daily swing (sp) is assumed
+# larger than the spread of the readings: the first hours show only a part of it. Other variation,
+# of the whole greenhouse (sg) or of one place (sh, sq), may be almost nothing, so its sds are wide.
+# It passes in hours (lg). Variation over half a day cannot be told from the daily one, and would
+# make outages seem worse than they are.
 PRIOR_MEDIAN: Final = Hyper(0.3, 3.0, 1.5, 1.0, 0.25, 8.0, 0.25, 2.5, 0.15, 0.15)
 PRIOR_LOG_SD: Final = Hyper(1.5, 0.6, 0.7, 0.6, 1.3, 0.5, 1.3, 0.5, 1.0, 1.0)
 
@@ -203,7 +205,7 @@ def _apart(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def in_time(h: Hyper, apart_h: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The covariance at times so far apart: of the whole greenhouse, and of one place's own."""
+    """Covariance at times `apart_h` (h) apart: of the common part, and of the part by place."""
     day = np.cos(apart_h * (2.0 * np.pi / HOURS))
     # cos 2x = 2 cos^2 x - 1
     day += h.half**2 * (2.0 * day * day - 1.0)
@@ -213,7 +215,7 @@ def in_time(h: Hyper, apart_h: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class Pairs:
-    """All pairs of readings: what of the covariance does not depend on its parameters."""
+    """All pairs of readings: the part of their covariance that does not depend on parameters."""
 
     def __init__(self, readings: Readings, day_length_s: float) -> None:
         hours = readings.time_s * (HOURS / day_length_s)
@@ -230,7 +232,7 @@ class Pairs:
         return common
 
     def gradient(self, h: Hyper, weights: FloatArray) -> FloatArray:
-        """(10,): by the logarithm of each parameter, sum(`weights` * covariance) / 2.
+        """(10,): derivative of sum(`weights` * covariance) / 2 by the log of each parameter.
 
         `weights` (n, n) are symmetric.
         """

@@ -1,8 +1,8 @@
-"""From readings to a model, and from a model to an estimate as of a moment. Pure, immutable.
+"""Fits a model to a sensor's readings, and estimates as of a moment with it. Pure, immutable.
 
-The kernel's most probable parameters: maximum a posteriori by BFGS with the analytic gradient
-(Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2006, 5.9). Coordinates are
-those in which the prior is a standard normal: (log parameter - log median) / sd of the log.
+The kernel's parameters are the most probable ones: maximum a posteriori, by BFGS with the analytic
+gradient (Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2006, 5.9). In their
+coordinates, the prior is a standard normal: (log parameter - log median) / sd of the log.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from lupin_twin.field.grid import FloatArray
 from lupin_twin.field.idw import Abandoned, never
 
 _MAX_STEPS: Final = 60
-# Half a thousandth of a unit of log probability changes nothing that anybody could see.
+# A gain of log probability below this changes nothing visible.
 _GOOD_ENOUGH: Final = 5e-4
 _SHORTEST: Final = 1e-3
-# Beyond, exp() is past what floats can multiply.
+# Beyond this coordinate, products of exp() would overflow.
 _FARTHEST: Final = 12.0
 _LOG_MEDIAN: Final = np.log(np.array(PRIOR_MEDIAN))
 _LOG_SD: Final = np.array(PRIOR_LOG_SD)
@@ -44,15 +44,15 @@ class FitFailed(RuntimeError):
 
 
 def hyper_of(coordinates: FloatArray) -> Hyper:
-    """The parameters at a place."""
+    """The kernel's parameters at these coordinates."""
     return Hyper(*np.exp(_LOG_MEDIAN + _LOG_SD * coordinates).tolist())
 
 
 def surprise(pairs: Pairs, y: FloatArray, should_stop: Callable[[], bool] = never) -> Objective:
-    """Minus the log of the posterior density, but for a constant, and its gradient.
+    """Return the objective: minus the log posterior density, up to a constant, and its gradient.
 
-    The density of covariances that cannot be factorised, or whose numbers are past what floats
-    hold, is taken to be 0. When `should_stop` says so, it raises `Abandoned`.
+    If the covariance cannot be factorised or overflows, the density counts as 0. The objective
+    raises `Abandoned` when `should_stop` returns true.
     """
 
     def at(coordinates: FloatArray) -> tuple[float, FloatArray]:
@@ -80,20 +80,20 @@ def minimise(objective: Objective, start: FloatArray) -> FloatArray:
     """BFGS (Nocedal and Wright, "Numerical Optimization", 2006, 6.1) with halved steps.
 
     Raises:
-        FitFailed: not even the start has a density.
+        FitFailed: the density is 0 even at the start.
 
     """
     place = start
     value, slope = objective(place)
     if not np.isfinite(value):
         raise FitFailed("the readings' covariance is singular at the prior's own median")
-    curvature = np.eye(len(place))  # the inverse Hessian, as far as it is known
+    curvature = np.eye(len(place))  # approximates the inverse Hessian
     for _ in range(_MAX_STEPS):
         step = -curvature @ slope
         gain = float(slope @ step)
         if -gain < _GOOD_ENOUGH:
             break
-        step *= min(1.0, 2.0 / float(np.abs(step).max()))  # a prior's two sds at a time
+        step *= min(1.0, 2.0 / float(np.abs(step).max()))  # two sds of the prior at most
         share, there = 1.0, place
         while True:
             there = np.clip(place + share * step, -_FARTHEST, _FARTHEST)
@@ -112,20 +112,20 @@ def minimise(objective: Objective, start: FloatArray) -> FloatArray:
     return place
 
 
-# The parameters of a greenhouse are as well known from these as from more.
+# Readings that are fitted at most: more do not improve the parameters.
 MAX_FITTED: Final = 150
-# They are of so many tags at most: of more, groups of neighbours, for these say over how many
-# metres the truth changes.
+# They come from at most `_TAGS` tags. If there are more, groups of `_TOGETHER` neighbours are
+# chosen, because these show over how many metres the values change.
 _TAGS: Final = 30
 _TOGETHER: Final = 6
-# Beyond this share of how far places differ, one knows no more of a place than of any other; nor
-# beyond how far readings spread.
+# A value counts as known while its sd is below this share of the variation between places, and
+# below the spread of the readings.
 _KNOWN_SHARE: Final = 0.6
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """How readings of one sensor hang together."""
+    """Fitted covariance model of one sensor's readings."""
 
     scale: Scale
     day_length_s: float
@@ -133,19 +133,17 @@ class Model:
 
     @property
     def sd_known(self) -> float:
-        """Where the estimate's sd (the sensor's unit) is below this, it is known."""
+        """Limit of an estimate's sd, in the sensor's unit; below it, the value counts as known."""
         local = INFLATION * math.sqrt(self.hyper.local_variance)
         return min(_KNOWN_SHARE * local, 1.0) * self.scale.spread
 
     def posterior(
         self, readings: Readings, at_s: float, should_stop: Callable[[], bool] = never
     ) -> Posterior:
-        """What the readings say of the moment `at_s` (ROS time, s), everywhere.
+        """Return what the readings tell about the moment `at_s` (ROS time, s), everywhere.
 
-        Its methods raise `numpy.linalg.LinAlgError` if the readings' covariance is
-        singular, as far as floats can tell.
-
-        There are some, and none is later.
+        There has to be a reading, and none may be later. The result's methods raise
+        `numpy.linalg.LinAlgError` if the readings' covariance is numerically singular.
         """
         return Posterior(
             self.scale, self.hyper, self.sd_known, self.day_length_s, readings, at_s, should_stop
@@ -158,13 +156,13 @@ def fit(
     day_length_s: float = 86_400.0,
     should_stop: Callable[[], bool] = never,
 ) -> Model:
-    """The model that the readings, and what is known beforehand, make most probable.
+    """Fit the most probable model to the readings, given the prior.
 
-    Of many readings 150 are fitted, of tags all over the greenhouse and of the whole day. A day
+    Of many readings, 150 are fitted, of tags all over the greenhouse and of the whole day. A day
     takes `day_length_s` of ROS time.
 
     Raises:
-        FitFailed: the readings do not let themselves be fitted.
+        FitFailed: the readings cannot be fitted.
         lupin_twin.field.idw.Abandoned: `should_stop`, called at each step, was true.
 
     """
@@ -177,7 +175,7 @@ def fit(
 
 
 def _some(readings: Readings, day_length_s: float) -> Readings:
-    """At most `MAX_FITTED` of them."""
+    """Choose at most `MAX_FITTED` of the readings."""
     if len(readings) <= MAX_FITTED:
         return readings.of_present()
     of = readings.of_present()

@@ -1,8 +1,8 @@
-"""The estimate as of a moment: its mean and its error anywhere, on grids, and of each tag.
+"""The estimate as of a moment: its mean and error at places, on grids, and for each tag.
 
-Pure. Up to `MAX_EXACT` readings are solved at once; of more, each place's neighbours are. The
-estimate is smooth, so a grid is computed at few places and interpolated between them by cubics
-(Keys, "Cubic convolution interpolation for digital image processing", 1981), along each axis.
+Pure. Up to `MAX_EXACT` readings are solved at once; if there are more, those near each place are.
+The estimate is smooth, so a grid is computed at few places and interpolated by cubics along each
+axis (Keys, "Cubic convolution interpolation for digital image processing", 1981).
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from lupin_twin.estimate.kernel import Hyper, IntArray, Readings, Scale
 from lupin_twin.field.grid import BoolArray, CellGrid, FloatArray, cell_centres, grid_dimensions
 from lupin_twin.field.idw import Abandoned, never
 
-# Places of the lattice, as a share of the length over which the truth changes.
+# Step of the lattice, as a share of the length over which the values change.
 _STEP: Final = 0.1
 _COARSEST_STEP: Final = 0.2
-# So many places are cheap; a lattice of more is as coarse as it may be.
+# Places above which a lattice is made coarser, up to `_COARSEST_STEP`.
 _CHEAP: Final = 4_096
 # Cells along an axis that are interpolated at a time.
 _CELLS_AT_ONCE: Final = 128
@@ -68,7 +68,7 @@ class Cells:
 
     @classmethod
     def of(cls, min_x: float, min_y: float, max_x: float, max_y: float, resolution: float) -> Cells:
-        """Of a box, m."""
+        """Make the cells of a box, m."""
         width, height = grid_dimensions(min_x, min_y, max_x, max_y, resolution)
         return cls(
             cell_centres(min_x, width, resolution),
@@ -79,9 +79,9 @@ class Cells:
         )
 
     def lattice(self, length: float) -> tuple[FloatArray, FloatArray]:
-        """Where along x and y, m, to compute what changes over `length`, m.
+        """The places along x and y, m, at which to compute values that change over `length`, m.
 
-        The cells themselves, or fewer places around them, a tenth to a fifth of the length apart.
+        They are the cells themselves, or fewer places, a tenth to a fifth of the length apart.
         """
         extent = self.resolution**2 * len(self.x) * len(self.y)
         step = length * _STEP
@@ -91,7 +91,7 @@ class Cells:
         return _places(self.x, step), _places(self.y, step)
 
     def spread(self, x: FloatArray, y: FloatArray, values: FloatArray) -> FloatArray:
-        """Values (len(y), len(x)) on the lattice, at the cells; none below the least."""
+        """Interpolate lattice values (len(y), len(x)) at the cells; none below their least."""
         if x is self.x and y is self.y:
             return values
         down = np.empty((len(self.y), len(x)))
@@ -104,7 +104,7 @@ class Cells:
         return result
 
     def filled(self, mean: FloatArray, sd: FloatArray, sd_known: float) -> EstimateGrid:
-        """With mean and sd (len(y), len(x)), in the sensor's unit."""
+        """Make the grid from mean and sd (len(self.y), len(self.x)), in the sensor's unit."""
         sd_32 = sd.astype(np.float32)
         return EstimateGrid(
             width=len(self.x),
@@ -120,16 +120,16 @@ class Cells:
 
 
 def _places(cells: FloatArray, step: float) -> FloatArray:
-    """From one step before the first cell to two after the last."""
+    """Places from one step before the first cell to two after the last."""
     count = int(np.ceil((cells[-1] - cells[0]) / step)) + 4
     result: FloatArray = cells[0] + (np.arange(count) - 1.0) * step
     return result
 
 
 def _shares(cells: FloatArray, places: FloatArray) -> list[tuple[slice, slice, FloatArray]]:
-    """Some cells along an axis, the places they lie between, and each place's share in each."""
+    """For parts of an axis: the cells, the places around them, and the interpolation weights."""
     position = (cells - places[0]) / (places[1] - places[0])
-    # The first cell lies on a place, and by what floats hold perhaps a little before it.
+    # The first cell lies on a place or, because of rounding, slightly before it.
     before = np.clip(position.astype(np.int64), 1, len(places) - 3)
     t = position - before
     shares = (
@@ -150,12 +150,12 @@ def _shares(cells: FloatArray, places: FloatArray) -> list[tuple[slice, slice, F
     return result
 
 
-# The most probable parameters do not know how little they know: sds are so much wider. Chosen on
+# Factor on all sds: the most probable parameters ignore their own uncertainty. Chosen on
 # `tests/bench/other_worlds.CHOOSING`.
 INFLATION: Final = 1.3
-# Numbers in an array of places and tags at a time.
+# Numbers in an array of places by tags that is computed at once.
 _AT_ONCE: Final = 4_000_000
-# Of fewer other tags nothing can be said of a tag that is left out.
+# A tag that is left out is predicted from at least this many others.
 _LEAST_OTHERS: Final = 4
 
 
@@ -196,7 +196,7 @@ class Posterior:
         """The estimate on a grid of cells, as GetField has it. Box and resolution are metres.
 
         Fine grids are interpolated between places that are no farther apart than a fifth of the
-        length over which the truth changes.
+        length over which the values change.
         """
         cells = Cells.of(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
         x, y = cells.lattice(self.hyper.l)
@@ -226,11 +226,11 @@ class Posterior:
         return tuple(result)
 
     def left_out(self, tags: IntArray) -> list[tuple[float, float, float]]:
-        """Of these tags: the newest reading, and mean and sd of what was predicted for it.
+        """For each of these tags: its latest reading, and the mean and sd predicted for it.
 
-        By all readings but its own and those of tags that are nearer to it than places between
-        tags commonly are to theirs: so it says of these places how sure one may be. Of a tag with
-        too few others nothing is said.
+        The prediction is made without the tag and the tags nearer to it than `gap_of`, the typical
+        distance from the floor to its nearest tag. So it shows how good estimates between tags are.
+        A tag with too few others is omitted.
         """
         of, result = self._present, []
         gap = gap_of(of.xy)
@@ -246,10 +246,10 @@ class Posterior:
         return result
 
     def advice(self, places: FloatArray, count: int, *, over: FloatArray) -> list[Place]:
-        """The `count` of `places` (k, 2) where other tags help most, m; the best first.
+        """Choose `count` of `places` (k, 2), m, where another tag helps most; the best first.
 
-        Each is the one where a single reading now, with those at the places before it, leaves the
-        least error: the root of the mean variance at `over` (m, 2), m. It takes 8 k (k + m) bytes.
+        A single reading at each place, added to those before it, leaves the least error. The error
+        is the root of the mean variance at `over` (m, 2), m. It takes 8 k (k + m) bytes.
         """
         candidates, targets = (np.asarray(one, float).reshape(-1, 2) for one in (places, over))
         gains = []
@@ -285,7 +285,7 @@ class Posterior:
         return Factor.of(self.hyper, readings, y, self.day_length_s)
 
     def _around(self, places: FloatArray) -> Iterator[tuple[Solved, IntArray]]:
-        """All rows of `places`, with what is solved of the readings that say most of them."""
+        """Yield all rows of `places` in groups, each with the solution from the readings near."""
         if self._is_exact:
             yield self._whole, np.arange(len(places))
             return
@@ -302,9 +302,9 @@ class Posterior:
     def _left_out(
         self, wanted: IntArray | None = None
     ) -> Iterator[tuple[LeftOut, IntArray, IntArray]]:
-        """Each tag that is wanted once (None: all), with what it is judged by.
+        """Yield the wanted tags (None: all) in groups, each tag once.
 
-        That, the tags that its rows of `xy` are, and which of these rows are to be judged.
+        A group is its predictor, the tags that its rows of `xy` are, and the rows to be judged.
         """
         of = self._present
         every = np.arange(len(of.xy)) if wanted is None else wanted
@@ -319,9 +319,9 @@ class Posterior:
                 yield LeftOut.of(self._factor(near), INFLATION), numbers, rows
 
     def _said_of(self, tag: int, off: Off) -> tuple[float, float, float]:
-        """A tag's newest reading, and mean and sd of what the others say of it.
+        """A tag's latest reading, and the mean and sd predicted for it from the others.
 
-        What is true is less sure, the noise of a reading is as it is.
+        The inflation applies to the true value, not to the noise of a reading.
         """
         newest = float(self._present.value[self._present.tag == tag][-1])
         noise, spread = self.hyper.noise, self.scale.spread
@@ -339,6 +339,6 @@ class Posterior:
 
 
 def _split(rows: IntArray, tags: int) -> list[IntArray]:
-    """Rows in parts whose products with so many tags fit into memory."""
+    """Split rows into parts whose products with this many tags fit into memory."""
     count = -(-len(rows) * (1 + tags) // _AT_ONCE)
     return np.array_split(rows, max(min(count, len(rows)), 1))

@@ -1,7 +1,7 @@
-"""GetField without ROS: its checks, the clipping to explored ground, the cache; and its quality.
+"""GetField without ROS: request checks, clipping to explored ground, the cache, and the quality.
 
-The error of a map is the leave-one-out error (cross-validation as in Davis, "Contouring
-algorithms", 1975): each tag's reading is predicted from the other tags' by the field's own rules,
+The quality of a field is its leave-one-out error (cross-validation as in Davis, "Contouring
+algorithms", 1975). Each tag's reading is predicted from the other tags' by the field's own rules,
 and compared with what was measured. Errors are in the sensor's own unit.
 
 Pure. Metres in the map frame throughout.
@@ -37,30 +37,30 @@ MAX_ENTRIES: Final = 64
 MAX_BYTES: Final = 64_000_000
 
 
-# m, where a request names none.
+# m, if a request gives none.
 DEFAULT_RESOLUTION_M: Final = 0.1
 
-# What computing takes, roughly and at worst: for each cell, and for each pair of a cell and a
-# sample that reaches it.
+# Rough worst-case cost of a field: for each cell, and for each pair of a cell and a sample that
+# reaches it.
 _CELL_S: Final = 20e-9
 _PAIR_S: Final = 15e-9
 
 
 class FieldRefused(ValueError):
-    """A request that gets no field; the message names the field, the value and the limit."""
+    """A request is refused; the message names its field, the value and the limit."""
 
 
-# The fields of a request, but for the sensor.
+# The fields of a request, except for the sensor.
 NUMBERS: Final = ("resolution", "bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y")
 
 
 @dataclass(frozen=True, slots=True)
 class FieldRequest:
-    """What to reconstruct: a sensor over a box (m, map frame) in cells of `resolution` (m).
+    """Request for a sensor's field over a box (m, map frame) in cells of `resolution` (m).
 
-    The numbers are rounded to float32, GetField's wire type: a request over HTTP and the same one
-    over ROS are the same request then, with the same field. `past_float32` names the first number
-    that float32 does not hold, as it was sent; `check_request` refuses it.
+    The numbers are rounded to float32, GetField's wire type. So the same request over HTTP and over
+    ROS compares equal, and has the same field. `past_float32` names the first number that float32
+    cannot hold, as it was sent; `check_request` refuses it.
     """
 
     sensor_type: str
@@ -83,7 +83,7 @@ class FieldRequest:
 
     @property
     def cells(self) -> dict[str, float]:
-        """The box and the resolution, m, as `grid_dimensions` and all that make a grid take it."""
+        """The box and the resolution, m, as keyword arguments of `grid_dimensions` and the like."""
         return {name: getattr(self, name) for name in NUMBERS}
 
 
@@ -98,7 +98,7 @@ class FieldRules:
 
     @classmethod
     def of(cls, parameters: TwinParameters) -> Self:
-        """As the parameters have them."""
+        """Take the rules from the node's parameters."""
         return cls(
             idw_power=parameters.idw_power,
             falloff_radius_m=parameters.idw_falloff_radius_m,
@@ -108,10 +108,9 @@ class FieldRules:
 
 
 class FieldKey(NamedTuple):
-    """Everything that a field depends on; `rules` are those by which it is made.
+    """Everything that a field depends on, as the key of the cache.
 
-    `observation_count` stands for the store's whole content. `map_revision` is None where no map
-    has come.
+    `observation_count` stands for the store's whole content. `map_revision` is None without a map.
     """
 
     request: FieldRequest
@@ -128,7 +127,7 @@ class FieldCache:
 
     @property
     def bytes(self) -> int:
-        """What the values take."""
+        """Memory that the values take."""
         return sum(grid.values.nbytes for grid in self._grids.values())
 
     def __len__(self) -> int:
@@ -142,7 +141,7 @@ class FieldCache:
         return grid
 
     def put(self, key: FieldKey, grid: FieldGrid) -> None:
-        """Cache `grid`, dropping the least recently used; not one past the whole bound."""
+        """Cache `grid`, unless it exceeds the limit alone; drops the least recently used ones."""
         if grid.values.nbytes > MAX_BYTES:
             return
         self._grids[key] = grid
@@ -152,9 +151,9 @@ class FieldCache:
 
 
 def cost_s(request: FieldRequest, samples: int, rules: FieldRules) -> float:
-    """About how long a field of so many samples takes, seconds of one core; for ordering work.
+    """Approximate cost of a field, seconds of one core; used to order work.
 
-    As if all samples lay within the box: one outside costs less.
+    It assumes that all samples lie within the box; those outside cost less.
     """
     width, height = check_request(request, rules.max_grid_cells)
     reach = 2.0 * max(rules.falloff_radius_m, rules.max_distance_m) / request.resolution
@@ -163,10 +162,10 @@ def cost_s(request: FieldRequest, samples: int, rules: FieldRules) -> float:
 
 
 def check_sensor_type(name: str) -> None:
-    """See that a sensor is named.
+    """Check the name of a sensor.
 
     Raises:
-        FieldRefused: the name is empty, or longer than any that is taken.
+        FieldRefused: the name is empty or too long.
 
     """
     if not name:
@@ -176,10 +175,10 @@ def check_sensor_type(name: str) -> None:
 
 
 def check_request(request: FieldRequest, max_grid_cells: int) -> tuple[int, int]:
-    """(width, height) of the grid that `request` asks for; nothing is allocated.
+    """Return (width, height) of the requested grid; nothing is allocated.
 
     Raises:
-        FieldRefused: the request names no sensor, its numbers make no grid, or a grid of more than
+        FieldRefused: the sensor's name or a number is invalid, or the grid has more than
             `max_grid_cells` cells.
 
     """
@@ -191,7 +190,7 @@ def check_request(request: FieldRequest, max_grid_cells: int) -> tuple[int, int]
     except ValueError as error:
         raise FieldRefused(str(error)) from error
     if width * height > max_grid_cells:
-        # As floats: a hostile request has sides of dozens of digits.
+        # As floats: in a hostile request, a side has dozens of digits.
         raise FieldRefused(
             f"resolution {request.resolution:g} m makes {float(width):.10g} x {float(height):.10g} "
             f"cells, the limit is {max_grid_cells} in all (max_grid_cells)"
@@ -206,7 +205,7 @@ def compute_field(
     rules: FieldRules,
     should_stop: Callable[[], bool] = never,
 ) -> FieldGrid:
-    """The field of `samples`; with a map, cells that it does not know are NaN.
+    """Compute the field of `samples`; with a map, cells that are unknown on it are NaN.
 
     Raises:
         FieldRefused: see `check_request`.
@@ -240,8 +239,8 @@ def default_box(
 ) -> tuple[float, float, float, float]:
     """(min_x, min_y, max_x, max_y) for a request without a box: all that can be painted.
 
-    The box of the tags' `positions` (x, y), wider by `max_distance_m` on every side; without a tag
-    the same around the origin. Tags that are far off (`far_off`) have no say.
+    The bounding box of the tags' `positions` (x, y), widened by `max_distance_m` on every side;
+    without tags, the same around the origin. Tags that are far off (`reach_of`) are ignored.
     """
     positions = list(positions)
     reach = reach_of(positions)
@@ -258,9 +257,9 @@ def default_box(
 def default_request(
     sensor_type: str, box: tuple[float, float, float, float], max_cells: int
 ) -> FieldRequest:
-    """The field over a default box, where a request names no resolution either.
+    """The request for a field over a default box, when no resolution is given either.
 
-    Cells are `DEFAULT_RESOLUTION_M` wide, or 2, 4, 8... times as wide where they would be more than
+    Cells are `DEFAULT_RESOLUTION_M` wide, or 2, 4, 8... times as wide, so that there are at most
     `max_cells`.
     """
     resolution = DEFAULT_RESOLUTION_M
@@ -272,12 +271,12 @@ def default_request(
         resolution *= 2.0
 
 
-# --- how far off it is, and how much of it is known -----------------------------------------------
+# --- quality: the error of a field, and how much of it is known -----------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class TagError:
-    """One tag's reading against what the others say; `error` is `predicted - measured`."""
+    """One tag's reading, and its prediction from the others; `error` is `predicted - measured`."""
 
     tag_id: str
     measured: float
@@ -289,9 +288,9 @@ class TagError:
 class FieldQuality:
     """The leave-one-out error of a sensor's current readings.
 
-    `judged` tags have another one in reach of the gate; `unjudged` have none, so nothing can be
-    said about them. `rmse` and `worst` are None where no tag is judged; of equally bad tags the
-    worst is the first.
+    `judged` tags have another one within `max_distance_m`; `unjudged` have none, so they cannot be
+    predicted. `rmse` and `worst` are None if no tag is judged; of equally bad tags, the worst is
+    the first.
     """
 
     judged: int
@@ -309,13 +308,13 @@ def leave_one_out(
     power: float,
     should_stop: Callable[[], bool] = never,
 ) -> FieldQuality:
-    """The quality of the field of `sensor_type` made of `tags` (a snapshot's) by these rules.
+    """The quality of a sensor's field that these rules make from the `tags` of a snapshot.
 
-    Only tags with a pose and a finite reading take part, as in the field. The cost follows the
+    Only tags with a pose and a finite reading take part, as in the field. The cost grows with the
     pairs of tags in reach of each other. `should_stop()` is called every millisecond or so.
 
     Raises:
-        ValueError: a rule out of its range, named with its value and the limit.
+        ValueError: a rule is out of its range; the message names it, its value and the limit.
         Abandoned: `should_stop` was true.
 
     """
@@ -344,7 +343,7 @@ def leave_one_out(
 
 
 def painted_share(grid: FieldGrid) -> float:
-    """The share of the grid's cells, 0 to 1, of which something is known."""
+    """The share of the grid's cells that have a value, 0 to 1."""
     return float(np.count_nonzero(~np.isnan(grid.values)) / grid.values.size)
 
 
@@ -355,10 +354,10 @@ def _predictions(
     idw: PairwiseIdw,
     should_stop: Callable[[], bool],
 ) -> FloatArray:
-    """Each sample's value from the others, NaN where none is in reach of the gate.
+    """Predict each sample's value from the others; NaN if none is within `max_distance_m`.
 
-    The samples are halved along the longer side of their box, again and again, until those of a
-    part and those that reach it make few enough pairs.
+    The samples are halved recursively along the longer side of their box, until a part and the
+    samples that reach it make few enough pairs.
     """
     predicted = np.full(value.size, np.nan)
     everyone = np.arange(value.size)
@@ -393,6 +392,6 @@ def _predict_part(
     np.subtract(y[near][:, None], y[part], out=gap)
     np.square(gap, out=gap)
     np.add(square, gap, out=square)
-    # A sample has no say about itself. `near` is in recorded order and holds all of `part`.
+    # A sample must not predict itself. `near` is in recorded order and holds all of `part`.
     square[np.searchsorted(near, part), np.arange(part.size)] = np.inf
     return idw.evaluate(square, value[near])

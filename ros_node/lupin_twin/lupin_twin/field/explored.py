@@ -25,14 +25,14 @@ MAX_MAP_CELLS: Final = 50_000_000
 _KNOWN_MIN: Final = 0
 _KNOWN_MAX: Final = 100
 
-# A map's resolution comes as float32, so that a point on the edge of two map cells lands now on
-# one side, now on the other. This much of a cell below its edge counts as on it.
+# A map's resolution is float32, so rounding may put a point on the edge of two map cells on either
+# side. A point that is below an edge by this share of a cell counts as on it.
 _EDGE_NOISE_CELLS: Final = 1e-4
 
-# Cells of the field that a turned map is looked up for at once; bounds the memory it takes.
+# Field cells that are looked up at once in a rotated map; bounds the memory.
 _CELLS_AT_ONCE: Final = 16_384
 
-# Where a map lies.
+# The fields that locate a map.
 _PLACE: Final = "frame_id", "width", "height", "resolution", "origin_x", "origin_y", "origin_yaw"
 
 
@@ -47,7 +47,7 @@ class OccupancyMap:
     time. `revision` differs between any two maps of a process.
 
     Raises:
-        ValueError: a map that cannot be right; the message names the defect.
+        ValueError: the map is invalid; the message names the defect.
 
     """
 
@@ -91,14 +91,14 @@ class OccupancyMap:
         return tuple(getattr(self, name) for name in _PLACE)
 
     def shows_the_same_as(self, other: OccupancyMap) -> bool:
-        """Whether place and cells are the same, whenever and however often it was published."""
+        """Whether place and cells are the same; stamp and revision may differ."""
         return self.place == other.place and np.array_equal(self.cells, other.cells)
 
 
 def digest_of(occupancy: OccupancyMap) -> int:
-    """Of place and cells: the same in all replicas, and for each copy that shows the same.
+    """Digest of a map's place and cells: the same in all replicas, and for republished maps.
 
-    SLAM publishes a map anew every few seconds, with another stamp each time.
+    SLAM publishes a map again every few seconds, with another stamp each time.
     """
     digest = blake2b(repr(occupancy.place).encode("utf-8", "surrogatepass"), digest_size=6)
     digest.update(occupancy.cells.data)
@@ -146,7 +146,7 @@ def explored_mask(
 def _indices(
     offset: FloatArray, resolution: float, count: int
 ) -> tuple[npt.NDArray[np.intp], BoolArray]:
-    """The map cell at each offset (m) along one axis, 0 where there is none; and where there is."""
+    """The map cell at each offset (m) along one axis, and whether there is one; 0 if not."""
     position = np.floor(offset / resolution + _EDGE_NOISE_CELLS)
     inside = (position >= 0) & (position < count)
     return np.where(inside, position, 0).astype(np.intp), inside
@@ -156,24 +156,24 @@ def _known(occupancy: npt.NDArray[np.int8]) -> BoolArray:
     return (occupancy >= _KNOWN_MIN) & (occupancy <= _KNOWN_MAX)
 
 
-# Next to a tag another measures nothing that this one does not.
+# A tag that is closer than this to another measures nothing new.
 LEAST_APART_M: Final = 0.5
-# What is not on any map may be this far from the tags.
+# Without a map, places may be this far outside the tags' bounding box.
 MARGIN_M: Final = 1.0
-# Places that are looked at along a side, and that are left at most.
+# Places that are considered along a side, and places that are kept at most.
 _ALONG: Final = 60
 MAX_PLACES: Final = 300
-# Of a site of so many tags fewer: each place has a neighbourhood of its own to be reckoned with.
+# With more tags than this, fewer places are kept: each has its own neighbours to be solved.
 _MANY_TAGS: Final = 64
 _PLACES_OF_MANY: Final = 100
-# nav_msgs/OccupancyGrid: percent; from here on it is more likely a wall.
+# nav_msgs/OccupancyGrid: percent; from here on, the cell is more likely a wall.
 _OCCUPIED: Final = 50
 
 
 def floor(tags: FloatArray, occupancy: OccupancyMap | None) -> FloatArray:
-    """Places (m, 2) all over the site: the map's free cells, or without a map about `tags`.
+    """Places (m, 2) all over the site: the map's free cells or, without a map, around `tags`.
 
-    None about a tag that is far off.
+    Tags that are far off do not count.
     """
     if occupancy is None or occupancy.cells.size == 0:
         reach = reach_of((x, y) for x, y in tags.tolist())
@@ -195,14 +195,14 @@ def floor(tags: FloatArray, occupancy: OccupancyMap | None) -> FloatArray:
 
 
 def free_of(tags: FloatArray, places: FloatArray) -> FloatArray:
-    """Those of `places` (k, 2) that no tag (T, 2) stands at."""
+    """Those of `places` (k, 2) that are not next to a tag (T, 2)."""
     apart = np.hypot(*(places[:, None, :] - tags[None, :, :]).transpose(2, 0, 1))
     result: FloatArray = places[(apart >= LEAST_APART_M).all(axis=1)]
     return result
 
 
 def _along(low: float, high: float) -> FloatArray:
-    """The middles of equal parts, half a metre long or longer."""
+    """The centres of equal parts, each half a metre or longer."""
     count = max(1, min(_ALONG, int((high - low) / LEAST_APART_M)))
     result: FloatArray = low + (np.arange(count) + 0.5) * (high - low) / count
     return result
@@ -213,7 +213,7 @@ def _cells(count: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
 
 
 def _thinned(places: FloatArray, tags: int) -> FloatArray:
-    """All of them, or so many that lie anywhere: the same ones every time."""
+    """All places, or a random selection, which is the same every time."""
     most = MAX_PLACES if tags <= _MANY_TAGS else _PLACES_OF_MANY
     if len(places) <= most:
         return places
@@ -222,16 +222,16 @@ def _thinned(places: FloatArray, tags: int) -> FloatArray:
     return result
 
 
-# --- as a text: one fact of the log, written again when the map is another ------------------------
+# --- a map as text: one fact of the journal, written again when the map has changed ---------------
 
-# A floor of 2 ha at 5 cm is some 100 kB. A larger text is no longer one row among others.
+# Characters; a floor of 2 ha at 5 cm takes about 100 kB. A larger text is too large for a row.
 MAX_TEXT: Final = 1_000_000
-# So many cells are packed in a tenth of a second.
+# Packing this many cells takes a tenth of a second.
 MAX_PACKED_CELLS: Final = 16_000_000
 
 
 def text_of(floor: OccupancyMap) -> str:
-    """JSON of a map, its cells deflated and in base64; empty: it is too large for a row."""
+    """JSON of a map, its cells deflated and in base64; empty if it is too large for a row."""
     if floor.cells.size > MAX_PACKED_CELLS:
         return ""
     about = {name: getattr(floor, name) for name in (*_PLACE, "stamp_ns")}
@@ -241,10 +241,10 @@ def text_of(floor: OccupancyMap) -> str:
 
 
 def map_of(text: str, revision: int) -> OccupancyMap:
-    """The map of a text.
+    """Read a map from its text.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the text is not a map.
 
     """
     try:
@@ -252,7 +252,7 @@ def map_of(text: str, revision: int) -> OccupancyMap:
         size = int(about["width"]) * int(about["height"])
         if not 0 <= size <= MAX_PACKED_CELLS:
             raise ValueError(f"it has {size} cells, the limit is {MAX_PACKED_CELLS}")
-        # Never more than it says, whatever was packed.
+        # At most one byte more than the stated size, whatever was packed.
         packed = base64.b64decode(about.pop("cells"), validate=True)
         cells = zlib.decompressobj().decompress(packed, size + 1)
         return OccupancyMap(**about, cells=np.frombuffer(cells, np.int8), revision=revision)

@@ -1,4 +1,4 @@
-"""The regular grid of every field: how many cells, where their centres lie, which tags it is for.
+"""The regular grid of every field: number of cells, cell centres, and which tags are far off.
 
 Pure: numpy and the standard library only.
 
@@ -6,8 +6,8 @@ Positions and the resolution are metres in the map frame. Cell `(i, j)` is colum
 row `j` (along y), its centre lies at `bbox_min + (index + 0.5) * resolution`. Row 0 is at
 `bbox_min_y`; `values` is row-major. NaN is "unknown" and never a reading.
 
-A robot that is lost pins a tag anywhere, and one such pin must not decide how wide the map is. The
-page has the same rule (`domain/farOff.ts`). Both are held to `tests/twin/far_off.json`.
+A lost robot may pin a tag anywhere, and one such pin must not decide how wide the map is. The page
+has the same rule (`domain/farOff.ts`), and `tests/twin/core/far_off.json` tests both.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CellGrid:
-    """`origin_x`, `origin_y` (m, map frame) is the corner of cell (0, 0), not its centre."""
+    """A regular grid; its origin (m, map frame) is the corner of cell (0, 0), not the centre."""
 
     width: int
     height: int
@@ -48,8 +48,8 @@ class FieldGrid(CellGrid):
     """A reconstructed field.
 
     `values` is flat, row-major, float32 and read-only, NaN where nothing is known. `value_min` and
-    `value_max` range over the finite cells and are both 0 where there are none. `sample_count` is
-    the number of samples that were given, those out of reach of the box too.
+    `value_max` are those of the finite cells, both 0 if there are none. `sample_count` is the
+    number of samples given, including those out of reach of the box.
     """
 
     values: npt.NDArray[np.float32]
@@ -65,16 +65,15 @@ def grid_dimensions(
     bbox_max_y: float,
     resolution: float,
 ) -> tuple[int, int]:
-    """(width, height) in cells: each `max(1, ceil(extent / resolution))`, float noise apart.
+    """(width, height) in cells: each `max(1, ceil(extent / resolution))`, up to float noise.
 
     Box and resolution are metres. An exact multiple stays one although its numbers were rounded:
-    1.1 m at 0.1 m is 11 cells, not 12, near the origin or far from it, whether the numbers are
-    float64 or went through float32 as GetField's do (which shows: none has a digit more). The
-    result may be too large to allocate, which is for the caller to refuse; it never overflows.
+    1.1 m at 0.1 m is 11 cells, not 12, near the origin or far from it. That holds for float64, and
+    for numbers that went through float32 as GetField's do; it is assumed if all of them fit into
+    float32. The result never overflows; if it is too large to allocate, the caller has to refuse.
 
     Raises:
-        ValueError: a number that is not finite, a resolution that is not positive, or an inverted
-            box.
+        ValueError: a number is not finite, the resolution is not positive, or the box is inverted.
 
     """
     # numpy's scalars would compute, and warn, in their own precision.
@@ -110,7 +109,7 @@ def _cells_along(
 ) -> int:
     quotient = (high - low) / resolution
     if math.isinf(quotient):
-        # Past float64: exact arithmetic still names the size, so that a limit can be held to it.
+        # Past float64: exact arithmetic still gives the size, so that it can be checked and named.
         return math.ceil((Fraction(high) - Fraction(low)) / Fraction(resolution))
     nearest = round(quotient)
     slack = (noise(low) + noise(high) + quotient * noise(resolution)) / resolution
@@ -146,31 +145,31 @@ def check_finite(name: str, number: float) -> None:
         raise ValueError(f"{name} is {number}, must be finite")
 
 
-# So near the middle no tag is far off: a site of 200 m may have most of its tags at one end.
+# No tag this near to the middle is far off: a site of 200 m may have most of its tags at one end.
 _ALWAYS_NEAR_M: Final = 200.0
 # Hampel's identifier: farther from the median than a multiple of the median distance (Davies and
-# Gather, 1993). Of tags along a line the farthest are at twice the median, so this leaves room.
+# Gather, 1993). In a line of tags, the farthest are at twice the median, so this leaves room.
 _SPREADS: Final = 10.0
-# Far off are few: where more than one in three would be, they are a second site, and none is.
+# If more than one in three tags would be far off, they are a second site, and none is far off.
 _ONE_IN: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """A circle about the middle of the tags; what is outside is far off."""
+    """A circle around the middle of the tags; a tag outside is far off."""
 
     x: float
     y: float
     radius_m: float
 
     def holds(self, x: float, y: float) -> bool:
-        """Whether a point is on the map."""
+        """Whether a point (m, map frame) is inside."""
         is_possible = abs(x) <= FARTHEST_M and abs(y) <= FARTHEST_M
         return is_possible and math.hypot(x - self.x, y - self.y) <= self.radius_m
 
 
 def reach_of(positions: Iterable[tuple[float, float]]) -> Reach:
-    """The circle of tags at these finite `positions` (x, y)."""
+    """The circle of the tags at these finite `positions` (x, y)."""
     everywhere = Reach(0.0, 0.0, math.inf)
     possible = [(x, y) for x, y in positions if everywhere.holds(x, y)]
     if not possible:
@@ -183,7 +182,7 @@ def reach_of(positions: Iterable[tuple[float, float]]) -> Reach:
 
 
 def far_off_tags(tags: Iterable[TagState]) -> list[str]:
-    """The ids of those of a snapshot's `tags` that are far off."""
+    """The ids of the far-off ones among a snapshot's `tags`."""
     pinned = [(tag.tag_id, tag.pose.x, tag.pose.y) for tag in tags if tag.pose is not None]
     reach = reach_of((x, y) for _, x, y in pinned)
     return [tag_id for tag_id, x, y in pinned if not reach.holds(x, y)]

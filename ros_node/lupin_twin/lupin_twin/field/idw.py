@@ -18,10 +18,10 @@ The definition (Shepard, "A two-dimensional interpolation function for irregular
 
 A distance is the float64 `sqrt(dx * dx + dy * dy)`; of equally near samples the first one counts.
 
-How it is computed: the grid is halved again and again, and each part has only the samples that
-reach it, until its pairs of a cell and a sample fit the processor's cache; there the definition is
-evaluated for all pairs at once. A part that nothing reaches is dropped on the way. So the cost
-follows the painted cells, and memory beyond the grid's own is that of one part.
+The algorithm halves the grid recursively, and gives each part only the samples that reach it. When
+the pairs of cells and samples of a part fit into the processor's cache, they are evaluated at once.
+A part that no sample reaches is dropped. So the cost is proportional to the painted cells, and
+memory beyond the grid's own is that of one part.
 """
 
 from __future__ import annotations
@@ -46,21 +46,21 @@ from lupin_twin.field.grid import (
 
 COINCIDENT_EPS_M: Final = 1e-3
 
-# So many pairs of a part are evaluated at once: two float64 arrays of that size stay in the
+# Pairs of a part that are evaluated at once. Two float64 arrays of this size stay in the
 # second-level cache, and numpy's work on them is several times the cost of calling it.
 MAX_PAIRS: Final = 65_536
-# With fewer points than this to a sample, numpy's loops are all overhead. It takes memory past
-# MAX_PAIRS only where more than a thousand samples reach one part.
+# With fewer points than this per sample, numpy's loops are mostly overhead. It takes memory past
+# MAX_PAIRS only if more than two thousand samples reach one part.
 _MIN_POINTS: Final = 32
 
-# 1/d² is used as it is up to here; past it (and for any power but 2) the weights are scaled by
+# Up to this radius, weights are plain 1/d². Beyond it, and for any power but 2, they are scaled by
 # the nearest distance of the cell, so that none overflows and the largest is exactly 1.
 _MAX_PLAIN_REACH_M: Final = 1e6
 
-# Larger readings count as this one: far past float32 both, and Σ(v/dᵖ) cannot overflow.
+# Larger readings are clipped to this: it is far past float32, and Σ(v/dᵖ) cannot overflow.
 _LARGEST_VALUE: Final = 1e280
 
-# What a sample closer than COINCIDENT_EPS_M weighs at least, at power 2, a rounding apart.
+# Least weight, at power 2, of a sample closer than COINCIDENT_EPS_M; 0.999 allows for rounding.
 _COINCIDENT_WEIGHT: Final = 0.999 / COINCIDENT_EPS_M**2
 
 IndexArray = npt.NDArray[np.intp]
@@ -69,7 +69,7 @@ IndexArray = npt.NDArray[np.intp]
 def _largest_square_within(radius: float) -> float:
     """The largest float64 whose square root is not greater than `radius`.
 
-    `sqrt(square) <= radius` and `square <= _largest_square_within(radius)` are the same then, to
+    So `sqrt(square) <= radius` and `square <= _largest_square_within(radius)` are equivalent, to
     the bit, and the root need not be taken for every pair.
     """
     square = min(radius * radius, sys.float_info.max)
@@ -83,11 +83,11 @@ _COINCIDENT_SQUARE: Final = _largest_square_within(math.nextafter(COINCIDENT_EPS
 
 
 class Abandoned(Exception):
-    """A computation that ended before its result, for nobody waits for it any more."""
+    """The computation was stopped early, because nobody waits for its result any more."""
 
 
 def never() -> bool:
-    """The `should_stop` of a computation that is always waited for."""
+    """The `should_stop` of a computation that is never stopped."""
     return False
 
 
@@ -113,14 +113,14 @@ def compute_idw_field(
     explored_mask: BoolArray | None = None,
     should_stop: Callable[[], bool] = never,
 ) -> FieldGrid:
-    """The field of `samples` over the box, by the module's definition.
+    """Compute the field of `samples` over the box, by the module's definition.
 
-    `samples` are (x, y, value) in the order they were recorded; `FieldSample` is one. No samples
-    make a field without a value, which is no error. `explored_mask` has the grid's shape,
+    `samples` are (x, y, value) in the order they were recorded; `FieldSample` is one. Without
+    samples all cells are NaN, which is no error. `explored_mask` has the grid's shape,
     (height, width). `should_stop()` is called every millisecond or so.
 
     Raises:
-        ValueError: an argument out of its range, named with its value and the limit.
+        ValueError: an argument is out of its range; the message names its value and the limit.
         Abandoned: `should_stop` was true.
 
     """
@@ -167,10 +167,10 @@ def compute_idw_field(
 def sample_columns(
     samples: Sequence[tuple[float, float, float]],
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The samples' x and y (m) and values, as arrays; values past `_LARGEST_VALUE` count as that.
+    """The samples' x and y (m) and values, as arrays; values are clipped to `_LARGEST_VALUE`.
 
     Raises:
-        ValueError: a sample that is not three finite numbers.
+        ValueError: a sample is not three finite numbers.
 
     """
     flat = np.fromiter(chain.from_iterable(samples), dtype=np.float64)
@@ -198,12 +198,12 @@ def _finite_range(values: npt.NDArray[np.float32]) -> tuple[float, float]:
 
 
 class PairwiseIdw:
-    """The definition's rules 2 to 5 for any points, given their squared distances to the samples.
+    """Evaluates rules 2 to 5 of the definition at any points, from squared distances to samples.
 
     Not to be shared between threads: the intermediate arrays are reused by the next evaluation.
 
     Raises:
-        ValueError: a rule out of its range, named with its value and the limit.
+        ValueError: a rule is out of its range; the message names it, its value and the limit.
 
     """
 
@@ -227,24 +227,23 @@ class PairwiseIdw:
         self._allocate(MAX_PAIRS)
 
     def _allocate(self, pairs: int) -> None:
-        # In one block: the allocator gives it back to the next field instead of to the system,
-        # and a fifth of a small field's time, page faults, is saved.
+        # In one block: the allocator reuses it for the next field instead of returning it to the
+        # system. That avoids page faults, a fifth of a small field's time.
         self._square, self._weight = np.empty((2, pairs))
         self._within = np.empty(pairs, dtype=np.bool_)
 
     def squares(self, samples: int, points: int) -> FloatArray:
-        """An array (samples, points) to put the squared distances (m²) into, for `evaluate`."""
+        """An array (samples, points) to fill with squared distances (m²), for `evaluate`."""
         pairs = samples * points
         if pairs > self._square.size:
             self._allocate(pairs)
         return self._square[:pairs].reshape(samples, points)
 
     def evaluate(self, square: FloatArray, value: FloatArray) -> FloatArray:
-        """The points' values, NaN behind the gate; `square` is `squares()`, filled, and is spent.
+        """The points' values, NaN past `max_distance_m`; `square`, from `squares`, is overwritten.
 
-        A sample that does not count for a point has an infinite squared distance to it. Call it
-        with numpy's floating point warnings off: 0/0 is a point that nothing reaches, 1/0 a sample
-        on a point.
+        An infinite squared distance excludes a sample from a point. Call it with numpy's
+        floating-point warnings off: 0/0 is a point that no sample reaches, 1/0 a sample on a point.
         """
         weight = self._weight[: square.size].reshape(square.shape)
         within = self._within[: square.size].reshape(square.shape)
@@ -262,14 +261,14 @@ class PairwiseIdw:
         total = np.ones(value.size).dot(weight)
         points: FloatArray = value.dot(weight)
         points /= total
-        # With equal radii a point out of reach is 0/0 by now, and the nearest sample matters only
-        # where the weights are so large that one may be coincident.
+        # With equal radii, a point out of reach is 0/0 by now. The nearest sample matters only if
+        # the weights are so large that one may be coincident.
         if self._equal_radii and np.maximum.reduce(total) < _COINCIDENT_WEIGHT:
             return points
         shortest = np.minimum.reduce(square, axis=0)
         special = np.flatnonzero((shortest <= _COINCIDENT_SQUARE) | (total == 0.0))
         if special.size:
-            # Of the root: two squares a rounding apart can be the same distance, and of equally
+            # By the root: squares that differ by rounding can be the same distance, and of equally
             # near samples the first one counts.
             distance = square[:, special]
             np.sqrt(distance, out=distance)
@@ -295,7 +294,7 @@ class PairwiseIdw:
 
 
 def fits(samples: int, points: int) -> bool:
-    """Whether so many are better evaluated at once than in parts."""
+    """Whether this many samples and points are better evaluated at once than in parts."""
     return samples * points <= MAX_PAIRS or points <= _MIN_POINTS
 
 
@@ -305,10 +304,10 @@ def _parts(
     idw: PairwiseIdw,
     explored: BoolArray | None,
 ) -> Iterator[tuple[slice, slice, IndexArray]]:
-    """Rows, columns and the samples near them, without the parts that stay NaN as a whole.
+    """Yield the rows, columns and near samples of each part, except parts that stay NaN.
 
     A part has the samples that reach the nearest point of its cells. Rounding is monotonic, so no
-    cell's own squared distance is below that point's, and none is lost to float noise.
+    cell's own squared distance is below that point's, and no sample is lost to float noise.
     """
     (x, y), (cell_x, cell_y) = samples, cells
     whole = slice(0, cell_y.size), slice(0, cell_x.size), np.arange(x.size)

@@ -1,1 +1,1 @@
-"""The log: what was observed, in plain SQL, and all that is asked of it."""
+"""The journal: the log of one twin's observations in SQLite, and every query on it."""

@@ -1,8 +1,8 @@
-"""Rows into tables: each write once, whatever is received again.
+"""Appends writes to the journal's tables, each only once, even if it is received again.
 
-A write is known by tag, kind, the stamp that it was sent with (`stamp_ns` where it has none) and
-source. Of what is known already a sensor keeps its first value; sensors that are new are a further
-part of the same scan.
+A write is identified by tag, kind, the stamp that it was sent with (`stamp_ns` if it has none) and
+source. When a scan is received again, known sensors keep their first values; sensors that are new
+are a further part of the same scan.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from lupin_twin.journal.schema import (
 )
 
 PURGED_SEQ: Final = "purged_seq"
-# The numbers go on from here at least: rows that had later ones are gone.
+# New numbers are above this one, because rows with numbers up to it may have been deleted.
 LAST_SEQ: Final = "last_seq"
-# Groups kept at hand; past that they are looked up in the file again.
+# Groups cached at most; then the cache is emptied, and they are looked up in the file again.
 _MAX_AT_HAND: Final = 100_000
 # Readings, flowers and rows that wait for `flush`: a few MB.
 _MAX_WAITING_WEIGHT: Final = 20_000
@@ -44,7 +44,7 @@ _ADD: Final = {
     table: f"INSERT INTO {table} VALUES ('{LOCAL_SITE}'{', ?' * columns})"  # noqa: S608
     for table, columns in (("scan", 11), ("look", 16), ("place", 13))
 }
-# Named, for SQLite takes `site` for a choice among many, and would read the whole table.
+# The indices are named because SQLite assumes that `site` is selective, and would scan the table.
 _KNOWN_SCAN: Final = (
     "SELECT stamp_ns, own_stamp_ns FROM scan INDEXED BY scan_at WHERE site = :site"
     " AND series = :series AND stamp_ns = :key AND source = :source"
@@ -62,7 +62,7 @@ _KNOWN_INSPECTION: Final = (
 
 @dataclass(slots=True)
 class _Group:
-    """The series of one tag and kind in a run, and the latest stamp that anything is known by."""
+    """The series of one tag and kind in a run, and the latest stamp that identifies a write."""
 
     series: dict[tuple[str, ...], int]
     newest_ns: int
@@ -71,8 +71,8 @@ class _Group:
 class Appender:
     """Writes rows through a connection, inside its caller's transaction.
 
-    What it remembers of the file is wrong after a transaction that was rolled back: make another
-    one then. Rows stand in the tables after `flush`.
+    Its cache of the file is wrong after a rollback: make a new one then. Rows are in the tables
+    only after `flush`.
     """
 
     def __init__(self, connection: sqlite3.Connection) -> None:
@@ -88,7 +88,7 @@ class Appender:
             *(connection.execute(text).fetchone()[0] for text in newest),
             *(row[0] - 1 for row in connection.execute("SELECT begun_seq FROM run")),
         )
-        # Of some runs, up to when everything is counted already.
+        # By run, for some of them: the time up to which all rows are counted already.
         self.counted_ns: dict[int, int] = {}
         self._groups: dict[tuple[int, str, int], _Group] = {}
         self._waiting: dict[str, list[tuple[object, ...]]] = {table: [] for table in _ADD}
@@ -96,18 +96,18 @@ class Appender:
         self._counted_seq = self.last_seq
 
     def append(self, run: int, rows: Iterable[Write], *, are_copies: bool = False) -> int:
-        """Take in what is not there yet; returns how many rows that were."""
+        """Add the rows that are not stored yet; returns how many were added."""
         new = 0
         for row in rows:
             new += self._append(run, row, int(are_copies))
-            # As texts they take more than as values: a batch of the largest, hundreds of MB.
+            # Text takes more memory than values: a batch of the largest rows, hundreds of MB.
             self._waiting_weight += weight(row)
             if self._waiting_weight > _MAX_WAITING_WEIGHT:
                 self.flush()
         return new
 
     def flush(self) -> None:
-        """Have what was taken in in the tables, and counted."""
+        """Write the added rows into the tables, and count them."""
         self._waiting_weight = 0
         for table, rows in self._waiting.items():
             if rows:
@@ -202,7 +202,7 @@ class Appender:
     def _known(
         self, at: tuple[int, str, int], key: int, source: str, is_copy: int
     ) -> tuple[int, int | None, set[str]] | None:
-        """The stamps of the write that is known by `key`, and its sensors; None: there is none."""
+        """The stamps and sensors of the stored write with this `key`; None if there is none."""
         (run, tag, kind), group = at, self._group(at)
         if is_copy or key > group.newest_ns:
             group.newest_ns = max(group.newest_ns, key)
@@ -260,7 +260,7 @@ class Appender:
         )
 
     def _series(self, at: tuple[int, str, int], names: tuple[str, ...]) -> int:
-        """The series of a write, the newest one, which is its first if there is none."""
+        """Return the series of the write `last_seq`, which begins one if there is none yet."""
         of_group = self._group(at).series
         series = of_group.get(names)
         if series is None:
@@ -273,12 +273,12 @@ class Appender:
 
 
 def _own_ns(write: Scan | Inspection) -> int | None:
-    """The stamp that it was sent with, where that is another than its own."""
+    """The stamp that the write was sent with; None if that is its `stamp_ns`."""
     return None if write.own_stamp_ns == write.stamp_ns else write.own_stamp_ns
 
 
 def _numbers(values: Iterable[float]) -> str:
-    """A JSON list; what is not finite is null."""
+    """A JSON list; numbers that are not finite are null."""
     text = ",".join([repr(float(value)) for value in values])
     return json_text(list(map(_finite, values))) if "n" in text else f"[{text}]"  # nan, inf
 
@@ -303,12 +303,12 @@ def _blooms(flower: Flower) -> str:
 
 
 def _unicode(text: str) -> str:
-    """The text as SQLite takes it: what is no Unicode must not cost the row."""
+    """The text as SQLite accepts it: a row must not be lost because of invalid Unicode."""
     return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")
 
 
 def _held(row: Write, begun_ns: int, *, retains_key: bool) -> Write:
-    """A row as a copy of it at `begun_ns`, never later. `retains_key`: it is the same write."""
+    """A copy of a row, not later than `begun_ns`. `retains_key`: it counts as the same write."""
     if row.stamp_ns <= begun_ns:
         return row
     if isinstance(row, Pin):
@@ -318,12 +318,12 @@ def _held(row: Write, begun_ns: int, *, retains_key: bool) -> Write:
 
 
 def copy_known(appender: Appender, before: Run, run: Run, rows: Iterable[Write]) -> None:
-    """Copy what was known in a run (see `copies`) into one, or a step, that begins now."""
+    """Copy what was known in a run (see `copies`) into a run, or a step of it, that begins now."""
     begun, found = run.begun, []
     for row in rows:
         is_here = before.root == run.root and row.stamp_ns <= begun.stamp_ns
         if not (is_here and isinstance(row, Pin)):
-            # What a simulation says again is new; a wall clock comes to no moment twice.
+            # A simulation that starts over repeats its stamps for new writes; wall time does not.
             row = replace(row, arrival_ns=begun.arrival_ns)  # noqa: PLW2901
             found.append(_held(row, begun.stamp_ns, retains_key=not begun.is_simulated))
     appender.append(run.root, found, are_copies=True)
@@ -336,18 +336,18 @@ _LOT: Final = 1_000
 
 
 def is_empty(connection: sqlite3.Connection) -> bool:
-    """Whether nothing was ever observed into a journal."""
+    """Whether a journal has never had an observation."""
     return not Appender(connection).last_seq
 
 
 def prefill(path: Path, holder: str, rows: Sequence[Write], until_ns: int) -> bool:
     """Write rows of wall time into a journal that is new or empty, all or none.
 
-    `rows` are in the order of their stamps, all before `until_ns`. Returns whether it was done:
-    into a journal that anybody has ever recorded, nothing is written.
+    `rows` are in the order of their stamps, all before `until_ns`. Returns whether it was done: a
+    journal that ever had an observation is left as it is.
 
     Raises:
-        InUse: a twin has it.
+        InUse: a twin writes it.
         Foreign, DamagedFile, sqlite3.Error, OSError: it cannot be written.
 
     """
@@ -359,7 +359,7 @@ def prefill(path: Path, holder: str, rows: Sequence[Write], until_ns: int) -> bo
             return False
         first = rows[0]
         with transaction(connection):
-            # Of twins that have received nothing.
+            # Runs of twins that received nothing.
             connection.execute("DELETE FROM run")
             put_run(connection, Run(1, Clock(first.stamp_ns, first.arrival_ns, False), 1))
             appender = Appender(connection)
@@ -373,6 +373,6 @@ def prefill(path: Path, holder: str, rows: Sequence[Write], until_ns: int) -> bo
 
 
 def simulated(connection: sqlite3.Connection) -> tuple[int, int] | None:
-    """The stretch of a journal that was filled in, ns of ROS time; None if nothing was."""
+    """The period of a journal that was filled in, ns of ROS time; None if there is none."""
     start_ns, end_ns = get_meta(connection, _FROM), get_meta(connection, _UNTIL)
     return (int(start_ns), int(end_ns)) if start_ns and end_ns else None

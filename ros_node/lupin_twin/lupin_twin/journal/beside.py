@@ -1,4 +1,4 @@
-"""Where a journal is; and beside it: its lock, how far it is archived, the log that has to last."""
+"""A journal's path, and the files beside it: the lock, the archive's mark, the WAL to be synced."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ NO_JOURNAL: Final = "off"
 def journal_path(
     given: str, environ: Mapping[str, str], domain: int, namespace: str
 ) -> Path | None:
-    """Where the journal is, None where there is none.
+    """Return the journal's path; None if it is off.
 
-    By default it is a file of the user's, named by domain and namespace.
+    By default it is a file in the user's state folder, named by domain and namespace.
 
     Raises:
-        RuntimeError: there is no home to keep it in.
+        RuntimeError: there is no home directory.
 
     """
     if given == NO_JOURNAL:
@@ -37,24 +37,24 @@ def journal_path(
 
 
 def demo_journal_path(environ: Mapping[str, str], seed: int) -> Path:
-    """Where the journal of a demo is: apart from a real twin's, and each seed for itself.
+    """Return the path of a demo's journal: apart from a real twin's, and one for each seed.
 
     Raises:
-        RuntimeError: there is no home to keep it in.
+        RuntimeError: there is no home directory.
 
     """
     return state_folder(environ) / f"demo-seed-{seed}.sqlite"
 
 
 def state_folder(environ: Mapping[str, str]) -> Path:
-    """The user's folder for what outlives a process (XDG Base Directory Specification).
+    """The user's folder for persistent state (XDG Base Directory Specification).
 
     Raises:
-        RuntimeError: there is no home to keep it in.
+        RuntimeError: there is no home directory.
 
     """
     given = Path(environ.get("XDG_STATE_HOME", ""))
-    # A relative path there is invalid and to be ignored.
+    # By the specification, a relative path is invalid and is ignored.
     home = given if given.is_absolute() else Path("~/.local/state").expanduser()
     return home / "lupin-twin"
 
@@ -64,7 +64,7 @@ class InUse(Exception):
 
 
 class Lock:
-    """Held from construction to `close`.
+    """A journal's lock for writing, held from construction to `close`.
 
     Raises:
         InUse: another process holds it.
@@ -83,7 +83,7 @@ class Lock:
         except BaseException:
             os.close(self._descriptor)
             raise
-        # Who holds it is only for the message: on a full disk the lock holds all the same.
+        # The holder's name is only for the message: on a full disk the lock works without it.
         try:
             os.ftruncate(self._descriptor, 0)
             os.pwrite(self._descriptor, f"{holder} (process {os.getpid()})\n".encode(), 0)
@@ -91,15 +91,15 @@ class Lock:
             pass
 
     def close(self) -> None:
-        """Let others write."""
+        """Release the lock."""
         os.close(self._descriptor)
 
 
 def holder_of(journal: Path) -> str | None:
-    """Who writes a journal, None if nobody does; for a moment it holds the lock with others.
+    """Return who writes a journal, None if nobody does; it takes a shared lock for a moment.
 
     Raises:
-        OSError: the lock is there and may not be read.
+        OSError: the lock exists but cannot be read.
 
     """
     try:
@@ -117,14 +117,14 @@ def holder_of(journal: Path) -> str | None:
 
 @contextmanager
 def writing_alone(journal: Path, holder: str) -> Iterator[sqlite3.Connection]:
-    """A journal that is there, to be written while its twin is stopped.
+    """Open an existing journal for writing while its twin is stopped.
 
     Raises:
-        InUse: a twin has it.
+        InUse: a twin writes it.
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
 
     """
-    # Not a thing is made beside a file that is no journal.
+    # Opened first, so that no lock is created beside a file that is not a journal.
     with closing(open_named(journal)):
         pass
     try:
@@ -144,12 +144,12 @@ def _name_in(descriptor: int) -> str:
 
 
 def mark_of(journal: Path) -> Path:
-    """The file: the journal's identity, and the last `seq` that is in the archive."""
+    """The archive's mark: a file with the journal's id, and the last `seq` that is archived."""
     return journal.with_name(journal.name + ".forwarded")
 
 
 def note_forwarded(journal: Path, journal_id: str, seq: int) -> None:
-    """Have it there.
+    """Write the archive's mark.
 
     Raises:
         OSError: it cannot be written.
@@ -162,7 +162,7 @@ def note_forwarded(journal: Path, journal_id: str, seq: int) -> None:
 
 
 def forwarded_seq(journal: Path, journal_id: str | None) -> int | None:
-    """The last number that is in the archive, of another journal 0; None: nobody forwards it."""
+    """The last `seq` that is archived; 0 if the mark is another journal's, None without a mark."""
     try:
         words = mark_of(journal).read_text(encoding="ascii").split()
     except FileNotFoundError:
@@ -173,15 +173,15 @@ def forwarded_seq(journal: Path, journal_id: str | None) -> int | None:
     return int(words[1]) if is_ours else 0
 
 
-# Half of what is promised; the other half is for the disk.
+# Half of the second that is promised; the other half is for the disk.
 _PERIOD_S: Final = 0.5
 
 
 class Syncing:
-    """Syncs the log of an open journal until it is closed.
+    """Syncs the write-ahead log (WAL) of an open journal, in a thread, until it is closed.
 
     Raises:
-        OSError: the log cannot be opened.
+        OSError: the WAL cannot be opened.
 
     """
 
@@ -192,16 +192,16 @@ class Syncing:
         self._is_dirty = threading.Event()
         self._stop = threading.Event()
         self._error: OSError | None = None
-        # The name of a new log has to last too.
+        # The directory entry of a new WAL has to be durable too.
         sync(journal.parent)
         self._thread = threading.Thread(target=self._run, name="journal sync", daemon=True)
         self._thread.start()
 
     def has_written(self) -> None:
-        """The log has grown.
+        """Note that the WAL has grown.
 
         Raises:
-            OSError: the last sync failed: nobody knows what of it is on the disk.
+            OSError: the last sync failed: it is unknown what is on the disk.
 
         """
         if self._error is not None:
@@ -209,7 +209,7 @@ class Syncing:
         self._is_dirty.set()
 
     def close(self) -> None:
-        """End the thread; a sync that hangs is left to itself."""
+        """Stop the thread; a sync that hangs is left behind."""
         self._stop.set()
         self._is_dirty.set()
         self._thread.join(timeout=1.0)

@@ -1,7 +1,7 @@
-"""How a period is answered: each entry where they are few, buckets of them else.
+"""Answers a query over a period: single entries if they are few, otherwise buckets.
 
-Buckets of an hour and more are made of hours, where these are whole; so are all where rows were
-deleted, or are too many. Shorter ones are read off the rows.
+Buckets of an hour or more are made from the counts of whole hours. If rows were deleted or are too
+many, all buckets are that long. Shorter ones are made from the rows.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from lupin_twin.journal.hours import deleted_ns, is_counted
 from lupin_twin.journal.runs import Span
 from lupin_twin.journal.schema import SiteLog
 
-# Rows that are read for one answer: a quarter of a second. Of more, the hours are reported.
+# Rows read for one answer: a quarter of a second. If there are more, the hourly counts are used.
 MAX_ROWS: Final = 50_000
 
 # (stamp, seq, value).
@@ -23,17 +23,17 @@ Entry = tuple[int, int, float]
 
 
 def bounds(span: Span) -> dict[str, Any]:
-    """A span, and the hours that it touches, as the SQL names them."""
+    """SQL parameters of a span, and of the hours that it touches."""
     hours = {"first": span.start_ns // HOUR_NS, "last": -(-span.end_ns // HOUR_NS)}
     return {"start": span.start_ns, "end": span.end_ns, **hours}
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Where something stands, as SQL: `rows`, and of what is counted by the hour the `hours`.
+    """Where values are stored, as SQL: their `rows`, and their hourly counts `hours`, if any.
 
-    `read` makes numbers of the rows' `value`; `sums` are the columns of an hour: how many, their
-    sum, least and largest.
+    `read` converts the rows' `value` to numbers. `sums` are the columns of an hour: count, sum,
+    minimum and maximum.
     """
 
     rows: str
@@ -44,7 +44,7 @@ class Table:
 
 
 class Part:
-    """What is requested, within one span; `of` are the values that the table's SQL names."""
+    """The requested values within one span; `of` are the parameters of the table's SQL."""
 
     def __init__(self, log: SiteLog, span: Span, table: Table, of: Mapping[str, Any]) -> None:
         self.span = span
@@ -54,19 +54,19 @@ class Part:
         self._deleted_ns = deleted_ns(log, span.run.id) if table.hours else -1
 
     def ask(self, sql: str, span: Span | None = None, /, **more: int) -> list[tuple[Any, ...]]:
-        """Rows within a part of the span, or all of it."""
+        """Execute SQL over a part of the span, or all of it; returns the rows."""
         query = {**bounds(span or self.span), **self._of, **more}
         return list(self._log.execute(sql, query).fetchall())
 
     def is_deleted(self) -> bool:
-        """Whether only hours are left of some of it."""
+        """Whether some of it is left only as hourly counts."""
         if self.span.start_ns > self._deleted_ns:
             return False
         last = min(self.span.end_ns - 1, self._deleted_ns) // HOUR_NS + 1
         return bool(self.ask(f"SELECT 1 {self._table.hours} LIMIT 1", last=last))
 
     def hourly(self) -> int:
-        """How many there are, by the hours."""
+        """Number of values, by the hourly counts."""
         if not self._table.hours:
             return 0
         n, *_ = self._table.sums
@@ -81,14 +81,14 @@ class Part:
         return [at_ns for at_ns in found if at_ns is not None]
 
     def entries(self, limit: str, span: Span | None = None) -> list[Entry]:
-        """Those within a part of the span, or all of it; `limit` is SQL's, or empty."""
+        """Entries within a part of the span, or all of it; `limit` is an SQL clause, or empty."""
         table = self._table
         rows = self.ask(f"SELECT stamp_ns, seq, {table.value} {table.rows}{limit}", span)
         values = table.read([value for *_, value in rows])
         return [(at_ns, seq, value) for (at_ns, seq, _), value in zip(rows, values, strict=True)]
 
     def fill(self, buckets: Buckets) -> None:
-        """Add them to buckets."""
+        """Add the values to buckets."""
         steps, rest = buckets.grid, [self.span]
         if self._table.hours and steps.bucket_ns >= HOUR_NS:
             hours, rest = whole_hours(self.span, self._deleted_ns)
@@ -112,7 +112,7 @@ class Part:
 def answer(
     parts_of: Callable[[int, int], Sequence[Part]], start_ns: int, end_ns: int, max_points: int
 ) -> SeriesPast:
-    """What there is in a period, of which `parts_of` gives the parts."""
+    """Answer a query over a period; `parts_of` returns the parts of any period."""
     parts = parts_of(start_ns, end_ns)
     are_deleted = any(part.is_deleted() for part in parts)
     if not are_deleted:
@@ -122,7 +122,7 @@ def answer(
             if len(found) > max_points:
                 break
         else:
-            # Of one stamp, in the order of receiving.
+            # Equal stamps are in order of arrival.
             singly = [(stamp_ns, value) for stamp_ns, _, value in sorted(found)]
             return individually(singly, start_ns, end_ns)
     steps = grid(start_ns, end_ns, max_points)
@@ -138,26 +138,26 @@ def answer(
 
 
 class Buckets:
-    """Counts, sums, least and largest by the bucket of a grid."""
+    """Count, sum, minimum and maximum for each bucket of a grid."""
 
     def __init__(self, steps: Grid) -> None:
         self.grid = steps
         self._found: dict[int, list[float]] = {}
 
     def add(self, index: int, n: int, total: float, low: float, high: float) -> None:
-        """Add some to a bucket."""
+        """Add several values to a bucket."""
         bucket = self._found.setdefault(index, [0, 0.0, low, high])
         bucket[0] += n
         bucket[1] += total
         bucket[2], bucket[3] = min(bucket[2], low), max(bucket[3], high)
 
     def add_value(self, stamp_ns: int, value: float) -> None:
-        """Add one."""
+        """Add one value."""
         index = (stamp_ns - self.grid.start_ns) // self.grid.bucket_ns
         self.add(index, 1, value, value, value)
 
     def past(self) -> SeriesPast:
-        """The answer. 12 digits are the same in whatever way, and on whichever engine, it came."""
+        """The answer, rounded to 12 digits: these are the same in SQLite and PostgreSQL."""
         steps, found = self.grid, sorted(self._found.items())
         return SeriesPast(
             steps.start_ns,
@@ -172,7 +172,7 @@ class Buckets:
 
 
 def individually(found: Sequence[tuple[int, float]], start_ns: int, end_ns: int) -> SeriesPast:
-    """An answer of single (stamp, value), not of buckets."""
+    """Make an answer of single (stamp, value) pairs, without buckets."""
     values = tuple(value for _, value in found)
     stamps = tuple(stamp_ns for stamp_ns, _ in found)
     return SeriesPast(start_ns, end_ns, None, stamps, (1,) * len(found), values, values, values)
@@ -183,9 +183,9 @@ def _rounded(number: float) -> float:
 
 
 def whole_hours(span: Span, horizon_ns: int) -> tuple[tuple[int, int], list[Span]]:
-    """The hours that a span has whole, first to before last, and what else is in it.
+    """Split a span into its whole hours (first, and last excluded) and the rest.
 
-    Up to the horizon rows were deleted: there an hour is the span's that begins or ends in it.
+    Up to the horizon, rows were deleted: there, an hour that is partly in the span counts as whole.
     """
     start_ns, end_ns = span.start_ns, span.end_ns
     first, last = -(-start_ns // HOUR_NS), end_ns // HOUR_NS

@@ -1,8 +1,8 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""Is a journal whole, and what is in it? Reads alone, also while a twin records.
+"""Checks a journal for damage, and summarises its content. Only reads, also while a twin records.
 
-SQLite checks its own structure, and that its indexes agree with their tables; here it is checked
-that rows mean something. SQLite keeps no checksums: a digit that has flipped is not found.
+SQLite checks its own structure, and that its indexes agree with their tables. This module also
+checks that rows are valid. SQLite keeps no checksums, so a flipped digit is not found.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from lupin_twin.journal.schema import (
     open_reader,
 )
 
-# A lot is one short read of the file: a check that takes minutes must not keep the log growing.
+# A lot is one short read of the file: a check that takes minutes must not keep the WAL growing.
 _ROWS: Final = 5_000
 _MAX_STRUCTURE: Final = 100
 _NO_STAMP: Final = "typeof(stamp_ns) != 'integer' OR stamp_ns NOT BETWEEN 0 AND 4611686018427387904"
 _BEHIND: Final = "r.seq > :after AND r.seq <= :until AND r.site = :site"
-# What is wrong with rows behind :after up to :until, as (seq, tag).
+# Queries for invalid rows numbered above :after and up to :until, as (seq, tag).
 _WRONG: Final = {
     "scan": (
         "SELECT seq, tag FROM scan AS r LEFT JOIN series AS s"
@@ -59,9 +59,9 @@ Progress = Callable[[str, float], None]
 
 
 def find_damage(path: Path) -> str | None:
-    """The first thing that is wrong with the file's structure, None if nothing is.
+    """Return the first defect of the file's structure, None if there is none.
 
-    Reads all of it, tables against their indexes: about half a second for 64 MB.
+    Reads the whole file, tables against their indexes: about half a second for 64 MB.
     """
     try:
         with closing(open_reader(path)) as connection:
@@ -74,13 +74,13 @@ def find_damage(path: Path) -> str | None:
 
 
 def find_all_damage(connection: sqlite3.Connection, report: Progress) -> Generator[str, None, None]:
-    """Everything that is wrong with a journal, a sentence each, as it is found.
+    """Yield every defect of a journal, a sentence each.
 
-    `report(what, share)` is called as the work goes on, with the share that is done. What lies on
-    pages that cannot be read is reported once, with the table that it ends the reading of.
+    `report(what, share)` is called as the work goes on, with the share that is done. A page that
+    cannot be read ends the check of its table, and is reported once.
 
     Raises:
-        sqlite3.OperationalError: somebody interrupts it; that is no damage.
+        sqlite3.OperationalError: the check was interrupted; that is no damage.
 
     """
     report("structure", 0.0)
@@ -130,7 +130,7 @@ def _rows(connection: sqlite3.Connection, table: str, report: Progress) -> Itera
 
 
 def delete_wrong(connection: sqlite3.Connection, table: str, after: int, until: int) -> None:
-    """Delete what is not what was written, of rows with these numbers of a twin's own log."""
+    """Delete the invalid rows of a twin's own journal numbered above `after` and up to `until`."""
     connection.execute(
         f"DELETE FROM {table} WHERE site = :site AND seq IN (SELECT seq FROM ({_WRONG[table]}))",
         {"site": LOCAL_SITE, "after": after, "until": until},
@@ -141,12 +141,12 @@ def delete_wrong(connection: sqlite3.Connection, table: str, after: int, until: 
 
 _COUNTED: Final = ("scan", "look", "place", "hour")
 
-# A run, and its first and last stamp in ns of ROS time; None where nothing is left of it.
+# A run, and its first and last stamp in ns of ROS time; None if nothing is left of it.
 RunExtent = tuple[Run, int | None, int | None]
 
 
 def row_counts(connection: sqlite3.Connection) -> dict[str, int]:
-    """How many rows each table has, copies too; how many tags; and how many scans that failed."""
+    """Number of rows of each table, copies included, and number of tags and of failed scans."""
     rows = {
         table: int(connection.execute(f"SELECT count(*) FROM {table}").fetchone()[0])
         for table in _COUNTED
@@ -154,7 +154,7 @@ def row_counts(connection: sqlite3.Connection) -> dict[str, int]:
     (rows["tag"],) = connection.execute(
         "SELECT count(*) FROM (SELECT tag FROM series UNION SELECT tag FROM place)"
     ).fetchone()
-    # Its index has none but those.
+    # A partial index holds just these rows.
     (rows["failure"],) = connection.execute(
         "SELECT count(*) FROM scan WHERE status != 0 AND is_copy = 0"
     ).fetchone()
@@ -162,7 +162,7 @@ def row_counts(connection: sqlite3.Connection) -> dict[str, int]:
 
 
 def quarantined_beside(path: Path) -> list[tuple[str, int]]:
-    """(name, bytes) of the damaged journals that were quarantined, the newest last."""
+    """(name, bytes) of the damaged journals that were quarantined, the latest last."""
     prefix = f"{path.name}.damaged-"
     return [
         (file.name, size_of(file))
@@ -191,7 +191,7 @@ _EXTENTS: Final = (
 
 
 def extents(connection: sqlite3.Connection) -> list[RunExtent]:
-    """The runs of the clock, in the order in which they began."""
+    """The runs of the clock with their first and last stamps, in the order in which they began."""
     found = {run: ends for run, *ends in connection.execute(_EXTENTS)}
     return [
         (run, *found.get(run.id, (None, None)))
@@ -201,7 +201,7 @@ def extents(connection: sqlite3.Connection) -> list[RunExtent]:
 
 
 def size_of(path: Path) -> int:
-    """Bytes of a file; 0: there is none."""
+    """Size of a file in bytes; 0 if it does not exist."""
     try:
         return path.stat().st_size
     except FileNotFoundError:

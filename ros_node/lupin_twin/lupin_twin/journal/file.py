@@ -1,4 +1,4 @@
-"""The open file, in the thread that writes it: transactions, runs, checkpoints, upkeep, damage."""
+"""A journal's open file, as its writer thread uses it: transactions, runs, upkeep, damage."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ from lupin_twin.journal.schema import (
     transaction,
 )
 
-# A file up to this size is read through for damage as it is opened: a quarter of a second.
+# A file up to this size is checked for damage when it is opened: a quarter of a second.
 _CHECKED_BYTES: Final = 64_000_000
-# The log is put into the file when it is this long: the longer, the fewer pages are written twice.
+# The WAL is checkpointed at this size: the larger it is, the fewer pages are written twice.
 _LOG_BYTES: Final = 8_000_000
 _PURGE_EVERY_S: Final = 60.0
 _POLL_EVERY_S: Final = 1.0
-# A robot that explores sends a map a second: not each of them is written.
+# Least time between two maps that are written: a robot that explores sends one every second.
 _MAP_REST_S: Final = 10.0
 _SALVAGE: Final = "salvage"
 
@@ -64,7 +64,7 @@ _LAST_INSPECTIONS: Final = (
     "SELECT stamp_ns, arrival_ns FROM look WHERE site = ? AND run = ? ORDER BY seq DESC LIMIT 100"
 )
 
-# What a row can be refused for by its own fault.
+# Errors that are caused by a single row, which is then refused.
 _ROW_ERRORS: Final = (
     ValueError,
     OverflowError,
@@ -76,10 +76,10 @@ _ROW_ERRORS: Final = (
 
 
 class JournalFile:
-    """Open from construction to `close`.
+    """A journal's file, open for writing from construction to `close`.
 
-    A damaged file is quarantined first and read as far as it goes; `quarantined` is its new name.
-    `is_sound`: None has it checked as it is opened, if it is not too large.
+    A damaged file is first quarantined, then salvaged into a new one; `quarantined` is its new
+    path. `is_sound` None: the file is checked when it is opened, if it is not too large.
 
     Raises:
         Foreign, sqlite3.Error, OSError: as `open_writer`.
@@ -96,13 +96,13 @@ class JournalFile:
         self._map_rests_until_s = 0.0
         self.quarantined = ""
         if is_sound is False or (is_sound is None and self._is_damaged()):
-            # Wall time, as whoever looks for the file reads it.
+            # Wall time, for the person who looks for the file.
             when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
             self.quarantined = str(quarantine(path, when))
         self._open()
 
     def close(self) -> None:
-        """Close it; what was committed is put into the file, and its log goes."""
+        """Move what was committed from the WAL into the file, and close it."""
         self._syncing.close()
         try:
             self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
@@ -125,31 +125,31 @@ class JournalFile:
             self._purges_before_ns: int | None = None
             self._is_shrinking = False
             self._syncing = Syncing(self._path)
-        except BaseException:  # whatever it was: nobody has this object, and could close it
+        except BaseException:  # whatever it was: the caller gets no object to close
             self._connection.close()
             raise
         self.inode = self._path.stat().st_ino
 
     def _salvage(self) -> None:
-        """Copy what can be read of what was quarantined, now or before the last end."""
+        """Copy what is readable of a file that was quarantined now, or before the last stop."""
         name = Path(self.quarantined).name or get_meta(self._connection, _SALVAGE)
         if not name:
             return
         set_meta(self._connection, _SALVAGE, name)
         salvage(self._path.with_name(name), self._connection)
         with transaction(self._connection):
-            # What could not be read nobody knows.
+            # It is unknown what could not be read, so each run counts as incomplete up to now.
             for run in self._runs():
                 note_lost(self._connection, run.root, self._last(run).stamp_ns)
             self._connection.execute("DELETE FROM meta WHERE key = ?", (_SALVAGE,))
 
     def note_world(self, world: World) -> None:
-        """Have it in the file what is observed from now on."""
+        """Write which world is observed from now on."""
         set_meta(self._connection, ORIGIN, world.origin)
         set_meta(self._connection, DAY_LENGTH, world.day_length_s)
 
     def put_map(self, floor: object, text_of: Callable[[], str]) -> None:
-        """Have the newest map in the file, by this call or one to come; empty: it is too large."""
+        """Write the latest map, with this call or a later one; an empty text: it is too large."""
         now_s = time.monotonic()
         if floor is self._map or now_s < self._map_rests_until_s:
             return
@@ -161,10 +161,10 @@ class JournalFile:
     # --- runs ---------------------------------------------------------------------------------
 
     def start(self, now: Clock, *, is_believed: bool) -> Restored:
-        """What a twin that starts now knows, in the run that it is in: the last one, or a new one.
+        """Continue the last run, or begin a new one; returns what the starting twin knows.
 
-        A wall clock that is behind what the log has received is doubted, unless `is_believed`:
-        nothing is begun then.
+        A wall clock that is behind the journal's last arrival is doubted, unless `is_believed`;
+        then no run is begun.
         """
         every = self._runs()
         run = next((r for r in reversed(every) if r.begun.is_simulated == now.is_simulated), None)
@@ -201,9 +201,9 @@ class JournalFile:
         ended_ns: int | None = None,
         places_only: bool = False,
     ) -> Run:
-        """A new run, or a step into `joins`; what was known in `before`, if any, is copied into it.
+        """Begin a run, or a step of the run `joins`; copies into it what was known in `before`.
 
-        `ended_ns` is how far the clock had come in `before`, where the twin saw it go back.
+        `ended_ns` is how far the clock had come in `before`, if the twin saw it go back.
         """
         execute = self._connection.execute
         with self._transaction():
@@ -221,9 +221,9 @@ class JournalFile:
         return run
 
     def rejoin(self, now: Clock, before: Run) -> Run:
-        """The wall's clock jumped ahead: the run that it had gone back from goes on, if any.
+        """After the wall clock jumped ahead, continue the run that it had gone back from, if any.
 
-        That is one that ended before now, the newest; else the run stays.
+        That is the latest run that ended before now; without one, `before` continues.
         """
         roots = [r for r in self._runs() if r.joins is None and not r.begun.is_simulated]
         begun = next(r for r in roots if r.id == before.root).begun
@@ -234,7 +234,7 @@ class JournalFile:
         return before
 
     def retain_run(self, run: Run) -> None:
-        """Have the run in the file, as it was in another one that is gone."""
+        """Write the current run into this file, as it was in another file that is gone."""
         if all(known.id != run.root for known in self._runs()):
             with self._transaction():
                 begun_seq = self._appender.last_seq + 1
@@ -246,9 +246,9 @@ class JournalFile:
         return runs(self._connection.execute)
 
     def _last(self, run: Run) -> Clock:
-        """The last that was received in a run."""
+        """The clock at the last write of a run."""
         last = run.begun
-        # The rows of a run lie together at the end; only a latched one may be older than others.
+        # The latest stamp is among the last rows, because only latched ones are out of order.
         for text in (_LAST_SCANS, _LAST_INSPECTIONS):
             for stamp_ns, arrival_ns in self._connection.execute(text, (LOCAL_SITE, run.id)):
                 if stamp_ns > last.stamp_ns:
@@ -256,7 +256,7 @@ class JournalFile:
         return last
 
     def _go_on_with(self, run: int) -> None:
-        """One run goes on; another, whose end nobody saw, ended with the last received in it."""
+        """Continue a run; any other run without a known end ended with its last write."""
         execute = self._connection.execute
         execute("UPDATE run SET ended_stamp_ns = NULL WHERE run = ?", (run,))
         for other in self._runs():
@@ -269,7 +269,7 @@ class JournalFile:
     # --- writing ------------------------------------------------------------------------------
 
     def append(self, rows: Sequence[tuple[Run, Write]]) -> tuple[int, int]:
-        """Write rows in one transaction; returns how many were new, and how many cannot be written.
+        """Write rows in one transaction; returns how many were new, and how many were refused.
 
         Raises:
             sqlite3.Error, OSError: nothing was written.
@@ -297,7 +297,7 @@ class JournalFile:
         return written
 
     def put_note(self, note: Note) -> Note:
-        """Write what somebody said; returns it with its id.
+        """Write a note; returns it with its id.
 
         Raises:
             sqlite3.Error, OSError: it was not written.
@@ -308,27 +308,27 @@ class JournalFile:
             return put_note(SiteLog(self._connection), self._appender.last_seq, note)
 
     def note_lost(self, run: Run, at_ns: int) -> None:
-        """Have it in the file that some of what was received up to a moment never came here."""
+        """Write that some of what was received up to a moment is not in the file."""
         with self._transaction():
             note_lost(self._connection, run.root, at_ns)
 
     def kept(self) -> Stretches:
-        """Of which stretches of ROS time all is here."""
+        """The periods of ROS time for which the journal is complete."""
         return kept(self._connection)
 
     def size(self) -> int:
-        """Bytes on the disk, the log included."""
+        """Bytes on the disk, the WAL included."""
         return self._path.stat().st_size + self._log_bytes()
 
     # --- upkeep -------------------------------------------------------------------------------
 
     def check_size(self, *, may_purge: bool) -> bool:
-        """One small step of what has to be done; returns whether there is more to do at once.
+        """Do one small step of upkeep; returns whether there is more to do at once.
 
         `may_purge`: the clock is believed.
 
         Raises:
-            sqlite3.Error, OSError: the file is no longer what it was.
+            sqlite3.Error, OSError: the file was removed or replaced, or cannot be written.
 
         """
         now_s = time.monotonic()

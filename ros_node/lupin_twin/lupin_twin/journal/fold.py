@@ -1,7 +1,7 @@
-"""From the log to the state: what is known of every tag in a run up to a moment.
+"""Computes the state from the journal: what is known about every tag in a run up to a moment.
 
-The one fold: a question about the past, a start and the copies at a run's beginning go by it. Of
-each series its newest row by then counts, of equal stamps the one received later.
+A query about the past, the start of a twin, and the copies at a run's beginning all use this fold.
+The latest row of each series up to then counts; of equal stamps, the one received later.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from lupin_twin.journal.rows import flower_of, listed_rows, named_numbers
 from lupin_twin.journal.runs import Run, runs, since_seq, span_at
 from lupin_twin.journal.schema import LOCAL_SITE
 
-# What a state takes, about, seconds of one core for each tag.
+# Approximate cost of a state, seconds of one core for each tag.
 STATE_S_PER_TAG: Final = 1e-5
 
 _NEWEST: Final = (
@@ -68,11 +68,10 @@ _PLACES: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Restored:
-    """What a twin that starts in a run knows: the state, and the last writes, for the histories.
+    """What a starting twin knows: its run, the state, and the last writes for the histories.
 
-    `last_seq` is how many writes the log has seen. `doubted_ns` is the latest moment of the wall's
-    clock that the log knows, where the clock now contradicts that: there is nothing yet to write
-    to.
+    `last_seq` is how many writes the journal has seen. `doubted_ns` is the latest wall time in the
+    journal if the clock now contradicts it; then there is no run to write into yet.
     """
 
     run: Run
@@ -84,10 +83,10 @@ class Restored:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """Tags in the order in which they were first received, and the numbers of what they rest on.
+    """Tags in the order in which they were first received, and the numbers of the rows used.
 
-    `observed` are those at which anything was observed: others have only failed attempts, or a
-    place. `placed_ns` is from when each tag has its place.
+    `observed` are the tags with an observation: others have only failed attempts, or a pose.
+    `placed_ns` is the time from which each tag has its pose.
     """
 
     tags: tuple[TagState, ...] = ()
@@ -98,10 +97,10 @@ class Known:
 
 
 def state_at(connection: sqlite3.Connection, at_ns: int, frame_id: str) -> Snapshot:
-    """Every tag as of `at_ns`, ROS time, in the order in which the log first received them.
+    """Every tag as of `at_ns`, ROS time, in the order in which the journal first received them.
 
-    Of the run that the moment belongs to, all writes with a stamp up to then count, whenever they
-    were received. Where others write meanwhile, ask within a transaction.
+    All writes with a stamp up to then count, of the run that the moment belongs to, whenever they
+    were received. If others write meanwhile, call it within a transaction.
     """
     every = runs(connection.execute)
     span = span_at(every, at_ns)
@@ -113,19 +112,19 @@ def state_at(connection: sqlite3.Connection, at_ns: int, frame_id: str) -> Snaps
 
 
 def fold(connection: sqlite3.Connection, run: int, at_ns: int, since: int) -> Known:
-    """What is known in a run as of a moment, of what has the seq `since` or a later one."""
+    """What is known in a run as of a moment, from rows numbered `since` or later."""
     with _no_collection():
         return _known(connection, {"site": LOCAL_SITE, "run": run, "at": at_ns, "since": since})
 
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Python looks for no garbage meanwhile: a hundred times in 90,000 new values, all alive."""
+    """Pause garbage collection, which would run a hundred times for 90,000 new, live values."""
     gc.disable()
     try:
         yield
     finally:
-        gc.enable()  # a second thread that is within goes on more slowly
+        gc.enable()  # a second thread that is inside only becomes slower
 
 
 def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> Known:
@@ -137,7 +136,7 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> Known:
     found: dict[str, list[tuple[int, int, tuple[Reading, ...]]]] = {}
     scans = execute(_SCANS.format(newest=_NEWEST.format(but=""), which=""), query).fetchall()
     scans.sort()
-    # Of series without sensors the newest may be a failure, and an attempt before it none.
+    # In a series without sensors, the latest row may be a failure, and an earlier one a success.
     succeeded = _NEWEST.format(but=f"AND status = {STATUS_OK} AND readings = '[]' ")
     which = f"AND s.kind = {KIND_TAG_READING} AND s.sensors = '[]'"
     scans += execute(_SCANS.format(newest=succeeded, which=which), query).fetchall()
@@ -189,7 +188,7 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> Known:
 def _places(
     execute: Any, query: dict[str, Any], first: dict[str, int]
 ) -> tuple[dict[str, Pose], dict[str, int]]:
-    """The place of each tag, that of its first write, and from when each has one."""
+    """The pose of each tag, from its first row, and the time from which the tag has one."""
     placed_ns: dict[str, int] = {}
     rows: dict[str, tuple[Any, ...]] = {}
     for row in execute(_PLACES, query).fetchall():
@@ -206,7 +205,7 @@ def _places(
 
 
 def _latest(scans: Sequence[tuple[int, int, tuple[Reading, ...]]]) -> tuple[Reading, ...]:
-    """The latest of each sensor, in the order in which the sensors were first received."""
+    """The latest reading of each sensor, in the order in which sensors were first received."""
     if len(scans) == 1:
         return scans[0][2]
     latest: dict[str, tuple[int, int, Reading]] = {}
@@ -219,11 +218,10 @@ def _latest(scans: Sequence[tuple[int, int, tuple[Reading, ...]]]) -> tuple[Read
 
 
 def copies(connection: sqlite3.Connection, run: Run, *, places_only: bool) -> list[Write]:
-    """What is known in a run, as rows of another one, or of a step, that begins now.
+    """Return what is known in a run, as rows for another run, or a step, that begins now.
 
-    The rows that the fold rests on, in the order of their tags, of a tag in the order in which
-    they count, with the stamps that they have there. `places_only`: tags do not move, but how old
-    their readings are is not known.
+    They are the rows that the fold uses, with the stamps that they have there. They are ordered by
+    tag, then by stamp. `places_only`: tags do not move, but the age of their readings is unknown.
     """
     known = fold(connection, run.root, FOREVER_NS, run.begun_seq)
     found: dict[str, list[tuple[int, int, Scan | Inspection]]] = {
@@ -239,7 +237,7 @@ def copies(connection: sqlite3.Connection, run: Run, *, places_only: bool) -> li
             rows.append(Pin(tag.tag_id, tag.pose, placed_ns, run.begun.arrival_ns))
         mine = sorted(found[tag.tag_id], key=lambda entry: entry[:2])
         if mine and tag.tag_id not in known.observed:
-            # How long nothing has been observed there.
+            # The time since which nothing has been observed there.
             since_ns = tag.last_observed_ns or 0
             rows.append(replace(mine[0][2], stamp_ns=since_ns, own_stamp_ns=since_ns))
         rows += [row for *_, row in mine]
@@ -247,7 +245,7 @@ def copies(connection: sqlite3.Connection, run: Run, *, places_only: bool) -> li
 
 
 def _readings(rows: list[tuple[Any, ...]]) -> list[tuple[Reading, ...]]:
-    """The readings of rows as `_SCANS` names them."""
+    """The readings of rows that `_SCANS` selects."""
     every = named_numbers((row[3] for row in rows), [row[8] for row in rows])
     return [
         tuple(map(Reading, names, values, repeat(row[5])))

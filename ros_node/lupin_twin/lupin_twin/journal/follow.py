@@ -1,11 +1,10 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""A log by its numbers: copied from where it left off.
+"""Copies a journal into another file by its row numbers, continuing where the last lot ended.
 
-At least once on the way, exactly once in the file: a lot is one transaction, and rows that are
-there are known by their numbers. A file holds one journal and has its identity; of another journal
-another file is made. What is counted by the hour is counted anew of the rows that come; up to where
-the journal has deleted rows, it comes as it was counted there. What is deleted or forgotten
-meanwhile is deleted here too.
+A row may be sent several times, but is stored once: a lot is one transaction, and stored rows are
+recognised by their numbers. A file holds one journal, and has its id; another journal gets another
+file. Hourly counts are made from the rows that arrive; where the journal has deleted rows, its own
+counts are copied. What the journal deletes or forgets meanwhile is deleted here too.
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ from lupin_twin.journal.schema import (
 
 MAX_ROWS: Final = 2_000
 _MAX_BYTES: Final = 1_000_000
-# In the order in which rows of one number belong.
+# Ordered as rows with the same number have to be written.
 _NUMBERED: Final = ("series", "scan", "look", "place", "note")
 _FACTS: Final = (
     *(DELETED, FORGOTTEN, "lost_ns:", PURGED_SEQ, "simulated_", RECORD, ORIGIN, DAY_LENGTH),
@@ -63,7 +62,7 @@ _COLUMNS: Final = {
     "run": 7, "meta": 2, "series": 5, "scan": 11, "look": 16, "place": 13, "note": 7,
     "hour": 6, "tally": 9, "event": 6,
 }  # fmt: skip
-# Up to this hour rows of a run were deleted, or may have been.
+# For each run, the hour up to which rows were deleted, or may have been.
 _PURGED: Final = (
     "SELECT CAST(substr(key, instr(key, ':') + 1) AS INTEGER) AS run,"
     f" max(CAST(value AS INTEGER)) / {HOUR_NS} AS hour FROM meta WHERE site = :site"
@@ -75,13 +74,13 @@ _ATTEMPTS: Final = (
     f" SELECT NULL, run, stamp_ns / {HOUR_NS} FROM look"
     " WHERE site = :site AND seq > :after AND seq <= :last AND is_copy = 0"
 )
-# What is counted of such hours comes with the series, the rest with the first lot; and whenever
-# attempts come late.
+# Counts of such hours are sent with their series, other counts with the first lot; and again
+# whenever attempts arrive late.
 _WITH: Final = (
     f"WITH purged AS ({_PURGED}), late AS (SELECT DISTINCT a.series, a.run, a.hour"
     f" FROM ({_ATTEMPTS}) AS a JOIN purged AS p ON p.run = a.run AND a.hour <= p.hour)"
 )
-# A pause that ends later is counted here, by the first attempt behind it.
+# A silence that ends later is counted in the copy, by the first attempt after it.
 _EVENTS: Final = (
     "(run IN (SELECT run FROM late) OR :after = 0 AND EXISTS (SELECT 1 FROM purged AS p"
     " WHERE p.run = event.run AND (p.hour + 1) *"
@@ -106,9 +105,9 @@ _OTHER_EVENTS: Final = f"{_WITH} DELETE FROM event WHERE site = :site AND {_EVEN
 _HOURS_OF: Final = (
     "SELECT count(*) FROM hour WHERE site = :site AND series = :series AND hour <= :hour"
 )
-# What an hour takes as a row.
+# Size of an hour as a row.
 _HOUR_BYTES: Final = 120
-# What rows of a liar, or of a damaged log, raise; `sqlite3` itself says of a file what it is.
+# Errors that rows of a hostile or damaged journal raise. Other errors of `sqlite3` are the file's.
 _UNUSABLE: Final = (
     *(ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RecursionError),
     *(sqlite3.IntegrityError, sqlite3.ProgrammingError, DamagedFile),
@@ -116,9 +115,9 @@ _UNUSABLE: Final = (
 
 
 class Lot(NamedTuple):
-    """Rows behind a number, each a JSON list: its table, its columns but the site.
+    """Rows after a number, each a JSON list: its table, and its columns except for the site.
 
-    `last` is the number to go on behind; `is_all`: nothing more was written yet.
+    `last` is the number after which to continue; `is_all`: nothing more was written yet.
     """
 
     journal: str
@@ -129,9 +128,9 @@ class Lot(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """How far a file is: the journal it is of, the last number, what it is of; as in `Condition`.
+    """How far a copy is: its journal's id, the last number, the world; others as in `Condition`.
 
-    A twin's own has no last number, and is complete up to its newest row.
+    A twin's own file has no last number, and is complete up to its latest row.
     """
 
     journal: str
@@ -143,11 +142,11 @@ class Followed:
 
 
 class NotALotError(ValueError):
-    """Rows that are none of a log; the file is as it was."""
+    """The rows are not those of a journal; the file is unchanged."""
 
 
 def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lot:
-    """The rows behind a number, in the order of numbers, and all that is small."""
+    """Read the rows after a number, in the order of numbers, and all rows of small tables."""
     log = SiteLog(connection)
     texts = [_text("run", row) for row in _all(log, "run")]
     texts += [_text("meta", row) for row in _all(log, "meta") if row[1].startswith(_FACTS)]
@@ -180,14 +179,14 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
 
 
 def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Followed:
-    """Put a lot, which was read `behind` a number, into its journal's file, made if need be.
+    """Write a lot, read after the number `behind`, into the copy of its journal; may create it.
 
-    `complete_ns` is up to when the journal had all, ROS time, before it was asked for the lot; None
-    where more follows.
+    `complete_ns` is up to when the journal was complete, ROS time, before the lot was requested;
+    None if more follows.
 
     Raises:
-        NotALotError: it cannot be what it says, or the file is no longer as far as `behind`.
-        DamagedFile: it is not whole any more, and has to be made anew.
+        NotALotError: the lot is invalid, or the file ends before `behind`.
+        DamagedFile: the copy is not complete any more, and has to be made anew.
         Foreign, sqlite3.Error, OSError: as `open_writer`.
 
     """
@@ -204,12 +203,12 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
                 gone, begun = _gone_seq(connection), int(get_meta(connection, _BEGUN) or 0)
             except _UNUSABLE as error:
                 raise NotALotError(f"rows that are none of a log: {error}") from error
-            # One that was put back from a backup gives its numbers to other rows.
+            # A journal that was restored from a backup gives the same numbers to other rows.
             there, here = get_meta(connection, _UP_TO) or "", _up_to(connection, behind)
             if there.startswith(f"{behind} ") and there != here:
                 raise DamagedFile("the journal has other rows by now")
-            # What came before the copy began is in the counts of those hours; without this, none
-            # would ever be whole where a journal deletes every minute.
+            # Rows from before the copy began are in the counts of those hours. Without this rule,
+            # no copy of a journal that deletes every minute would ever be complete.
             is_counted = gone <= begun and _purged(connection) == purged
             if 0 < last < gone and not is_counted:
                 raise DamagedFile("rows that it does not have yet were deleted in the journal")
@@ -223,7 +222,7 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
 
 
 def followed(path: Path) -> Followed:
-    """How far a file is.
+    """Return how far a copy is.
 
     Raises:
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_reader`.
@@ -231,7 +230,7 @@ def followed(path: Path) -> Followed:
     """
     with closing(open_reader(path)) as connection:
         try:
-            _gone_seq(connection)  # which `write` goes by
+            _gone_seq(connection)  # `write` relies on it
             return _followed(connection)
         except _UNUSABLE as error:
             raise DamagedFile(f"{path} says nonsense of itself: {error}") from error
@@ -254,11 +253,11 @@ def _last(connection: sqlite3.Connection) -> int:
 
 
 def _newest(connection: sqlite3.Connection, upto: int = FOREVER_NS) -> tuple[int, int, int]:
-    """The number, stamp and arrival of what was received last, up to a number; 0: nothing."""
+    """Number, stamp and arrival of the last row up to a number; all 0 if there is none."""
     return max(outermost(connection, "DESC", upto), default=(0, 0, 0))
 
 
-# --- out of a log ---------------------------------------------------------------------------------
+# --- reading a journal ----------------------------------------------------------------------------
 
 
 def _all(log: SiteLog, table: str) -> list[tuple[Any, ...]]:
@@ -277,7 +276,7 @@ def _behind(log: SiteLog, table: str, after: int, most: int) -> list[tuple[Any, 
 
 
 def _up_to(connection: sqlite3.Connection, after: int) -> str:
-    """A number, and by what the last row up to it is known: its own, and its arrival."""
+    """A number, and what identifies the last row up to it: its own number, and its arrival."""
     seq, _, arrival_ns = _newest(connection, after)
     return f"{after} {seq} {arrival_ns}"
 
@@ -287,13 +286,13 @@ def _text(table: str, row: Iterable[Any]) -> str:
     return json.dumps([table, *columns], separators=(",", ":"), ensure_ascii=False)
 
 
-# --- into a file ----------------------------------------------------------------------------------
+# --- writing a copy -------------------------------------------------------------------------------
 
 
 def _put(connection: sqlite3.Connection, lot: Lot) -> None:
     after, log = _last(connection), SiteLog(connection)
     rows, counted = list(_rows(lot.rows)), []
-    # First: what came since may be of a series with the same tag and sensors.
+    # Delete first: rows written since may be of a series with the same tag and sensors.
     for table, *row in rows:
         if table == "meta" and row[0].startswith(RECORD) and log.meta(row[0]) != row[1]:
             delete_recorded(connection, row[1])
@@ -302,12 +301,12 @@ def _put(connection: sqlite3.Connection, lot: Lot) -> None:
             counted.append((table, row))
         elif table not in WRITTEN or row[0] > after:
             _insert(connection, table, row, replaces=table in {"run", "meta"})
-    # Another process may have put newer ones in.
+    # Another process may have written later counts.
     if lot.last >= after:
         log.execute(_OTHER_EVENTS, {"after": after, "last": lot.last})
         for table, row in counted:
             _insert(connection, table, row, replaces=True)
-    # Then the rest: whether pests are new in it is known by what was before.
+    # Then count the other rows: whether their pests are new depends on what was before.
     counted_ns = {run: (hour + 1) * HOUR_NS - 1 for run, hour in _purged(connection).items()}
     count_rows(log, after, lot.last, counted_ns)
     delete_up_to(connection, _purged_seq(connection))
@@ -327,7 +326,7 @@ def _purged(connection: sqlite3.Connection) -> dict[int, int]:
 
 
 def _gone_seq(connection: sqlite3.Connection) -> int:
-    """Up to this number rows were deleted that had been counted: by age, by size, or forgotten."""
+    """The number up to which counted rows were deleted: by age, by size, or forgotten."""
     forgotten = (int(str(record["seq"])) for record in records(connection))
     return max(_purged_seq(connection), *forgotten, 0)
 

@@ -1,9 +1,9 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""What long views need, upserted in the transaction that writes the rows it follows from.
+"""Counts for long views of the past, upserted in the transaction that writes the counted rows.
 
 By the hour: readings of each sensor (`hour`), the site's scans, failures and inspections (`tally`).
-One by one, for they are rare (`event`): pests seen and cleared, stretches without an attempt. All
-of it stays when rows are deleted, and none of it is ever computed anew: a row that comes late is
+One by one, because they are rare (`event`): pests seen and cleared, and silences, which are times
+without an attempt. Counts stay when rows are deleted, and are never recomputed: a late row is
 added.
 """
 
@@ -19,30 +19,30 @@ from lupin_twin.core.state import STATUS_OK
 from lupin_twin.journal.rows import numbers_of
 from lupin_twin.journal.schema import DamagedFile, SiteLog, json_text
 
-# Shorter stretches without an attempt are no silence, whatever is usual.
+# A shorter time without an attempt is no silence, whatever interval is usual.
 SILENCE_NS: Final = 600 * 1_000_000_000
-# With the number of a run behind it: the last stamp of what was deleted of it.
+# Followed by the number of a run: the last stamp of its deleted rows.
 DELETED: Final = "purged_ns:"
-# The same: up to when the site's counts have what was forgotten since.
+# Followed by the number of a run: up to when the site's counts include rows forgotten since.
 FORGOTTEN: Final = "counted_ns:"
-# What is counted by the hour.
+# Events that are counted by the hour.
 TALLIED: Final = (Event.SCANS, Event.FAILURES, Event.INSPECTIONS)
-# A sum of larger readings could be beyond any number, which PostgreSQL refuses.
+# A sum of larger readings could overflow, which PostgreSQL refuses.
 _LARGEST: Final = 1e290
 
 
 def is_counted(value: float) -> bool:
-    """Whether a reading counts in the long views: those that are no number do not."""
+    """Whether a reading counts in the long views: NaN, infinite and huge ones do not."""
     return -_LARGEST < value < _LARGEST
 
 
 def count_rows(log: SiteLog, after: int, until: int, counted_ns: Mapping[int, int]) -> None:
-    """Count the rows that have a number behind one, up to another; each once, whatever its stamp.
+    """Count the rows numbered above `after` and up to `until`; each once, whatever its stamp.
 
-    `counted_ns`: of some runs, up to when everything is counted already.
+    `counted_ns`: for some runs, the time up to which all rows are counted already.
 
     Raises:
-        DamagedFile: a scan has no series, or its readings are none.
+        DamagedFile: a scan has no series, or its readings are invalid.
 
     """
     within = {"after": after, "until": until}
@@ -92,7 +92,7 @@ def extent(log: SiteLog, run: int) -> tuple[int, int] | None:
 
 
 def deleted_ns(log: SiteLog, run: int) -> int:
-    """The last stamp of a run of which something was deleted; -1 if nothing was."""
+    """The last stamp of a run's deleted rows; -1 if none was deleted."""
     return int(log.meta(f"{DELETED}{run}") or -1)
 
 
@@ -141,7 +141,7 @@ _LAST: Final = _ENDS.format("DESC")
 def _upsert_hours(log: SiteLog, hours: dict[tuple[int, int], list[Sequence[float]]]) -> None:
     rows: list[tuple[Any, ...]] = []
     found = _hours_of(log, hours)
-    # In the order of the table: its pages are met once.
+    # In the order of the table, so that each of its pages is visited once.
     for (series, hour), scans in sorted(hours.items()):
         n, total, low, high = found.get((series, hour)) or _no_hour(len(scans[0]))
         for values in scans:
@@ -154,7 +154,7 @@ def _upsert_hours(log: SiteLog, hours: dict[tuple[int, int], list[Sequence[float
                 total[sensor] += value
                 low[sensor] = min(low[sensor], value)
                 high[sensor] = max(high[sensor], value)
-        # What a sum has beyond 15 digits is noise, and takes room.
+        # Digits of a sum beyond 15 are noise, and take space.
         sums = ",".join([f"{number:.15g}" for number in total])
         texts = json_text(n), f"[{sums}]", json_text(low), json_text(high)
         rows.append((log.site, series, hour, *texts))
@@ -162,7 +162,7 @@ def _upsert_hours(log: SiteLog, hours: dict[tuple[int, int], list[Sequence[float
 
 
 def _hours_of(log: SiteLog, keys: Iterable[tuple[int, int]]) -> dict[tuple[int, int], Any]:
-    """The lists of those hours of series that are there."""
+    """The stored lists of these (series, hour) pairs, as far as they exist."""
     by_hour: dict[int, list[int]] = {}
     for series, hour in keys:
         by_hour.setdefault(hour, []).append(series)
@@ -216,7 +216,7 @@ _SILENCE_OVER: Final = (
 
 
 def silence_over(log: SiteLog, run: int, at_ns: int) -> tuple[int, int] | None:
-    """The attempts between which a moment is, if they are far apart; the later may be then."""
+    """The attempts around a moment, if a silence lies between them; the later may be at it."""
     query = {"run": run, "event": Event.SILENCES, "at": at_ns}
     found = log.execute(_SILENCE_OVER, query).fetchone()
     return (found[0], found[1]) if found and found[1] >= at_ns else None
@@ -231,7 +231,7 @@ def _note_silences(log: SiteLog, run: int, stamps: list[int]) -> None:
         elif at_ns < first_ns:
             _note_silence(log, run, at_ns, first_ns)
             first_ns = at_ns
-        elif at_ns in (first_ns, last_ns):  # of many tags at one moment
+        elif at_ns in (first_ns, last_ns):  # many tags at one moment
             continue
         elif (over := silence_over(log, run, at_ns)) is not None and over[1] > at_ns:
             gone = {"run": run, "event": Event.SILENCES, "at": over[0], "seq": 0}
@@ -263,13 +263,13 @@ _LAST_CHANGE: Final = (
 def _note_pests(  # noqa: PLR0917
     log: SiteLog, run: int, stamp_ns: int, tag: str, seq: int, anomaly: int, bug_count: int
 ) -> None:
-    """Note what an inspection changes; a late one may make the next one a change, or none."""
+    """Note whether an inspection is a change; a late one may alter that of the next one."""
     within = {"run": run, "tag": tag, "at": stamp_ns, "seq": seq}
     before = log.execute(_BEFORE, within).fetchone()
     if before is not None:
         had = bool(before[2])
     else:
-        # A tag without inspection has no pest; that of a deleted one is known by what it changed.
+        # A tag without inspections has no pest. If they were deleted, the last change tells it.
         change = log.execute(_LAST_CHANGE, within).fetchone()
         had = change is not None and change[0] == Event.PESTS_SEEN
     has = bool(anomaly)

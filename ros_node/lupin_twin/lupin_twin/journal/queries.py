@@ -1,10 +1,10 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""A period: one sensor of one tag, or what happened at one tag or at the whole site.
+"""Queries over a period: one sensor of one tag, or events of one tag or of the whole site.
 
-Each reading or event, or buckets of them, as in GetHistory.srv. Everything goes by spans: what a
-run has said of moments that another one holds is left out. At a tag all is read off its rows. Of
-the site scans, failures and inspections come by the hour where they are many, or deleted; what is
-rare is kept one by one.
+The answer has each reading or event, or buckets of them, as in GetHistory.srv. Queries go by spans:
+rows of a run are left out at times that belong to another run. For a tag, all is read from its
+rows. For the site, scans, failures and inspections come from the hourly counts if they are many or
+deleted; rare events are stored one by one.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ from lupin_twin.journal.rows import named_numbers, sensor_names
 from lupin_twin.journal.runs import Run, Span, cut, runs, spans
 from lupin_twin.journal.schema import SiteLog
 
-# What an answer costs, about, s; the second for events of the whole site, each tag.
+# Approximate cost of an answer, s; and of events of the whole site, s for each tag.
 SERIES_S: Final = 0.01
 SERIES_S_PER_TAG: Final = 1e-5
-# What the newest readings of a sensor cost, each tag.
+# Approximate cost of the latest readings of a sensor, s for each tag.
 NEWEST_S_PER_TAG: Final = 3e-4
 
 _WITHIN: Final = (
@@ -52,7 +52,7 @@ _WITHIN: Final = (
 _HOURS_WITHIN: Final = (
     "FROM hour WHERE site = :site AND series = :series AND hour >= :first AND hour < :last"
 )
-# Of a JSON list on both engines.
+# An element of a JSON list, in the SQL of both SQLite and PostgreSQL.
 _IN_HOUR: Final = tuple(
     f"CAST({name} ->> CAST(:place AS INTEGER) AS {kind})"
     for name, kind in (
@@ -65,14 +65,14 @@ _IN_HOUR: Final = tuple(
 
 
 def series(connection: Any, request: SeriesRequest, now_ns: int) -> SeriesPast:
-    """What a sensor gave, or the events that are requested, see GetHistory.srv.
+    """Return the readings of a sensor, or the requested events, see GetHistory.srv.
 
-    Where rows were deleted, the answer is in buckets of whole hours.
+    If rows were deleted, the answer is in buckets of whole hours.
     """
     log = SiteLog(connection)
     if request.event is not None:
         return _events(log, request, now_ns)
-    # A reading of this very moment counts as one of the past.
+    # A reading with the stamp of now counts as past.
     end_ns = max(request.end_ns or now_ns + 1, request.start_ns)
     start_ns = request.start_ns
     if not start_ns:
@@ -81,7 +81,7 @@ def series(connection: Any, request: SeriesRequest, now_ns: int) -> SeriesPast:
     return answer(partial(_parts, log, request), start_ns, end_ns, request.max_points)
 
 
-# Of each series from the stamp on of the last that counts: a search of its own, by the limit.
+# For each series, rows from the stamp of the oldest that counts; LIMIT keeps that search separate.
 _NEWEST: Final = (
     "SELECT s.tag, r.stamp_ns, r.seq, r.readings FROM (SELECT s.*, coalesce((SELECT stamp_ns"
     " FROM scan WHERE site = s.site AND series = s.series AND stamp_ns >= :start"
@@ -96,9 +96,9 @@ _SETS: Final = "SELECT DISTINCT sensors FROM series WHERE site = :site AND run =
 def newest(
     connection: Any, sensor_type: str, start_ns: int, end_ns: int, each: int
 ) -> dict[str, list[tuple[int, float]]]:
-    """Of every tag the last `each` readings of a sensor in a period: (ns of ROS time, value).
+    """Return each tag's last `each` readings of a sensor in a period: (ns of ROS time, value).
 
-    In their order, and without those that are not finite.
+    They are in order of time, without those that are not finite.
     """
     log = SiteLog(connection)
     found: dict[str, list[Entry]] = {}
@@ -145,13 +145,13 @@ def _at(sensors: str, place: int, texts: list[str]) -> list[float]:
 
 # --- what happened -------------------------------------------------------------------------------
 
-# A silence is longer than so many median intervals between the attempts of the period.
+# A silence is longer than this many median intervals between the attempts of the period.
 INTERVALS: Final = 3
 
-# The first and the last attempt of a stretch in which no gap matters.
+# The first and the last attempt of a period without a silence.
 Extent = tuple[int, int]
 
-# What is no copy, of all tags or of one.
+# Rows that are no copies, of all tags or of one.
 FROM_SCAN: Final = (
     "FROM series CROSS JOIN scan WHERE series.site = :site AND run = :run{tag}"
     " AND scan.site = :site AND scan.series = series.series"
@@ -165,7 +165,7 @@ _FROM_EVENT: Final = (
     "FROM event WHERE site = :site AND run = :run AND event = :event{tag}"
     " AND stamp_ns >= :start AND stamp_ns < :end"
 )
-# What has the value of an event, and where the rows are.
+# By event: the column of its value, and the rows that it is read from.
 _ROWS: Final = {
     Event.SCANS: ("sensors", f"{FROM_SCAN} AND kind = 0 AND status = 0"),
     Event.FAILURES: ("status", f"{FROM_SCAN} AND status != 0"),
@@ -195,10 +195,10 @@ _SILENCES: Final = (
 
 
 def _events(log: SiteLog, request: SeriesRequest, now_ns: int) -> SeriesPast:
-    """The events that are requested, see GetHistory.srv."""
+    """Return the requested events, see GetHistory.srv."""
     source = _Source(log, None if request.tag_id == EVERY_TAG else request.tag_id)
     axis = spans(runs(log.execute))
-    # What is of this very moment counts as past.
+    # An event with the stamp of now counts as past.
     end_ns = max(request.end_ns or now_ns + 1, request.start_ns)
     start_ns = request.start_ns
     if not start_ns:
@@ -242,9 +242,9 @@ def _runs(found: Sequence[Span], start_ns: int, end_ns: int) -> SeriesPast:
 def _silences(
     source: _Source, axis: Sequence[Span], period: Extent, now_ns: int
 ) -> Iterator[tuple[int, float]]:
-    """(start, seconds) of each, cut to the period; the last one lasts until now.
+    """Yield (start, seconds) of each silence, cut to the period; the last may last until now.
 
-    Before the first attempt that is known there is no silence.
+    Before the first known attempt, there is no silence.
     """
     start_ns, end_ns = period
     within = cut(axis, start_ns, end_ns)
@@ -269,8 +269,8 @@ def _silences(
 
 
 def _usual_ns(source: _Source, within: Sequence[Span], period_ns: int) -> float:
-    """The median interval; 0 where it is too short to matter."""
-    # Half of the intervals would have to be longer than that, and there is no room for so many.
+    """The median interval between attempts, ns; 0 if it is too short to matter."""
+    # With more attempts, half of the intervals cannot be long enough to matter within the period.
     most = 1 + 2 * INTERVALS * period_ns / SILENCE_NS
     if sum(source.attempts(span) for span in within) > most:
         return 0.0
@@ -284,14 +284,14 @@ def _outermost(source: _Source, axis: Iterable[Span], which: int) -> int | None:
     return next(found, None)
 
 
-# --- where it stands ------------------------------------------------------------------------------
+# --- the attempts and events of a tag or the site -------------------------------------------------
 
 
 class _Source:
     """The attempts and events of a tag, or of the site (`tag` None), span by span.
 
-    Rows are there as far back as they are kept, what is rare for good; of the site the hours
-    of all attempts too.
+    Rows exist as far back as they are retained, rare events forever; for the site, also the hourly
+    counts of all attempts.
     """
 
     def __init__(self, log: SiteLog, tag: str | None) -> None:
@@ -311,7 +311,7 @@ class _Source:
         ]
 
     def attempts(self, span: Span) -> int:
-        """How many there were, at least."""
+        """Number of attempts, at least."""
         if self.tag is not None:
             return 0
         first, last = -(-span.start_ns // HOUR_NS), span.end_ns // HOUR_NS
@@ -319,7 +319,7 @@ class _Source:
         return int(self.ask(sql, span, first=first, last=last)[0][0])
 
     def stamps(self, span: Span) -> Iterator[int]:
-        """Of each attempt; what was deleted of the site is spread over its hour."""
+        """The stamp of each attempt; deleted attempts of the site are spread over their hour."""
         kept_ns = 0
         if self.tag is None:
             kept_ns = (deleted_ns(self._log, span.run.id) // HOUR_NS + 1) * HOUR_NS
@@ -335,9 +335,9 @@ class _Source:
                         yield stamp_ns
 
     def stretches(self, span: Span, longest_ns: int, period: Extent) -> Iterable[Extent]:
-        """The attempts of a period and the next ones on both sides, in order.
+        """The attempts of a period and the next ones on both sides, as extents in order.
 
-        Such as follow each other within `longest_ns` may be in one.
+        Attempts that follow each other within `longest_ns` may be in one extent.
         """
         if self.tag is not None:
             found = [stamp_ns for part in cut([span], *period) for stamp_ns in self.stamps(part)]
@@ -373,7 +373,7 @@ class _Source:
     def _near(self, run: Run, at_ns: int, which: int) -> int:
         """The last attempt up to a moment (0) or the first from then on (1).
 
-        There are earlier ones and later ones.
+        There have to be attempts on both sides.
         """
         over = silence_over(self._log, run.id, at_ns if which else at_ns + 1)
         if over is not None:
@@ -381,7 +381,7 @@ class _Source:
         start_ns = at_ns if which else at_ns - SILENCE_NS
         rows = self.ask(_ENDS, Span(run, start_ns, start_ns + SILENCE_NS + 1))
         found: list[int] = [row[1 - which] for row in rows if row[0] is not None]
-        if not found:  # it is deleted
+        if not found:  # its rows are deleted
             return at_ns
         return min(found) if which else max(found)
 
@@ -394,7 +394,7 @@ class _Source:
 
 
 def _numbers(values: list[int | str]) -> list[float]:
-    """Of a scan the number of its sensors."""
+    """Convert the values of rows to numbers; that of a scan is the number of its sensors."""
     return [
         float(len(sensor_names(value)) if isinstance(value, str) else value) for value in values
     ]

@@ -1,8 +1,8 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""A new file in a journal's place: one of version 3 upgraded, or one without gaps.
+"""Upgrades a journal of version 3, and vacuums a journal.
 
-It is built beside the journal, synced, and takes its name: whoever is killed meanwhile has the old
-one whole. The old one of an upgrade stays beside it as `NAME.v3`.
+An upgrade builds a new file beside the journal, syncs it, and renames it: if the process is killed
+meanwhile, the old file is intact. The old file stays beside the new one as `NAME.v3`.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _NUMBERS: Final = (RETENTION_NS, RETENTION_BYTES, "simulated_from_ns", "simulate
 
 
 def is_version3(path: Path) -> bool:
-    """Whether a file is a journal of that version; one that cannot be read is none.
+    """Whether a file is a journal of version 3; False if it does not exist.
 
     Only its first bytes are read (https://www.sqlite.org/fileformat2.html, 1.3).
     """
@@ -57,27 +57,27 @@ def is_version3(path: Path) -> bool:
 
 
 def upgrade(path: Path, report: Callable[[float], None]) -> str:
-    """Upgrade a journal of version 3, which the caller holds the lock of.
+    """Upgrade a journal of version 3; the caller holds its lock.
 
-    `report(share)` is called as the work goes on. Returns in words what was left out, for it was
-    not what had been written: nothing, mostly.
+    `report(share)` is called as the work goes on. Returns, in words, which rows were left out
+    because they are damaged; usually empty.
 
     Raises:
-        sqlite3.Error, DamagedFile, OSError: it is as it was: somebody reads it, say, or the disk
-            is full.
+        sqlite3.Error, DamagedFile, OSError: the journal is unchanged: somebody reads it, say, or
+            the disk is full.
 
     """
     new = path.with_name(path.name + ".upgrade")
     try:
         with closing(sqlite3.connect(path, isolation_level=None, timeout=5.0)) as connection:
-            # All of it in the one file: the log beside it would be taken for one of the new file.
+            # First move the WAL into the file: otherwise it would be taken for the new file's WAL.
             if _is_read(connection):
                 somebody = f"somebody reads {path}, which is to be upgraded"
                 raise sqlite3.OperationalError(somebody)  # noqa: TRY301
             connection.execute("PRAGMA query_only = 1")
             _remove(new)
             with closing(open_writer(new)) as target:
-                # Of what is begun again if it fails, nothing has to be safe before it is done.
+                # A failed upgrade begins again, so nothing has to be durable before it is done.
                 target.execute("PRAGMA journal_mode = MEMORY")
                 target.execute("PRAGMA synchronous = OFF")
                 damaged = _Upgrade(Version3(connection), target, report).run()
@@ -88,7 +88,7 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
         if isinstance(error, sqlite3.OperationalError) and str(error).startswith("no such"):
             raise DamagedFile(f"the tables of {path} are not those of a journal") from error
         raise
-    # Empty by now, but of the old file: who still reads that has them open, and keeps them.
+    # Empty by now, but they belong to the old file. A process that still reads it has them open.
     for end in ("-wal", "-shm"):
         path.with_name(path.name + end).unlink(missing_ok=True)
     new.chmod(path.stat().st_mode & 0o777)
@@ -98,7 +98,7 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
 
 
 def _is_read(connection: sqlite3.Connection) -> bool:
-    """Put all of the log into the file, unless somebody still reads what was before."""
+    """Move the whole WAL into the file; returns whether a reader prevented that."""
     connection.execute("PRAGMA busy_timeout = 1000")
     ((is_busy, *_),) = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
     return bool(is_busy)
@@ -110,11 +110,11 @@ def _remove(new: Path) -> None:
 
 
 def _keep(path: Path) -> Path:
-    """Give the old file a second name, and return it; nothing that has one is overwritten."""
+    """Give the old file a second name, and return that; no other file is overwritten."""
     for kept in numbered(path, f".v{VERSION}"):
         if not kept.exists():
             break
-        if kept.samefile(path):  # killed between this and the end
+        if kept.samefile(path):  # an earlier upgrade was killed after this step
             return kept
     try:
         os.link(path, kept)
@@ -123,7 +123,7 @@ def _keep(path: Path) -> Path:
         try:
             shutil.copyfile(path, part)
             sync(part)
-        except OSError:  # the disk is full: what is there of it would keep it so
+        except OSError:  # the disk is full: a partial copy would keep it so
             part.unlink(missing_ok=True)
             raise
         part.rename(kept)
@@ -132,7 +132,7 @@ def _keep(path: Path) -> Path:
 
 
 class _Upgrade:
-    """From the one open file to the other."""
+    """Copies an open journal of version 3 into an open new one."""
 
     def __init__(
         self, old: Version3, target: sqlite3.Connection, report: Callable[[float], None]
@@ -151,7 +151,7 @@ class _Upgrade:
                 for number, run, row in lot:
                     self._begin_until(run)
                     if self._appender.counted_ns and number > self._old.meta("rolled_id"):
-                        # From here on the old file has not counted yet.
+                        # From here on, the old file has no counts yet.
                         self._appender.flush()
                         self._appender.counted_ns.clear()
                     self._appender.append(run, (row,))
@@ -165,7 +165,7 @@ class _Upgrade:
         return self._old.damaged
 
     def _begin_until(self, last: int) -> None:
-        """Begin the runs up to one: those before it, in which nothing was received, too."""
+        """Begin the runs up to one, including earlier ones in which nothing was received."""
         if last not in self._begun:
             for number in sorted(self._old.runs.keys() - self._begun.keys()):
                 if number <= last:
@@ -176,7 +176,7 @@ class _Upgrade:
         run = Run(old.id, old.begun, self._appender.last_seq + 1, None, old.ended_ns)
         self._begun[old.id] = run
         put_run(self._target, run)
-        # The last stamp of what was deleted by age or size.
+        # The last stamp of the rows that were deleted by age or size.
         if (purged_ns := self._old.meta(f"purged_ns:{run.id}", -1)) >= 0:
             self._carry_counts(run.id, purged_ns)
         before = None if old.follows is None else self._begun.get(old.follows)
@@ -185,7 +185,7 @@ class _Upgrade:
             copy_known(self._appender, before, run, rows)
 
     def _carry_counts(self, run: int, purged_ns: int) -> None:
-        """What was counted in hours some of whose rows are deleted; the others are not counted."""
+        """Copy the counts of hours with deleted rows; their other rows are not counted again."""
         hour = purged_ns // HOUR_NS
         self._appender.counted_ns[run] = (hour + 1) * HOUR_NS - 1
         set_meta(self._target, f"{DELETED}{run}", purged_ns)
@@ -199,7 +199,7 @@ class _Upgrade:
         self._target.executemany(f"INSERT INTO {table} VALUES ({marks})", rows)
 
     def _hours(self, run: int, until: int) -> list[tuple[object, ...]]:
-        """Rows of `hour`: several series of the old file are one here, that of any source."""
+        """Rows of `hour`; series of the old file that differ only by source become one."""
         numbers: dict[tuple[str, int, tuple[str, ...]], int] = {}
         found: dict[tuple[int, int], list[Bucket]] = {}
         for tag_id, kind, sensors, hour, buckets in self._old.hours(run, until):
@@ -219,13 +219,13 @@ class _Upgrade:
 
 
 def _joined(one: Bucket, other: Bucket) -> Bucket:
-    """What both have counted."""
+    """The counts of both."""
     low, high = min(one[2], other[2]), max(one[3], other[3])
     return one[0] + other[0], one[1] + other[1], low, high
 
 
 def _finite(bucket: Bucket) -> tuple[float | None, ...]:
-    """As it stands in `hour`: without a reading there is no least and no largest."""
+    """A bucket as stored in `hour`: without a reading there is no minimum and no maximum."""
     return bucket if bucket[0] else (0, 0.0, None, None)
 
 
@@ -233,13 +233,13 @@ _INSTRUCTIONS: Final = 100_000
 
 
 def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:
-    """Make the file small; returns its bytes before and after.
+    """Vacuum a journal; returns its size in bytes before and after.
 
-    All of it is read for damage first: without gaps, what is still to be saved of a damaged one
-    would be lost. `report(what, share)` is called meanwhile.
+    The whole file is checked for damage first: vacuuming a damaged file would lose what can still
+    be salvaged. `report(what, share)` is called meanwhile.
 
     Raises:
-        InUse: a twin has it.
+        InUse: a twin writes it.
         NotPossible: it is damaged, or somebody reads it.
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
 
@@ -261,5 +261,5 @@ def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:
 
 
 def handle_interrupts(connection: sqlite3.Connection) -> None:
-    """Have Ctrl-C end what takes SQLite minutes: Python sees it only in Python."""
+    """Let Ctrl-C end a long SQLite statement: Python handles signals only while it runs itself."""
     connection.set_progress_handler(lambda: 0, _INSTRUCTIONS)

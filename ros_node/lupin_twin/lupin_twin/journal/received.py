@@ -1,9 +1,9 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""What was received, write by write, and notes: behind a number, recently, in a period.
+"""Queries for single writes (after a number, recent, of a period), exports, and notes.
 
-An export reads a stretch of time in one short transaction, so that a reader that takes an hour over
-ten million rows keeps the log from being put into the file for no longer than that. Notes have one
-number each as every write, so that whoever follows the log has them.
+An export reads a short stretch of time in each transaction. So a client that takes an hour for ten
+million rows does not block checkpoints of the WAL meanwhile. A note has a number, as every write,
+so that followers of the journal receive it.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from lupin_twin.journal.rows import named_numbers, sensor_names
 from lupin_twin.journal.runs import Run, Span, cut, runs, span_at, spans
 from lupin_twin.journal.schema import WRITTEN, SiteLog, one_view
 
-# What an answer of so many writes takes, about, s.
+# Approximate cost of a full answer of writes, s.
 WRITES_S: Final = 0.05
 
 _NEWEST: Final = "SELECT max(seq) FROM {} WHERE site = :site"
@@ -60,8 +60,8 @@ _SCANS: Final = (
 _INSPECTIONS: Final = (
     f"{_INSPECTION} WHERE site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
 )
-# Of each series, or tag, from the stamp on of the last that is recent. With a limit neither engine
-# makes the search part of the join, where PostgreSQL would do it again for each row.
+# For each series, or tag, the stamp of its oldest recent row. LIMIT keeps this search out of the
+# join in both databases; in the join, PostgreSQL would repeat it for each row.
 _FIRST_RECENT: Final = (
     "(SELECT s.*, coalesce((SELECT DISTINCT stamp_ns FROM {table} WHERE site = s.site"
     " AND {which} AND stamp_ns <= :at AND is_copy = 0 ORDER BY stamp_ns DESC LIMIT 1 OFFSET :more),"
@@ -91,7 +91,7 @@ _INSPECTIONS_BETWEEN: Final = (
 
 
 def observed(connection: Any, request: PeriodRequest) -> PastWrites:
-    """What was observed in a period; each moment is that of the run that holds it."""
+    """Return what was observed in a period; each moment comes from the run that it belongs to."""
     log = SiteLog(connection)
     axis = spans(runs(log.execute))
     found: list[PastWrite] = []
@@ -104,7 +104,7 @@ def observed(connection: Any, request: PeriodRequest) -> PastWrites:
 
 
 def recent(connection: Any, request: RecentRequest) -> tuple[PastWrite, ...]:
-    """What was recent at a moment."""
+    """Return the writes that were recent at a moment."""
     log = SiteLog(connection)
     span = span_at(runs(log.execute), request.at_ns)
     if span is None:
@@ -116,7 +116,7 @@ def recent(connection: Any, request: RecentRequest) -> tuple[PastWrite, ...]:
 
 
 def scans(connection: Any, request: ScansRequest) -> tuple[PastWrite, ...]:
-    """The scans of a stretch of time."""
+    """Return the scans of a period."""
     log = SiteLog(connection)
     span = span_at(runs(log.execute), request.at_ns)
     if span is None:
@@ -135,7 +135,7 @@ def scans(connection: Any, request: ScansRequest) -> tuple[PastWrite, ...]:
 
 
 def writes(connection: Any, request: WritesRequest) -> PastWrites:
-    """The next writes, copies left out."""
+    """Return the next writes, without copies."""
     log = SiteLog(connection)
     newest = max(log.execute(_NEWEST.format(table)).fetchone()[0] or 0 for table in WRITTEN)
     after = request.after or _beginning(log, request, newest)
@@ -157,7 +157,7 @@ def _axis(found: Iterable[Span]) -> tuple[RunSpan, ...]:
 
 
 def _beginning(log: SiteLog, request: WritesRequest, newest: int) -> int:
-    """The number before the first write that is requested: arrivals ascend with numbers."""
+    """The number before the first requested write; bisects, as arrivals ascend with numbers."""
     low, high = 0, newest
     if request.reach_count:
         low = max(0, newest - request.reach_count)
@@ -190,7 +190,7 @@ def _of_inspections(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
 # --- an export -----------------------------------------------------------------------------------
 
 LOT: Final = 1_000
-# Readings that are read in one go, about, and what that costs, s.
+# Approximate number of readings that are read at once, and what that costs, s.
 _STRETCH: Final = 40_000
 STRETCH_S: Final = 0.1
 _FIRST_STRETCH_NS: Final = 60 * 1_000_000_000
@@ -208,7 +208,7 @@ def rows(
     tag_id: str | None = None,
     sensor_type: str | None = None,
 ) -> Iterator[list[PastRow]]:
-    """Lots of at most `LOT` rows, see `Export`."""
+    """Yield the rows of an export in lots of at most `LOT`, see `Export`."""
     export = Export(start_ns, end_ns, tag_id, sensor_type)
     while True:
         with one_view(connection):
@@ -219,16 +219,16 @@ def rows(
 
 
 def lots(found: list[PastRow]) -> Iterator[list[PastRow]]:
-    """Rows, `LOT` at a time."""
+    """Split rows into lots of `LOT`."""
     for first in range(0, len(found), LOT):
         yield found[first : first + LOT]
 
 
 class Export:
-    """The rows of a period; None: of all tags; of all sensors, and of attempts without a reading.
+    """The rows of a period; None: all tags, or all sensors and attempts without a reading.
 
-    Each step may be over another connection. An export that deleting has overtaken is not whole,
-    and does not look so.
+    Each step may use another connection. If rows of the period are deleted meanwhile, the export
+    fails, so that it does not look complete.
     """
 
     def __init__(
@@ -242,15 +242,15 @@ class Export:
         self._length_ns = _FIRST_STRETCH_NS
         self._run: Run | None = None
         self._places: dict[str, tuple[float, float]] = {}
-        # The last stamp of each run that was deleted when the first row was given.
+        # By run, the last stamp that was already deleted when the first row was returned.
         self._deleted_ns: dict[int, int] = {}
         self._has_begun = False
 
     def step(self, connection: Any) -> list[PastRow] | None:
-        """The rows of the next stretch of time, maybe none; None: that was all.
+        """Return the rows of the next stretch of time, maybe none; None at the end.
 
         Raises:
-            NotRemembered: behind rows that were given, some are deleted since.
+            NotRemembered: rows that come next were deleted since the first ones were returned.
 
         """
         log = SiteLog(connection)
@@ -272,7 +272,7 @@ class Export:
             raise NotRemembered(why)
         while True:
             until_ns = min(start_ns + self._length_ns, span.end_ns)
-            # Of one stamp there are as many scans as there are.
+            # The scans of one stamp cannot be divided.
             limit = "" if self._length_ns == 1 else f" LIMIT {_STRETCH}"
             scans = self._ask(log, _EXPORTED + limit, start_ns, until_ns)
             read = sum(1 + scan[-1].count(",") for scan in scans)
@@ -311,7 +311,7 @@ class Export:
 
 
 def _places(log: SiteLog, run: Run) -> dict[str, tuple[float, float]]:
-    """Where tags are: what was known first holds, what was carried into the run before all."""
+    """Position of each tag: its first row in the run counts, copies included."""
     found = log.execute(
         "SELECT tag, x, y FROM place WHERE site = :site AND run = :run ORDER BY seq DESC",
         {"run": run.id},
@@ -321,28 +321,28 @@ def _places(log: SiteLog, run: Run) -> dict[str, tuple[float, float]]:
 
 # --- notes ----------------------------------------------------------------------------------------
 
-# An id is the number of the write, in hexadecimal digits that sort as it does, and digits of
-# chance: an archive has the notes of several journals of one site, whose numbers are the same.
+# An id is the number of the write, in hexadecimal digits that sort as it does, and random digits.
+# An archive may hold the notes of several journals of one site, which use the same numbers.
 _DIGITS: Final = 16
 _OURS: Final = re.compile(rf"[0-9a-f]{{{_DIGITS}}}", re.ASCII)
-# No log counts so far; SQLite counts to twice that.
+# No journal has as many; the limit of SQLite is twice that.
 _MOST: Final = 2**62
 _COUNT: Final = "SELECT count(*) FROM note WHERE site = :site"
 _NEWEST_NOTES: Final = (
     "SELECT id, made_at_ns, made_by, kind, subject, text, until_ns FROM note WHERE site = :site"
     " ORDER BY made_at_ns DESC, id DESC LIMIT :most"
 )
-# What looking for notes takes, about, s of one core.
+# Approximate cost of a query for notes, s of one core.
 NOTES_S: Final = 0.02
 
 
 def id_behind(number: int) -> str:
-    """A text that sorts behind every id up to that number, and before those past it."""
+    """A text that sorts after every id up to that number, and before all later ids."""
     return f"{number + 1:0{_DIGITS}x}"
 
 
 def number_of(note_id: str) -> int:
-    """The number of the write; 0: somebody else has given the id."""
+    """The number in an id; 0 if another program made the id."""
     if _OURS.match(note_id) is None:
         return 0
     number = int(note_id[:_DIGITS], 16)
@@ -350,8 +350,8 @@ def number_of(note_id: str) -> int:
 
 
 def last_number(log: SiteLog) -> int:
-    """The number of the log's last note; 0: there is none."""
-    # Downwards, past those of somebody else.
+    """The number of the journal's last note; 0 if there is none."""
+    # In descending order, skipping ids of other programs.
     found = log.execute("SELECT id FROM note WHERE site = :site ORDER BY id DESC")
     return next((number for (text,) in found if (number := number_of(text))), 0)
 
@@ -367,7 +367,7 @@ def put_note(log: SiteLog, number: int, note: Note) -> Note:
 
 
 def notes(connection: Any, request: NotesRequest) -> PastNotes:
-    """What a log has of notes."""
+    """Return the notes of a journal."""
     log = SiteLog(connection)
     journal = log.journal_id
     (count,) = log.execute(_COUNT).fetchone()
@@ -378,21 +378,21 @@ def notes(connection: Any, request: NotesRequest) -> PastNotes:
     return PastNotes(journal, count, tuple(found))
 
 
-# People write none faster than a disk.
+# Notes that may wait: more than people write while a disk is slow.
 _MAX_WAITING: Final = 100
 
 
 class NoteQueue:
-    """Notes on their way from whoever says them to the thread that writes; for any thread.
+    """A queue of notes to the thread that writes; any thread may use it.
 
-    Whoever gives up waiting cancels the future, and the note is not written.
+    If the caller gives up waiting and cancels the future, the note is not written.
     """
 
     def __init__(self) -> None:
         self._waiting: deque[tuple[Note, Future[Note]]] = deque()
 
     def put(self, note: Note) -> Future[Note]:
-        """Hand a note over; the future gets it with its id."""
+        """Queue a note; the future's result is the note with its id."""
         written: Future[Note] = Future()
         if len(self._waiting) >= _MAX_WAITING:
             written.set_exception(NotesUnwritable(f"{_MAX_WAITING} notes wait for the disk"))
@@ -401,10 +401,10 @@ class NoteQueue:
         return written
 
     def write(self, put: Callable[[Note], Note]) -> None:
-        """Have all that wait written.
+        """Write all waiting notes with `put`.
 
         Raises:
-            Exception: what `put` raised, once the note's future has it.
+            Exception: what `put` raised, after the note's future has failed.
 
         """
         for note, written in self._taken():
@@ -415,7 +415,7 @@ class NoteQueue:
                 raise
 
     def refuse(self, why: str) -> None:
-        """Let none wait any longer."""
+        """Fail all waiting notes, with this reason."""
         for _, written in self._taken():
             written.set_exception(NotesUnwritable(f"no note can be written now: {why}"))
 

@@ -1,7 +1,7 @@
-"""What is deleted: by age and by size, a little at a time, the oldest first; a tag on request.
+"""Deletes rows by age and by size, the oldest first and a few at a time; and tags on request.
 
-Rows go by ranges of their numbers, which lie together in the file; the pages they leave are used
-again, and what is left over is given back to the disk. Hours stay.
+Rows are deleted by ranges of their numbers, which lie together in the file. Freed pages are used
+again, and surplus ones are given back to the disk. Hourly counts stay.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from lupin_twin.journal.schema import (
     transaction,
 )
 
-# What one step deletes or moves: some ten milliseconds, for observations wait behind it.
+# What one step deletes or moves: about ten milliseconds, because observations wait meanwhile.
 _ROWS: Final = 300
 _PAGES: Final = 128
-# Free pages that are kept for what is written next: a hundredth of the file, and 256 at least.
+# Free pages that stay in the file for new rows: a hundredth of the file, but at least 256.
 _FREE_PAGES: Final = 256
 
-# The limits stand in the file, for who looks at it without its twin.
+# The limits are in the file, for tools that read it without its twin.
 RETENTION_NS: Final = "kept_ns"
 RETENTION_BYTES: Final = "kept_bytes"
-# With the number of a run behind it.
+# Followed by the number of a run: the time up to which some of its rows were lost.
 _LOST: Final = "lost_ns:"
-# Stretches that are reported at most, the last ones.
+# At most this many periods are reported: the last ones.
 _MAX_STRETCHES: Final = 16
 
-# Of ROS time, `start <= stamp < end`, ns.
+# Periods of ROS time, `start <= stamp < end`, ns.
 Stretches = tuple[tuple[int, int], ...]
 
 
@@ -55,27 +55,27 @@ class Limits:
 
 
 def note_limits(connection: sqlite3.Connection, limits: Limits) -> None:
-    """Have the limits in the file."""
+    """Write the limits into the file."""
     set_meta(connection, RETENTION_NS, int(limits.days * DAY_NS))
     set_meta(connection, RETENTION_BYTES, limits.max_bytes)
 
 
 def used_bytes(connection: sqlite3.Connection) -> int:
-    """What is in use of the file."""
+    """Bytes of the file that are in use."""
     pages, free, size = pages_of(connection)
     return (pages - free) * size
 
 
 def note_lost(connection: sqlite3.Connection, run: int, at_ns: int) -> None:
-    """Have it in the file that some of what a run received up to a moment was never written."""
+    """Write that some of what a run received up to a moment was never written."""
     before_ns = int(get_meta(connection, f"{_LOST}{run}") or -1)
     set_meta(connection, f"{_LOST}{run}", max(at_ns, before_ns))
 
 
 def kept(connection: sqlite3.Connection) -> Stretches:
-    """The stretches of ROS time of which all is here that their run has received.
+    """The periods of ROS time for which everything that their run received is here.
 
-    The first begins with the log, or with the first attempt in it, if that is of earlier.
+    The first begins with the journal, or with its first attempt if that has an earlier stamp.
     """
     log = SiteLog(connection)
     every = runs(connection.execute)
@@ -95,10 +95,10 @@ def kept(connection: sqlite3.Connection) -> Stretches:
 
 
 def horizon_ns(connection: sqlite3.Connection, limits: Limits, now_ns: int) -> int:
-    """What was received before this, by the wall's clock, goes now.
+    """Return the wall time before which rows that were received are deleted now.
 
-    That clock may be ahead. So what was received last limits it, and one round, each minute,
-    deletes an hour of data at most: a wrong clock that is soon corrected costs little.
+    The wall clock may be ahead. So the last arrival limits it, and one round, each minute, deletes
+    an hour of data at most. A wrong clock that is soon corrected costs little.
     """
     first = min((row[2] for row in outermost(connection, "ASC")), default=now_ns)
     last = max((row[2] for row in outermost(connection, "DESC")), default=now_ns)
@@ -113,7 +113,7 @@ def purge_step(
 ) -> bool:
     """Delete some rows that are too old or too many; returns whether there may be more.
 
-    Of what is too old, rows past `forwarded_seq` stay: the archive does not have them yet.
+    Rows that are too old but past `forwarded_seq` stay: the archive does not have them yet.
     """
     oldest = sorted(
         row
@@ -134,7 +134,7 @@ def purge_step(
         return False
     _write_horizons(connection, last)
     delete_up_to(connection, last)
-    # The numbers go on when everything is gone.
+    # Numbers continue from here even if no row is left.
     set_meta(connection, PURGED_SEQ, last)
     return True
 
@@ -147,7 +147,7 @@ def delete_up_to(connection: sqlite3.Connection, last: int) -> None:
 
 
 def unmet_limit(connection: sqlite3.Connection, limits: Limits, before_ns: int) -> str:
-    """Which limit is exceeded though nothing more can be deleted, in words; empty: none."""
+    """Which limit is exceeded although nothing more can be deleted, in words; empty if none."""
     if used_bytes(connection) > limits.max_bytes:
         return "no scans are kept: hours, which stay, are larger than journal_max_mb"
     if any(row[2] < before_ns for row in outermost(connection, "ASC")):
@@ -158,9 +158,9 @@ def unmet_limit(connection: sqlite3.Connection, limits: Limits, before_ns: int) 
 def outermost(
     connection: sqlite3.Connection, way: str, upto: int = FOREVER_NS
 ) -> list[tuple[int, int, int]]:
-    """Number, stamp and arrival of the first (ASC) or last (DESC) scan and inspection there is.
+    """Number, stamp and arrival of the first (ASC) or last (DESC) scan and inspection.
 
-    Of those up to a number, if one is given.
+    Only those numbered up to `upto` count.
     """
     return [
         row
@@ -191,7 +191,7 @@ def shrink_step(connection: sqlite3.Connection) -> bool:
     spare = free - max(_FREE_PAGES, pages // 100)
     if spare <= 0:
         return False
-    # A script: `execute` would take the first of its steps alone, which is one page.
+    # As a script, because `execute` would do only its first step, which frees one page.
     connection.executescript(f"PRAGMA incremental_vacuum({min(spare, _PAGES)})")
     return spare > _PAGES
 
@@ -213,24 +213,24 @@ _OF_SERIES: Final = (
 )
 
 
-# How many scans, inspections and places of a tag are gone.
+# Numbers of scans, inspections and places of a tag that were deleted.
 Forgotten = tuple[int, int, int]
 
 
 def forget(path: Path, tag_id: str, *, pose_only: bool, by: str, at_ns: int) -> Forgotten:
-    """Delete a tag's places or all that is known of it, at `at_ns` of wall time.
+    """Delete a tag's places, or everything about it; `at_ns` is now, in wall time.
 
     Counts of the whole site (tallies) stay as they are.
 
     Raises:
-        InUse: a twin has it.
-        NotPossible: the journal knows no such tag, or no place of it.
+        InUse: a twin writes it.
+        NotPossible: the journal has no such tag, or no place of it.
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
 
     """
     with writing_alone(path, "lupin-twin journal forget") as connection, transaction(connection):
         _check_known(connection, path, tag_id)
-        # The numbers go on, also when the newest rows are gone.
+        # Numbers continue from here even if the latest rows are deleted.
         last_seq = Appender(connection).last_seq
         set_meta(connection, LAST_SEQ, last_seq)
         forgotten = delete_tag(connection, tag_id, last_seq, pose_only=pose_only)
@@ -248,9 +248,9 @@ def forget(path: Path, tag_id: str, *, pose_only: bool, by: str, at_ns: int) -> 
 
 
 def records(connection: sqlite3.Connection) -> Iterator[Mapping[str, object]]:
-    """What was forgotten, the oldest first.
+    """The records of what was forgotten, the oldest first.
 
-    `tag`, `what`, `by`, `at`: ns of wall time, `seq`: the last number that was given before it.
+    Keys: `tag`, `what`, `by`, `at` (ns of wall time), `seq` (the last number given before it).
     """
     found = connection.execute(
         "SELECT value FROM meta WHERE key LIKE ? ORDER BY length(key), key", (f"{RECORD}%",)
@@ -270,10 +270,10 @@ def _check_known(connection: sqlite3.Connection, path: Path, tag_id: str) -> Non
 
 
 def delete_recorded(connection: sqlite3.Connection, record: str) -> None:
-    """Delete in a copy of the log what one of the `records`, JSON, says was deleted in it.
+    """Repeat a deletion in a copy of the journal, from one of its `records`, as JSON.
 
     Raises:
-        ValueError, KeyError, TypeError: it is none.
+        ValueError, KeyError, TypeError: it is not a record.
 
     """
     found = json.loads(record)
@@ -284,7 +284,7 @@ def delete_recorded(connection: sqlite3.Connection, record: str) -> None:
 def delete_tag(
     connection: sqlite3.Connection, tag_id: str, upto: int, *, pose_only: bool
 ) -> Forgotten:
-    """Delete a tag's places, or all that is known of it, up to a number."""
+    """Delete a tag's places, or everything about it, up to a number."""
 
     def gone(table: str, which: str) -> int:
         query = {"site": LOCAL_SITE, "tag": tag_id, "upto": upto}

@@ -1,4 +1,4 @@
-"""Writes out of the journal's tables; its texts as values."""
+"""Reads scans and inspections from the journal's tables, and parses the JSON in them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
 
 
 def weight(write: Write) -> int:
-    """What a write costs in memory, in readings or flowers."""
+    """The size of a write in memory, counted in readings, flowers and footprint points."""
     if isinstance(write, Scan):
         return 1 + len(write.readings)
     if isinstance(write, Inspection) and write.flower is not None:
@@ -45,9 +45,9 @@ def last_rows(connection: sqlite3.Connection, run: Run) -> list[Scan | Inspectio
 
 
 def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan | Inspection]:
-    """The last scans and inspections of a tag in the run of now, in the order of receiving.
+    """The last scans and inspections of a tag in the current run, in the order of arrival.
 
-    Each series by itself, which is quick on both engines.
+    Each series is read by itself, which is fast in both SQLite and PostgreSQL.
     """
     span = span_at(runs(connection.execute), FOREVER_NS)
     if span is None:
@@ -74,7 +74,7 @@ def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan 
 def listed_rows(
     connection: sqlite3.Connection, run: int, scans: Sequence[int], inspections: Sequence[int]
 ) -> list[tuple[int, Scan | Inspection]]:
-    """The scans and inspections of a run with these seqs, each with its own."""
+    """The scans and inspections of a run with these seqs, as (seq, write)."""
     query = {"site": LOCAL_SITE, "run": run, "scans": json.dumps(scans)}
     query["looks"] = json.dumps(inspections)
     return _rows(
@@ -90,7 +90,7 @@ def listed_rows(
 def _rows(
     connection: sqlite3.Connection, scans: str, inspections: str, query: dict[str, Any]
 ) -> list[tuple[int, Scan | Inspection]]:
-    """Scans and inspections (`r`) with their seqs, out of these joins with the series (`s`)."""
+    """Scans and inspections (`r`), as (seq, write), from these joins with the series (`s`)."""
     return [*_scans(connection, scans, query), *_inspections(connection, inspections, query)]
 
 
@@ -137,10 +137,10 @@ def _inspections(
 
 
 def numbers_of(texts: Sequence[str]) -> list[list[float]]:
-    """Many JSON lists of numbers at once; null is NaN.
+    """Parse many JSON lists of numbers at once; null is NaN.
 
     Raises:
-        DamagedFile: one of them is none.
+        DamagedFile: a text is not a list of numbers.
 
     """
     joined = f"[{','.join(texts)}]"
@@ -148,7 +148,7 @@ def numbers_of(texts: Sequence[str]) -> list[list[float]]:
         every: list[list[Any]] = json.loads(joined, parse_int=float)
         if "null" in joined:
             every = [[math.nan if value is None else value for value in row] for row in every]
-        sum(map(sum, every))  # what is no number cannot be added
+        sum(map(sum, every))  # raises unless all are numbers
     except (ValueError, TypeError, RecursionError):
         every = []
     if len(every) != len(texts):
@@ -159,10 +159,10 @@ def numbers_of(texts: Sequence[str]) -> list[list[float]]:
 def named_numbers(
     sensors: Iterable[str], readings: Sequence[str]
 ) -> list[tuple[tuple[str, ...], list[float]]]:
-    """Of many scans, the names of their sensors and what those read.
+    """Parse the sensor names and the readings of many scans.
 
     Raises:
-        DamagedFile: one of the texts is none, or there are more or fewer readings than sensors.
+        DamagedFile: a text is invalid, or there are more or fewer readings than sensors.
 
     """
     found = list(zip(map(sensor_names, sensors), numbers_of(readings), strict=True))
@@ -189,10 +189,10 @@ def sensor_names(text: str) -> tuple[str, ...]:
 
 
 def flower_of(row: Sequence[Any]) -> Flower:
-    """An inspection of flowers, its columns from species on, without `is_copy`.
+    """Make a flower from the columns of an inspection, from species on, without `is_copy`.
 
     Raises:
-        DamagedFile: its blooms or its box are none.
+        DamagedFile: its blooms or its box are invalid.
 
     """
     species, confidence, anomaly, flower_count, bug_count, blooms, box = row

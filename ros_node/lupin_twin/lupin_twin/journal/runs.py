@@ -1,10 +1,11 @@
-"""Runs of the clock: which one a twin that starts is in, and which one a moment belongs to.
+"""Runs of the clock: which one a starting twin is in, and which one a moment belongs to.
 
-Wall time goes on over a restart, and is set a little now and then; a simulation begins again at 0:
-what it said yesterday at second 500 must not look fresh at second 510 today.
+In a run, ROS time goes forward. Wall time continues over a restart, and is corrected a little now
+and then. A simulation begins again at 0: an observation of yesterday at second 500 must not look
+fresh at second 510 today.
 
-Where runs overlap, the newest that holds a moment has it. Between the end of a run and the next
-one's beginning the earlier one goes on, and so does the last; before all of them is the first.
+If runs overlap, a moment belongs to the latest that contains it. A run lasts until the next one
+begins, and the last one forever; the first one also has all time before it.
 """
 
 from __future__ import annotations
@@ -21,25 +22,25 @@ from lupin_twin.core.parameters import World
 from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.journal.schema import DAY_LENGTH, LOCAL_SITE, ORIGIN, SiteLog
 
-# A wall clock that is set back by no more is the same clock, corrected.
+# A wall clock that is set back by at most this was only corrected: the run goes on.
 CORRECTION_NS: Final = 300 * 1_000_000_000
-# How much faster than before a simulation may go on.
+# How much faster than before a simulation that goes on may be.
 _FASTER: Final = 2.0
 
 
 class Turn(Enum):
-    """Why a clock is followed anew."""
+    """What a clock did, so that its run has to be determined anew."""
 
     START = "start"
-    BELIEVED = "believed"  # the start, with a clock that contradicts the log and stays so
+    BELIEVED = "believed"  # the start, with a clock that keeps contradicting the journal
     STEP = "step"  # a wall clock was set back a little: the run goes on
-    BACK = "back"  # a new run
-    AHEAD = "ahead"  # a wall clock jumped ahead: a run that it had gone back from may go on
+    BACK = "back"  # the clock went back: a new run
+    AHEAD = "ahead"  # a wall clock jumped ahead: the run that it had gone back from may go on
 
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """A moment on both clocks, ns: ROS time, which may be simulated, and the wall's."""
+    """A moment on both clocks, ns: ROS time, which may be simulated, and wall time."""
 
     stamp_ns: int
     arrival_ns: int
@@ -48,9 +49,9 @@ class Clock:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A stretch of ROS time, or a step within one (`joins` is the run that it is part of).
+    """A run of the clock, or a step within one (`joins` is the run that it is part of).
 
-    What holds in it was written with `begun_seq` or later, copies of what was known included.
+    Its rows have the number `begun_seq` or a later one, including copies of what was known.
     """
 
     id: int
@@ -67,7 +68,7 @@ class Run:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A stretch of ROS time, `start_ns <= stamp < end_ns`, and the run that it belongs to."""
+    """A period of ROS time, `start_ns <= stamp < end_ns`, and the run that it belongs to."""
 
     run: Run
     start_ns: int
@@ -75,7 +76,7 @@ class Span:
 
 
 def runs(execute: Callable[..., Any]) -> list[Run]:
-    """Every run and step, in the order in which they began; of a connection to either engine."""
+    """Every run and step, in the order in which they began; in SQLite or PostgreSQL."""
     return [
         Run(row[0], Clock(row[2], row[3], bool(row[1])), row[4], row[5], row[6])
         for row in execute(
@@ -87,30 +88,30 @@ def runs(execute: Callable[..., Any]) -> list[Run]:
 
 
 def since_seq(every: Iterable[Run], root: int, at_ns: int) -> int:
-    """From which seq on the rows of a run hold as of a moment: its last step by then."""
+    """The seq from which rows of a run count as of a moment: that of its last step by then."""
     steps = [run for run in every if run.root == root]
     begun = [run for run in steps if run.begun.stamp_ns <= at_ns]
     return (begun or steps)[-1 if begun else 0].begun_seq
 
 
 def spans(every: Iterable[Run]) -> tuple[Span, ...]:
-    """All of the axis from 0 to `FOREVER_NS`, in order; empty where there is no run."""
+    """Divide the time axis from 0 to `FOREVER_NS` among the runs, in order; empty without a run."""
     every = list(every)
     roots = [run for run in every if run.joins is None]
-    # A step may lead to before the beginning.
+    # A step may begin before its run.
     begun: dict[int, int] = {}
     for run in every:
         stamp_ns = run.begun.stamp_ns
         begun[run.root] = min(stamp_ns, begun.get(run.root, stamp_ns))
     waiting = sorted(roots, key=lambda run: (begun[run.id], run.id), reverse=True)
-    # A run holds its beginning at least, and the last moment that was received.
+    # A run contains at least its beginning, and the last stamp that was received.
     until = {
         run.id: FOREVER_NS if run.ended_ns is None else max(run.ended_ns, run.begun.stamp_ns) + 1
         for run in roots
     }
     edges = set(begun.values()) | set(until.values()) - {FOREVER_NS}
     starts: list[tuple[int, Run]] = []
-    holding: list[tuple[int, int, Run]] = []  # the newest first
+    holding: list[tuple[int, int, Run]] = []  # the latest first
     for at_ns in sorted(edges):
         while waiting and begun[waiting[-1].id] <= at_ns:
             run = waiting.pop()
@@ -128,14 +129,14 @@ def spans(every: Iterable[Run]) -> tuple[Span, ...]:
 
 
 def span_at(every: Iterable[Run], at_ns: int) -> Span | None:
-    """The span of a moment; None before 0, and where there is no run."""
+    """The span of a moment; None before 0, or if there is no run."""
     found = spans(every)
     index = bisect_right([span.start_ns for span in found], at_ns)
     return found[index - 1] if index else None
 
 
 def world_of(log: SiteLog) -> World:
-    """What is observed, as whoever wrote last has noted it."""
+    """The observed world, as noted by the twin that wrote last."""
     span = span_at(runs(log.execute), FOREVER_NS)
     is_simulated = span is not None and span.run.begun.is_simulated
     origin = origin_of(log.meta(ORIGIN) or "", is_simulated=is_simulated)
@@ -143,7 +144,7 @@ def world_of(log: SiteLog) -> World:
         day_s = float(log.meta(DAY_LENGTH) or "")
     except ValueError:
         day_s = 0.0
-    # Else it is none: all that shows or estimates by the day would end in it.
+    # Any other length is invalid: displays and estimates by the day would fail with it.
     return World(origin, day_s) if 1.0 <= day_s <= World().day_length_s else World(origin)
 
 
@@ -157,7 +158,7 @@ def cut(axis: Iterable[Span], start_ns: int, end_ns: int) -> list[Span]:
 
 
 def put_run(connection: Any, run: Run) -> None:
-    """Have a run in the file."""
+    """Write a run into the file."""
     connection.execute(
         "INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
         (
@@ -174,11 +175,11 @@ def put_run(connection: Any, run: Run) -> None:
 
 
 def simulation_goes_on(begun: Clock, last: Clock, now: Clock) -> bool:
-    """Whether a simulation that is received `now` is the one last received at `last`.
+    """Whether the simulation that is received `now` is the one that was last received at `last`.
 
-    It is if its clock is further on than one could be that began after the last word of the old
-    one: at twice the pace that the old one had, or the wall's. Where the wall's clock was set back
-    meanwhile, how long that was is not known, and it is another.
+    It is, if its clock is further than that of a new one could be. That would have begun after
+    `last`, and run at most twice as fast as the old one, or as wall time. If the wall clock was set
+    back meanwhile, the time between is unknown, and it counts as a new one.
     """
     waited_ns = now.arrival_ns - last.arrival_ns
     if waited_ns < -CORRECTION_NS:
@@ -190,7 +191,7 @@ def simulation_goes_on(begun: Clock, last: Clock, now: Clock) -> bool:
 
 
 def turn_of(before: Clock, now: Clock, jumped_ns: int) -> Turn | None:
-    """What a clock has done while the twin lived; None: it went on.
+    """What a clock did while the twin was running; None: it just went on.
 
     `jumped_ns` is how much further it went than the steady clock.
     """

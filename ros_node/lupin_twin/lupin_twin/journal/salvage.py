@@ -1,8 +1,8 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""A damaged file: quarantined under a name that says when, and what can be read of it copied.
+"""Quarantines a damaged journal under a dated name, and copies what can be read into a new one.
 
-SQLite itself reads it, on both sides of each damaged page. What the copy loses with a page are its
-rows, and those of the pages that only it leads to.
+SQLite itself reads the file, on both sides of each damaged page. With such a page, the copy loses
+its rows, and those of the pages that are reachable only through it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from lupin_twin.journal.schema import (
     transaction,
 )
 
-# Rows that are read in one go; around damage, fewer.
+# Rows that are read at once; around damage, fewer.
 _LOT: Final = 1_000
 _LAST: Final = 2**61
 _LEAST_ROW_BYTES: Final = 20
@@ -45,7 +45,7 @@ _TYPES: Final[Mapping[str, tuple[type, ...]]] = {
     "DOUBLE PRECISION": (int, float),
 }
 _ALL: Final = "SELECT * FROM {0} WHERE site = 'local'"
-# An index of the series has all that their table has.
+# This index has all columns of its table, and so is a second copy of it.
 _SERIES_OF: Final = (
     "SELECT site, series, run, tag, kind, sensors FROM series INDEXED BY series_of"
     " WHERE site = 'local'"
@@ -53,7 +53,7 @@ _SERIES_OF: Final = (
 _TABLES: Final = (
     "run", "series", "scan", "look", "place", "hour", "tally", "event", "note"
 )  # fmt: skip
-# By what each is ordered.
+# Small tables, and the column by which each is ordered.
 _SMALL: Final = {"run": "run", "series": "series", "place": "seq", "note": "id"}
 _NO_RUN: Final = "run NOT IN (SELECT run FROM run)"
 _MEANINGLESS: Final = {
@@ -61,7 +61,7 @@ _MEANINGLESS: Final = {
     "series": f"{_NO_RUN} OR NOT json_valid(sensors)",
     "place": _NO_RUN,
 }
-# What was counted of deleted rows is kept; of rows that are there it is counted again.
+# Counts of deleted rows are copied; rows that exist are counted again.
 _COUNTED: Final = {
     "hour": ("series", f"hour <= :at / {HOUR_NS}"),
     "tally": ("run", f"hour <= :at / {HOUR_NS}"),
@@ -80,27 +80,27 @@ Record = tuple[Any, ...]
 
 
 def numbered(path: Path, end: str) -> Iterator[Path]:
-    """Names of files beside one, to find one that is not taken."""
+    """Yield names of files beside `path`, to find one that is not taken."""
     for number in count():
         yield path.with_name(f"{path.name}{end}" + (f"-{number}" if number else ""))
 
 
 def quarantine(path: Path, when: str) -> Path:
-    """Rename a file and its log; returns the new name. Nothing is ever deleted or overwritten."""
+    """Rename a file and its WAL; returns the new path. No data is deleted or overwritten."""
     aside = next(name for name in numbered(path, f".damaged-{when}") if not name.exists())
     log = path.with_name(path.name + "-wal")
     if log.exists():
         log.rename(aside.with_name(aside.name + "-wal"))
-    # The index of the log is made anew from the log; one that is left behind is of another file.
+    # SQLite rebuilds the WAL's index from the WAL; one left behind would be of another file.
     path.with_name(path.name + "-shm").unlink(missing_ok=True)
     path.rename(aside)
     return aside
 
 
 def readable(connection: sqlite3.Connection, select: str, number: str) -> Iterator[list[Record]]:
-    """Lots of rows in the order of their number, their first column; empty ones for damage.
+    """Yield lots of rows in the order of their number, the first column; an empty lot is damage.
 
-    `select` is a query up to the condition of the number: "SELECT id, .. FROM table WHERE".
+    `select` is a query up to the condition on the number: "SELECT id, .. FROM table WHERE".
     """
     text = f"{select} {number} >= ? ORDER BY {number} LIMIT ?"
 
@@ -111,8 +111,8 @@ def readable(connection: sqlite3.Connection, select: str, number: str) -> Iterat
             if is_damage_error(error):
                 return None
             raise
-        # A number may be damaged: none counts that is not between its neighbours. What stands at
-        # the end of a lot comes in the next one.
+        # A number may be damaged: rows count only if it is within the lot's range. The last row of
+        # a full lot is left to the next one.
         numbers = [row[0] for row in rows[-1:] if isinstance(row[0], int)]
         if len(rows) == size > 1:
             del rows[-1]
@@ -121,7 +121,7 @@ def readable(connection: sqlite3.Connection, select: str, number: str) -> Iterat
             for row in rows
             if isinstance(row[0], int) and at <= row[0] <= max(numbers, default=0)
         ]
-        # Nothing, before the end: the order is damaged.
+        # No such row before the end means that the order is damaged.
         return None if not fitting and (rows or at <= end) else fitting
 
     at, size, end = 0, _LOT, -1
@@ -140,7 +140,7 @@ def readable(connection: sqlite3.Connection, select: str, number: str) -> Iterat
 
 
 def _behind_damage(lot: Callable[[int, int], object], bad: int) -> int:
-    """The number from which on rows can be read again."""
+    """The number after damage from which rows can be read again."""
     step = 1
     while bad + step < _LAST and lot(bad + step, 1) is None:
         bad += step
@@ -155,11 +155,11 @@ def _behind_damage(lot: Callable[[int, int], object], bad: int) -> int:
 def salvage(aside: Path, connection: sqlite3.Connection) -> None:
     """Copy what can be read of a quarantined journal into a new one; rows keep their numbers.
 
-    What was copied before, by somebody who was killed amid it, is copied again; of a file that
-    somebody has taken away, nothing.
+    After a salvage that was killed, everything is copied again. If the quarantined file is gone,
+    nothing is copied.
 
     Raises:
-        sqlite3.Error, OSError: the new one cannot be written, or the old one not be opened.
+        sqlite3.Error, OSError: the new one cannot be written, or the old one cannot be opened.
 
     """
     if not aside.exists():
@@ -195,7 +195,7 @@ def _has_tables(old: sqlite3.Connection) -> bool:
 
 
 def _mend(aside: Path, mended: Path) -> None:
-    """A copy of a file with the header and schema of a new one: in each journal they lie there."""
+    """Copy a file with a new one's header and schema, which lie at the same place in each."""
     for end in ("", "-wal"):
         if aside.with_name(aside.name + end).exists():
             shutil.copyfile(aside.with_name(aside.name + end), mended.with_name(mended.name + end))
@@ -205,7 +205,7 @@ def _mend(aside: Path, mended: Path) -> None:
             if number + 1 not in roots:
                 file.seek(number * PAGE_SIZE)
                 file.write(content[number * PAGE_SIZE : (number + 1) * PAGE_SIZE])
-        # How many pages there are tells the file's size.
+        # With a page count of 0, SQLite uses the file's size.
         file.seek(28)
         file.write(bytes(4))
 
@@ -238,14 +238,14 @@ def _copy(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> None:
                 delete_wrong(new, table, behind, last)
                 count_rows(SiteLog(new), behind, last, purged)
             behind = last
-            # What is in the file already need not be in its log too.
+            # Move each lot into the file, so that the WAL does not grow.
             new.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
 
 
 def _both_ends(
     old: sqlite3.Connection, select: str, by: str, values: Mapping[str, Any] | None = None
 ) -> Iterator[Record]:
-    """Rows from the first one on until some are damaged, and so from the last one on."""
+    """Yield rows from the first one up to damage, then from the last one back to damage."""
     for order in ("ASC", "DESC"):
         try:
             yield from old.execute(f"{select} ORDER BY {by} {order}", values or {})
@@ -257,18 +257,18 @@ def _both_ends(
 
 
 def _copy_facts(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> dict[int, int]:
-    """What is noted of the log as a whole; returns the last deleted stamp of each run."""
+    """Copy facts about the journal as a whole; returns the last deleted stamp of each run."""
     purged, largest = {}, size // _LEAST_ROW_BYTES
     for _, key, value in _both_ends(old, _ALL.format("meta"), "key"):
         run = str(key).removeprefix(DELETED)
         if key in (LAST_SEQ, PURGED_SEQ) and str(value).isdecimal():
             largest = max(largest, int(value))
         if run != key and run.isdecimal() and str(value).isdecimal():
-            # All of that hour is counted.
+            # The whole hour is counted already.
             purged[int(run)] = (int(value) // HOUR_NS + 1) * HOUR_NS - 1
         if key not in ("journal_id", "salvage", LAST_SEQ):
             set_meta(new, key, value)
-    # The numbers go on past all that may have been lost at the end.
+    # New numbers are past those of all rows that may have been lost at the end.
     set_meta(new, LAST_SEQ, largest + 1_000_000)
     return purged
 

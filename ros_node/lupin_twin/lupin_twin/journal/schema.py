@@ -1,23 +1,23 @@
-"""The tables, for SQLite and PostgreSQL alike, how a file with them is opened, and one site's rows.
+"""The journal's tables, for SQLite and PostgreSQL alike; opening a file; queries on one site.
 
-Plain SQL that any tool reads. `site` leads every key; in a twin's own file there is one, `local`.
-Times are ns: stamps ROS time, arrivals wall time.
+Plain SQL that any tool reads. `site` leads every key; a twin's own file has only one, `local`.
+Times are ns: stamps are ROS time, arrivals are wall time.
 
-`seq` is one sequence over scan, look and place, in the order in which things were received; the
-number of a series is the seq of its first write. Inspections have one too, of kind 1 without
-sensors; the id of a note begins with its own. A failed attempt is a scan with another status than
-0, a failed inspection of flowers one of that series. `own_stamp_ns` is the stamp that was sent,
-where that could not be true (from the future; 0: none), NULL where it is `stamp_ns`, and -1 in a
-copy that is known by no stamp. A copy (`is_copy`) is what was known as a run or a step began;
-`begun_seq` is its first. A step is a row of `run` that `joins` another: the same run, whose clock
-was set a little. Rows refer to the run, never to the step. `ended_stamp_ns` is NULL in the run that
-goes on, and in a step.
+`seq` is one sequence over scan, look and place, in the order of arrival. The number of a series is
+the seq of its first write. Inspections have a series too, of kind 1 without sensors; the id of a
+note begins with its number. A failed attempt is a scan whose status is not 0; a failed inspection
+is such a scan in the inspections' series. `own_stamp_ns` is the stamp that was sent, if it cannot
+be true (from the future; 0: none). It is NULL if it equals `stamp_ns`, and -1 in a copy that no
+stamp identifies. A copy (`is_copy`) is what was known when a run or a step began; `begun_seq` is
+the first copy. A step is a row of `run` that `joins` another: the same run, whose clock was
+corrected a little. Rows refer to the run, never to the step. `ended_stamp_ns` is NULL in the
+current run, and in a step.
 
-What follows from the rows is written with them, copies left out, and outlives them (see `hours`).
-`hour` has the finite readings of each sensor, in the order of `sensors`, as JSON lists: how many,
-their sum, least and largest. `tally` has the same of the site's scans, failures and inspections,
-with the first stamp and the last. `event` has what is rare: pests seen and cleared, with the number
-of bugs, and stretches of more than ten minutes without an attempt, in ns.
+Counts are written with their rows, without copies, and outlive them (see `hours`). `hour` has the
+finite readings of each sensor, in the order of `sensors`, as JSON lists: count, sum, minimum and
+maximum. `tally` has the same of the site's scans, failures and inspections, with the first and the
+last stamp. `event` has what is rare: pests seen and cleared, with the number of bugs, and silences
+(more than ten minutes without an attempt), in ns.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ from urllib.parse import quote
 APPLICATION_ID: Final = 0x4C55504A  # "LUPJ"
 VERSION: Final = 4
 LOCAL_SITE: Final = "local"
-# The tables of what was received.
+# The tables of observations.
 WRITTEN: Final = ("scan", "look")
 
-# A commit writes whole pages, and a commit is a few scans: measured, fewest bytes to the disk.
+# A commit has a few scans, and writes whole pages: this size was measured to write fewest bytes.
 PAGE_SIZE: Final = 1024
 
-# {key}: what SQLite keeps a table by, PostgreSQL has no such thing. {json}: both have `->>` for it.
-# {months}: PostgreSQL has large tables in parts by month of the stamp, which is in the key then.
+# {key}: a clause that only SQLite has. {json}: a type that has `->>` in both. {months}: PostgreSQL
+# partitions large tables by month of the stamp, which then is part of the key.
 _TABLES: Final = """
 CREATE TABLE meta (
     site TEXT NOT NULL, key TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (site, key)
@@ -113,35 +113,35 @@ CREATE TABLE note (
 """
 _KEYED: Final = " WITHOUT ROWID"
 SQLITE_TABLES: Final = _TABLES.format(key=_KEYED, months=_KEYED, stamp="", json="TEXT")
-# Its parts are made by the archive.
+# The archive creates the partitions.
 POSTGRESQL_TABLES: Final = _TABLES.format(
     key="", months=" PARTITION BY RANGE (stamp_ns)", stamp=", stamp_ns", json="JSON"
 )
 
 _MAGIC: Final = b"SQLite format 3\0"
-# Errors that say that the file itself is no longer what was written.
+# Error codes which mean that the file itself is damaged.
 _DAMAGE: Final = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB})
 _BAD_TEXT: Final = ("Could not decode to UTF-8", "malformed JSON")
 
 
 class Foreign(Exception):
-    """A file of somebody else, or of another version: it is left as it is."""
+    """The file is another program's, or of another version; it is left as it is."""
 
 
 class Empty(FileNotFoundError):
-    """A file with nothing in it: a journal that is just being made."""
+    """The file is empty: a journal that is just being created."""
 
 
 class NotPossible(Exception):
-    """What cannot be done with a file now; the message says why. The file is as it was."""
+    """A file does not allow the operation now; the message says why. The file is unchanged."""
 
 
 class DamagedFile(Exception):
-    """A journal whose header or tables are not what was written."""
+    """The journal's header, tables or rows are not what was written."""
 
 
-# What opening or reading a file that is no longer what was written may end in. Python cannot decode
-# what SQLite quotes of a damaged table.
+# Errors that opening or reading a damaged file may raise. Python may fail to decode what SQLite
+# quotes from a damaged table.
 FILE_ERRORS: Final = (sqlite3.Error, DamagedFile, UnicodeDecodeError)
 
 
@@ -149,7 +149,7 @@ def is_damage_error(error: BaseException) -> bool:
     """Whether an error means that the file is damaged."""
     if isinstance(error, (DamagedFile, UnicodeDecodeError)):
         return True
-    # A text that is none any more: SQLite does not look into texts, Python and its JSON do.
+    # A damaged text: SQLite does not check texts, but Python and the JSON functions do.
     if isinstance(error, sqlite3.Error) and str(error).startswith(_BAD_TEXT):
         return True
     code = getattr(error, "sqlite_errorcode", None)
@@ -157,13 +157,13 @@ def is_damage_error(error: BaseException) -> bool:
 
 
 def open_writer(path: Path) -> sqlite3.Connection:
-    """The one connection that writes, in the calling thread; makes the file where there is none.
+    """Open the one connection that writes, in the calling thread; creates a missing file.
 
-    A commit goes to the write-ahead log and is not waited for: whoever holds the connection
-    syncs that. Nothing is checkpointed unless requested.
+    A commit goes to the write-ahead log (WAL), and is not synced: the owner of the connection has
+    to do that. Nothing is checkpointed unless requested.
 
     Raises:
-        Foreign: the file is somebody else's, or of another version.
+        Foreign: the file is another program's, or of another version.
         sqlite3.Error, OSError: it cannot be opened, or is damaged (`is_damage_error`).
 
     """
@@ -178,7 +178,7 @@ def open_writer(path: Path) -> sqlite3.Connection:
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = NORMAL")
         connection.execute("PRAGMA wal_autocheckpoint = 0")
-        # The log begins again behind a checkpoint, and its size tells how much of it is new.
+        # The WAL is truncated after a checkpoint, so that its size tells how much of it is new.
         connection.execute("PRAGMA journal_size_limit = 0")
         connection.execute("PRAGMA cache_size = -16000")
     except BaseException:
@@ -187,7 +187,7 @@ def open_writer(path: Path) -> sqlite3.Connection:
     return connection
 
 
-# All of it comes in one transaction: for the mode of the vacuum alone SQLite writes a page too.
+# All in one transaction: SQLite writes a page even for setting auto_vacuum alone.
 _NEW: Final = (
     f"PRAGMA page_size = {PAGE_SIZE}; BEGIN; PRAGMA auto_vacuum = INCREMENTAL; {SQLITE_TABLES}"  # noqa: S608
     f" INSERT INTO site VALUES ('{LOCAL_SITE}', '');"
@@ -204,7 +204,7 @@ def _create(connection: sqlite3.Connection, path: Path) -> None:
 
 
 def empty_file() -> tuple[bytes, frozenset[int]]:
-    """The bytes of a new journal, and the numbers of its pages with a table's or index's rows."""
+    """The bytes of a new journal, and the numbers of the root pages of its tables and indexes."""
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as new:
         new.executescript(_NEW)
         roots = new.execute("SELECT rootpage FROM sqlite_schema")
@@ -213,7 +213,7 @@ def empty_file() -> tuple[bytes, frozenset[int]]:
 
 @contextmanager
 def transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """All or nothing of what is written within."""
+    """Write everything within, or nothing."""
     connection.execute("BEGIN IMMEDIATE")
     try:
         yield
@@ -226,16 +226,16 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
 
 @contextmanager
 def one_view(connection: sqlite3.Connection) -> Iterator[None]:
-    """All that is read within is of one moment; keep it short, for the log grows meanwhile."""
+    """Read everything within as of one moment; keep it short, because the WAL grows meanwhile."""
     connection.execute("BEGIN")
     try:
         yield
     finally:
-        connection.rollback()  # does nothing where an interrupted statement has ended it
+        connection.rollback()  # does nothing if an interrupted statement has ended it
 
 
 def sync(path: Path) -> None:
-    """Make a file last, or the names in a folder."""
+    """Sync a file, or the names in a folder, to the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -244,16 +244,16 @@ def sync(path: Path) -> None:
 
 
 def open_reader(path: Path, *, is_still: bool = False) -> sqlite3.Connection:
-    """A connection that cannot write; it may be used in one thread at a time.
+    """Open a connection that cannot write; it may be used in one thread at a time.
 
-    `is_still`: nobody writes the file, and it has no log: then its folder may be read-only too.
+    `is_still`: nobody writes the file, and it has no WAL, so its folder may be read-only too.
 
     Raises:
         Empty: nothing is in it yet.
         Foreign, DamagedFile, sqlite3.Error, OSError: as `open_writer`.
 
     """
-    # To open a FIFO would wait for ever.
+    # Opening a FIFO would wait forever.
     if path.exists() and not path.is_file():
         raise Foreign(f"{path} is no journal: it is no regular file")
     connection = sqlite3.connect(
@@ -274,7 +274,7 @@ def open_reader(path: Path, *, is_still: bool = False) -> sqlite3.Connection:
 
 
 def open_named(path: Path, *, is_still: bool = False) -> sqlite3.Connection:
-    """As `open_reader`, of a file that somebody names: what is no database is not called damaged.
+    """As `open_reader`, for a file that a user names: one that is no database is `Foreign`.
 
     Raises:
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_reader`.
@@ -283,8 +283,8 @@ def open_named(path: Path, *, is_still: bool = False) -> sqlite3.Connection:
     try:
         return open_reader(path, is_still=is_still)
     except (sqlite3.DatabaseError, Empty) as error:
-        # Looked at only now: to close a file that SQLite has open takes its locks away. To SQLite
-        # a file of a few bytes is empty.
+        # Only now, because closing a file that SQLite has open releases its locks. For SQLite, a
+        # file of a few bytes is empty.
         code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_NOTADB)
         if code == sqlite3.SQLITE_NOTADB and _starts_as_something_else(path):
             raise Foreign(
@@ -299,8 +299,8 @@ def _starts_as_something_else(path: Path) -> bool:
 
 
 def _check_identity(connection: sqlite3.Connection, path: Path) -> frozenset[bytes]:
-    """The indexes that an earlier release has not made: queries need none of them."""
-    # This first: all that a file that is being made is to hold comes at once.
+    """Check that a file is a journal; returns the SQL of indexes that an earlier release lacks."""
+    # Checked first: a new file gets all of its content at once.
     if connection.execute("PRAGMA page_count").fetchone() == (0,):
         raise Empty(f"{path} is empty: a journal that is just being made, or none")
     (application_id,) = connection.execute("PRAGMA application_id").fetchone()
@@ -311,7 +311,7 @@ def _check_identity(connection: sqlite3.Connection, path: Path) -> frozenset[byt
             raise DamagedFile(f"{path} is a journal with a damaged header")
         raise Foreign(f"{path} is a database, but not a journal of lupin-twin")
     if version != VERSION:
-        # No release wrote an earlier one than that (`rebuild`).
+        # No release wrote a version before that (see `rebuild`).
         is_before = version == VERSION - 1
         what = "a twin that starts with it upgrades it" if is_before else "it cannot be read"
         raise Foreign(
@@ -335,10 +335,10 @@ def _own_tables() -> frozenset[bytes]:
         return frozenset(sql for (sql,) in new.execute(_SCHEMA))
 
 
-# Facts: where what is recorded comes from, and how long a day takes there, see `World`.
+# Keys of facts: the origin of the observations, and the length of a day, see `World`.
 ORIGIN: Final = "origin"
 DAY_LENGTH: Final = "day_length_s"
-# Another: the newest map, see `explored.text_of`.
+# The latest map, see `explored.text_of`.
 MAP: Final = "map"
 
 # --- one site's rows ------------------------------------------------------------------------------
@@ -356,31 +356,31 @@ _NAME: Final = re.compile(r":([a-z_]+)")
 
 @dataclass(frozen=True, slots=True)
 class SiteLog:
-    """Where queries go to; each may name `:site`, and other values as `:name`.
+    """Runs queries on one site's journal; each may name `:site`, and other values as `:name`.
 
-    Who asks more than one holds a transaction: what they find is of one moment then.
+    To run several queries as of one moment, hold a transaction.
     """
 
     connection: Any
     site: str = LOCAL_SITE
 
     def execute(self, sql: str, values: Mapping[str, Any] = _NOTHING) -> Any:
-        """A cursor; its rows come as tuples."""
+        """Execute SQL; returns a cursor whose rows are tuples."""
         return self.connection.execute(self._of_engine(sql), {**values, "site": self.site})
 
     def execute_many(self, sql: str, rows: Sequence[tuple[Any, ...]]) -> None:
-        """The same statement for many rows of values, each for a `?`."""
+        """Execute a statement for many rows of values, one for each `?`."""
         if rows:
             self.connection.cursor().executemany(self._of_engine(sql), rows)
 
     def meta(self, key: str) -> str | None:
-        """A noted fact about the log as a whole, None where it is not noted."""
+        """A noted fact about the journal as a whole; None if it is not noted."""
         found = self.execute(_META, {"key": key}).fetchone()
         return None if found is None else str(found[0])
 
     @property
     def journal_id(self) -> str:
-        """One log's name among logs: what was quarantined has another in its place."""
+        """The journal's unique id; the file in a quarantined one's place has another."""
         return self.meta("journal_id") or ""
 
     def _of_engine(self, sql: str) -> str:
@@ -398,10 +398,10 @@ def json_text(values: Sequence[object]) -> str:
 
 
 def get_meta(connection: sqlite3.Connection, key: str) -> str | None:
-    """A noted fact about this twin's own log, None where it is not noted."""
+    """A noted fact about this twin's own journal; None if it is not noted."""
     return SiteLog(connection).meta(key)
 
 
 def set_meta(connection: sqlite3.Connection, key: str, value: object) -> None:
-    """Note a fact about this twin's own log."""
+    """Note a fact about this twin's own journal."""
     SiteLog(connection).execute(_SET_META, {"key": key, "value": str(value)})

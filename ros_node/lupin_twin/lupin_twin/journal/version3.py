@@ -1,9 +1,9 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""A journal of version 3, as far as its upgrade has to read it: rows of packed bytes.
+"""Reads a journal of version 3, whose rows are packed bytes, as far as its upgrade needs it.
 
-Numbers are little-endian, float32 where that holds all of a row exactly, else float64. The last two
+Numbers are little-endian, float32 if that holds all of a row exactly, else float64. The last two
 bytes of a row's blob are a check over the row's other columns and the bytes before: the high half
-of Adler-32 (RFC 1950, section 8.2). A row whose check does not fit is left out and counted.
+of Adler-32 (RFC 1950, section 8.2). A row whose check fails is left out and counted.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ VERSION: Final = 3
 _SCAN: Final = "id, series, stamp_ns, own_stamp_ns, lag_us, mission, detail, readings"
 _TALLIED: Final = {"scan": Event.SCANS, "failure": Event.FAILURES, "look": Event.INSPECTIONS}
 _NOTHING: Final = -(2**63)
-# What of an earlier run a run begins with.
+# What a run carries over from an earlier one: only places, or everything.
 _PLACES, _ALL = 1, 2
 _COLUMN: Final = struct.Struct("<q")
 _SHAPE: Final = struct.Struct("<HHH")  # flowers, corners of the box, species named
@@ -55,7 +55,7 @@ Bucket = tuple[int, float, float, float]
 
 
 class OldRun(NamedTuple):
-    """A run of the clock; `follows` is the run whose knowledge it carries, or places alone."""
+    """A run of the clock; it carries over what was known in the run `follows`, or only places."""
 
     id: int
     begun: Clock
@@ -79,11 +79,11 @@ class _Series(NamedTuple):
 
 
 class _BadRow(ValueError):
-    """A row that is not what was written."""
+    """The row is not what was written."""
 
 
 class Version3:
-    """What a connection to such a file gives; `damaged` counts the rows that were left out.
+    """Reads an open file of version 3; `damaged` counts the rows that were left out.
 
     Raises:
         sqlite3.Error: the file cannot be read at all.
@@ -101,11 +101,11 @@ class Version3:
         self._tags = {row[0]: str(row[1]) for row in self._table("tag", "id, tag_id")}
         self._names = {row[0]: str(row[1]) for row in self._table("name", "id, text")}
         self._series = dict(self._every_series())
-        # Numbers alone: other keys are not ours to read.
+        # Only numbers are used, see `meta`.
         self._meta = {row[0]: row[1] for row in connection.execute("SELECT key, value FROM meta")}
 
     def meta(self, key: str, default: int = 0) -> int:
-        """A number of the file's own, `default` where it was never set."""
+        """A number in the file's table `meta`; `default` if it was never set."""
         value = self._meta.get(key)
         return value if isinstance(value, int) else default
 
@@ -116,12 +116,12 @@ class Version3:
         )
 
     def last_id(self) -> int:
-        """The number of the last write, about."""
+        """The approximate number of the last write."""
         found = self._all("SELECT max(id) FROM scan UNION SELECT max(id) FROM look", ())
         return max(1, *(number or 0 for (number,) in found))
 
     def hours(self, run: int, until: int) -> Iterator[OldHour]:
-        """What was counted of the readings up to an hour, for each series by itself."""
+        """The counts of readings up to an hour, for each series by itself."""
         # Tags in the order in which they were first received.
         for number, series in sorted(self._series.items(), key=lambda entry: entry[1].tag):
             if series.run != run or not series.sensors:
@@ -152,9 +152,9 @@ class Version3:
                     yield event, hour, *numbers[4 * index : 4 * index + 4], first_ns, last_ns
 
     def event(self, run: int, until: int) -> Iterator[tuple[object, ...]]:
-        """What is rare, up to an hour: pauses of more than ten minutes, and changes of pests.
+        """Rare events up to an hour: silences of more than ten minutes, and changes of pests.
 
-        Event, stamp, number, tag, value.
+        Yields event, stamp, number, tag, value.
         """
         last: int | None = None
         for first_ns, last_ns in self._all(
@@ -174,7 +174,7 @@ class Version3:
                 yield event, stamp_ns, number, self._tags[tag], bugs
 
     def _all(self, sql: str, values: tuple[object, ...]) -> list[tuple[Any, ...]]:
-        """What was counted of deleted rows; where that is damaged, none of it is reported."""
+        """Query the counts of deleted rows; returns none if they are damaged."""
         try:
             return self._connection.execute(sql, values).fetchall()
         except sqlite3.Error as error:
@@ -259,7 +259,7 @@ class Version3:
                 self.damaged += 1
 
     def _table(self, table: str, what: str) -> Iterator[tuple[Any, ...]]:
-        """The rows of a table in the order of their numbers, without those out of reach."""
+        """The rows of a table in the order of their numbers, without unreadable ones."""
         for lot in readable(self._connection, f"SELECT {what} FROM {table} WHERE", "id"):
             self.damaged += not lot
             yield from lot
@@ -269,7 +269,7 @@ class Version3:
 
 
 def _unsealed(columns: tuple[Any, ...], sealed: object) -> bytes:
-    """What was packed, if it is what was written."""
+    """Verify a row's check, and return its packed bytes."""
     if not isinstance(sealed, bytes) or len(sealed) < 2:
         raise _BadRow
     try:

@@ -1,7 +1,7 @@
-"""The journal as the twin sees it: hand over, and get what was known before.
+"""The journal as the twin uses it: it hands rows over, and gets what was known before.
 
-One thread opens, writes, checkpoints and looks after the file; another syncs it. Whatever happens
-to the disk happens to them: nothing here raises, waits or grows without bound for the caller.
+One thread opens, writes, checkpoints and maintains the file; another syncs it. A slow or failing
+disk affects only them: for the caller, nothing here raises, waits or grows without bound.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from lupin_twin.journal.rows import weight
 from lupin_twin.journal.runs import Clock, Run, Turn
 from lupin_twin.journal.schema import DamagedFile, Foreign, is_damage_error
 
-# Readings, flowers and rows together: some 60 MB, twenty minutes of the largest greenhouse.
+# Readings, flowers and rows that may wait: about 60 MB, twenty minutes of the largest greenhouse.
 MAX_WEIGHT: Final = 200_000
 
 
 class Entry(NamedTuple):
-    """A row, the clock it was received by (1: the first), and when: steady clock, and ROS time."""
+    """A row, the number of its era (1: the first), and when it came: steady clock and ROS time."""
 
     era: int
     row: Write
@@ -47,9 +47,9 @@ class Entry(NamedTuple):
 
 
 class Pending:
-    """A queue between two threads. When it is full the oldest are lost, and counted.
+    """A queue between two threads. When it is full, the oldest are lost and counted.
 
-    What is newest is what a twin that starts again needs.
+    The latest are what a restarted twin needs.
     """
 
     def __init__(self) -> None:
@@ -59,11 +59,11 @@ class Pending:
         self._weight = 0
         self._lost = 0
         self._lost_ns: tuple[int, int] | None = None
-        # So many of the oldest are being written.
+        # How many of the oldest are being written.
         self._held = 0
 
     def put(self, entry: Entry) -> None:
-        """Hand over; takes microseconds, whatever the disk does."""
+        """Add an entry; takes microseconds, whatever the disk does."""
         with self._lock:
             self._entries.append(entry)
             self._weight += weight(entry.row)
@@ -72,7 +72,7 @@ class Pending:
             self.arrived.set()
 
     def hold(self, count: int) -> list[Entry]:
-        """At most so many of the oldest; they wait still, and are not lost, until they are done."""
+        """Return at most `count` of the oldest; they stay in the queue, safely, until `done`."""
         self.arrived.clear()
         with self._lock:
             held = list(islice(self._entries, count))
@@ -82,7 +82,7 @@ class Pending:
         return held
 
     def done(self, count: int) -> None:
-        """So many of those are written."""
+        """Remove the first `count` of the held entries, which are written now."""
         with self._lock:
             self._held = 0
             for _ in range(count):
@@ -98,41 +98,41 @@ class Pending:
             self._lost_ns = min(first_ns, lost.at_ns), max(last_ns, lost.at_ns)
 
     def counts(self) -> tuple[int, int, float | None]:
-        """(waiting, lost, when the oldest that waits was handed over)."""
+        """(waiting, lost, when the oldest waiting entry was handed over: steady clock, s)."""
         with self._lock:
             oldest = self._entries[0].handed_over_s if self._entries else None
             return len(self._entries), self._lost, oldest
 
     @property
     def complete_ns(self) -> int | None:
-        """When the first was received that waits or was lost, ROS time; None: there is none."""
+        """When the first waiting or lost entry was received, ROS time; None if there is none."""
         with self._lock:
             found = [entry.at_ns for entry in islice(self._entries, 1)]
             found += (self._lost_ns or ())[:1]
             return min(found, default=None)
 
     def take_lost(self) -> int | None:
-        """When the last of those was received that were lost since this was asked; None: none."""
+        """When the last entry lost since the previous call was received; None if none was lost."""
         with self._lock:
             lost_ns, self._lost_ns = self._lost_ns, None
         return None if lost_ns is None else lost_ns[1]
 
 
-# Rows wait so long for others to share a commit with, from when the first of them was handed over;
-# half of the 100 ms in which they are safe from a killed process. Late ones do not wait.
+# Rows wait this long, from when the first was handed over, for others to share a commit with. They
+# have to be safe from a killed process within 100 ms. Late rows do not wait.
 _GATHER_S: Final = 0.04
 _MAX_BATCH: Final = 500
-_SLOW_S: Final = 1.0  # ten times what is promised: a checkpoint on a slow disk alarms nobody yet
+_SLOW_S: Final = 1.0  # ten times that promise: a checkpoint on a slow disk must not raise an alarm
 _RETRY_S: Final = (0.5, 1.0, 2.0, 5.0, 10.0)
-_IDLE_S: Final = 1.0  # with nothing to write: how often the file is looked after
-# Readers have a file quarantined no oftener: were it their fault, copies would fill the disk.
+_IDLE_S: Final = 1.0  # how often the file is maintained while there is nothing to write
+# Least time between two quarantines caused by readers: if they are wrong, copies fill the disk.
 _HEAL_EVERY_S: Final = 86_400.0
 _WELL: Final = (JournalState.RECORDING, JournalState.OFF)
 _HEALED_IN: Final = (*_WELL, JournalState.FAILING)
 
 
 class _Era(NamedTuple):
-    """A clock that the twin has followed, and why; `before_ns` is where the one before it was."""
+    """A clock that the twin follows, and why; `before_ns` is the last time of the one before."""
 
     clock: Clock
     turn: Turn
@@ -140,9 +140,9 @@ class _Era(NamedTuple):
 
 
 class Journal:
-    """Records from construction to `close`. Every method is for the thread that hands over.
+    """Records from construction to `close`. Unless noted, methods are for the twin's thread.
 
-    `is_temporary`: the file's folder is its own and goes at the end.
+    `is_temporary`: the file is alone in its folder, which is deleted at the end.
     """
 
     def __init__(
@@ -167,14 +167,14 @@ class Journal:
         self._was_attempted = threading.Event()
         self._restored: Restored | None = None
         self._reported = Condition(JournalState.STARTING, "opening the journal", str(path))
-        # The writer thread's own.
+        # Owned by the writer thread.
         self._runs: list[Run] = []
         self._lock: Lock | None = None
         self._failures = 0
         self._is_sound: bool | None = None
         self._heals_from_s = -math.inf
         self._met_damage = self._quarantined = self._left_out = ""
-        # What was received last, as the log has it, where the clock contradicts that.
+        # Wall time of the journal's last arrival, if the clock contradicts it.
         self._doubted_ns: int | None = None
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._thread.start()
@@ -187,17 +187,17 @@ class Journal:
         turn: Turn = Turn.START,
         before_ns: int | None = None,
     ) -> None:
-        """Follow a clock from now on, and say why.
+        """Follow a clock from now on; `turn` tells why.
 
-        Nothing is written before the first. With that, the journal restores; if the clock is
-        doubted, it waits for another start, of one that agrees or is believed.
+        Nothing is written before the first call, which restores what was known. If its clock is
+        doubted, the journal waits for another call, with a clock that agrees or is believed.
         """
         self._was_attempted.clear()
         self._eras.append(_Era(clock, turn, before_ns))
         self._pending.arrived.set()
 
     def write(self, row: Write, at_ns: int | None = None) -> None:
-        """Hand a row over that was received at `at_ns`, ROS time; None: as it was stamped.
+        """Hand over a row that was received at `at_ns`, ROS time; None: at its stamp.
 
         It is safe from a killed process within 100 ms.
         """
@@ -205,7 +205,7 @@ class Journal:
         self._pending.put(Entry(len(self._eras), row, time.monotonic(), at_ns))
 
     def write_note(self, note: Note) -> Future[Note]:
-        """Hand a note over; the future has it with its id, or `NotesUnwritable`, soon."""
+        """Hand over a note; the future soon has it with its id, or raises `NotesUnwritable`."""
         written = self._notes.put(note)
         self._pending.arrived.set()
         if self._stop.is_set() or self._reported.state not in (*_WELL, JournalState.STARTING):
@@ -213,13 +213,13 @@ class Journal:
         return written
 
     def write_map(self, floor: OccupancyMap) -> None:
-        """Hand the newest map over; one that comes before it was written takes its place."""
+        """Hand over the latest map; it replaces one that was not written yet."""
         self._map = floor
 
     def take_restored(self, wait_s: float = 0.0) -> Restored | None:
-        """What was known before, once; None if that is not there (yet).
+        """Return what was known before, once; None if it is not available (yet).
 
-        Waits at most `wait_s`, and no longer than until the file turns out not to be usable.
+        Waits at most `wait_s`, and only until the file turns out to be unusable.
         """
         if wait_s:
             self._was_attempted.wait(wait_s)
@@ -228,12 +228,12 @@ class Journal:
 
     @property
     def condition(self) -> Condition:
-        """How it is doing; for any thread. Where nothing waits, it is complete up to now."""
+        """The journal's condition; for any thread. If nothing waits, it is complete up to now."""
         waiting, lost, oldest_s = self._pending.counts()
         behind_s = 0.0 if oldest_s is None else time.monotonic() - oldest_s
         last = self._reported
         state, detail = last.state, last.detail
-        # What waits for the first clock waits for no disk.
+        # Rows that wait for the first clock do not wait for the disk.
         if self._eras and state in _WELL and behind_s > _SLOW_S:
             state = JournalState.SLOW
             detail = f"the disk is slow: the journal is {behind_s:.0f} s behind"
@@ -250,16 +250,16 @@ class Journal:
         )
 
     def heal(self, damage: str) -> None:
-        """Have the file quarantined, as somebody has met damage in it; for any thread.
+        """Quarantine the file, because a reader has found damage in it; for any thread.
 
-        What can be read of it is read, as at a start. That is done once a day at most.
+        What can be read of it is salvaged, as at a start. This is done at most once a day.
         """
         if self._reported.state in _HEALED_IN and time.monotonic() >= self._heals_from_s:
             self._met_damage = damage
             self._pending.arrived.set()
 
     def close(self, wait_s: float = 1.5) -> None:
-        """Write what is waiting and let go of the file; a disk that hangs is not waited for."""
+        """Write the waiting rows and close the file; a disk that hangs is not waited for."""
         self._stop.set()
         self._pending.arrived.set()
         self._thread.join(wait_s)
@@ -280,7 +280,7 @@ class Journal:
                 if is_damage_error(error):
                     self._is_sound = False
                     if not self._failures:
-                        wait_s = 0.0  # a twin that starts waits for what can be read of it
+                        wait_s = 0.0  # a starting twin waits for what can be salvaged
                 if wait_s:
                     self._was_attempted.set()
             if self._stop.is_set():
@@ -295,7 +295,7 @@ class Journal:
         self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if self._lock is None:
             self._lock = Lock(self._path, self._holder)
-        # One that cannot be read is quarantined like any other.
+        # A damaged one is quarantined, whatever its version.
         if self._is_sound is not False and is_version3(self._path):
             self._left_out = upgrade(self._path, self._report_progress)
         file = JournalFile(self._path, self._limits, is_sound=self._is_sound)
@@ -318,7 +318,7 @@ class Journal:
                 self._report_well(file)
                 if not is_last and not self._pending.arrived.wait(0.0 if has_more else _IDLE_S):
                     continue
-                # Others may be about to come.
+                # Other rows may arrive soon, and share the commit.
                 if not is_last:
                     self._stop.wait(self._gather_s())
         finally:
@@ -330,17 +330,17 @@ class Journal:
 
     def _see_damage(self) -> None:
         damage, self._met_damage = self._met_damage, ""
-        # Two may have met it, one of them a little later.
+        # Two readers may report the same damage, one of them a little later.
         if damage and time.monotonic() >= self._heals_from_s:
             self._heals_from_s = time.monotonic() + _HEAL_EVERY_S
             raise DamagedFile(f"it is damaged ({damage}), and is being quarantined")
 
     def _catch_up(self, file: JournalFile) -> None:
-        """Give each clock that the twin has followed its run; the first one restores."""
+        """Give each era its run; the first one restores what was known."""
         while len(self._runs) < len(self._eras):
             era = self._eras[len(self._runs)]
             if self._runs:
-                # A run begins with what was known: what was received before it is written first.
+                # A run begins with what is known, so rows received before it are written first.
                 self._write(file, all_that_waits=True)
                 self._runs.append(self._next_run(file, self._runs[-1], era))
                 continue
@@ -368,7 +368,7 @@ class Journal:
             entries = self._pending.hold(_MAX_BATCH)
             if not entries:
                 return
-            # An era that has no run yet comes after all that have one.
+            # Entries of an era without a run yet come after all others.
             known = [entry for entry in entries if entry.era <= len(self._runs)]
             written, refused = file.append(
                 [(self._runs[max(0, entry.era - 1)], entry.row) for entry in known]

@@ -1,1 +1,1 @@
-"""The node and its services: the only code of the twin that knows ROS."""
+"""The twin's node and services: the only code of the twin that depends on ROS."""

@@ -40,20 +40,20 @@ from lupin_twin.ros.parameters import naming
 from lupin_twin.runtime import process
 
 WARNING_PERIOD_S: Final = 5.0
-# So long, s, messages that wait are taken one right behind the other before others have their turn.
+# How long, s, waiting messages are taken one after the other before other callbacks have a turn.
 DRAIN_S: Final = 0.02
-# A message that waited for longer, s, before it was read shows that the thread is too slow:
-# at 200 a second, ten of the fifty that may wait. It is believed for as long as says the other.
+# A message that waited longer than this, s, shows that the thread is too slow. At 200 a second, ten
+# of the fifty that may wait do so by then. The thread then counts as behind for `BELIEVED_S`.
 BEHIND_S: Final = 0.05
 BELIEVED_S: Final = 0.25
-# As ROS has it by default, reliable and volatile, but for the depth.
+# The default of ROS, reliable and volatile, except for the depth.
 SERVICE_QOS: Final = QoSProfile(depth=SERVICE_DEPTH)
 
 
 def waker(condition: Any) -> Callable[[], None]:
-    """What wakes a node's thread by a guard condition; nothing, where the node is gone by then.
+    """Return a function that wakes a node's thread by a guard condition, if the node still exists.
 
-    Work that was begun for a node may end after it.
+    Work that was begun for a node may end after the node.
     """
 
     def wake() -> None:
@@ -66,8 +66,8 @@ def waker(condition: Any) -> Callable[[], None]:
 def latched(depth: int) -> QoSProfile:
     """RELIABLE and TRANSIENT_LOCAL: a late subscriber still gets the last `depth` messages.
 
-    Fixed, never inferred from the graph: a profile chosen before the other side is there misses
-    what the other side has latched.
+    Fixed, never inferred from the graph: a profile chosen before the publisher is discovered would
+    miss what it has latched.
     """
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
@@ -78,7 +78,7 @@ def latched(depth: int) -> QoSProfile:
 
 
 def qos_of(topic: Topic) -> QoSProfile:
-    """How a topic of the table of interfaces is published, and subscribed to."""
+    """The QoS of a topic in the table of interfaces, for publishing and subscribing."""
     if topic.is_latched:
         return latched(topic.depth)
     reliability = ReliabilityPolicy.RELIABLE if topic.is_reliable else ReliabilityPolicy.BEST_EFFORT
@@ -88,9 +88,9 @@ def qos_of(topic: Topic) -> QoSProfile:
 def read_message(
     data: bytes, shape: MessageShape, read: Callable[[bytes, Any], Any] = deserialize_message
 ) -> Any | Drop:
-    """The message that `data` holds, serialised; a drop, where it is too large or none.
+    """Deserialise a message; returns a drop if it is too large or cannot be read.
 
-    Its lengths are checked first: ROS would make room for whatever they claim.
+    Its lengths are checked first: ROS would allocate whatever they claim.
     """
     try:
         shape.check(data)
@@ -102,17 +102,17 @@ def read_message(
 
 
 class NodeUtilities:
-    """What one node says and counts; belongs to its thread."""
+    """Subscriptions, warnings and counts of one node; belongs to its thread."""
 
     def __init__(self, node: Node) -> None:
         self.tally = Tally()
-        # When the message in hand was published, by its publisher's clock, and how long before it
-        # was received that was, s, by the two clocks.
+        # When the current message was published, by its publisher's clock, and how long before its
+        # arrival that was, s, by the two clocks.
         self.published_ns = 0
         self.published_ago_s = 0.0
         self.node = node
         self._inputs: list[Input] = []
-        # As it was looked at last.
+        # As of the last `check_inputs`.
         self.input_problems: tuple[str, ...] = ()
         self._drains: list[Callable[[], None]] = []
         self._behind_until_s = -math.inf
@@ -129,20 +129,20 @@ class NodeUtilities:
         callback: Callable[[Any], None],
         is_wanted: Callable[[bytes], bool] | None = None,
     ) -> str:
-        """Have `callback(message)` called, guarded, for each message on a latched topic.
+        """Call `callback(message)`, guarded, for each message on a latched topic.
 
-        Publishers that do not latch it, or are not reliable, are matched too, as soon as DDS
-        reports one that it has matched with no subscription: see `inputs`.
+        Publishers that do not latch, or are not reliable, are matched too, as soon as DDS reports
+        one that matches no subscription: see `inputs`.
 
-        With `is_wanted` the topic is one that is not latched and that many share: what is not
-        wanted, serialised as it is, or is lost of it, is nothing to be counted.
+        `is_wanted` is for a topic that is not latched, and that many nodes share. It selects
+        messages while they are serialised; unwanted and lost ones are not counted.
 
-        `parameter` is what gave the name. Returns the topic as ROS has resolved and remapped it:
-        that is the name in its graph, and in warnings. What is past the limits of `shape` is
-        dropped before a single object is made of it.
+        `parameter` is the parameter that gave the name. Returns the topic's name as resolved and
+        remapped by ROS, as it appears in its graph and in warnings. A message past the limits of
+        `shape` is dropped before a single object is made from it.
 
         Raises:
-            lupin_twin.core.parameters.ParameterError: a name that ROS does not take.
+            lupin_twin.core.parameters.ParameterError: the name is invalid in ROS.
 
         """
         source = Input(depth)
@@ -154,7 +154,7 @@ class NodeUtilities:
             self.published_ns = info["source_timestamp"]
             self.published_ago_s = (info["received_timestamp"] - self.published_ns) / 1e9
             number = info["publication_sequence_number"]
-            # Of depth 1, the newest is wanted and nothing else.
+            # With depth 1, only the latest message is wanted.
             if depth > 1 and number is not None and is_wanted is None:
                 lost = source.gaps.see(number, lambda: int(self.node.count_publishers(name)))
                 if lost:
@@ -202,7 +202,7 @@ class NodeUtilities:
         return listen(source.profiles[level], SubscriptionEventCallbacks(incompatible_qos=guarded))
 
     def every(self, group: Any, period_s: float, what: str, callback: Callable[[], None]) -> Any:
-        """A timer by the steady clock: a paused simulation is no reason to look dead."""
+        """Create a timer on the steady clock, so that it also runs while a simulation is paused."""
         return self.node.create_timer(
             period_s,
             self.guarded(what, callback),
@@ -211,7 +211,7 @@ class NodeUtilities:
         )
 
     def check_inputs(self) -> tuple[str, ...]:
-        """What is wrong with what publishes on latched topics; what is new of it is logged."""
+        """Return what is wrong with the publishers on latched topics; new problems are logged."""
         before, now_s = self.input_problems, time.monotonic()
         domain = self.node.context.get_domain_id()
         self.input_problems = tuple(
@@ -229,10 +229,10 @@ class NodeUtilities:
     def _drain_behind(
         self, subscription: Any, read: Callable[[bytes, dict[str, Any]], None], depth: int
     ) -> None:
-        """Take, behind each message, those that wait.
+        """After each message, also take those that wait.
 
-        The executor brings one message a round, beside whatever else is due: where that takes its
-        time, more come than are taken, and the queue overruns.
+        The executor delivers one message a round, beside whatever else is due. If that takes long,
+        more messages arrive than are taken, and the queue overflows.
         """
 
         def drain(most: float, most_s: float) -> None:
@@ -254,29 +254,30 @@ class NodeUtilities:
         self._drains.append(lambda: drain(depth, math.inf))
 
     def drain(self) -> None:
-        """Take the messages that wait, before something that takes the thread for long.
+        """Take the waiting messages, before work that occupies the thread for long.
 
-        All that there is room for, however long that takes: so nothing waits when that begins.
+        It takes as many as the queues can hold, however long that takes, so that they are empty
+        when the work begins.
         """
         for drain in self._drains:
             drain()
 
     @property
     def is_behind(self) -> bool:
-        """Whether messages have recently waited for long: what can wait should."""
+        """Whether messages have recently waited for long; work that can wait should wait then."""
         return time.monotonic() < self._behind_until_s
 
     def _see_wait(self, received_ns: int) -> None:
-        # By the clock that the middleware stamped it with, if it did.
+        # The middleware stamps arrivals with wall time, if at all.
         if received_ns and time.time_ns() - received_ns > BEHIND_S * 1e9:
             self._behind_until_s = time.monotonic() + BELIEVED_S
 
     def new_map(
         self, msg: Any, topic: str, frame_id: str, before: OccupancyMap | None
     ) -> OccupancyMap | None:
-        """A map that can be used and shows something else than the one before; else None.
+        """Return a valid map that differs from the one before, else None.
 
-        One that cannot is dropped. Its revision is for the caller to say.
+        An invalid one is dropped. The caller has to set the revision.
         """
         if dropped := ingest.wrong_frame(msg.header.frame_id, frame_id):
             self.drop(dropped, topic)
@@ -289,7 +290,7 @@ class NodeUtilities:
         return None if before is not None and new.shows_the_same_as(before) else new
 
     def check_twins(self, twins: TwinCount, topic: str, what: str) -> None:
-        """Count who publishes a twin's state; `what` becomes of it where they are several."""
+        """Count the publishers of a twin's state; warns if several; `what` is the consequence."""
         if twins.see(int(self.node.count_publishers(topic)), time.monotonic()):
             self.warn(
                 ("twins", 0),
@@ -304,11 +305,11 @@ class NodeUtilities:
 
     @property
     def callback_errors(self) -> int:
-        """Errors met by callbacks so far."""
+        """Number of errors in callbacks so far."""
         return self.tally.callback_errors
 
     def counts(self) -> Counts:
-        """All that was dropped, lost and met so far."""
+        """Return all drops, losses and errors so far."""
         return self.tally.value(time.monotonic())
 
     def lose(self, count: int, topic: str) -> None:
@@ -351,7 +352,7 @@ class NodeUtilities:
             )
 
 
-# Between an error and the next try: an executor that fails at once must not take a whole core.
+# Pause after an error, s: an executor that fails at once must not take a whole core.
 PAUSE_S: Final = 0.05
 
 
@@ -359,7 +360,7 @@ def spin_until_shutdown(executor: Any, on_error: Callable[[str, Exception], None
     """Spin until the executor or its context is shut down.
 
     An exception that leaves a callback ends rclpy's own `spin`, and with it a thread that nobody
-    watches. Here it goes to `on_error(what, exception)`, and the spinning goes on.
+    watches. Here it goes to `on_error(what, exception)`, and spinning continues.
     """
     while True:
         try:
@@ -374,20 +375,20 @@ def spin_until_shutdown(executor: Any, on_error: Callable[[str, Exception], None
 
 
 def end_spinning(executor: Any) -> None:
-    """Ask the spinning to end, once, from any thread; a callback that runs now ends first.
+    """Ask the spinning to end, once, from any thread; a callback that is running ends first.
 
-    rclpy's `shutdown` takes apart what a spin that is just about to wait still needs, so it has
-    to run where nothing waits: in the spinning thread itself.
+    rclpy's `shutdown` destroys what a spin that is about to wait still needs. So it has to run in
+    the spinning thread itself.
     """
     executor.create_task(executor.shutdown)
 
 
 @contextmanager
 def running_ros(args: Sequence[str] | None) -> Iterator[None]:
-    """ROS until the end of this; whoever calls it has blocked the signals.
+    """Run ROS until the end of the context; the caller has to block signals before.
 
     Raises:
-        ParameterError: arguments that ROS cannot take.
+        ParameterError: ROS rejects the arguments.
 
     """
     try:
@@ -403,7 +404,7 @@ def running_ros(args: Sequence[str] | None) -> Iterator[None]:
 
 @contextmanager
 def spinning(node: Any, at_end: Callable[[], None] = lambda: None) -> Iterator[None]:
-    """Spin a node in a thread of its own until the end of this; `at_end` is called there."""
+    """Spin a node in its own thread until the end of the context; that thread calls `at_end`."""
     executor = SingleThreadedExecutor()
     executor.add_node(node)
 
@@ -424,7 +425,7 @@ def spinning(node: Any, at_end: Callable[[], None] = lambda: None) -> Iterator[N
 
 
 def run_until_signal(node: Any) -> int:
-    """Spin a node until a stop signal comes; `process.block` was called.
+    """Spin a node until a stop signal comes; the caller has to call `process.block` before.
 
     Returns the exit code: 1 if its thread has died.
     """

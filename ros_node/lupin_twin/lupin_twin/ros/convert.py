@@ -1,8 +1,8 @@
-"""Messages to dataclasses and back: this and the other `convert_…` alone know both.
+"""Converts ROS messages to dataclasses and back; only this and `convert_services` know both.
 
-Everything that comes in is copied into immutable values, everything that goes out is a fresh
-message (or, for the state, one that is cached per tag and rebuilt only when the tag has changed).
-No rule lives here: what was received becomes plain values, and `ingest` says what counts.
+Everything that comes in is copied into immutable values. Everything that goes out is a fresh
+message or, for the state, one that is cached per tag, and rebuilt only when the tag has changed.
+There are no rules here: what was received becomes plain values, and `ingest` decides what counts.
 
 Numbers go into messages as plain Python `float` and `int`: rclpy does not check fields by default
 and would serialise a NumPy scalar as garbage.
@@ -74,7 +74,7 @@ def diagnostics(findings: Iterable[Finding], node: str, now_ns: int) -> Any:
 
 
 def findings_of(msg: Any, state_topic: str) -> Iterator[Finding]:
-    """What the twin says of itself that publishes `state_topic`, by its name from the root on."""
+    """The findings of the twin that publishes `state_topic`, a name from the root on."""
     node = _node_of(msg, state_topic)
     begin = f"{node}: "
     for status in msg.status:
@@ -124,7 +124,7 @@ def shortest(value: float) -> float:
 
 
 def floats(cells: npt.NDArray[np.float32]) -> array[float]:
-    """Cells as a message takes them fastest; copied, for the grid may be cached.
+    """Cells in the type that a message accepts fastest; copied, because the grid may be cached.
 
     0.4 ms for a million; assigning the NumPy array itself takes 72 ms, and a list 15 ms.
     """
@@ -139,7 +139,7 @@ def _saturated(value: int) -> int:
 
 
 def pose_of(pose: Any) -> Pose:
-    """geometry_msgs/Pose as it was sent: what of it counts is for `ingest` to say."""
+    """geometry_msgs/Pose as it was sent; `ingest` decides whether it counts."""
     position, orientation = pose.position, pose.orientation
     return Pose(
         x=float(position.x),
@@ -153,7 +153,7 @@ def pose_of(pose: Any) -> Pose:
 
 
 def received(msg: Any) -> Received:
-    """lupin_msgs/Observation as it was sent; of a flower's pose its own frame counts, if it has."""
+    """lupin_msgs/Observation as it was sent; a flower's pose counts in its own frame, if any."""
     frame_id, pose = msg.header.frame_id, msg.tag_pose_in_map
     sent: Scan | Inspection | None = None
     if msg.kind == KIND_TAG_READING:
@@ -213,7 +213,7 @@ def map_of(msg: Any, revision: int) -> OccupancyMap:
     """nav_msgs/OccupancyGrid as an immutable map.
 
     Raises:
-        ValueError: a malformed map; the message names the defect.
+        ValueError: the map is malformed; the message names the defect.
 
     """
     info = msg.info
@@ -239,11 +239,10 @@ def yaw(orientation: Any) -> float:
 
 
 def snapshot_of(msg: Any, before: Snapshot | None = None, times: Any = None) -> Snapshot:
-    """lupin_msgs/TwinState as a snapshot: the other direction of `StateMessages`.
+    """lupin_msgs/TwinState as a snapshot: the inverse of `StateMessages`.
 
-    `times` is the lupin_msgs/TwinTimes of the same stamp: without it nothing is known of when what
-    was observed, but for the tag's last observation. A tag that is as it was in `before` is the
-    very same value.
+    `times` is the lupin_msgs/TwinTimes of the same stamp; without it, the only time known is that
+    of each tag's last observation. A tag that is as it was in `before` is the same object.
     """
     of_tag = {} if times is None else {each.tag_id: each for each in times.tags}
     tags = (tag_state(each, of_tag.get(each.tag_id)) for each in msg.tags)
@@ -320,7 +319,7 @@ def _readings_message(readings: Iterable[Reading]) -> list[Any]:
 
 
 class StateMessages:
-    """Builds TwinState and TwinTimes of snapshots; caches each tag's parts until the tag changes.
+    """Builds TwinState and TwinTimes from snapshots; caches a tag's parts until the tag changes.
 
     The messages handed out are the builder's own: publish them at once and do not keep them.
     """
@@ -343,7 +342,7 @@ class StateMessages:
         return TwinTimes(header=_header(snapshot), tags=times)
 
     def parts(self, tag: TagState) -> tuple[TagState, Any, Any]:
-        """The tag, its TwinTagState but for the age, and its TagTimes."""
+        """The tag, its TwinTagState without the age, and its TagTimes."""
         cached = self._cache.get(tag.tag_id)
         if cached is None or cached[0] is not tag:
             cached = self._cache[tag.tag_id] = tag, tag_message(tag), times_message(tag)
@@ -407,7 +406,7 @@ def _polygon_message(footprint: Iterable[tuple[float, float, float]]) -> Any:
 
 
 def pose_message(pose: Pose | None) -> Any:
-    """A pose as geometry_msgs/Pose; no pose is `w == 0`, which ROS's default of 1 is not."""
+    """A pose as geometry_msgs/Pose; no pose is `w == 0`, while ROS's default is 1."""
     if pose is None:
         return PoseMsg(orientation=Quaternion(w=0.0))
     return PoseMsg(

@@ -1,7 +1,7 @@
-"""Fields, estimates, the past, and the requests for them, as messages and as values.
+"""Converts requests and responses of the services to dataclasses and back.
 
 What is built here may be large: a state of 20,000 tags is half a million objects. So it is built on
-a worker, and nothing of it is cached.
+a worker, and nothing is cached.
 """
 
 from __future__ import annotations
@@ -48,14 +48,14 @@ from lupin_twin.runtime.estimates import (
 )
 from lupin_twin.runtime.workers import in_turns
 
-# What a field and its response say by the same names.
+# Attributes that have the same names in a grid and in its response.
 _GRID: Final = ("width", "height", "origin_x", "origin_y")
 _SHARED: Final = (*_GRID, "value_min", "value_max", "sample_count")
 _OF_ESTIMATES: Final = (*_GRID, "sd_known")
 
 
 def field_request_of(msg: Any) -> FieldRequest:
-    """GetField.Request as a value; of GetEstimate.Request, what it shares with that."""
+    """GetField.Request as a value; or the part of GetEstimate.Request that is the same."""
     return FieldRequest(msg.sensor_type, **{name: float(getattr(msg, name)) for name in NUMBERS})
 
 
@@ -88,7 +88,7 @@ def response_of(estimate: Estimate) -> Any:
     )
 
 
-# --- what an estimate is worth --------------------------------------------------------------
+# --- reports on estimates -------------------------------------------------------------------
 
 
 def report_request_of(msg: Any) -> ReportRequest:
@@ -97,13 +97,13 @@ def report_request_of(msg: Any) -> ReportRequest:
 
 
 def report_request_message(request: ReportRequest) -> Any:
-    """The other direction of `report_request_of`."""
+    """The inverse of `report_request_of`."""
     return GetEstimateReport.Request(
         sensor_type=request.sensor_type, max_places=request.max_places or 0
     )
 
 
-# Of a `TagCheck` and of the response.
+# Attributes that have the same names in a `TagCheck` and in the response.
 _NUMBERS: Final = ("measured", "expected", "expected_sd", "z", "offset")
 
 
@@ -138,10 +138,10 @@ _CHECKED: Final = (
 
 
 def report_of(response: Any) -> Report:
-    """A GetEstimateReport.Response that is `ok`: the other direction of `report_response`.
+    """A GetEstimateReport.Response that is `ok`, as a value: the inverse of `report_response`.
 
     Raises:
-        ValueError: its lists are not of one length, or are longer than a twin's.
+        ValueError: its lists differ in length, or are longer than any twin's.
 
     """
     tags = [getattr(response, name) for name in ("tag_ids", *_CHECKED, "left_out")]
@@ -179,9 +179,9 @@ def report_of(response: Any) -> Report:
     )
 
 
-# Of tables that are small the rows come each time; of one series, decades of hours.
+# Each lot has all rows of small tables, and maybe decades of hours of one series.
 _MAX_ROWS: Final = 500_000
-# It becomes the name of a file.
+# A journal's id: it becomes the name of a file.
 _ID: Final = re.compile("[0-9a-f]{32}")
 
 
@@ -196,7 +196,7 @@ def writes_request(request: Any) -> WritesRequest:
 
 
 def rows_request_message(after: int) -> Any:
-    """A question for the log's rows behind a number."""
+    """A request for the journal's rows after a number."""
     return GetWrites.Request(after=after, max_count=MAX_WRITES, as_rows=True)
 
 
@@ -208,11 +208,11 @@ def rows_response(lot: Lot) -> Any:
 
 
 def lot_of(response: Any, after: int) -> Lot:
-    """The rows in a GetWrites.Response: the other direction of `rows_response`.
+    """The rows in a GetWrites.Response: the inverse of `rows_response`.
 
     Raises:
         PastRefused, NotRemembered: it is not `ok`.
-        NotALotError: it says nothing new, and that there is more, or it is too much.
+        NotALotError: it has nothing new although there is more, is too large, or has a bad id.
 
     """
     if not response.ok:
@@ -262,8 +262,8 @@ def writes_response(past: PastWrites) -> Any:
 
 
 UINT32_MAX: Final = 4_294_967_295
-# What building an answer takes, and reading one, roughly and at worst, for each tag, and for each
-# reading, flower and point of it.
+# Rough worst-case cost of building or reading an answer, s: for each tag, and for each reading,
+# flower and footprint point of a tag.
 TAG_S: Final = 60e-6
 ITEM_S: Final = 20e-6
 
@@ -274,7 +274,7 @@ ITEM_S: Final = 20e-6
 def state_response(snapshot: Snapshot) -> Any:
     """A snapshot as GetStateAt.Response: its state, and its times with the same stamp.
 
-    For a worker's thread: it rests often.
+    For a worker's thread: it often lets other threads run.
     """
     states = convert.StateMessages()
     for tag in in_turns(snapshot.tags):
@@ -289,7 +289,7 @@ def series_request(request: Any) -> SeriesRequest:
     """GetHistory.Request as a value.
 
     Raises:
-        PastRefused: it cannot be answered.
+        PastRefused: it is invalid.
 
     """
     max_points = int(request.max_points) or DEFAULT_POINTS

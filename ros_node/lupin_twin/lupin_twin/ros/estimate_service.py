@@ -1,4 +1,4 @@
-"""The services of the estimate: requests in, responses made off the node's thread."""
+"""The ROS services of the estimate; their responses are made off the node's thread."""
 
 from __future__ import annotations
 
@@ -42,19 +42,20 @@ from lupin_twin.runtime.estimates import (
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import JobQueue, Query, ShouldStop
 
-# A report, s of one core at worst.
+# Worst-case cost of a report, s of one core.
 _REPORT_S: Final = 2.0
-# A sensor's report serves so long, s: tags are scanned minutes apart. Reports of all sensors, each
-# asked for again and again, take no more than a tenth of a core.
+# A sensor's report is reused for this long, s: tags are scanned minutes apart. The factor limits
+# reports of all sensors, requested again and again, to a tenth of a core.
 REST_S: Final = 30.0
 REST_FACTOR: Final = 9.0
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A requested estimate, and about what making it takes, `cost_s` s of one core.
+    """A requested estimate, and its approximate cost, `cost_s` s of one core.
 
-    `look_up()`, on the node's thread, begins the search for what `make`, on any, makes it of.
+    `look_up()`, on the node's thread, starts the query for the readings. `make`, on any thread,
+    makes the estimate from them.
     """
 
     cost_s: float
@@ -64,11 +65,11 @@ class Task:
 
 @dataclass(slots=True)
 class EstimateService:
-    """The services of one node; belongs to the node's thread.
+    """The estimate's services on one node; belongs to the node's thread.
 
-    All is made when asked, of what the journal has; of each sensor what was found last is retained.
+    Estimates are made on request, from the journal; each sensor's last result is cached.
     `occupancy()` is the latest map, where another tag could stand. `day_length_s` is s of ROS time.
-    Queries about the past are made in the same `queue`: no field waits for one.
+    Queries about the past use the same `queue`, and fields another, so that no field waits for one.
     """
 
     utilities: NodeUtilities
@@ -81,11 +82,11 @@ class EstimateService:
     now_ns: Callable[[], int]
     _known: dict[str, Known] = field(default_factory=dict)
     _rests_until_s: dict[str, float] = field(default_factory=dict)
-    # Sensors whose estimates were reported as too narrow, and have not been better since.
+    # Sensors whose estimates were reported as overconfident, and have not recovered since.
     _warned: set[str] = field(default_factory=set)
 
     def offer(self, node: Any, group: Any) -> None:
-        """Have `node` offer the services, by names relative to its namespace; some answer later."""
+        """Create the services on `node`, with names relative to its namespace."""
         plans = (
             (GetEstimate, GET_ESTIMATE.name, self._estimate),
             (GetEstimateReport, GET_ESTIMATE_REPORT.name, self._report),
@@ -93,10 +94,10 @@ class EstimateService:
         offer(node, group, plans, self.queue, self.utilities.report)
 
     def prepare(self, request: EstimateRequest) -> Task:
-        """What is to be done for an estimate.
+        """Check a request, and return the task of making its estimate.
 
         Raises:
-            FieldRefused, PastRefused: a bad request.
+            FieldRefused, PastRefused: the request is invalid.
 
         """
         now_ns, day_s = self.now_ns(), self.day_length_s
@@ -116,7 +117,7 @@ class EstimateService:
         return Task(cost, look_up, make)
 
     def report(self, request: ReportRequest) -> Future[Report]:
-        """The report to come."""
+        """Request a report; returns its future."""
         answer: Future[Report] = Future()
 
         def reply(report: Report | Exception) -> None:
@@ -137,7 +138,7 @@ class EstimateService:
         reply: Callable[[Any], None],
         write: Callable[[Report], Any],
     ) -> Query:
-        """A report, which `write` makes an answer of on a worker."""
+        """The query for a report, which `write` converts to an answer on a worker."""
         sensor, day_s, occupancy = request.sensor_type, self.day_length_s, self.occupancy()
 
         def look_up() -> Future[Any]:
@@ -170,7 +171,7 @@ class EstimateService:
         return Query(look_up, end, make, _REPORT_S)
 
     def _learn(self, sensor: str, known: Known, took_s: float) -> None:
-        """Retain what was found of a sensor that something can be said of."""
+        """Cache a sensor's new result, if there is one, and warn of problems."""
         if known is self._known.get(sensor) or not (known.loaded or known.failed):
             return
         self._known[sensor] = known
@@ -183,7 +184,7 @@ class EstimateService:
         if report.record.is_trusted is not False:
             self._warned.discard(sensor)
         elif sensor not in self._warned:
-            # Once: for as long as it lasts, /diagnostics and the page say so.
+            # Only once: while it lasts, /diagnostics and the page show it.
             self._warned.add(sensor)
             self.utilities.warn(
                 ("trust", sensor),
@@ -192,7 +193,7 @@ class EstimateService:
             )
 
     def finding(self) -> Finding:
-        """How those do that were asked for, for the twin's diagnostics."""
+        """The state of the requested estimates, for the twin's diagnostics."""
         wrong = []
         for sensor, known in self._known.items():
             if known.report.fit_problem:

@@ -1,8 +1,8 @@
-"""A latched topic as one node receives it: publishers of any QoS, each message once; its problems.
+"""Latched input topics of a node: matches publishers of any QoS, and detects losses and problems.
 
-Fast DDS says nothing when a queue overruns: its event for lost messages stays silent. But each
-writer numbers what it writes. Which writer a message is from is not known, so numbers are matched
-to writers by where each of them left off.
+Fast DDS does not report when a queue overflows: its event for lost messages stays silent. But each
+writer numbers its messages. A message does not name its writer, so its number is matched to the
+writer whose last number it continues.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from lupin_twin.runtime.process import FOLDER, ports
 
 # What rclpy calls a node whose name DDS does not know (rmw_dds_common, graph_cache.cpp).
 _NO_NAME: Final = "_NODE_NAME_UNKNOWN_"
-# What was latched comes as a publisher is found; what is lost on the way comes again within 3 s.
+# Latched messages arrive when a publisher is discovered; lost ones are sent again within 3 s.
 SETTLED_S: Final = 5.0
 # rmw_fastrtps makes its own transports for LOCALHOST (8.4.3, participant.cpp).
 _HINT: Final = (
@@ -30,10 +30,10 @@ _HINT: Final = (
 
 
 def _profiles(depth: int) -> tuple[QoSProfile, ...]:
-    """How a latched topic is subscribed to, the best first; each matches more publishers.
+    """QoS profiles for subscribing to a latched topic, best first; each matches more publishers.
 
-    The first is the contract's: RELIABLE and TRANSIENT_LOCAL. DDS matches it with no publisher of
-    ROS's default, which is VOLATILE, nor the second with one that is BEST_EFFORT.
+    The first is the contract's: RELIABLE and TRANSIENT_LOCAL. DDS does not match it with a
+    publisher of ROS's default, which is VOLATILE, nor the second with one that is BEST_EFFORT.
     """
     reliable, best_effort = ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT
     latched, volatile = DurabilityPolicy.TRANSIENT_LOCAL, DurabilityPolicy.VOLATILE
@@ -52,16 +52,16 @@ MAX_WRITERS: Final = 16
 
 
 class Gaps:
-    """Follows the numbers on one topic."""
+    """Detects messages lost on one topic by the numbers of its writers."""
 
     def __init__(self) -> None:
-        self._next: list[int] = []  # of each writer, the last one at the end
+        self._next: list[int] = []  # the next number of each writer, the last active one at the end
 
     def see(self, number: int, writers: Callable[[], int]) -> int:
         """Note a message's number; returns how many are known to be lost before it.
 
-        `writers` counts those that are there now; called only where the number is not one expected.
-        A number that may be the first of a new writer is taken for that.
+        `writers` counts the current writers; it is called only if the number is not expected. A
+        number that may be the first of a new writer counts as that.
         """
         if number in self._next:
             self._next.remove(number)
@@ -78,11 +78,11 @@ class Gaps:
         return lost
 
     def settle(self, writers: int) -> None:
-        """Note that of so many writers those without a message by now have published none yet."""
+        """Note that there are `writers`, and that those without a message have published none."""
         self._next[:0] = [1] * (writers - len(self._next))
 
     def unsettle(self) -> None:
-        """Note that other writers are there than before: whoever is new may begin anywhere."""
+        """Note that the writers have changed: a new one may begin with any number."""
         self._next = [expected for expected in self._next if expected != 1]
 
 
@@ -93,10 +93,10 @@ class Input:
         self.topic = ""
         self.gaps = Gaps()
         self.profiles = _profiles(depth)
-        # How many of these are subscribed with.
+        # How many of the profiles are subscribed with.
         self.subscriptions = 0
         self._has_received = False
-        # What was received last: of so many messages none is in two subscriptions' queues.
+        # The last messages; more than the queues of all subscriptions can hold.
         self._last: deque[tuple[int, int]] = deque(maxlen=4 * depth)
         self._publishers: frozenset[bytes] = frozenset()
         self._since_s = -math.inf
@@ -114,7 +114,7 @@ class Input:
         return True
 
     def check(self, publishers: Sequence[Any], domain: int, now_s: float) -> Iterator[str]:
-        """What is wrong with the publishers, rclpy's TopicEndpointInfo, and the remedy."""
+        """Yield what is wrong with the publishers (rclpy's TopicEndpointInfo), with the remedy."""
         ids = frozenset(bytes(one.endpoint_gid) for one in publishers)
         if ids != self._publishers:
             self._publishers = ids
@@ -142,7 +142,7 @@ class Input:
 def other_users(domain: int, folder: Path = FOLDER, own: int | None = None) -> list[str]:
     """Users other than `own` (None: this process's) whose processes take part in a ROS domain.
 
-    By who owns the ports that Fast DDS has in shared memory: nobody else can write to them.
+    They are found as the owners of Fast DDS's ports in shared memory, which only they can write.
     """
     found = set()
     for port in ports(domain):
@@ -167,19 +167,19 @@ def _faults(publisher: Any) -> list[tuple[str, str]]:
 
 
 def name_of(publisher: Any) -> str:
-    """What a publisher's node is called, for a person to read."""
+    """The name of a publisher's node, for a person to read."""
     if publisher.node_name == _NO_NAME:
         return "somebody"
     return f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
 
 
-# A twin that has died stays in DDS's graph for 20 s (the lease), and one restarted in its place is
-# none beside it.
+# A twin that has died stays in DDS's graph for 20 s (the lease). A twin restarted in its place must
+# not count as a second one.
 LEFT_OVER_S: Final = 30.0
 
 
 class TwinCount:
-    """Counts the twins that publish one state: several, once the graph has shown so for long."""
+    """Counts the twins that publish one state: several only if the graph shows them for long."""
 
     def __init__(self) -> None:
         self.value = 1

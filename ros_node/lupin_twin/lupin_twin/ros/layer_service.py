@@ -1,7 +1,7 @@
-"""What viewers such as RViz are shown: fields as points, tags and planters as markers; on topics.
+"""Topics for viewers such as RViz: fields as points, tags and planters as markers.
 
-Nothing is computed or published while nobody subscribes. What is computed is made on a thread of
-its own, one after the other, and not while messages wait for the node: no request to the twin
+Nothing is computed or published while nobody subscribes. Messages are made on a separate thread,
+one after the other, and not while incoming messages wait for the node. So no request to the twin
 waits for a picture.
 """
 
@@ -54,19 +54,19 @@ from lupin_twin.runtime.workers import JobQueue, Query, ShouldStop, Workers
 LAYERS_PERIOD_S: Final = 0.2
 # A topic is published no more often than this, s, and only when something has changed.
 PERIOD_S: Final = 1.0
-# All of it is taken to be large, s of one core: then one is made after the other.
+# Every message counts as large, s of one core: then they are made one after the other.
 _COST_S: Final = 1.0
 
 
-# What gets the message that was made; None: it is the one before.
+# Receives the message that was made; None: it has not changed.
 _Reply = Callable[[bytes | Exception | None], None]
 
 
 @dataclass(slots=True)
 class _Topic:
-    """While `key_of()` is the same, the message would be the same; None: not known before.
+    """A topic. While `key_of()` is the same, so is the message; None: not known before it is made.
 
-    `plan(reply, should_stop)` is the query that makes it.
+    `plan(reply, should_stop)` returns the query that makes the message.
     """
 
     publisher: Any
@@ -84,7 +84,7 @@ class _Topic:
 class LayerService:
     """The topics of one node; belongs to the node's thread.
 
-    `wake()` is called in another one when the queue has something to deliver.
+    `wake()` is called in another thread when the queue has something to deliver.
     """
 
     utilities: NodeUtilities
@@ -94,7 +94,7 @@ class LayerService:
     occupancy: Callable[[], OccupancyMap | None]
     snapshot: Callable[[], Snapshot]
     now_ns: Callable[[], int]
-    # How many writes the journal has, which estimates are made of.
+    # Number of writes in the journal, from which estimates are made.
     written: Callable[[], int]
     day_length_s: float
     wake: Callable[[], None]
@@ -111,10 +111,10 @@ class LayerService:
         self.queue = JobQueue(self._workers, self.wake, lambda: self.utilities.is_behind)
 
     def offer(self, node: Any, sensors: Sequence[str], frame_id: str) -> None:
-        """Have `node` offer the topics, by names relative to its namespace.
+        """Create the topics on `node`, with names relative to its namespace.
 
         Raises:
-            ParameterError: sensors that make no topics, or two that make the same.
+            ParameterError: a sensor gives no valid topic, or two give the same.
 
         """
         for topic, sensor in topics_of(sensors).items():
@@ -133,11 +133,11 @@ class LayerService:
         ):
             arrays = MarkerArrays(marks, make, frame_id)
             publisher = node.create_publisher(MarkerArray, kind.name, qos_of(kind))
-            # They age: whether they are the same is found where they are made.
+            # Markers show ages: whether they have changed is known only when they are made.
             self._topics.append(_Topic(publisher, lambda: None, partial(self._plan_marks, arrays)))
 
     def check(self) -> None:
-        """Begin what is wanted and may have changed; to be called every `LAYERS_PERIOD_S`."""
+        """Begin messages that are wanted and may have changed; call it every `LAYERS_PERIOD_S`."""
         self.queue.go_on()
         now_s = time.monotonic()
         for topic in self._topics:
@@ -189,7 +189,7 @@ class LayerService:
         key = self.store.observation_count, self.rules(), revision
         if sensor not in self._estimated:
             return key
-        # An estimate goes on from minute to minute, with nothing received: its error grows.
+        # An estimate changes from minute to minute even if nothing is received: its error grows.
         minute_ns = int(self.day_length_s / MINUTES_A_DAY * NANOSECONDS_PER_SECOND)
         return key, self.written(), self.now_ns() // minute_ns
 
@@ -214,7 +214,7 @@ class LayerService:
         return Query(partial(_or_nothing, task.look_up), reply, make, _COST_S)
 
     def _request(self, sensor: str, snapshot: Snapshot) -> FieldRequest:
-        """The same for all sensors: the box is that of all tags with a place."""
+        """The request for a sensor's field; its box, that of all tags, is the same for all."""
         rules = self.rules()
         key = self.store.observation_count, rules
         if self._whole is None or self._whole[0] != key:
@@ -232,7 +232,7 @@ class LayerService:
     # --- the node's -------------------------------------------------------------------------
 
     def finding(self) -> Finding:
-        """What is published, and of how many topics it is wanted, for the twin's diagnostics."""
+        """Messages published by topic, and the topics with subscribers, for diagnostics."""
         topics = {topic.publisher.topic_name: topic for topic in self._topics}
         wrong = "; ".join(
             f"{name}: {topic.problem}" for name, topic in topics.items() if topic.problem
@@ -246,14 +246,14 @@ class LayerService:
         )
 
     def close(self) -> None:
-        """End the thread; what it makes is for nobody then."""
+        """End the thread; its current work is abandoned."""
         for topic in self._topics:
             topic.is_wanted = False
         self._workers.close()
 
 
 def _or_nothing(look_up: Callable[[], Future[Any]]) -> Future[Any]:
-    """What is found; without a journal that can be read no reading, and a field has no error."""
+    """The readings found; none if the journal cannot be read, and then a field has no error."""
     found: Future[Any] = Future()
     look_up().add_done_callback(
         lambda search: found.set_result(

@@ -1,8 +1,8 @@
-"""Fields as points, tags and planters as markers: the messages that viewers such as RViz read.
+"""Builds messages for viewers such as RViz: fields as points, tags and planters as markers.
 
-Metres in the map frame. Cells of which nothing is known are no points: no viewer draws a NaN as
-nothing. Messages are serialised here, on any thread. Markers have the stamp 0, by which a viewer
-takes its newest transform: they are latched, and may be shown long after.
+Metres in the map frame. Unknown cells become no points, because no viewer leaves a NaN out.
+Messages are serialised here, on any thread. Markers have the stamp 0, so that a viewer uses its
+latest transform: they are latched, and may be shown long after.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from lupin_twin.field.grid import FieldGrid, cell_centres
 from lupin_twin.ros.convert import time_msg
 from lupin_twin.runtime.workers import in_turns
 
-# As on the page: an observation is fresh for so long, s, and old from so long on.
+# As on the page: below this age, s, an observation is fresh, and from this age on it is old.
 FRESH_S: Final = 60.0
 OLD_S: Final = 1800.0
-# A box has so many corners at least.
+# A planter's outline has at least this many corners.
 MIN_CORNERS: Final = 3
 
 Appearance = Literal["fresh", "fading", "old", "failed"]
 
 
 class TagMark(NamedTuple):
-    """A tag at its place, m, map frame."""
+    """A tag at its position, m, map frame."""
 
     number: int
     tag_id: str
@@ -59,9 +59,9 @@ class PlanterMark(NamedTuple):
 
 
 def appearance_of(tag: TagState, now_ns: int | None) -> Appearance:
-    """Failed, if its last attempt was; else by the age of its last observation.
+    """Failed, if the tag's last attempt failed; else by the age of its last observation.
 
-    What was never observed, or nobody knows when, is old.
+    A tag that was never observed, or at an unknown time, is old.
     """
     if tag.last_try is not None and tag.last_try.status != STATUS_OK:
         return "failed"
@@ -72,7 +72,7 @@ def appearance_of(tag: TagState, now_ns: int | None) -> Appearance:
 
 
 def tag_marks(snapshot: Snapshot) -> list[TagMark]:
-    """The tags that have a place."""
+    """The tags that have a pose."""
     now_ns = snapshot.now_ns
     return [
         TagMark(number, tag.tag_id, tag.pose.x, tag.pose.y, tag.pose.z, appearance_of(tag, now_ns))
@@ -91,23 +91,23 @@ def planter_marks(snapshot: Snapshot) -> list[PlanterMark]:
     return [PlanterMark(number, corners) for corners, number in found.items()]
 
 
-# A point takes 20 bytes: no message is larger than 1 MB, whatever max_grid_cells says. Beside those
-# of 2.5 MB, an answer of a service came 3 s late now and then; beside those of 1.4 MB, none did.
+# A point takes 20 bytes: no message is larger than 1 MB, whatever max_grid_cells is. With messages
+# of 2.5 MB, a service's response was 3 s late now and then; with 1.4 MB, none was.
 MAX_POINTS: Final = 50_000
 # The columns of `points`, each float32.
 COLUMNS: Final = ("x", "y", "z", "value", "error")
-# What stands for an error that is not known: none is below 0.
+# Stands for an unknown error; no error is below 0.
 ERROR_UNKNOWN: Final = -1.0
 
 PointArray = npt.NDArray[np.float32]
 
 
 def topic_of(sensor: str) -> str:
-    """The topic of a sensor's layer, relative; what a name in ROS must not have is written in hex.
+    """The relative topic of a sensor's layer; characters that ROS forbids are written in hex.
 
-    `soil moisture` is `soil_x20_moisture`. A token that begins with no letter has `sensor_` before
-    it: ROS takes no digit there, and hides what begins with an underscore. Two sensors may come to
-    one name: see `topics_of`.
+    `soil moisture` is `soil_x20_moisture`. A token that does not begin with a letter gets the
+    prefix `sensor_`. ROS allows no digit there, and hides names that begin with an underscore. Two
+    sensors may give the same name: see `topics_of`.
     """
     token = re.sub(r"[^A-Za-z0-9_]", lambda other: f"_x{ord(other.group()):x}_", sensor)
     if not re.match(r"[A-Za-z]", token):
@@ -119,7 +119,7 @@ def topics_of(sensors: Iterable[str]) -> dict[str, str]:
     """The sensors by their topics.
 
     Raises:
-        ParameterError: two of them come to the same.
+        ParameterError: two of them give the same topic.
 
     """
     named: dict[str, str] = {}
@@ -137,10 +137,9 @@ def topics_of(sensors: Iterable[str]) -> dict[str, str]:
 def points(grid: FieldGrid, estimate: EstimateGrid | None) -> PointArray:
     """(n, 5): x, y, z (0, the floor), value and error of the cells whose value is known, in order.
 
-    The error is that of the value shown, in its unit: by how much the truth is expected to differ
-    from it (the root of the mean square), by the estimate on the same grid. That knows the truth to
-    lie around its mean, which is not the value, with its sd. Without an estimate it is
-    `ERROR_UNKNOWN`.
+    The error is that of the value shown, in its unit: its root mean square deviation from the true
+    value, by the estimate on the same grid. That has the true value around the estimate's mean,
+    which is not the value shown, with its sd. Without an estimate the error is `ERROR_UNKNOWN`.
     """
     known = np.flatnonzero(np.isfinite(grid.values))
     rows, columns = np.divmod(known, grid.width)
@@ -163,8 +162,8 @@ _FLOAT32_BYTES: Final = 4
 TAG_M: Final = 0.15
 TEXT_M: Final = 0.12
 OUTLINE_M: Final = 0.03
-# Red, green, blue. They say how old and whether it failed, and judge nothing: so neither green nor
-# red, which on the page are verdicts. Whoever sees no colours reads a failure in the text.
+# Red, green, blue. Colours show age and failure, but no status, so they are neither green nor red,
+# which on the page show a status. For people who cannot see colours, a failure is in the text too.
 COLOURS: Final[Mapping[Appearance, tuple[float, float, float]]] = {
     "fresh": (0.10, 0.42, 0.85),
     "fading": (0.55, 0.72, 0.92),
@@ -254,8 +253,8 @@ def _marker(
 class MarkerArrays:
     """Builds visualization_msgs/MarkerArray of one kind of marks, and caches each one's markers.
 
-    An array says all there is: its first marker deletes what was there before, so nothing that is
-    gone stays in a viewer, not even from a twin before this one. Belongs to one thread at a time.
+    An array is complete: its first marker deletes all earlier ones, so that nothing outdated stays
+    in a viewer, not even from an earlier twin. Belongs to one thread at a time.
     """
 
     def __init__(
@@ -272,7 +271,7 @@ class MarkerArrays:
         self._clear = Marker(header=Header(frame_id=frame_id), action=Marker.DELETEALL)
 
     def build(self, snapshot: Snapshot) -> bytes | None:
-        """The array, serialised, if it is another than the one before; made in turns."""
+        """The serialised array, or None if it has not changed; lets other threads run meanwhile."""
         marks, before = self._marks(snapshot), self._markers
         if before is not None and marks == [*before]:
             return None

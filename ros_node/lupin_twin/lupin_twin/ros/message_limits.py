@@ -1,13 +1,13 @@
-"""The messages that are subscribed to, and the limits of each, checked on the serialised bytes.
+"""Limits of the messages that are subscribed to, checked on the serialised bytes.
 
-A deserialiser makes room for as many elements as a message claims, and only then finds that they
-are not there: eight megabytes that claim to be eight million tags cost it more than a gigabyte.
-Here the bytes are walked by the message's shape, and nothing is made of them: a length that cannot
-fit into the bytes left, or is past a limit of ours, is refused.
+A deserialiser allocates as many elements as a message claims, and only then finds that they are
+missing. Eight megabytes that claim to be eight million tags cost it more than a gigabyte. Here the
+bytes are walked by the message's shape, and no objects are made from them. A length that cannot fit
+into the bytes left, or exceeds one of our limits, is refused.
 
 The encoding is plain CDR as ROS 2 has it on the wire (OMG DDSI-RTPS 2.5, 10.5, and CORBA 3.0,
-15.3): four bytes that name the byte order, then every number aligned to its own size, counted from
-behind those four; a text or a sequence has its length before it as a uint32.
+15.3). Four bytes give the byte order; then each number is aligned to its own size, counted from the
+end of those four. A text or a sequence is preceded by its length as a uint32.
 """
 
 from __future__ import annotations
@@ -46,15 +46,15 @@ _ARRAY: Final = re.compile(r"(?P<number>.+)\[(?P<count>\d+)\]")
 
 
 class MalformedError(ValueError):
-    """Bytes that are no message of this shape, or one past a limit; says where and by how much."""
+    """The bytes are not a message of this shape, or exceed a limit; says where and by how much."""
 
 
 class TooManyError(MalformedError):
-    """A message past a limit of ours; says which, and by how much."""
+    """The message exceeds one of our limits; says which, and by how much."""
 
 
 class _Reader:
-    """One message on the way through its shape: the bytes, and what may still be claimed."""
+    """A message that is being walked: its bytes, and how many elements it may still claim."""
 
     __slots__ = ("data", "elements_left", "end", "length_at")
 
@@ -78,10 +78,10 @@ _Walk = Callable[[_Reader, int], int]
 
 
 class _Part(NamedTuple):
-    """How to walk over a value, and the fewest bytes that one takes.
+    """How to walk over a value, and its least size in bytes.
 
-    `steps` is there for a value of fixed size: how many bytes it takes, padding included, by where
-    (modulo 8) it begins.
+    `steps`, for a value of fixed size, is its size in bytes with padding, by the offset (modulo 8)
+    at which it begins.
     """
 
     walk: _Walk
@@ -90,16 +90,16 @@ class _Part(NamedTuple):
 
 
 class MessageShape:
-    """A message type as it is serialised, and the most that one message of it may hold.
+    """The serialised form of a message type, and the limits of one message.
 
-    `max_bytes` bounds it as a whole, `limits` the elements of a sequence, by its path
-    (`tag_reading.readings`), `max_elements` those of all sequences of messages in it together;
-    sequences of plain numbers take no more than their bytes. Of types that are read here none is
-    empty, or has texts or sequences with a limit of their own, or arrays but of numbers.
+    `max_bytes` limits the whole message. `limits` has the most elements of a sequence, by its path
+    (`tag_reading.readings`); `max_elements` limits those of all sequences of messages together.
+    Sequences of plain numbers are limited by their bytes. Types must not be empty, and must not
+    have bounded texts or sequences, or arrays of anything but numbers.
 
     Raises:
-        ImportError: it has a field of a type that is not installed.
-        TypeError: it has no sequence by a limit's path.
+        ImportError: the type of a field is not installed.
+        TypeError: there is no sequence with a limit's path.
 
     """
 
@@ -120,11 +120,11 @@ class MessageShape:
             raise TypeError(f"{message_type.__name__} has no sequences {sorted(self._limits)}")
 
     def check(self, data: bytes) -> int:
-        """How many bytes the message takes; what comes behind it is nobody's.
+        """Check a message; returns how many bytes it takes. Bytes behind it are ignored.
 
         Raises:
-            MalformedError: a length in `data` cannot be.
-            TooManyError: it is past a limit.
+            MalformedError: a length in `data` is impossible.
+            TooManyError: the message exceeds a limit.
 
         """
         if len(data) > self.max_bytes:
@@ -156,8 +156,8 @@ class MessageShape:
 
 
 def _fixed(size: int, count: int) -> _Part:
-    """So many numbers of `size` bytes one behind the other."""
-    # Aligned from behind the header, which has half the size of the largest number.
+    """`count` numbers of `size` bytes, one after the other."""
+    # Aligned from the end of the header, which has half the size of the largest number.
     return _of_steps(
         tuple((_HEADER_BYTES - begin) % size + size * count for begin in range(_ALIGNMENTS)),
         size * count,
@@ -169,7 +169,7 @@ def _of_steps(steps: tuple[int, ...], min_bytes: int) -> _Part:
 
 
 def _in_a_row(parts: Sequence[_Part]) -> _Part:
-    """Parts one behind the other; neighbours of fixed size become one step."""
+    """Parts one after the other; adjacent ones of fixed size become one step."""
     merged: list[_Part] = []
     for part in parts:
         last = merged[-1] if merged else None
@@ -253,8 +253,8 @@ DISCOVERED_TAGS: Final = MessageShape(
 )
 # A map of 4,000 × 4,000 cells has 16 MB.
 MAP: Final = MessageShape(OccupancyGrid, max_bytes=64_000_000)
-# 20,000 tags with ten sensors and forty flowers each have 48 MB. How many a single tag has is for
-# the twin to bound that publishes it.
+# 20,000 tags with ten sensors and forty flowers each have 48 MB. The twin that publishes the state
+# limits how many a single tag has.
 STATE: Final = MessageShape(
     TwinState,
     max_bytes=64_000_000,
@@ -268,8 +268,8 @@ TIMES: Final = MessageShape(
     limits={"tags": MAX_TAGS},
     max_elements=MAX_TAGS + 2 * MAX_ITEMS,
 )
-# A twin says seven things of itself, with a few dozen values, in some kB. Whoever collects those of
-# a whole robot has more; it is published on a topic that all nodes share.
+# A twin reports about a dozen findings, with a few dozen values, in a few kB. Aggregators of a
+# whole robot publish more, and all nodes share the topic.
 DIAGNOSTICS: Final = MessageShape(
     DiagnosticArray,
     max_bytes=1_000_000,

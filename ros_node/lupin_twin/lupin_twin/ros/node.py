@@ -1,4 +1,4 @@
-"""The rclpy node `lupin_twin`: parameters, QoS, callbacks, and nothing that can be tested without.
+"""The rclpy node `lupin_twin`: parameters, QoS, callbacks; nothing that can be tested without ROS.
 
 Everything here runs on one thread, in one callback group: the store and the cache need no lock.
 """
@@ -126,7 +126,7 @@ class TwinNode(AdjustableNode):
     def listen(self, listener: Callable[[Snapshot], None], heartbeat_s: float) -> None:
         """Call `listener(snapshot)` on this thread now, after each change, and as a heartbeat.
 
-        The heartbeat goes by the steady clock and does not depend on `state_publish_rate_hz`: a
+        The heartbeat goes by the steady clock and does not depend on `state_publish_rate_hz`. So a
         listener can tell a quiet greenhouse from a dead twin, however rarely the topic is
         published.
         """
@@ -135,7 +135,7 @@ class TwinNode(AdjustableNode):
         self.utilities.every(self._group, heartbeat_s, "heartbeat", self.notify_listener)
 
     def snapshot(self) -> Snapshot:
-        """Every tag, now by ROS time, and whether that runs."""
+        """Every tag as of now in ROS time, and the state of its clock."""
         snapshot = self.store.snapshot(self.now_ns(), self.parameters.frame_id)
         return replace(snapshot, clock=self._clock_state)
 
@@ -182,7 +182,7 @@ class TwinNode(AdjustableNode):
         ).offer(self, group)
         self.estimates.offer(self, group)
         self.layers.offer(self, p.layers, p.frame_id)
-        for service in self.services:  # those of its parameters too
+        for service in self.services:  # including those for parameters
             responses.watch(service)
         self._diagnostics = self.create_publisher(DiagnosticArray, own.name, qos_of(own))
         for period_s, what, callback in (
@@ -271,7 +271,7 @@ class TwinNode(AdjustableNode):
         self.layers.queue.deliver()
 
     def destroy_node(self) -> None:
-        """End the workers and the journal too; what they compute is for nobody then."""
+        """Also end the workers, whose current work is abandoned, and the journal."""
         self._workers.close()
         self.layers.close()
         self.memory.close()
@@ -300,7 +300,7 @@ class TwinNode(AdjustableNode):
         )
 
     def _publish_state(self) -> None:
-        # Of a large greenhouse each of the two takes this thread for tenths of a second.
+        # For a large greenhouse, each of the two occupies this thread for tenths of a second.
         self.utilities.drain()
         snapshot = self.snapshot()
         self._state_publisher.publish(self._states.build(snapshot))
@@ -315,7 +315,7 @@ class TwinNode(AdjustableNode):
 
     @property
     def origin(self) -> Origin:
-        """Where what is observed comes from."""
+        """Where the observations come from."""
         return origin_of(self._world.origin, is_simulated=self.get_clock().ros_time_is_active)
 
     # --- small parts ------------------------------------------------------------------------
@@ -328,7 +328,7 @@ class TwinNode(AdjustableNode):
         return near is not None and refused is None
 
     def notify_listener(self) -> None:
-        """Give it the state as it is."""
+        """Call the listener with the current state."""
         if self._listener is not None:
             self._listener(self.snapshot())
 
@@ -372,7 +372,7 @@ class TwinNode(AdjustableNode):
             self._clock_subscription = None
 
     def now_ns(self) -> int:
-        """ROS time; what follows from a clock that has gone back is done."""
+        """Return ROS time, ns; also handles a clock that has gone back."""
         clock = self.get_clock()
         now_ns = int(clock.now().nanoseconds)
         is_simulated = bool(clock.ros_time_is_active)

@@ -1,6 +1,6 @@
-"""Parameters out of ROS: declared from the table in `parameters`; every complaint names one.
+"""A node's ROS parameters, declared from the table in `core.parameters`; errors name the parameter.
 
-For the twin's node, and for whoever else reads some of the twin's parameters.
+For the twin's node, and for other nodes that read some of the twin's parameters.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ ALL_NAMES: Final = tuple(spec.name for spec in fields(TwinParameters))
 
 
 def declare(node: Any, names: Iterable[str] = ALL_NAMES) -> TwinParameters:
-    """Declare these of the twin's parameters on a node and read them; the others keep defaults.
+    """Declare some of the twin's parameters on a node and read them; the others keep defaults.
 
-    Warns of each override that is no parameter at all: most likely a name with a typing error.
+    Warns of each override that is not a parameter: most likely a misspelt name.
 
     Raises:
-        ParameterError: a value of the wrong type or out of its range.
+        ParameterError: a value has the wrong type, or is out of its range.
 
     """
     defaults, given = TwinParameters(), _overrides(node)
-    # Before ROS sees one: its own complaint about a range is another. And what another node of the
-    # twin's reads from the same file has to be right here as well.
+    # Checked before ROS does, because its message about a range differs. Values for other nodes in
+    # the same file have to be valid here as well.
     TwinParameters(**{name: given[name] for name in ALL_NAMES if name in given})
     values = {}
     for name in names:
@@ -54,7 +54,7 @@ def declare(node: Any, names: Iterable[str] = ALL_NAMES) -> TwinParameters:
 
 
 def _for_ros(value: Any) -> Any:
-    """A list without anything in it has no type in ROS: one empty name stands for it."""
+    """The value for ROS, where an empty list has no type: one empty name stands for it."""
     return [*value] or [""] if isinstance(value, tuple) else value
 
 
@@ -64,7 +64,7 @@ def _descriptor(name: str, default: object) -> ParameterDescriptor:
         description=described.description,
         additional_constraints=described.fixed and f"read only: {described.fixed}",
         read_only=bool(described.fixed),
-        # `idw_power: 2` is an integer to YAML; our own check takes it.
+        # `idw_power: 2` is an integer in YAML; our own check accepts it.
         dynamic_typing=True,
     )
     if described.low is not None:
@@ -80,23 +80,23 @@ def _descriptor(name: str, default: object) -> ParameterDescriptor:
 
 
 class AdjustableNode(Node):  # type: ignore[misc]  # rclpy is not typed
-    """A node of which some parameters may be changed while it runs.
+    """A node that has parameters which may be changed while it runs.
 
-    `ros2 param set` comes to the methods below. They ask before rclpy does: that refuses what is
-    read only, or out of its range, in words that name neither the reason nor the limit.
+    `ros2 param set` calls the methods below. They check before rclpy does, which refuses values
+    that are read only or out of range without naming the reason or the limit.
     """
 
     parameters = TwinParameters()
 
     def adjust(self, now: TwinParameters) -> None:
-        """Go by other parameters; called after each change of those that were declared."""
+        """Apply changed parameters; called after each change of declared ones."""
 
     def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
-        """One after the other."""
+        """Set the parameters one after the other."""
         return [self.set_parameters_atomically([one]) for one in parameter_list]
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """All of them or, with the reason, none."""
+        """Set all of the parameters or, with the reason, none."""
         wanted = {one.name: one.value for one in parameter_list if one.name in ALL_NAMES}
         try:
             new = changed(self.parameters, wanted)
@@ -110,7 +110,7 @@ class AdjustableNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
 
 def unknown_overrides(node: Any) -> list[str]:
-    """Names that were set for a node (`-p`, a file) and that neither it nor the twin has."""
+    """Names that were set for a node (`-p`, a file), but that neither it nor a twin has."""
     return sorted(
         name for name in _overrides(node) if name not in ALL_NAMES and not node.has_parameter(name)
     )
@@ -124,7 +124,7 @@ def _overrides(node: Any) -> dict[str, Any]:
 
 @contextmanager
 def naming(parameter: str, value: str) -> Iterator[None]:
-    """Turn rclpy's complaint about a topic's name into one that names the parameter."""
+    """Turn rclpy's error about a topic's name into one that names the parameter."""
     try:
         yield
     except (InvalidTopicNameException, InvalidServiceNameException) as error:
@@ -134,9 +134,9 @@ def naming(parameter: str, value: str) -> Iterator[None]:
 
 @contextmanager
 def naming_own_parameters() -> Iterator[None]:
-    """Turn rclpy's complaint about its own parameters, made with the node, into one of ours.
+    """Turn rclpy's error about its own parameters into one of ours.
 
-    They are `use_sim_time` and `start_type_description_service`.
+    They are made with the node: `use_sim_time` and `start_type_description_service`.
     """
     try:
         yield

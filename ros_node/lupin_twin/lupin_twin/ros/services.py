@@ -1,11 +1,11 @@
-"""The services of fields and of the past; responses of any service that are sent later.
+"""The services of fields and of the past, and delayed responses of any service.
 
-They are made off the node's thread, or cannot be sent yet. A service may get a request before its
-middleware has found the reader of the response: where a machine is busy that takes seconds. The
-middleware waits 0.1 s, then drops the response; rclpy says so in a Python warning, once in the life
-of a process, and the client waits for ever. Known as ros2/rmw_fastrtps issue 842; of a client that
-came to a twin beside four busy processes, the first request met it once in 162. So such a response
-is tried again for a while.
+A response is delayed if it is made off the node's thread, or cannot be sent yet. A service may get
+a request before its middleware has discovered the reader of the response; on a busy machine that
+takes seconds. The middleware waits 0.1 s, then drops the response. rclpy reports it in a Python
+warning, once per process, and the client waits forever (ros2/rmw_fastrtps issue 842). Beside four
+busy processes, it happened to one in 162 clients on their first request. So such a response is
+retried for a while.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ Report = Callable[[str, Exception], None]
 
 @dataclass(frozen=True, slots=True)
 class FieldService:
-    """The service of fields: what takes longer than a tick is computed off the node's thread."""
+    """The service of fields, which are computed off the node's thread unless they are cached."""
 
     utilities: NodeUtilities
     workers: Workers
@@ -62,10 +62,10 @@ class FieldService:
     occupancy: Callable[[], OccupancyMap | None]
 
     def offer(self, node: Any, name: str, group: Any) -> None:
-        """Have `node` offer the service.
+        """Create the service on `node`.
 
         Raises:
-            ParameterError: a name that ROS does not take.
+            ParameterError: the name is invalid in ROS.
 
         """
         with naming("field_service_name", name):
@@ -94,17 +94,17 @@ class FieldService:
         return Query(partial(self.workers.submit, compute, cost), keep, cost_s=cost)
 
 
-# What the message of a series takes at worst, s of one core; and that of all tags.
+# Worst-case cost of the message of a series, s of one core; and of that of all tags.
 MESSAGE_S: Final = SMALL_S
 EVERY_TAG_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class PastService:
-    """The services of one node; belongs to its thread.
+    """The services of the past on one node; belongs to the node's thread.
 
-    Every request gets a response, where there is no answer one that says why. How large a past
-    state may be is estimated by the `store`, that of now.
+    Every request gets a response; if there is no answer, it says why. The size of a past state is
+    estimated from the current one, `store`.
     """
 
     utilities: NodeUtilities
@@ -115,7 +115,7 @@ class PastService:
     frame_id: str
 
     def offer(self, node: Any, group: Any) -> None:
-        """Have `node` offer the services, by names relative to its namespace; some answer later."""
+        """Create the services on `node`, with names relative to its namespace."""
         plans = (
             (GetStateAt, GET_STATE_AT.name, self._state_at),
             (GetHistory, GET_HISTORY.name, self._history),
@@ -168,9 +168,9 @@ def offer(
     queue: JobQueue,
     report: Report,
 ) -> None:
-    """Have `node` offer services: type, name, and what makes the query of `request` and `reply`.
+    """Create services on `node`: type, name, and a function of `request` and `reply`.
 
-    None: there is none, for it has replied already.
+    The function returns the query that makes the answer, or None if it has replied already.
     """
     for kind, name, plan in services:
 
@@ -184,20 +184,20 @@ def offer(
             try:
                 if (query := plan(request, reply)) is not None:
                     queue.ask(query)
-            except Exception as error:  # noqa: BLE001  # no client waits for ever
+            except Exception as error:  # noqa: BLE001  # no client may wait forever
                 return refusal(kind, error, report)
             return later
 
         node.create_service(kind, name, answer, qos_profile=SERVICE_QOS, callback_group=group)
 
 
-# How rclpy's warning begins (7.1.6), that the middleware has dropped a response.
+# The beginning of rclpy's warning (7.1.6) that the middleware has dropped a response.
 UNSENT: Final = "failed to send response (timeout)"
-# How often responses are tried again, s, and for how long. Discovery that lost a message makes up
-# for it within some 3 s, more on a busy machine.
+# How often responses are retried, s, and for how long. Discovery that lost a message recovers
+# within about 3 s, or later on a busy machine.
 RETRY_S: Final = 0.5
 PATIENCE_S: Final = 30.0
-# Responses that are retained; what took longer to try, s, needs too much memory (60 MB took 0.5 s).
+# Responses retained at most. One that took longer to try, s, is too large (60 MB took 0.5 s).
 MAX_UNSENT: Final = 8
 MAX_ATTEMPT_S: Final = 0.5
 
@@ -205,7 +205,7 @@ Send = Callable[[Any, Any], None]
 
 
 def refusal(kind: Any, error: Exception, report: Report) -> Any:
-    """A response of a service that is empty but for why; what nobody expected is reported."""
+    """A service's response with only an error message; an unexpected error is also reported."""
     if isinstance(error, FieldRefused):
         return kind.Response(error_message=str(error))
     if not isinstance(error, PastRefused | NotRemembered):
@@ -224,8 +224,8 @@ class _Unsent(NamedTuple):
 class Responses:
     """Sends the responses of one node's services; belongs to the node's thread.
 
-    The node's utilities warn of a response that was given up, and take the messages that came
-    during an attempt: observations must not be lost for a client that is never found.
+    The node's utilities warn of a response that was given up, and take the messages that arrived
+    during an attempt. Observations must not be lost because a client is never discovered.
     """
 
     def __init__(self, utilities: NodeUtilities) -> None:
@@ -257,10 +257,10 @@ class Responses:
         service.send_response = send_response
 
     def go_on(self) -> None:
-        """Try again until an attempt fails; to be called every `RETRY_S`.
+        """Retry responses until an attempt fails; to be called every `RETRY_S`.
 
-        An attempt that fails blocks the node's thread for 0.1 s. The newest first, and what failed
-        goes to the end: one that can be sent does not wait long behind others that never will be.
+        An attempt that fails blocks the node's thread for 0.1 s. The latest response is first, and
+        a failed one goes to the end. So one that can be sent does not wait long behind others.
         """
         while self._unsent:
             one = self._unsent.popleft()
@@ -291,8 +291,8 @@ def _was_sent(send: Send, response: Any, header: Any) -> bool:
     try:
         send(response, header)
     except (RuntimeWarning, SystemError) as error:
-        # Of a warning that is an error, Python makes the cause of a SystemError where it comes out
-        # of C++ that does not look for one.
+        # rclpy's C++ does not check for the warning, which is raised as an error. So Python raises
+        # a SystemError, with the warning as its cause.
         for each in (error, error.__cause__):
             if isinstance(each, RuntimeWarning) and str(each).startswith(UNSENT):
                 return False

@@ -1,1 +1,1 @@
-"""Threads, processes, signals, and what runs on them beside the node."""
+"""Threads, processes and signals, and the background work of the node."""

@@ -1,8 +1,9 @@
-"""What the log has of a sensor's day: its estimate as of a moment, and what estimates are worth.
+"""Makes estimates of a sensor from a day of the journal, and reports how good they are.
 
-Pure, but for `readings_at`. A report compares each tag's newest reading with what all the others
-say of it, leaves out what sensors have read since they changed, and counts how many of the new
-scans lie where all but the tags nearby say. Metres in the map frame, times ns of ROS time.
+Pure, except for `readings_at`. A report compares each tag's latest reading with its prediction from
+all others, and leaves out what sensors have read since they changed. It counts how many of the new
+scans lie where they were predicted without nearby tags. Metres in the map frame, times ns of ROS
+time.
 """
 
 from __future__ import annotations
@@ -38,20 +39,20 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import newest
 from lupin_twin.runtime.workers import in_turns
 
-# With fewer readings of a day there is little to learn, and nothing to be said of estimates.
+# With fewer readings in a day, there is little to learn, and estimates are not judged.
 FIRST_FIT: Final = 10
-# What making an estimate takes beside its grid: a fit, and a posterior to find changed sensors by.
+# Cost of an estimate relative to its grid: it also takes a fit, and a posterior to find changes.
 AS_OF: Final = 3.0
-# Readings that are looked up in the log, of all tags together: of few tags all of a day.
+# Readings read from the journal, for all tags together; with few tags, all of a day.
 _MAX_READINGS: Final = 20_000
 
 
 def readings_at(
     log: sqlite3.Connection, sensor: str, at_ns: int, day_length_s: float
 ) -> list[TagPast]:
-    """What the log has of the day up to a moment; of equal stamps, what was received last.
+    """Read a sensor's readings of the day up to a moment; of equal stamps, the last received.
 
-    Numbers of an answer are float32: a reading past those does not count.
+    Answers are in float32, so a reading beyond its range does not count.
     """
     places = {
         tag.tag_id: tag.pose
@@ -74,13 +75,13 @@ def readings_at(
 
 
 def are_enough(pasts: Sequence[TagPast]) -> bool:
-    """Whether there is something to be said of estimates that are made of these readings."""
+    """Whether there are enough readings to make and judge estimates."""
     return sum(len(past.readings) for past in pasts) >= FIRST_FIT
 
 
 @dataclass(frozen=True, slots=True)
 class TagCheck:
-    """A tag's newest reading beside what is expected of it; see `cholesky.Change`."""
+    """A tag's latest reading, and what was expected of it; see `cholesky.Change`."""
 
     tag_id: str
     measured: float
@@ -94,9 +95,9 @@ class TagCheck:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loaded:
-    """What a sensor's readings say as of `at_ns`; without what changed sensors have read.
+    """A sensor's model and readings as of `at_ns`, without readings since a tag's sensor changed.
 
-    Not their posterior: it takes megabytes a sensor, and tenths of a second to make again.
+    The posterior is not cached: it takes megabytes, and can be made again in tenths of a second.
     """
 
     at_ns: int
@@ -120,13 +121,13 @@ def load(
     day_length_s: float,
     should_stop: Callable[[], bool] = never,
 ) -> tuple[Loaded, Posterior]:
-    """What readings up to a moment say, fitted to them alone, and their posterior then.
+    """Fit a model to readings up to a moment; returns it with the posterior at that moment.
 
     Raises:
         lupin_twin.field.idw.Abandoned: `should_stop`, called every few milliseconds, was true.
         lupin_twin.estimate.model.FitFailed: no model can be fitted.
         lupin_twin.field.engine.FieldRefused: see `readings_of`.
-        numpy.linalg.LinAlgError: numbers that nothing can be made of.
+        numpy.linalg.LinAlgError: the readings cannot be computed with.
 
     """
     readings = readings_of(pasts, at_ns, day_length_s)
@@ -140,7 +141,7 @@ def load(
     loaded = Loaded(at_ns, model, posterior.readings, checks)
     if loaded.changed:
         rest = readings_of(unchanged(pasts, loaded.changed), at_ns, day_length_s)
-        # What they have read since says as little of how readings hang together.
+        # Readings since a change are no good for the model either.
         model = fit(rest, day_length_s=day_length_s, should_stop=should_stop)
         posterior = model.posterior(rest, 0.0, should_stop)
         loaded = Loaded(at_ns, model, rest, checks)
@@ -168,10 +169,10 @@ def estimate_at(
     day_length_s: float,
     should_stop: Callable[[], bool] = never,
 ) -> Estimate:
-    """The estimate as of a moment, of readings up to then alone: model, changed sensors and all.
+    """Make the estimate as of a moment from readings up to then alone, its model included.
 
     Raises:
-        FieldRefused: see `readings_of`; or nothing can be made of these readings.
+        FieldRefused: see `readings_of`; or these readings cannot be computed with.
         lupin_twin.field.idw.Abandoned: `should_stop`, called every few milliseconds, was true.
 
     """
@@ -189,12 +190,12 @@ MAX_PLACES: Final = 20
 
 @dataclass(frozen=True, slots=True)
 class ReportRequest:
-    """A sensor, and how many places for other tags are wanted; None: none.
+    """Request for a report on a sensor, with `max_places` places for other tags; None: none.
 
-    Working them out is dear. By the service there is no asking for none.
+    Places are expensive to find. The ROS service has no way to request none.
 
     Raises:
-        FieldRefused: names the field, the value and the limit.
+        FieldRefused: a value is invalid; the message names the field, the value and the limit.
 
     """
 
@@ -212,11 +213,11 @@ class ReportRequest:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What a sensor's estimates are worth as of `at_ns`.
+    """How good a sensor's estimates are as of `at_ns`.
 
-    `fitted_at_ns` is when the model was fitted that serves, None: none yet; `fit_problem` what is
-    wrong with fits or with the day's length, empty: nothing. `tags` are the newest readings beside
-    what is expected of them, `places` where another tag helps most, the best first.
+    `fitted_at_ns` is when the current model was fitted, None if there is none. `fit_problem` is
+    what is wrong with the last fit, empty if nothing is. `tags` are the latest readings with what
+    was expected of them, `places` where another tag helps most, the best first.
     """
 
     at_ns: int
@@ -229,9 +230,9 @@ class Report:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Known:
-    """What was found last of a sensor's estimates; `failed` counts the models that could not be.
+    """The last result for a sensor; `failed` counts the models that could not be fitted.
 
-    `loaded` None: too few readings.
+    `loaded` is None if there are too few readings.
     """
 
     report: Report
@@ -241,9 +242,9 @@ class Known:
 
 
 def find(before: Known | None, pasts: Sequence[TagPast], at_ns: int, day_length_s: float) -> Known:
-    """What is to be said as of now: the scans since `before` are compared with what others say.
+    """Judge a sensor's estimates as of now; scans since `before` are compared with predictions.
 
-    Where nothing can be made of the readings, what was found before stays, with the reason.
+    If the readings cannot be computed with, the earlier result stays, with the reason.
     """
     grades = Grades(day_length_s) if before is None else copy(before.grades)
     nothing = Known(
@@ -264,9 +265,9 @@ def find(before: Known | None, pasts: Sequence[TagPast], at_ns: int, day_length_
 
 
 def _graded(loaded: Loaded, posterior: Posterior, pasts: Sequence[TagPast], since_ns: int) -> Tally:
-    """How many of the newest scans since then came to lie where they were predicted.
+    """Count the tags' latest scans since then, and how many lay where they were predicted.
 
-    Of a sensor that has changed nothing is counted, nor of a scan that was received late.
+    Changed sensors do not count, nor do scans that were received late.
     """
     fresh = [
         row
@@ -283,7 +284,7 @@ def _graded(loaded: Loaded, posterior: Posterior, pasts: Sequence[TagPast], sinc
 
 
 def advice(loaded: Loaded, occupancy: OccupancyMap | None, count: int) -> tuple[Place, ...]:
-    """Where other tags help most, over all the free floor; nowhere, where none is free."""
+    """Where other tags help most, over all the free floor; empty if no place is free."""
     tags = loaded.readings.xy
     over = floor(tags, occupancy)
     places = free_of(tags, over)

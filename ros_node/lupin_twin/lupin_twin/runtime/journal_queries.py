@@ -1,8 +1,8 @@
-"""Asking the journal about the past: in threads of its own, over connections that cannot write.
+"""Queries the journal about the past, in its own threads, over connections that cannot write.
 
-Small queries wait for no large one, what nobody waits for any more ends, and what cannot be
-answered is refused with what to do about it. Nothing has to be started again when the cause is
-gone: each search checks whether the file is still the one that is open.
+Small queries do not wait for large ones, and abandoned ones end. A query that cannot be answered is
+refused with a remedy. Nothing has to be restarted when the cause is gone: each search checks
+whether the file is still the one that is open.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from lupin_twin.core.past import NotRemembered
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, is_damage_error, open_reader
 from lupin_twin.runtime.workers import ShouldStop, Workers
 
-# A query that takes longer is ended, whoever waits: while it reads, the log cannot be reused.
+# A query that takes longer, s, is ended: while it reads, the WAL cannot be reused.
 MAX_S: Final = 60.0
-# So many steps of SQLite's machine lie between two checks whether to stop: about a millisecond.
+# Steps of SQLite's virtual machine between two checks whether to stop: about a millisecond.
 _STEPS: Final = 20_000
-# So long the end waits for queries that run to stop, for the log to go with the last connection.
+# How long `close` waits, s, for running queries: the WAL is removed with the last connection.
 _END_S: Final = 1.0
 _CACHE_KB: Final = 8_000
 
@@ -43,10 +43,10 @@ class _Open:
 
 
 class Recall:
-    """Answers from construction to `close`; any thread may ask. Who asks bounds how many wait.
+    """Answers queries from construction to `close`, of any thread; callers limit how many wait.
 
-    `condition` gives, on any thread, the state of the journal and where it is; `heal(damage)` is
-    called where damage is found, on any thread.
+    `condition` returns, on any thread, the state of the journal and its path; `heal(damage)` is
+    called when damage is found, on any thread.
     """
 
     def __init__(
@@ -65,9 +65,9 @@ class Recall:
         self._is_closed = False
 
     def query(self, search: Search[AnswerT], cost_s: float = 0.0) -> Future[AnswerT]:
-        """The answer to come of `search`, which is estimated to take `cost_s` of one core.
+        """Run `search`, which is estimated to take `cost_s` s of one core; returns its future.
 
-        It sees the journal as of one moment. The future may have `NotRemembered`, or what the
+        It sees the journal as of one moment. The future may raise `NotRemembered`, or what the
         search raises; cancel it when nobody waits any more.
         """
         try:
@@ -78,7 +78,7 @@ class Recall:
             return refused
 
     def close(self) -> None:
-        """End: what waits is dropped, what runs has to stop and is waited for a little."""
+        """Drop waiting queries, and stop running ones, which are waited for briefly."""
         self._workers.close()
         with self._changed:
             self._is_closed = True
@@ -136,8 +136,8 @@ class Recall:
     def _take(self, path: Path, inode: int) -> _Open:
         status = path.stat()
         if inode not in (0, status.st_ino):
-            # Its index is found by name, `-shm`. SQLite would begin it anew under the writer, which
-            # has it in its memory for the other file: SIGBUS.
+            # SQLite finds the WAL's index by its name, `-shm`. It would rebuild that under the
+            # writer, which has mapped it for the other file: SIGBUS.
             raise NotRemembered(
                 f"the journal {path} was replaced; the twin opens the new one within seconds"
             )
@@ -165,7 +165,7 @@ class Recall:
 
 
 def _why_not(path: Path, error: Exception) -> Exception:
-    """What is wrong with the file and what to do; an error of the search's own stays as it is."""
+    """An error that tells what is wrong with the file, and the remedy; other errors unchanged."""
     if isinstance(error, Foreign):
         why = f"{error}; name another file by the parameter journal"
     elif isinstance(error, FileNotFoundError):

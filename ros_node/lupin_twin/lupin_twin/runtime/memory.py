@@ -1,10 +1,11 @@
-"""What the twin knows, and its journal: each write handed over, each start restored.
+"""Connects the store with its journal: hands each write over, and restores the state at a start.
 
-A wall clock that contradicts the log is doubted (`_Doubt`): what was known is shown as it was, what
-is observed is shown and waits. Once the clock agrees it is written, moved by what the clock jumped.
+A wall clock that contradicts the journal is doubted (`_Doubt`). Then the restored state is shown as
+it was, and new observations are shown, but not written. Once the clock agrees, they are written,
+with stamps corrected by the clock's jump.
 
 No ROS; time and environment are arguments. Everything here runs on the thread that the store
-belongs to, and takes microseconds, but for the start: that waits for what was known before.
+belongs to, and takes microseconds, except for the start, which waits for the restored state.
 """
 
 from __future__ import annotations
@@ -30,23 +31,23 @@ from lupin_twin.journal.runs import CORRECTION_NS, Clock, Turn, turn_of
 from lupin_twin.journal.writer import Journal
 from lupin_twin.runtime.journal_queries import Recall
 
-# So long a start waits for what was known before; what comes later is taken in as it comes.
+# How long, s, a start waits for the restored state; after that, it is taken in when it arrives.
 _START_WAIT_S: Final = 10.0
 
 # Two simulations on one /clock make it go back dozens of times a second, and each run stays in the
-# file: so many may begin within such a time, by the wall's clock.
+# file. So only this many may begin within this wall time.
 MAX_NEW_RUNS: Final = 10
 NEW_RUNS_NS: Final = 100 * 1_000_000_000
-# A clock that has contradicted the log for so long, by the steady clock, is believed.
+# A clock that has contradicted the journal for this long, by the steady clock, is believed.
 DOUBT_NS: Final = 600 * 1_000_000_000
-# Writes that are buffered at most while the log is read at the start.
+# Writes that are buffered at most while the journal is read at the start.
 MAX_EARLY: Final = 20_000
 
 
 class _Early(NamedTuple):
-    """A write that was taken in before the log's last word was known; when, by the steady clock.
+    """A write that was received before the state was restored.
 
-    `lead_ns` is what the wall's clock was ahead of the steady one then.
+    `lead_ns` is how far the wall clock was ahead of the steady clock then.
     """
 
     write: Write
@@ -54,7 +55,7 @@ class _Early(NamedTuple):
 
 
 class _Doubt(NamedTuple):
-    """A wall clock that contradicts the log, from `clock` on; the log knows `last_ns`."""
+    """A wall clock that contradicts the journal from `clock` on; `last_ns`: its last arrival."""
 
     clock: Clock
     since_ns: int
@@ -62,7 +63,7 @@ class _Doubt(NamedTuple):
 
 
 class Memory:
-    """A store, what it received, and the journal of both; `recall` queries that.
+    """The store, what it received, and the journal of both; `recall` queries the journal.
 
     `steady_ns` is a clock that never jumps.
     """
@@ -78,10 +79,10 @@ class Memory:
         self.journal = journal
         self._steady_ns = steady_ns
         self._clock: Clock | None = None
-        # What the wall's clock is ahead of the steady one.
+        # How far the wall clock is ahead of the steady clock.
         self._lead_ns = 0
         self._begun_ns: deque[int] = deque(maxlen=MAX_NEW_RUNS)
-        # From when each tag has its place.
+        # Since when each tag has its pose.
         self._placed_ns: dict[str, int] = {}
         self._early: deque[_Early] | None = deque(maxlen=MAX_EARLY)
         self._lost = 0
@@ -91,12 +92,11 @@ class Memory:
         self.recall = Recall(lambda: self.condition, heal=journal.heal)
 
     def follow(self, now: Clock) -> str | None:
-        """Keep to a clock: the first moment of it restores, one that goes back begins a new run.
+        """Follow a clock: its first moment restores the state, and going back begins a new run.
 
-        Returns a summary of what it restored from the journal, once it has. A moment of 0 is a
-        simulated clock that has not started: nothing is known then of when anything was. One that
-        goes back time and again stays in a run, as at its latest, until it may begin another
-        (`MAX_NEW_RUNS`).
+        Returns a summary of what was restored from the journal, once it was. A moment of 0 is a
+        simulated clock that has not started, and is ignored. A clock that goes back too often stays
+        in its run, at its latest moment, until it may begin another (`MAX_NEW_RUNS`).
         """
         if now.stamp_ns <= 0:
             return None
@@ -118,7 +118,7 @@ class Memory:
         return self._take(self.journal.take_restored(), now)
 
     def apply(self, write: Write, arrival_ns: int) -> Drop | None:
-        """Write what is now and what was, and hand it over; returns what the store refused."""
+        """Apply a write to the store, and hand it to the journal; returns a drop if refused."""
         write = replace(write, arrival_ns=arrival_ns)
         if self._early is not None:
             self._lost += len(self._early) == MAX_EARLY
@@ -135,7 +135,7 @@ class Memory:
 
     @property
     def condition(self) -> Condition:
-        """How the journal is doing."""
+        """The journal's condition."""
         condition, early = self.journal.condition, self._early
         if condition.complete_ns is None and self._clock is not None:
             condition = replace(condition, complete_ns=self._clock.stamp_ns)
@@ -145,7 +145,7 @@ class Memory:
         return replace(condition, waiting=len(early), lost=self._lost, complete_ns=last_ns)
 
     def close(self) -> None:
-        """Answer nothing more, and write what is waiting."""
+        """Stop answering queries, and write the waiting rows."""
         self.recall.close()
         self.journal.close()
 
@@ -159,7 +159,7 @@ class Memory:
     def _hand_over(self, write: Write) -> None:
         now_ns = 0 if self._clock is None else self._clock.stamp_ns
         if write.pose is not None:
-            # A place belongs to the moment of the scan that brought it, as its readings do.
+            # A place has the stamp of the scan that brought it, as its readings do.
             stamp_ns = now_ns if isinstance(write, Pin) else write.stamp_ns
             tag, placed_ns = self._store.tag(write.tag_id), self._placed_ns.get(write.tag_id)
             if tag and tag.pose and (placed_ns is None or stamp_ns < placed_ns):
@@ -177,7 +177,7 @@ class Memory:
     # --- what was known before ----------------------------------------------------------------
 
     def _take(self, restored: Restored | None, now: Clock) -> str | None:
-        """Begin with what the log knows, and what came meanwhile on top of it."""
+        """Restore what the journal knows, and apply what was received meanwhile on top of it."""
         if restored is None:
             return None
         doubt, early = self._doubt, self._early or ()
@@ -204,12 +204,12 @@ class Memory:
         self.repeats = Repeats()
         for row in restored.rows:
             self.repeats.add(row)
-        # From before what was handed over meanwhile, if it was earlier.
+        # A place that was handed over meanwhile counts if it is earlier.
         placed = dict(restored.known.placed_ns)
         for tag_id, at_ns in self._placed_ns.items():
             placed[tag_id] = min(at_ns, placed.get(tag_id, at_ns))
         self._placed_ns = placed
-        # The count goes on where it was: it never falls, over a restart either.
+        # The count never falls, not even over a restart.
         self._store.observation_count = max(
             self._store.observation_count, count + 1, restored.last_seq
         )
@@ -217,7 +217,7 @@ class Memory:
     def hold_to(self, now: Clock) -> bool:
         """Follow a clock that has gone back; returns whether anything was later than now.
 
-        What a simulation says again is new; a wall clock comes to no moment twice.
+        A simulation that starts over repeats its stamps for new writes; wall time does not.
         """
         if not self._store.hold_to(now.stamp_ns):
             return False
@@ -225,7 +225,7 @@ class Memory:
         return True
 
     def _check_doubt(self, doubt: _Doubt, now: Clock) -> str | None:
-        """Ask the log again once the clock agrees with it, or has contradicted it for long."""
+        """Restore again once the clock agrees with the journal, or has contradicted it for long."""
         if self._is_requested:
             return self._take(self.journal.take_restored(), now)
         self._agrees = now.is_simulated or now.arrival_ns >= doubt.last_ns - CORRECTION_NS
@@ -242,7 +242,7 @@ class Memory:
 def open_journal(
     path: Path | None, holder: str, days: float, max_mb: float, world: World = World()
 ) -> Journal:
-    """A journal at work; without a path it is in a temporary file, gone at the end.
+    """Open a journal; without a path, in a temporary file that is deleted at the end.
 
     `holder` names this process to others; `world` is what is observed.
     """
@@ -255,9 +255,9 @@ def open_journal(
 
 
 def _moved(early: _Early, by_ns: int) -> _Early:
-    """What was taken in by a clock that was wrong by so much, as of the right one.
+    """Correct a write that was received while the clock was wrong by `by_ns`.
 
-    Where the producer's own clock was right, it is as old as its stamp.
+    If the producer's own clock was right, its stamp counts.
     """
     write = replace(early.write, arrival_ns=early.write.arrival_ns + by_ns)
     if not isinstance(write, Pin):

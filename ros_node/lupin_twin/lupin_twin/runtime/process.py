@@ -1,11 +1,11 @@
-"""How a process begins and ends: its threads for BLAS, its stop signals, its last moments.
+"""How a process starts and ends: BLAS threads, stop signals, exit, and stale DDS shared memory.
 
 Ctrl-C and SIGTERM are waited for, never handled asynchronously: neither ends in a traceback.
 Standard library alone, so that a command can call `block` before it imports anything slow.
 
-And stale shared memory of Fast DDS, which stops every later start in its domain for ever: a process
-that is killed while it creates the memory of a port leaves it marked as unfinished. Whoever opens
-it next waits in C++, with Python's lock held: there is no node, no log line, no signal handler
+Stale shared memory of Fast DDS blocks every later start in its domain forever. A process that is
+killed while it creates the memory of a port leaves it marked as unfinished. The next one that opens
+it waits in C++ and holds the GIL: there is no node, no log line, no signal handler
 (https://github.com/eProsima/Fast-DDS/issues/1144). So it is removed before a node is made.
 """
 
@@ -26,21 +26,21 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final, NoReturn, TextIO
 
-# An idle worker ends at once when it is closed; what takes longer is at work.
+# An idle worker ends at once when it is closed; one that takes longer, s, is at work.
 IDLE_WORKERS_END_S: Final = 0.1
-# What a shell says of a command that Ctrl-C has ended: 128 and the signal's number.
+# Exit code of a command that Ctrl-C has ended, as in a shell: 128 and the signal's number.
 INTERRUPTED: Final = 130
-# What Python says where the last of the standard output could not be written.
+# Exit code of Python if the last of the standard output could not be written.
 NOT_WRITTEN: Final = 120
-# Of arguments that cannot be taken.
+# Exit code for invalid arguments.
 USAGE_ERROR: Final = 2
 
 
 def exit_after(main: Callable[[], int]) -> NoReturn:
-    """Run `main` and `exit_process` with what it returns, and in the same way where it raises.
+    """Run `main`, and `exit_process` with the code that it returns; also if it raises.
 
-    As Python puts itself away, no thread may be within SQLite or a disk that hangs. Ctrl-C ends it
-    quietly, also before `main` waits for it: what it imports takes its time.
+    While Python shuts down, no thread may be in SQLite, or wait for a disk that hangs. Ctrl-C ends
+    the process quietly, also during slow imports, before `main` waits for it.
     """
     try:
         open_standard_files()
@@ -59,7 +59,7 @@ def exit_after(main: Callable[[], int]) -> NoReturn:
 
 
 def refuse(command: str, reason: str) -> int:
-    """Say in a line why a command does not start; the exit code then."""
+    """Print in one line why a command does not start; returns the exit code."""
     sys.stderr.write(f"{command}: {' '.join(reason.split())}\n")
     return USAGE_ERROR
 
@@ -81,16 +81,16 @@ def split_ros_args(argv: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def open_standard_files() -> None:
-    """Open /dev/null for each of the three that whoever started this process has closed.
+    """Open /dev/null for each standard stream that the parent process has closed.
 
-    The next file that is opened would get its number, and whatever a library in C prints would be
-    written into it. Python has None for it, and `sys.stderr.write` would raise.
+    Otherwise the next file that is opened would get its number, and a C library would print into
+    that file. Python has None for such a stream, and `sys.stderr.write` would raise.
     """
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            # The lowest number that is free: this one. Children are to have it too.
+            # `open` takes the lowest free number, which is this one. Children inherit it too.
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
@@ -101,8 +101,8 @@ def exit_process(code: int) -> NoReturn:
     """End the process, whatever its other threads are computing.
 
     Python waits at its end for every worker of a pool, daemon or not, and numpy cannot be
-    interrupted: a large field would hold up Ctrl-C for as long as it takes. So where, and only
-    where, a thread is still at work, the process ends without Python's (and DDS's) tidying up.
+    interrupted. A large field would delay Ctrl-C for as long as it takes. So if, and only if, a
+    thread is still at work, the process ends without the cleanup of Python and DDS.
     """
     deadline_s = time.monotonic() + IDLE_WORKERS_END_S
     others = [thread for thread in threading.enumerate() if thread is not threading.main_thread()]
@@ -115,10 +115,10 @@ def exit_process(code: int) -> NoReturn:
 
 
 def _flushed(code: int) -> int:
-    """Write what still waits to be; the exit code then.
+    """Flush the standard output and error; returns the exit code.
 
-    Where the standard output fails, that is reported. That the standard error does is no failure of
-    the command: Python itself would take it for one, and finds nothing to write any more.
+    If the standard output fails, that is reported. If the standard error does, that is no failure
+    of the command. Python would treat it as one, so its text is discarded.
     """
     try:
         sys.stdout.flush()
@@ -136,7 +136,7 @@ def _flushed(code: int) -> int:
 
 
 def discard_output(stream: TextIO) -> None:
-    """Have /dev/null take what a stream could not write, and will try again."""
+    """Redirect a stream to /dev/null, because Python will retry what it could not write."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)
@@ -146,7 +146,7 @@ _VARIABLE: Final = "OPENBLAS_NUM_THREADS"
 
 
 def limit_blas_threads() -> None:
-    """Have OpenBLAS start no threads, here and in children, unless the environment says so."""
+    """Keep OpenBLAS from starting threads, here and in children, unless the environment asks."""
     os.environ.setdefault(_VARIABLE, "1")
 
 
@@ -155,9 +155,9 @@ _LARGE_BYTES: Final = 1_000_000
 
 
 def return_large_blocks() -> None:
-    """Have glibc give the memory of a large array back to the system as soon as it is freed.
+    """Make glibc return the memory of a large array to the system as soon as it is freed.
 
-    By default it comes to keep those of up to 32 MB: an estimate left 50 MB behind.
+    By default it ends up keeping blocks of up to 32 MB: an estimate left 50 MB behind.
     """
     with suppress(AttributeError, OSError):  # another C library
         ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, _LARGE_BYTES)
@@ -165,14 +165,14 @@ def return_large_blocks() -> None:
 
 STOP_SIGNALS: Final = frozenset({signal.SIGINT, signal.SIGTERM})
 
-# So long an end may take, s, whatever hangs: five times as long as it is meant to.
+# How long shutdown may take, s, whatever hangs: five times as long as intended.
 END_S: Final = 10
 _STDERR: Final = 2
 _PR_SET_PDEATHSIG: Final = 1
 
 
 def block() -> None:
-    """Hold the stop signals back until `wait` takes them.
+    """Block the stop signals until `wait` takes them.
 
     To be called first of all, before ROS starts its threads: they inherit this.
     """
@@ -189,7 +189,7 @@ def wait(end_within_s: int = END_S) -> None:
 
 
 def stop_flag() -> threading.Event:
-    """A flag that a stop signal sets; `block` was called. From then on the process has to end."""
+    """Return a flag that a stop signal sets; call `block` before. Then the process has to end."""
     flag = threading.Event()
 
     def note() -> None:
@@ -201,10 +201,10 @@ def stop_flag() -> threading.Event:
 
 
 def must_end(within_s: int = END_S) -> None:
-    """From now on the process ends within so long, even if the middleware never comes back.
+    """End the process within `within_s` from now, even if the middleware hangs.
 
-    The traceback of every thread is printed. Neither of the two needs the interpreter: a call that
-    hangs may keep it. The second is there for what runs after Python has ended.
+    In that case the traceback of every thread is printed. Neither of the two timers needs the
+    interpreter, which a hanging call may hold. The second covers what runs after Python has ended.
     """
     faulthandler.dump_traceback_later(within_s, exit=True, file=_STDERR)
     signal.alarm(within_s + 1)
@@ -214,12 +214,12 @@ def end_with_parent() -> None:
     """Have the kernel send SIGTERM when the process that started this one is gone (prctl(2))."""
     parent = os.getppid()
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-    if os.getppid() != parent:  # it went before the kernel was asked
+    if os.getppid() != parent:  # it ended before the call
         sys.exit(0)
 
 
-FOLDER: Final = Path("/dev/shm")  # noqa: S108  # where Linux keeps it
-# Making one takes milliseconds.
+FOLDER: Final = Path("/dev/shm")  # noqa: S108  # where Linux keeps shared memory
+# Younger files, s, may still be in creation, which takes milliseconds.
 YOUNG_S: Final = 5.0
 # The RTPS specification's default port numbers, 9.6.1.1: where a domain's begin, and how many.
 _PORT_BASE: Final = 7400
@@ -238,9 +238,10 @@ def ports(domain: int) -> range:
 
 
 def remove_stale_shared_memory(domain: int, folder: Path = FOLDER) -> list[str]:
-    """Remove what killed processes left unfinished of a domain's ports; returns the file names.
+    """Remove a domain's ports that killed processes left unfinished; returns the file names.
 
-    What cannot be removed, another user's, is logged as an error: the start may hang on it.
+    A file that cannot be removed, because it is another user's, is logged as an error: the start
+    may hang on it.
     """
     removed = []
     for path in _unfinished(domain, folder):

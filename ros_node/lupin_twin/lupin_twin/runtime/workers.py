@@ -1,12 +1,12 @@
-"""Threads for what takes longer than a tick, so ordered that the small never waits for the large.
+"""Worker threads and job queues for longer work; small jobs never wait for large ones.
 
-A job is due at its arrival plus `PATIENCE` times its estimated cost, and the earliest due goes
-first. So a dear job lets cheap ones pass, but only those that come within `PATIENCE` times its own
-cost: none starves, whatever comes later. One thread takes nothing but small jobs (`SMALL_S`): they
-need not wait for a large one to end either.
+A job is due at its arrival plus `PATIENCE` times its estimated cost, and the earliest due runs
+first. So an expensive job lets cheap ones pass, but only those that arrive within `PATIENCE` times
+its own cost: no job starves. One thread takes only small jobs (`SMALL_S`), so that they need not
+wait for a large one to end either.
 
-Work that nobody waits for ends: `Job.cancel` takes it off the queue, and where it runs already,
-its `should_stop` turns true, which long computations ask between their steps.
+Work that nobody waits for ends. `Job.cancel` removes it from the queue or, if it runs already,
+turns its `should_stop` true, which long computations check between their steps.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from typing import Any, Final, Generic, TypeVar
 
 from lupin_twin.core.past import NotRemembered
 
-# Estimates are seconds of one core. A small job costs what nobody notices: those of a few clients
-# that ask at the rate they may do not keep the threads busy.
+# Estimated costs are seconds of one core. The cost of a small job is negligible: a few clients that
+# send requests at their allowed rate do not keep the threads busy.
 SMALL_S: Final = 0.02
 PATIENCE: Final = 2.0
 # Threads that take any job; two, so that one heavy job does not hold up all other large ones.
 LARGE_THREADS: Final = 2
 SMALL_THREADS: Final = 1
 
-# What is made in plain Python keeps all other threads waiting: so long, s, before it rests.
+# Plain Python code keeps all other threads waiting; after this long, s, it pauses.
 TURN_S: Final = 0.002
 
 ResultT = TypeVar("ResultT")
@@ -40,7 +40,7 @@ ShouldStop = Callable[[], bool]
 
 
 class Job(Future[ResultT], Generic[ResultT]):
-    """The result to come of `work(should_stop)`, which is estimated to take `cost_s`."""
+    """The future of `work(should_stop)`, which is estimated to take `cost_s`."""
 
     def __init__(
         self,
@@ -61,7 +61,7 @@ class Job(Future[ResultT], Generic[ResultT]):
         return self._is_abandoned
 
     def cancel(self) -> bool:
-        """Nobody waits any more: take it off the queue, or let it end soon where it runs."""
+        """Abandon the job: remove it from the queue or, if it runs, let it end soon."""
         if not self.done() and not self._is_abandoned:
             self._is_abandoned = True
             self._on_cancel(self)
@@ -77,12 +77,12 @@ class Job(Future[ResultT], Generic[ResultT]):
             self.set_exception(error)
         else:
             self.set_result(result)
-        # What it was made of must not live as long as its result.
+        # The inputs must not live as long as the result.
         del self._work
 
 
 class Workers:
-    """The threads and the jobs that wait for one. Any thread may call it.
+    """A pool of threads, and the jobs that wait for one. Any thread may call it.
 
     The threads start with the first job. `clock` tells seconds and never jumps.
     """
@@ -111,11 +111,11 @@ class Workers:
 
     @property
     def running(self) -> int:
-        """Jobs that a thread is at."""
+        """Jobs that a thread is running."""
         return len(self._running)
 
     def submit(self, work: Callable[[ShouldStop], ResultT], cost_s: float = 0.0) -> Future[ResultT]:
-        """Have `work(should_stop)` done; `cost_s` is an estimate, in seconds of one core.
+        """Queue `work(should_stop)`; `cost_s` is an estimate, in seconds of one core.
 
         Raises:
             RuntimeError: the workers were closed.
@@ -132,7 +132,7 @@ class Workers:
         return job
 
     def close(self) -> None:
-        """End: drop what waits, and ask what runs to stop. Waits for nothing."""
+        """Drop waiting jobs, and ask running ones to stop. Does not wait for them."""
         with self._changed:
             self._is_closed = True
             left = [*self._waiting, *self._running]
@@ -166,7 +166,7 @@ class Workers:
             while not self._is_closed:
                 mine = [job for job in self._waiting if job.cost_s <= SMALL_S or not only_small]
                 if mine:
-                    job = min(mine, key=lambda job: job.due_s)  # of equals, the first that came
+                    job = min(mine, key=lambda job: job.due_s)  # if equal, the first that arrived
                     self._waiting.remove(job)
                     self._running.add(job)
                     return job
@@ -179,11 +179,11 @@ def in_turns(
     clock: Callable[[], float] = time.perf_counter,
     rest: Callable[[float], None] = time.sleep,
 ) -> Iterator[ItemT]:
-    """The items, with a rest after each `TURN_S` in which something was made of them, as long.
+    """Yield the items; after each `TURN_S` of the caller's work on them, pause for as long.
 
-    The interpreter lets one thread run at a time, and takes it from the one only after 5 ms: who
-    makes half a million objects would leave a node's thread, which waits for it at each message,
-    next to nothing.
+    The interpreter runs one thread at a time, and switches only after 5 ms. A loop that makes half
+    a million objects would leave next to nothing to a node's thread, which waits for the
+    interpreter at each message.
     """
     begun_s = clock()
     for item in items:
@@ -193,21 +193,21 @@ def in_turns(
             begun_s = clock()
 
 
-# Queries of a sort that wait for their answer, and those that are dealt with at once.
+# Limits of small, and of large, queries: those without an answer, and those processed at once.
 MAX_QUERIES: Final = 32
 LARGE_AT_ONCE: Final = 1
 SMALL_AT_ONCE: Final = 4
-# While the owner's thread is behind, so much time, s, lies between two of a sort.
+# Time between two small, or two large, queries while the owner's thread is behind, s.
 PACE_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Query:
-    """What is looked up, what is made of the result, and who gets it.
+    """What to look up, how to make the answer from the result, and who gets the answer.
 
-    `look_up` begins the search; `make`, if there is one, is called on a worker with its result, as
-    `cost_s` estimates, s of one core. `reply` gets the answer, or the exception. What is no longer
-    wanted when its turn comes is dropped. `since_s` is when it was made, by the steady clock.
+    `look_up` begins the search. `make`, if given, is called with its result on a worker; `cost_s`
+    is its estimated cost, s of one core. `reply` gets the answer, or the exception. A query that is
+    no longer wanted when its turn comes is dropped. `since_s` is when it was made, steady clock.
     """
 
     look_up: Callable[[], Future[Any]]
@@ -219,14 +219,14 @@ class Query:
 
 
 class JobQueue:
-    """Work of more than a tick for one thread, which owns the queue and gets the answers.
+    """Queries of one thread, which owns the queue, gets the answers, and is not blocked by them.
 
-    Large queries are taken `large_at_once`, each when the one before has been delivered: what is
-    made for the largest takes some 200 MB. Small ones do not wait behind them, nor are refused for
-    them. While `is_behind()` says that messages wait for the owner's thread, queries wait too, but
-    for one a second. `wake()` is called in another thread when `deliver` has something to do;
-    `clock` tells seconds and never jumps. `answered` counts answers, `slowest_s` is the longest
-    that one took.
+    At most `large_at_once` large queries are processed until their answers are delivered, because
+    the largest takes about 200 MB. Small ones do not wait behind them, nor are refused because of
+    them. While `is_behind()` (messages wait for the owner's thread), queries wait too, except for
+    one a second. `wake()` is called in another thread when `deliver` has something to do. `clock`
+    returns seconds and never jumps. `answered` counts answers, `slowest_s` is the longest that one
+    took.
     """
 
     def __init__(
@@ -252,10 +252,10 @@ class JobQueue:
         return sum(lane.count for lane in self._lanes)
 
     def ask(self, query: Query) -> None:
-        """Have the query answered by `deliver`.
+        """Queue a query, to be answered by `deliver`.
 
         Raises:
-            NotRemembered: too many of its sort wait.
+            NotRemembered: too many small, or large, queries wait.
 
         """
         lane = self._lane(query)
@@ -266,14 +266,14 @@ class JobQueue:
         self._begin(lane)
 
     def go_on(self) -> None:
-        """Begin what may be begun by now; to be called now and then."""
+        """Begin the queries that may begin by now; to be called now and then."""
         for lane in self._lanes:
             self._begin(lane)
 
     def deliver(self) -> None:
-        """Hand out one answer; where there are more, `wake` is called for the next.
+        """Deliver one answer; if there are more, `wake` is called for the next.
 
-        Sending a large one takes a while, and what else waits for this thread comes in between.
+        Sending a large one takes a while, so other callbacks of this thread run in between.
         """
         try:
             query, answer = self._done.get_nowait()
@@ -318,7 +318,7 @@ class JobQueue:
             put(answer)
 
         def make(search: Future[Any]) -> None:
-            # In whichever thread searched: that one is not for making messages.
+            # This runs in the thread that searched, which is not for making messages.
             try:
                 found, made = search.result(), query.make
                 assert made is not None
@@ -338,7 +338,7 @@ class JobQueue:
 
 @dataclass(slots=True)
 class _Lane:
-    """Queries of a sort, how many are dealt with at once, and when the last was begun."""
+    """Small or large queries, how many are processed at once, and when the last was begun."""
 
     at_once: int
     under_way: int = 0

@@ -17,7 +17,7 @@ QUERIES = re.findall(r"```sql\n(.*?)```", PAGE, re.DOTALL)
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A day of a small greenhouse, whose tag 0 is called 7 here."""
+    """A day of a small greenhouse, whose tag 0 is called 12 here."""
     path = tmp_path_factory.mktemp("log") / "j.sqlite"
     shutil.copy(ROOT / "tests" / "fixtures" / "journals" / "day.sqlite", path)
     upgrade(path, lambda share: None)
@@ -30,7 +30,7 @@ def rows(path: Path, sql: str) -> list[tuple[object, ...]]:
 
 
 def test_the_temperature_of_a_day(path: Path) -> None:
-    found = rows(path, QUERIES[0].replace("'7'", "'0'"))
+    found = rows(path, QUERIES[0].replace("'12'", "'0'"))
     assert len(found) == 90
     assert found[0] == ("2025-11-21 00:00:00", 13.02)
 
@@ -46,7 +46,7 @@ def test_the_failed_attempts_of_a_week(path: Path) -> None:
 def test_the_mean_of_each_day(path: Path) -> None:
     found = {row[1:3]: row for row in rows(path, QUERIES[2])}
     assert len(QUERIES) == 3
-    readings = [value for _, value in rows(path, QUERIES[0].replace("'7'", "'0'"))]
+    readings = [value for _, value in rows(path, QUERIES[0].replace("'12'", "'0'"))]
     day, _, _, mean, low, high = found["0", "temperature"]
     assert day == "2025-11-21"
     assert mean == pytest.approx(sum(map(float, map(str, readings))) / 90)

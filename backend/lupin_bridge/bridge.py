@@ -1,4 +1,7 @@
-"""Source to clients: takes what the twin tells, paces it, and keeps watch over both sides."""
+"""The core of the bridge: judges the twin's states, and sends them to clients at a limited rate.
+
+It also watches for a silent twin and for stuck clients.
+"""
 
 from __future__ import annotations
 
@@ -32,31 +35,30 @@ from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 
 log = logging.getLogger(__name__)
 
-# How often silence and stuck clients are looked for. Silence counts from 3 s on, and a client has
+# Interval of the check for silence and stuck clients. A twin is silent after 3 s, and clients have
 # to know by 3.5 s.
 WATCH_PERIOD_S = 0.2
 
 
-# A heartbeat this soon after a frame is spared. With one heartbeat a second, two frames are never
-# farther apart than 1.8 s; a browser calls 3 s silence.
+# A heartbeat this soon after a frame is not sent. With one heartbeat per second, frames are still
+# at most 1.8 s apart; a browser reports silence after 3 s.
 HEARTBEAT_SPARED_S = 0.8
 
-# Frames that may go out one right behind the other where the mean rate allows it. With one, a
-# single late change would shift the beat, and of a producer that keeps to the rate every change
-# after it would wait for its slot.
+# Frames that may be sent back to back while the mean rate allows it. With 1, a single late change
+# would shift the schedule: every later change of a producer at exactly this rate would wait.
 PACE_BURST: Final = 2.0
 _EVERYBODY: Final = ""
-# What a frame of alarms takes to write, at worst; and how fast such frames follow each other: each
-# holds all of them, for every client.
+# Worst-case time to write an alarms frame, and the limits on the rate of such frames: each holds
+# all alarms, and goes to every client.
 ALARMS_S: Final = 0.03
 ALARMS_REST_S: Final = 1.0
 ALARM_BYTES_PER_S: Final = 500_000
 
 
 class Bridge:
-    """Everything between a source and its listeners. Belongs to the event loop.
+    """Everything between a source and its clients. Belongs to the event loop.
 
-    `clock` tells seconds and never jumps. `admission` is given where several share one.
+    `clock` returns monotonic seconds. Bridges may share one `admission`.
     """
 
     def __init__(
@@ -136,14 +138,14 @@ class Bridge:
         self._watch.start()
         self._publishing_alarms = asyncio.create_task(self._publish_alarms(), name="alarm frames")
         self.outward.start(self, self.criteria.sensors)
-        if self.latest is not None:  # there may be no second state: a silent site has one
+        if self.latest is not None:  # there may be no second state: a silent site sends one
             self.notes.start()
         self._alarm_feed.start()
         self._estimates.start()
         self.robot.start()
 
     async def stop(self) -> None:
-        """Stop them, and the channels; `announce_shutdown` has notified the clients."""
+        """Stop all that `start` began; call `announce_shutdown` first to notify the clients."""
         await end(self._learning, self._publishing_alarms)
         await self._watch.stop()
         await asyncio.gather(self._alarm_feed.stop(), self.notes.stop())
@@ -153,7 +155,7 @@ class Bridge:
         await asyncio.gather(self.outward.stop(), self.source.stop())
 
     def announce_shutdown(self) -> None:
-        """Tell every client that the bridge is about to go."""
+        """Notify every client that the bridge is shutting down."""
         self.liveness.shutting_down = True
         self._publish_status()
 
@@ -161,7 +163,7 @@ class Bridge:
 
     @property
     def latest(self) -> TwinUpdate | None:
-        """The newest state, before any pacing; None while no twin was heard."""
+        """The newest state, without rate limit; None until one is received."""
         return self.liveness.update
 
     @property
@@ -171,26 +173,26 @@ class Bridge:
 
     @property
     def origin(self) -> Origin:
-        """Where observations come from, as the twin says, or the log of one that is not heard."""
+        """Where observations come from, as reported by the twin or, before it is seen, its log."""
         return self.status.update.origin
 
     @property
     def ros_time_ns(self) -> int | None:
-        """ROS time now: the newest state's, and the time since it came; None: it is not known."""
+        """ROS time now, ns: the newest state's, plus the time since it came; None: not known."""
         latest, silent_s = self.latest, self.liveness.silent_s(self._clock())
         if latest is None or silent_s is None:
             return None
-        if latest.snapshot.clock != "running":  # paused: it stands
+        if latest.snapshot.clock != "running":  # paused: it does not advance
             return latest.snapshot.now_ns
         return latest.snapshot.stamp_ns + int(silent_s * NANOSECONDS_PER_SECOND)
 
     @property
     def judged(self) -> Judged:
-        """What was said with the last frame; of a greenhouse whose twin is silent, that it is."""
+        """The judgement sent with the last frame; if the twin is silent, that it is silent."""
         return self._judged if self.status.is_live else silenced(self._judged)
 
     def seen(self) -> GreenhouseState:
-        """How the greenhouse is now, for notifications of it."""
+        """The current state of the greenhouse, for notifications."""
         return GreenhouseState(
             self.status,
             self.judged,
@@ -200,16 +202,16 @@ class Bridge:
         )
 
     def join(self, client: Client) -> None:
-        """Add a listener; it has the status and the current state when this returns."""
-        self._publish_status()  # all clients get it at once
+        """Add a client; it has been sent the status and the current state when this returns."""
+        self._publish_status()  # the other clients get a change no later
         self.hub.join(client, self._clock())
 
     def serve(self, client: Client) -> None:
-        """A listener's socket is free again."""
+        """Send a client what it lacks: its socket is free again."""
         self.hub.serve(client, self._clock())
 
     def note_answer(self, path: str, status: int, seconds: float) -> None:
-        """An HTTP answer has begun."""
+        """Count an HTTP answer, which has begun."""
         self.http_answers[str(status)] += 1
         self.metrics.http_seconds.labels(route_class(path)).observe(seconds)
 
@@ -256,14 +258,14 @@ class Bridge:
             "lupin_estimate_fit_failing",
             {name: bool(report.fit_problem) for name, report in known.items()},
         )
-        # A twin that does not say has no zeros: nobody knows.
+        # Counts that the twin does not report are absent, not zero.
         for name, counts in (
             ("lupin_dropped", None if latest is None else latest.counts),
             ("lupin_web_dropped", None if latest is None else latest.own_counts),
         ):
             if counts is not None:
                 yield name, {str(why): counts.dropped.get(why, 0) for why in (*Reason, LOST, LATE)}
-        if journal.state == "unknown":  # nobody knows: no zeros
+        if journal.state == "unknown":  # absent, not zero
             return
         yield "lupin_journal_recording", journal.state == "recording"
         yield "lupin_journal_rows", journal.written
@@ -280,7 +282,7 @@ class Bridge:
         self.liveness.update, self.liveness.updated_s = state, now_s
         self._alarm_feed.on_state(state)
         if self._push_timer is not None:
-            return  # it will take this state along
+            return  # the timer will send this state
         if self._is_redundant(state, now_s):
             return
         self._push_when_due()
@@ -295,9 +297,9 @@ class Bridge:
             self._push()
 
     def _is_redundant(self, state: TwinUpdate, now_s: float) -> bool:
-        """Whether this is a mere heartbeat, and a frame has just gone out.
+        """Whether this is only a heartbeat, and a frame has just been sent.
 
-        It would tell nobody anything, and a change right behind it would have to wait for its turn.
+        It has nothing new, and would make a change right behind it wait for its slot.
         """
         pushed = self._pushed
         return (
@@ -314,7 +316,7 @@ class Bridge:
         now_s = self._clock()
         self._pushed, self._pushed_s = state, now_s
         self._publish_status()
-        # A source answers once it has started, which it may not have as it tells its first state.
+        # A source answers once it has started; its first state may come before that.
         has_started = self._publishing_alarms is not None
         if has_started:
             self.notes.start()
@@ -328,7 +330,7 @@ class Bridge:
     def _judge_state(self, snapshot: Snapshot) -> Judged:
         try:
             judged = self._judge.see(snapshot)
-        except Exception:  # whatever it is: the state itself goes out
+        except Exception:  # whatever failed: the state itself must be sent
             self._states_unjudged += 1
             if not self._is_judge_failing:
                 log.exception("the state could not be judged: every status is unknown")
@@ -344,7 +346,7 @@ class Bridge:
         self._has_alarms.set()
 
     async def _publish_alarms(self) -> None:
-        """The newest alarms, again and again; a frame of a thousand is written by a worker."""
+        """Send the alarms after each change; a worker writes the frame, which may hold 1,000."""
         while True:
             await self._has_alarms.wait()
             self._has_alarms.clear()
@@ -352,10 +354,10 @@ class Bridge:
             try:
                 wire = await asyncio.wrap_future(self.source.workers.submit(write, ALARMS_S))
                 self.hub.publish_alarms(wire, self._clock())
-            except Exception:  # nobody waits for this task: the next alarms are sent
+            except Exception:  # nobody awaits this task: it goes on with the next change
                 log.exception("the newest alarms could not be sent")
                 continue
-            # Of many alarms that change all the time, no more is sent than a browser can take.
+            # If many alarms change all the time, send no more than a browser can take.
             await asyncio.sleep(max(ALARMS_REST_S, len(wire) / ALARM_BYTES_PER_S))
 
     def _alarms_writer(self) -> Callable[[object], bytes]:
@@ -374,13 +376,12 @@ class Bridge:
         status = self.status
         if not status.is_news_after(self._published):
             return
-        is_one = status.is_live and status.update.twin_count <= 1
-        is_good = is_one or status.reason == "shutting_down"
-        first = self._published is None
-        if (first and not is_good) or (
-            self._published and status.has_more_detail_than(self._published)
-        ):
-            # Of a fleet many are open.
+        is_good = status.is_live and status.update.twin_count <= 1
+        before = self._published
+        # A fleet closes pages that nobody reads any more: nothing to log.
+        is_end = status.reason == "shutting_down"
+        if not is_end and (status.has_more_detail_than(before) if before else not is_good):
+            # A fleet has many bridges.
             message = f"site {self.site}: {status.message}" if self.site else status.message
             log.log(logging.INFO if is_good else logging.WARNING, "%s", message)
         self._published = status
@@ -397,6 +398,6 @@ class Bridge:
         now_s = self._clock()
         if not self.status.is_live:
             self.hub.remind(now_s)
-        self.hub.serve_all(now_s)  # who asked for a low rate may be due by now
+        self.hub.serve_all(now_s)  # clients with a low rate may be due by now
         if stuck := self.hub.dismiss_stuck(now_s):
             log.warning("closed %d clients that took no frame", stuck)

@@ -1,8 +1,7 @@
-"""Lines for people, on streams that may be closed, full, or read by nobody.
+"""Output of the commands for people, and other helpers that commands share.
 
-A line that cannot be written ends no work and changes no exit code: the files count.
-
-And what commands share: their actions, and where they write.
+The standard streams may be closed, full, or read by nobody. A line that cannot be written ends no
+work and changes no exit code: only the files count.
 """
 
 from __future__ import annotations
@@ -24,19 +23,19 @@ _AGAIN_AFTER_S: Final = 0.5
 
 
 def say(text: str) -> None:
-    """A line beside the output; where there is no way to say it, it is left out."""
+    """Write a line to the standard error; if that fails, drop it."""
     _written(sys.stderr, f"lupin-twin: {' '.join(text.split())}\n")
 
 
 def tell(*lines: str) -> None:
-    """Lines that are the output; where they cannot be written, that is reported, once for all."""
+    """Write lines to the standard output; if that fails, report it once."""
     error = _written(sys.stdout, "".join(f"{line}\n" for line in lines))
     if error is not None and not isinstance(error, BrokenPipeError):  # `| head`: it has enough
         say(f"cannot write to the standard output: {getattr(error, 'strerror', error)}")
 
 
 class Progress:
-    """How far it is, on the standard error: one line that is written over, if a person looks."""
+    """Progress on the standard error: on a terminal, one line that is overwritten."""
 
     def __init__(self) -> None:
         self._is_seen = sys.stderr.isatty()
@@ -44,7 +43,7 @@ class Progress:
         self._reported_s = 0.0
 
     def tell(self, what: str, share: float) -> None:
-        """Show what is done, and the share of it that is."""
+        """Show the current step, and the share of it that is done, 0 to 1."""
         is_new, self._what = what != self._what, what
         if not self._is_seen:
             if is_new:
@@ -55,21 +54,21 @@ class Progress:
             _written(sys.stderr, f"\r\x1b[K{what} {share:.0%}")
 
     def clear(self) -> None:
-        """Make place for other lines."""
+        """Clear the line, for other output."""
         if self._is_seen:
             _written(sys.stderr, "\r\x1b[K")
 
 
 def _written(stream: TextIO | None, text: str) -> Exception | None:
-    """Write at once; returns why not."""
+    """Write and flush; returns the error if that fails."""
     if stream is None:
         return None
     try:
         stream.write(text)
         stream.flush()
-    except (OSError, ValueError) as error:  # ValueError: somebody has closed it
+    except (OSError, ValueError) as error:  # ValueError: it is closed
         with suppress(OSError, ValueError):
-            discard_output(stream)  # or Python would try once more as it ends, and complain
+            discard_output(stream)  # or Python would try again at exit, and complain
         return error
     return None
 
@@ -80,14 +79,14 @@ FAILED: Final = 1
 
 
 class CommandError(Exception):
-    """It cannot be done; the message is the one line that says why."""
+    """A command failed; the message is one line that says why."""
 
 
 Roles: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # noqa: SLF001
 
 
 def add_role(roles: Roles, role: str, text: str, **more: Any) -> argparse.ArgumentParser:
-    """Add a role without abbreviations: what one means would change with the next option."""
+    """Add a role without abbreviated options: a new option could change what one means."""
     return roles.add_parser(role, help=text, description=text, allow_abbrev=False, **more)
 
 
@@ -103,35 +102,35 @@ def add_actions(
 
 
 def user() -> str:
-    """Who runs the command."""
+    """The name of the user who runs the command."""
     try:
         return getpass.getuser()
     except (KeyError, OSError):  # a user without a name
         return f"user {os.getuid()}"
 
 
-# Of these two, only the copy is written.
+# Errors of the copy: the journal is only read.
 _NOT_WRITTEN: Final = {
     sqlite3.SQLITE_FULL,
     sqlite3.SQLITE_IOERR_WRITE,
     sqlite3.SQLITE_IOERR_FSYNC,
     sqlite3.SQLITE_IOERR_TRUNCATE,
 }
-# So that Ctrl-C ends it in between.
+# Pages copied per step; Ctrl-C takes effect between two steps.
 _PAGES_AT_ONCE: Final = 1000
 
 
 def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], None]) -> int:
-    """Copy it to a new file by SQLite's own online backup; returns the file's size, bytes.
+    """Copy a journal to a new file by SQLite's online backup; returns the file's size, bytes.
 
-    `report` gets the share that is copied.
+    `report` gets the copied share, 0 to 1.
 
     Raises:
-        CommandError: there is such a file, or it cannot be made or written.
+        CommandError: `target` exists, or cannot be created or written.
         sqlite3.Error: the journal cannot be read.
 
     """
-    # Without a transaction, each write of the twin would have SQLite begin the copy anew.
+    # Without a transaction, SQLite would restart the copy after each write of the twin.
     journal.execute("BEGIN")
     journal.execute("SELECT count(*) FROM sqlite_schema").fetchone()
     try:
@@ -140,7 +139,7 @@ def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], 
         raise CommandError(f"{target} is there already, and nothing is overwritten") from error
     except OSError as error:
         raise CommandError(f"cannot write {target}: {error.strerror}") from error
-    # Half of a copy looks like all of it: whatever ends this, Ctrl-C too, removes it.
+    # An incomplete copy looks complete: whatever ends this, Ctrl-C too, removes it.
     with ExitStack() as if_unfinished:
         if_unfinished.callback(target.unlink)
         try:
@@ -159,11 +158,11 @@ def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], 
 
 
 def standard(data: bytes) -> None:
-    """Write to the standard output, at once.
+    """Write to the standard output, and flush.
 
     Raises:
-        CommandError: it does not take it.
-        BrokenPipeError: who read it has gone.
+        CommandError: it cannot be written.
+        BrokenPipeError: the reader has gone.
 
     """
     try:

@@ -1,6 +1,6 @@
-"""Fields and estimates: how they are asked for, and written as JSON, PNG or NPY. Pure.
+"""Fields and estimates: their query parameters, and their output as JSON, PNG or NPY. Pure.
 
-On a worker: large ones take a while.
+Write them on a worker: large ones take a while.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class FieldQuery:
-    """The parameters of a field; `resolution` and the box are None where left to the server."""
+    """Query parameters of a field; `resolution` and box None: the server chooses."""
 
     sensor_type: Name = needed("name of a sensor, as in a reading")
     resolution: Annotated[float, Gt(0)] | None = parameter(
@@ -72,10 +72,10 @@ class FieldQuery:
 
     @property
     def box(self) -> Box | None:
-        """The box, where one is given.
+        """The box; None: not given.
 
         Raises:
-            FieldRefused: not all of it is.
+            FieldRefused: only part of the box is given.
 
         """
         box = self.bbox_min_x, self.bbox_min_y, self.bbox_max_x, self.bbox_max_y
@@ -85,7 +85,7 @@ class FieldQuery:
         return None if missing else box  # type: ignore[return-value]  # all of it is there
 
     def request(self, default_box: Box, max_cells: int) -> FieldRequest:
-        """The request for GetField; one with neither box nor resolution has `max_cells` at most.
+        """The request for GetField; with neither box nor resolution, of at most `max_cells` cells.
 
         Raises:
             FieldRefused: see `box`.
@@ -100,7 +100,7 @@ class FieldQuery:
 
 @dataclass(frozen=True, slots=True)
 class EstimateQuery(FieldQuery):
-    """Those of an estimate: it is two numbers a cell, and a picture shows one of them."""
+    """Query parameters of an estimate: it has two numbers per cell, and a PNG shows one of them."""
 
     layer: Literal["mean", "sd"] = parameter(
         "PNG only: which of the two numbers; transparent where the estimate is not known", "mean"
@@ -108,7 +108,7 @@ class EstimateQuery(FieldQuery):
 
 
 def check_scale(query: FieldQuery, field_format: FieldFormat, cells: int, max_cells: int) -> None:
-    """Refuse a scale for anything but a picture, and a picture past the cell limit.
+    """Refuse a scale for other formats than PNG, and a PNG of more than `max_cells` pixels.
 
     Raises:
         FieldRefused: either of the two.
@@ -126,7 +126,7 @@ def check_scale(query: FieldQuery, field_format: FieldFormat, cells: int, max_ce
 
 
 def negotiate(accept: str | None) -> FieldFormat | None:
-    """The format that an Accept header prefers, JSON where it is open; None: none will do.
+    """The format that an Accept header prefers, JSON by default; None: none is acceptable.
 
     RFC 9110, section 12.5.1: the most specific range that matches a format gives its weight.
     """
@@ -142,9 +142,9 @@ def negotiate(accept: str | None) -> FieldFormat | None:
 
 
 def weighted(header: str) -> list[tuple[str, float]]:
-    """What a header accepts, in lower case, and each one's weight (RFC 9110, section 12.4.2).
+    """The items of an Accept header, in lower case, with their weights (RFC 9110, section 12.4.2).
 
-    What is no weight counts as 0.
+    An invalid weight counts as 0.
     """
     found = []
     for part in header.lower().split(","):
@@ -177,9 +177,9 @@ def matches(if_none_match: str | None, tag: str) -> bool:
 
 
 def headers(metadata: Mapping[str, str], file_name: str, kind: str = "Field") -> dict[str, str]:
-    """A field's metadata as `X-Field-…` headers, and a name for who saves it.
+    """A field's metadata as `X-Field-…` headers, and a file name to save it under.
 
-    Values are ASCII and neither begin nor end with a space; what is not so is percent-encoded.
+    Characters other than ASCII, and spaces at either end of a value, are percent-encoded.
     """
     result = {f"X-{kind}-{name}": _header_value(value) for name, value in metadata.items()}
     result["Content-Disposition"] = f'inline; filename="{safe_name(file_name)}"'
@@ -199,7 +199,7 @@ _SAFE: Final = " !#$&'()*+,-./:;<=>?@[]^_`{|}~"
 
 
 def rgb(hue: float, saturation: float, lightness: float) -> tuple[int, int, int]:
-    """A colour of degrees, percent, percent as 0 to 255 a channel (CSS Color 4, section 7)."""
+    """HSL (degrees, percent, percent) to RGB, 0 to 255 per channel (CSS Color 4, section 7)."""
     channels = colorsys.hls_to_rgb(hue / 360, lightness / 100, saturation / 100)
     red, green, blue = (round(channel * 255) for channel in channels)
     return red, green, blue
@@ -207,12 +207,12 @@ def rgb(hue: float, saturation: float, lightness: float) -> tuple[int, int, int]
 
 # Palette index 0 is "not known"; the ramp has the other 255.
 _RAMP_STEPS: Final = 255
-# Numbers that are written at once: for this millisecond, no other thread of this process runs.
+# Numbers per call of orjson, about a millisecond: no other thread of this process runs meanwhile.
 _AT_ONCE: Final = 16_384
 
 
 def extent(grid: FieldGrid | EstimateGrid, sensor: Sensor) -> dict[str, str]:
-    """Of which sensor the cells are, how many, and where they lie."""
+    """The sensor of the cells, and the grid's size, origin and resolution."""
     return {
         "Sensor": sensor.name,
         "Unit": sensor.unit,
@@ -225,7 +225,7 @@ def extent(grid: FieldGrid | EstimateGrid, sensor: Sensor) -> dict[str, str]:
 
 
 def metadata(grid: FieldGrid, sensor: Sensor) -> dict[str, str]:
-    """What a picture or a bare array cannot say of itself: extent, range, unit, sensor."""
+    """What the cells of a PNG or NPY do not show: sensor, unit, extent, range of values."""
     return {
         **extent(grid, sensor),
         "Value-Min": str(np.float32(grid.value_min)),
@@ -247,7 +247,7 @@ def write(
 
 
 def write_json(grid: FieldGrid) -> bytes:
-    """`schema.GetFieldResponse`."""
+    """The field as JSON of `schema.GetFieldResponse`."""
     return _json(
         grid,
         {"values": grid.values},
@@ -261,7 +261,7 @@ def _json(
     grid: FieldGrid | EstimateGrid, arrays: Mapping[str, npt.NDArray[np.float32]], **rest: Any
 ) -> bytes:
     """A service's response, its arrays flat and row-major, NaN as null."""
-    # As in the services' float32, and so the shortest decimals that are the same one: 0.1.
+    # float32, as in the services: orjson then writes the shortest decimal of each, such as 0.1.
     fields = {
         "width": grid.width,
         "height": grid.height,
@@ -274,12 +274,12 @@ def _json(
     for name, cells in arrays.items():
         parts += (b',"%b":[' % name.encode(), *numbers(cells), b"]")
     parts += (b",", orjson.dumps(fields, option=orjson.OPT_SERIALIZE_NUMPY)[1:])
-    # Put together once: to copy thirty megabytes takes a while too.
+    # Joined once: copying thirty megabytes takes a while.
     return b"".join(parts)
 
 
 def numbers(cells: npt.NDArray[np.float32]) -> Iterator[bytes]:
-    """The numbers of an array as JSON, row-major, without the brackets, in parts; NaN as null."""
+    """Yield an array's numbers as JSON in parts, row-major, without the brackets; NaN is null."""
     flat = np.ascontiguousarray(cells).ravel()
     for start in range(0, flat.size, _AT_ONCE):
         part = flat[start : start + _AT_ONCE]
@@ -292,7 +292,7 @@ _ZEROED: Final[Mapping[Any, Any]] = {int: 0, float: 0.0}
 
 
 def refusal_json(service: Any, reason: str) -> bytes:
-    """The failure body of a service, which `schema` has as a type: all but the reason is zeroed."""
+    """The failure response of a service (a type of `schema`): the reason; all else is zero."""
     fields = service.model_fields.items()
     zeroed = {name: _ZEROED.get(field.annotation, []) for name, field in fields}
     return orjson.dumps({**zeroed, "ok": False, "error_message": reason})
@@ -305,12 +305,12 @@ def _npy(array: npt.NDArray[np.float32]) -> bytes:
 
 
 def write_png(grid: FieldGrid, sensor_type: str, sensors: Sensors, scale: int = 1) -> bytes:
-    """A picture of `scale` pixels a cell, its top row at `bbox_max_y`; NaN is transparent.
+    """A PNG with cells of `scale` by `scale` pixels, top row at `bbox_max_y`; NaN is transparent.
 
-    One hue, alpha rising from 0 at `value_min` to `max_alpha` at `value_max`: a palette and its
-    transparency lose nothing of that, and take a fifth of RGBA's time (PNG, third edition, 11.3.2).
+    It has one hue; alpha rises from 0 at `value_min` to `max_alpha` at `value_max`. A palette with
+    transparency holds this exactly, in a fifth of RGBA's time (PNG, third edition, 11.3.2).
     """
-    # What only looks back, in a process of its own, makes no pictures, and need not hold Pillow.
+    # The process that reads the past makes no pictures, and does not load Pillow.
     from PIL import Image  # noqa: PLC0415
     from PIL.PngImagePlugin import PngInfo  # noqa: PLC0415
 
@@ -345,19 +345,19 @@ def _palette_indices(grid: FieldGrid) -> npt.NDArray[np.uint8]:
     values = _rows(grid)
     span = grid.value_max - grid.value_min
     if span > 0.0:
-        # In float64: the span of two float32, or the inverse of it, may be past float32.
+        # In float64: the span of two float32 values, or its inverse, may overflow float32.
         steps = np.subtract(values, grid.value_min, dtype=np.float64)
         steps *= (_RAMP_STEPS - 1) / span
         np.rint(steps, out=steps)
     else:
-        # One value everywhere is the maximum as much as the minimum: show it.
+        # A single value is both minimum and maximum: draw it as the maximum.
         steps = np.full(values.shape, _RAMP_STEPS - 1.0)
     steps += 1
     return np.where(np.isfinite(values), steps, 0).astype(np.uint8)
 
 
 def estimate_metadata(estimate: Estimate, sensor: Sensor) -> dict[str, str]:
-    """What a picture or a bare array cannot say of itself: extent, unit, the limit of known."""
+    """What the cells of a PNG or NPY do not show: extent, unit, the sd below which one is known."""
     grid = estimate.grid
     return {
         **extent(grid, sensor),
@@ -367,12 +367,12 @@ def estimate_metadata(estimate: Estimate, sensor: Sensor) -> dict[str, str]:
     }
 
 
-# The ideal range is so many sds wide where a place is known: an interval of 9 in 10 is half of it.
+# A cell is known if the ideal range is wider than this many sds: its 90 % interval is about half.
 _SDS_OF_IDEAL: Final = 6.0
 
 
 def within_ideal(estimate: Estimate, sensor: Sensor) -> Estimate:
-    """The estimate, known only where its interval for 9 of 10 is about half of the ideal range."""
+    """The estimate, known only where its 90 % interval is at most about half the ideal range."""
     spans = [ranges.ideal for ranges in (sensor.day, sensor.night) if ranges.ideal is not None]
     limit = min((span.width for span in spans), default=math.inf) / _SDS_OF_IDEAL
     grid = estimate.grid
@@ -404,7 +404,7 @@ def write_estimate(
 
 
 def estimate_picture(estimate: Estimate, layer: str) -> FieldGrid:
-    """One of the two numbers as a field, NaN where the estimate is not known."""
+    """A layer of the estimate (mean or sd) as a field, NaN where the estimate is not known."""
     grid = estimate.grid
     cells = grid.mean if layer == "mean" else grid.sd
     values = np.where(grid.known, cells, np.float32(np.nan)).ravel()

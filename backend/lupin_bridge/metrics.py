@@ -1,4 +1,4 @@
-"""What Prometheus scrapes: numbers are read off at the scrape, times are histograms."""
+"""Prometheus metrics: gauges and counters are read at each scrape, durations are histograms."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 CONTENT_TYPE: Final = "text/plain; version=0.0.4; charset=utf-8"
 
-# A metric's name, and its value; by its label, where it has one.
+# A metric's name, and its value; with a label, a value by label.
 Sample = tuple[str, float | Mapping[str, float]]
 
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """What a metric is; `label`: there is a value for each of it."""
+    """A metric's kind and help text; `label`: its label name, if it has one."""
 
     kind: Literal["gauge", "counter"]
     help: str
@@ -30,7 +30,7 @@ class Described:
 
 gauge = partial(Described, "gauge")
 counter = partial(Described, "counter")
-# By name; of a counter, `_total` is written behind it, as Prometheus wants it.
+# By name; the output adds `_total` to a counter's, as Prometheus requires.
 METRICS: Final = {
     "lupin_clients": gauge("WebSocket clients that follow the state"),
     "lupin_clients_blocked": gauge("clients whose socket takes nothing just now"),
@@ -122,7 +122,7 @@ class Metrics(Collector):
         self.past_seconds = self._histogram("past", "question")
 
     def describe(self) -> Iterable[Metric]:
-        """Nothing: the registry would scrape at once, before there is anything to read."""
+        """Describe nothing, or the registry would collect at once, when nothing can be read yet."""
         return ()
 
     def collect(self) -> Iterator[Metric]:
@@ -170,14 +170,14 @@ def route_class(path: str) -> str:
 
 
 class Metered:
-    """The outermost: notes each HTTP answer as it begins, refusals included."""
+    """The outermost ASGI middleware: notes each HTTP answer as it begins, refusals included."""
 
     def __init__(self, app: ASGIApp, note: Note) -> None:
         self._app = app
         self._note = note
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on, and watch for the answer."""
+        """Pass the request on, and note when its answer begins."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return

@@ -1,8 +1,8 @@
-"""Query strings: how each is read, its moments, and what it requests of the past. Pure.
+"""Query strings: how they are parsed, moments in them, and the parameters of past queries. Pure.
 
-One is read by the dataclass of its parameters, which also describes it to OpenAPI. pydantic reads,
-and is imported as it does: what looks back knows queries, and has no use for it. Moments are exact
-to the nanosecond.
+Each kind has a dataclass of its parameters, which parses it and describes it to OpenAPI. pydantic
+is imported only to parse: the process that reads the past uses this module without it. Moments are
+exact to the nanosecond.
 """
 
 from __future__ import annotations
@@ -33,28 +33,28 @@ Parameters = Sequence[tuple[str, str]]
 MOMENT: Final = "ROS seconds as a decimal number, or ISO 8601 with an offset"
 AT: Final = f"as of this moment: {MOMENT}; default: now"
 _UNSAFE_IN_NAME: Final = re.compile(r"[^A-Za-z0-9._-]")
-# A tag's, or a sensor's.
+# The name of a tag or of a sensor.
 Name = Annotated[str, Len(1, MAX_TEXT_LENGTH)]
 
 
 def parameter(description: str, default: Any = None) -> Any:
-    """A field of a query, for people; a keyword's own name has an underscore behind it."""
+    """An optional parameter of a query; a field named like a Python keyword ends in `_`."""
     return field(default=default, metadata={"description": description})
 
 
 def needed(description: str) -> Any:
-    """One that has to be given."""
+    """A required parameter of a query."""
     return field(metadata={"description": description})
 
 
 def read(kind: type[QueryT], given: Parameters) -> QueryT:
-    """A query string's parameters as a query.
+    """Parse a query string's parameters into a query, a dataclass of this kind.
 
-    A query is refused, never guessed at: an unknown or repeated parameter is a typing error that
-    would otherwise go unseen.
+    An unknown or repeated parameter is refused: it is usually a typing error, which would otherwise
+    go unseen.
 
     Raises:
-        PastRefused: an unknown or repeated parameter, or a value that cannot be.
+        PastRefused: an unknown or repeated parameter, or an invalid value.
 
     """
     from pydantic import ValidationError  # noqa: PLC0415  # see above
@@ -78,7 +78,7 @@ def read(kind: type[QueryT], given: Parameters) -> QueryT:
 
 
 def parameters_of(kind: type[Any]) -> list[dict[str, Any]]:
-    """A query's parameters as OpenAPI has them."""
+    """A query's parameters as OpenAPI describes them."""
     described = _adapter(kind).json_schema()["properties"]  # type: ignore[arg-type]  # as above
     return [
         {
@@ -93,12 +93,12 @@ def parameters_of(kind: type[Any]) -> list[dict[str, Any]]:
 
 
 def safe_name(text: str) -> str:
-    """A file's name of it: what a file system or a shell could take amiss becomes an underscore."""
+    """A file name: characters that are special to a file system or a shell become underscores."""
     return _UNSAFE_IN_NAME.sub("_", text)
 
 
 def _plain(schema: dict[str, Any]) -> dict[str, Any]:
-    """Without null: in a query string, what is not given is left out."""
+    """A JSON schema without null: a query string omits the parameter instead."""
     kinds = schema.get("anyOf", [schema])
     plain = next(kind for kind in kinds if kind.get("type") != "null")
     if schema.get("default") is not None:
@@ -119,7 +119,7 @@ def _adapter(kind: type[Any]) -> Any:
 MAX_SECONDS: Final = 2**31 - 1
 
 _SECONDS: Final = re.compile(r"([0-9]+)(?:\.([0-9]+))?", re.ASCII)
-# In a query string, `+01:00` reads ` 01:00`.
+# In a query string, `+01:00` is decoded as ` 01:00`.
 _ISO: Final = re.compile(
     r"(\d{4}-\d\d-\d\d[Tt](?:[01]\d|2[0-3]):\d\d(?::\d\d(?:\.(\d+))?)?)"
     r"([Zz]|[+ -]\d\d:?[0-5]\d)",
@@ -130,16 +130,16 @@ _SECONDS_A_DAY: Final = 86_400
 
 
 def moment(name: str, text: str) -> int:
-    """A moment in a query string, ns of ROS time; what is finer than a nanosecond is cut off.
+    """Parse a moment in a query string, ns of ROS time; finer fractions are truncated.
 
     Raises:
-        PastRefused: no moment, one before 0, or past what ROS time holds.
+        PastRefused: not a moment, one before 0, or past the range of ROS time.
 
     """
     text = text.strip(" ")
     if plain := _SECONDS.fullmatch(text):
         whole, fraction = plain.groups()
-        # As text: int() takes its time for a thousand digits.
+        # Compare lengths first: int() is slow for a thousand digits.
         seconds = int(whole) if len(whole.lstrip("0")) <= len(str(MAX_SECONDS)) else None
     elif iso := _ISO.fullmatch(text):
         shown, fraction, offset = iso.groups()
@@ -169,7 +169,7 @@ def compact(stamp_ns: int) -> str:
     return f"{datetime.fromtimestamp(whole, UTC):%Y%m%dT%H%M%SZ}"
 
 
-# --- what is requested of the past ----------------------------------------------------------------
+# --- parameters of queries about the past ---------------------------------------------------------
 
 _FROM: Final = f"{MOMENT}; default: the oldest in the journal"
 _TO: Final = "as `from`; this moment itself is not in the period; default: now"
@@ -180,7 +180,7 @@ Points = Annotated[int, Interval(ge=1, le=MAX_POINTS)]
 
 @dataclass(frozen=True, slots=True)
 class OfMoment:
-    """A query string that has a moment alone."""
+    """A query string whose only parameter is a moment."""
 
     at: str | None = parameter(AT)
 
@@ -193,10 +193,10 @@ class OfPeriod:
     to: str | None = parameter(_TO)
 
     def span(self, now_ns: int | None) -> tuple[int, int]:
-        """From when to when, ns; 0: from the oldest, to now. `now_ns` is None: it is not known.
+        """Start and end, ns of ROS time; start 0: the oldest; end 0: now; `now_ns` None: not known.
 
         Raises:
-            PastRefused: no moment, or a period that cannot be.
+            PastRefused: not a moment, or an invalid period.
 
         """
         start_ns = 0 if self.from_ is None else moment("from", self.from_)
@@ -250,7 +250,7 @@ class OfNotes(OfPeriod):
     )
 
 
-# A shift, where nobody says from when on.
+# The default length of a report's period: a shift.
 SHIFT_S: Final = 8 * 3_600
 MAX_REPORT_DAYS: Final = 31
 
@@ -283,20 +283,20 @@ class OfExport(OfPeriod):
 
 
 def at(parameters: Parameters, now_ns: int | None) -> int | None:
-    """The moment of `at`, ns; None: now. `now_ns` is None where it is not known.
+    """The moment of `at`, ns of ROS time; None: now. `now_ns` None: not known.
 
     Raises:
-        PastRefused: anything but one `at`, or a moment that has not come.
+        PastRefused: anything but one `at`, or a moment in the future.
 
     """
     return at_of(read(OfMoment, parameters).at, now_ns)
 
 
 def at_of(text: str | None, now_ns: int | None) -> int | None:
-    """`at`, where the other parameters are read elsewhere.
+    """As `at`, of a query that is already parsed.
 
     Raises:
-        PastRefused: no moment, or one that has not come.
+        PastRefused: not a moment, or one in the future.
 
     """
     if text is None:
@@ -311,7 +311,7 @@ def report(given: OfReport, now_ns: int | None) -> tuple[int, int]:
     """The period of a report, ns of ROS time; it ends now at the latest.
 
     Raises:
-        PastRefused: a period with nothing in it, or too long a one; now is not known.
+        PastRefused: the period is empty or too long, or now is not known.
 
     """
     to_ns = None if given.to is None else moment("to", given.to)

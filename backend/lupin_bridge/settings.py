@@ -1,10 +1,9 @@
 """The bridge's settings: one table for the command line, environment, file, checks and docs.
 
-A type here says what a value may be; `settings_from` has pydantic check it.
+A field's type states its valid values; `settings_from` has pydantic check them.
 
-Where settings come from: the command line, the environment, a file, in this order. pydantic says
-what is wrong with a value. The message names the setting as its operator gave it: as an option, a
-variable, or a file's line and key.
+The command line takes precedence over the environment, and that over a file. An error message names
+the setting as its operator gave it: as an option, a variable, or a file's line and key.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from annotated_types import Interval, MinLen
 
 
 class SettingError(ValueError):
-    """A setting that cannot be; the message names it, its value and the limit."""
+    """A setting is invalid; the message names the setting, its value and the limit."""
 
 
 UNIX: Final = "unix:"
@@ -39,9 +38,9 @@ _groups: list[str] = []
 
 
 def _setting(default: Any, help_text: str, *, group: str = "", is_private: bool = False) -> Any:
-    """A line of the table; a `group` goes on until the next one.
+    """Declare a setting; its `group` also applies to the settings after it, until the next group.
 
-    `is_private`: a password may be in it, so no message repeats it.
+    `is_private`: the value may hold a password, so no message shows it.
     """
     if group:
         _groups.append(group)
@@ -51,7 +50,7 @@ def _setting(default: Any, help_text: str, *, group: str = "", is_private: bool 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How the bridge serves, as `settings_from` found it right. Times are seconds."""
+    """The bridge's settings, as validated by `settings_from`. Times are seconds."""
 
     host: Annotated[str, MinLen(1)] = _setting(
         "127.0.0.1",
@@ -169,26 +168,26 @@ class Settings:
     log_level: Literal["debug", "info", "warning", "error"] = _setting(
         "info", "the least that is logged"
     )
-    # What the operator called a setting: the option, a variable, a file's line.
+    # How the operator gave each setting: an option, a variable, or a file's line and key.
     given_as: Mapping[str, str] = field(
         default_factory=dict, repr=False, compare=False, kw_only=True
     )
 
     def called(self, name: str) -> str:
-        """What a message should call a setting: as its operator gave it."""
+        """The name of a setting in messages: as its operator gave it."""
         return self.given_as.get(name, option(name))
 
     def wrong(self, name: str, why: str) -> SettingError:
-        """That a setting cannot be, by what its operator called it."""
+        """An error about a setting, which names it as its operator gave it."""
         return SettingError(f"{self.called(name)} {why}")
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Secrets:
-    """What must not stand on a command line, for others can read it; None: not given.
+    """Secrets, which must not be on a command line, where others can read them; None: not given.
 
-    `token` is what readers have to know, `mqtt_password` what the broker asks for, `webhook_secret`
-    signs what is posted.
+    Readers need `token`, the broker asks for `mqtt_password`, and `webhook_secret` signs what is
+    posted.
     """
 
     token: str | None = None
@@ -197,18 +196,18 @@ class Secrets:
 
 
 def table() -> tuple[Field[Any], ...]:
-    """The settings themselves; of each the metadata has `group` and `help`."""
+    """The settings as dataclass fields; their metadata has `group` and `help`."""
     return tuple(spec for spec in fields(Settings) if spec.metadata)
 
 
 @cache
 def types() -> Mapping[str, Any]:
-    """What each setting may be."""
+    """The annotated type of each setting."""
     return get_type_hints(Settings, include_extras=True)
 
 
 def limits_of(name: str) -> str:
-    """What a setting may be, in words; empty: any text."""
+    """The valid values of a setting, in words; empty: any text."""
     hint = types()[name]
     for limit in getattr(hint, "__metadata__", ()):
         if isinstance(limit, Interval):
@@ -240,29 +239,29 @@ def variable(name: str) -> str:
 log = logging.getLogger(__name__)
 
 CONFIG_VARIABLE: Final = variable("config")
-# Each by a variable of its name, or in a file that a setting names.
+# Each is given by a variable of its name, or in the file that the setting NAME_file names.
 SECRETS: Final = tuple(spec.name for spec in fields(Secrets))
 _NOT_IN_THE_TABLE: Final = (CONFIG_VARIABLE, *map(variable, SECRETS))
-# No name, address or path has one, and C's functions end a text, or fail, at the first.
+# No name, address or path contains one, and C functions truncate such text, or fail.
 _CONTROL: Final = re.compile(r"[\x00-\x1f\x7f]")
 _BARE: Final = re.compile(r"[A-Za-z0-9_-]{1,64}")
-# Nobody writes this much; a device or a disk image given by mistake is not read to its end.
+# More than anybody writes: a device or disk image given by mistake is not read whole.
 MAX_FILE_BYTES: Final = 65_536
 
-# The setting, what its operator called it, and the value.
+# The setting, its name as the operator gave it, and its value.
 _Given = tuple[str, str, Any]
 
 
 def settings_from(
     options: Mapping[str, Any], environment: Mapping[str, str], config: str | None = None
 ) -> Settings:
-    """The settings, each from the first place that has it.
+    """The settings, each from the first source that has it.
 
-    `options` are those of the command line, as text, by their names, None where not given; `config`
-    is --config's.
+    `options` maps each option of the command line to its text, or to None if it is not given;
+    `config` is the value of --config.
 
     Raises:
-        SettingError: a value that cannot be, a key that is no setting, a file that cannot be read.
+        SettingError: a value is invalid, a key is no setting, or a file cannot be read.
 
     """
     path, called = (
@@ -289,7 +288,7 @@ def settings_from(
 
 
 def _checked(name: str, called: str, value: Any, *, is_text: bool) -> Any:
-    from pydantic import TypeAdapter, ValidationError  # noqa: PLC0415  # `--help` has no use for it
+    from pydantic import TypeAdapter, ValidationError  # noqa: PLC0415  # `--help` does not need it
 
     try:
         found = TypeAdapter(types()[name]).validate_python(
@@ -306,7 +305,7 @@ def _checked(name: str, called: str, value: Any, *, is_text: bool) -> Any:
 
 
 def _shown(name: str, value: Any) -> str:
-    """A value as a message repeats it; of a private one, its kind alone."""
+    """A value as messages show it; of a private one, only its type."""
     if any(spec.name == name and spec.metadata["is_private"] for spec in table()):
         kind = {"str": "text", "list": "a list", "dict": "a table"}.get(
             type(value).__name__, "a number or date"
@@ -325,12 +324,12 @@ def _of_environment(environment: Mapping[str, str]) -> Iterator[_Given]:
 
 
 def take_secrets(settings: Settings, environment: MutableMapping[str, str]) -> Secrets:
-    """What the operator keeps from others, with the environment rid of it.
+    """Read the secrets, and remove them from the environment.
 
-    The processes that the bridge starts have no use for it.
+    The processes that the bridge starts do not need them.
 
     Raises:
-        SettingError: one is given twice, or its file cannot be read.
+        SettingError: a secret is given twice, or its file cannot be read.
 
     """
     return Secrets(**{name: _take_secret(name, settings, environment) for name in SECRETS})
@@ -360,9 +359,9 @@ def _take_secret(
 
 
 def strange_variables(environment: Iterable[str]) -> list[str]:
-    """Warnings of variables that look like settings and are none.
+    """Warnings about variables that look like settings but are none.
 
-    They are no error: other programs, and Kubernetes, may have variables that begin like ours.
+    They are no error: Kubernetes and other programs may set variables with our prefix.
     """
     known = {*_NOT_IN_THE_TABLE, *(variable(spec.name) for spec in table())}
     return [
@@ -412,7 +411,7 @@ def read_text(path: str, called: str, max_bytes: int = MAX_FILE_BYTES) -> str:
 
 
 def _line_of(key: str, text: str) -> str:
-    # tomllib gives no places. Tables are no settings, so a key stands at a line's begin.
+    # tomllib reports no positions. No setting is a table, so each key starts a line.
     found = re.search(rf"""^[ \t\[]*["']?{re.escape(key)}["']?[ \t]*[=.\]]""", text, re.MULTILINE)
     return "" if found is None else f" line {text.count(chr(10), 0, found.start()) + 1}"
 

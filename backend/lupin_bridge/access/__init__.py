@@ -1,1 +1,1 @@
-"""Who may read: policy, credentials, TLS."""
+"""Access control: policy, credentials, accounts."""

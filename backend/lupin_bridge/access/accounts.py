@@ -1,8 +1,8 @@
-"""The file of people: accounts, tokens, sessions, devices, the audit trail. SQLite, of mode 600.
+"""The accounts file: accounts, tokens, sessions, devices, the audit trail. SQLite, mode 600.
 
-Nothing of it is exported, followed or forwarded. A password is kept as its argon2id hash (RFC 9106,
-by argon2-cffi), a token and a session's cookie as SHA-256: they are 256 random bits, so nothing
-slower is needed, and finding one by its hash takes no time that tells anything of it.
+Nothing of it is exported, followed or forwarded. A password is stored as its argon2id hash (RFC
+9106, by argon2-cffi), a token and a session's cookie as SHA-256: they are 256 random bits, so no
+slower hash is needed, and the time of a lookup by hash reveals nothing.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from lupin_bridge.access.credentials import (
 from lupin_bridge.settings import Settings
 from lupin_twin.journal.beside import state_folder
 
-# A shift: whoever takes over a control room's screen signs in by a name of their own.
+# A shift: whoever takes over a control room's screen signs in under their own name.
 SESSION_S: Final = 12 * 3600
 _MAX_SESSIONS: Final = 20
 _MAX_AUDITED: Final = 100_000
@@ -96,7 +96,7 @@ class Audited(NamedTuple):
 
 
 def accounts_path(settings: Settings) -> Path:
-    """The file, be it there or not."""
+    """The path of the accounts file, whether it exists or not."""
     if settings.accounts:
         return Path(settings.accounts).expanduser().absolute()
     try:
@@ -106,10 +106,10 @@ def accounts_path(settings: Settings) -> Path:
 
 
 def make_file(path: Path) -> None:
-    """Have the file there, for its owner alone.
+    """Create the file, for its owner alone, unless it exists.
 
     Raises:
-        AccountError: it cannot be made, or is something else.
+        AccountError: it cannot be created, or is something else.
 
     """
     try:
@@ -127,18 +127,18 @@ def make_file(path: Path) -> None:
 
 
 class Accounts:
-    """The open file, in one thread; `is_writer` may change it.
+    """The open accounts file, in one thread; only with `is_writer` can it be changed.
 
     Raises:
-        AccountError: it is not there, cannot be read, or is something else.
+        AccountError: it does not exist, cannot be read, or is something else.
 
     """
 
     def __init__(self, path: Path, *, is_writer: bool = False) -> None:
         with ExitStack() as if_unusable:
             try:
-                # A reader too is opened for writing: it may be the first, and the log needs its
-                # index.
+                # A reader also opens it for writing: the first one has to create the index of the
+                # write-ahead log.
                 self._connection = sqlite3.connect(
                     f"file:{quote(os.fsencode(path))}?mode=rw", uri=True, isolation_level=None
                 )
@@ -160,12 +160,12 @@ class Accounts:
             if_unusable.pop_all()
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the file."""
         self._connection.close()
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
-        """All or nothing; what the disk says is said."""
+        """A transaction; errors of SQLite become `AccountError`."""
         connection = self._connection
         try:
             connection.execute("BEGIN IMMEDIATE")
@@ -189,7 +189,7 @@ class Accounts:
     ) -> None:
         """Add an account (`secret`: its password's hash, "": it signs in elsewhere) or a token.
 
-        `sites` are those that they may read; none: all.
+        `sites` are the sites that it may read; none: all.
 
         Raises:
             AccountError: there is one of that name, or it cannot be written.
@@ -240,7 +240,7 @@ class Accounts:
         return Person(name, role, sites=_lines(sites)), secret
 
     def of_token(self, secret: str) -> Person | None:
-        """Whose token it is, by its digest."""
+        """The person of a token, by its digest; None: unknown."""
         found = self._connection.execute(
             "SELECT name, role, sites FROM person WHERE secret = ? AND kind = 'token'", (secret,)
         ).fetchone()
@@ -250,7 +250,7 @@ class Accounts:
         return Person(name, role, by="token", token=secret, sites=_lines(sites))
 
     def of_session(self, session: str, now_s: float) -> Person | None:
-        """Whose session it is, by its id in the file; None: it has ended."""
+        """The person of a session, by its id in the file; None: it has ended."""
         found = self._connection.execute(_OF_SESSION, (session, int(now_s))).fetchone()
         if found is None:
             return None
@@ -262,18 +262,18 @@ class Accounts:
     def begin_session(
         self, name: str, address: str, now_s: int, *, ends_others: bool = False
     ) -> str:
-        """A new session of an account or token, as its cookie has it.
+        """Begin a session of an account or token; returns its cookie.
 
-        `ends_others`: those that the name has end.
+        `ends_others`: end the other sessions of that name.
 
         Raises:
-            AccountError: it has gone meanwhile, or nothing can be written.
+            AccountError: the name has gone meanwhile, or the file cannot be written.
 
         """
         cookie = secrets.token_urlsafe(32)
         with self._writing() as connection:
             connection.execute("DELETE FROM session WHERE ends_at_s <= ?", (now_s,))
-            # Of one whose password many know, the oldest ends.
+            # Past the limit, the oldest ends: many people may know one password.
             connection.execute(
                 "DELETE FROM session WHERE id IN (SELECT id FROM session WHERE name = ?"
                 " ORDER BY ends_at_s DESC LIMIT -1 OFFSET ?)",
@@ -288,7 +288,7 @@ class Accounts:
         return cookie
 
     def end_session(self, person: Person, address: str, now_s: int) -> None:
-        """End it.
+        """End a session.
 
         Raises:
             AccountError: it cannot be written.
@@ -301,7 +301,7 @@ class Accounts:
     # --- devices that are notified ------------------------------------------------------------
 
     def add_device(self, name: str, device: Device, address: str, now_s: int) -> None:
-        """Have a browser notified; of too many, the oldest makes room.
+        """Add a browser to notify; past the limit, it replaces the oldest.
 
         Raises:
             AccountError: the account has gone meanwhile, or it cannot be written.
@@ -322,7 +322,7 @@ class Accounts:
                 _audit(connection, Audited(now_s, name, "add device", "", address))
 
     def remove_device(self, endpoint: str, name: str = "") -> None:
-        """Notify it no more; `name`: only if it is theirs.
+        """Remove a browser; with `name`, only if it is theirs.
 
         Raises:
             AccountError: it cannot be written.
@@ -334,7 +334,7 @@ class Accounts:
             )
 
     def devices(self, site: str) -> list[Device]:
-        """Those of everybody who may read this site."""
+        """The devices of everybody who may read this site."""
         found = self._connection.execute(
             "SELECT endpoint, public_key, device.secret, language, sites FROM device"
             " JOIN person USING (name) ORDER BY endpoint"
@@ -342,7 +342,7 @@ class Accounts:
         return [Device(*row) for *row, sites in found if not sites or site in _lines(sites)]
 
     def kept(self, key: str, make: Callable[[], str]) -> str:
-        """A value of this file, made by whoever is first.
+        """A value that is stored in this file; the first caller makes it.
 
         Raises:
             AccountError: it cannot be written.
@@ -357,10 +357,10 @@ class Accounts:
         value: str = found[0]
         return value
 
-    # --- what was done ------------------------------------------------------------------------
+    # --- the audit trail ----------------------------------------------------------------------
 
     def note(self, done: Audited) -> None:
-        """Have it in the audit trail.
+        """Add an entry to the audit trail.
 
         Raises:
             AccountError: it cannot be written.

@@ -1,7 +1,7 @@
 """Who makes a request and what they may; the shared token, its sessions, and our cookies. Pure.
 
-A session of the shared token is a signed cookie (`itsdangerous`) and stands in no table, so it
-survives a restart and holds at every replica that has the same token. A new token ends them all.
+A session of the shared token is a signed cookie (`itsdangerous`), not a row of a table. So it
+survives a restart, and is valid at every replica with the same token. A new token ends them all.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from itsdangerous import BadSignature, Signer
 from lupin_bridge.settings import SettingError
 
 Role = Literal["viewer", "operator", "admin", "writer"]
-# What each may, the ones before it may too.
+# Each may also do what the ones before it may.
 ROLES: Final[tuple[Role, ...]] = ("viewer", "operator", "admin")
-# A token of a sensor posts observations, and may nothing else: it stands in no one's row.
+# A sensor's token may only post observations: its role has no rank among the others.
 WRITER: Final = "writer"
 TOKEN_ROLES: Final[tuple[Role, ...]] = (*ROLES, WRITER)
 Kind = Literal["account", "token"]
@@ -32,16 +32,16 @@ _NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@+-]{0,63}")
 
 
 class AccountError(Exception):
-    """It cannot be done; the message is the one line that says why."""
+    """An operation on accounts failed; the message is one line that says why."""
 
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """Who makes a request, what they may, and how that is known.
+    """Who makes a request, what they may do, and how they are known.
 
-    `session` is its id; `ends_at_s` when it ends, s since the epoch. `token` is the digest of the
-    one that a request came with. `name` is empty for the shared token. `sites` are those whose data
-    they may read, empty: all.
+    `session` is their session's id, `ends_at_s` its end, s since the epoch. `token` is the digest
+    of the request's token. `name` is empty for the shared token. `sites` are those whose data they
+    may read; empty: all.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Person:
         return self.role in ROLES and ROLES.index(self.role) >= ROLES.index(role)
 
     def reads(self, site: str) -> bool:
-        """Whether the data of a site are for them; "": a bridge without a name of its site."""
+        """Whether they may read the data of a site; "": a bridge without a site's name."""
         return not self.sites or site in self.sites
 
 
@@ -67,10 +67,10 @@ def is_name(text: str) -> bool:
 
 
 def check_name(name: str) -> None:
-    """Refuse what can be no name.
+    """Refuse an invalid name.
 
     Raises:
-        AccountError: it cannot.
+        AccountError: it is invalid.
 
     """
     if not is_name(name):
@@ -81,7 +81,7 @@ def check_name(name: str) -> None:
 
 
 def check_password(password: str) -> None:
-    """Refuse what is too short or too long.
+    """Refuse a password that is too short or too long.
 
     Raises:
         AccountError: it is.
@@ -101,16 +101,16 @@ MIN_TOKEN_LENGTH: Final = 16
 _TOKEN: Final = re.compile(r"[A-Za-z0-9._~+/-]+=*")
 # Long enough for a shift's screen not to ask daily, short enough for a lost tablet to forget.
 SHARED_SESSION_S: Final = 7 * 24 * 3600
-# Sessions that are remembered as signed out. To make one takes the token.
+# Signed-out sessions that are remembered; only who has the token can make more.
 MAX_SIGNED_OUT: Final = 10_000
-# Who has the shared token: nobody by name.
+# Anybody with the shared token, without a name.
 SHARED: Final = Person("", "viewer", by="shared token")
 
 
 class Credentials:
-    """Tells the shared token and its sessions from all others, in constant time.
+    """Checks the shared token and its sessions, in constant time.
 
-    `called` is what messages call the place that the token was given in.
+    `called` names, in messages, where the token was given.
     """
 
     def __init__(self, token: str, called: str = "LUPIN_TOKEN") -> None:
@@ -144,7 +144,7 @@ class Credentials:
         return self._signer.sign(session).decode()
 
     def session_of(self, cookie: str, now_s: float) -> Person | None:
-        """Who has the session that a cookie stands for; None: it is none of ours, or has ended."""
+        """The person of a cookie's session; None: it is none of ours, or has ended."""
         try:
             session = self._signer.unsign(cookie).decode()
         except BadSignature:
@@ -167,15 +167,15 @@ class Credentials:
 
 
 def digest(secret: str) -> str:
-    """As which a token or a session's cookie is kept."""
+    """The form in which a token or a session's cookie is stored."""
     return hashlib.sha256(secret.encode()).hexdigest()
 
 
 # --- our own cookie, out of a request's headers ---------------------------------------------------
 
-# The standard library's parser undoes quotes and escapes, before Python 3.11.10 and 3.12.6 in a
-# time that grows with the square of the length (CVE-2024-7592): 40 kB of backslashes held up
-# everybody for two seconds. Ours is never quoted, and nobody else's is looked at.
+# Not by the standard library's parser, which undoes quotes and escapes. Before Python 3.11.10 and
+# 3.12.6, its time grows with the square of the length (CVE-2024-7592): 40 kB of backslashes held up
+# everybody for two seconds. Our cookie is never quoted, and no other is parsed.
 
 # What a browser keeps for one host may be more, but no WebSocket handshake with a longer line gets
 # through: without this limit, the page would come and its data would not.
@@ -183,13 +183,13 @@ MAX_COOKIE_BYTES: Final = 8_000
 
 
 class CookieTooLong(ValueError):
-    """More than is looked at; the message says how long it is, and the limit."""
+    """The Cookie headers are too long; the message says how long, and the limit."""
 
 
 def cookies_of(name: str, headers: Iterable[tuple[bytes, bytes]]) -> list[str]:
     """The values of all cookies of this name: a browser may keep one for each of several paths.
 
-    `headers` as in an ASGI scope: names in lower case. What is not ASCII is nobody's of ours.
+    `headers` as in an ASGI scope: names in lower case. A value that is not ASCII is none of ours.
 
     Raises:
         CookieTooLong: the Cookie headers are longer than `MAX_COOKIE_BYTES` together.

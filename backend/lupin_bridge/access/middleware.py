@@ -1,6 +1,7 @@
-"""Access control: every request passes policy and credentials here, and only reads.
+"""Access control: checks the policy, credentials and method of every request.
 
-Outside is `AccessControl` (403, 401, 429, 414, security headers), inside of it `ReadOnly` (405).
+The outer middleware is `AccessControl` (403, 401, 429, 414, security headers), the inner one
+`ReadOnly` (405).
 """
 
 from __future__ import annotations
@@ -46,13 +47,13 @@ from lupin_bridge.settings import SettingError, Settings
 log = logging.getLogger(__name__)
 
 _READS: Final = ("GET", "HEAD")
-# Where a session begins and ends, and people say something. A form, a link or a picture of a
-# foreign page can ask for these too, with the browser's cookie, but none of them can send a header
-# of its own: for that, a script has to ask first (CORS preflight), and is not given leave.
+# Routes that begin or end a session, or write. A form, a link or a picture on a foreign page can
+# send requests to them too, with the browser's cookie. But it cannot add a header: for that, a
+# script needs a CORS preflight, which is refused.
 SIGN_IN: Final = "/api/signin"
 NOTES: Final = "/api/notes"
 PUSH: Final = "/api/push"
-# Takes no session: a token in a header is nothing that a browser sends along by itself.
+# Takes no session, only a token in a header, which a browser never sends by itself.
 OBSERVATIONS: Final = "/api/observations"
 _METHODS: Final = {
     SIGN_IN: ("POST",),
@@ -63,9 +64,9 @@ _METHODS: Final = {
 }
 OWN_HEADER: Final = "X-Lupin-Twin"
 
-# The page loads nothing from elsewhere, is framed by nobody, and runs no inline script. No other
-# page gets at an answer unless by CORS, which CORP does not touch. No HSTS: it would take the way
-# past a self-signed certificate, and it binds all ports of a host, other people's services too.
+# The page loads nothing from elsewhere, cannot be framed, and runs no inline script. Other pages
+# can read an answer only by CORS, which CORP does not affect. No HSTS: it would block the way past
+# a self-signed certificate, and it applies to all ports of a host, so to other services too.
 CONTENT_POLICY: Final = (
     "default-src 'self'; img-src 'self' blob: data:; connect-src 'self'; object-src 'none'; "
     "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
@@ -82,13 +83,13 @@ _SECURITY_HEADERS: Final = {
 
 
 class ReadOnly:
-    """ASGI middleware: reads only, but for sign-in, notes and observations."""
+    """ASGI middleware: only reads, except sign-in, notes, devices and observations."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on what a path is there for, refuse anything else."""
+        """Pass on the methods that a path allows, refuse all others."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -128,28 +129,28 @@ OPEN_PATHS: Final = frozenset(
 # `?lang=`, which the sign-in page goes by too.
 _LANGUAGE: Final = re.compile(r"[A-Za-z]{2,3}(?:-[A-Za-z0-9]{1,8}){0,2}")
 
-# Below these, a fleet has what is of one site alone.
+# Paths of a fleet that concern one site.
 _OF_SITE: Final = re.compile(r"/(?:api/)?sites/(?P<site>[^/]*)")
-# What anybody needs who is known, whatever they may read.
+# Paths for everybody who is known, whatever sites they may read.
 _OF_NO_SITE: Final = frozenset({"/api/session", "/api/signout"})
 
-# In a request's state: who makes it, where anybody has to say so.
+# Key in a request's state: who makes it, if credentials are needed.
 PERSON_KEY: Final = "person"
-# So soon after an account or a session has ended, what it has open ends too.
+# How soon after the end of an account or a session its open connections end, s.
 _POLL_S: Final = 2.0
 
-# Path and query. The longest that means something has a tag's name of a few hundred; each segment
-# of a path is looked for on the disk, and each parameter is taken apart.
+# Path and query. The longest useful one has a tag_id of a few hundred bytes. Each segment of a path
+# is looked up on the disk, and each parameter is parsed, so more would cost.
 MAX_TARGET_BYTES: Final = 4_096
 
-# Wrong tokens an address may send at once, and a minute from then on.
+# Wrong tokens that an address may send at once, and per minute after that.
 GUESS_BURST: Final = 10
 GUESSES_PER_MINUTE: Final = 10
 
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """Who may read: the hosts and origins, and the people; None: they have been asked already.
+    """Who has access: hosts, origins and people; `people` None: they were checked before.
 
     `site` is the site whose data this bridge has; a fleet has those of all sites.
     """
@@ -161,11 +162,11 @@ class Access:
 
     @property
     def is_closed(self) -> bool:
-        """Whether whoever reads needs a right to."""
+        """Whether readers need credentials."""
         return self.people is not None and self.people.is_on
 
     def site_of(self, path: str) -> str | None:
-        """The one site that an address is about; None: none, or several."""
+        """The one site that a path concerns; None: none, or several."""
         if path in _OF_NO_SITE:
             return None
         if not self.is_fleet:
@@ -178,7 +179,7 @@ class Access:
         """From the settings, and the token if there is one.
 
         Raises:
-            SettingError: an allowed origin or host that is none, or a token that cannot be one.
+            SettingError: an allowed origin or host, or the token, is invalid.
 
         """
         called = settings.called("token_file") if settings.token_file else "LUPIN_TOKEN"
@@ -203,7 +204,7 @@ class Access:
 class AccessControl:
     """ASGI middleware: 403 for foreign hosts and pages, 401 and 429 without the token.
 
-    And 414 for an address that is far too long, and security headers on all.
+    Also 414 for an address that is far too long, and security headers on every answer.
     """
 
     def __init__(self, app: ASGIApp, access: Access) -> None:
@@ -250,7 +251,7 @@ class AccessControl:
         await deny(refusal, scope, receive, send)
 
     def _check_reach(self, person: Person | None, path: str) -> Response | Person | None:
-        """Whether somebody who is known may be here."""
+        """The person, or a refusal if they may not use this path."""
         if person is None:
             return None
         if person.role == WRITER and path != OBSERVATIONS:
@@ -265,11 +266,11 @@ class AccessControl:
     async def _pass_on(
         self, person: Person | None, scope: Scope, receive: Receive, send: Send
     ) -> None:
-        # FastAPI takes the cookies of every request apart, wanted or not.
+        # Or FastAPI would parse the cookies of every request, wanted or not.
         scope = {**scope, "headers": [line for line in scope["headers"] if line[0] != b"cookie"]}
         if person is not None:
             scope["state"] = {**scope.get("state", {}), PERSON_KEY: person}
-        if person is None or person == SHARED or scope["type"] == "http":
+        if person == SHARED or scope["type"] == "http":
             await self._app(scope, receive, send)
             return
         looking = asyncio.create_task(self._end_with(person, scope["state"][CONNECTION_KEY]))
@@ -278,17 +279,20 @@ class AccessControl:
         finally:
             looking.cancel()
 
-    async def _end_with(self, person: Person, connection: Connection) -> None:
+    async def _end_with(self, person: Person | None, connection: Connection) -> None:
+        """Close the connection when the session ends; without a person, at the first account."""
         people = self._access.people
+        if people is None:
+            return
         try:
-            while people is not None and people.still(person):
+            while not people.is_on if person is None else people.still(person):
                 await asyncio.sleep(_POLL_S)
         except AccountError as error:
-            log.warning("%s: what %s had open is closed", error, person.name)
+            log.warning("%s: what %s had open is closed", error, person and person.name)
         connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")
 
     def _check_credentials(self, request: HTTPConnection) -> Response | Person | None:
-        """Who makes the request, None: nobody has to say so here, or why it is not let in."""
+        """Who makes the request; None: no credentials are needed here; or a refusal."""
         path, people = path_of(request.scope), self._access.people
         if people is None or path in OPEN_PATHS or not people.is_on:
             return None
@@ -299,8 +303,8 @@ class AccessControl:
         if header is not None:
             return self._check_header(people, header, client_of(request))
         if path == SIGN_IN:
-            return None  # by name and password, if there are accounts: the route looks
-        # A cookie is no guess: it cannot be made without the token, however often one tries.
+            return None  # the route checks name and password, if there are accounts
+        # A wrong cookie does not count as a guess: nobody can forge one without the token.
         try:
             person = people.by_cookies(request.scope["headers"])
         except CookieTooLong as error:
@@ -327,19 +331,19 @@ class AccessControl:
 
 
 def client_of(request: HTTPConnection) -> str:
-    """The client that limits are counted for: who is connected, or whom a trusted proxy names."""
+    """The client that limits count for: the peer, or the one that a trusted proxy names."""
     return client_key(request.client.host if request.client is not None else "")
 
 
 def _refusal(status: int, detail: str, headers: Mapping[str, str] | None = None) -> Response:
-    """An answer in the application's stead, to a request or a WebSocket handshake."""
+    """A refusal, sent instead of the application's answer to a request or WebSocket handshake."""
     body = orjson.dumps({"detail": detail}) if detail else b""
     known = {"cache-control": "no-store", **(headers or {})}
     return Response(body, status, known, "application/json" if body else None)
 
 
 async def deny(response: Response, scope: Scope, receive: Receive, send: Send) -> None:
-    """Answer in the application's stead."""
+    """Send a response instead of the application's."""
     if scope["type"] == "websocket":
         await WebSocket(scope, receive, send).send_denial_response(response)
     else:
@@ -395,8 +399,8 @@ def _with_cors(send: Send, foreign: str | None) -> Send:
             headers.add_vary_header("Origin")
             if foreign is not None:
                 headers["Access-Control-Allow-Origin"] = foreign
-                # Listed by the operator and never a pattern: its pages may use the session that
-                # the browser sends along anyway for a WebSocket.
+                # The operator has listed this origin, and never as a pattern. So its pages may use
+                # the session, which the browser sends for a WebSocket anyway.
                 headers["Access-Control-Allow-Credentials"] = "true"
                 own = [name for name in headers if name.startswith("x-field-")]
                 headers["Access-Control-Expose-Headers"] = ", ".join(("ETag", "Retry-After", *own))

@@ -1,7 +1,7 @@
-"""Who makes a request, by the shared token and the file of people. Belongs to the event loop.
+"""Authentication by the shared token and the accounts file. Belongs to the event loop.
 
-What reads the file does so at once, some 20 µs. What writes it, or reckons a password, does so on
-one thread: argon2 takes 64 MB and a tenth of a second on purpose, so one at a time, and few wait.
+Reads of the file take some 20 µs, on the loop. Writes and password checks run on one thread: argon2
+takes 64 MB and a tenth of a second on purpose, so one runs at a time, and few may wait.
 """
 
 from __future__ import annotations
@@ -36,20 +36,21 @@ log = logging.getLogger(__name__)
 
 ResultT = TypeVar("ResultT")
 
-# Passwords that wait for the thread, and the rest of what may: a flood of sign-ins keeps no note
-# out of the audit trail.
+# Passwords that may wait for the thread. Writes may wait even behind twice as many, so that a flood
+# of sign-ins keeps no note out of the audit trail.
 MAX_WAITING: Final = 8
 
 
-# Sign-ins that an address may try in vain at once, and a minute from then on.
+# Failed sign-ins of an address at once, and per minute after that.
 ATTEMPT_BURST: Final = 10
 ATTEMPTS_PER_MINUTE: Final = 10
 
 
 class People:
-    """`path` is the file of people; until it is there nobody has an account, then it must stay.
+    """Finds out who makes a request.
 
-    `shared` is the shared token. `is_proxied`: a trusted proxy names the person.
+    `path` is the accounts file: until it exists, there are no accounts; then it must stay. `shared`
+    is the shared token. `is_proxied`: a trusted proxy names the person.
     """
 
     def __init__(
@@ -60,22 +61,24 @@ class People:
         self._is_proxied = is_proxied
         self._accounts: Accounts | None = None
         self._inode = 0
+        self._has_file = _may_be_there(path)
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="accounts")
         self._waiting = 0
         self._attempts = RateLimit(ATTEMPTS_PER_MINUTE / 60.0, ATTEMPT_BURST)
 
     @property
     def is_on(self) -> bool:
-        """Whether whoever reads has to say who they are."""
+        """Whether readers need credentials."""
         return bool(self.shared or self._is_proxied or self.has_file)
 
     @property
     def has_file(self) -> bool:
-        """Whether anybody can sign in here."""
-        return self._accounts is not None or self._path.exists()
+        """Whether there is an accounts file, so that people can sign in."""
+        self._has_file = self._has_file or _may_be_there(self._path)
+        return self._has_file
 
     def by_cookies(self, headers: Iterable[tuple[bytes, bytes]]) -> Person | None:
-        """Whose session it is, by the cookies of a request.
+        """The person of a session, by the cookies of a request; None: none is valid.
 
         Raises:
             AccountError: the file cannot be read.
@@ -98,7 +101,7 @@ class People:
         return self._ask(find)
 
     def by_token(self, token: str) -> Person | None:
-        """Whose token it is.
+        """The person of a token; None: it is unknown.
 
         Raises:
             AccountError: the file cannot be read.
@@ -109,7 +112,7 @@ class People:
         return self._ask(lambda it: it.of_token(digest(token))) if self.has_file else None
 
     def by_proxy(self, name: str) -> Person | None:
-        """Whom a trusted proxy names; without an account of that name they only read.
+        """The person whom a trusted proxy names; without such an account, they are a viewer.
 
         Raises:
             AccountError: the file cannot be read.
@@ -122,7 +125,7 @@ class People:
         return replace(known, by="proxy")
 
     def still(self, person: Person) -> bool:
-        """Whether a session or token is what it was as its connection began.
+        """Whether a session or token is still as it was when its connection began.
 
         Raises:
             AccountError: the file cannot be read.
@@ -134,7 +137,7 @@ class People:
             return self.by_proxy(person.name) == person
         if person.session:
             return self._ask(lambda it: it.of_session(person.session, time.time())) == person
-        # Another token of the same name is not the one that was revoked.
+        # By its digest: a new token of the same name does not count for a revoked one.
         return self._ask(lambda it: it.of_token(person.token)) == person
 
     def has_account(self, person: Person) -> bool:
@@ -147,7 +150,7 @@ class People:
         return self.has_file and self._ask(lambda it: it.of_name(person.name)) is not None
 
     async def check(self, name: str, password: str, address: str) -> Person | None:
-        """Who signs in; None: there is no such account, or the password is another.
+        """The person who signs in; None: there is no such account, or the password is wrong.
 
         Both take the same time.
 
@@ -156,7 +159,7 @@ class People:
             AccountError: the file cannot be read.
 
         """
-        # Many at once are no more than the few that wait for the thread.
+        # Concurrent attempts are bounded by the few that may wait for the thread.
         wait_s = self._attempts.wait_s(address, time.monotonic())
         if wait_s > 0.0:
             raise ClientLimitError(
@@ -167,7 +170,7 @@ class People:
         try:
             person = await self._check(name, password)
         except asyncio.CancelledError:
-            # The thread may work on it all the same: whoever leaves has tried.
+            # The thread may check it all the same: a cancelled attempt counts.
             self._attempts.take(address, time.monotonic())
             raise
         if person is None:
@@ -212,7 +215,7 @@ class People:
         return self._cookie_name()
 
     async def write(self, work: Callable[[Accounts, int], ResultT]) -> ResultT:
-        """What `work(accounts, now_s)` gives, on the thread.
+        """The result of `work(accounts, now_s)`, on the thread.
 
         Raises:
             ClientLimitError: too many wait.
@@ -260,8 +263,19 @@ class People:
         return self._accounts
 
 
+def _may_be_there(path: Path) -> bool:
+    """Whether there may be a file; if that cannot be seen, nobody is let in without a right."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError:
+        return True
+    return True
+
+
 def hashed(password: str) -> str:
-    """A password as it is kept."""
+    """The hash of a password, as it is stored."""
     from argon2 import PasswordHasher  # noqa: PLC0415  # few ever sign in
 
     return PasswordHasher().hash(password)
@@ -271,7 +285,7 @@ _nobodys: list[str] = []
 
 
 def verify(kept: str, password: str) -> bool:
-    """Whether it is the password; of an account without one it never is, in the same time."""
+    """Whether a password matches its hash; an empty hash never matches, in the same time."""
     from argon2 import PasswordHasher  # noqa: PLC0415  # as above
     from argon2.exceptions import InvalidHashError, VerificationError  # noqa: PLC0415
 

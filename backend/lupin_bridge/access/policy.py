@@ -1,26 +1,26 @@
-"""Where requests come from: past which proxies, below which path, and from whose page.
+"""The access policy: which proxies are believed, and which hosts and origins are allowed.
 
-A header may claim any address. X-Forwarded-For and X-Forwarded-Proto are believed of a proxy that
-the operator has named, and of nobody else. What the claim replaces (`client` and `scheme` of the
-scope) counts for limits, logs, wrong tokens and the check of origins. uvicorn's own middleware for
-this takes an address with a port, as some proxies write it, for a new client each time, knows no
-IPv4 address on a socket that listens for IPv6, and reads the last line of several alone.
+Anybody may send X-Forwarded-For and X-Forwarded-Proto, so they are believed only from a proxy that
+the operator has named. They replace `client` and `scheme` of the scope, and so count for limits,
+logs, wrong tokens and the check of origins. The middleware of uvicorn takes an address with a port,
+as some proxies write it, for a new client each time. It also knows no IPv4 address on a socket that
+listens for IPv6, and reads only the last of several lines.
 
-A browser will carry any page's request to a bridge that its machine can reach. Four rules keep
-foreign pages from reading, or computing, anything through it:
+A browser sends any page's requests to a bridge that its machine can reach. Four rules keep foreign
+pages from reading anything through it, or making it compute:
 
 - Host: the name that the browser used has to be one of this bridge's. A page at evil.example whose
   name is made to resolve to 127.0.0.1 (DNS rebinding) is "same origin" to the browser; its Host
-  header still says evil.example. An IP address is nobody's name to point elsewhere.
+  header still says evil.example. IP addresses are allowed: nobody can point them elsewhere.
 - Origin (RFC 6454): a request that a page makes in CORS mode, or for a WebSocket, names the page's
   origin. It has to be this bridge's own, or one that the operator has allowed.
 - Sec-Fetch-Site (W3C Fetch Metadata): a request without Origin that a foreign page makes, for an
   `<img>` or an `<iframe>` say, is refused as well. The page could not read the answer, only
   make us compute it.
-- Referer: beyond this machine and without TLS, browsers send no Sec-Fetch headers. What is no page
-  is then refused to whoever names a foreign page as where it comes from. A page passes, for that is
-  what a link looks like; none of ours can be framed. A foreign page may keep its name to itself:
-  then its request looks like a program's.
+- Referer: without TLS, browsers send no Sec-Fetch headers to another machine. A request with a
+  foreign Referer is then refused, unless it is for a page: that is what a link looks like, and none
+  of our pages can be framed. A foreign page may suppress its Referer: then its request looks like a
+  program's.
 
 Programs other than browsers send none of Origin, Sec-Fetch-Site and Referer.
 """
@@ -41,7 +41,7 @@ from lupin_bridge.settings import SettingError, Settings, unix_path
 # RFC 3986: a path of plain segments, none of which is "." or "..", without a slash at its end.
 _PATH_PREFIX: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
 _HEADER: Final = re.compile(r"[A-Za-z][A-Za-z0-9-]{0,63}")
-# In a request's state: whom a trusted proxy names.
+# Key in a request's state: whom a trusted proxy names.
 PROXY_USER_KEY: Final = "proxy_user"
 # "10.0.0.7:1234" and "[fd00::7]:1234", as some proxies write an address.
 _WITH_PORT: Final = re.compile(r"\[(?P<v6>[^\]]+)\](?::\d+)?|(?P<v4>[\d.]+):\d+")
@@ -92,7 +92,7 @@ class Proxies:
 
     def trusts(self, address: str) -> bool:
         """Whether this is a proxy whose headers count."""
-        if not address:  # TCP's peers have one, and it listens on nothing else
+        if not address:  # only the peer of a Unix socket has none
             return self.has_unix_socket
         ip = _address(address)
         return ip is not None and any(ip in network for network in self.proxies)
@@ -100,8 +100,8 @@ class Proxies:
     def client(self, peer: str, forwarded_for: Iterable[str]) -> str:
         """The client, by X-Forwarded-For in lines: the nearest address that is no trusted proxy.
 
-        Each proxy adds at the right whom it got the request from; what stands to the left of the
-        first stranger is the stranger's own claim. What is no address ends the search.
+        Each proxy appends its peer at the right; what is left of the first untrusted address is
+        only a claim of that client. An invalid address ends the search.
         """
         client = peer
         hops = [hop for line in forwarded_for for hop in line.split(",")]
@@ -114,10 +114,10 @@ class Proxies:
 
 
 class BehindProxies:
-    """ASGI middleware, the first of all: the client, scheme and path behind proxies and prefix.
+    """ASGI middleware, before access control: sets client, scheme and path behind proxies.
 
-    A proxy may cut the prefix off or leave it on: either way `root_path` is the prefix and `path`
-    has it, as ASGI wants it.
+    A proxy may strip the prefix or keep it: either way `root_path` is the prefix, and `path`
+    includes it, as ASGI requires.
     """
 
     def __init__(self, app: ASGIApp, proxies: Proxies) -> None:
@@ -142,7 +142,7 @@ class BehindProxies:
         headers = Headers(scope=scope)
         client = self._proxies.client(peer, headers.getlist("x-forwarded-for"))
         forwarded: dict[str, object] = {"client": (client, 0)}
-        # Of several, the nearest proxy's: it is the one that we know.
+        # Of several, the last: it is from the nearest proxy, which is the one that we trust.
         proto = ",".join(headers.getlist("x-forwarded-proto")).rpartition(",")[2].strip().lower()
         if proto in ("http", "https"):
             is_socket = scope["type"] == "websocket"
@@ -150,14 +150,14 @@ class BehindProxies:
         return forwarded
 
     def _user(self, scope: Scope) -> dict[str, object]:
-        """Whom the proxy names, in the state: nothing reads the header itself."""
+        """Whom the proxy names, for the state: nothing else reads the header."""
         header = self._proxies.user_header.lower().encode()
         if not header:
             return {}
         named = [value for name, value in scope["headers"] if name == header]
         if not named or not self._proxies.trusts((scope.get("client") or ("", 0))[0]):
             return {}
-        # A proxy that adds its line to the client's, and does not replace it, names two.
+        # There are two if the proxy adds its line to the client's instead of replacing that.
         name = named[0].decode("latin-1").strip() if len(named) == 1 else ""
         return {"state": {**scope.get("state", {}), PROXY_USER_KEY: name}}
 
@@ -279,8 +279,8 @@ class AccessPolicy:
             return self._judge_origin(" ".join(origins), own)
         referer = headers.get("referer", "")
         if site := headers.get("sec-fetch-site"):
-            # A link shows our page to a person; the page that led there does not see it. A frame,
-            # or an object, is a navigation too, of which the person need not see anything.
+            # A link shows our page to a person, and not to the page with the link. A frame or an
+            # object is a navigation too, but the person need not see anything of it.
             how = headers.get("sec-fetch-mode"), headers.get("sec-fetch-dest")
             if site in ("cross-site", "same-site") and how != ("navigate", "document"):
                 return Decision(

@@ -1,1 +1,1 @@
-"""Alarms while the bridge runs: where they come from, how they stand, and who is told."""
+"""Alarms while the bridge runs: derived from the log, kept in order, with people's notes."""

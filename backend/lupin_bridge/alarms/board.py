@@ -1,11 +1,10 @@
-"""All alarms that are known, in their order.
+"""All known alarms, in order; and the notes of people, with their effect on alarms.
 
-A hundred thousand alarms cost the loop nothing: a worker puts them in order, and the loop takes
-over what that hands out. An `AlarmBoard` belongs to the event loop; the rest is pure.
+A hundred thousand alarms do not block the event loop: a worker sorts them, and the loop takes over
+the result. `AlarmBoard` and `NoteBoard` belong to the event loop; the rest is pure.
 
-And what people said, as the log has it, and what of it stands of each alarm. On the event loop.
-Every process looks for notes in its log once a second, the one that writes them too: so all
-browsers and replicas are told the same, and nobody has to tell anybody.
+Every process looks for notes in its log once a second, even the one that writes them. So all
+browsers and replicas get the same notes, and no process has to notify another.
 """
 
 from __future__ import annotations
@@ -27,17 +26,16 @@ from lupin_twin.core.past import NotRemembered, PastRefused
 
 log = logging.getLogger(__name__)
 
-# Of the active ones, so many are told to who has room for few: Home Assistant keeps no attributes
-# past 16 kB.
+# Active alarms sent to receivers with little room: Home Assistant keeps no attributes past 16 kB.
 MAX_WORST: Final = 20
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What has changed: alarms that are new, worse or cleared, in the order of that.
+    """What has changed: alarms that are new, worse or cleared, in the order of these events.
 
-    An observation that is heard late may withdraw an alarm. `is_past`: these were found as the past
-    was gone through, at the start: others may know of them since long, by their ids.
+    An observation that is received late may withdraw an alarm. `is_past`: these were found when the
+    past was read at the start, so receivers may have known them, by their ids, for long.
     """
 
     changed: tuple[Alarm, ...]
@@ -45,13 +43,13 @@ class Change:
     is_past: bool = False
 
 
-# Where the alarms are from: nowhere yet, from a journal, or from what was heard since the start.
+# What the alarms are derived from: nothing yet, a journal, or what was received since the start.
 AlarmSource = Literal["starting", "journal", "heard"]
 
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """All alarms and the active ones, newest first; the worst of these; and these by tag.
+    """All alarms, and the active ones, newest first; the worst active ones; the active ones by tag.
 
     `number` grows with every change. `since_ns` is the moment of ROS time from which on alarms are
     known; None: not yet.
@@ -67,7 +65,7 @@ class Board:
 
 
 def board_of(alarms: Iterable[Alarm], since_ns: int = 0) -> Board:
-    """Alarms in their order, without what was over before `since_ns`."""
+    """The board of these alarms, without those cleared before `since_ns`."""
     kept = (alarm for alarm in alarms if not _is_over(alarm, since_ns))
     known = sorted(kept, key=lambda alarm: (-alarm.raised_at_ns, alarm.id))
     active = tuple(alarm for alarm in known if alarm.is_active)
@@ -83,7 +81,7 @@ def board_of(alarms: Iterable[Alarm], since_ns: int = 0) -> Board:
 
 
 def change_between(before: Board, now: Board, since_ns: int = 0) -> Change:
-    """What has changed from one board to the next; what is gone because it is old has not."""
+    """The change from one board to the next; alarms dropped for their age are not part of it."""
     gone = {alarm.id: alarm for alarm in before.alarms}
     changed = [alarm for alarm in now.alarms if gone.pop(alarm.id, None) != alarm]
     withdrawn = [
@@ -95,7 +93,7 @@ def change_between(before: Board, now: Board, since_ns: int = 0) -> Change:
 
 
 def _is_dropped(alarm: Alarm, now: Board) -> bool:
-    """Whether its tag has had so many since that it is not kept."""
+    """Whether the alarm was dropped because its tag has had too many since."""
     if alarm.cleared_at_ns is None:
         return False
     over = [it.cleared_at_ns for it in now.alarms if it.tag_id == alarm.tag_id]
@@ -104,7 +102,7 @@ def _is_dropped(alarm: Alarm, now: Board) -> bool:
 
 
 def happened_ns(alarm: Alarm) -> int:
-    """When it became as it is: raised, or cleared."""
+    """When the alarm last changed: when it was cleared or, if it is active, raised."""
     return alarm.raised_at_ns if alarm.cleared_at_ns is None else alarm.cleared_at_ns
 
 
@@ -113,24 +111,24 @@ def _is_over(alarm: Alarm, since_ns: int) -> bool:
 
 
 def worst_first(alarm: Alarm) -> tuple[int, int, str]:
-    """An order: by verdict, and then the newest."""
+    """Sort key: the worst verdict first, then the newest alarm."""
     return ORDER[alarm.reason.verdict], -alarm.raised_at_ns, alarm.id
 
 
 def active_first(alarm: Alarm) -> tuple[bool, tuple[int, int, str]]:
-    """An order: what somebody has to act on, and then what is over, each the worst first."""
+    """Sort key: active alarms, which need action, before cleared ones; each worst first."""
     return not alarm.is_active, worst_first(alarm)
 
 
 class AlarmBoard:
-    """Holds the newest `Board`; `on_change` is told each change of it, and must not wait."""
+    """Holds the newest `Board`; `on_change` is called with each change, and must not block."""
 
     def __init__(self, on_change: Callable[[Change], None] = lambda _: None) -> None:
         self.now = Board()
         self.on_change = on_change
 
     def put(self, found: Board, change: Change, source: AlarmSource, since_ns: int | None) -> None:
-        """Take these for the alarms as they stand; it is no change where nothing is new."""
+        """Make this the newest board; if nothing is new, `on_change` is not called."""
         before = self.now
         is_same = found.alarms is before.alarms
         if is_same and (source, since_ns) == (before.source, before.since_ns):
@@ -140,18 +138,18 @@ class AlarmBoard:
         self.on_change(change)
 
 
-# --- what people said of alarms -------------------------------------------------------------------
+# --- the notes of people on alarms ----------------------------------------------------------------
 
 POLL_S: Final = 1.0
 OF_ALARM: Final = "alarm:"
-# Notes that one name may write at once, and a minute from then on.
+# Notes that one name may write at once, and per minute after that.
 NOTE_BURST: Final = 300
 NOTES_PER_MINUTE: Final = 60
 
 
 @dataclass(frozen=True, slots=True)
 class AlarmNotes:
-    """What stands of an alarm; None: nobody has said so. Times are ns of ROS time."""
+    """The notes in force on an alarm; None: there is no such note."""
 
     acknowledged: Note | None = None
     shelved: Note | None = None
@@ -163,7 +161,7 @@ NOTHING_SAID: Final = AlarmNotes()
 def notes_of_alarms(
     alarms: Iterable[Alarm], notes: Iterable[Note], now_ns: int | None
 ) -> Mapping[str, AlarmNotes]:
-    """By the id of each alarm that anybody has said something of."""
+    """The notes in force, by the id of their alarm."""
     if now_ns is None:
         return {}
     alarms = tuple(alarms)
@@ -172,7 +170,7 @@ def notes_of_alarms(
     shelves: dict[str, Note] = {}
     for (subject, kind), note in standing(notes, now_ns).items():
         name = subject.removeprefix(OF_ALARM)
-        # Nobody has acknowledged what an alarm became later.
+        # An acknowledgement ends when the alarm gets worse.
         if kind == ACKNOWLEDGE and note.made_at_ns >= worse_ns.get(name, 0):
             found[name] = AlarmNotes(acknowledged=note)
         elif kind == SHELVE and (note.until_ns or 0) > now_ns:
@@ -183,9 +181,9 @@ def notes_of_alarms(
 
 
 def _shelved(alarms: Sequence[Alarm], shelves: Mapping[str, Note]) -> Mapping[str, Note]:
-    """A shelf holds also for an alarm that returns meanwhile. It ends when the alarm gets worse.
+    """The note that shelves each alarm, by the alarm's id. It ends when the alarm gets worse.
 
-    What comes back is an alarm of the same tag, kind, sensor and side.
+    It also covers an alarm that returns: one of the same tag, kind, sensor and side.
     """
     held: dict[tuple[object, ...], tuple[Note, int]] = {}
     for alarm in alarms:
@@ -201,7 +199,7 @@ def _shelved(alarms: Sequence[Alarm], shelves: Mapping[str, Note]) -> Mapping[st
 
 
 def _verdict_at(alarm: Alarm, at_ns: int) -> Verdict:
-    """How bad it was at a moment."""
+    """The verdict of an alarm at a moment."""
     was_better = alarm.worse_at_ns is not None and at_ns < alarm.worse_at_ns
     return alarm.raised_as if was_better and alarm.raised_as else alarm.reason.verdict
 
@@ -214,9 +212,9 @@ def _what(alarm: Alarm) -> tuple[object, ...]:
 
 
 class NoteBoard(Periodic):
-    """The notes of the log; `on_change` is called when there are others. `number` counts that.
+    """The notes of the log; `on_change` is called when they have changed, which `number` counts.
 
-    `pace` is how fast each name may write. It looks from `start` on: the source knows its log then.
+    `pace` limits how fast each name may write. Start it once the source knows its log.
     """
 
     def __init__(self, source: TwinSource, on_change: Callable[[], None]) -> None:
@@ -229,16 +227,16 @@ class NoteBoard(Periodic):
 
     @property
     def notes(self) -> tuple[Note, ...] | None:
-        """All that are known, in the order in which they were written; None: not looked yet."""
+        """All known notes, in the order in which they were written; None: not read yet."""
         return None if self._found is None else self._found.notes
 
     @property
     def count(self) -> int:
-        """How many the log has."""
+        """How many notes the log has."""
         return 0 if self._found is None else self._found.count
 
     async def look(self) -> None:
-        """See whether there are others.
+        """Read new notes from the log.
 
         Raises:
             NotRemembered, PastRefused, TwinUnavailableError: the log cannot be read now.
@@ -248,7 +246,7 @@ class NoteBoard(Periodic):
         request = NotesRequest() if known is None else NotesRequest(known.journal, known.count)
         found = await self._source.notes(request)
         newest = self._found
-        # Another look may have been quicker, and has seen more.
+        # Another call may have been quicker, and have read more.
         is_older = newest and newest.journal == found.journal and newest.count >= found.count
         if found.notes is not None and not is_older:
             self._found = found
@@ -256,6 +254,6 @@ class NoteBoard(Periodic):
             self._on_change()
 
     async def _look_quietly(self) -> None:
-        # They are as they were; whoever asks the log for more is told why.
+        # The notes stay as they were; requests that read the log report why.
         with contextlib.suppress(NotRemembered, PastRefused, TwinUnavailableError):
             await self.look()

@@ -1,7 +1,7 @@
-"""From the twin's log to alarms and verdicts: the past at the start, and then what has come since.
+"""Follows the twin's log and derives the alarms: from the past at the start, then from new writes.
 
-The journal is followed write by write, in lots, on workers; while nothing changes, nothing is done.
-Where none is kept, or it fails, what the states tell is taken instead, and that is said.
+The journal is read in lots, and evaluated on workers; while nothing changes, nothing is done. If
+there is no journal, or it fails, the twin's states are used instead, and the board says so.
 """
 
 from __future__ import annotations
@@ -48,16 +48,16 @@ from lupin_twin.core.state import (
     sure_species,
 )
 
-# The one run of the clock that is told of here.
+# The run of the clock of all writes that are made from states.
 RUN = 0
 _UNKNOWN = TagState("")
 
 
 def writes_between(before: Snapshot | None, now: Snapshot, number: int) -> list[PastWrite]:
-    """The scans, inspections and failed attempts that are new, numbered from `number` on.
+    """The scans, inspections and failed attempts between two states, numbered from `number` on.
 
-    Of attempts at one tag that lie closer together than two states, all but the last may be missed,
-    and one that failed counts as one at its sensors.
+    If there were several attempts at one tag, all but the last may be missed. A failed attempt
+    counts as a failed scan.
     """
     known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
     found = [
@@ -70,7 +70,7 @@ def writes_between(before: Snapshot | None, now: Snapshot, number: int) -> list[
 
 
 def _of_tag(before: TagState, tag: TagState) -> list[PastWrite]:
-    """In the order of time."""
+    """The new writes of one tag, in the order of time."""
     found: list[PastWrite] = []
     known = {(reading.name, reading.observed_at_ns) for reading in before.readings}
     scans: dict[int, list[tuple[str, float]]] = {}
@@ -100,36 +100,36 @@ def _of_tag(before: TagState, tag: TagState) -> list[PastWrite]:
 
 log = logging.getLogger(__name__)
 
-# Writes that are read at once: some tens of milliseconds of a worker.
+# Writes per lot: some tens of milliseconds of a worker.
 LOT: Final = 500
 LOT_S: Final = 0.05
-# And of the past in all: a large greenhouse's last day, a small one's weeks.
+# Writes of the past in all: the last day of a large greenhouse, weeks of a small one.
 REACH_COUNT: Final = 300_000
-# What is observed stands in the journal so long after; and once more, for a disk that is slow.
+# After this long, an observation is in the journal; it is read once more later, for a slow disk.
 JOURNAL_S: Final = 0.15
 AGAIN_S: Final = 1.5
-# So long after a look nothing is looked at: who scans all the time is followed once a second.
+# Pause after each reading: a robot that scans all the time is followed once a second.
 REST_S: Final = 0.85
 RETRY_S: Final = 5.0
-# A journal that has not answered for so long says nothing of now, although the twin is there.
+# A journal that has not answered for this long says nothing about now, even if the twin is live.
 UNANSWERED_S: Final = 30.0
 _NOT_RECORDED: Final = frozenset({JournalState.FAILING, JournalState.IN_USE, JournalState.FOREIGN})
-# Numbers of what is heard here: beyond those of any journal.
+# Numbers of writes that are made from states: beyond those of any journal.
 _FIRST_RECEIVED: Final = 2**62
 _ALL_TIME: Final = (RunSpan(RUN, 0, FOREVER_NS),)
 _SILENCES: Final = 100
 
-# What a board is of: alarms of the log, those beside them, and the moment from which they are kept.
+# What a board is made of: alarms of the log, silences, and since when cleared alarms are kept.
 _NOTHING: Final[tuple[tuple[Alarm, ...], tuple[Alarm, ...], int]] = ((), (), 0)
 
 ResultT = TypeVar("ResultT")
 
 
 class AlarmFeed:
-    """Keeps `board` as it follows from what the twin observes. Belongs to the event loop.
+    """Keeps `board` up to date with the twin's observations. Belongs to the event loop.
 
-    `now_ns` tells ROS time, None where it is not known; `days` is how far back the past is read.
-    `note_days` hears of the values of quantities of a day, by tag.
+    `now_ns` returns ROS time; None: not known. `days` is how far back the past is read. `note_days`
+    gets the daily quantities, by tag.
     """
 
     def __init__(
@@ -163,7 +163,7 @@ class AlarmFeed:
         self._received: list[PastWrite] = []
         self._received_number = _FIRST_RECEIVED
         self._silences: list[Alarm] = []
-        # The twin's last time that was known.
+        # The last known time of the twin.
         self._last_ns: int | None = None
         self._alarms: tuple[Alarm, ...] = ()
         self._newest_board, self._board_of = Board(), _NOTHING
@@ -171,11 +171,11 @@ class AlarmFeed:
         self._task: asyncio.Task[None] | None = None
 
     def start(self) -> None:
-        """Begin to follow."""
+        """Start following."""
         self._task = asyncio.create_task(self._run(), name="alarms")
 
     async def stop(self) -> None:
-        """End."""
+        """Stop."""
         if self._again is not None:
             self._again.cancel()
         await end(self._task)
@@ -183,7 +183,7 @@ class AlarmFeed:
     # --- what happens ----------------------------------------------------------------------------
 
     def on_state(self, update: TwinUpdate) -> None:
-        """The twin has a new state; costs nothing where that and the journal are as before."""
+        """Take a new state of the twin; does nothing if that and the journal are unchanged."""
         before, now = self._seen, update.snapshot
         self._last_ns = self._last_ns if now.now_ns is None else now.now_ns
         self._withdraw_silences()
@@ -201,7 +201,7 @@ class AlarmFeed:
                 self._received_number += len(writes)
                 self._received += writes
             self._seen = now
-        # What comes late, or is written late, is in the journal and changes nothing that is now. It
+        # A late observation, or a late write, is in the journal, but does not change the state. It
         # is read when the source has it: a copy of the journal may be late too.
         written = self._source.journal().written
         is_written = is_kept and written != self._written
@@ -210,9 +210,9 @@ class AlarmFeed:
             self._wake.set()
 
     def on_silence(self, *, is_silent: bool, last_ns: int | None) -> None:
-        """The twin has fallen silent, or speaks again; `last_ns` is its newest stamp.
+        """Note that the twin has fallen silent, or is live again; `last_ns` is its newest stamp.
 
-        None: it has lost its clock, and is silent since the last time that it knew.
+        None: it has lost its clock, and has been silent since its last known time.
         """
         last_ns = self._last_ns if last_ns is None else last_ns
         open_now = self._silences[-1] if self._silences else None
@@ -227,7 +227,7 @@ class AlarmFeed:
         self._wake.set()
 
     def _withdraw_silences(self) -> None:
-        """Where the clock has gone back, those that are yet to come."""
+        """Withdraw the silences that are in the future, because the clock has gone back."""
         now_ns = self._now_ns()
         been = [it for it in self._silences if now_ns is None or it.raised_at_ns <= now_ns]
         if been != self._silences:
@@ -253,7 +253,7 @@ class AlarmFeed:
             self._wake.clear()
             try:
                 await (self._take_received() if self._origin == "heard" else self._follow())
-            except Exception as error:  # nobody waits for this task: it goes on whatever it was
+            except Exception as error:  # nobody awaits this task: it goes on after any error
                 if not isinstance(error, (NotRemembered, PastRefused, TwinUnavailableError)):
                     log.exception("alarms are as they were, and are worked out anew")
                     self._begin(self._origin)
@@ -261,7 +261,10 @@ class AlarmFeed:
                     log.info("alarms are as they were: %s", error)
                 why = str(error)
                 self._ask_again(RETRY_S)
-                await self._publish_silence(loop.time() - answered_s)
+                try:
+                    await self._publish_silence(loop.time() - answered_s)
+                except Exception:  # as above
+                    log.exception("alarms are as they were, and are worked out anew")
             else:
                 why, answered_s = "", loop.time()
             await asyncio.sleep(REST_S)
@@ -286,7 +289,7 @@ class AlarmFeed:
             request = WritesRequest(self._last, self._reach_ns / 1e9, REACH_COUNT, LOT)
             past = await self._source.writes(request)
             if generation != self._generation:
-                return  # it was begun anew meanwhile, and has been woken
+                return  # begun anew meanwhile, and woken
             if self._is_another(past):
                 self._begin("journal")
                 continue
@@ -344,10 +347,10 @@ class AlarmFeed:
         self._board.put(board, replace(change, is_past=is_past), self._origin, begins_ns)
 
     async def _publish_silence(self, unanswered_s: float) -> None:
-        """The rest is as it was: of a twin that is gone nobody else says anything.
+        """Publish silences with the last known alarms: nothing else reports that a twin is gone.
 
-        Of one that is there, and a journal that does not answer, nobody may take it for all there
-        is.
+        If the twin is live but its journal does not answer, the source is `starting`: these alarms
+        may not be all there are.
         """
         now, beside = self._board.now, tuple(self._silences)
         since_ns = self._board_of[2]
@@ -358,10 +361,10 @@ class AlarmFeed:
         self._board.put(board, change, source, now.since_ns)
 
     def _newest(self, beside: tuple[Alarm, ...], since_ns: int) -> tuple[Board, Change]:
-        """The board as it is now, the very same where nothing is another; on a worker."""
+        """The newest board, the same object if nothing has changed. Call it on a worker."""
         alarms, before = self._alarms, self._newest_board
         known, known_beside, known_ns = self._board_of
-        # What falls out for its age does so by the hour.
+        # Alarms are dropped for their age once an hour.
         since_ns -= since_ns % FORGET_EVERY_NS
         if alarms is known and (beside, since_ns) == (known_beside, known_ns):
             return before, Change(())
@@ -370,20 +373,20 @@ class AlarmFeed:
         return now, change_between(before, now, since_ns)
 
     async def _on_worker(self, work: Callable[[object], ResultT]) -> ResultT:
-        """Done where it holds up nobody; the loop only takes over what comes of it."""
+        """Run the work on a worker, where it does not block the event loop."""
         return await asyncio.wrap_future(self._source.workers.submit(work, LOT_S))
 
 
-# Between two attempts.
+# Pause between two attempts to read the log, s.
 LEARN_AGAIN_S: Final = 2.0
-# What is recent of a tag, looked up and judged by, takes so long, about.
+# Rough time to look up what is recent of a tag, and to judge by it.
 RECENT_S_PER_TAG: Final = 2e-4
 
 
 async def learn_recent(source: TwinSource, judge: Judge, first: Snapshot) -> None:
-    """Give the judge what was recent at the first state: after a start not everything is old.
+    """Give the judge what was recent at the first state, or all would seem unknown after a start.
 
-    It is asked again while the log cannot be read; until then the judge goes by what is heard.
+    Retries while the log cannot be read; until then, the judge knows only what is received.
     """
     recent = partial(as_found, RecentRequest(first.stamp_ns))
     while True:

@@ -1,10 +1,9 @@
 # ruff: noqa: S608  # SQL is put together of constants, and of names of tables
-"""The archive's database: reached, made, brought up to date, and what is wrong with it said.
+"""The archive's database: connections, tables, versions, contents, checks and retention.
 
 psycopg is imported where it is needed: it is the extra `fleet`.
 
-And what is in it, by site, whether its rows fit each other, and what is given up by age. Scans and
-inspections are given up. What was counted of them stays.
+Retention deletes scans and inspections by their age. What was counted of them stays.
 """
 
 from __future__ import annotations
@@ -25,11 +24,11 @@ if TYPE_CHECKING:
     import psycopg
 
 VERSION: Final = 1
-# Whoever listens is told the site that has something new: a hint, which may be lost.
+# Listeners are notified of a site with new rows: a hint, which may be lost.
 CHANNEL: Final = "lupin_log"
 _OLDEST_SERVER: Final = 150_000
-# A network that is gone is met within half a minute, here and, by `_SESSION`, at the server. A
-# host that does not answer must not keep from the next one, which may be a standby of before.
+# A lost network is noticed within half a minute, here and, by `_SESSION`, at the server. A host
+# that does not answer must not keep us from the next one, which may be a former standby.
 _LINK: Final = {
     "connect_timeout": "4",
     "keepalives_idle": "10",
@@ -40,12 +39,12 @@ _LINK: Final = {
 _SESSION: Final = (
     "SET tcp_keepalives_idle = 10; SET tcp_keepalives_interval = 5; SET tcp_keepalives_count = 3"
 )
-# Up to which stamp something was deleted or lost never gets less.
+# The stamp up to which something was deleted or lost never decreases.
 META_AGAIN: Final = (
     "ON CONFLICT (site, key) DO UPDATE SET value = CASE WHEN meta.key ~ '_ns:' THEN"
     " greatest(meta.value::bigint, excluded.value::bigint)::text ELSE excluded.value END"
 )
-# What libpq adds to the reason: advice to programmers, and how it came to know.
+# What libpq adds to the reason: advice to programmers, and where it failed.
 _NOISE: Final = tuple(
     map(
         re.compile,
@@ -55,24 +54,24 @@ _NOISE: Final = tuple(
         ),
     )
 )
-# A question that takes longer is given up: nobody waits for its answer any more.
+# A query that takes longer is cancelled: nobody waits for its answer any more.
 _MAX_MS: Final = 10_000
 _SITE: Final = re.compile(r"[a-z][a-z0-9_-]{0,62}")
 
 
 class ArchiveError(CommandError):
-    """What cannot be done with the archive."""
+    """An operation on the archive failed."""
 
 
 class UsageError(ArchiveError, SettingError):
-    """Asked for in a way that can never work: no later try helps."""
+    """A request that can never work: no retry helps."""
 
 
 def check_site(called: str, site: str) -> None:
-    """Whether it may be a site's name, which its user in the database has too.
+    """Refuse an invalid name of a site, which is also the name of its user in the database.
 
     Raises:
-        UsageError: it may not.
+        UsageError: it is invalid.
 
     """
     if not _SITE.fullmatch(site):
@@ -82,7 +81,7 @@ def check_site(called: str, site: str) -> None:
 
 
 def check_url(url: str) -> dict[str, Any]:
-    """What an address says.
+    """The parts of an archive's address.
 
     Raises:
         UsageError: it is no address of a PostgreSQL, or psycopg is not installed.
@@ -96,8 +95,8 @@ def check_url(url: str) -> dict[str, Any]:
         found = conninfo.conninfo_to_dict(url)
     except ProgrammingError:
         found = {}
-    # What was given is not repeated: there may be a password in it. With an @ of its own, part of
-    # the password counts as the host, which messages name; a socket without a file begins with @.
+    # The address is not repeated: it may hold a password. If that contains an @, a part of it
+    # counts as the host, which messages name; the host of an abstract socket begins with @.
     if not found or "@" in str(found.get("host", ""))[1:]:
         raise UsageError(
             "--archive-url is no address of a PostgreSQL, expected one such as"
@@ -107,20 +106,20 @@ def check_url(url: str) -> dict[str, Any]:
 
 
 def place_of(url: str) -> str:
-    """Where that is, for a line: no password is in it."""
+    """Host and database of an address, for messages, without the password."""
     said = check_url(url)
     return f"{said.get('host', 'the local PostgreSQL')}/{said.get('dbname', '')}"
 
 
 def connect(url: str, name: str, session: str = "read-write") -> psycopg.Connection[Any]:
-    """A connection that commits by itself; its transactions are blocks.
+    """A connection in autocommit mode; transactions are explicit blocks.
 
-    Of several hosts it is to the one that takes writes; with another `session`, as libpq's
-    `target_session_attrs` has it.
+    Of several hosts it is to the one that takes writes; `session` is libpq's
+    `target_session_attrs`.
 
     Raises:
         UsageError: see `check_url`.
-        ArchiveError: there is none to be had.
+        ArchiveError: no connection can be made.
 
     """
     said = check_url(url)
@@ -136,7 +135,7 @@ def connect(url: str, name: str, session: str = "read-write") -> psycopg.Connect
 
 
 def archive_url() -> str:
-    """Where the archive is: not on the command line of a process, which others can read."""
+    """The archive's address, from the environment: others can read a command line."""
     return os.environ[variable("archive_url")]
 
 
@@ -152,7 +151,7 @@ def open_archive(url: str) -> Any:
     connection = connect(url, "lupin-twin fleet", session="any")
     try:
         connection.read_only = True
-        # All that is read in one transaction is of one moment.
+        # A transaction sees one state of the archive.
         connection.isolation_level = psycopg.IsolationLevel.REPEATABLE_READ
         with explaining():
             connection.execute(f"SET statement_timeout = {_MAX_MS}")
@@ -203,11 +202,11 @@ def _explained(error: psycopg.Error) -> str:
 
 
 def check_version(connection: psycopg.Connection[Any]) -> None:
-    """Whether it is an archive of this version.
+    """Refuse an archive of another version.
 
     Raises:
-        ArchiveError: it is of another one.
-        psycopg.Error: it is none, see `explaining`.
+        ArchiveError: it is of another version.
+        psycopg.Error: it is no archive, see `explaining`.
 
     """
     found = connection.execute("SELECT version FROM archive").fetchone()
@@ -223,7 +222,7 @@ def init(connection: psycopg.Connection[Any]) -> None:
     """Make tables and roles, all or nothing.
 
     Raises:
-        ArchiveError: there is an archive already, or this is no place for one.
+        ArchiveError: there is an archive already, or the database is not suitable.
         psycopg.Error: whatever the database says.
 
     """
@@ -262,7 +261,7 @@ def _text(name: str) -> Any:
     return files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
-# --- what is in it, and what is given up by age ---------------------------------------------------
+# --- contents, checks and retention ---------------------------------------------------------------
 
 _SITES: Final = (
     "SELECT site.site, machine, process, heard_at > now() - INTERVAL '10 s',"
@@ -270,7 +269,7 @@ _SITES: Final = (
     " FROM site LEFT JOIN forwarder ON forwarder.site = site.site ORDER BY site.site"
 )
 _COUNT: Final = "SELECT count(*), max(arrival_ns) FROM {} WHERE site = %s"
-# What fits nothing: rows of a table, of which there should be none.
+# Inconsistent rows, of which there should be none.
 _STRAY: Final = {
     "scans without a series": (
         "scan WHERE NOT EXISTS (SELECT FROM series WHERE series.site = scan.site"
@@ -299,7 +298,7 @@ _STRAY: Final = {
 
 
 def overview(connection: Any) -> list[str]:
-    """A line a site."""
+    """A line for each site."""
     lines = []
     for site, machine, process, is_live, heard_at, epoch in connection.execute(_SITES).fetchall():
         counts = []
@@ -333,12 +332,12 @@ def check(connection: Any) -> list[str]:
 _NAMED: Final = (
     "SELECT site FROM site WHERE %(site)s::text IS NULL OR site = %(site)s ORDER BY site"
 )
-# What a simulation said is as old as its arrival.
+# The age of a simulation's rows counts from their arrival.
 _RUNS: Final = (
     "SELECT run, CASE is_simulated WHEN 0 THEN 0 ELSE begun_arrival_ns - begun_stamp_ns END"
     " FROM run WHERE site = %s AND joins IS NULL ORDER BY run"
 )
-# Parts of the tables that are over, each with both of its names.
+# Monthly partitions that are over: their names in both tables.
 _MONTHS: Final = (
     "SELECT relname, replace(relname, 'scan', 'look') FROM pg_class WHERE oid IN"
     " (SELECT inhrelid FROM pg_inherits WHERE inhparent = 'scan'::regclass)"
@@ -365,9 +364,9 @@ _DELETE: Final = (
 
 
 def retain(connection: Any, days: float, site: str | None) -> Iterator[str]:
-    """Delete what is older than so many days, of a site or of all; a line for each that had any.
+    """Delete what is older than `days`, of one site or of all; yields a line for each deletion.
 
-    A month that is over goes as a whole where nothing else is in it, at once.
+    A month that is old enough is dropped whole, at once, if it has no rows of other sites.
 
     Raises:
         ArchiveError: there is no such site.

@@ -1,9 +1,9 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""Forwarding a journal to the archive: again and again until it is asked to end.
+"""Forwards a journal to the archive, again and again until it is stopped.
 
-Whatever is wrong is said once, in one line, and tried again later; the twin has no part in it.
+A problem is reported once, in one line, and retried later; it does not affect the twin.
 
-The archive's end: a site's rows appended, a batch a transaction, each row once.
+`Sink` is the archive's end: it appends a site's rows, one batch per transaction, each row once.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ from lupin_twin.core.past import DAY_NS
 from lupin_twin.journal.retention import RECORD
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, SiteLog
 
-# Where the tables that are in parts by month have the stamp.
+# The column of the stamp, in tables that are partitioned by month.
 _STAMP: Final = {"scan": 3, "look": 4}
-# What is said anew of a row that is there; of other tables a row stays as it came first.
+# By table: its key, and the columns to update if the row exists; rows of other tables never change.
 _SAID_ANEW: Final = {
     "run": ("site, run", "joins ended_stamp_ns"),
     "hour": ("site, series, hour", "n total low high"),
@@ -77,11 +77,11 @@ _HERE: Final = (
 
 
 class Sink:
-    """A connection to the archive that writes a site, from `begin` on it alone; in one thread.
+    """A connection to the archive that writes a site, exclusively from `begin` on; in one thread.
 
     Raises:
-        ArchiveError: there is none.
-        psycopg.Error: anything else that the database says; also of every method.
+        ArchiveError: no connection can be made.
+        psycopg.Error: any other error of the database; also in every method.
 
     """
 
@@ -91,13 +91,13 @@ class Sink:
         self._months: set[int] = set()
 
     def close(self) -> None:
-        """Let others write the site."""
+        """Close the connection, so that others may write the site."""
         self._connection.close()
 
     def _lock(self) -> None:
         check_version(self._connection)
         execute = self._connection.execute
-        # The server lets go of it when the connection ends, however that ends.
+        # The server releases the lock when the connection ends, for whatever reason.
         name = f"lupin-twin forward {self._site}"
         (is_ours,) = execute(
             "SELECT pg_try_advisory_lock(hashtextextended(%s, 0))", (name,)
@@ -114,16 +114,16 @@ class Sink:
         execute("INSERT INTO site VALUES (%s, '') ON CONFLICT DO NOTHING", (self._site,))
 
     def heard(self) -> None:
-        """Have it in the archive that this forwarder lives."""
+        """Note in the archive that this forwarder is alive."""
         self._connection.execute(
             "UPDATE forwarder SET heard_at = now() WHERE site = %s", (self._site,)
         )
 
     def begin(self, source: Source, say: Callable[[str], None]) -> Epoch:
-        """Keep others from the site; returns where the journal goes on.
+        """Lock the site; returns the epoch in which the journal goes on.
 
-        One that is not what was forwarded last begins an epoch. So does one that was put back from
-        a copy: its numbers are given to other rows now.
+        A journal that is not the last one forwarded begins a new epoch. So does one that was
+        restored from a copy: its numbers now belong to other rows.
 
         Raises:
             ArchiveError: the archive is of another version, or another forwarder writes the site.
@@ -150,11 +150,11 @@ class Sink:
         log = SiteLog(self._connection, self._site)
         here = arrival_of(log, last.seq_offset + last.forwarded_seq)
         there = source.arrival_of(last.forwarded_seq)
-        # One that is no longer here or there was deleted.
+        # A row that is missing here or there was deleted.
         return here is None or there is None or here == there
 
     def _new_epoch(self, source: Source, epoch: Epoch) -> Epoch:
-        # Before the epoch: if this is cut short it is done again, to the same numbers.
+        # Before the epoch: if this is interrupted, it is repeated with the same numbers.
         for table, rows in source.counted(epoch):
             self._put({table: rows})
         self._connection.execute(
@@ -164,11 +164,11 @@ class Sink:
         return epoch
 
     def put(self, batch: Batch, epoch: Epoch) -> Epoch:
-        """Append a batch, all or nothing; returns where the epoch stands now."""
+        """Append a batch, all or nothing; returns the epoch as it is now."""
         upto = max(batch.upto, epoch.forwarded_seq)
         self._make_months(batch)
         with self._connection.pipeline(), self._connection.transaction():
-            # First: what came since may be of a series with the same tag and sensors.
+            # First: later rows may be of a series with the same tag and sensors.
             for _, key, value in batch.rows.get("meta", ()):
                 if key.startswith(RECORD):
                     record = json.loads(value)
@@ -189,7 +189,7 @@ class Sink:
         return replace(epoch, forwarded_seq=upto)
 
     def _make_months(self, batch: Batch) -> None:
-        """Have a part of the tables for each month, and for the one behind it."""
+        """Create the partitions of the batch's months, and of the month after each."""
         days = {
             row[column] // DAY_NS
             for table, column in _STAMP.items()
@@ -210,7 +210,7 @@ class Sink:
 
 
 def _text(value: Any) -> Any:
-    """What PostgreSQL can hold: its text has no NUL, and a batch with one would never go in."""
+    """The value without NUL, which PostgreSQL's text cannot hold: the batch would never go in."""
     return value.replace("\0", "\ufffd") if isinstance(value, str) else value
 
 
@@ -220,7 +220,7 @@ log = logging.getLogger(__name__)
 
 FIRST_WAIT_S: Final = 0.5
 MAX_WAIT_S: Final = 5.0
-# How often is looked for what is new, and how often the archive is told that this lives.
+# Interval of looking for new rows, and of the heartbeat in the archive.
 _POLL_S: Final = 0.25
 _HEARTBEAT_S: Final = 2.0
 
@@ -229,7 +229,7 @@ class Forwarder:
     """Forwards the journal that `path` finds, to a site of the archive.
 
     Raises:
-        UsageError: the site or the address cannot be.
+        UsageError: the site or the address is invalid.
 
     """
 
@@ -246,7 +246,7 @@ class Forwarder:
         self._wait_s = FIRST_WAIT_S
 
     def run(self, *, once: bool = False) -> bool:
-        """Forward for ever, or `once` what is there; returns whether that was done."""
+        """Forward for ever, or `once` what is there; returns whether that succeeded."""
         while True:
             wrong = self._try(once=once)
             if once:
@@ -256,7 +256,7 @@ class Forwarder:
                 self._wait_s = min(2 * self._wait_s, MAX_WAIT_S)
 
     def _try(self, *, once: bool) -> bool:
-        """Forward until something is wrong, which is said, or the journal is another one."""
+        """Forward until the journal is replaced; True: there was a problem, which is reported."""
         try:
             path = self._path()
             try:
@@ -275,7 +275,7 @@ class Forwarder:
         return False
 
     def _forward(self, source: Source, *, once: bool) -> None:
-        # Without an archive too: from now on the twin keeps what is not there.
+        # Even if the archive is down: from now on, the twin keeps what is not there yet.
         source.claim()
         with closing(Sink(self._url, self._site)) as sink:
             epoch = sink.begin(source, self._say)
@@ -287,7 +287,7 @@ class Forwarder:
                         epoch = sink.put(batch, epoch)
                     source.was_sent(batch, epoch)
                     is_full = batch.is_full
-                if not is_said:  # one that is reached may still take nothing, time after time
+                if not is_said:  # not earlier: a reachable archive may still refuse every batch
                     self._told, self._wait_s, is_said = "", FIRST_WAIT_S, True
                     self._say(f"site {self._site} is forwarded to {place_of(self._url)}")
                 if once and not is_full:
@@ -306,10 +306,10 @@ _RESTART_S: Final = 5.0
 
 
 def check(settings: Settings, role: str) -> None:
-    """Refuse what can never be forwarded.
+    """Refuse settings with which nothing can ever be forwarded.
 
     Raises:
-        SettingError: it is asked for.
+        SettingError: such settings are given.
 
     """
     given = [name for name in ("site", "archive_url") if getattr(settings, name)]
@@ -325,10 +325,10 @@ def check(settings: Settings, role: str) -> None:
 
 
 class Forwarding:
-    """The process, from construction to `stop`; started again whenever it has ended.
+    """Keeps a process that forwards, from construction to `stop`; restarts it whenever it ends.
 
-    Without a site there is none. `journal` is the path of the twin's journal, empty while it is
-    not known.
+    Without a site, there is none. `journal` returns the path of the twin's journal; empty: not
+    known yet.
     """
 
     def __init__(self, settings: Settings, journal: Callable[[], str]) -> None:
@@ -343,7 +343,7 @@ class Forwarding:
         self._task = asyncio.create_task(self._keep(), name="forwarding")
 
     async def stop(self) -> None:
-        """End it, at any moment: it goes on from there another time."""
+        """End the process, which is safe at any moment: the next one goes on from there."""
         await end(self._task)
         if self._process is not None and self._process.returncode is None:
             self._process.kill()

@@ -1,8 +1,8 @@
 # ruff: noqa: S608  # SQL is put together of constants
-"""The journal's end: what comes after a number, as rows of the archive.
+"""The journal's end of forwarding: reads the rows after a number, as rows of the archive.
 
-The file is only read, in a process that is not its twin's. What is read is on the disk before it
-is handed on: after a power cut the twin must not count anew from before what the archive has.
+The file is only read, in a process that is not its twin's. Rows are synced to the disk before they
+are handed on. Otherwise, after a power cut, the twin could reuse numbers that the archive has.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _INSPECTIONS: Final = 500
 _APPENDED: Final = {"scan": _SCANS, "look": _INSPECTIONS, "place": _SCANS}
 _WITHIN: Final = f"site = '{LOCAL_SITE}' AND seq > :after AND seq <= :upto"
 
-# Each with the archive's site and numbers: `seqs` and `runs` are what those are moved by.
+# Each with the archive's site and numbers: `seqs` and `runs` are the offsets of these.
 _ROWS: Final = {
     "series": (
         "SELECT :site, series + :seqs, run + :runs, tag, kind, sensors FROM series"
@@ -59,7 +59,7 @@ _ROWS: Final = {
         "SELECT :site, seq + :seqs, run + :runs, tag, stamp_ns, arrival_ns, x, y, z, qx, qy, qz,"
         f" qw, is_copy FROM place WHERE {_WITHIN}"
     ),
-    # What those are counted in, as it is now.
+    # The counts that include those rows, as they are now.
     "hour": (
         "SELECT :site, hour.series + :seqs, hour.hour, n, total, low, high FROM"
         f" (SELECT DISTINCT series, stamp_ns / {HOUR_NS} AS hour FROM scan WHERE {_WITHIN}"
@@ -80,7 +80,7 @@ _ROWS: Final = {
 _ARRIVAL: Final = " UNION ALL ".join(
     f"SELECT arrival_ns FROM {table} WHERE site = :site AND seq = :seq" for table in _APPENDED
 )
-# Few: they are looked through each time, and what has changed is sent.
+# Small tables: all rows are read each time, and those that have changed are sent.
 _SMALL: Final = {
     "run": (
         "SELECT :site, run + :runs, is_simulated, begun_stamp_ns, begun_arrival_ns,"
@@ -100,12 +100,12 @@ _TOUCHED_SINCE: Final = (
     f" CROSS JOIN series USING (site, series) WHERE {_WITHIN} UNION ALL"
     f" SELECT run, stamp_ns FROM look WHERE {_WITHIN}) GROUP BY run"
 )
-# The last event that began before a stamp may be one that goes on over it.
+# The last event that began before a stamp may go on past it.
 _EVENT_OVER: Final = (
     f"SELECT max(stamp_ns) FROM event WHERE site = '{LOCAL_SITE}' AND run = :run"
     " AND event = :event AND stamp_ns < :since"
 )
-# All that was counted of a series, of a run.
+# All counts of a series (`hour`) or a run (`tally`): the numbers of these, and the rows of one.
 _COUNTED: Final = {
     "hour": (
         f"SELECT series FROM series WHERE site = '{LOCAL_SITE}'",
@@ -126,7 +126,7 @@ _COUNTED: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Epoch:
-    """How a journal's numbers stand in the archive, and the last of them that is there."""
+    """The offsets of a journal's numbers in the archive, and the last number forwarded."""
 
     site: str
     number: int
@@ -137,10 +137,10 @@ class Epoch:
 
 @dataclass(slots=True)
 class Batch:
-    """Rows by their table for one transaction, up to the number `upto` of the journal.
+    """Rows by table for one transaction, up to the number `upto` of the journal.
 
-    `events` are all of a run (the archive's number) from a stamp on: others are there no more.
-    `small` are all rows of the small tables, be they new or not.
+    `events` are, by run (the archive's number) and stamp, all from that stamp on: they replace
+    those of the archive. `small` are all rows of the small tables, new or not.
     """
 
     upto: int
@@ -160,7 +160,7 @@ def arrival_of(log: SiteLog, seq: int) -> int | None:
 
 
 class Source:
-    """An open journal, in one thread. `path` has to be one.
+    """An open journal, in one thread; `path` has to be a journal.
 
     Raises:
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
@@ -177,29 +177,29 @@ class Source:
         self._events_since: dict[int, int] | None = None
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the journal."""
         self._connection.close()
 
     @cached_property
     def journal_id(self) -> str:
-        """Its identity."""
+        """The journal's id."""
         return get_meta(self._connection, "journal_id") or ""
 
     def is_replaced(self) -> bool:
-        """Whether another file has its name now, or none."""
+        """Whether its path is now that of another file, or of none."""
         try:
             return self._path.stat().st_ino != self._inode
         except FileNotFoundError:
             return True
 
     def has_changed(self) -> bool:
-        """Whether anybody has written since this was asked last."""
+        """Whether anybody has written since the last call."""
         (version,) = self._connection.execute("PRAGMA data_version").fetchone()
         before, self._version = self._version, version
         return bool(before != version)
 
     def last_seq(self) -> int:
-        """The last number that it has given."""
+        """The last number that the journal has assigned."""
         return Appender(self._connection).last_seq
 
     def arrival_of(self, seq: int) -> int | None:
@@ -207,10 +207,10 @@ class Source:
         return arrival_of(SiteLog(self._connection), seq)
 
     def batch(self, epoch: Epoch) -> Batch:
-        """What comes next, as of one moment, and on the disk.
+        """The next batch, as of one moment, and synced to the disk.
 
         Raises:
-            ArchiveError: it is being saved from damage.
+            ArchiveError: the journal is being salvaged.
 
         """
         with one_view(self._connection):
@@ -238,7 +238,7 @@ class Source:
         return found
 
     def was_sent(self, batch: Batch, epoch: Epoch) -> None:
-        """Have it beside the journal, and here, that a batch is in the archive."""
+        """Note, here and beside the journal, that a batch is in the archive."""
         self._sent = batch.small
         if batch.events:
             self._events_since = {}
@@ -248,8 +248,8 @@ class Source:
         """Have the twin keep what is not in the archive yet.
 
         Raises:
-            ArchiveError: it is not to be forwarded now.
-            OSError: there is no writing beside the journal.
+            ArchiveError: it cannot be forwarded now.
+            OSError: nothing can be written beside the journal.
 
         """
         self._refuse_salvaged()
@@ -261,14 +261,14 @@ class Source:
             note_forwarded(self._path, self.journal_id, seq)
 
     def counted(self, epoch: Epoch) -> Iterator[tuple[str, list[Row]]]:
-        """Lots of hours and tallies, also of rows that were deleted before they were forwarded."""
+        """Yield all counts in lots, also those of rows deleted before they were forwarded."""
         moved = {"site": epoch.site, "seqs": epoch.seq_offset, "runs": epoch.run_offset}
         for table, (numbers, sql) in _COUNTED.items():
             for (number,) in self._connection.execute(numbers).fetchall():
                 yield table, self._rows(sql, {**moved, "number": number})
 
     def _refuse_salvaged(self) -> None:
-        # Rows come in any order then.
+        # Then rows come in any order.
         if get_meta(self._connection, "salvage"):
             raise ArchiveError(f"the journal {self._path} is being saved from damage")
 
@@ -278,7 +278,7 @@ class Source:
         return self._connection.execute(sql, asked).fetchall()
 
     def _upto(self, after: int) -> tuple[int, bool]:
-        """The last number of the next batch, and whether there is more behind it."""
+        """The last number of the next batch, and whether there is more after it."""
         last, ends = after, []
         for table, most in _APPENDED.items():
             (count, end) = self._connection.execute(
@@ -292,9 +292,9 @@ class Source:
         return (min(ends), True) if ends else (last, False)
 
     def _facts(self, asked: Mapping[str, Any]) -> list[Row]:
-        """What of the file's facts is true of the archive too.
+        """The rows of the file's `meta` that are true of the archive too.
 
-        Rows that were deleted here are there, but for those that were never forwarded.
+        Rows that were deleted here stay there, except those that were never forwarded.
         """
         purged = int(get_meta(self._connection, PURGED_SEQ) or 0)
         of_runs = ("lost_ns:", "purged_ns:") if purged > asked["after"] else ("lost_ns:",)
@@ -315,7 +315,7 @@ class Source:
         return found
 
     def _see_events(self, found: Batch, asked: Mapping[str, Any]) -> None:
-        """Events change where rows come late, so they are sent once all rows are."""
+        """Add the events to a batch that is not full: late rows change them, so rows go first."""
         since = self._events_since
         if since is not None and found.upto > asked["after"]:
             for run, stamp_ns in self._rows(_TOUCHED_SINCE, asked):
@@ -333,7 +333,7 @@ class Source:
             found.events[key] = self._rows(_EVENTS, within)
 
     def _sync(self) -> None:
-        # Of the log alone: closing a descriptor of the file would take SQLite's locks with it.
+        # Only the write-ahead log: closing a descriptor of the file would drop SQLite's locks.
         with suppress(FileNotFoundError):
             log = os.open(self._path.with_name(self._path.name + "-wal"), os.O_RDONLY)
             try:

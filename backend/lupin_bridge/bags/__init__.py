@@ -1,1 +1,1 @@
-"""Recordings (MCAP files, as `ros2 bag` has them): made, mended, and played again."""
+"""Recordings (MCAP files, as `ros2 bag` writes them): made from a journal, read, and played."""

@@ -1,8 +1,9 @@
-"""A period of a journal as a recording of the messages that made it: an MCAP file, as rosbag2's.
+"""Exports a period of a journal as a recording of its messages: an MCAP file, as rosbag2's.
 
-The journal does not keep all of a message. What it lacks is left at its default: where the robot
-saw a tag at each scan (its place comes as a discovered tag), the hour of the simulated day. The
-stamp is the one by which it counts; the frame is empty, which is the one that the twin expects.
+The journal does not keep all of a message. What it lacks has its default: where the robot saw a tag
+at each scan (a tag's place comes as a discovered tag), and the hour of the simulated day. The stamp
+is the one by which the twin counts it. The frame is empty, which stands for the one that the twin
+expects.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ from lupin_twin.journal.runs import Run, cut, runs, spans
 from lupin_twin.journal.schema import LOCAL_SITE, one_view
 from lupin_twin.ros.convert import observation_message, pose_message, time_msg
 
-# One of rosbag2's profiles, as it writes them since its metadata's version 9 (Jazzy), without which
-# it takes a file for of that version. No deadline, no lifespan: RMW_DURATION_INFINITE.
+# A QoS profile as rosbag2 writes it since version 9 of its metadata (Jazzy), which it also assumes
+# for a file without metadata. No deadline, no lifespan: RMW_DURATION_INFINITE.
 _PROFILE: Final = """\
 - history: keep_last
   depth: {depth}
@@ -53,21 +54,21 @@ _PROFILE: Final = """\
 
 
 def offered_qos(topic: Topic) -> str:
-    """How a topic is published, as rosbag2 writes that."""
+    """The QoS with which a topic is published, as rosbag2 writes it."""
     durability = "transient_local" if topic.is_latched else "volatile"
     return _PROFILE.format(depth=topic.depth, durability=durability)
 
 
 # --- the rows -------------------------------------------------------------------------------------
 
-# Rows that are read in one go, in one short transaction: the log may not grow meanwhile for long.
+# Rows that are read in one short transaction: during a long one, the write-ahead log would grow.
 LOT: Final = 2_000
 
 
 class JournalRows:
-    """The writes with `start_ns <= stamp < end_ns`.
+    """The writes of a period, `start_ns <= stamp < end_ns`.
 
-    `places` are those that tags have before: by an earlier write, or an earlier run of the clock.
+    `places` are the tags' places before it: by an earlier write, or an earlier run of the clock.
     """
 
     def __init__(self, connection: sqlite3.Connection, start_ns: int, end_ns: int) -> None:
@@ -79,7 +80,7 @@ class JournalRows:
             self.places = self._places_before(start_ns)
 
     def __iter__(self) -> Iterator[tuple[Run, Write]]:
-        """Each with the run of the clock that it belongs to, in the order of receiving."""
+        """Yield each write with its run of the clock, in the order of receipt."""
         parts = (self._rows("scan"), self._rows("look"), self._places())
         for _, run, row in heapq.merge(*parts, key=itemgetter(0)):
             yield run, row
@@ -93,7 +94,7 @@ class JournalRows:
         return list(first.values())
 
     def _rows(self, table: str) -> Iterator[tuple[int, Run, Write]]:
-        """Those of scans or of inspections with their numbers, by these."""
+        """Yield scans or inspections as (number, run, row), in the order of their numbers."""
         after = 0
         while True:
             with one_view(self._connection):
@@ -159,15 +160,15 @@ def export(
 ) -> tuple[int, int]:
     """Write what was received with `start_ns <= stamp < end_ns` into a new file.
 
-    Returns how many observations, and messages of discovered tags.
+    Returns how many observations, and messages of discovered tags, were written.
 
-    A message is logged when it arrived, by the wall clock, as a recorder would have. Places that
-    tags had before come first. Where time was simulated, `/clock` comes before each message.
-    Where nothing was received no file is left.
+    A message's log time is when it arrived, by the wall clock, as in a recorder. Places that tags
+    had before come first. In simulated time, `/clock` comes before each message. If nothing was
+    received, no file is left.
 
     Raises:
-        OSError: the file cannot be made or written, and there is none then; FileExistsError: it is
-            there already.
+        OSError: the file cannot be made or written, and none is left; FileExistsError: it is there
+            already.
         LookupError: the message types are not installed.
 
     """

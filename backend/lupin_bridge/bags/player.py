@@ -33,17 +33,17 @@ from lupin_twin.runtime import process
 
 NODE_NAME: Final = "lupin_player"
 _BEAT_S: Final = 0.02
-# So many a beat, 100 a second: of the 50 that may wait at a twin none is lost while its thread is
-# busy for half a second. DDS acknowledges what waits there, taken or not.
+# Messages per beat, which makes 100 a second. A twin's queue holds 50, so none is lost while its
+# thread is busy for half a second. DDS acknowledges what waits there, taken or not.
 _MAX_A_BEAT: Final = 2
-# A message goes out so long behind the clock, s: before the twin knows that time, its stamp would
-# be one from the future.
+# How far messages follow behind the clock, s: before the twin knows that time, their stamps would
+# be in the future.
 _LAG_S: Final = 0.1
-# A machine that stood still goes on from where it stood.
+# Longest step of time: after the machine stood still, the recording goes on where it was.
 _MAX_STEP_S: Final = 0.25
 # Longer silences than this, s of waiting, are announced.
 _LONG_S: Final = 60.0
-# How long the twin is waited for: DDS finds who is there within 3 s, a busy machine takes longer.
+# Longest wait for the twin: discovery by DDS takes up to 3 s, and longer on a busy machine.
 _TWIN_S: Final = 30.0
 _POLL_S: Final = 1.0
 # Before a loop begins again, DDS delivers what was published.
@@ -51,7 +51,7 @@ _DELIVERY_S: Final = 0.5
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Play until a signal comes; at the end of the recording the time stands."""
+    """Play until a signal comes; at the end of the recording, time stands still."""
     own, ros_args = process.split_ros_args(sys.argv[1:] if argv is None else argv)
     options = parser().parse_args(own)
     process.end_with_parent()
@@ -84,7 +84,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
-    """Publishes the recorded topics and `/clock`, and looks who subscribes."""
+    """Publishes the recorded topics and `/clock`, and knows whether they have subscribers."""
 
     def __init__(self, inputs: Mapping[str, str]) -> None:
         super().__init__(NODE_NAME)
@@ -94,7 +94,7 @@ class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.advertise()
 
     def advertise(self) -> None:
-        """Publish by new publishers: a late subscriber gets nothing of an earlier loop."""
+        """Make new publishers: a late subscriber must get nothing of an earlier loop."""
         for publisher in self._publishers_by_topic.values():
             self.destroy_publisher(publisher)
         for topic, kind in self._inputs.items():
@@ -142,9 +142,9 @@ class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
 
 class Player:
-    """What is due at which moment. Time is an argument of `beat`; `node` publishes.
+    """Decides what is due at each moment. Time is an argument of `beat`; `node` publishes.
 
-    What lies before the start is published first, all of it but of maps: of these the last one.
+    Messages from before the start are published first: all of them, but only the last of each map.
     """
 
     def __init__(self, recording: Recording, node: PlayerNode, options: argparse.Namespace) -> None:
@@ -190,7 +190,7 @@ class Player:
         """Publish the time and what is due.
 
         Raises:
-            RecordingError: the recording is damaged here, or its clock tells no time.
+            RecordingError: the recording is damaged here, or its `/clock` cannot be read.
 
         """
         left = _MAX_A_BEAT
@@ -214,7 +214,7 @@ class Player:
                 left -= 1
                 self._publish(message)
             else:
-                # The time waits for what is due: the twin must be able to take it.
+                # Time waits for messages that are due: the twin must be able to take them.
                 self._position_ns = message.log_ns + lag_ns
                 break
             self._next = next(self._rest, None)
@@ -238,7 +238,7 @@ class Player:
     def _clock_ns(self, message: Recorded) -> int:
         try:
             return nanoseconds(deserialize_message(message.data, Clock).clock)
-        except RuntimeError as error:  # rclpy's own: the bytes are none
+        except RuntimeError as error:  # rclpy's own: the bytes are no such message
             name, kind = self._recording.name, CLOCK.type_name
             raise RecordingError(
                 f"cannot read {name}: a message of {message.topic} is no {kind}"

@@ -1,4 +1,4 @@
-"""Recordings as `ros2 bag record -s mcap` leaves them: files and folders, read as one. No ROS.
+"""Reads recordings as `ros2 bag record -s mcap` writes them: files and folders, as one. No ROS.
 
 The `mcap` library reads them, a chunk at a time; what it cannot read, the `mcap` tool can repair.
 """
@@ -20,12 +20,12 @@ from mcap.records import Statistics
 
 from lupin_twin.core.interfaces import CLOCK, DISCOVERED_TAGS, MAP, OBSERVATIONS
 
-# Of the files' names.
+# The suffix of the files' names.
 SUFFIX: Final = ".mcap"
 MESSAGE_ENCODING: Final = "cdr"
 # What a twin subscribes to, by type.
 INPUTS: Final = {it.type_name: it for it in (OBSERVATIONS, DISCOVERED_TAGS, MAP)}
-# What reading a damaged file ends in, whichever of the library's layers meets it.
+# The errors of reading a damaged file, from any layer of the library.
 _DAMAGE: Final = (McapError, ValueError, LookupError, struct.error, RuntimeError, EOFError)
 
 
@@ -86,7 +86,7 @@ class Recording:
     def inputs(self) -> dict[str, str]:
         """The topics that a twin subscribes to, and their types.
 
-        Of several grids, costmaps most likely, those alone that are called `map`, if there is one.
+        Of several grids, most of them costmaps, only those called `map` count, if there are any.
 
         Raises:
             RecordingError: there are none.
@@ -106,10 +106,10 @@ class Recording:
         return chosen
 
     def check_start(self, start_s: float) -> None:
-        """Refuse a start behind the end.
+        """Refuse a start after the end.
 
         Raises:
-            RecordingError: see above.
+            RecordingError: it is after the end.
 
         """
         duration_s = (self.end_ns - self.start_ns) / 1e9
@@ -126,7 +126,7 @@ class Recording:
         before_ns: int | None = None,
         newest_first: bool = False,
     ) -> Iterator[Recorded]:
-        """The messages of these topics, `from_ns` <= their time < `before_ns`, in its order.
+        """The messages of these topics, `from_ns` <= time < `before_ns`, in the order of time.
 
         Raises:
             RecordingError: a file is damaged from there on.

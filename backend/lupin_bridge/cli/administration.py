@@ -1,6 +1,6 @@
-"""What an administrator runs: `archive` and `forward`; `user`, `token` and `audit`.
+"""The commands of an administrator: `archive` and `forward`; `user`, `token` and `audit`.
 
-Accounts and tokens are in a file that bridges read: a change counts at once while they run.
+Accounts and tokens are in a file that bridges read: changes take effect at once in running ones.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def add_archive(roles: Roles) -> None:
     _add_url(forward)
     journal.add_which(forward)
     forward.add_argument("--once", action="store_true", help="send what is there, and end")
-    # As `serve` starts it: it ends with that, however that ends.
+    # For `serve`, which starts it: it ends with `serve`, for whatever reason that ends.
     forward.add_argument("--end-with-input", action="store_true", help=argparse.SUPPRESS)
 
 
@@ -170,7 +170,7 @@ def _forward(options: argparse.Namespace, environ: Mapping[str, str], url: str) 
         os.nice(_NICENESS)
         threading.Thread(target=_end_with_input, name="end", daemon=True).start()
 
-    # Looked for each time: it may be about to be made.
+    # Looked for each time: the journal may not exist yet.
     path = partial(journal.path_of, options, environ)
     forwarder = Forwarder(url, _given(options, environ, "site"), path, say)
     return 0 if forwarder.run(once=options.once) else FAILED
@@ -178,7 +178,7 @@ def _forward(options: argparse.Namespace, environ: Mapping[str, str], url: str) 
 
 def _end_with_input() -> None:
     sys.stdin.buffer.read()
-    # Killed at any moment, it goes on from there.
+    # Safe at any moment: the next forwarder goes on from there.
     os._exit(0)
 
 

@@ -1,6 +1,6 @@
-"""The command `lupin-twin`: its options, and one clear line where something is wrong with them.
+"""The command `lupin-twin`: its options, one-line errors about them, and the bridge's log.
 
-The bridge's log: a line for people, or a JSON object a line for a log collector.
+The log has lines for people, or a JSON object on each line for a log collector.
 """
 
 from __future__ import annotations
@@ -44,22 +44,22 @@ from lupin_twin.runtime.process import (
     split_ros_args,
 )
 
-# Of a repeated message: so many at once of our own, and one a period from then on.
+# How often a message of ours may repeat at once, and the period of each further one.
 AT_ONCE: Final = 20
 PERIOD_S: Final = 5.0
-# Of all that one logger says.
+# The same limits for all messages of one logger.
 LOGGER_AT_ONCE: Final = 200
 LOGGER_PERIOD_S: Final = 0.2
 MAX_KINDS: Final = 1_000
 
 _NUMBER: Final = re.compile(r"(?:0x)?[0-9a-f]*[0-9][0-9a-f]*", re.IGNORECASE)
 
-# uvicorn's words, with a trace of no use: the bytes were a stranger's.
+# uvicorn's message, whose trace is of no use: a client sent the bytes.
 _NO_TEXT: Final = "Invalid UTF-8 sequence received from client."
 
 
 class JsonFormatter(logging.Formatter):
-    """One JSON object a record: time (UTC), level, logger, message, and the error if any."""
+    """One JSON object per record: time (UTC), level, logger, message, and the error if any."""
 
     def format(self, record: logging.LogRecord) -> str:
         """The record as one line."""
@@ -75,10 +75,10 @@ class JsonFormatter(logging.Formatter):
 
 
 class OnceInAWhile(logging.Filter):
-    """Lets few records of a kind through, and not too many of one logger, whatever their kinds.
+    """Limits the rate of records of each kind, and of all records of one logger.
 
-    Any stranger can cause some of them as often as he likes, and a disk is soon full. A kind is
-    what a record says without its numbers (addresses, sizes, ids), and of its lines the first.
+    Any client can cause some of them as often as it likes, which would soon fill a disk. A kind is
+    the first line of a message, without its numbers (addresses, sizes, ids).
     """
 
     def __init__(self) -> None:
@@ -89,7 +89,7 @@ class OnceInAWhile(logging.Filter):
         self._held_back: Counter[Hashable] = Counter()
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Whether to write the record; what it says of those before it is added."""
+        """Whether to write the record; adds to it how many were held back before."""
         now_s = time.monotonic()
         text = record.getMessage() if record.msg == "%s" else str(record.msg)
         error = record.exc_info[0] if record.exc_info else None
@@ -112,20 +112,20 @@ def set_up_log(log_format: str, level: str = "info") -> None:
     """Send the log to standard error in this format, from this level on."""
     least = logging.getLevelNamesMapping()[level.upper()]
     handler = logging.StreamHandler(sys.stderr)
-    # What ROS's nodes log passes no logger of ours, but this.
+    # Records of the ROS nodes bypass our loggers' levels, but not this handler's.
     handler.setLevel(least)
-    # Here, and not at the root logger: what passes through others does not meet its filters.
+    # Here, not at the root logger: records of other loggers do not pass its filters.
     handler.addFilter(OnceInAWhile())
     if log_format == "json":
         handler.setFormatter(JsonFormatter())
     else:
         handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
     logging.root.addHandler(handler)
-    # The libraries' debugging is not the bridge's: a line for each byte.
+    # No debugging of libraries: some log a line for each byte.
     logging.root.setLevel(max(least, logging.INFO))
     for ours in ("lupin_bridge", "lupin_twin"):
         logging.getLogger(ours).setLevel(least)
-    # Its news (started, waiting, connection open) are logged here, once.
+    # Without uvicorn's news (started, waiting, connection open).
     logging.getLogger("uvicorn").setLevel(max(least, logging.WARNING))
 
 
@@ -162,8 +162,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     play_args = _play_args(options)
     try:
         settings = _settings_from(options)
-        # Before anything slow is imported, and before the first thread: Ctrl-C and SIGTERM wait
-        # until the server asks for them, so that neither can end in a traceback.
+        # Before any slow import, and before the first thread. Ctrl-C and SIGTERM wait until the
+        # server unblocks them, so that neither can end in a traceback.
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
         _prepare_process()
         set_up_log(settings.log_format, settings.log_level)
@@ -202,7 +202,7 @@ ROLES = {
 }
 
 
-# Handed on to the patrol, which checks their ranges; what is no number is refused here already.
+# Passed to the patrol, which checks their ranges; what is no number is refused here already.
 PATROL_OPTIONS: dict[str, tuple[type[int | float], str]] = {
     "speed": (
         float,
@@ -217,12 +217,12 @@ def _patrol_args(options: argparse.Namespace) -> list[str]:
     return [f"--{name}={value}" for name, value in given.items() if value is not None]
 
 
-# Recorded seconds a second.
+# Limits of --speed with a recording: recorded seconds per second.
 PLAYER_SPEEDS = (0.1, 100.0)
 
 
 def _play_args(options: argparse.Namespace) -> list[str]:
-    """What `demo --from` hands on to the player; nothing without."""
+    """The arguments that `demo --from` passes to the player; empty without `--from`."""
     if options.role != "demo":
         return []
     given = [f"--start={options.start}"] if options.start is not None else []
@@ -272,7 +272,7 @@ def parser() -> argparse.ArgumentParser:
                 arguments.add_argument(
                     option(spec.name),
                     action="append" if spec.default == () else "store",
-                    # None: not given here, and so for the environment or the file to say.
+                    # None: not given here, so the environment or the file decides.
                     default=None,
                     metavar=spec.name.rpartition("_")[2].upper(),
                     help=f"{spec.metadata['help']}{limits and f', {limits}'} "

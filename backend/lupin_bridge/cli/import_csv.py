@@ -1,4 +1,4 @@
-"""`lupin-twin import`: readings of before, from CSV, into a journal; without `--write`, a look."""
+"""`lupin-twin import`: imports past readings from CSV; without `--write`, only examines them."""
 
 from __future__ import annotations
 
@@ -45,16 +45,16 @@ from lupin_twin.journal.schema import FILE_ERRORS, open_named
 _REPORT_EVERY: Final = 20_000
 # Characters of a line; a field of the csv module has 131,072 at most.
 _MAX_LINE: Final = 1_000_000
-# Lines that are named of each reason; their count is before them.
+# Lines that are named for each reason of refusal, after their count.
 _EXAMPLES: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """What stands where. `tag_id` is every row's tag where there is no column `tag`.
+    """Which column is what. `tag_id` is the tag of every row, if there is no column `tag`.
 
-    `sensors` by sensor; or `sensor` is the column that names it, `value` the one with the number,
-    and `names` is what that calls each sensor.
+    Either `sensors` has a column for each sensor; or the column `sensor` names it, the column
+    `value` has the number, and `names` maps the names in that column to sensors.
     """
 
     time: str
@@ -74,9 +74,9 @@ Found = tuple[int, str, tuple[str, ...], list[float]]
 
 @dataclass(slots=True)
 class Summary:
-    """What was found in the file. `refused`: of each reason how often, and in which first lines.
+    """What was found in the file. `refused`: by reason, how often, and the first lines.
 
-    `sensors` has of each sensor how many readings, the least and the greatest.
+    `sensors`: by sensor, the number of readings, the least and the greatest.
     """
 
     rows: int = 0
@@ -89,14 +89,14 @@ class Summary:
     refused: dict[str, list[int]] = field(default_factory=dict)
 
     def refuse(self, reason: str, line: int) -> None:
-        """A row, or a reading of it, that is not imported."""
+        """Count a row, or a reading of it, that is not imported."""
         lines = self.refused.setdefault(reason[:120], [0])
         lines[0] += 1
         if len(lines) <= _EXAMPLES:
             lines.append(line)
 
     def take(self, found: Found) -> None:
-        """A scan that can be imported.
+        """Count a scan that can be imported.
 
         Raises:
             ValueError: with it there would be more tags or sensors than a twin takes.
@@ -114,7 +114,7 @@ class Summary:
         self.scans += 1
 
     def lines(self) -> Iterator[str]:
-        """The same for a person."""
+        """The summary as lines for a person."""
         yield f"{self.rows} rows, {self.scans} scans of {len(self.tags)} tags"
         if self.scans:
             first, last = (
@@ -134,10 +134,10 @@ class Summary:
 
 
 def columns_of(content: Any) -> Columns:
-    """What stands where, as the file of columns says it.
+    """The columns, from the content of the file of `--map`.
 
     Raises:
-        ConfigError: a key that cannot be.
+        ConfigError: a key or a value is invalid.
 
     """
     table = Table("", content)
@@ -169,19 +169,17 @@ def columns_of(content: Any) -> Columns:
 
 
 def counted(file: TextIO, report_every: Callable[[int], None]) -> Iterator[str]:
-    """The lines of a file, telling now and then how many bytes in it is.
+    """Yield the lines of a file; reports now and then how many bytes were read.
 
     Raises:
         csv.Error: a line is too long.
 
     """
-    at = 0
     for number, line in enumerate(iter(partial(file.readline, _MAX_LINE), "")):
         if len(line) == _MAX_LINE:
             raise csv.Error(f"line {number + 1} has {_MAX_LINE:,} characters or more")
-        at += len(line)
         if number % _REPORT_EVERY == 0:
-            report_every(at)
+            report_every(file.buffer.tell())
         # InfluxDB's annotations
         yield "\n" if line.startswith("#") else line
 
@@ -190,8 +188,8 @@ def scans(lines: Iterator[str], columns: Columns, summary: Summary) -> Iterator[
     """The scans of a CSV file with a header; what is refused is in the summary.
 
     Raises:
-        ConfigError: the header has not the columns.
-        csv.Error: it is no CSV.
+        ConfigError: the header lacks a column.
+        csv.Error: it is not CSV.
 
     """
     reader = csv.reader(lines)
@@ -267,7 +265,7 @@ def _number(name: str, text: str, column: Value) -> float:
     try:
         value = float(text) * column.factor + column.offset
     except ValueError:
-        if text in ("unknown", "unavailable"):  # of a sensor in Home Assistant that is away
+        if text in ("unknown", "unavailable"):  # a sensor of Home Assistant that is offline
             raise ValueError(f"{name} is {text}") from None
         raise ValueError(f"{name} is no number") from None
     if not column.low <= value <= column.high or math.isinf(value):
@@ -275,7 +273,7 @@ def _number(name: str, text: str, column: Value) -> float:
     return value
 
 
-# Rows of many tags have the same moment, one behind the other.
+# Cached: rows of many tags have the same moment, one after the other.
 @lru_cache(maxsize=256)
 def _moment_ns(text: str, zone: ZoneInfo | None) -> int:
     seconds = seconds_of(text, zone)
@@ -353,9 +351,10 @@ def _run(options: argparse.Namespace, path: Path) -> int:
 
 
 def in_order(found: Iterator[Found], summary: Summary) -> Iterator[Merged]:
-    """The scans by their stamps; rows of one tag and moment are one, of each sensor its first.
+    """The scans in the order of stamps; rows of one tag and moment become one scan.
 
-    Exports have one sensor behind the other; there may be more than the memory holds.
+    Of several values of a sensor, the first counts. Sorted on disk: exports have one sensor after
+    the other, and may be larger than the memory.
     """
     ids: dict[tuple[str, ...], int] = {}
     with closing(sqlite3.connect("", isolation_level=None)) as disk:
@@ -384,7 +383,7 @@ def in_order(found: Iterator[Found], summary: Summary) -> Iterator[Merged]:
 
 
 def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, int]:
-    """Write them where each belongs, batch by batch; how many are new, and how many were known."""
+    """Write the scans into their runs, in batches; returns how many are new, and were known."""
     path.parent.mkdir(parents=True, exist_ok=True)
     new = count = 0
     with (

@@ -1,6 +1,6 @@
-"""`lupin-twin journal`: what is in a journal, is it whole, its rows, a copy, less of it.
+"""`lupin-twin journal`: inspects, checks, exports, backs up and shrinks a journal.
 
-Everything but `forget` and `vacuum` reads, also while a twin writes.
+All actions but `forget` and `vacuum` only read, also while a twin writes.
 """
 
 from __future__ import annotations
@@ -170,7 +170,7 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
 def path_of(
     options: argparse.Namespace, environ: Mapping[str, str], *, may_be_new: bool = False
 ) -> Path:
-    """The journal that the options name; with `may_be_new`, one that is to be made too.
+    """The journal that the options name; with `may_be_new`, also one that does not exist yet.
 
     Raises:
         CommandError: there is none.
@@ -221,7 +221,7 @@ def _reader(path: Path) -> sqlite3.Connection:
     try:
         connection = open_named(path)
     except sqlite3.OperationalError:
-        # SQLite wants to write beside a file that it reads. Where nobody can, nobody writes it.
+        # SQLite has to write beside a file that it reads. Where we cannot, nobody writes the file.
         if path.with_name(path.name + "-wal").exists() or holder_of(path) is not None:
             raise
         connection = open_named(path, is_still=True)
@@ -346,7 +346,7 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
     if target.suffix != SUFFIX:
         raise CommandError(f"{target} does not end in {SUFFIX}: that is how its form is known")
     try:
-        # Here, where it is needed: it knows ROS.
+        # Imported only where it is needed: it needs ROS.
         from lupin_bridge.bags.journal_export import export  # noqa: PLC0415
 
         with closing(_reader(path)) as connection:
@@ -421,6 +421,6 @@ def iso(stamp_ns: int) -> str:
 
 
 def fail(message: str) -> int:
-    """One line of what is wrong; returns the exit code."""
+    """Print one line on what is wrong; returns the exit code."""
     say(message)
     return FAILED

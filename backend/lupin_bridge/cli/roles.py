@@ -1,6 +1,6 @@
-"""What `serve`, `demo`, `web` and `fleet` run: a source, a bridge and a server around one loop.
+"""Runs `serve`, `demo`, `web` and `fleet`: a source, a bridge and a server on one event loop.
 
-What the demo has and no robot needs: who feeds its twin, a journal of its own, and a past.
+A demo also needs what feeds its twin, a journal of its own, and a past.
 """
 
 from __future__ import annotations
@@ -55,16 +55,16 @@ log = logging.getLogger(__name__)
 
 # How long the patrol's day takes at its usual speed, s: the sun goes 60 times as fast.
 DAY_S: Final = 86_400.0 / 60.0
-# Mostly it takes two, and on a busy machine many more.
+# Time to fill in a past, which usually takes two seconds, and many more on a busy machine.
 _TIMEOUT_S: Final = 30.0
 
 
 @dataclass(frozen=True, slots=True)
 class Feed:
-    """Who feeds a demo's twin: a module to run with its arguments, in a process of its own.
+    """What feeds a demo's twin: a module and its arguments, run in a process of its own.
 
     `twin_args` are arguments of ROS for the twin alone, and `world` is what it then observes.
-    `journal` is the file that a past of such a patrol is to be filled into, None where none is.
+    `journal` is the file to fill with a past of this patrol; None: there is none to fill.
     """
 
     what: str
@@ -78,11 +78,11 @@ class Feed:
 def patrolled(
     environ: Mapping[str, str], patrol_args: Sequence[str], ros_args: Sequence[str]
 ) -> Feed:
-    """Feed it by the simulated patrol.
+    """Feed the twin by the simulated patrol.
 
-    Its journal is apart from a real twin's, and seeds from each other; whatever is given after our
-    own arguments of ROS counts instead. A past is filled into that journal, and into no other: a
-    file of parameters may name another one, and is not looked at here.
+    Each seed has a journal of its own, apart from a real twin's. The operator's arguments of ROS
+    come after ours, and take precedence. A past is filled only into that journal: a parameter file
+    may name another one, and is not read here.
     """
     try:
         path = demo_journal_path(environ, int(_option("seed", patrol_args) or 0))
@@ -104,10 +104,10 @@ def patrolled(
 def recorded(
     files: Sequence[str], play_args: Sequence[str], ros_args: Sequence[str], folder: Path
 ) -> Feed:
-    """Feed it by a recording, which `lupin_bridge.bags.player` plays with these options.
+    """Feed the twin by a recording, which `lupin_bridge.bags.player` plays with these options.
 
-    Its journal is in `folder`, and of this recording alone. The twin subscribes to the topics as
-    they were recorded, and at the end the time stands.
+    Its journal is in `folder`, for this recording alone. The twin subscribes to the topics as they
+    were recorded. At the end, time stands still.
 
     Raises:
         lupin_bridge.bags.recording.RecordingError: it cannot be played.
@@ -131,11 +131,10 @@ def recorded(
 
 
 def with_past(feed: Feed) -> Feed:
-    """Fill its journal if that is empty; else have the patrol go on with the time of day.
+    """Fill the feed's journal if it is empty; else have the patrol go on at the right time of day.
 
-    A demo that is started again would begin a second morning otherwise, and what comes daily in
-    its journal would fit no day at all. Whatever hinders it is logged, and the demo goes on
-    without.
+    Otherwise, a demo that is started again would begin a second morning, and the daily course in
+    its journal would fit no day. Errors are logged, and the demo goes on without a past.
     """
     path, past = feed.journal, None
     if path is None:
@@ -171,8 +170,8 @@ def with_past(feed: Feed) -> Feed:
 def since_morning_s(past_ns: int, patrol_args: Sequence[str], now_ns: int) -> float:
     """Patrol seconds from the last nine o'clock to now.
 
-    The filled in past ended at nine, at `past_ns`, and days have gone on since, as long as they are
-    now.
+    The past that was filled in ended at nine o'clock, at `past_ns`. Since then, days have gone on,
+    as long as they are now.
     """
     return (now_ns - past_ns) / 1e9 * _speed(patrol_args) % DAY_S
 
@@ -206,11 +205,11 @@ def run(
     """Run a role until a signal ends it.
 
     `patrol_args` are the options of the patrol, in the role `demo`; it gets `ros_args` too, so that
-    a namespace or a remapping holds for both. With `recording`, its files, and
-    `play_args`, the player's options, that takes the patrol's place.
+    a namespace or a remapping holds for both. With `recording` (its files) and `play_args` (the
+    player's options), the player takes the patrol's place.
 
     Raises:
-        SettingError: a setting, a parameter or an argument of ROS with which it cannot run.
+        SettingError: a setting, a parameter or an argument of ROS is invalid.
 
     """
     with ExitStack() as ending:
@@ -230,7 +229,7 @@ def _open_listener(settings: Settings, access: Access) -> socket.socket:
     """Listen, and warn of who may read.
 
     Raises:
-        SettingError: it cannot listen there, or the certificate cannot be.
+        SettingError: it cannot listen there, or the certificate is invalid.
 
     """
     if settings.tls_cert:
@@ -342,7 +341,7 @@ class Feeder:
         self._watch = asyncio.create_task(self._report_end())
 
     async def stop(self) -> None:
-        """Ask it to end, and wait for that; kill it if that does not come."""
+        """Ask the process to end, and wait; kill it if it does not end in time."""
         self._process.terminate()
         try:
             await asyncio.wait_for(asyncio.shield(self._watch), FEEDER_STOP_S)
@@ -352,7 +351,7 @@ class Feeder:
 
     async def _report_end(self) -> None:
         code = await asyncio.to_thread(self._process.wait)
-        # At Ctrl-C a terminal signals both: on the loop, ours is known by now.
+        # At Ctrl-C a terminal signals both processes: by now, the loop knows of our signal.
         if not self._is_stopping():
             log.error(
                 "the %s has ended with code %d; the twin goes on without it", self._what, code
@@ -361,7 +360,7 @@ class Feeder:
 
 # --- the page over all greenhouses, until a signal ends it ----------------------------------------
 
-# Of the twin's own: a fleet has none.
+# Settings of a twin, which a fleet does not have.
 _NOT_HERE = ("site", "journal", "mqtt_url", "webhook_url", "http_observations")
 
 
@@ -369,10 +368,10 @@ def run_fleet(settings: Settings, secrets: Secrets, ros_args: Sequence[str]) -> 
     """Serve until a signal ends it.
 
     Raises:
-        SettingError: a setting with which it cannot run.
+        SettingError: a setting is missing or invalid.
 
     """
-    # What is wrong is said once, here.
+    # Errors are reported once, here.
     logging.getLogger("psycopg").setLevel(logging.CRITICAL)
     if ros_args:
         raise SettingError("fleet takes no arguments of ROS")
@@ -396,7 +395,7 @@ async def _run_fleet(
     listener = _open_listener(settings, access)
     await asyncio.to_thread(_report_error, settings.archive_url)
     settings = replace(settings, max_clients=allow_connections(settings.max_clients))
-    # For the process that reads; not on its command line, which others can read.
+    # For the processes that read; not on their command line, which others can read.
     os.environ[variable("archive_url")] = settings.archive_url
     supervisor = Supervisor(os.environ)
     limits = Limits()
@@ -412,7 +411,7 @@ async def _run_fleet(
 
 
 def _report_error(url: str) -> None:
-    """At once, in one line; it may pass, so the page is served all the same, and says so."""
+    """Log at once if the archive cannot be read; that may pass, so the page is served anyway."""
     try:
         with closing(open_archive(url)):
             pass

@@ -1,4 +1,4 @@
-"""The source of `serve`: a twin in this process, in a thread of its own; its past in another."""
+"""The source of `serve`: a twin in a thread of this process; another process reads its past."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class LocalTwin(RosSource[TwinNode]):
         self._world = world
         # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
         self.identity = uuid.uuid4().hex[:12]
-        # The first comes before the start is over.
+        # Never None once started: the first one comes before `start` returns.
         self.update: TwinUpdate
 
     async def start(
@@ -76,20 +76,20 @@ class LocalTwin(RosSource[TwinNode]):
         return self.update.journal
 
     async def estimate_report(self, request: ReportRequest) -> Report:
-        """What the node makes of its log."""
+        """The report that the node makes of its log."""
         return await self._in_time(self._result(lambda node: node.estimates.report(request)))
 
     writes_notes = True
 
     async def write_note(self, note: Note) -> Note:
-        """Through the node's journal, whose thread writes it."""
+        """See `TwinSource`: the thread of the node's journal writes it."""
         return await self._in_time(self._result(lambda node: node.memory.journal.write_note(note)))
 
     async def _result(self, begin: Callable[[TwinNode], Future[ResultT]]) -> ResultT:
         return await asyncio.wrap_future(await self.thread.call(begin))
 
     async def now(self) -> Now:
-        """What who looks back has to know of now."""
+        """See `TwinSource`."""
         update = self.update
         return Now(now_ns_of(update), update.snapshot.frame_id, update.journal)
 

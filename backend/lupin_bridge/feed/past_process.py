@@ -1,7 +1,7 @@
-"""The parent's end of the process that reads the past (`query.Child`): started, asked, ended.
+"""The parent's end of the process that reads the past (`query.Child`): starts, queries, ends it.
 
-Belongs to the event loop. A process that dies is logged, its questions are answered with that, and
-the next one is started for the first question after a rest.
+Belongs to the event loop. If the process dies, that is logged, and its pending queries fail. The
+first query after a pause starts the next process.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from lupin_twin.field.explored import OccupancyMap
 
 log = logging.getLogger(__name__)
 
-# Questions under way.
+# Queries under way at most.
 MAX_PENDING: Final = 100
-# For so long after a death none is started.
+# Pause after the death of a process, s.
 REST_S: Final = 2.0
 
 AnswerT = TypeVar("AnswerT")
-# Imported and not run as a module: what is pickled here is of that name there too.
+# Imported, not run as `__main__`: pickled names must be the same in both processes.
 _CHILD: Final = "lupin_bridge.feed.query"
 
 
 class PastProcess:
-    """A process that answers questions until `stop`; it begins with the first one.
+    """A process that answers queries about the past, from the first query until `stop`.
 
-    It imports what each kind of question needs when one comes. `child` is the module whose `main`
-    it runs.
+    It imports what a kind of query needs when the first one comes. `child` is the module whose
+    `main` it runs.
     """
 
     def __init__(self, child: str = _CHILD) -> None:
@@ -48,24 +48,24 @@ class PastProcess:
         self.asked: dict[int, asyncio.Future[Any]] = {}
         self.why_down = ""
         self._numbers = itertools.count(1)
-        # Where questions go; until the process is there, they are kept for it.
+        # The process's standard input; until it runs, queries wait in `_unsent`.
         self._queries: asyncio.StreamWriter | None = None
         self._unsent: dict[int, tuple[bytes, OccupancyMap | None]] = {}
         self._sent_map: OccupancyMap | None = None
         self._life: asyncio.Task[None] | None = None
 
     async def stop(self) -> None:
-        """End it; what is being asked has no answer."""
+        """End the process; pending queries fail."""
         self.why_down = "the process that reads the past is ending"
         await end(self._life)
         self._refuse_all()
 
     async def ask(self, question: PastQuery[AnswerT], now: Now, cost_s: float) -> AnswerT:
-        """The answer; `cost_s` estimates all that it takes, s of one core.
+        """Answer a query; `cost_s` is its estimated cost, s of one core.
 
         Raises:
-            NotRemembered: it has died, or too much is asked.
-            Exception: whatever was met there.
+            NotRemembered: the process has died, or too many queries are under way.
+            Exception: whatever the query raised there.
 
         """
         if self.why_down:
@@ -108,12 +108,12 @@ class PastProcess:
     # --- its life -------------------------------------------------------------------------------
 
     async def _live(self) -> None:
-        """Start it and wait for its end; then have the next one started."""
+        """Run one process until it ends; after a pause, the next query starts another one."""
         try:
             ended = await self._until_it_ends()
         except OSError as error:
             ended = f"cannot be started: {error}"
-        except Exception as error:  # or nobody would ever be answered again
+        except Exception as error:  # or no query would ever be answered again
             log.exception("the process that reads the past met an error here")
             ended = f"met an error: {error}"
         log.error("the process that reads the past %s", ended)
@@ -142,7 +142,7 @@ class PastProcess:
             return _exit_text(await process.wait())
         finally:
             self.pid = self._queries = None
-            # Not by `process.kill`: of one that has just ended, that takes the exit code from
+            # Not by `process.kill`: if the process has just ended, that takes the exit code from
             # asyncio, which waits for it.
             with contextlib.suppress(ProcessLookupError):
                 if process.returncode is None:
@@ -161,7 +161,7 @@ class PastProcess:
 
 
 class _Packer(pickle.Pickler):
-    """Pickles a question, but for its map, which may be large: `map` is sent once."""
+    """Pickles a query without its map, which may be large: `map` is sent once."""
 
     def __init__(self) -> None:
         self.file = io.BytesIO()
@@ -169,7 +169,7 @@ class _Packer(pickle.Pickler):
         self.map: OccupancyMap | None = None
 
     def persistent_id(self, value: Any) -> str | None:
-        """What stands for a map."""
+        """The placeholder of a map; None: any other value is pickled."""
         if not isinstance(value, OccupancyMap):
             return None
         self.map = value
@@ -179,6 +179,6 @@ class _Packer(pickle.Pickler):
 def _exit_text(code: int) -> str:
     if code >= 0:
         return f"ended with code {code}"
-    # Those for real-time uses have no names.
+    # Real-time signals have no names.
     known = {number.value: number.name for number in signal.Signals}
     return f"was killed by {known.get(-code, f'signal {-code}')}"

@@ -1,8 +1,8 @@
-"""Questions about the past as values, so that another process may answer them.
+"""Queries about the past as picklable values, and the child process that answers them.
 
-That reads the journal, makes answers, and ends with its parent. Questions come in on standard
-input, and their answers go out on standard output, finished: whatever they take, they take no turn
-of the parent's interpreter. It loads no ROS.
+The child reads the journal, and ends with its parent. It reads queries on standard input, and
+writes complete answers to standard output, so they never hold the parent's interpreter lock. It
+loads no ROS.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ from lupin_twin.runtime.workers import ShouldStop
 
 ResultT = TypeVar("ResultT")
 
-# A moment, ns of ROS time, which `Snapshot` answers; a series, which `SeriesPast` does; what was
-# recent at a moment, or scanned up to one, which a tuple of `PastWrite` does; what was received, or
-# observed in a period, which `PastWrites` does; what people said, which `PastNotes` does; a tag's
-# last scans, which a `History` does; or what reads the log by itself, such as an export.
+# What a query needs of the log, and the type of the result. A moment, ns of ROS time: `Snapshot`; a
+# series: `SeriesPast`; what was recent at a moment, or scanned up to it: a tuple of `PastWrite`;
+# what was received, or observed in a period: `PastWrites`; notes: `PastNotes`; a tag's last scans:
+# `History`; or a function that reads the log by itself, such as an export's step.
 Need = (
     int
     | SeriesRequest
@@ -59,16 +59,16 @@ Need = (
     | LatestRequest
     | Callable[[sqlite3.Connection], Any]
 )
-# Looks up what is needed of the log, as of one moment of its writing.
+# Looks up a need in the log; all needs of a query see the same state of the log.
 Find = Callable[[Need], Any]
-# What makes the answer of what is found; it ends early where `should_stop` says that nobody waits
-# for it. Both can be pickled.
+# Makes an answer of what is found. It ends early if `should_stop` says that nobody waits for it.
+# Queries and answers can be pickled.
 PastQuery = Callable[[Find, ShouldStop], ResultT]
 
 
 @dataclass(frozen=True, slots=True)
 class Now:
-    """What a question is about: ROS time, ns; the frame of poses; and how the journal is."""
+    """What a query refers to: ROS time, ns; the frame of poses; and the journal's condition."""
 
     stamp_ns: int
     frame_id: str
@@ -76,7 +76,7 @@ class Now:
 
 
 def as_found(need: Need, find: Find, _should_stop: ShouldStop) -> Any:
-    """A `PastQuery`: what was found, as it is."""
+    """A `PastQuery` that answers with what was found, unchanged."""
     return find(need)
 
 
@@ -86,14 +86,14 @@ def export_step(
     find: Find,
     _should_stop: ShouldStop,
 ) -> tuple[Export | None, list[ResultT]]:
-    """A `PastQuery`: the next lots through `write`, and the export from there; None: its end."""
+    """A `PastQuery`: the rest of the export (None: complete), and the next lots by `write`."""
     rows: list[PastRow] | None = find(export.step)
     return (None, []) if rows is None else (export, [write(lot) for lot in lots(rows)])
 
 
 # --- the process that reads the past --------------------------------------------------------------
 
-# Before each answer: its number, and how long its pickle is.
+# The header of each answer: its number, and the length of its pickle, bytes.
 HEAD: Final = struct.Struct(">QQ")
 # nice(2): beside a busy twin it gets a quarter of the core that they share.
 NICENESS: Final = 5
@@ -102,23 +102,23 @@ Search = Callable[[Any, ShouldStop], Any]
 
 
 class Child:
-    """Answers what comes in until that ends; `recall` is where the log is asked.
+    """Answers queries until its input ends; `recall` runs them on the log.
 
-    In come pairs of a number and: a question, pickled with its `Now` and its cost; None, nobody
-    waits for that answer any more; or the map that questions from here on mean.
+    The input is pairs of a number and one of these: a query, pickled with its `Now` and its cost;
+    None, which cancels the query of that number; or the map that later queries refer to.
     """
 
     def __init__(self, recall: type[Recall] = Recall) -> None:
         self._condition = UNKNOWN_JOURNAL
         self._recall = recall(lambda: self._condition)
         self._running: dict[int, Future[Any]] = {}
-        # Of its type nothing is imported before one comes.
+        # Untyped: the module of its type is not imported before a map comes.
         self._map: Any = None
         self._sending = threading.Lock()
         self._out: IO[bytes]
 
     def run(self, questions: IO[bytes], answers: IO[bytes]) -> None:
-        """Take questions until the parent is gone."""
+        """Take queries until the parent is gone."""
         self._out = answers
         while True:
             try:
@@ -147,7 +147,7 @@ class Child:
     def _search(self, question: PastQuery[Any], now: Now) -> Search:
         def search(log: sqlite3.Connection, should_stop: ShouldStop) -> Any:
             def find(need: Any) -> Any:
-                if should_stop():  # as a statement ends that is interrupted
+                if should_stop():  # as SQLite ends an interrupted statement
                     raise sqlite3.OperationalError("interrupted")
                 return _found(need, now, log)
 
@@ -158,20 +158,20 @@ class Child:
     # --- in a worker's thread -------------------------------------------------------------------
 
     def _reply(self, number: int, done: Future[Any]) -> None:
-        if self._running.pop(number, None) is not None:  # or nobody waits
+        if self._running.pop(number, None) is not None:  # else nobody waits
             error = done.exception()
             self._send(number, error is not None, error or done.result())
 
     def _send(self, number: int, is_error: bool, value: Any) -> None:
         answer = pickle.dumps((is_error, _portable(value) if is_error else value), 5)
-        # Whoever sends waits until the parent has taken it: so much is kept for it, and no more.
+        # A sender waits until the parent has taken its answer, which bounds the memory for answers.
         with self._sending:
             self._out.writelines((HEAD.pack(number, len(answer)), answer))
             self._out.flush()
 
 
 class _Unpickler(pickle.Unpickler):
-    """Reads a question, of which the map was sent before (see `past_process`)."""
+    """Unpickles a query, whose map was sent before it (see `past_process`)."""
 
     def __init__(self, message: bytes, occupancy_map: Any) -> None:
         super().__init__(io.BytesIO(message))
@@ -206,11 +206,11 @@ def _found(need: Any, now: Now, log: sqlite3.Connection) -> Any:
 
 
 def _portable(error: BaseException) -> BaseException:
-    """An error as it can cross, with its trace as a note."""
+    """The error, or a `RuntimeError` if it cannot be pickled, with its traceback as a note."""
     portable = error
     try:
         pickle.loads(pickle.dumps(error))  # noqa: S301  # our own
-    except Exception:  # noqa: BLE001  # there are those that cannot be made again
+    except Exception:  # noqa: BLE001  # some cannot be unpickled
         portable = RuntimeError(repr(error))
     trace = "".join(traceback.format_exception(error))
     portable.add_note(f"in the process that reads the past:\n{trace}")
@@ -218,17 +218,17 @@ def _portable(error: BaseException) -> BaseException:
 
 
 def main(child: Callable[[], Child] = Child) -> None:
-    """Answer the parent until it ends, however that is."""
-    # Ctrl-C and a service manager's signal to all are the parent's to act on.
+    """Answer the parent until it ends, for whatever reason."""
+    # Only the parent acts on Ctrl-C and on a service manager's signal to all processes.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     os.nice(NICENESS)
     gc.freeze()
-    # Whatever is printed here is no answer.
+    # Standard output carries answers only: what is printed goes to standard error.
     with os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)
         try:
             child().run(sys.stdin.buffer, answers)
         finally:
-            # At once: nobody waits for what is under way, and nothing here is to be put away.
+            # At once: nobody waits for queries under way, and there is nothing to clean up.
             os._exit(0)

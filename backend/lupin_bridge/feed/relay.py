@@ -1,22 +1,22 @@
-"""ROS topics as they are on the wire, for whoever in the bridge asks for one: raw CDR, on demand.
+"""Relays ROS topics as raw CDR to listeners in the bridge, on demand; has message definitions too.
 
     close = await source.relay.listen(topic, on_sample)
     ...
     close()
 
-`topic` is one of `topics_of(source.names)`, or a `Topic` of one's own, its name from the root on.
-`on_sample(sample)` is called on the event loop for each sample, and must not wait. Of a latched
-topic the newest ones come first. One `Topic` is one subscription, however many listen; it ends some
-seconds after the last of them has closed, so that who comes and goes makes no work in the ROS
-thread. While nobody listens there is none.
+`topic` is one of `topics_of(source.names)`, or another `Topic` with an absolute name.
+`on_sample(sample)` is called on the event loop for each sample, and must not block. A new listener
+of a latched topic first gets its newest samples. All listeners of a `Topic` share one subscription.
+It ends some seconds after the last of them has closed, so that listeners that come and go make no
+work in the ROS thread.
 
-The ROS thread hands over bytes and does nothing else with them. Of what the loop has not taken yet,
-as of what is kept for who listens later, the oldest give way to the newest. A sample that is larger
-than the topic's bytes is left out, and counted.
+The ROS thread hands over bytes and does nothing else with them. Samples that wait for the loop, and
+those cached for later listeners, are bounded: the oldest are dropped. A sample larger than the
+topic's limit is dropped, and counted.
 
-The definition of a message type, with all that it is made of, as bags and viewers want it. From the
-`.msg` files that every message package installs, wherever ROS is installed. The form is that of the
-schema encoding `ros2msg` (https://mcap.dev/spec/registry#ros2msg).
+`schema_text` gives the definition of a message type with all its parts, for bags and viewers. It
+reads the `.msg` files that every message package installs with ROS. The format is the schema
+encoding `ros2msg` (https://mcap.dev/spec/registry#ros2msg).
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def absolute(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class TwinNames:
-    """From the root on and after remapping; `field_layers` is what those of fields begin with."""
+    """A twin's names, absolute and remapped; topics of field layers begin with `field_layers`."""
 
     state_topic: str
     field_service: str
@@ -61,7 +61,7 @@ class TwinNames:
 
 
 def topics_of(names: TwinNames) -> tuple[Topic, ...]:
-    """A twin's state, what it listens to, and what it says of itself."""
+    """A twin's topics: its state, its inputs and its diagnostics."""
     return (
         replace(interfaces.STATE, name=names.state_topic),
         replace(interfaces.OBSERVATIONS, name=names.observations_topic),
@@ -71,7 +71,7 @@ def topics_of(names: TwinNames) -> tuple[Topic, ...]:
     )
 
 
-# How long, s, a topic that nobody listens to any more is still relayed.
+# How long a topic is still relayed after its last listener has left, s.
 LINGER_S: Final = 5.0
 
 
@@ -81,7 +81,7 @@ class NotRelayedError(RuntimeError):
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A message as CDR, with the four bytes that say how; `stamp_ns` is ROS time as it came."""
+    """A message as CDR, with its 4-byte header; `stamp_ns` is the ROS time of its receipt."""
 
     data: bytes
     stamp_ns: int
@@ -89,7 +89,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class RosTime:
-    """A moment; `is_simulated`: by `/clock`, and 0 while that has told none."""
+    """ROS time, ns; `is_simulated`: it follows `/clock`, and is 0 until that publishes."""
 
     now_ns: int
     is_simulated: bool
@@ -107,7 +107,7 @@ class Bounded:
         return len(self.samples)
 
     def put(self, sample: Sample) -> int:
-        """Take a sample; returns how many others gave way to it."""
+        """Add a sample; returns how many old ones were dropped for it."""
         self.samples.append(sample)
         self._bytes += len(sample.data)
         given_way = 0
@@ -117,25 +117,25 @@ class Bounded:
         return given_way
 
     def take(self) -> Sample:
-        """Take the oldest out."""
+        """Remove and return the oldest sample."""
         sample = self.samples.popleft()
         self._bytes -= len(sample.data)
         return sample
 
 
 class _Relayed:
-    """One topic: what has come of it, and who listens."""
+    """One relayed topic: its samples and its listeners."""
 
     def __init__(self, topic: Topic) -> None:
         self.topic = topic
-        # What the ROS thread has put there, and the loop has not taken.
+        # Samples from the ROS thread that the loop has not taken yet.
         self.incoming: deque[Sample] = deque(maxlen=topic.depth)
         self.latched = Bounded(topic)
         self.opening: asyncio.Task[Callable[[], None]]
         self.listeners: list[Callable[[Sample], None]] = []
 
     def hand_out(self) -> None:
-        """Give all that has come to all who listen."""
+        """Pass all new samples to all listeners."""
         while self.incoming:
             sample = self.incoming.popleft()
             if self.topic.is_latched:
@@ -145,17 +145,17 @@ class _Relayed:
 
 
 class Relay:
-    """All topics that are listened to. Belongs to the event loop.
+    """All relayed topics. Belongs to the event loop.
 
-    `thread()` is the `RosThread`, asked for with the first topic: it need not run before. `ros` is
-    `ros_source.RelayRos`: what ROS does for the relay, in its thread.
+    `thread()` returns the `RosThread`; it is first called for the first topic, so the thread may
+    start later. `ros` is `ros_source.RelayRos`: the relay's calls to rclpy, made in that thread.
     """
 
     def __init__(self, thread: Callable[[], Any], ros: Any) -> None:
         self._thread = thread
         self._ros = ros
         self.linger_s = LINGER_S
-        # Samples that were too large, or gave way before the loop had taken them.
+        # Samples that were too large, or dropped before the loop had taken them.
         self.skipped = 0
         self._topics: dict[Topic, _Relayed] = {}
         self._closing: set[asyncio.Task[None]] = set()
@@ -165,10 +165,10 @@ class Relay:
         return len(self._topics)
 
     async def listen(self, topic: Topic, on_sample: Callable[[Sample], None]) -> Callable[[], None]:
-        """Listen to a topic, whoever publishes it; returns what ends that, however often called.
+        """Listen to a topic, whoever publishes it; returns a function that ends this, idempotent.
 
         Raises:
-            NotRelayedError: its type is not installed here, or ROS takes no such name.
+            NotRelayedError: its type is not installed here, or its name is invalid.
             TwinUnavailableError: the ROS thread has ended.
 
         """
@@ -182,18 +182,18 @@ class Relay:
         close = partial(self._leave, relayed, on_sample)
         with ExitStack() as undo:
             undo.callback(close)
-            # Not ended with who asked first: others may wait for it by now.
+            # Shielded from the first listener's cancellation: others may wait for it by now.
             await asyncio.shield(relayed.opening)
             undo.pop_all()
         return close
 
     def renew(self) -> None:
-        """Subscribe to all topics again: there is another node."""
+        """Subscribe to all topics again, on a new node."""
         for relayed in self._topics.values():
             self._open(relayed)
 
     async def published(self, is_wanted: Callable[[str, str], bool]) -> Mapping[str, str]:
-        """Topics that somebody publishes now, and their types; `is_wanted(name, type)` takes them.
+        """The topics that have a publisher now, with their types; `is_wanted(name, type)` filters.
 
         Raises:
             TwinUnavailableError: the ROS thread has ended.
@@ -215,10 +215,10 @@ class Relay:
         return now
 
     def read(self, topic: Topic, sample: Sample) -> Any:
-        """The ROS message of a sample; for a worker's thread, a map takes its time.
+        """The ROS message of a sample. Call it on a worker: a map takes a while.
 
         Raises:
-            ValueError: none of the topic's type, or one that is too large.
+            ValueError: not a message of the topic's type, or too large.
 
         """
         return self._ros.read(topic, sample.data)
@@ -246,7 +246,7 @@ class Relay:
         return close
 
     def _opened(self, relayed: _Relayed, task: asyncio.Task[Callable[[], None]]) -> None:
-        # Looked at here, should all who waited have left.
+        # Retrieve the exception, in case all listeners have left.
         if task.cancelled() or task.exception() is not None:
             self._forget(relayed)
 
@@ -273,11 +273,11 @@ class Relay:
             close = await relayed.opening
             await self._thread().call(lambda _: close())
         except Exception as error:  # noqa: BLE001  # nobody waits for this task
-            # As a rule the thread has ended, and all with it.
+            # Usually the thread has ended, and its subscriptions with it.
             log.info("%s was not unsubscribed: %r", relayed.topic.name, error)
 
 
-# --- the definition of a message type, with all that it is made of, as bags and viewers want it ---
+# --- definitions of message types, for bags and viewers -------------------------------------------
 
 ENCODING: Final = "ros2msg"
 _RULE: Final = "=" * 80
@@ -294,13 +294,13 @@ _PRIMITIVES: Final = frozenset(
 
 
 def schema_text(type_name: str, environ: Mapping[str, str] = os.environ) -> str:
-    """The text of `package/msg/Name` and, each once, of all types that it is made of.
+    """The definition of `package/msg/Name`, followed by all types that it contains, each once.
 
-    Looked for as ROS does: in the prefixes of AMENT_PREFIX_PATH, then in Python's own, where the
-    wheels of ROS put it.
+    It is searched as ROS does: in the prefixes of AMENT_PREFIX_PATH, then in Python's own, where
+    the ROS wheels install it.
 
     Raises:
-        LookupError: it, or a type that it is made of, is not installed, or it is no such name.
+        LookupError: no such name, or it or a type that it contains is not installed.
 
     """
     prefixes = [prefix for prefix in environ.get("AMENT_PREFIX_PATH", "").split(":") if prefix]
@@ -317,7 +317,7 @@ def _schema_text(type_name: str, prefixes: tuple[str, ...]) -> str:
             texts[name] = _definition(name, needed_by, prefixes)
             wanted += [(part, f", a part of {name},") for part in _parts(texts[name], name)]
     own, *others = texts
-    # A part is known by `package/Name` there, without the `msg`.
+    # The encoding calls a part `package/Name`, without the `msg`.
     return "\n".join(
         (
             texts[own],
@@ -343,7 +343,7 @@ def _definition(type_name: str, needed_by: str, prefixes: tuple[str, ...]) -> st
 
 
 def _parts(text: str, type_name: str) -> list[str]:
-    """The message types that the fields of a definition have, in their order."""
+    """The message types of a definition's fields, in their order."""
     package = type_name.partition("/")[0]
     found = []
     for line in text.splitlines():

@@ -1,8 +1,8 @@
-"""What both sources over ROS have in common: a node in a thread, and what the relay needs.
+"""`RosSource`, the base of both sources over ROS; also the robot's topics and the relay's ROS side.
 
-The robot's layer: the newest message of each of its topics, when asked for. No executor waits for
-these subscriptions. DDS keeps the newest message, and whoever asks takes it: so localisation that
-publishes a hundred times a second costs the ROS thread one message a second.
+The robot's topics are polled, not waited for by the executor: DDS keeps the newest message of each
+until it is taken. So localisation that publishes a hundred times a second costs the ROS thread one
+message a second.
 """
 
 from __future__ import annotations
@@ -50,19 +50,19 @@ from lupin_twin.ros.base_node import latched, qos_of, read_message
 from lupin_twin.ros.message_limits import MessageShape
 from lupin_twin.runtime.workers import Workers
 
-# A way of 250 m by Nav2's planners; of more, reading it would take too long.
+# Poses of a plan at most: 250 m by Nav2's planners. Reading more would take too long.
 MAX_POSES: Final = 5_000
-# What is shown of it: a frame holds it whole.
+# Points of a plan that are shown at most: each frame holds all of them.
 SHOWN_POINTS: Final = 60
 
-# CDR (OMG DDS-XTypes, 7.4): four bytes say how, numbers lie at multiples of their size behind them.
+# CDR (OMG DDS-XTypes, 7.4): a 4-byte header; then each number is aligned to its own size.
 _CDR_HEADER_BYTES: Final = 4
 # Three coordinates and a quaternion.
 _POSE_BYTES: Final = 56
 
 
 class _OnDemand(CallbackGroup):  # type: ignore[misc]  # rclpy is not typed
-    """Of subscriptions that nobody waits for."""
+    """The callback group of polled subscriptions, which no executor runs."""
 
     def can_execute(self, _entity: Any) -> bool:
         return False
@@ -76,7 +76,7 @@ class _OnDemand(CallbackGroup):  # type: ignore[misc]  # rclpy is not typed
 
 @dataclass(slots=True)
 class _ReceivedTopic:
-    """A topic, and how it is subscribed to: as it is published, once somebody does."""
+    """A topic and its subscription; `how` is its type and whether it is latched, as published."""
 
     name: str
     types: tuple[str, ...]
@@ -86,7 +86,7 @@ class _ReceivedTopic:
 
 
 class RobotTopics:
-    """The robot's topics as one node hears them; all of it on that node's thread."""
+    """The robot's topics as one node receives them. Use it on that node's thread only."""
 
     def __init__(self) -> None:
         self._group = _OnDemand()
@@ -97,9 +97,9 @@ class RobotTopics:
         )
 
     def look(self, node: Any, now_ns: int | None) -> Robot:
-        """What has come since the last look; `now_ns` is the twin's time, None: not known.
+        """What has come since the last call; `now_ns` is the twin's time; None: not known.
 
-        What cannot be used is dropped, with a warning, and counted as all that the node drops.
+        Unusable messages are dropped, with a warning, and counted among the node's drops.
         """
         return Robot(
             self._read(node, self._pose, _position, now_ns),
@@ -118,7 +118,7 @@ class RobotTopics:
         if message is None:
             return None
         value: ValueT | Drop | None = message if isinstance(message, Drop) else None
-        # Of a battery, the frame says where in the robot it is.
+        # A battery's frame is its place in the robot.
         if value is None and topic is not self._battery:
             value = ingest.wrong_frame(message.header.frame_id, node.parameters.frame_id)
         if value is None:
@@ -142,7 +142,7 @@ class RobotTopics:
         return read_message(taken[0], topic.shape, read)
 
     def _subscribe(self, node: Any, topic: _ReceivedTopic) -> None:
-        """Subscribe as the topic is published; again where that has changed."""
+        """Subscribe with the publishers' type and QoS, and again when these have changed."""
         try:
             found = node.get_publishers_info_by_topic(topic.name)
         except InvalidTopicNameException as error:
@@ -156,7 +156,7 @@ class RobotTopics:
                     f"{topic.name} is published as {found[0].topic_type}, and not used: "
                     f"expected {' or '.join(topic.types)}",
                 )
-            return  # what was subscribed to may come back
+            return  # the publisher of a subscribed topic may come back
         type_name = min((it.topic_type for it in usable), key=topic.types.index)
         how = (
             type_name,
@@ -189,20 +189,20 @@ class RobotTopics:
 
 @dataclass(frozen=True, slots=True)
 class _Path:
-    """nav_msgs/Path, of each pose its place on the floor alone."""
+    """nav_msgs/Path, reduced to the x and y of each pose, m."""
 
     header: Any
     points: list[tuple[float, float]]
 
 
 def _read_path(data: bytes, _: Any) -> _Path:
-    """Read it from its bytes: rclpy makes eight objects of each pose, 70 ms of work a thousand."""
+    """Parse the CDR itself: rclpy makes eight objects per pose, 70 ms for a thousand poses."""
     order = "<" if data[1] & 1 else ">"
     length_at, place_at = Struct(f"{order}I").unpack_from, Struct(f"{order}dd").unpack_from
     body = data[_CDR_HEADER_BYTES:]
 
     def behind_header(at: int) -> int:
-        # sec and nanosec, and the text of frame_id behind its length.
+        # sec and nanosec, then the length of frame_id and its text.
         return int(at + 12 + length_at(body, at + 8)[0])
 
     at = behind_header(0)
@@ -221,7 +221,7 @@ def _read_path(data: bytes, _: Any) -> _Path:
 
 
 def _stamp_ns(message: Any, now_ns: int | None) -> int | Drop:
-    """When it was said: by its header, or now."""
+    """A message's time, ns of ROS time: its header's stamp, at most now; now if that is 0."""
     stamp_ns = convert.nanoseconds(message.header.stamp)
     if now_ns is None:
         return stamp_ns
@@ -260,7 +260,7 @@ def _plan(_topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Plan | Drop:
 
 def _battery(_topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Battery | Drop | None:
     share = float(message.percentage)
-    if math.isnan(share):  # not measured, says the message's definition
+    if math.isnan(share):  # not measured, by the message's definition
         return None
     if not 0.0 <= share <= 1.0:
         return Drop(
@@ -270,12 +270,12 @@ def _battery(_topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Battery | D
 
 
 def _is_near(x: float, y: float) -> bool:
-    return abs(x) < FARTHEST_M and abs(y) < FARTHEST_M  # NaN is neither
+    return abs(x) < FARTHEST_M and abs(y) < FARTHEST_M  # false for NaN
 
 
 # --- the source -----------------------------------------------------------------------------------
 
-# Also made into messages here: the topics of `relay.topics_of`.
+# Types that are also deserialized here: those of the topics of `relay.topics_of`.
 _SHAPES: Final = {
     "lupin_msgs/msg/TwinState": message_limits.STATE,
     "lupin_msgs/msg/Observation": message_limits.OBSERVATION,
@@ -286,15 +286,15 @@ _SHAPES: Final = {
 
 
 class RelayRos:
-    """What rclpy does for the relay."""
+    """The relay's calls to rclpy."""
 
     def subscribe(
         self, node: Any, topic: Topic, take: Callable[[Sample], None]
     ) -> Callable[[], None]:
-        """Subscribe raw: nothing is made of the bytes in this thread. What is returned ends it.
+        """Subscribe raw, so that this thread deserializes nothing; returns what unsubscribes.
 
         Raises:
-            ValueError: the topic's type is not installed, or ROS takes no such topic.
+            ValueError: the topic's type is not installed, or its name is invalid.
 
         """
         clock = node.get_clock()
@@ -315,9 +315,9 @@ class RelayRos:
         return lambda: node.destroy_subscription(subscription)
 
     def published(self, node: Any, is_wanted: Callable[[str, str], bool]) -> Mapping[str, str]:
-        """Topics that somebody publishes as a type that is wanted, and that type.
+        """The topics that are published with a wanted type, and that type.
 
-        Whoever else uses the name with another type, or only listens to it, changes nothing.
+        Subscribers, and publishers of another type under the same name, do not matter.
         """
         return {
             name: type_name
@@ -328,15 +328,15 @@ class RelayRos:
         }
 
     def time(self, node: Any) -> RosTime:
-        """By the node's clock."""
+        """ROS time by the node's clock."""
         clock = node.get_clock()
         return RosTime(clock.now().nanoseconds, bool(clock.ros_time_is_active))
 
     def read(self, topic: Topic, data: bytes) -> Any:
-        """As the nodes read it, in any thread: lengths are checked before anything is made of it.
+        """Deserialize as the nodes do, in any thread; lengths are checked first.
 
         Raises:
-            ValueError: none of this type, or one that is too large.
+            ValueError: not a message of this type, or too large.
 
         """
         message = read_message(data, _SHAPES[topic.type_name])
@@ -346,7 +346,7 @@ class RelayRos:
 
 
 def names_of(node: Any) -> TwinNames:
-    """What a twin's topics and service are called, as a node of ours resolves them."""
+    """The names of a twin's topics and service, as our own node resolves them."""
     parameters = node.parameters
     resolve = node.resolve_topic_name
     return TwinNames(
@@ -367,7 +367,7 @@ Post = Callable[[TwinUpdate], None]
 
 
 class RosSource(TwinSource, Generic[NodeT]):
-    """A source with a node; who extends it says which."""
+    """A source with a ROS node; the subclass makes the node."""
 
     thread: RosThread[NodeT, TwinUpdate]
 
@@ -392,7 +392,7 @@ class RosSource(TwinSource, Generic[NodeT]):
             if before is None or update.made_s != before.made_s:
                 on_state(update)
 
-        # Both of the ROS thread alone; most bridges never publish an observation.
+        # Both are used in the ROS thread only; most bridges never publish an observation.
         self._robot_topics = RobotTopics()
         self._observations: Any = None
         self.thread = RosThread(
@@ -425,12 +425,12 @@ class RosSource(TwinSource, Generic[NodeT]):
         await self._in_time(self.thread.call(publish))
 
     async def robot(self, now_ns: int | None) -> Robot | None:
-        """From the robot's own topics, the newest message of each."""
+        """See `TwinSource`: the newest message of each of the robot's topics."""
         return await self.thread.call(lambda node: self._robot_topics.look(node, now_ns))
 
 
 def now_ns_of(update: TwinUpdate) -> int:
-    """ROS time now: an update may be a heartbeat old."""
+    """ROS time now, ns: the update's stamp plus its age, which may be a heartbeat."""
     snapshot = update.snapshot
     if snapshot.clock != "running":
         return snapshot.stamp_ns

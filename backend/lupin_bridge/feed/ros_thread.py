@@ -1,7 +1,7 @@
-"""The ROS thread and the only bridge between it and the event loop.
+"""The ROS thread, and the only crossing between it and the event loop.
 
-Towards the loop go the newest event (`post`) and the answers to calls; towards ROS go calls. Both
-directions wake the other side at once. Nothing here knows what the node does.
+The loop sends calls to the thread. The thread sends back their results, and the newest event
+(`post`). Both directions wake the other side at once. Nothing here knows what the node does.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from lupin_bridge.settings import SettingError
 from lupin_twin.ros.base_node import end_spinning, spin_until_shutdown
 from lupin_twin.runtime.process import remove_stale_shared_memory
 
-# rcl would write lines of its own to standard error, between those that a log collector reads. Its
-# log file and `/rosout` stay as they are.
+# Keeps rcl from writing its own lines to standard error, which a log collector reads. Its log file
+# and `/rosout` stay as they are.
 QUIET: Final = ("--ros-args", "--disable-stdout-logs")
 
 
 @cache
 def forward() -> None:
-    """From now on, hand on what rclpy's loggers log: the place that all of it passes, filtered."""
+    """From now on, pass all that rclpy's loggers log, after ROS has filtered it, to `logging`."""
     write = rclpy_implementation.rclpy_logging_rcutils_log
 
     def write_and_hand_on(severity: Any, name: str, message: str, *place: Any) -> None:
         write(severity, name, message, *place)
         function, file, line = place
-        # ROS's severities are Python's numbers, and ROS has decided already that it is to be told.
+        # ROS uses Python's numbers for severities, and has already filtered by them.
         record = logging.LogRecord(
             name, int(severity), file, line, "%s", (message,), None, function
         )
@@ -50,14 +50,14 @@ def forward() -> None:
 log = logging.getLogger(__name__)
 
 # A stop waits this long for the ROS thread. A callback that computes a huge field takes longer
-# and cannot be interrupted: it is left behind, and the process ends without it (`leave`).
+# and cannot be interrupted: the thread is left behind, and the process ends without it.
 STOP_TIMEOUT_S = 0.9
-# How long after one heartbeat came back the next one is sent.
+# Pause between the return of a heartbeat and the next one.
 BEAT_PERIOD_S = 1.0
 _NOT_RUNNING: Final = "the ROS thread is not running"
 
 
-# With `utilities` (`NodeUtilities`) and `parameters` (`TwinParameters`).
+# A node with `utilities` (`NodeUtilities`) and `parameters` (`TwinParameters`).
 NodeT = TypeVar("NodeT", bound=Node)
 EventT = TypeVar("EventT")
 ResultT = TypeVar("ResultT")
@@ -67,8 +67,8 @@ class RosThread(Generic[NodeT, EventT]):
     """Runs one node in one thread of its own.
 
     `make_node(context, post)` is called in the thread; the node calls `post(event)` with what the
-    loop should know. On the loop, `on_event(event)` gets the newest one (what came in between is
-    skipped), and `on_death()` is told once if the thread ends without having been stopped.
+    loop should know. On the loop, `on_event(event)` gets the newest event (older ones are skipped),
+    and `on_death()` is called once if the thread ends without having been stopped.
     """
 
     def __init__(
@@ -92,12 +92,12 @@ class RosThread(Generic[NodeT, EventT]):
         self._newest: EventT | None = None
         # Calls whose answer has not come yet.
         self.calls_waiting = 0
-        # What is told when the thread is stopped: nothing else would end it.
+        # Failed when the thread is stopped: nothing else would end them.
         self._unanswered: set[asyncio.Future[Any]] = set()
         # Errors met by the node's callbacks, as of the last heartbeat.
         self.callback_errors = 0
         self._beating: asyncio.Task[None] | None = None
-        # When the heartbeat was sent that has not come back yet; loop's clock.
+        # When the heartbeat that has not come back yet was sent, by the loop's clock.
         self._beat_sent_s: float | None = None
         self._is_waking = False
         self._is_stopping = False
@@ -120,7 +120,7 @@ class RosThread(Generic[NodeT, EventT]):
         self._beating = asyncio.create_task(self._beat(), name="heartbeat")
 
     async def stop(self) -> None:
-        """Stop the node and join the thread; who waits for an answer gets TwinUnavailableError."""
+        """Stop the node and join the thread; calls under way raise TwinUnavailableError."""
         was_stopping, self._is_stopping = self._is_stopping, True
         if self._beating is not None:
             self._beating.cancel()
@@ -128,7 +128,7 @@ class RosThread(Generic[NodeT, EventT]):
             end_spinning(self._executor)
         self._is_joining = True
         try:
-            # A callback that runs now ends first: not to be waited for on the loop.
+            # A running callback ends first, which must not block the loop.
             await asyncio.to_thread(self._thread.join, STOP_TIMEOUT_S)
         finally:
             self._is_joining = False
@@ -144,13 +144,13 @@ class RosThread(Generic[NodeT, EventT]):
 
     @property
     def stuck_s(self) -> float:
-        """How long a heartbeat through the thread has been on its way, s; 0: none is."""
+        """For how long a heartbeat has been unanswered, s; 0: none is under way."""
         return 0.0 if self._beat_sent_s is None else self._loop.time() - self._beat_sent_s
 
     async def call(self, work: Callable[[NodeT], ResultT]) -> ResultT:
         """Run `work(node)` in the ROS thread, between two callbacks, and return its result.
 
-        It is not begun any more once nobody waits for it.
+        If the caller is cancelled first, `work` does not run.
 
         Raises:
             TwinUnavailableError: the thread has ended.
@@ -179,7 +179,7 @@ class RosThread(Generic[NodeT, EventT]):
             self.calls_waiting -= 1
 
     async def _answer(self, result: asyncio.Future[ResultT]) -> ResultT:
-        if self._is_stopping:  # since it was asked
+        if self._is_stopping:  # stopped since the call
             raise TwinUnavailableError(_NOT_RUNNING)
         self._unanswered.add(result)
         try:
@@ -192,8 +192,8 @@ class RosThread(Generic[NodeT, EventT]):
     ) -> Any:
         """Run `start(node)`, which returns an rclpy Future, and wait for that future's result.
 
-        Awaiting it as it is would spin a core; its done callback wakes the loop instead. If the
-        waiting ends early (a time-out), `give_up(node, future)` runs in the ROS thread.
+        Awaiting an rclpy Future itself would busy-wait; its done callback wakes the loop instead.
+        If the caller is cancelled (a time-out), `give_up(node, future)` runs in the ROS thread.
 
         Raises:
             TwinUnavailableError: the thread has ended.
@@ -201,7 +201,7 @@ class RosThread(Generic[NodeT, EventT]):
 
         """
         result: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        # Both in the ROS thread, where the one that was handed over first may run last.
+        # `begin` and `end` run in the ROS thread, not necessarily in the order of submission.
         future: Any = None
 
         def begin(node: NodeT) -> None:
@@ -236,7 +236,7 @@ class RosThread(Generic[NodeT, EventT]):
             await asyncio.sleep(BEAT_PERIOD_S)
 
     def require_node(self) -> NodeT:
-        """The node, on its own thread alone."""
+        """The node; call this in the ROS thread only."""
         if self._node is None:
             raise TwinUnavailableError("the ROS thread has no node")
         return self._node
@@ -255,7 +255,7 @@ class RosThread(Generic[NodeT, EventT]):
             self._executor = executor
             self.to_loop(_settle, self._started, None, None)
             spin_until_shutdown(executor, self._report)
-        except BaseException as caught:  # noqa: BLE001  # no thread dies unseen
+        except BaseException as caught:  # noqa: BLE001  # no thread ends unnoticed
             error = caught
         finally:
             self._end(error)
@@ -292,17 +292,16 @@ class RosThread(Generic[NodeT, EventT]):
             self.to_loop(self._on_death)
 
     def to_loop(self, callback: Callable[..., None], *args: Any) -> None:
-        """Have a callback run on the event loop, which is woken at once; from this thread."""
+        """Run a callback on the event loop, which wakes at once; call this in the ROS thread."""
         try:
             self._loop.call_soon_threadsafe(callback, *args)
         except RuntimeError:
-            # The loop is closed: nobody is left to be told.
+            # The loop is closed: nobody is left to notify.
             log.debug("event loop closed, dropped %r", callback)
 
     def _post(self, event: EventT) -> None:
         self._newest = event
-        # One wake-up for as many events as come before the loop gets round to it, and none before
-        # there is a node to look at.
+        # One wake-up covers all events until the loop runs; there is none before the node exists.
         if self._node is not None and not self._is_waking:
             self._is_waking = True
             self.to_loop(self._drain)
@@ -310,7 +309,7 @@ class RosThread(Generic[NodeT, EventT]):
     # --- on the event loop again --------------------------------------------------------------
 
     def _drain(self) -> None:
-        # First the flag, then the value: an event posted in between wakes the loop once more.
+        # Flag first, then value: an event posted in between wakes the loop once more.
         self._is_waking = False
         event = self._newest
         if event is not None:
@@ -318,7 +317,7 @@ class RosThread(Generic[NodeT, EventT]):
 
 
 def _settle(future: asyncio.Future[Any], value: Any, error: BaseException | None) -> None:
-    if future.done():  # the one who asked has gone
+    if future.done():  # the caller has gone
         return
     if error is None:
         future.set_result(value)

@@ -1,4 +1,4 @@
-"""Work on the event loop: what is shared, what is repeated, and how either ends."""
+"""Asyncio helpers: run identical work once (`Shared`), repeat work (`Periodic`), end tasks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ log = logging.getLogger(__name__)
 
 
 async def end(*tasks: asyncio.Task[Any] | None) -> None:
-    """End tasks, and wait for that; None: it was never begun."""
+    """Cancel tasks, and wait until they have ended; None: a task that never started."""
     begun = [task for task in tasks if task is not None]
     for task in begun:
         task.cancel()
@@ -21,9 +21,9 @@ async def end(*tasks: asyncio.Task[Any] | None) -> None:
 
 
 class Periodic:
-    """Does `work` every so often, from `start` to `stop`; the first time after `first_s`.
+    """Repeats `work` with pauses of `every_s`, from `start` to `stop`; the first is `first_s`.
 
-    Whatever it raises is logged as `what`, and it goes on: nobody waits for it.
+    An error is logged under the name `what`, and it goes on: nobody awaits it.
     """
 
     def __init__(
@@ -38,12 +38,12 @@ class Periodic:
         self._task: asyncio.Task[None] | None = None
 
     def start(self) -> None:
-        """Begin, once."""
+        """Start, unless it has started."""
         if self._task is None:
             self._task = asyncio.create_task(self._repeat(), name=self._what)
 
     async def stop(self) -> None:
-        """End."""
+        """Stop."""
         await end(self._task)
 
     async def _repeat(self) -> None:
@@ -57,9 +57,9 @@ class Periodic:
 
 
 class Shared(Generic[ResultT]):
-    """Identical work under way is done once, and ends when nobody waits for it any more.
+    """Runs identical work once for all callers, and cancels it when nobody waits any more.
 
-    The work is known by what it makes. Belongs to the event loop.
+    A key identifies the work. Belongs to the event loop.
     """
 
     def __init__(self) -> None:
@@ -71,12 +71,12 @@ class Shared(Generic[ResultT]):
     async def get(
         self, key: Hashable, start: Callable[[], Coroutine[Any, Any, ResultT]]
     ) -> ResultT:
-        """The result of `start()`, or of the one under way with this key.
+        """The result of `start()`, or of the work under way with this key.
 
-        Who leaves does not end it for the others; the last one who leaves does.
+        A cancelled caller does not end it for the others; the last cancelled caller does.
 
         Raises:
-            Exception: whatever the work raised, for all who wait.
+            Exception: whatever the work raised, in all callers.
 
         """
         flight = self._flights.get(key)
@@ -89,14 +89,14 @@ class Shared(Generic[ResultT]):
         finally:
             flight.waiting -= 1
             if not flight.waiting and not flight.task.done():
-                self._forget(key, flight)  # or who comes now would wait for what is about to end
+                self._forget(key, flight)  # or a new caller would wait for cancelled work
                 flight.task.cancel()
 
     def _forget(self, key: Hashable, flight: _Flight[ResultT]) -> None:
         if self._flights.get(key) is flight:
             del self._flights[key]
         if flight.task.done() and not flight.task.cancelled():
-            flight.task.exception()  # looked at, should all who waited have left
+            flight.task.exception()  # retrieved, in case all callers have gone
 
 
 class _Flight(Generic[ResultT]):

@@ -1,7 +1,7 @@
-"""What the routes need of a twin, wherever it runs.
+"""`TwinSource`, the routes' interface to a twin, wherever it runs; and the log of the robot.
 
-What the robot says of itself: where it is, where it has been, its plan, its battery. Of now alone:
-nothing of it is in the journal. Times are ROS time, ns; positions m in the map frame.
+`RobotLog` has the robot's position, trail, plan and battery. They are current values only: the
+journal has none of them. Times are ROS time, ns; positions are m in the map frame.
 """
 
 from __future__ import annotations
@@ -30,21 +30,22 @@ from lupin_twin.journal.received import NOTES_S, STRETCH_S, WRITES_S, Export
 from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 
-# A stamp that is farther ahead of the twin's time was made by a clock that is wrong.
+# A stamp farther ahead of the twin's time than this comes from a wrong clock.
 MAX_AHEAD_NS: Final = 10 * NANOSECONDS_PER_SECOND
-# Of the trail: how far back, how close, how many. Past that, what is older is made coarser.
+# Limits of the trail: its age, the distance and time between points, their number. A full trail
+# loses every second point of its older half.
 TRAIL_NS: Final = 3600 * NANOSECONDS_PER_SECOND
 TRAIL_STEP_M: Final = 0.1
 TRAIL_STEP_NS: Final = NANOSECONDS_PER_SECOND
 TRAIL_POINTS: Final = 720
-# A plan that nobody repeats is none any more after so long, or once the robot is where it ends.
+# A plan expires this long after it was published, or once the robot is within ARRIVED_M of its end.
 PLAN_NS: Final = 600 * NANOSECONDS_PER_SECOND
 ARRIVED_M: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """Where the robot was at `at_ns`; `heading` from x towards y, rad; None: it does not say."""
+    """Where the robot was at `at_ns`; `heading` is rad from x towards y; None: not reported."""
 
     x: float
     y: float
@@ -54,7 +55,7 @@ class Position:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The way that the robot means to take, as of `at_ns`; without points: none."""
+    """The path that the robot plans to take, as of `at_ns`; no points: it has no plan."""
 
     points: tuple[tuple[float, float], ...]
     at_ns: int
@@ -62,7 +63,7 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """How full the battery was at `at_ns`, 0 to 100."""
+    """The battery's charge at `at_ns`, percent, 0 to 100."""
 
     percent: float
     at_ns: int
@@ -70,7 +71,7 @@ class Battery:
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """What is known of a robot; None: it has not said, or it does not hold any more."""
+    """What is known of a robot; None: not reported, or no longer valid."""
 
     position: Position | None = None
     plan: Plan | None = None
@@ -81,19 +82,19 @@ ValueT = TypeVar("ValueT", Position, Plan, Battery)
 
 
 class RobotLog:
-    """The newest of each, and the trail of the last hour, bounded."""
+    """The newest position, plan and battery, and a bounded trail of the last hour."""
 
     def __init__(self) -> None:
         self.now = Robot()
         self.trail: list[Position] = []
-        # Whether the robot has been away from where its plan ends: a round ends where it begins.
+        # Whether the robot has been away from its plan's end: a round ends where it begins.
         self._was_away = False
 
     def take(self, heard: Robot, now_ns: int | None) -> bool:
-        """Take what was heard since the last time; returns whether anything is another now.
+        """Take what was received since the last call; returns whether anything has changed.
 
-        `now_ns` is the twin's time; None: it is not known. A clock that has gone back makes all
-        unknown that would be of the future.
+        `now_ns` is the twin's time; None: not known. Values stamped in the future become unknown:
+        the clock has gone back.
         """
         before = self.now
         future_ns = FOREVER_NS if now_ns is None else now_ns + MAX_AHEAD_NS
@@ -141,7 +142,7 @@ def _same_end(a: Plan, b: Plan) -> bool:
 
 
 def _newest(known: ValueT | None, heard: ValueT | None, future_ns: int) -> ValueT | None:
-    """What holds of the two; what was known is not, if it would be of the future."""
+    """The newer of the two; a known value stamped in the future is dropped."""
     if known is not None and known.at_ns > future_ns:
         known = None
     if known is None or (heard is not None and heard.at_ns >= known.at_ns):
@@ -149,11 +150,11 @@ def _newest(known: ValueT | None, heard: ValueT | None, future_ns: int) -> Value
     return known
 
 
-# --- what the routes need of a twin ---------------------------------------------------------------
+# --- the interface to a twin ----------------------------------------------------------------------
 
 ResultT = TypeVar("ResultT")
 
-# What a callback may take at worst, on a slow machine: the largest state there is takes a second.
+# No callback takes this long, even on a slow machine: the largest possible state takes a second.
 STUCK_AFTER_S: Final = 10.0
 
 ELSEWHERE: Final = (
@@ -172,15 +173,14 @@ class TwinTimeoutError(TwinUnavailableError):
 
 @dataclass(frozen=True, slots=True)
 class TwinUpdate:
-    """All that the ROS thread tells the loop, as of one moment; immutable.
+    """All that a source reports to the event loop, as of one moment; immutable.
 
-    `revision` is the snapshot's, `twin_count` how many nodes publish the state, `made_s` when it
-    was told (monotonic clock). `counts` is what the twin dropped, lost and met; None: it does not
-    say. `own_counts` is the same of a node of ours that is not the twin; `rules` are those of a
-    twin in this process; `journal` is the twin's, wherever it is, as far as that tells. So are
-    `origin`, where its observations come from, and `input_problems`, why it does not hear all of
-    what is published for it. `silent_s` is for how long the twin has been silent, where it was so
-    before this was told; 0: it is live.
+    `revision` is the snapshot's. `twin_count` is how many nodes publish the state. `made_s` is when
+    this was made (monotonic clock). `counts` is what the twin dropped, lost and met; None: not
+    reported. `own_counts` is the same for our own node, where that is not the twin. `rules` are the
+    field rules. The twin reports `journal`, its journal's condition; `origin`, where its
+    observations come from; and `input_problems`, why it misses messages. `silent_s` is for how long
+    the twin had been silent when this was made; 0: it was live.
     """
 
     snapshot: Snapshot
@@ -198,7 +198,7 @@ class TwinUpdate:
 
     @property
     def drops(self) -> tuple[Recent, ...]:
-        """What was dropped or lost lately, by the twin and then by a node of ours."""
+        """Recent drops and losses: those of the twin, then those of our own node."""
         theirs = () if self.counts is None else self.counts.recent
         ours = () if self.own_counts is None else self.own_counts.recent
         return theirs + tuple(replace(drop, message=f"web: {drop.message}") for drop in ours)
@@ -206,10 +206,10 @@ class TwinUpdate:
 
 @dataclass(frozen=True, slots=True)
 class ThreadState:
-    """How the ROS thread behind a source does; as it is here, where there is none.
+    """The state of a source's ROS thread; the defaults stand for a source without one.
 
-    `stuck_s` is how long it has not answered a heartbeat, s, 0 between two; `calls_waiting` are
-    calls to it, `callback_errors` those met by callbacks so far, as of the last heartbeat.
+    `stuck_s` is for how long a heartbeat has been unanswered, s; 0 between two. `calls_waiting`
+    counts calls to the thread. `callback_errors` counts errors, as of the last heartbeat.
     """
 
     is_alive: bool = True
@@ -219,35 +219,35 @@ class ThreadState:
 
 
 class TwinSource(ABC):
-    """A twin in this process, one elsewhere, or what an archive has of one; and its log.
+    """A twin and its log: in this process, in another one, or as an archive has it.
 
-    Everything here is called on the event loop. `workers` is where this process does what takes
-    longer than a tick; `stop` closes it. `relay` is where ROS topics are listened to as they are on
-    the wire. `past` reads the log; what is observed within the journal's 100 ms may be missing.
+    Everything here is called on the event loop. `workers` runs work that would block the loop;
+    `stop` closes it. `relay` passes on ROS topics as raw bytes. `past` reads the log, which may
+    lack the last 100 ms: the journal writes in batches.
     """
 
     past: PastProcess
     workers: Workers
     relay: Relay
     timeout_s: float
-    # What was told last, or is newer than that by a map.
+    # The last update that was reported; it may have a newer map.
     update: TwinUpdate | None = None
-    # The twin's: how fields are made; so many of a tag's last scans are told; names in ROS.
+    # The twin's field rules, how many of a tag's last scans it keeps, and its ROS names.
     rules: FieldRules
     buffer_len: int
     names: TwinNames
-    # Who is named where an answer takes too long.
+    # Named in the message of a time-out.
     answerer = "the twin"
-    # A `RosThread`, or what is said where there is none.
+    # A `RosThread`, or a `ThreadState` where there is none.
     thread: Any = ThreadState()
-    # Tells the counts of one process from another's; empty where revisions are digests.
+    # Distinguishes the revisions of two processes that count; empty where revisions are digests.
     identity = ""
 
     @abstractmethod
     async def start(
         self, on_state: Callable[[TwinUpdate], None], on_death: Callable[[], None]
     ) -> None:
-        """Start; `on_state` gets every change (the newest, where they come fast)."""
+        """Start; `on_state` gets every change, or only the newest of a fast series."""
 
     @abstractmethod
     async def stop(self) -> None:
@@ -255,19 +255,19 @@ class TwinSource(ABC):
 
     @property
     def world(self) -> World:
-        """What is observed, as far as the twin or its log says; a demo's day is shorter."""
+        """What the twin observes, as far as it or its log reports that; a demo's day is shorter."""
         return World("unknown")
 
     def revision(self) -> str:
-        """The revision now: opaque, changes exactly when a field could; empty: nothing has come.
+        """The current revision: opaque, changes exactly when a field could; empty: no state yet.
 
-        What a call brings from a twin is never newer: what has changed is told at once.
+        No answer from the twin is newer, because changes are reported at once.
         """
         return "" if self.update is None else self.update.revision
 
     @abstractmethod
     def journal(self) -> Condition:
-        """How the twin's journal does, as far as it tells."""
+        """The condition of the twin's journal, as far as it is reported."""
 
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map, if any has come."""
@@ -275,20 +275,20 @@ class TwinSource(ABC):
 
     @abstractmethod
     async def estimate_report(self, request: ReportRequest) -> Report:
-        """What a sensor's estimates are worth.
+        """The report on the quality of a sensor's estimates.
 
         Raises:
-            TwinUnavailableError: nobody there to say.
+            TwinUnavailableError: no twin answers.
 
         """
 
-    async def robot(self, now_ns: int | None) -> Robot | None:  # noqa: ARG002  # for who hears one
-        """What the robot has said since this was last asked; None: here it is never heard.
+    async def robot(self, now_ns: int | None) -> Robot | None:  # noqa: ARG002  # for RosSource
+        """What the robot has reported since the last call; None: this source never receives it.
 
-        `now_ns` is the twin's time; None: it is not known.
+        `now_ns` is the twin's time; None: not known.
 
         Raises:
-            TwinUnavailableError: nobody there to hear it any more.
+            TwinUnavailableError: the ROS thread has ended.
 
         """
         return None
@@ -297,14 +297,14 @@ class TwinSource(ABC):
 
     @abstractmethod
     async def now(self) -> Now:
-        """At what a question is asked, and of which log, once that is known."""
+        """The time and the log that a query refers to; waits until they are known."""
 
     async def _explain(self, error: NotRemembered) -> NotRemembered:
-        """The error as the caller gets it."""
+        """The error that the caller gets; a source may also start a repair."""
         return error
 
     async def ask(self, question: PastQuery[ResultT], cost_s: float) -> ResultT:
-        """The answer to a question; `cost_s` estimates all that it takes, s of one core."""
+        """Answer a query about the past; `cost_s` is its estimated cost, s of one core."""
         now = await self.now()
         try:
             return await self._in_time(self.past.ask(question, now, cost_s))
@@ -312,11 +312,11 @@ class TwinSource(ABC):
             raise await self._explain(error) from None
 
     async def writes(self, request: WritesRequest) -> PastWrites:
-        """What was heard, scan by scan and look by look, in the order of hearing."""
+        """The received scans and inspections, in the order of receipt."""
         return await self.ask(partial(as_found, request), WRITES_S)
 
     async def notes(self, request: NotesRequest) -> PastNotes:
-        """What people said."""
+        """The notes that people wrote."""
         return await self.ask(partial(as_found, request), NOTES_S)
 
     # Only the process that keeps the journal writes it.
@@ -331,11 +331,11 @@ class TwinSource(ABC):
         """
         raise NotesUnwritable(f"the note of {note.by} cannot be written: {ELSEWHERE}")
 
-    # Whether there is a node to publish by.
+    # Whether there is a ROS node that can publish.
     takes_observations = False
 
     async def publish_observation(self, scan: Scan) -> None:
-        """Publish readings over ROS, as a robot does; whether the twin takes them is the twin's.
+        """Publish readings over ROS, as a robot does; the twin may still reject them.
 
         Raises:
             TwinUnavailableError: there is no node.
@@ -351,10 +351,10 @@ class TwinSource(ABC):
         sensor_type: str | None,
         write: Callable[[Sequence[PastRow]], ResultT],
     ) -> AsyncGenerator[ResultT]:
-        """Every reading and failed attempt of a period, at the pace of whoever takes them.
+        """Yield every reading and failed attempt of a period, at the pace of the consumer.
 
-        They come in lots, each through `write`, which is called in another process. None: all tags,
-        all sensors.
+        They come in lots, each converted by `write`, which runs in another process. `tag_id` and
+        `sensor_type` None: all.
         """
         period = Export(start_ns, end_ns, tag_id, sensor_type)
         async for lot in exported(lambda step: self.ask(step, STRETCH_S), period, write):
@@ -371,7 +371,7 @@ class TwinSource(ABC):
 
 
 def ailment(thread: Any) -> str | None:
-    """What is wrong with the thread behind a source so that only a restart helps; None: nothing."""
+    """What is wrong with a source's thread that only a restart mends; None: nothing."""
     if not thread.is_alive:
         return "The ROS thread has ended. Restart."
     if thread.stuck_s >= STUCK_AFTER_S:
@@ -387,9 +387,9 @@ async def exported(
     period: Export,
     write: Callable[[Sequence[PastRow]], ResultT],
 ) -> AsyncGenerator[ResultT]:
-    """The rows of a period, lot by lot through `write`; the next ones are asked for as it is taken.
+    """Yield the rows of a period in lots, converted by `write`; queries the next ones when needed.
 
-    `ask` asks the process that reads the past.
+    `ask` queries the process that reads the past.
     """
     export: Export | None = period
     while export is not None:

@@ -1,9 +1,9 @@
-"""The source of `web`: a twin elsewhere. As many of these as needed may share one twin.
+"""The source of `lupin-twin web`: a twin in another process, which many sources may share.
 
-The log of a twin elsewhere, as a file here: the twin's own, or one that follows it. Which file is
-the twin's own is known by its identity, not by its path alone. Where that cannot be read, the log
-is followed by `get_writes` into a file of this user, one for each journal: a twin that begins
-another one has another file. A file that is damaged is deleted and copied anew.
+It reads the twin's log in a file on this machine: the twin's own file, or a copy. The twin's own
+file is recognized by its journal's id, not by its path alone. If it cannot be read, `get_writes`
+fetches the rows into a copy, a file of this user for each journal. When a twin begins a new
+journal, it gets a new copy. A damaged copy is deleted and made anew.
 """
 
 from __future__ import annotations
@@ -43,15 +43,15 @@ log = logging.getLogger(__name__)
 
 ResultT = TypeVar("ResultT")
 
-# How often it is looked whether more was written; what is shown as past is as old at most.
+# Interval of polling for new rows, and so how far the past shown here lags at most.
 POLL_S: Final = 0.3
-# After an error, and where there is nothing to follow.
+# Interval after an error, and while there is nothing to follow.
 RETRY_S: Final = 1.0
-# A twin that is heard says within a second where its journal is.
+# Longest wait for a log: a live twin reports within a second where its journal is.
 FOUND_S: Final = 3.0
-# A copy that was not written for so long is deleted at the start, unless it is the newest.
+# A copy that was not written for this long is deleted at the start, unless it is the newest.
 RETAINED_S: Final = 90 * 86_400.0
-# What putting a lot into the file takes, about, s.
+# Estimated time to write a lot into the file, s.
 _WRITE_S: Final = 0.05
 _FILE_ERRORS: Final = (Foreign, OSError, *FILE_ERRORS)
 _ERRORS: Final = (
@@ -61,11 +61,11 @@ _ERRORS: Final = (
 
 
 class FollowedLog:
-    """`condition` is that of the log which is read here; None: there is none yet.
+    """Finds the log of a twin in another process, or keeps a copy of it up to date.
 
-    `query(after)` gives the rows behind a number. `named` is the twin's own file as it is called
-    here, and is read before its twin is heard; None: as the twin calls it. `world` is what is
-    observed, as the log says. Belongs to the event loop.
+    `query(after)` returns the rows after a row number. `named` is the path of the twin's own file
+    on this machine, read even before the twin is received; None: the path that the twin reports.
+    `world` is what the twin observes, by the log. Belongs to the event loop.
     """
 
     def __init__(
@@ -88,12 +88,12 @@ class FollowedLog:
 
     @property
     def condition(self) -> Condition | None:
-        """See above."""
+        """The condition of the log that is read here; None: there is none yet."""
         if self._own is not None:
             return replace(self._reported, path=str(self._own))
         if self._followed is None:
             return None
-        # A twin that cannot write its journal, or is gone, keeps nobody from reading what is here.
+        # A copy can be read even if its twin is gone, or cannot write its journal.
         return replace(
             self._reported,
             state=JournalState.RECORDING,
@@ -105,12 +105,12 @@ class FollowedLog:
         )
 
     def on_update(self, journal: Condition) -> None:
-        """What the twin says of its journal; what it said last holds while it says nothing."""
+        """Take the twin's report on its journal; the last one stays valid until a new one comes."""
         if journal.state is not JournalState.UNKNOWN and journal.journal_id:
             self._reported, self._is_heard = journal, True
 
     async def explain(self, error: NotRemembered) -> NotRemembered:
-        """The same error, but of a copy: that is made anew here, and not by the twin."""
+        """The error; if it is about a copy, one that says so, as this process makes that anew."""
         if self._own is not None or self._followed is None:
             return error
         path = self._path(self._followed.journal)
@@ -122,12 +122,12 @@ class FollowedLog:
         return NotRemembered(f"{why} as soon as the twin answers")
 
     async def wait(self) -> None:
-        """Return once a log is known; wait no longer than it usually takes."""
+        """Wait until a log is known, for at most `FOUND_S`."""
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self._is_known.wait(), FOUND_S)
 
     async def start(self, folder: Path | None) -> None:
-        """Begin with the file that was followed last into a folder; None: there is no place."""
+        """Start with the newest copy in a folder; None: there is no folder for copies."""
         self._folder = folder
         if folder is not None:
             with contextlib.suppress(*_ERRORS):
@@ -136,7 +136,7 @@ class FollowedLog:
         self._task = asyncio.create_task(self._keep(), name="log")
 
     async def stop(self) -> None:
-        """End; the next one goes on where this one was."""
+        """Stop; the next start continues the copy."""
         await end(self._task)
 
     def _path(self, journal: str) -> Path:
@@ -161,7 +161,7 @@ class FollowedLog:
                 await asyncio.sleep(RETRY_S)
 
     async def _look(self) -> float:
-        """See where the log is, or take what is new of it; returns when to look again, s."""
+        """Find the log, or copy its new rows; returns the time to wait before the next call, s."""
         own = self._named or Path(self._reported.path)
         found = await self._on_worker(lambda: _found(own))
         if found is not None and self._named is not None and not self._is_heard:
@@ -182,11 +182,11 @@ class FollowedLog:
             return RETRY_S
         here = self._path(twin.journal_id)
         try:
-            # Each time: another `web` may write it too, and anybody may delete it.
+            # Read each time: another `web` may write it too, and anybody may delete it.
             after = await self._on_worker(lambda: _last(here))
             lot = await self._query(after)
             if lot.journal != twin.journal_id:
-                return RETRY_S  # it is another one since, and says so soon
+                return RETRY_S  # the twin has begun a new journal, and soon reports that
             self._followed = await self._on_worker(
                 lambda: write(here, lot, twin.complete_ns, after)
             )
@@ -204,7 +204,7 @@ class FollowedLog:
 
 
 def _newest(folder: Path) -> Followed | None:
-    """The copy that was written last; others that are old are deleted."""
+    """The copy that was written last; old ones among the others are deleted."""
     files = sorted(folder.glob("*.sqlite"), key=lambda it: it.stat().st_mtime)
     for path in files[:-1]:
         if path.stat().st_mtime < time.time() - RETAINED_S:
@@ -223,12 +223,12 @@ def _delete(path: Path) -> None:
 def _last(path: Path) -> int:
     try:
         return followed(path).last if path.exists() else 0
-    except Empty:  # whoever began it was killed
+    except Empty:  # the process that created it was killed
         return 0
 
 
 def _found(path: Path) -> Followed | None:
-    """What a file says of itself; None: it is not there, or cannot be read."""
+    """A file's journal id and extent; None: it does not exist, or cannot be read."""
     try:
         return followed(path)
     except _FILE_ERRORS:
@@ -237,26 +237,26 @@ def _found(path: Path) -> Followed | None:
 
 # --- the source -----------------------------------------------------------------------------------
 
-# ROS time beyond this, in 2001, is that of a wall's clock, and goes on while nobody tells it.
+# ROS time past this, in 2001, is wall-clock time, which goes on while the twin is silent.
 _A_DATE_NS: Final = 10**18
 
-# How often it is looked whether the twin is lost.
+# Interval of the check whether the twin is lost.
 _LOOK_S: Final = 1.0
-# A node that is made while the network has no address never hears it: so it is made again, after
-# as long a silence again, and no later than this.
+# A node made while the network has no address never receives the twin. So the node is made anew
+# again when the silence has doubled, or has grown by this, whichever is first.
 _REJOIN_AGAIN_S: Final = 300.0
 
-# What reading a tag of an answer takes, roughly and at worst.
+# Rough worst-case time to read one tag of an answer.
 _READ_TAG_S: Final = 20e-6
 
 
 class WebTwin(RosSource[WebNode]):
     """`TwinSource` over the ROS contracts of a twin in another process.
 
-    One that was received, and then for `stale_after_s` no more, is asked nothing; after
-    `rejoin_after_s`, the node is made anew: Fast DDS may never find a twin again that it lost for
-    longer than its lease of 20 s. `journal` is its file as it is called here; None: as the twin
-    calls it.
+    A twin that has been silent for `stale_after_s` gets no requests. After `rejoin_after_s`, the
+    node is made anew: Fast DDS may never rediscover a twin that it lost for longer than its lease
+    of 20 s. `journal` is the path of the twin's file on this machine; None: the path that the twin
+    reports.
     """
 
     def __init__(
@@ -273,7 +273,7 @@ class WebTwin(RosSource[WebNode]):
         self.rejoin_after_s = rejoin_after_s
         self._rejoining = Periodic(self._rejoin_if_lost, _LOOK_S, "the look for a lost twin")
         self._join: Callable[[], Awaitable[None]]
-        # When the update was made that nothing follows.
+        # `made_s` of the last update before the silence.
         self._lost_s = 0.0
         self._rejoin_at_s = 0.0
         self._node: WebNode | None = None
@@ -317,7 +317,7 @@ class WebTwin(RosSource[WebNode]):
                     post(update)
 
             node = WebNode(pass_on, renew, context=context)
-            # As `update`, it holds on in a node that is made anew.
+            # Like `update`, what the old node knew stays valid in the new one.
             if self._node is not None:
                 node.take_over(self._node)
             self._node = node
@@ -361,17 +361,17 @@ class WebTwin(RosSource[WebNode]):
 
     @property
     def world(self) -> World:
-        """As the log says, where it is read here."""
+        """See `TwinSource`: by the log, if one is read here."""
         return self._log.world
 
     def journal(self) -> Condition:
-        """The twin's, as far as it is read here; before that, what is said on `/diagnostics`."""
+        """The condition of the log that is read here; until there is one, as on `/diagnostics`."""
         return self._log.condition or (
             UNKNOWN_JOURNAL if self.update is None else self.update.journal
         )
 
     async def estimate_report(self, request: ReportRequest) -> Report:
-        """What the twin's service says."""
+        """The answer of the twin's service."""
         wanted = convert_services.report_request_message(request)
         response = await self._request(GetEstimateReport, wanted)
         check_ok(response)
@@ -383,13 +383,13 @@ class WebTwin(RosSource[WebNode]):
             raise TwinUnavailableError(f"the twin's answer cannot be used: {error}") from error
 
     async def now(self) -> Now:
-        """What who looks back has to know of now, and where the log is."""
+        """See `TwinSource`."""
         if self.update is not None:
             await self._log.wait()
         condition, update = self._log.condition, self.update
         if condition is None:
             raise TwinUnavailableError("the twin's journal is not known here yet")
-        if update is None:  # it has been followed before, and its twin is not there
+        if update is None:  # a log from an earlier run, whose twin is not received
             now_ns = condition.complete_ns or 0
             if now_ns > _A_DATE_NS:
                 now_ns = max(now_ns, time.time_ns())
@@ -404,13 +404,13 @@ class WebTwin(RosSource[WebNode]):
         return convert_services.lot_of(response, after)
 
     async def _request(self, service: Any, request: Any) -> Any:
-        """The twin's response; `service` is its type.
+        """The twin's response; `service` is the service's type.
 
         Raises:
-            TwinUnavailableError: nobody there to answer, or not in time.
+            TwinUnavailableError: no twin answers in time.
 
         """
-        # DDS offers the services of a twin that was killed for another twenty seconds.
+        # DDS offers the services of a killed twin for another twenty seconds.
         update = self.update
         if update is not None and time.monotonic() - update.made_s >= self._stale_after_s:
             raise TwinUnavailableError(
@@ -421,14 +421,14 @@ class WebTwin(RosSource[WebNode]):
         return await self._in_time(
             self.thread.ask(
                 lambda node: node.clients_of_twin[service].call_async(request),
-                # Or it would be kept for ever.
+                # Or rclpy would keep it for ever.
                 lambda node, future: node.clients_of_twin[service].remove_pending_request(future),
             )
         )
 
 
 def _folder(node: WebNode) -> Path | None:
-    """Where a log is followed to."""
+    """The folder for copies of logs; None: there is none."""
     domain = int(node.context.get_domain_id())
     try:
         journal = journal_path("", os.environ, domain, node.get_namespace())

@@ -1,4 +1,4 @@
-"""The ROS side of `lupin-twin web`: a consumer of a twin elsewhere, over its ROS contracts."""
+"""The ROS node of `lupin-twin web`, which follows a twin elsewhere by its ROS contracts."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ from lupin_twin.ros.parameters import (
 NODE_NAME: Final = "lupin_web"
 
 
-# How long a state waits for the times that a twin publishes right behind it. Without them it is
-# shown all the same, and when what was observed is not known.
+# How long a state waits for its times, which a twin publishes right after it. It is then shown
+# without them, and when things were observed is not known.
 TIMES_PATIENCE_S: Final = 0.5
 
-# What a twin said of itself, once a second, stands for so long, s.
+# How long a twin's report of itself, sent once a second, stays valid, s.
 REPORT_HOLDS_S: Final = 5.0
 
 # The twin's parameters that a consumer has to know too. They are not on the wire: where the twin's
@@ -61,14 +61,14 @@ SHARED_PARAMETERS: Final = (
 
 
 class WebNode(AdjustableNode):
-    """Follows `/twin/state` with its `/twin/times`, and `/map`, and asks the twin's services.
+    """Follows `/twin/state` with its `/twin/times`, and `/map`, and calls the twin's services.
 
-    Of `/diagnostics`, which all nodes of a domain share, it takes what the twin says of itself that
-    publishes this state, and nothing else.
+    All nodes of a domain share `/diagnostics`: it takes only the report of the twin that publishes
+    this state.
 
-    `on_state(snapshot)` is called for each state, once its times are there. Its tags are the very
-    same values as in the one before where nothing has changed. `on_map()` is called for each map
-    that is another.
+    `on_state(snapshot)` is called for each state, once its times are there. Unchanged tags are the
+    same objects as in the snapshot before. `on_map()` is called when the map or a parameter of this
+    node has changed.
 
     Raises:
         lupin_twin.core.parameters.ParameterError: a parameter out of its range.
@@ -97,7 +97,7 @@ class WebNode(AdjustableNode):
         self._newest: Snapshot | None = None
         # When the newest state was published.
         self._published_ns = 0
-        # What came last of each: they belong together where their stamps are the same.
+        # The newest message of each, not yet shown; they belong together if their stamps are equal.
         self._state: Any = None
         self._times: Any = None
         self._stamp_watch = StampWatch()
@@ -128,7 +128,7 @@ class WebNode(AdjustableNode):
             callback=self._take_diagnostics,
             is_wanted=lambda data: self._topics["state_topic"].encode() in data,
         )
-        # Nobody calls it from here; roslib's clients are told its name.
+        # Never called from here; roslib clients get its name.
         with naming("field_service_name", p.field_service_name):
             validate_topic_name(p.field_service_name, is_service=True)
         self.clients_of_twin: dict[Any, Any] = {
@@ -146,7 +146,7 @@ class WebNode(AdjustableNode):
     # --- for the source, on this node's thread ------------------------------------------------
 
     def take_over(self, before: WebNode) -> None:
-        """Know what a node knew that this one takes the place of."""
+        """Take over the state of the node that this one replaces."""
         self.occupancy_map = before.occupancy_map
         self.digest, self.publishers_digest = before.digest, before.publishers_digest
         self._published_ns = before._published_ns
@@ -162,8 +162,8 @@ class WebNode(AdjustableNode):
     def revision(self) -> str:
         """Digests of who publishes the state, of poses and readings, and of the map.
 
-        The twin's count is not on the wire, nor are its parameters: but one that was started with
-        others is another publisher. Of this node's own they are part, once they are changed.
+        The twin's own revision and parameters are not on the wire, but a twin restarted with other
+        parameters is another publisher. Changes of this node's own parameters are counted too.
         """
         map_revision = 0 if self.occupancy_map is None else self.occupancy_map.revision
         known = f"{self.publishers_digest}-{self.digest}-{map_revision:x}"
@@ -171,12 +171,12 @@ class WebNode(AdjustableNode):
 
     @property
     def self_report(self) -> SelfReport:
-        """What the twin that is followed said of itself lately."""
+        """The recent report of the followed twin; an empty one if it is too old."""
         is_recent = time.monotonic() - self._reported_s < REPORT_HOLDS_S
         return self._report if is_recent else SelfReport()
 
     def why_not(self, service: Any) -> str:
-        """What is to be said where no twin offers it; empty: one does."""
+        """Why the service cannot be called, for a person; empty: a twin offers it."""
         if self.clients_of_twin[service].service_is_ready():
             return ""
         if self.count_publishers(self._topics["state_topic"]):
@@ -188,8 +188,8 @@ class WebNode(AdjustableNode):
     # --- callbacks ----------------------------------------------------------------------------
 
     def _take_state(self, msg: Any) -> None:
-        # DDS goes on in a twin that is stuck, and what it latched comes again to a new node: that
-        # is no sign of life. 0: the middleware says no times.
+        # DDS goes on in a stuck twin: a new node gets its latched state again, which is no sign of
+        # life. 0: the middleware reports no times.
         if 0 < self.utilities.published_ns == self._published_ns:
             return
         self._published_ns = self.utilities.published_ns
@@ -215,7 +215,7 @@ class WebNode(AdjustableNode):
         return True
 
     def _show_without_times(self) -> None:
-        # They may still come.
+        # `_state` stays: its times may still come.
         if self._state is not None:
             self._show(self._state, None)
 
@@ -241,7 +241,7 @@ class WebNode(AdjustableNode):
         self._on_state(snapshot)
 
     def _take_map(self, msg: Any) -> None:
-        # Kept, and told with the next state: a map is no sign of life of the twin.
+        # Reported with the next state: a map is no sign of life of the twin.
         topic, frame_id = self._topics["map_topic"], self.parameters.frame_id
         new = self.utilities.new_map(msg, topic, frame_id, self.occupancy_map)
         if new is not None:
@@ -249,21 +249,21 @@ class WebNode(AdjustableNode):
             self._on_map()
 
     def _take_diagnostics(self, msg: Any) -> None:
-        # Told with the next state, like the map: a twin that publishes none is none to show.
+        # Reported with the next state, like the map: without a state there is no twin to show.
         said = list(findings_of(msg, self._topics["state_topic"]))
         if said:
             self._report = self_report(said)
             self._reported_s = time.monotonic()
 
     def adjust(self, now: TwinParameters) -> None:
-        """See `AdjustableNode`. A twin's own are not on the wire: they are set here as there."""
+        """See `AdjustableNode`. The twin's parameters are not on the wire: set them here too."""
         self.rules = FieldRules.of(now)
         self._changes += 1
         self._on_map()
 
 
 def _digest_of(tags: Sequence[TagState]) -> str:
-    """Of poses and readings, and of which readings are of one scan: only those derive a VPD."""
+    """A digest of poses and readings, and of which readings share a scan: only those give a VPD."""
     digest = blake2b(digest_size=12)
     for tag in tags:
         times = [reading.observed_at_ns for reading in tag.readings]
@@ -274,7 +274,7 @@ def _digest_of(tags: Sequence[TagState]) -> str:
 
 
 def check_ok(response: Any) -> None:
-    """Raise what a service's refusal says."""
+    """Raise the error that a service's refusal states."""
     if response.ok:
         return
     error = error_of(response.error_message)

@@ -1,4 +1,4 @@
-"""The fleet's application: the overview, and below `/sites/` each site's own, made when opened."""
+"""The fleet's application: the overview and, below `/sites/`, each site's own, made when opened."""
 
 from __future__ import annotations
 
@@ -83,12 +83,12 @@ from lupin_twin.journal.received import STRETCH_S, Export
 from lupin_twin.runtime.workers import Workers
 
 _TIDY_S: Final = 5.0
-# What the cached answers of one site may take.
+# Limit of the cached answers of one site.
 _CACHE_BYTES: Final = 4_000_000
-# No browser gets more frames than one in so many seconds; and one at least in so many.
+# Least, and greatest, time between two frames to a browser.
 _FRAME_S: Final = 1.0
 _HEARTBEAT_S: Final = 5.0
-# What a browser signs in by, and the sensors in force.
+# The routes for signing in, and of the sensors in force.
 _AS_EVERYWHERE: Final = frozenset(
     {
         *("/api/signin", "/api/signout", "/api/session", "/signin", "/signin.css", "/signin.js"),
@@ -97,7 +97,7 @@ _AS_EVERYWHERE: Final = frozenset(
 )
 
 
-# Opened by itself, a picture has its own colours, and nothing else.
+# A picture that is opened by itself may use its own styles, and nothing else.
 _PICTURE_POLICY: Final = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"
 
 
@@ -113,7 +113,7 @@ class Fleet:
             settings.max_clients, limits.client_timeout_s, lambda _: Status("live", None)
         )
         self.criteria, self.limits = criteria, limits
-        # One for all sites: what a client may ask for does not grow with them.
+        # One for all sites: a client's limits do not grow with the number of sites.
         self.admission = Admission(limits)
         self.workers = Workers("work")
 
@@ -127,14 +127,14 @@ class Fleet:
                 admission=self.admission,
                 cache=AnswerCache(_CACHE_BYTES),
             )
-            # Who may read has been looked at by then; who writes is looked at there.
+            # Readers have been checked before they get here; the routes check who writes.
             app = create_app(bridge, access=Access(access.policy))
             app.state.access = access
             ready = asyncio.create_task(bridge.start(), name=f"open {name}")
             return Opened(source, bridge, app, ready)
 
         self.pages = SitePages(make, lambda: self.watching.sites, limits.open_sites)
-        # What `routes.answers` needs of a bridge, too.
+        # `routes.answers` needs these, as it does of a bridge.
         self.cache = AnswerCache()
         self.answering: Shared[Answer] = Shared()
         self._frame: SitesFrame | None = None
@@ -143,12 +143,12 @@ class Fleet:
         self._tidying = Periodic(self._tidy, _TIDY_S, "tidying")
 
     async def start(self) -> None:
-        """Begin to watch the archive."""
+        """Start watching the archive."""
         self.watching.start()
         self._tidying.start()
 
     async def stop(self) -> None:
-        """Close every page, and end."""
+        """Close every page, and stop."""
         if self._push_timer is not None:
             self._push_timer.cancel()
         await self._tidying.stop()
@@ -157,27 +157,27 @@ class Fleet:
         await asyncio.gather(self.watching.stop(), self.past.stop())
 
     def announce_shutdown(self) -> None:
-        """Tell every client that this is about to go."""
+        """Notify every client that the fleet is shutting down."""
         for opened in self.pages:
             opened.bridge.announce_shutdown()
 
     # --- the overview -------------------------------------------------------------------------
 
     def sites_for(self, request: HTTPConnection) -> Mapping[str, Site]:
-        """The sites that whoever makes a request may read."""
+        """The sites that the person of a request may read."""
         person, sites = person_of(request), self.watching.sites
         if person is None or not person.sites:
             return sites
         return {name: site for name, site in sites.items() if person.reads(name)}
 
     def join(self, client: Client) -> None:
-        """Add a browser; it has every site when this returns."""
+        """Add a browser; it has been sent every site when this returns."""
         if self._frame is None:
             self._push()
         self.hub.join(client, time.monotonic())
 
     def serve(self, client: Client) -> None:
-        """A browser's socket is free again."""
+        """Send a browser what it lacks: its socket is free again."""
         self.hub.serve(client, time.monotonic())
 
     def _on_news(self) -> None:
@@ -203,7 +203,7 @@ class Fleet:
             self._push()
 
     def measure(self) -> Iterator[tuple[str, str, float]]:
-        """What Prometheus reads: a name, what it is, the number."""
+        """Yield (name, help text, value) of each metric, for Prometheus."""
         watching = self.watching
         yield "lupin_fleet_sites", "sites in the archive", len(watching.sites)
         live = sum(site.is_live for site in watching.sites.values())
@@ -229,7 +229,7 @@ class OfSitesExport(OfExport):
 
 
 async def respond_sites(fleet: Fleet, kind: Format, request: Request) -> Response:
-    """Every row of a period of the sites that are named, or of all."""
+    """Every row of a period, of the named sites or of all."""
     given = read(OfSitesExport, request.query_params.multi_items())
     known = fleet.sites_for(request)
     named = [known[name] for name in chosen(given.sites, known)]
@@ -269,7 +269,7 @@ def create_fleet_app(
     access: Access,
     proxies: Proxies,
 ) -> FastAPI:
-    """The application around a fleet that its caller starts and stops."""
+    """Build the application for a fleet; the caller starts and stops the fleet."""
     app = FastAPI(title="lupin-twin fleet", version=__version__, openapi_url=None)
     app.state.access = access
     app.state.bridge = fleet
@@ -279,7 +279,7 @@ def create_fleet_app(
     _add_probes(app, fleet)
     every = (*pages.router.routes, *status.router.routes)
     app.router.routes.extend(it for it in every if getattr(it, "path", "") in _AS_EVERYWHERE)
-    # The last one added is the first to be asked.
+    # The last one added runs first.
     app.add_middleware(PieceByPiece)
     app.add_middleware(ReadOnly)
     app.add_middleware(Sites, pages=fleet.pages, page=SitePage(STATIC_FOLDER))
@@ -305,7 +305,7 @@ def create_fleet_app(
 
 
 def sites_wire(client: Client, frame: SitesFrame, only: tuple[str, ...]) -> bytes:
-    """A frame for who may read `only` these sites; all, if none is named."""
+    """A frame for a client that may read `only` these sites; empty: all."""
     base = frame.base
     if base is not None and base.seq == client.sent_seq:
         return frame.delta(only)
@@ -330,7 +330,7 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
 
     @app.api_route("/api/sites/{name}/map.svg", methods=["GET", "HEAD"])
     async def site_map(request: Request, name: str) -> Response:
-        """Where the tags of a site are, and how each one is."""
+        """A picture of where the tags of a site are, and of their verdicts."""
         site = fleet.watching.sites.get(name)
         if site is None or not site.dots:
             return error_response(f"there is no map of a site {name[:64]!r}", 404)
@@ -342,7 +342,7 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
 
     @app.websocket("/ws/sites")
     async def ws_sites(websocket: WebSocket) -> None:
-        """Every site at once, then what has changed; a client is not listened to."""
+        """Every site at once, then what has changed; input is ignored."""
         await websocket.accept()
         person = person_of(websocket)
         only = () if person is None else person.sites

@@ -1,9 +1,10 @@
-"""One sensor of several sites on one time axis, in whole hours; the outlier first.
+"""Queries of several sites at once: one sensor compared over time, and a report of each site.
 
-A site's value in a bucket is the mean of all its readings there, whatever their tag. Hours are what
-the log has counted already: reading by reading, a week of fifty sites would take a minute.
+The comparison puts the outlier first. A site's value in a bucket is the mean of all its readings
+there, of any tag. Buckets are whole hours, which the log has counted already: reading by reading, a
+week of fifty sites would take a minute.
 
-What happened between two moments at every site, counted in whole hours, and its newest notes. Each
+The report has what happened between two moments, also by the hour, and the newest notes. Each
 site's own report has the rest.
 """
 
@@ -33,14 +34,14 @@ from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 MAX_SITES: Final = 50
 MAX_DAYS: Final = 31
 MAX_POINTS: Final = 500
-# As a chart of a laptop's width has room for; of a week, each hour.
+# As many as fit a chart of a laptop's width: a week by the hour.
 _POINTS: Final = 168
 _DAY_NS: Final = 24 * HOUR_NS
-# At worst, s of one core: to read what is compared, and to write it.
+# Worst-case cost, s of one core, to read what is compared, and to write it.
 COMPARE_S: Final = 2.0
-# Over sites, in each bucket: between the outer two lies the middle half of them.
+# Over the sites, in each bucket: the middle half of them lies between the outer two.
 _QUANTILES: Final = (0.25, 0.5, 0.75)
-# Enough for any sensor, and the same however the sums were added up.
+# Digits: enough for any sensor, and the same in whatever order sums were added.
 _DIGITS: Final = 9
 
 _HOURS: Final = """
@@ -75,7 +76,7 @@ class OfCompare(OfPeriod):
 
 @dataclass(frozen=True, slots=True)
 class Compare:
-    """What is compared: `sites` are pairs of a site and its name, `steps` have whole hours."""
+    """The query of `/api/compare`; `sites` are pairs of a site and its name."""
 
     sensor_type: str
     sites: tuple[tuple[str, str], ...]
@@ -83,7 +84,7 @@ class Compare:
     unit: str
 
     def answer(self, connection: Any) -> Answer:
-        """The answer, of the count and sum of readings by site and bucket."""
+        """The answer, from the count and sum of readings by site and bucket."""
         steps = self.steps
         query = {
             "sensor": self.sensor_type,
@@ -111,7 +112,7 @@ class Compare:
                     "site": site,
                     "name": name,
                     "mean": _number(own.mean()) if own.size else None,
-                    # Also what is too warm by day and too cold by night is an outlier.
+                    # Also a site that is too warm by day and too cold by night is an outlier.
                     "deviation": _number(math.sqrt((away**2).mean())) if own.size else None,
                     "means": _numbers(means[site]),
                 }
@@ -160,7 +161,7 @@ def compare(
 
 
 def chosen(text: str | None, known: Mapping[str, object]) -> list[str]:
-    """The sites that are named with commas between them; all, if none is.
+    """The sites of a comma-separated list; None: all.
 
     Raises:
         NotFound: one is not in the archive.
@@ -171,7 +172,7 @@ def chosen(text: str | None, known: Mapping[str, object]) -> list[str]:
     names = list(dict.fromkeys(text.split(",")))
     for name in names:
         if name not in known:
-            why = f"there is no site {name[:64]!r} in the archive ({len(known)} others are)"
+            why = f"there is no site {name[:64]!r} in the archive, which has {len(known)}"
             raise NotFound(why)
     return names
 
@@ -241,14 +242,14 @@ class OfSitesReport(OfReport):
 
 @dataclass(frozen=True, slots=True)
 class SitesReport:
-    """`sites` are a site, its name, its active alarms, and up to when it was heard, ns."""
+    """The fleet's `/api/report`; `sites` are (site, name, active alarms, last heartbeat in ns)."""
 
     sites: tuple[tuple[str, str, int | None, int], ...]
     start_ns: int
     end_ns: int
 
     def answer(self, connection: Any) -> Answer:
-        """The answer, of what was counted by site and event, and the newest notes."""
+        """The answer, from the counts by site and event, and the newest notes."""
         query = {
             "sites": [site for site, *_ in self.sites],
             "first": self.start_ns // HOUR_NS,
@@ -278,7 +279,7 @@ class SitesReport:
             {
                 "site": site,
                 "name": names[site],
-                # Who took it back, if anybody did, and when.
+                # Who withdrew it, if anybody did, and when.
                 **note_json(
                     Note(*note), {note[0]: Note("", at_ns, by, WITHDRAW, "")} if by else {}
                 ),

@@ -1,7 +1,7 @@
-"""What the overview says of a site, and how that is put on the wire. Pure.
+"""What the overview shows of each site, as JSON and frames; and a small map of each. Pure.
 
-A site's small map: where its tags are and how each one is, as an SVG of a few hundred bytes. The
-colours are those of the page's `--pin-*`, in light and in dark.
+The map shows where the tags are and how each one is, as an SVG of a few hundred bytes. The colours
+are those of the page's `--pin-*`, in light and in dark.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import TagState
 from lupin_twin.field.grid import reach_of
 
-# Places along each side. Of tags at the same place the worst is drawn, so that no map is larger
-# than 7 kB, whatever the site.
+# Positions along each side. Of several tags at one position, the worst is drawn, so that no map is
+# larger than 7 kB, whatever the site.
 _ALONG_X: Final = 40
 _ALONG_Y: Final = 20
 # Not by colour alone: the worse, the larger.
@@ -38,7 +38,7 @@ _STYLE: Final = (
 def dots(tags: Iterable[TagState], healths: Mapping[str, Health]) -> str:
     """A path for each verdict, the worst on top; empty: no tag has a pose.
 
-    A tag that is far off the others is left out, or these would be one dot.
+    A tag that is far off the others is left out, or the others would become one dot.
     """
     every = [
         (pose.x, pose.y, healths[tag.tag_id].verdict)
@@ -52,7 +52,7 @@ def dots(tags: Iterable[TagState], healths: Mapping[str, Health]) -> str:
     left, top = min(x for x, _, _ in placed), max(y for _, y, _ in placed)
     width, height = max(x for x, _, _ in placed) - left, top - min(y for _, y, _ in placed)
     metres = max(width / _ALONG_X, height / _ALONG_Y) or 1.0
-    # In the middle; y grows upwards in the map frame, and downwards here.
+    # Centred; y grows upwards in the map frame, and downwards here.
     right, down = (_ALONG_X - width / metres) / 2, (_ALONG_Y - height / metres) / 2
     drawn: dict[tuple[int, int], Verdict] = {}
     for x, y, verdict in placed:
@@ -74,25 +74,25 @@ def map_svg(paths: str) -> bytes:
 
 
 def map_version(paths: str) -> str | None:
-    """Another one where another map is drawn; None: there is nothing to draw."""
+    """A digest that changes with the map; None: there is nothing to draw."""
     return blake2b(paths.encode(), digest_size=6).hexdigest() if paths else None
 
 
 # --- the overview ---------------------------------------------------------------------------------
 
-# A forwarder says every two seconds that it lives; this long after the last time it counts as gone.
+# A forwarder sends a heartbeat every two seconds; this long after the last it counts as gone.
 LIVE_S: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """A site as its log and its forwarder have it. Times are ns of the archive's clock.
+    """A site as its log and its forwarder show it. Times are ns of the archive's clock.
 
-    `origin` is where what it reports comes from, as far as its log says.
-    `last_seq` grows with every row, `heard_ns` is when the forwarder was heard last, 0: never.
-    `last_received_ns` is when the twin received its newest row, by the clock of its machine.
-    `verdict` and `active_alarms` are None while they are being worked out; `alarms` are the worst
-    of the active ones, as in `/api/alarms`. `dots` draw its map, `notes` is how many people wrote.
+    `origin` is where its observations come from, as far as its log reports that. `last_seq` grows
+    with every row; `heard_ns` is the forwarder's last heartbeat; 0: never. `last_received_ns` is
+    when the twin received its newest row, by the clock of its machine. `verdict` and
+    `active_alarms` are None until they are computed; `alarms` are the worst active ones, as in
+    `/api/alarms`. `dots` draw its map; `notes` is the number of notes.
     """
 
     site: str
@@ -111,7 +111,7 @@ class Site:
 
 @dataclass(frozen=True, slots=True)
 class Archive:
-    """Whether the archive answers; where it does not, `message` says why, and since when (ns)."""
+    """Whether the archive answers; if not, `message` says why, and `since_ns` since when."""
 
     is_reachable: bool
     message: str = ""
@@ -119,7 +119,7 @@ class Archive:
 
 
 def site_json(site: Site, archive: Archive, now_ns: int) -> dict[str, Any]:
-    """An entry of `/api/sites`: of a site that is silent nobody knows how it is."""
+    """An entry of `/api/sites`; the verdict of a silent site is unknown."""
     is_live = site.is_live and archive.is_reachable
     return {
         "site": site.site,
@@ -136,7 +136,7 @@ def site_json(site: Site, archive: Archive, now_ns: int) -> dict[str, Any]:
 
 
 def etag(sites: Mapping[str, Site], archive: Archive) -> str:
-    """The same from every replica that has seen the same; how long ago that was is left out."""
+    """The ETag of the overview, the same in replicas that have seen the same; ages do not count."""
     said = [(*_lasting(site),) for site in sites.values()]
     text = repr((said, archive.is_reachable)).encode()
     return f'W/"{blake2b(text, digest_size=12).hexdigest()}"'
@@ -149,14 +149,14 @@ def _lasting(site: Site) -> tuple[object, ...]:
     )
 
 
-# Of an answer; who has more to look at begins with the worst.
+# Entries of an answer at most, the worst first.
 MAX_LISTED: Final = 200
 
 
 def alarms_json(sites: Iterable[Site], archive: Archive) -> dict[str, Any]:
-    """`/api/alarms`: active ones, the worst first, then the newest; of silent sites the last known.
+    """`/api/alarms`: active ones, worst first, then newest; of silent sites, the last known.
 
-    `total` counts those too that are left out.
+    `total` includes those that are left out.
     """
     every = list(sites)
     found = [
@@ -180,7 +180,7 @@ def _worst_first(alarm: Mapping[str, Any]) -> tuple[Any, ...]:
 
 
 class SitesFrame:
-    """All sites, or what is not as in `base`, on its way to every browser; written once."""
+    """One overview for all browsers, whole or what differs from `base`; each serialized once."""
 
     def __init__(
         self,
@@ -199,15 +199,15 @@ class SitesFrame:
             base.base = None
 
     def full(self, only: tuple[str, ...] = ()) -> bytes:
-        """Every site; `only`: of these, if any is named."""
+        """A frame of every site, or `only` of these, if any is named."""
         return self._wire(self._sites.values(), (), only, is_whole=True)
 
     def delta(self, only: tuple[str, ...] = ()) -> bytes:
-        """What is not as in the frame before; all of it, where the archive comes or goes."""
-        assert self.base is not None  # the hub asks only then
+        """A frame of what differs from `base`; of all sites, if the archive has come or gone."""
+        assert self.base is not None  # the caller checks that
         known, archive = self.base._sites, self.base._archive  # noqa: SLF001  # its own
         is_all = self._archive.is_reachable != archive.is_reachable
-        # That a site still lives is no news.
+        # A heartbeat alone is no change.
         changed = [
             site
             for name, site in self._sites.items()
@@ -237,7 +237,7 @@ class SitesFrame:
 
 
 def archive_json(archive: Archive) -> dict[str, Any]:
-    """Whether it answers."""
+    """Whether the archive answers, and if not, why."""
     return {
         "is_reachable": archive.is_reachable,
         "message": archive.message,

@@ -1,6 +1,6 @@
-"""The pages of sites: made when opened, closed when nobody reads them or others need the place.
+"""The pages of sites: made when opened, closed when nobody reads them or others need the slot.
 
-A site's page has a way back to all of them: the page itself knows of no others.
+A site's page gets a link back to the overview: the HMI itself knows of only one greenhouse.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from lupin_bridge.routes.answers import error_response, has_etag, not_modified
 from lupin_bridge.serving.admission import REVALIDATE
 
 _STYLE: Final = '<link rel="stylesheet" href="./fleet-back.css" /></head>'
-# Which of them is shown is the page's to say, see `fleet-back.css`.
+# `fleet-back.css` shows the one in the page's language.
 _WORDS: Final = "".join(
     f'<span lang="{language}">{words}</span>'
     for language, words in {
@@ -41,14 +41,14 @@ _ROOT: Final = '<div id="root">'
 
 
 class SitePage:
-    """`index.html` of the folder; there may be none."""
+    """The HMI's page, `index.html` of the folder, with a link back; there may be none."""
 
     def __init__(self, static_folder: Path) -> None:
         file = static_folder / "index.html"
         self._text = file.read_text(encoding="utf-8") if file.is_file() else ""
 
     def answer(self, request: Request) -> Response | None:
-        """The page, with its query on the way back too; None: as it is, if it is there at all."""
+        """The page, whose link back keeps the query; None: it is served unchanged, or missing."""
         query = request.url.query
         if not self._text or "kiosk" in parse_qs(query, keep_blank_values=True):
             return None
@@ -61,7 +61,7 @@ class SitePage:
         return Response(body, 200, {"ETag": etag, **REVALIDATE}, "text/html; charset=utf-8")
 
 
-# A page that nobody has asked anything of for so long, and that nobody follows, is closed.
+# A page without requests or followers for this long is closed.
 _IDLE_S: Final = 120.0
 _PREFIX: Final = "/sites/"
 
@@ -79,7 +79,7 @@ class Opened:
 
 
 class SitePages:
-    """At most `limit` pages at once. `make` begins one; `sites` are those that there are."""
+    """At most `limit` open pages. `make` makes one; `sites` returns the sites that exist."""
 
     def __init__(
         self, make: Callable[[str], Opened], sites: Callable[[], Collection[str]], limit: int
@@ -102,7 +102,7 @@ class SitePages:
         if opened is None:
             if name not in self.sites():
                 known = len(self.sites())
-                return f"there is no site {name[:64]!r} in the archive ({known} others are)"
+                return f"there is no site {name[:64]!r} in the archive, which has {known}"
             if len(self._open) >= self._limit:
                 least = self._least_needed(client)
                 if least is None:
@@ -112,10 +112,10 @@ class SitePages:
         return opened
 
     def _least_needed(self, client: str) -> str | None:
-        """The site that makes place for a client's; None: none does.
+        """The site to close for one of a client's; None: there is none.
 
-        It is one that nobody reads. Where all are read, the client who reads the most gives the
-        newest that it alone reads to who has at least two fewer.
+        It is one that nobody reads. If all are read, the client that reads the most loses the
+        newest that it alone reads. It does so only to a client that reads at least two fewer.
         """
         idle = [it for it in self._open.items() if not it[1].users]
         if idle:
@@ -139,7 +139,7 @@ class SitePages:
         closing.add_done_callback(self._closing.discard)
 
     def tidy(self, now_s: float) -> None:
-        """Close those that nobody reads any more."""
+        """Close the pages that nobody reads any more."""
         for name, opened in list(self._open.items()):
             if not opened.users and now_s - opened.used_s >= _IDLE_S:
                 self._close(name)
@@ -152,7 +152,7 @@ class SitePages:
 
 
 class Sites:
-    """ASGI: what is below `/sites/NAME` goes to that site's application, as if below a prefix."""
+    """ASGI middleware: passes what is below `/sites/NAME` to that site's application."""
 
     def __init__(self, app: ASGIApp, pages: SitePages, page: SitePage) -> None:
         self._app = app
@@ -187,5 +187,5 @@ class Sites:
             await (page or found.app)(own, receive, send)
         finally:
             found.users[client] -= 1
-            found.users += Counter()  # without those who read no more
+            found.users += Counter()  # drops clients that read no more
             found.used_s = time.monotonic()

@@ -1,8 +1,8 @@
 """The process that reads the sites' logs: `query.Child`, over the archive in place of a journal.
 
-One process answers for all sites that are open here. Which site a question is of stands where the
-path of a journal does otherwise. Every query of the log names its site `:site` and is understood by
-both engines: a `SiteLog` stands in the place of a connection to a twin's own journal.
+One process answers for all open sites. A query has the name of its site in place of a journal's
+path. Every SQL query of the log has its site as `:site`, and works with both engines: a `SiteLog`
+stands in for a connection to a twin's own journal.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ _ARRIVED: Final = (
 )
 
 
-# What it is known by is of the text: the same in all replicas.
+# A map is identified by a hash of its text, which is the same in all replicas.
 _NEWER_MAP: Final = (
     "SELECT value, hashtextextended(value, 0) FROM meta WHERE site = :site AND key = :key"
     " AND hashtextextended(value, 0) <> :known"
 )
-# The number up to which the site's journal has come, by which its own notes are known.
+# The last forwarded number of the site's journal, after which notes from here are numbered.
 _FORWARDED: Final = "SELECT forwarded_seq FROM epoch WHERE site = :site ORDER BY epoch DESC LIMIT 1"
 _WRITE_MS: Final = 5_000
 logger = logging.getLogger(__name__)
@@ -60,9 +60,9 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Latest:
-    """What a site's twin would report now, as far as its log has come here."""
+    """The query of what a site's twin would report now, as far as its log has arrived."""
 
-    # Of the map that is known already.
+    # Hash of the map that is known already.
     map_hash: int
 
 
@@ -70,8 +70,8 @@ class Latest:
 class Reported:
     """All tags as of the site's time now; what is kept of the past, and what of it is simulated.
 
-    `is_walls`: that time is the wall's, so it goes on also while nothing comes. `world` is what is
-    observed.
+    `is_walls`: that time is wall-clock time, which goes on even while nothing comes. `world` is
+    what the twin observes.
     """
 
     snapshot: Snapshot
@@ -79,13 +79,13 @@ class Reported:
     world: World
     kept_ns: Stretches
     simulated_ns: tuple[int, int] | None
-    # By what the newest map is known; and itself, where that is another one.
+    # Hash of the newest map; and the map itself, if it is another one than that of the query.
     map_hash: int
     occupancy_map: OccupancyMap | None
 
 
 class ArchiveChild(Child):
-    """Answers questions about sites."""
+    """Answers queries about sites."""
 
     def __init__(self) -> None:
         super().__init__(ArchiveRecall)
@@ -105,7 +105,7 @@ class ArchiveChild(Child):
 
 
 def _write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
-    """Write what somebody said into a site's log, at the primary; returns it with its id.
+    """Write a note into a site's log, at the primary; returns it with its id.
 
     Raises:
         ArchiveError: there is no archive that can be written; `psycopg.Error`: it refuses.
@@ -116,11 +116,11 @@ def _write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
         closing(connect(archive_url(), "lupin-twin fleet")) as connection,
         connection.transaction(),
     ):
-        # Ended before its writer gives up: others read over these few connections, too.
+        # Ends before its caller gives up: others also read over these few connections.
         connection.execute(f"SET LOCAL statement_timeout = {_WRITE_MS}")
         log = SiteLog(connection, site)
         (forwarded,) = log.execute(_FORWARDED).fetchone() or (0,)
-        # Behind all that were forwarded, and before those that the twin has yet to write.
+        # After all that were forwarded, and before those that the twin has yet to write.
         written = put_note(log, max(forwarded, last_number(log)) + 1, note)
         connection.execute("SELECT pg_notify(%s, %s)", (CHANNEL, site))
         if should_stop():
@@ -139,7 +139,7 @@ def _latest(log: SiteLog, asked: Latest, frame_id: str) -> Reported:
     stamp_ns, arrival_ns = log.execute(_ARRIVED).fetchone()
     if not is_walls:
         now_ns = (stamp_ns or 0) + max(0, now_ns - (arrival_ns or now_ns))
-    # Also what a robot's clock, a little ahead of this one, has stamped: it was received.
+    # Includes stamps of a robot's clock that is a little ahead of this one: they were received.
     known = state_at(journal, FOREVER_NS, frame_id)
     return Reported(
         Snapshot(max(now_ns, stamp_ns or 0), frame_id, known.tags),
@@ -162,7 +162,7 @@ def _newer_map(log: SiteLog, known: int) -> tuple[int, OccupancyMap | None]:
 
 
 class ArchiveRecall(Recall):
-    """Asks the archive: each question in a transaction, over connections that are kept."""
+    """Queries the archive, each query in a transaction, over pooled connections."""
 
     def _answer(
         self, question: Callable[[Any, ShouldStop], AnswerT], is_abandoned: ShouldStop
@@ -187,7 +187,7 @@ class ArchiveRecall(Recall):
         with suppress(IndexError):  # there is none
             while True:
                 connection: Any = self._idle.pop()
-                # One whose server has gone says so only when it is used.
+                # A connection whose server has gone fails only when it is used.
                 try:
                     with explaining():
                         connection.execute("SELECT 1")

@@ -1,6 +1,7 @@
-"""The source of one site's page: its twin as its log in the archive has it.
+"""`SiteTwin`, the source of one site's page: its twin as its log in the archive shows it.
 
-The newest overview of the archive, as the process that watches it says. On the event loop.
+`Watching` has the newest overview of the archive, from the process that watches it. Both belong to
+the event loop.
 """
 
 from __future__ import annotations
@@ -34,10 +35,10 @@ from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
 
-# It answers at each look, every two seconds at least; a link that is dead takes half a minute
-# to be found out by the system.
+# The watching process answers every two seconds at least; the system takes half a minute to notice
+# a dead link.
 STUCK_S: Final = 6.0
-# Before its first answer it has to be started, and to connect.
+# Longer before its first answer: it has to start and connect.
 _START_S: Final = 15.0
 _RETRY_S: Final = 1.0
 
@@ -45,7 +46,7 @@ _RETRY_S: Final = 1.0
 class Watching:
     """The sites and the archive as they were seen last, from `start` to `stop`.
 
-    `on_news` is called where anything is not as it was.
+    `on_news` is called when anything has changed.
     """
 
     def __init__(self, settings: Settings, on_news: Callable[[], None]) -> None:
@@ -53,7 +54,7 @@ class Watching:
         self.archive = Archive(is_reachable=False, message="the archive has not been read yet")
         self.looks = 0
         self._on_news = on_news
-        # What an archive's clock is ahead of this process's steady one.
+        # How far the archive's clock is ahead of this process's monotonic one.
         self._ahead_ns = time.time_ns() - time.monotonic_ns()
         self.process = PastProcess("lupin_bridge.fleet.watcher")
         self._settings = settings
@@ -65,11 +66,11 @@ class Watching:
         return time.monotonic_ns() + self._ahead_ns
 
     def start(self) -> None:
-        """Begin to watch."""
+        """Start watching."""
         self._task = asyncio.create_task(self._keep(), name="watching")
 
     async def stop(self) -> None:
-        """End."""
+        """Stop."""
         await end(self._task)
         await self.process.stop()
 
@@ -85,14 +86,14 @@ class Watching:
             await asyncio.sleep(_RETRY_S)
 
     async def _look(self) -> News:
-        """What is new; that it takes long is said meanwhile."""
+        """Wait for news; if they take too long, report that meanwhile."""
         about = Now(0, "", UNKNOWN_JOURNAL)
         settings: Any = self._settings  # see `WatchChild`
         look: asyncio.Task[News] = asyncio.create_task(self.process.ask(settings, about, 0.0))
         try:
             patience_s = STUCK_S if self.looks else _START_S
             done, _ = await asyncio.wait((look,), timeout=patience_s)
-            # Once it is said why, that stays: a query that is ended for its time says more.
+            # A reason that was reported before stays: that of a cancelled query says more.
             if not done and (self.archive.is_reachable or not self.archive.since_ns):
                 self._down(f"the archive has not answered for {STUCK_S:g} s")
             return await look
@@ -127,7 +128,7 @@ _NO_REPORT: Final = "how right estimates were is known to the twin of the greenh
 
 
 class SiteTwin(TwinSource):
-    """`TwinSource` over a site's log; `past` reads those of all sites, `workers` are of all."""
+    """`TwinSource` over a site's log; all sites share `past` and `workers`."""
 
     answerer = "the archive"
 
@@ -145,20 +146,20 @@ class SiteTwin(TwinSource):
         self.workers = workers
         self.relay = Relay(_no_ros, None)
         self._watching = watching
-        # The parameters of a twin are not in its log: where they are others there, fields differ.
+        # A twin's parameters are not in its log: if they are not the defaults, fields differ.
         self._parameters = TwinParameters()
         self.rules = FieldRules.of(self._parameters)
         self.buffer_len = self._parameters.buffer_len
-        # As a twin's are called unless they are renamed; nobody is heard by them here.
+        # A twin's default names; nothing is received under them here.
         self.names = TwinNames("/twin/state", "/twin/get_field")
         self._map: OccupancyMap | None = None
         self._map_hash = 0
         self._reported: Reported | None = None
         self._read_ns = 0
         self._seq = -1
-        # Why what is new could not be read.
+        # Why new rows could not be read.
         self._problem = ""
-        # Whether it was live, up to where it was read, what was wrong.
+        # As last notified: whether it was live, up to where it was read, what was wrong.
         self._said: tuple[bool, int, str] | None = None
         self._wake = asyncio.Event()
         self._has_read = asyncio.Event()
@@ -169,25 +170,25 @@ class SiteTwin(TwinSource):
         on_state: Callable[[TwinUpdate], None],
         on_death: Callable[[], None],  # noqa: ARG002  # there is no thread that could die
     ) -> None:
-        """Begin to follow the site; who opens it first waits for what is known of it."""
+        """Start following the site; waits for its first state, within the time-out."""
         self._task = asyncio.create_task(self._follow(on_state), name=f"site {self.site}")
         if self._watching.archive.is_reachable:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._has_read.wait(), self.timeout_s)
 
     async def stop(self) -> None:
-        """End; the process that reads goes on for others."""
+        """Stop; the process that reads goes on for other sites."""
         await end(self._task)
 
     def on_news(self) -> None:
-        """The overview has changed: maybe this site."""
+        """See whether this site has changed: the overview has."""
         site = self._site
         if site.last_seq != self._seq or self._said is None or self._is_live != self._said[0]:
             self._wake.set()
 
     @property
     def world(self) -> World:
-        """As the site's log says."""
+        """See `TwinSource`: by the site's log."""
         return World("unknown") if self._reported is None else self._reported.world
 
     @property
@@ -199,7 +200,7 @@ class SiteTwin(TwinSource):
         return self._watching.archive.is_reachable and self._site.is_live
 
     async def _follow(self, on_state: Callable[[TwinUpdate], None]) -> None:
-        """Read what is new; and meanwhile say that the site is live, however long that takes."""
+        """Read new rows; meanwhile, report that the site is live, however long reading takes."""
         reading = asyncio.create_task(self._keep_reading(on_state), name=f"read {self.site}")
         try:
             while True:
@@ -249,14 +250,14 @@ class SiteTwin(TwinSource):
         ago_s = max(0.0, (self._watching.now_ns - site.heard_ns) / 1e9) if site.heard_ns else 0.0
         stamp_ns = self._now_ns(reported)
         if not is_live:
-            # As of when it was last heard: who shows it adds for how long that was ago.
+            # As of the forwarder's last heartbeat: readers add `silent_s`.
             stamp_ns = site.heard_ns if reported.is_walls else _newest_ns(reported)
         before = None if self.update is None else self.update.snapshot
         self.update = TwinUpdate(
             replace(
                 reported.snapshot, stamp_ns=stamp_ns, tags=same_tags(before, reported.snapshot.tags)
             ),
-            # Of what was read: the same in all replicas.
+            # Made of what was read: the same in all replicas.
             f"{self.site}-{self._seq}-{self._map_hash}",
             occupancy_map=self._map,
             journal=self.journal(),
@@ -276,7 +277,7 @@ class SiteTwin(TwinSource):
     # --- see `TwinSource` ---------------------------------------------------------------------
 
     def journal(self) -> Condition:
-        """The site's log, whose path is the site."""
+        """The condition of the site's log, whose path is the site's name."""
         site, reported = self._site, self._reported
         complete_ns = None
         if reported is not None:
@@ -292,13 +293,13 @@ class SiteTwin(TwinSource):
         )
 
     async def estimate_report(self, request: ReportRequest) -> Report:  # noqa: ARG002  # none
-        """None: how right estimates were is counted by the twin."""
+        """Always raises `NotFound`: only the twin counts how right estimates were."""
         raise NotFound(_NO_REPORT)
 
     writes_notes = True
 
     async def write_note(self, note: Note) -> Note:
-        """Into the site's log in the archive, where every replica reads it."""
+        """See `TwinSource`: into the site's log in the archive, where every replica reads it."""
         try:
             written: Note = await self._in_time(self._reading(note))
         except NotRemembered as error:
@@ -306,7 +307,7 @@ class SiteTwin(TwinSource):
         return written
 
     async def now(self) -> Now:
-        """What who looks back has to know of now."""
+        """See `TwinSource`."""
         reported = self._reported
         if reported is None:
             raise TwinUnavailableError(f"the site has not been read yet. {self._problem}".strip())

@@ -1,8 +1,7 @@
-"""The process that watches the archive: what is new of which site, and how each one is.
+"""The process that watches the archive, and judges each site.
 
-It answers each look with the sites that are not as before. A site's verdict and its alarms are
-worked out where its last number has changed, by the judge that every bridge has, from the rows that
-have come since.
+It answers each query with the sites that have changed. When a site's last number has changed, the
+new rows give its verdict and alarms, by the same judge that a bridge has.
 """
 
 from __future__ import annotations
@@ -47,21 +46,21 @@ log = logging.getLogger(__name__)
 
 AnswerT = TypeVar("AnswerT")
 
-# A forwarder's word that there is something new wakes it at once; that may be lost, so it looks.
+# A forwarder's notification wakes it at once; that may be lost, so it polls too.
 POLL_S: Final = 2.0
-# Of what came together, the rest goes along.
+# Further notifications within this time are taken together with the first.
 _GATHER_S: Final = 0.05
-# So long it judges before it looks again: a site's freshness waits for no other site's verdict.
+# How long it judges before it looks again: no site's liveness waits for the verdicts of others.
 _JUDGING_S: Final = 1.0
-# What grows old does so by itself; how soon that is said.
+# Interval of judging a site again without new rows, because its readings grow old.
 _AGE_S: Final = 10.0
 _LOT: Final = 2_000
-# Of a site, the worst; all of them are on its own page.
+# The worst alarms of a site that are shown; all of them are on its own page.
 MAX_ALARMS: Final = 20
 # As many as a bridge reads of the past, see `alarms.feed`.
 _REACH_COUNT: Final = 300_000
 
-# Whatever a site has written of itself: no value of its own may end the look at all of them.
+# No value that a site has written, whatever it is, may break this query of all sites.
 _FACTS: Final = (
     "SELECT site.site, site.name, coalesce(CAST(extract(epoch FROM"
     " least(greatest(heard_at, 'epoch'), now())) * 1e9 AS BIGINT), 0),"
@@ -85,9 +84,9 @@ _NOW: Final = "SELECT CAST(extract(epoch FROM now()) * 1e9 AS BIGINT)"
 
 @dataclass(slots=True)
 class _Judged:
-    """What is kept of a site to judge it again; `seq` is up to where that was done.
+    """What is kept of a site to judge it again; `seq` is the last number that was judged.
 
-    `was_live` is whether it was so then, `notes` are all that people had written.
+    `was_live` is whether it was live then; `notes` are all notes until then.
     """
 
     judge: Judge
@@ -105,7 +104,7 @@ class _Judged:
 
 
 def _origin(name: str, judged: _Judged) -> Origin:
-    """By a clock that is simulated no robot works; which clock it is, is known of a judged site."""
+    """A site's origin: never a robot if its clock is simulated, which only judging finds out."""
     if judged.snapshot is None:
         return "unknown" if name == "robot" else origin_of(name, is_simulated=False)
     return origin_of(name, is_simulated=judged.is_simulated)
@@ -122,14 +121,14 @@ class Watcher:
         self.sites: dict[str, Site] = {}
         self._judged: dict[str, _Judged] = {}
         self._reported: Mapping[str, Site] | None = None
-        # By the archive's clock, of the last look.
+        # Time of the last look, by the archive's clock.
         self._now_ns = 0
         self._is_judging = False
         with suppress(psycopg.errors.ReadOnlySqlTransaction):
-            connection.execute(f"LISTEN {CHANNEL}")  # a standby knows no such thing
+            connection.execute(f"LISTEN {CHANNEL}")  # a standby cannot listen
 
     def news(self) -> News:
-        """What is not as it was; it looks and judges in turn, for who lives is reported first."""
+        """What has changed; looks and judges by turns, so that liveness is reported first."""
         if self._is_judging:
             until_s = time.monotonic() + _JUDGING_S
             for _ in self._judge_due(self._now_ns):
@@ -145,7 +144,7 @@ class Watcher:
         return News(self._now_ns, tuple(self.sites), changed)
 
     def _wait(self) -> None:
-        """Until somebody says that there is something new, or it is time to look."""
+        """Wait for a notification, or until it is time to look."""
         is_notified = False
         for _ in self.connection.notifies(timeout=POLL_S, stop_after=1):
             is_notified = True
@@ -154,7 +153,7 @@ class Watcher:
                 pass
 
     def _see(self) -> int:
-        """See who lives, and whose log has grown; returns the time of the archive's clock, ns."""
+        """Read which sites are live, and whose log has grown; returns the archive's time, ns."""
         execute = self.connection.execute
         ((now_ns,),) = execute(_NOW).fetchall()
         before, self.sites = self.sites, {}
@@ -182,14 +181,14 @@ class Watcher:
         return int(now_ns)
 
     def _judge_due(self, now_ns: int) -> Iterator[str]:
-        """Judge the sites whose turn it is, the longest ago first; gives each name when done."""
+        """Judge the sites that are due, the longest ago first; yields each name when done."""
         for name in sorted(self.sites, key=lambda name: self._judged[name].judged_s):
             if self._is_due(name):
                 self._judge_safely(name, now_ns)
                 yield name
 
     def _is_due(self, name: str) -> bool:
-        """Whether a site's turn has come."""
+        """Whether a site has to be judged."""
         site, judged = self.sites[name], self._judged[name]
         is_behind = (
             judged.seq != site.last_seq
@@ -200,7 +199,7 @@ class Watcher:
         return (is_behind and not judged.is_failing) or time.monotonic() - judged.judged_s >= _AGE_S
 
     def _judge_safely(self, name: str, now_ns: int) -> None:
-        """Judge a site; one that cannot be judged is unknown, and costs no other its status."""
+        """Judge a site; one that cannot be judged is unknown, and does not affect the others."""
         import psycopg  # noqa: PLC0415  # the extra `fleet`
 
         judged = self._judged[name]
@@ -208,7 +207,7 @@ class Watcher:
             self._judge(name, judged, now_ns)
         except Exception as error:  # whatever is in its rows, or how long they take
             if self.connection.closed:
-                raise  # of the archive, not of the site
+                raise  # the archive's error, not the site's
             if not judged.is_failing:
                 is_known = isinstance(error, DamagedFile | psycopg.Error)
                 why = "site %s cannot be judged: its status is unknown: %s"
@@ -237,9 +236,9 @@ class Watcher:
                 judged.note_count = site.notes
         assert judged.snapshot is not None  # it has been read above, at the latest
         newest_ns = judged.snapshot.stamp_ns
-        # A simulation's time stands between two looks.
+        # A simulation's time does not advance between two looks.
         now_ns = newest_ns if judged.is_simulated else now_ns
-        # What was known last of a site that is silent does not grow old.
+        # The last known state of a silent site does not grow old.
         moment_ns = now_ns if site.is_live else min(now_ns, max(site.heard_ns, newest_ns))
         if judged.is_caught_up:
             alarms = _alarms(site, judged, moment_ns)
@@ -264,7 +263,7 @@ class Watcher:
         judged.is_simulated = span is not None and span.run.begun.is_simulated
         found = state_at(log, FOREVER_NS, "")
         before = judged.snapshot
-        # What has not changed is judged no second time.
+        # Unchanged tags are not judged a second time.
         tags = same_tags(before, found.tags)
         newest_ns = max((tag.last_observed_ns or 0 for tag in tags), default=0)
         judged.snapshot = replace(found, stamp_ns=newest_ns, tags=tags)
@@ -285,9 +284,9 @@ class Watcher:
 
 
 def _alarms(site: Site, judged: _Judged, moment_ns: int) -> list[Alarm]:
-    """Those of its log, and that it is silent: as on its own page, to the id.
+    """The alarms of its log, and that of its silence, with the same ids as on its own page.
 
-    The judge hears of the quantities of a day that they are of.
+    Also gives the judge the daily quantities of the log.
     """
     reach_ns = int(Limits().alarm_days * 86_400e9)
     found: list[Alarm] = []
@@ -305,7 +304,7 @@ def _alarms(site: Site, judged: _Judged, moment_ns: int) -> list[Alarm]:
 
 @dataclass(frozen=True, slots=True)
 class News:
-    """`names` are those of all sites, `changed` the sites that are new or not as before."""
+    """The answer: `names` are those of all sites, `changed` the sites that are new or changed."""
 
     now_ns: int
     names: tuple[str, ...]
@@ -313,7 +312,7 @@ class News:
 
 
 class WatchChild(Child):
-    """Looks whenever it gets the settings to judge by; it knows what it has answered before."""
+    """Answers each query, which is the settings to judge by, with the changes since the last."""
 
     def __init__(self) -> None:
         super().__init__(_WithoutJournal)

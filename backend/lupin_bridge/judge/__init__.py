@@ -1,1 +1,1 @@
-"""What the twin says, judged: by the ranges of one file, for page, frames and HTTP alike."""
+"""Judges what the twin reports by the ranges of one file, for page, frames and HTTP alike."""

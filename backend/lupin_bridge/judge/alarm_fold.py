@@ -1,7 +1,7 @@
-"""From the log, write by write, to the alarms of all tags and of the greenhouse. Pure.
+"""Folds the log, write by write, into the alarms of all tags and of the greenhouse. Pure.
 
-The alarms are the same whatever the order of receiving, however often anything was received, and
-however that was divided: they follow from the log, the ranges, and the moment.
+The alarms depend on the log, the ranges and the moment alone: not on the order of receipt, on
+repetition, or on how writes are divided into lots.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_twin.core.past import FOREVER_NS, HOUR_NS, PastWrite, RunSpan
 from lupin_twin.core.state import Reading
 
-# Writes that are kept, of all tags about; of a tag its share of these.
+# Writes kept for all tags together, roughly; each tag has an equal share.
 KEPT: Final = 100_000
-# What is over and not reported any more is dropped as often as that.
+# Interval of dropping what is over and no longer reported.
 FORGET_EVERY_NS: Final = HOUR_NS
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """All alarms, in no order, the very same tuple where none is another than before.
+    """All alarms, unordered; the same tuple object if none has changed.
 
-    At `due_ns` they may be others by themselves. `days` are, by tag, the values of quantities of a
-    day: those of the last whole one, of the newest run.
+    At `due_ns` they may change by time alone. `days` has, by tag, the daily quantities of the last
+    whole day of the newest run.
     """
 
     alarms: tuple[Alarm, ...]
@@ -53,19 +53,19 @@ class _Run:
     limits: dict[int, int] = field(default_factory=dict)
     news: dict[str, None] = field(default_factory=dict)
     house: tuple[Alarm, ...] = ()
-    # Whether the pauses of before are others, and with them what was overdue.
+    # Whether earlier pauses have changed, and with them what was overdue.
     is_late: bool = False
-    # When the tags whose gap is open will be overdue.
+    # By tag with an open gap: when it will be overdue.
     due: dict[str, int] = field(default_factory=dict)
 
 
 class Follower:
-    """Belongs to one thread at a time.
+    """Derives the alarms from the writes that it takes. Belongs to one thread at a time.
 
-    `spans` are the runs of the clock; of other ones another follower has to be made. `kept` is how
-    many writes are kept, about; `max_episodes` how many cleared alarms are, of each tag.
+    `spans` are the runs of the clock; when they change, a new follower is needed. It keeps about
+    `kept` writes, and `max_episodes` cleared alarms of each tag.
 
-    `missed` counts what was older than what is kept of its tag; it was not taken in.
+    `missed` counts writes that were ignored because they were older than what is kept of their tag.
     """
 
     def __init__(
@@ -92,12 +92,12 @@ class Follower:
         self._alarms: tuple[Alarm, ...] = ()
 
     def take(self, writes: Iterable[PastWrite]) -> None:
-        """Take in what was received."""
+        """Take writes, in the order of receipt."""
         for write in writes:
             if write.stamp_ns < self._forgotten_ns:
                 self.missed += 1
                 continue
-            # Where two runs overlap, the newer one is told.
+            # Where two runs overlap, only the newer one counts.
             spans = self._spans_of.get(write.run, ())
             if not any(span.start_ns <= write.stamp_ns < span.end_ns for span in spans):
                 continue
@@ -111,7 +111,7 @@ class Follower:
     def found(self, now_ns: int, since_ns: int = 0) -> Found:
         """The alarms at `now_ns`.
 
-        Those that were over before `since_ns` may be among them; they are forgotten by and by.
+        Those cleared before `since_ns` may be among them; they are dropped from time to time.
         """
         if since_ns > self._forgotten_ns + FORGET_EVERY_NS:
             self._forget(since_ns)
@@ -142,7 +142,7 @@ class Follower:
             run.tags[write.tag_id] = tag
         newest_ns = run.stretches.newest_ns
         if newest_ns is not None and write.stamp_ns <= newest_ns:
-            # How long a pause may be follows from the scans before it: of earlier ones it stands.
+            # A pause's limit follows from the scans before it, so those of earlier pauses stand.
             run.limits = {at: ns for at, ns in run.limits.items() if at < write.stamp_ns}
             run.is_late |= run.stretches.add(write.stamp_ns)
         else:
@@ -152,7 +152,7 @@ class Follower:
             self.missed += 1
 
     def _settle(self, run: _Run) -> None:
-        """Work out what each tag's news say of the day, and forget what there is no room for."""
+        """Update day and night from the tags with news, and drop writes past the limit."""
         changed_ns = FOREVER_NS
         for tag_id in run.news:
             at_ns = run.days.put(tag_id, run.tags[tag_id].trail.turns)
@@ -167,7 +167,7 @@ class Follower:
             run.tags[tag_id].keep(keep)
 
     def _forget(self, before_ns: int) -> None:
-        """What was over before is reported no more, and must not grow as long as this runs."""
+        """Drop what was over before a moment: it is no longer reported, and must not pile up."""
         self._forgotten_ns = before_ns
         for number, run in list(self._runs.items()):
             newest_ns = run.stretches.newest_ns
@@ -185,11 +185,11 @@ class Follower:
     def _is_day(self, run: _Run) -> Callable[[int], bool]:
         return lambda at_ns: self._criteria.day(run.days.is_day(at_ns), at_ns).is_day
 
-    # --- telling -------------------------------------------------------------------------------
+    # --- the alarms ----------------------------------------------------------------------------
 
     def _judge(self, run: _Run, *, is_on: bool) -> None:
         last_ns = run.stretches.newest_ns or 0
-        # Of a run that is over, what is overdue ends with the last that was received in it.
+        # In a run that is over, overdue alarms end with the last write received in it.
         is_all = run.is_late or (run.news and not is_on)
         due = [tag_id for tag_id, due_ns in run.due.items() if due_ns <= last_ns]
         ask = dict.fromkeys(run.tags) if is_all else run.news | dict.fromkeys(due)
@@ -216,7 +216,7 @@ class Follower:
             table[tag_id] = alarms
 
     def _overdue(self, run: _Run, tag_id: str, last_ns: int, *, is_on: bool) -> Iterator[Alarm]:
-        """Of a tag that is not scanned, while others are: pauses of the greenhouse do not count."""
+        """Yield the alarms of a tag that is not scanned while others are; pauses do not count."""
         run.due.pop(tag_id, None)
         for gap in run.tags[tag_id].gaps:
             due_ns = run.stretches.overdue_ns(gap.start_ns, gap.holds_ns) + 1
@@ -242,7 +242,7 @@ class Follower:
             )
 
     def _stops(self, run: _Run, now_ns: int | None, since_ns: int) -> tuple[tuple[Alarm, ...], int]:
-        """When nothing was tried anywhere for longer than the tags' own scan intervals allow."""
+        """The alarms of pauses that exceed the tags' scan intervals, and the next due time."""
         found: list[Alarm] = []
         due_ns = FOREVER_NS
         last_ns = run.stretches.newest_ns
@@ -263,9 +263,9 @@ class Follower:
         return tuple(found), due_ns
 
     def _limit_ns(self, run: _Run, at_ns: int) -> int:
-        """How long nothing may be tried after a moment: as long as half of the tags may wait.
+        """How long a pause from a moment on may last: the median validity of the tags' readings.
 
-        Pauses come one behind the other; that of a moment does not change any more.
+        It is cached, as a moment's limit does not change any more.
         """
         limit_ns = run.limits.get(at_ns)
         if limit_ns is None:

@@ -1,10 +1,10 @@
 """Whether it is day in the greenhouse: by its own light, else by the clock. Pure.
 
-Light decides where it was measured lately, for lamps make day in winter and screens make night in
-summer. The greenhouse is one: what half of its sensors say or more, each by its newest reading
-unless scans have left that out for long.
+Recently measured light decides: lamps make day in winter, and screens make night in summer. The
+whole greenhouse has day if at least half of its light sensors say so. Each counts by its newest
+reading, unless scans have left it out for long.
 
-And quantities of a day, one value a day of a tag: from dawn to dawn by the clock.
+Also the daily quantities of a tag: one value for each day, from dawn to dawn by the clock.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from lupin_bridge.judge.quantities import DAILY, Course, IsDay, Sensors
 from lupin_twin.core.past import DAY_NS, PastWrite
 from lupin_twin.core.state import Reading
 
-# The sensor that tells, by its name.
+# The name of the light sensor.
 LIGHT: Final = "light"
-# The dullest day gives a greenhouse some hundred lx, moon and lamps outside less than ten.
+# The dullest day gives a greenhouse some hundred lx; the moon and lamps outside, less than ten.
 DAY_FROM_LX: Final = 50.0
-# A light that the scans of its tag have left out for longer says nothing of their day any more.
+# A light sensor that the scans of its tag have left out for longer than this no longer counts.
 LEFT_OUT_NS: Final = 2 * 3600 * 1_000_000_000
 
 Source = Literal["light", "clock", "assumed"]
@@ -34,7 +34,7 @@ Source = Literal["light", "clock", "assumed"]
 
 @dataclass(frozen=True, slots=True)
 class Day:
-    """Whether it is day, and what says so: the light, the clock, or nothing (then it is day)."""
+    """Whether it is day, and what decided that: light, clock, or nothing (then it is day)."""
 
     is_day: bool
     source: Source
@@ -42,9 +42,9 @@ class Day:
 
 @dataclass(frozen=True, slots=True)
 class ClockDay:
-    """From when to when it is day by the clock on the wall; the zone None is this machine's.
+    """The hours of day by wall-clock time; zone None: this machine's.
 
-    From an hour to the same hour it is always day.
+    If `begins` equals `ends`, it is always day.
     """
 
     zone: tzinfo | None
@@ -52,14 +52,14 @@ class ClockDay:
     ends: time = time(20)
 
     def is_day(self, now_s: float) -> bool:
-        """`now_s` is Unix time; a day may end after midnight."""
+        """Whether it is day at `now_s`, Unix time; a day may end after midnight."""
         wall = datetime.fromtimestamp(now_s, self.zone).time()
         if self.begins < self.ends:
             return self.begins <= wall < self.ends
         return wall >= self.begins or wall < self.ends
 
     def nights(self, from_s: float, to_s: float) -> Iterator[tuple[float, float]]:
-        """The nights that meet a period, from when to when, Unix time, oldest first."""
+        """Yield (dusk, dawn) of the nights that overlap a period, Unix time, oldest first."""
         if self.begins == self.ends:
             return
         # A day that ends after midnight is followed by a dawn of the same date.
@@ -81,21 +81,21 @@ class ClockDay:
 
 
 def says_day(light_lx: float | None) -> bool | None:
-    """What a sensor's reading says; None or not finite: nothing."""
+    """Whether a reading of light says that it is day; None: there is none, or it is not finite."""
     if light_lx is None or not math.isfinite(light_lx):
         return None
     return light_lx >= DAY_FROM_LX
 
 
 class Light:
-    """The light of all tags, by tag: what each says, and how many say that it is day."""
+    """What the light sensor of each tag says, and how many say that it is day."""
 
     def __init__(self) -> None:
         self._is_bright: dict[str, bool] = {}
         self._bright = 0
 
     def put(self, tag_id: str, says: bool | None) -> None:
-        """What a tag's sensor says now; None: nothing."""
+        """Set what a tag's sensor says now; None: nothing."""
         self._bright -= self._is_bright.pop(tag_id, False)
         if says is not None:
             self._is_bright[tag_id] = says
@@ -103,12 +103,12 @@ class Light:
 
     @property
     def is_day(self) -> bool | None:
-        """What half of the sensors say or more; None without any."""
+        """Whether at least half of the sensors say that it is day; None: there are none."""
         return 2 * self._bright >= len(self._is_bright) if self._is_bright else None
 
 
 def judge_day(light: bool | None, clock: ClockDay | None, now_s: float | None) -> Day:
-    """By what the light says; where that is nothing, by the clock at `now_s` (Unix time)."""
+    """Decide by the light; if that is None, by the clock at `now_s` (Unix time)."""
     if light is not None:
         return Day(light, "light")
     if clock is not None and now_s is not None:
@@ -116,12 +116,12 @@ def judge_day(light: bool | None, clock: ClockDay | None, now_s: float | None) -
     return Day(True, "assumed")
 
 
-# From a moment of ROS time on, ns, what a tag's sensor said: day, night, or nothing.
+# From a moment on (ns of ROS time), a tag's light sensor says day, night, or nothing.
 Turn = tuple[int, bool | None]
 
 
 class DayLine:
-    """The days and nights of a greenhouse; tags are known by any name."""
+    """The days and nights of a greenhouse over time, by the light of all its tags."""
 
     def __init__(self) -> None:
         self._turns: dict[str, tuple[Turn, ...]] = {}
@@ -132,13 +132,13 @@ class DayLine:
         self._is_day: list[bool | None] = []
 
     def forget(self, before_ns: int, turns: Mapping[str, Sequence[Turn]]) -> None:
-        """Of what was before, nothing is asked any more; `turns` are all that are left."""
+        """Forget what was before a moment; `turns` are all that is left, by tag."""
         self._since_ns = before_ns
         self._turns = {tag_id: tuple(of_tag) for tag_id, of_tag in turns.items()}
         self._rebuild()
 
     def put(self, tag_id: str, turns: Sequence[Turn]) -> int | None:
-        """All of a tag's turns; from when on those of the greenhouse may be other, or None."""
+        """Set all turns of a tag; returns from when on the greenhouse's may differ; None: never."""
         before, now = self._turns.get(tag_id, ()), tuple(turns)
         if now == before:
             return None
@@ -152,7 +152,7 @@ class DayLine:
         return self._rebuild()
 
     def is_day(self, at_ns: int) -> bool | None:
-        """What the light of then said; None: none had been measured."""
+        """Whether it was day by the light at that moment; None: none had been measured."""
         index = bisect_right(self._at, at_ns)
         return self._is_day[index - 1] if index else None
 
@@ -172,7 +172,7 @@ class DayLine:
         return min(changed, default=None)
 
     def _line(self) -> list[Turn]:
-        """The greenhouse's days and nights, as far back as they are asked for."""
+        """The greenhouse's turns of day and night, back to `_since_ns`."""
         known = zip(self._at, self._is_day, strict=True)
         first = (self._since_ns, self.is_day(self._since_ns))
         return [first, *(turn for turn in known if turn[0] > self._since_ns)]
@@ -190,11 +190,11 @@ class DayLine:
             self._is_day.append(is_day)
 
 
-# --- quantities of a day --------------------------------------------------------------------------
+# --- daily quantities -----------------------------------------------------------------------------
 
 # A value counts until the next one, and no longer than this after its day was complete.
 COUNTS_NS: Final = 30 * 3600 * 1_000_000_000
-# Scans of so long before a moment say all of the days that count then: one is complete within two.
+# Scans of this long before a moment give all days that count then: a day is complete within two.
 SINCE_NS: Final = COUNTS_NS + 2 * DAY_NS
 _MINUTE_NS: Final = 60 * 1_000_000_000
 ValueT = TypeVar("ValueT")
@@ -204,7 +204,7 @@ DayNumber = Callable[[int], int]
 
 @dataclass(slots=True)
 class TagDays:
-    """A tag's days; `step` takes the readings of each sensor in the order of time."""
+    """A tag's daily quantities; `step` takes the readings of each sensor in the order of time."""
 
     sensors: Sensors
     is_day: IsDay
@@ -214,11 +214,11 @@ class TagDays:
     _courses: dict[str, tuple[int, Course]] = field(default_factory=dict)
 
     def copy(self) -> TagDays:
-        """The same, to go on from here apart."""
+        """An independent copy."""
         return replace(self, values=dict(self.values), _courses=dict(self._courses))
 
     def step(self, name: str, value: float, stamp_ns: int) -> Sequence[Reading]:
-        """The next reading of a sensor; what the first of a day says of the day before."""
+        """Take a sensor's next reading; the first of a day returns the values of the day before."""
         quantities = self.sensors.judged_by_the_day.get(name)
         if quantities is None:
             return ()
@@ -243,7 +243,7 @@ class TagDays:
 
 
 def _by_the_minute(of: Callable[[int], ValueT]) -> Callable[[int], ValueT]:
-    """The same for many moments: day and night begin on whole minutes."""
+    """The function, cached by the minute: day and night begin on whole minutes."""
     known = cache(lambda minute: of(minute * _MINUTE_NS))
     return lambda at_ns: known(at_ns // _MINUTE_NS)
 
@@ -251,11 +251,11 @@ def _by_the_minute(of: Callable[[int], ValueT]) -> Callable[[int], ValueT]:
 def days_of(
     scans: Iterable[PastWrite], sensors: Sensors, is_day: IsDay, number: DayNumber
 ) -> Mapping[str, Sequence[Reading]]:
-    """By tag, what its scans of `SINCE_NS` up to a moment, oldest first, say of its last day."""
+    """By tag, the daily quantities of its last day; `scans`: the last `SINCE_NS`, oldest first."""
     every: dict[str, dict[str, dict[int, float]]] = {}
     for scan in scans:
         for name, value in zip(scan.sensors, scan.values, strict=True):
-            # Of one moment, what was received last.
+            # For one moment, the value received last counts.
             every.setdefault(scan.tag_id, {}).setdefault(name, {})[scan.stamp_ns] = value
     is_day, number = _by_the_minute(is_day), _by_the_minute(number)
     found = {}

@@ -1,18 +1,21 @@
-"""Alarms, and the episodes of one tag: what was wrong from when to when, by its occasions alone.
+"""The episodes of one tag, from which alarms are made: what was wrong, from when to when.
 
-Pure; ns of ROS time. An alarm is one episode of a reason at a tag, or of the greenhouse. It is
-never stored: it follows from what was observed and from the ranges.
+Pure; times are ns of ROS time. An alarm is one episode of a reason at a tag, or of the greenhouse.
+It is never stored: it is derived from the observations and the ranges.
 
 An occasion is all that was received of a tag with one stamp. A reason that holds at two occasions
-in a row, of those that can tell, raises an alarm; one that has not held at two clears it. Attempts
-that fail raise one only where they go on for the tag's usual interval: a second one in a round says
-no more than the first. A sensor that scans leave out is old once its reading holds no longer, but
-not before three times the sensor's own last interval: what every tenth scan has is not missing from
-the others. Received once, it has no interval yet. Too little light raises one after two hours:
-before, it may be dawn or dusk. A pest raises one at once: a later inspection that sees none may
-have missed it. What is out of its range is so until it lies within by 5 % of the range's width: a
-value that wobbles about a limit is one episode. A quantity of a day has one value a day, known at
-the first scan of the next one: that raises or clears, and has no deadband.
+in a row raises an alarm, and two without it clear that; only occasions that can show it count. But:
+- Failed attempts have to go on for the tag's usual interval: a second one in the same round says no
+  more than the first.
+- A sensor that scans leave out is old once its reading is no longer valid, but not before three
+  times the sensor's own last interval: a sensor of every tenth scan is not missing from the others.
+  Received once, it has no interval yet.
+- Too little light has to last two hours: before that, it may be dawn or dusk.
+- A pest raises an alarm at once: a later inspection that sees none may have missed it.
+- A value out of range counts as such until it is inside by 5 % of the range's width: a value that
+  wobbles about a limit is one episode.
+- A daily quantity is known at the first scan of the next day. Its one value raises or clears the
+  alarm, without deadband.
 """
 
 from __future__ import annotations
@@ -76,10 +79,10 @@ class Alarm:
 
 
 def alarm_id(tag_id: str, kind: str, sensor: str, run_ns: int, began_ns: int) -> str:
-    """The same for the same episode, whoever works it out.
+    """The id of an episode, the same in every process that computes it.
 
-    `began_ns` is the observation with which it began, `run_ns` when the twin's clock began to run
-    that tells its time: a simulation tells the same times again and again.
+    `began_ns` is the observation with which it began. `run_ns` is the start of that run of the
+    twin's clock: a simulation has the same times again and again.
     """
     digest = blake2b(digest_size=12)
     for part in (tag_id, kind, sensor, str(run_ns), str(began_ns)):
@@ -90,7 +93,7 @@ def alarm_id(tag_id: str, kind: str, sensor: str, run_ns: int, began_ns: int) ->
 
 
 def silence(last_ns: int) -> Alarm:
-    """That of a twin that was received last at a moment."""
+    """The alarm of a silent twin, which was last received at `last_ns`."""
     reason = Reason(Kind.SILENT, Verdict.UNKNOWN, since_ns=last_ns)
     return Alarm(alarm_id(SITE, Kind.SILENT, "", 0, last_ns), reason, SITE, last_ns)
 
@@ -99,17 +102,17 @@ def silence(last_ns: int) -> Alarm:
 HOLD: Final = 2
 # Dawn and dusk, and a cloud, are over by then.
 TWILIGHT_NS: Final = 2 * 3600 * 1_000_000_000
-# Cleared episodes of a tag that are kept by default: a sensor that goes wild has no more.
+# Cleared episodes kept per tag by default, however wild a sensor goes.
 MAX_EPISODES: Final = 100
 
-# Kind, sensor, and what tells two of those apart: the side of a range, the kind of an attempt.
+# Kind, sensor, and what distinguishes two of these: the side of a range, the kind of an attempt.
 Key = tuple[Kind, str, str]
 _DIM: Final[Key] = (Kind.RANGE, LIGHT, "low")
 
 
 @dataclass(frozen=True, slots=True)
 class _Watch:
-    """One reason at a tag: how it stands, and how often in a row it has not been so."""
+    """A reason being watched at a tag; `against` counts the occasions in a row without it."""
 
     began_ns: int
     reason: Reason
@@ -145,13 +148,13 @@ class TagEpisodes:
     max_episodes: int = MAX_EPISODES
     _species: str = ""
     _scans_ns: tuple[int, ...] = ()
-    # Of each sensor, the last scan that had it, and how long it was from the one before.
+    # By sensor: the last scan that had it, and the time since the one before, ns.
     _received_ns: dict[str, tuple[int, int]] = field(default_factory=dict)
     _watches: dict[Key, _Watch] = field(default_factory=dict)
     _done: tuple[Alarm, ...] = ()
 
     def copy(self) -> TagEpisodes:
-        """The same, to go on from here apart."""
+        """An independent copy."""
         return replace(
             self,
             days=self.days.copy(),
@@ -160,14 +163,14 @@ class TagEpisodes:
         )
 
     def alarms(self, ended_ns: int | None = None) -> Iterator[Alarm]:
-        """All of them; those that are open end at `ended_ns`, where the run has."""
+        """Yield all alarms; if the run has ended, at `ended_ns`, so have the open ones."""
         yield from self._done
         for key, watch in self._watches.items():
             if watch.raised_at_ns is not None:
                 yield self._alarm(key, watch, ended_ns)
 
     def step(self, writes: Sequence[PastWrite], is_day: IsDay) -> None:
-        """The next occasion: `writes` of one stamp, in the order of receiving."""
+        """Take the next occasion: `writes` of one stamp, in the order of receipt."""
         stamp_ns = writes[0].stamp_ns
         for write in writes:
             if write.has_seen and write.species:
@@ -202,7 +205,7 @@ class TagEpisodes:
                 day = is_day(stamp_ns) if day is None else day
                 yield from self._of_range(reading, is_day=day)
                 for of_day in self.days.step(name, reading.value, stamp_ns):
-                    # A sensor of that name goes first.
+                    # A sensor of that name takes precedence.
                     if of_day.name not in self._received_ns:
                         yield from self._of_range(of_day, is_day=True)
         if readings:
@@ -236,7 +239,7 @@ class TagEpisodes:
             yield _Finding(key, is_out, is_near, reason, min if side == "low" else max)
 
     def _of_age(self, present: Collection[str], stamp_ns: int) -> Iterator[_Finding]:
-        """Of the sensors that were read before: those that a scan has, and those it left out."""
+        """Findings on the age of each known sensor, whether the scan has it or left it out."""
         holds: int | None = None
         for name, (last_ns, interval) in self._received_ns.items():
             key = (Kind.OLD, name, "")
@@ -292,8 +295,8 @@ class TagEpisodes:
             if verdict is not reason.verdict:
                 watch = replace(watch, worse_at_ns=stamp_ns)
         elif self._has_lasted(finding.key, watch, stamp_ns):
-            # It is raised now, with what is so now, and began with the first of them; what is old
-            # is so since its last reading.
+            # Raised now, with the current reason, since the first occasion; `old` is since its last
+            # reading.
             is_old = now.kind is Kind.OLD
             reason = now if is_old else replace(now, since_ns=watch.began_ns)
             watch = replace(watch, raised_at_ns=stamp_ns, raised_as=verdict)
@@ -306,7 +309,7 @@ class TagEpisodes:
             return True
         usual_ns = interval_ns(self._scans_ns)
         if usual_ns is None:
-            # Scanned once, it was the next round's turn when it failed.
+            # Scanned once: the first failure shows when the next round came.
             usual_ns = watch.began_ns - self._scans_ns[0] if self._scans_ns else 0
         return stamp_ns - watch.began_ns >= usual_ns
 
@@ -326,7 +329,7 @@ class TagEpisodes:
 
 
 def readings_of(writes: Sequence[PastWrite]) -> tuple[Reading, ...]:
-    """The readings of an occasion: of one sensor, what was received last."""
+    """The readings of an occasion: for each sensor, the one received last."""
     stamp_ns = writes[0].stamp_ns
     latest = {
         name: value

@@ -1,7 +1,7 @@
-"""What the operator wants readings judged by, and tags judged by that, snapshot by snapshot.
+"""Judges the tags of each snapshot by the operator's criteria.
 
-Pure, but for the file of sensors. Kept between snapshots are each tag's recent scans and its last
-verdict, and since when each of its reasons holds.
+Pure, except that it reads the sensors file. Between snapshots it keeps each tag's recent scans, its
+last verdict, and since when each of its reasons has held.
 """
 
 from __future__ import annotations
@@ -42,19 +42,19 @@ from lupin_bridge.settings import SettingError, Settings, read_text
 from lupin_twin.core.past import DAY_NS, FOREVER_NS, PastWrite
 from lupin_twin.core.state import Reading, Snapshot, TagState
 
-# Nobody writes this much.
+# More than anybody writes.
 MAX_FILE_BYTES: Final = 1_000_000
 _HOUR: Final = r"((?:[01]\d|2[0-3]):[0-5]\d)"
 _HOURS: Final = re.compile(f"{_HOUR}-{_HOUR}")
-# Nights of a longer period are narrower than a line.
+# In a chart of a longer period, nights are narrower than a line.
 _LONGEST_S: Final = 400 * 86_400
-# No robot drove before; simulations begin at 0.
+# ROS time before this, in 2014, is simulated: simulations begin at 0.
 _OLDEST_S: Final = 1.4e9
 
 
 @dataclass(frozen=True, slots=True)
 class Criteria:
-    """What readings are judged by."""
+    """What readings are judged by: sensors with ranges, a fixed validity, and the hours of day."""
 
     sensors: Sensors
     recent_s: float | None
@@ -62,17 +62,17 @@ class Criteria:
 
     @classmethod
     def of(cls, settings: Settings) -> Criteria:
-        """As the settings have it, or a `SettingError`: of the file, the zone or the hours."""
+        """The criteria of the settings; raises `SettingError` about the file, zone or hours."""
         return cls(_sensors(settings), settings.reading_validity_s or None, _clock(settings))
 
     def holds_ns(self, scans_ns: Sequence[int]) -> int:
-        """How long readings hold after scans, oldest first; a fixed time goes before that."""
+        """How long readings are valid after scans, oldest first; a fixed time takes precedence."""
         if self.recent_s is not None:
             return int(self.recent_s * 1e9)
         return holds_ns(interval_ns(scans_ns))
 
     def day(self, light: bool | None, stamp_ns: int) -> Day:
-        """Whether it was day at a moment of ROS time at which the light said so, or None."""
+        """Whether it was day at a moment of ROS time; `light` is what the light said, or None."""
         return judge_day(light, self.clock, unix_s(stamp_ns))
 
     def is_day(self, stamp_ns: int) -> bool:
@@ -80,7 +80,7 @@ class Criteria:
         return self.day(None, stamp_ns).is_day
 
     def nights(self, start_ns: int, end_ns: int) -> Sequence[tuple[int, int]] | None:
-        """The nights by the clock that meet a period; None: simulated, or very long."""
+        """The nights by the clock that overlap a period; None: simulated, or very long."""
         from_s, to_s = unix_s(start_ns), unix_s(end_ns)
         if from_s is None or to_s is None or to_s - from_s > _LONGEST_S:
             return None
@@ -88,13 +88,13 @@ class Criteria:
         return [(round(dusk_s * 1e9), round(dawn_s * 1e9)) for dusk_s, dawn_s in nights]
 
     def day_number(self, stamp_ns: int) -> int:
-        """Which day it was by the clock, from dawn to dawn; a simulation's are of 24 hours."""
+        """The number of the day by the clock, from dawn to dawn; in a simulation, of each 24 h."""
         now_s = unix_s(stamp_ns)
         return stamp_ns // DAY_NS if now_s is None else self.clock.number(now_s)
 
 
 def own_sensors() -> Sensors:
-    """The file that comes with the bridge."""
+    """The sensors of the file that comes with the bridge."""
     from lupin_bridge.judge.sensors_file import parse  # noqa: PLC0415  # nothing of the past needs it
 
     return parse(files("lupin_bridge").joinpath("sensors.json").read_text(encoding="utf-8"))
@@ -117,7 +117,7 @@ def _clock(settings: Settings) -> ClockDay:
     if hours is None:
         raise settings.wrong("day_hours", f"is {settings.day_hours!r}, not such as 06:00-20:00")
     begins, ends = (time.fromisoformat(hour) for hour in hours.groups())
-    # None: this machine's, which changes with summer and winter.
+    # None: this machine's zone, daylight saving time included.
     zone = zone_of(settings.time_zone) if settings.time_zone else None
     if settings.time_zone and zone is None:
         raise settings.wrong(
@@ -135,23 +135,23 @@ def zone_of(name: str) -> ZoneInfo | None:
 
 
 def unix_s(stamp_ns: int) -> float | None:
-    """The wall's time of a moment in ROS time; None: that is simulated, and has no such hours."""
+    """The Unix time of a moment of ROS time, s; None: that is simulated, and has none."""
     seconds = stamp_ns / 1e9
     return seconds if seconds > _OLDEST_S else None
 
 
 # --- snapshot by snapshot -------------------------------------------------------------------------
 
-# Readings that are judged at once, a tag counting as one more: some 20 ms.
+# Readings judged per snapshot, where each tag counts as one more: some 20 ms.
 MAX_AT_ONCE: Final = 6_000
 _UNKNOWN: Final = Health(Verdict.UNKNOWN)
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """The greenhouse and its tags as of one snapshot: the very same values where nothing changed.
+    """The judgement of the greenhouse and its tags; unchanged parts are the same objects as before.
 
-    `number` counts what was told. While the twin's clock does not run, everything is unknown.
+    `number` grows with each change. While the twin's clock does not run, everything is unknown.
     """
 
     house: Health
@@ -165,12 +165,12 @@ NOTHING_JUDGED: Final = Judged(_UNKNOWN, {}, Day(True, "assumed"))
 
 
 def silenced(judged: Judged) -> Judged:
-    """The same of a greenhouse whose twin has fallen silent since."""
+    """The same judgement, after the twin has fallen silent."""
     return replace(judged, house=judge_site({}, is_silent=True))
 
 
 def unjudged(snapshot: Snapshot) -> Judged:
-    """Of a snapshot that could not be judged nothing is known; it is next to no other."""
+    """The judgement of a snapshot that could not be judged: all unknown, and outside the count."""
     tags = {tag.tag_id: _UNKNOWN for tag in snapshot.tags}
     return replace(NOTHING_JUDGED, tags=tags, number=-1)
 
@@ -182,9 +182,9 @@ def judge_once(
     *,
     days: Mapping[str, Sequence[Reading]] = MappingProxyType({}),
 ) -> Judged:
-    """What is to be said of one snapshot, given what was recent in the log then.
+    """Judge one snapshot, given what was recent in the log then.
 
-    Nobody knows since when a reason holds: told is the observation that says so.
+    Since when a reason has held is not known: `since_ns` is the observation that shows it.
     """
     judge = Judge(criteria, max_at_once=math.inf)
     judge.note_days(days)
@@ -194,20 +194,21 @@ def judge_once(
 
 @dataclass(slots=True)
 class _Tag:
-    """A tag; for how long its readings hold, and until when what was said of it does."""
+    """A tag, how long its readings are valid, and until when its judgement is."""
 
     state: TagState
     holds_ns: int = SHORTEST_NS
     until_ns: int = FOREVER_NS
-    # It was scanned once, and nothing says how long that holds.
+    # It was scanned only once, so its scan interval is not known.
     is_once: bool = False
 
 
 class Judge:
-    """Belongs to one thread. Of many, so many are judged at once as nobody has to wait for.
+    """Judges snapshot after snapshot. Belongs to one thread.
 
-    While `knows_recent` is false, the robot counts as moving: until `learn`, every tag looks as if
-    it had one scan only.
+    `max_at_once` bounds the readings that are judged per snapshot, so that none takes long; other
+    tags wait for the next one. While `knows_recent` is false, the robot counts as moving: until
+    `learn`, every tag seems to have been scanned only once.
     """
 
     def __init__(
@@ -222,10 +223,10 @@ class Judge:
         self._tags: dict[str, _Tag] = {}
         self._recent = RecentScans(criteria.day)
         self._seen: tuple[TagState, ...] = ()
-        # Before that, what was said of each tag holds.
+        # Until then, no judgement changes by age alone.
         self._first_until_ns = FOREVER_NS
         self._now_ns: int | None = None
-        # The last time that was known: a simulation that is started anew stops its clock before.
+        # The last known time: a simulation stops its clock before it starts anew.
         self._known_ns = 0
         self._waiting: dict[str, None] = {}
         self._counts = Counter[Verdict]()
@@ -238,12 +239,12 @@ class Judge:
         self.knows_recent = knows_recent
 
     def see(self, snapshot: Snapshot) -> Judged:
-        """What is to be said now; the very same object where nothing has changed."""
+        """Judge a snapshot; returns the same object as before if nothing has changed."""
         before, now_ns = self._judged, snapshot.now_ns
         is_back = now_ns is not None and now_ns < self._known_ns
         self._known_ns = self._known_ns if now_ns is None else now_ns
         if is_back:
-            # What was before is no part of any interval.
+            # Earlier scans are not part of any interval.
             self._scans.forget()
             self._recent = RecentScans(self._criteria.day)
             _, stamps_ns = self._recent.see(snapshot.tags)
@@ -251,7 +252,7 @@ class Judge:
         news, gone = self._news(snapshot)
         day = self._recent.day(snapshot.stamp_ns)
         if now_ns is None or self._now_ns is None or is_back:
-            # All ages are others.
+            # All ages have changed.
             news = dict.fromkeys(self._tags)
         self._now_ns = None  # after an error, all are judged again
         self._waiting |= news | self._grown_old(now_ns)
@@ -266,31 +267,31 @@ class Judge:
         return judged
 
     def learn(self, writes: Iterable[PastWrite], first: Snapshot | None = None) -> None:
-        """What was recent at the first snapshot: `first`, where it has not been seen."""
+        """Take what was recent at the first snapshot; `first`: that, if it has not been seen."""
         tags = [kept.state for kept in self._tags.values()] if first is None else first.tags
         self._recent = RecentScans.of(tags, writes, self._criteria.day)
-        # With what is known already: of the last scan of each tag alone, no interval can be told.
+        # Begin anew with all scans: the last scan of each tag alone gives no interval.
         self._scans.forget()
         self._scans.heard(self._recent.stamps_ns(), self._now_ns if first is None else first.now_ns)
         self._waiting |= dict.fromkeys(self._tags)
 
     def note_changed(self, changed: Mapping[str, Mapping[str, int]]) -> None:
-        """By tag, the sensors that do not read as predicted, and since when: for the next time."""
+        """Set, for the next snapshot, the sensors that deviate from predictions, and since when."""
         self._waiting |= _others(self._changed, changed)
         self._changed = changed
 
     def note_days(self, days: Mapping[str, Sequence[Reading]]) -> None:
-        """By tag, the values of quantities of a day: for the next time."""
+        """Set, for the next snapshot, the daily quantities by tag."""
         if days is not self._days:
             self._waiting |= _others(self._days, days)
             self._days = days
 
     def holds_ns(self) -> dict[str, int]:
-        """For how long each tag's readings hold, as was last known."""
+        """By tag, how long its readings are valid, as of its last judgement."""
         return {tag_id: kept.holds_ns for tag_id, kept in self._tags.items()}
 
     def _news(self, snapshot: Snapshot) -> tuple[dict[str, None], list[str]]:
-        """The tags whose state is another than the last one seen, and those that are gone."""
+        """The tags whose state has changed since the last snapshot, and those that are gone."""
         if snapshot.tags == self._seen:
             return {}, []
         news: dict[str, None] = {}
@@ -318,7 +319,7 @@ class Judge:
         return news, gone
 
     def _turn(self) -> list[str]:
-        """Who is judged now of those who wait; a tag at least."""
+        """The waiting tags that are judged now, at least one."""
         turn: list[str] = []
         seen = readings = 0
         for tag_id in self._waiting:
@@ -333,7 +334,7 @@ class Judge:
         return turn
 
     def _grown_old(self, now_ns: int | None) -> dict[str, None]:
-        """The tags of which something was true until now only."""
+        """The tags whose judgement may change now by age alone."""
         if now_ns is None or now_ns < self._first_until_ns:
             return {}
         untils = [(kept.until_ns, tag_id) for tag_id, kept in self._tags.items()]
@@ -403,12 +404,12 @@ class Judge:
 
 
 def _others(before: Mapping[str, object], now: Mapping[str, object]) -> dict[str, None]:
-    """The tags of which not the same is said."""
+    """The tags whose values differ."""
     return {name: None for name in (*before, *now) if before.get(name) != now.get(name)}
 
 
 def _since(before: Health, now: Health) -> Health:
-    """Reasons that held before hold since then."""
+    """The judgement; reasons that held before keep their `since_ns`."""
     if not before.reasons or not now.reasons:
         return now
     known = {_key(reason): reason.since_ns for reason in before.reasons}

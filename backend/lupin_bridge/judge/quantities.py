@@ -1,14 +1,12 @@
-"""The sensors: what each is called, how it is drawn, and which values are good for plants. Pure.
+"""The sensors: their names, colours and ranges; and quantities derived from readings. Pure.
 
-And quantities that growers steer by, out of what was measured:
+Derived from one scan. Saturation vapour pressure: Tetens in the form of FAO Irrigation and Drainage
+Paper 56 (Allen et al., 1998), equation 11: es = 0.6108 exp(17.27 T / (T + 237.3)) kPa, T in °C.
+Deficit: equations 19 and 26, for one place and moment. Dew point: equation 11 solved for T.
 
-Of one scan. Saturation vapour pressure: Tetens in the form of FAO Irrigation and Drainage Paper 56
-(Allen et al., 1998), equation 11: es = 0.6108 exp(17.27 T / (T + 237.3)) kPa, T in °C. Deficit:
-equations 19 and 26, for one place and moment. Dew point: equation 11 solved for T.
-
-Of one sensor's readings of 24 hours. Between two readings that are no farther apart than
-`MAX_GAP_NS` the course is a straight line; farther apart, nothing is known of the time between. Of
-less than `LEAST_COVERED` of 24 hours, there is no value (NaN).
+Derived from one sensor's readings of 24 hours. Between two readings at most `MAX_GAP_NS` apart,
+values are interpolated linearly; over longer gaps, nothing is known. If less than `LEAST_COVERED`
+of the 24 hours is known, there is no value (NaN).
 
 - Daily light integral, mol/m²/d: the sum of the photons of 400 to 700 nm. In sunlight 54 lx are
   1 umol/m²/s (Thimijan and Heins, HortScience 18, 1983, 818-822); lamps have other factors.
@@ -37,9 +35,9 @@ from lupin_twin.core.past import DAY_NS, HOUR_NS
 _A: Final = 17.27
 _B_C: Final = 237.3
 _E0_KPA: Final = 0.6108
-# Beyond this the formula means nothing, and no greenhouse is.
+# The formula is not valid beyond these limits, and no greenhouse is beyond them.
 _COLDEST_C, _HOTTEST_C = -40.0, 80.0
-# A sensor in saturated air reads up to this; it is taken for 100 %.
+# A sensor in saturated air reads up to this, which counts as 100 %.
 _SATURATED_PERCENT: Final = 105.0
 
 
@@ -49,16 +47,16 @@ def saturation_kpa(temperature_c: float) -> float:
 
 
 def vapour_pressure_deficit_kpa(temperature_c: float, humidity_percent: float) -> float:
-    """What the air could still take up, kPa; NaN for what cannot be (humidity outside 0 to 105)."""
+    """Vapour pressure deficit, kPa; NaN for impossible air (humidity outside 0 to 105 %)."""
     if not _is_air(temperature_c, humidity_percent):
         return math.nan
     return saturation_kpa(temperature_c) * (1.0 - min(humidity_percent, 100.0) / 100.0)
 
 
 def dew_point_c(temperature_c: float, humidity_percent: float) -> float:
-    """The temperature (°C) at which dew falls; NaN for what cannot be, and for dry air."""
+    """The temperature (°C) at which dew forms; NaN for impossible air, and for dry air."""
     share = min(humidity_percent, 100.0) / 100.0
-    # The share and not the percentage: that of the least number above 0 is 0.
+    # Test the share, not the percentage: the smallest positive percentage gives a share of 0.
     if not _is_air(temperature_c, humidity_percent) or share == 0.0:
         return math.nan
     over = math.log(share) + _A * temperature_c / (temperature_c + _B_C)
@@ -72,7 +70,7 @@ def _is_air(temperature_c: float, humidity_percent: float) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Derived:
-    """One derived quantity: what it is made of, in the order of `formula`'s arguments."""
+    """One derived quantity; its `sources` are in the order of `formula`'s arguments."""
 
     name: str
     sources: tuple[str, str]
@@ -80,7 +78,7 @@ class Derived:
 
 
 def condensation_margin_k(temperature_c: float, humidity_percent: float) -> float:
-    """By how much air may cool (K) before dew falls; NaN for what cannot be, and for dry air.
+    """By how much air may cool (K) before dew forms; NaN for impossible air, and for dry air.
 
     On a surface that is colder than the air by more than this, water condenses.
     """
@@ -106,15 +104,15 @@ BASE_C: Final = 10.0
 Readings = Sequence[tuple[int, float]]
 # Whether it is day at a moment of ROS time, ns.
 IsDay = Callable[[int], bool]
-# So long are the pieces that a line from day to night is cut to.
+# Length of the pieces into which the line from a reading by day to one by night is cut.
 _PIECE_NS: Final = 600 * 1_000_000_000
 
 
 @dataclass(slots=True)
 class Course:
-    """A sensor's course from its first reading on, reading by reading in the order of time.
+    """Integrals and extremes of a sensor's readings, added one by one in the order of time.
 
-    Lengths are in ns, sums in the sensor's unit times ns, each by night and by day.
+    `lengths` are ns, `sums` the sensor's unit times ns; each is a pair: by night, by day.
     """
 
     last_ns: int
@@ -135,7 +133,7 @@ class Course:
         """The course with one more reading."""
         gap_ns, now = at_ns - self.last_ns, is_day(at_ns)
         lengths, sums = [*self.lengths], [*self.sums]
-        # Between two readings by day it was day; from day to night the line is cut to pieces.
+        # Between two readings by day it was day; between day and night the line is cut into pieces.
         count = 1 if now is self.is_day else -(-gap_ns // _PIECE_NS)
         for index in range(count if 0 < gap_ns <= MAX_GAP_NS else 0):
             from_ns, to_ns = (gap_ns * (index + more) // count for more in (0, 1))
@@ -155,14 +153,14 @@ class Course:
         )
 
     def mean(self, *of_day: bool) -> float:
-        """The mean over time by night, by day, or both; NaN where there was none."""
+        """The mean over time by night (False), by day (True), or both; NaN: nothing is known."""
         length_ns = sum(self.lengths[by_day] for by_day in of_day)
         return sum(self.sums[by_day] for by_day in of_day) / length_ns if length_ns else math.nan
 
 
 @dataclass(frozen=True, slots=True)
 class Daily:
-    """One quantity: what it is made of, its unit, and how."""
+    """One daily quantity: its sensor, its unit and its formula."""
 
     name: str
     sensor: str
@@ -174,7 +172,7 @@ class Daily:
         return self.formula(course) if sum(course.lengths) >= LEAST_COVERED * DAY_NS else math.nan
 
     def at(self, at_ns: int, readings: Readings, is_day: IsDay) -> float:
-        """Its value at a moment, of the readings of the 24 hours up to then; NaN: not known."""
+        """Its value at a moment, from the readings of the 24 hours before; NaN: not known."""
         first = bisect_left(readings, at_ns - DAY_NS, key=itemgetter(0))
         recent = readings[first : bisect_right(readings, at_ns, key=itemgetter(0))]
         if not recent:
@@ -231,9 +229,9 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Ranges:
-    """What a sensor should read: ideal, and critical outside the wider `critical`.
+    """The ranges of a sensor: `ideal`, and the wider `critical`; values outside that are critical.
 
-    None: outside of it nothing is wrong. Without `ideal` nothing is judged.
+    `critical` None: no value is critical. `ideal` None: no value is judged.
     """
 
     ideal: Span | None = None
@@ -244,8 +242,8 @@ class Ranges:
 class Sensor:
     """One sensor. Hue in degrees, lightness in percent (HSL); `unit` is empty where not known.
 
-    What lies outside `plausible` no sensor reads that works: it is no reading; None: anything may
-    be.
+    A working sensor never reads a value outside `plausible`, so such a value is not a reading;
+    None: any value may be one. `species` maps lower-case names to the ranges of day and night.
     """
 
     name: str
@@ -259,7 +257,7 @@ class Sensor:
     plausible: Span | None = None
 
     def is_plausible(self, value: float) -> bool:
-        """Whether a sensor that works can read this: a finite number within `plausible`."""
+        """Whether a working sensor can read this: a finite number within `plausible`."""
         span = self.plausible
         is_finite = value - value == 0.0
         return is_finite and (span is None or span.low <= value <= span.high)
@@ -271,14 +269,14 @@ class Sensor:
         return tuple(each.ideal for each in ranges if each.ideal is not None)
 
     def ranges(self, *, is_day: bool, species: str = "") -> Ranges:
-        """What holds at a tag with such plants; of an unknown species, what holds for all."""
+        """The ranges at a tag with this species; for an unknown one, the general ranges."""
         day, night = self.species.get(species.lower(), (self.day, self.night))
         return day if is_day else night
 
 
 @dataclass(frozen=True)
 class Sensors:
-    """The whole file, `text` as it stands, for whoever asks for it."""
+    """All sensors of a file; `text` is the file itself, which the bridge also serves."""
 
     by_name: Mapping[str, Sensor]
     fallback: Sensor
@@ -287,7 +285,7 @@ class Sensors:
     text: str
 
     def named(self, name: str) -> Sensor:
-        """A sensor; one that the file does not know has neither unit nor ranges."""
+        """A sensor by name; one that is not in the file looks like `fallback`, without ranges."""
         known = self.by_name.get(name)
         if known is not None:
             return known
@@ -295,10 +293,9 @@ class Sensors:
         return Sensor(name, other.label or name, other.unit, other.hue, other.lightness)
 
     def digits(self, name: str) -> int | None:
-        """How many a value has after the point, as the page writes it; None: as its size deserves.
+        """Decimal places of a value, as the page writes it; None: they depend on the value's size.
 
-        So many that the largest limit has about three figures: of the sensor itself, or of what it
-        is computed of.
+        The largest ideal limit, of the sensor or else of its sources, gets about three digits.
         """
         sources: tuple[str, ...] = DERIVED[name].sources if name in DERIVED else ()
         if name in DAILY:
@@ -312,7 +309,7 @@ class Sensors:
 
     @cached_property
     def judged_by_the_day(self) -> Mapping[str, tuple[str, ...]]:
-        """By sensor, the quantities of a day that are made of it and have a range."""
+        """By sensor, the daily quantities that are derived from it and have an ideal range."""
         found: dict[str, tuple[str, ...]] = {}
         for daily in DAILY.values():
             if self.named(daily.name).ideals:

@@ -1,11 +1,10 @@
-"""The recent scans of each tag, and by what each is judged: the day and the plants of its own time.
+"""Recent scans of each tag, with the day or night and the species of their time; scan intervals.
 
-Pure. Of the state and of what was recent in the log it is worked out for any moment; while states
-come one by one, scan by scan.
+Pure; times are ns of ROS time. For any moment, recent scans are computed from the state and the
+recent log; for states as they come, scan by scan.
 
-How often tags are scanned, and when nothing was. Times are ns of ROS time. A patrol that comes
-every two minutes and stays away for ten has stopped; one that comes twice a day has not. So a tag's
-readings hold for three times the median of its own last intervals.
+A patrol that comes every two minutes and stays away for ten has stopped; one that comes twice a day
+has not. So a tag's readings are valid for three times the median of its own last intervals.
 """
 
 from __future__ import annotations
@@ -27,37 +26,38 @@ _S: Final = 1_000_000_000
 SHORTEST_NS: Final = 600 * _S
 LONGEST_NS: Final = 24 * 3600 * _S
 TIMES_MEDIAN: Final = 3
-# Intervals that count: a patrol may change its pace.
+# How many of the last intervals count: a patrol may change its pace.
 INTERVALS: Final = 8
 
 
 def interval_ns(scans_ns: Sequence[int]) -> int | None:
-    """The median of the intervals between scans, the oldest first; None before two are known."""
+    """The median of the intervals between scans, oldest first; None: there are fewer than two."""
     if len(scans_ns) < 2:
         return None
     return int(median(after - before for before, after in pairwise(scans_ns)))
 
 
 def holds_ns(interval_ns: int | None) -> int:
-    """How long readings hold at such an interval.
+    """How long readings are valid at a scan interval.
 
-    Scanned once, a tag has none: nobody knows when it should be again, and it has the longest time.
+    None: the tag was scanned only once. When it should be scanned again is not known, so its
+    readings are valid for the longest time.
     """
     if interval_ns is None:
         return LONGEST_NS
     return min(LONGEST_NS, max(SHORTEST_NS, TIMES_MEDIAN * interval_ns))
 
 
-# Intervals that count: about a lap of a greenhouse, so that the way back to its beginning does too.
+# How many of the last intervals count: about a lap, so that the way back to its start is included.
 LAP_INTERVALS: Final = 30
 
 
 @dataclass(frozen=True, slots=True)
 class Patrol:
-    """`interval_ns` is the median of the last intervals between scans, whatever tag they were of.
+    """How the greenhouse is scanned; `interval_ns` is the median of the last intervals of any tags.
 
-    None: fewer than two scans are known, or none. `overdue` are the tags none of whose readings
-    holds any more, those that never had one included.
+    None: fewer than two scans are known, or none. `overdue` counts the tags whose readings are all
+    too old, including those that never had one.
     """
 
     interval_ns: int | None = None
@@ -66,24 +66,24 @@ class Patrol:
 
 
 class Scans:
-    """When tags were scanned of late; several at one time are one."""
+    """The times of the last scans of any tags; scans of the same time count once."""
 
     def __init__(self) -> None:
         self._scans_ns: deque[int] = deque(maxlen=LAP_INTERVALS + 1)
 
     def heard(self, stamps_ns: Iterable[int], now_ns: int | None) -> None:
-        """Count what is later than the last one known; what nobody can have seen yet is no scan."""
+        """Add the stamps later than the last known one; stamps in the future are ignored."""
         for stamp_ns in sorted(set(stamps_ns)):
             is_later = not self._scans_ns or stamp_ns > self._scans_ns[-1]
             if is_later and (now_ns is None or stamp_ns <= now_ns):
                 self._scans_ns.append(stamp_ns)
 
     def forget(self) -> None:
-        """The clock has gone back: what was before is no part of any interval."""
+        """Forget all scans: the clock has gone back, so they are not part of any interval."""
         self._scans_ns.clear()
 
     def patrol(self, overdue: int) -> Patrol:
-        """As it is now."""
+        """How the greenhouse is scanned now."""
         scans = list(self._scans_ns)
         if not scans:
             return Patrol(overdue=overdue)
@@ -91,14 +91,14 @@ class Scans:
         return Patrol(int(median(intervals)) if intervals else None, scans[-1], overdue)
 
 
-# That are kept: of some months, at least.
+# Pauses kept at most: those of some months, at least.
 MAX_PAUSES: Final = 10_000
 
 
 class Stretches:
-    """Stretches of time without a pause: attempts no farther apart than readings hold at least.
+    """Periods without a pause: attempts in them are at most `SHORTEST_NS` apart.
 
-    In whatever order attempts are added, and however often: the stretches are the same.
+    They do not depend on the order in which attempts are added, or on repetition.
     """
 
     def __init__(self) -> None:
@@ -106,7 +106,7 @@ class Stretches:
         self._last: list[int] = []
 
     def add(self, stamp_ns: int) -> bool:
-        """Count an attempt at this moment; returns whether it lies in no stretch that was known."""
+        """Add an attempt at this moment; returns whether it lies outside all known stretches."""
         first, last = self._first, self._last
         after = bisect_right(first, stamp_ns)
         before = after - 1
@@ -127,9 +127,9 @@ class Stretches:
         return True
 
     def forget(self, before_ns: int) -> int:
-        """Drop the pauses that ended before; returns from when on nothing is missing.
+        """Drop the pauses that ended before a moment; returns from when on no pause is missing.
 
-        Of more than `MAX_PAUSES`, the oldest are dropped too.
+        Past `MAX_PAUSES`, the oldest are dropped too.
         """
         old = max(bisect_left(self._first, before_ns) - 1, 0)
         many = max(len(self._first) - MAX_PAUSES - 1, 0)
@@ -153,10 +153,10 @@ class Stretches:
         return any(start_ns <= first and last <= end_ns for first, last in begun)
 
     def overdue_ns(self, since_ns: int, holds_ns: int) -> int:
-        """When what was scanned at `since_ns` has not been for `holds_ns`; pauses do not count.
+        """When `holds_ns` have passed since a scan at `since_ns`, pauses not counted.
 
-        What runs out as a pause begins does so as it ends: it is overdue a moment later, and in a
-        pause no moment is later.
+        If they pass just as a pause begins, the result is its end: overdue begins a moment later,
+        and in a pause no time passes.
         """
         due_ns = since_ns + holds_ns
         for first, last in self.pauses(since_ns):
@@ -168,7 +168,7 @@ class Stretches:
 
 # --- the recent scans of each tag -----------------------------------------------------------------
 
-# Whether it was day at a moment, ns, at which the light said so, or None: nothing.
+# Whether it was day, given what the light said (None: nothing) and the moment, ns of ROS time.
 DayOf = Callable[[bool | None, int], Day]
 
 
@@ -187,18 +187,18 @@ _stamp_ns = attrgetter("stamp_ns")
 
 @dataclass(slots=True)
 class Recent:
-    """Of one tag, its scans, oldest first, and its inspections."""
+    """One tag's recent scans, oldest first, and inspections, each (stamp, species)."""
 
     scans: tuple[Scanned, ...] = ()
     looks: tuple[tuple[int, str], ...] = ()
 
     @property
     def stamps_ns(self) -> tuple[int, ...]:
-        """When it was scanned, the last times."""
+        """The stamps of its last scans."""
         return tuple(scan.stamp_ns for scan in self.scans[-INTERVALS - 1 :])
 
     def see(self, looks: Iterable[tuple[int, str]]) -> None:
-        """Take in inspections; of one moment the last counts."""
+        """Add inspections; for one moment, the last one counts."""
         known = dict(self.looks)
         known.update(looks)
         found = tuple(sorted(known.items()))[-INTERVALS - 1 :]
@@ -209,7 +209,7 @@ class Recent:
             )
 
     def put(self, tag: TagState, at_ns: int, values: Mapping[str, float]) -> None:
-        """Take in a scan; those that nothing is judged by any more go."""
+        """Add a scan, and drop those that no judgement needs any more."""
         scan = Scanned(at_ns, values, species=self.species_at(at_ns))
         before = bisect_left(self.scans, at_ns, key=_stamp_ns)
         behind = bisect_right(self.scans, at_ns, before, key=_stamp_ns)
@@ -221,7 +221,7 @@ class Recent:
         self.scans = scans
 
     def decide(self, at_ns: int, *, is_day: bool) -> bool:
-        """It was day, or night, at the scan of that moment; whether that is another."""
+        """Set day or night for the scan of a moment; returns whether that has changed."""
         for index, scan in enumerate(self.scans):
             if scan.stamp_ns == at_ns and scan.is_day is not is_day:
                 now = replace(scan, is_day=is_day)
@@ -230,7 +230,7 @@ class Recent:
         return False
 
     def day_at(self, at_ns: int) -> bool | None:
-        """What the light said at a moment; None: it was left out for long, or never told."""
+        """What the light said at a moment; None: scans left it out for long, or never had it."""
         by_then = self.scans[: bisect_right(self.scans, at_ns, key=_stamp_ns)]
         for scan in reversed(by_then):
             if by_then[-1].stamp_ns - scan.stamp_ns > LEFT_OUT_NS:
@@ -240,30 +240,30 @@ class Recent:
         return None
 
     def news(self, tag: TagState) -> dict[int, dict[str, float]]:
-        """The scans of a state that are not known so, by their stamps."""
+        """The scans of a state that are new or have changed, by stamp."""
         known = {scan.stamp_ns: scan.values for scan in self.scans}
         found: dict[int, dict[str, float]] = {}
         for reading in tag.readings:
             at_ns = reading.observed_at_ns
             if at_ns is None:
                 continue
-            # What is no number is not equal to itself.
+            # As text, because NaN is not equal to itself.
             before = known.get(at_ns, {})
             if repr(before.get(reading.name)) != repr(reading.value):
                 found.setdefault(at_ns, dict(before))[reading.name] = reading.value
         return found
 
     def species_at(self, at_ns: int) -> str:
-        """The last species by then of which the camera was sure."""
+        """The last species until then that the camera was sure of; empty: none."""
         by_then = self.looks[: bisect_right(self.looks, at_ns, key=lambda look: look[0])]
         return next((species for _, species in reversed(by_then) if species), "")
 
 
 class RecentScans:
-    """Those of all tags of a state. `day_of` says whether it was day.
+    """The recent scans of all tags. `day_of` decides whether it was day.
 
-    In whatever order scans are taken in: each is judged by the light of its own time, which is what
-    every tag's last scan by then says.
+    The order in which scans are added does not matter. Each is judged by the light of its own time:
+    by what the last scan of every tag until then says.
     """
 
     def __init__(self, day_of: DayOf) -> None:
@@ -276,7 +276,7 @@ class RecentScans:
     def of(
         cls, tags: Sequence[TagState], writes: Iterable[PastWrite], day_of: DayOf
     ) -> RecentScans:
-        """Those of a state; `writes` is what the log has of them, see `RecentRequest`."""
+        """The recent scans of a state; `writes` is the log of them (see `RecentRequest`)."""
         found = cls(day_of)
         scans: dict[tuple[int, str], dict[str, float]] = {}
         looks: dict[str, list[tuple[int, str]]] = {}
@@ -289,7 +289,7 @@ class RecentScans:
         for tag in tags:
             for reading in tag.readings:
                 if reading.observed_at_ns is not None:
-                    # What the state has is what counts.
+                    # The state takes precedence over the log.
                     key = reading.observed_at_ns, tag.tag_id
                     scans.setdefault(key, {})[reading.name] = reading.value
             found.tag(tag.tag_id).see((*looks.get(tag.tag_id, ()), *_inspection_of(tag)))
@@ -300,11 +300,11 @@ class RecentScans:
         return found
 
     def tag(self, tag_id: str) -> Recent:
-        """What is recent of a tag."""
+        """A tag's recent scans and inspections."""
         return self._tags[tag_id]
 
     def stamps_ns(self) -> Iterator[int]:
-        """When any tag was scanned."""
+        """The stamps of the recent scans of all tags."""
         return (scan.stamp_ns for recent in self._tags.values() for scan in recent.scans)
 
     def day(self, at_ns: int) -> Day:
@@ -312,7 +312,7 @@ class RecentScans:
         return self._day_of(self._light.is_day, at_ns)
 
     def see(self, tags: Iterable[TagState]) -> tuple[set[str], list[int]]:
-        """Take in tags that have changed; whose scans are judged otherwise, and the new stamps."""
+        """Take changed tags; returns those with scans now judged otherwise, and the new stamps."""
         scans: list[TakenScan] = []
         for tag in tags:
             recent = self.tag(tag.tag_id)
@@ -321,7 +321,7 @@ class RecentScans:
         return self.take(scans), [at_ns for at_ns, *_ in scans]
 
     def take(self, scans: Sequence[TakenScan]) -> set[str]:
-        """Take scans in; the tags with one that is judged by another light than before."""
+        """Add scans; returns the tags with a scan that is judged by another light than before."""
         others: set[str] = set()
         in_time = sorted(scans, key=lambda scan: (scan[0], scan[1].tag_id))
         for at_ns, group in groupby(in_time, key=itemgetter(0)):
@@ -341,12 +341,12 @@ class RecentScans:
         return others
 
     def forget(self, tag_id: str) -> None:
-        """Of a tag that is gone."""
+        """Forget a tag that is gone."""
         self._tags.pop(tag_id, None)
         self._light.put(tag_id, None)
 
     def _decide_since(self, at_ns: int, *, all_of_it: bool) -> set[str]:
-        """Something came late: what was scanned at that moment, and since, is judged anew."""
+        """After a late scan, decide day or night again at its moment and, if `all_of_it`, since."""
         until_ns = self._newest_ns if all_of_it else at_ns
         stamps = {
             scan.stamp_ns
@@ -368,7 +368,7 @@ class RecentScans:
         return others
 
 
-# When, of which tag, and what it read.
+# The stamp, the tag, and the values by sensor.
 TakenScan = tuple[int, TagState, Mapping[str, float]]
 
 

@@ -1,6 +1,6 @@
-"""The file of sensors, checked by pydantic before anything starts: text in, `Sensors` out. Pure.
+"""Parses the sensors file with pydantic: text in, `Sensors` out. Pure.
 
-Nobody needs it where no file is read: pydantic is 6 MB.
+Import it only where a file is read: pydantic takes 6 MB.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ MAX_TEXT = 64
 _Name = Annotated[str, Field(max_length=MAX_TEXT)]
 _Limit = Annotated[float, Field(ge=-1e9, le=1e9)]
 _Share = Annotated[float, Field(ge=0, le=100)]
-# The sensors that each computed quantity is made of.
+# The sensors from which each quantity is derived.
 _COMPUTED_OF = {
     **{name: derived.sources for name, derived in DERIVED.items()},
     **{name: (daily.sensor,) for name, daily in DAILY.items()},
 }
-# Those that the page speaks beside English, which is the `label` itself.
+# The page's languages other than English, whose text is `label`.
 Language = Literal["de", "es", "nl"]
 
 
 class SensorsError(ValueError):
-    """What is wrong with a file of sensors; the message names field, limit and value."""
+    """A sensors file is invalid; the message names field, limit and value."""
 
 
 class _Part(BaseModel):
@@ -63,7 +63,7 @@ class _DayAndNight(_Ranges):
     night: _Ranges | None = None
 
     def by_day_and_night(self) -> tuple[Ranges, Ranges]:
-        """Of a night that says nothing, what holds by day."""
+        """The ranges by day and by night; without `night`, those of the day hold by night too."""
         return self.made(), (self.night or self).made()
 
 
@@ -72,10 +72,10 @@ class _Sensor(_DayAndNight):
     unit: _Name
     hue: Annotated[float, Field(ge=0, le=360)]
     lightness: _Share
-    # For who reads the file: what it is called in other languages, and what it is computed of here.
+    # For readers of the file: the name in other languages, and the sensors it is derived from.
     labels: dict[Language, Annotated[_Name, Field(min_length=1)]] = {}
     derived: tuple[_Name, ...] = ()
-    # What a sensor that works can read; and where all of this is from.
+    # What a working sensor can read; and the source of these numbers.
     plausible: tuple[_Limit, _Limit] | None = None
     source: str = ""
     species: dict[str, _DayAndNight] = {}
@@ -111,7 +111,7 @@ class _File(_Part):
     ramp: _Ramp
     fallback: _Sensor
     sensors: dict[str, _Sensor]
-    # For who reads the file: bays, rows or zones, with the ids of their tags (`A*`: that begin so).
+    # For readers of the file: bays, rows or zones, with the ids of their tags; `A*`: a prefix.
     areas: dict[_Name, list[_Name]] = {}
 
     @model_validator(mode="after")
@@ -129,7 +129,7 @@ def parse(text: str) -> Sensors:
     """The sensors of a file's text.
 
     Raises:
-        SensorsError: it is no JSON, or says what cannot be.
+        SensorsError: it is not JSON, or its content is invalid.
 
     """
     try:
@@ -150,5 +150,5 @@ def _said(error: ValidationError) -> str:
     where = ".".join(str(part)[:MAX_TEXT] for part in first["loc"])
     shown = "" if isinstance(first["input"], dict | str) else f", not {first['input']!r:.60}"
     said = f"{where or 'the file'}: {first['msg'].removeprefix('Value error, ')}{shown}"
-    # A name in it may have anything, and this is one line.
+    # Names may contain any character, and the message must be one line.
     return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in said)

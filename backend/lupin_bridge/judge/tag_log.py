@@ -1,7 +1,7 @@
-"""One tag's log in one run of the clock, and what follows of it by itself. Pure.
+"""One tag's log in one run of the clock, and the states derived from it. Pure.
 
-What comes in order is added to what is known. What comes late finds its place, and all behind it
-is worked out again. What the log has no room for any more is kept as what it led to.
+Writes that come in order extend the state. A late write is inserted at its place, and all states
+after it are computed again. Writes that the log has no room for survive as the state they led to.
 """
 
 from __future__ import annotations
@@ -19,33 +19,33 @@ from lupin_bridge.judge.quantities import IsDay
 from lupin_bridge.judge.scans import INTERVALS, SHORTEST_NS
 from lupin_twin.core.past import PastWrite
 
-# So many occasions lie between two states of a tag that are kept to begin again from.
+# Occasions between two checkpoints of a tag's state.
 MARK: Final = 64
 StateT = TypeVar("StateT")
 
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """From one scan to the next, or to none yet; `holds_ns` is how long readings held then."""
+    """From one scan to the next (None: none yet); `holds_ns`: how long readings were valid then."""
 
     start_ns: int
     end_ns: int | None
     holds_ns: int
 
 
-# Whether a gap matters for ever: one that is too long, or in which the greenhouse paused.
+# Whether a gap (start, end, validity) has to be kept: it is too long, or the greenhouse paused.
 Matters = Callable[[int, int, int], bool]
 
 
-# How long readings hold after scans, the oldest first.
+# How long readings are valid after scans, oldest first.
 HoldsNs = Callable[[Sequence[int]], int]
 
 
 @dataclass(frozen=True, slots=True)
 class Trail:
-    """What a tag's scans say of its scan interval and of its light, up to one of them.
+    """A tag's gaps between scans, and the turns of its light, up to one of its scans.
 
-    `holds_ns` is how long readings hold after that.
+    `holds_ns` is how long readings are valid after that scan.
     """
 
     scans_ns: tuple[int, ...] = ()
@@ -74,7 +74,7 @@ class Trail:
         return Trail(scans_ns, gaps, turns, light_ns, holds_ns(scans_ns))
 
     def since(self, before_ns: int) -> Trail:
-        """The trail without what nobody asks for any more: what was over before."""
+        """The trail without what was over before a moment."""
         gaps = tuple(gap for gap in self.gaps if gap.end_ns is None or gap.end_ns >= before_ns)
         first = bisect_right(self.turns, before_ns, key=lambda turn: turn[0])
         return replace(self, gaps=gaps, turns=self.turns[max(0, first - 1) :])
@@ -87,7 +87,7 @@ class TagLog:
         self._stamps_ns = array("q")
         self._numbers = array("q")
         self._values: list[bytes] = []
-        # All else of a write is most often as it was before.
+        # The rest of each write, which is mostly the same: equal ones share one object.
         self._others: list[PastWrite] = []
         self._known: dict[PastWrite, PastWrite] = {}
 
@@ -100,7 +100,7 @@ class TagLog:
         return self._stamps_ns[-1] if self._stamps_ns else -1
 
     def put(self, write: PastWrite) -> bool:
-        """Put a write where it belongs; False: it is there already."""
+        """Insert a write at its place; False: it is there already."""
         stamp_ns, number = write.stamp_ns, write.number
         at = bisect_right(self._stamps_ns, stamp_ns)
         while at and self._stamps_ns[at - 1] == stamp_ns and self._numbers[at - 1] >= number:
@@ -122,11 +122,11 @@ class TagLog:
             yield [self._write(index) for index in group]
 
     def newest(self, count: int) -> int:
-        """A stamp behind which lie about so many writes."""
+        """A stamp after which there are about `count` writes."""
         return self._stamps_ns[-count - 1] if count < len(self) else -1
 
     def drop(self, until_ns: int) -> None:
-        """Without what is not later."""
+        """Drop all writes up to and including a stamp."""
         count = bisect_right(self._stamps_ns, until_ns)
         del self._stamps_ns[:count], self._numbers[:count]
         del self._values[:count], self._others[:count]
@@ -143,9 +143,9 @@ class TagLog:
 
 
 class Replay(Generic[StateT]):
-    """What a log leads to, occasion by occasion: `step` makes one state of another.
+    """The state that a log leads to, with checkpoints; `step` applies one occasion to a state.
 
-    The first of the states that are kept is what the log has no room for any more.
+    The first checkpoint is the state after the writes that the log has dropped.
     """
 
     def __init__(
@@ -159,7 +159,7 @@ class Replay(Generic[StateT]):
         self._at_ns, self._state, self._since_mark = -1, state, 0
 
     def state(self, log: TagLog) -> StateT:
-        """The state behind all of the log; the caller only reads it."""
+        """The state after the whole log; the caller must not change it."""
         for group in log.occasions(self._at_ns):
             self._state = self._step(self._state, group)
             self._at_ns = group[0].stamp_ns
@@ -171,7 +171,7 @@ class Replay(Generic[StateT]):
         return self._state
 
     def back_to(self, before_ns: int) -> None:
-        """What is not earlier is worked out again."""
+        """Return to a checkpoint before a stamp, so that all from there on is computed again."""
         if before_ns > self._at_ns:
             return
         while len(self._marks) > 1 and self._marks[-1][0] >= before_ns:
@@ -180,12 +180,12 @@ class Replay(Generic[StateT]):
         self._state, self._since_mark = self._copy(state), 0
 
     def each(self, change: Callable[[StateT], StateT]) -> None:
-        """Change every state that is kept."""
+        """Change every checkpoint, and the current state."""
         self._marks = [(at_ns, change(state)) for at_ns, state in self._marks]
         self._state = change(self._state)
 
     def settle(self, log: TagLog, until_ns: int) -> None:
-        """The log will be without what is not later than `until_ns`."""
+        """Move the first checkpoint to `until_ns`: the log is about to drop all until then."""
         at_ns, state = self._marks[0]
         for group in log.occasions(at_ns, until_ns):
             state = self._step(state, group)
@@ -195,7 +195,7 @@ class Replay(Generic[StateT]):
 
 
 class TagPast:
-    """One tag in one run."""
+    """One tag in one run of the clock: its log, and the trail and episodes derived from it."""
 
     def __init__(
         self, episodes: TagEpisodes, holds_ns: HoldsNs, matters: Matters, is_day: IsDay
@@ -219,16 +219,16 @@ class TagPast:
 
     @property
     def trail(self) -> Trail:
-        """What its scans say of its scan interval and of its light."""
+        """Its gaps between scans, and the turns of its light."""
         return self._trail.state(self._log)
 
     @property
     def episodes(self) -> TagEpisodes:
-        """What was wrong with it when; the caller only reads it."""
+        """Its episodes; the caller must not change them."""
         return self._episodes.state(self._log)
 
     def add(self, write: PastWrite) -> bool:
-        """Take a write in; False: it belongs to what the log has no room for any more."""
+        """Add a write; False: it is older than what the log keeps."""
         if write.stamp_ns <= self._settled_ns:
             return False
         if self._log.put(write):
@@ -237,16 +237,16 @@ class TagPast:
         return True
 
     def judge_anew(self, from_ns: int) -> None:
-        """What was day is night from a moment on."""
+        """Compute the episodes again from a moment on: day and night have changed."""
         self._episodes.back_to(from_ns)
 
     def keep(self, count: int) -> None:
-        """Have the log keep about so many writes, once there are a quarter more."""
+        """Shrink the log to about `count` writes, once there are a quarter more."""
         if len(self._log) > count + max(1, count // 4):
             self._settle(self._log.newest(count))
 
     def forget(self, before_ns: int) -> int:
-        """Drop what was over before; returns when the oldest gap begins that is kept."""
+        """Drop what was over before a moment; returns the start of the oldest gap that is kept."""
         self._trail.state(self._log)
         self._settle(before_ns - 1)
         self._trail.each(lambda trail: trail.since(before_ns))
@@ -254,7 +254,7 @@ class TagPast:
 
     @property
     def gaps(self) -> Sequence[Gap]:
-        """Those that matter, and the one since the last scan."""
+        """The gaps that matter, and the open one since the last scan."""
         trail = self.trail
         if not trail.scans_ns:
             return trail.gaps
@@ -271,5 +271,5 @@ class TagPast:
 
 
 def is_long(start_ns: int, end_ns: int) -> bool:
-    """Whether it is longer than readings hold at least."""
+    """Whether a gap is longer than the shortest time for which readings are valid."""
     return end_ns - start_ns > SHORTEST_NS

@@ -1,7 +1,7 @@
-"""What is to be said of a tag, and of the greenhouse: a verdict, and the reasons for it as data.
+"""Judges one tag, and the greenhouse: a verdict, and the reasons for it as data.
 
-Pure, and without memory. Times are ns of ROS time. A verdict is that of the worst reason; healthy
-is only what was judged and is recent.
+Pure and stateless. Times are ns of ROS time. A verdict is that of the worst reason; a tag is
+healthy only if a recent value was judged.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from lupin_bridge.judge.quantities import DERIVED, Ranges, Sensor, Sensors
 from lupin_bridge.judge.scans import Recent, Scanned
 from lupin_twin.core.state import NO_FLOWER, STATUS_OK, Reading, TagState
 
-# Readings that do not hold any more say nothing about now, but until then nobody may forget that
-# the last that was received of a tag was alarming.
+# How long a bad reading counts: one that is no longer valid says nothing about now, but the last
+# news of a tag must not be forgotten if it was alarming.
 FORGOTTEN_NS: Final = 24 * 3600 * 1_000_000_000
-# While no tag has an interval yet, the robot has stopped when nothing was scanned for longer.
+# While most tags have no scan interval yet, the robot has stopped after this long without a scan.
 FIRST_ROUND_NS: Final = 1800 * 1_000_000_000
-# Of a range's width: what has been out of it is so until it lies so far within.
+# Share of a range's width: a value that was out of range is so until it is this far inside.
 DEADBAND: Final = 0.05
 
 
 class Verdict(StrEnum):
-    """From the worst to the best; a tag of which nothing is known is no better than unknown."""
+    """A verdict, from worst to best; a tag about which nothing is known is unknown."""
 
     CRITICAL = "critical"
     STRESSED = "stressed"
@@ -39,7 +39,7 @@ ORDER: Final = {verdict: index for index, verdict in enumerate(Verdict)}
 
 
 def worst(verdicts: Iterable[Verdict]) -> Verdict | None:
-    """The worst of them, None of none."""
+    """The worst of the verdicts; None: there are none."""
     return min(verdicts, key=ORDER.__getitem__, default=None)
 
 
@@ -58,13 +58,13 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """Why: `value` and the `limit` that it passed, in the sensor's unit.
+    """A reason for a verdict: `value`, and the `limit` that it passed, in the sensor's unit.
 
-    `since_ns` is the observation that says so; None: there was none. Of `old`, `limit` is how long
-    readings hold, s, and `since_ns` the last one: its age would change all the time. Of `pest`,
-    `value` is how many were counted, of `scan_failed` the attempt's status, of `reading_failed`
-    what no sensor reads that works, or None: no number. `release` is what a value has to pass that
-    is back inside `limit`, and that only the deadband still holds; None: nothing like that.
+    `since_ns` is the observation that shows it; None: there was none. In `old`, `limit` is how long
+    readings are valid, s, and `since_ns` the last one: an age would change all the time. `value` is
+    the number of pests in `pest`, the attempt's status in `scan_failed`, and the implausible value
+    in `reading_failed`; None: not a number. `release` is what a value back inside `limit` must pass
+    to leave the deadband; None: the deadband does not hold it.
     """
 
     kind: Kind
@@ -94,11 +94,11 @@ def judge_tag(
     changed: Mapping[str, int],
     days: Sequence[Reading],
 ) -> Health:
-    """What is to be said of a tag at `now_ns`, where its readings hold for `holds_ns`.
+    """Judge a tag at `now_ns`; its readings are valid for `holds_ns`.
 
-    Each reading is judged by the day and the plants of its own time, which `recent` has.
-    `changed` are the sensors that do not read as everything else predicts, and since when. `days`
-    are the values of quantities of a day, observed when the day was complete.
+    Each reading is judged by day or night, and by the species, of its own time, from `recent`.
+    `changed` has the sensors that deviate from the prediction, and since when. `days` are the daily
+    quantities, stamped when their day was complete.
     """
     reasons: list[Reason] = []
     was_judged = False
@@ -138,7 +138,7 @@ def judge_tag(
 
 
 def failed(reading: Reading, sensor: Sensor) -> Reason:
-    """That a sensor gives no number, or one that cannot be and the limit of what can."""
+    """The reason that a reading is not a number, or is implausible, with the limit it passed."""
     value, span, limit = reading.value, sensor.plausible, None
     if math.isfinite(value) and span is not None:
         limit = span.low if value < span.low else span.high
@@ -153,10 +153,9 @@ def failed(reading: Reading, sensor: Sensor) -> Reason:
 
 
 def _still_out(reading: Reading, ranges: Ranges, sensor: Sensor, recent: Recent) -> Reason | None:
-    """A value within its range by less than the deadband, of a tag that has been out of it.
+    """The reason of a value inside its range that the deadband still holds; None: it does not.
 
-    That is so since the last scan that was out of it, of those that are recent, unless one since
-    was further within.
+    It does if a recent scan was out of range, and none since was farther inside than the deadband.
     """
     for verdict in (Verdict.CRITICAL, Verdict.STRESSED):
         for sign in (-1.0, 1.0):
@@ -179,7 +178,7 @@ def _still_out(reading: Reading, ranges: Ranges, sensor: Sensor, recent: Recent)
 
 
 def _edge(ranges: Ranges, verdict: Verdict, sign: float) -> tuple[float, float] | None:
-    """The limit below (-1) or above (1), and what a value has to pass that comes back inside it."""
+    """The lower (-1) or upper (1) limit, and what a value back inside it must pass; None: none."""
     span = ranges.critical if verdict is Verdict.CRITICAL else ranges.ideal
     if span is None or ranges.ideal is None:
         return None
@@ -209,7 +208,7 @@ def _was_out(
 
 
 def _value_of(scan: Scanned, name: str) -> float | None:
-    """What a scan says of a sensor, measured or derived."""
+    """A scan's value of a sensor, measured or derived; None: it has none."""
     if name in scan.values or name not in DERIVED:
         return scan.values.get(name)
     first, second = (scan.values.get(source) for source in DERIVED[name].sources)
@@ -217,7 +216,7 @@ def _value_of(scan: Scanned, name: str) -> float | None:
 
 
 def judge_value(reading: Reading, ranges: Ranges) -> Reason | None:
-    """What is wrong with a finite value: outside critical, outside ideal, or nothing."""
+    """The reason of a finite value outside the critical or the ideal range; None: it is inside."""
     for verdict, span in (
         (Verdict.CRITICAL, ranges.critical),
         (Verdict.STRESSED, ranges.ideal),
@@ -232,7 +231,7 @@ def judge_value(reading: Reading, ranges: Ranges) -> Reason | None:
 
 
 def derive(readings: Sequence[Reading]) -> list[Reading]:
-    """The derived quantities of readings that are of one scan; a sensor of that name goes first."""
+    """The quantities derived from readings of one scan, unless a sensor has the same name."""
     by_name = {reading.name: reading for reading in readings}
     found = []
     for derived in DERIVED.values():
@@ -247,14 +246,14 @@ def derive(readings: Sequence[Reading]) -> list[Reading]:
 
 
 def with_derived(tags: Sequence[TagState], sensor_type: str) -> Sequence[TagState]:
-    """The tags, those that have what it takes with a reading of the derived `sensor_type` too."""
+    """The tags, with a reading of the derived `sensor_type` added where it can be derived."""
     if sensor_type not in DERIVED:
         return tags
     return [replace(tag, readings=(*tag.readings, *derive(tag.readings))) for tag in tags]
 
 
 def plausible(tags: Sequence[TagState], sensor: Sensor) -> list[TagState]:
-    """The tags without what no sensor reads that works: that is no climate."""
+    """The tags without implausible readings of the sensor: these say nothing about the climate."""
 
     def is_wrong(reading: Reading) -> bool:
         return reading.name == sensor.name and not sensor.is_plausible(reading.value)
@@ -270,10 +269,10 @@ def plausible(tags: Sequence[TagState], sensor: Sensor) -> list[TagState]:
 def judge_site(
     tags: Mapping[Verdict, int], *, is_silent: bool, stopped: Reason | None = None
 ) -> Health:
-    """The greenhouse is its worst tag; unknown where more than half are, or nothing is scanned.
+    """Judge the greenhouse by its worst tag; unknown if over half of them are, or scanning stopped.
 
-    What is critical goes before what is not known. `tags` is how many have each verdict, `stopped`
-    why nothing is known of when tags will be scanned again.
+    Critical takes precedence over unknown. `tags` counts the tags of each verdict; `stopped` is the
+    reason that scanning has stopped; None: it has not.
     """
     if is_silent:
         return Health(Verdict.UNKNOWN, (Reason(Kind.SILENT, Verdict.UNKNOWN),))
@@ -291,7 +290,7 @@ def _age_ns(observed_at_ns: int | None, now_ns: int) -> int | None:
 
 
 def _of_age(tag: TagState, now_ns: int, holds_ns: int) -> Iterable[Reason]:
-    """Each sensor whose reading does not hold any more; one reason where none does."""
+    """A reason for each sensor whose reading is too old; a single one if all are."""
     ages = {r.name: _age_ns(r.observed_at_ns, now_ns) for r in tag.readings}
     old = {name: age for name, age in ages.items() if age is None or age > holds_ns}
     limit_s = holds_ns / 1e9
@@ -319,7 +318,7 @@ def _of_days(
     measured = {reading.name for reading in tag.readings}
     for day in days:
         complete_ns = day.observed_at_ns or 0
-        # A sensor of that name goes first.
+        # A sensor of that name takes precedence.
         if day.name in measured or now_ns - complete_ns > COUNTS_NS:
             continue
         species = recent.species_at(complete_ns)
@@ -356,16 +355,16 @@ def _of_flowers(tag: TagState) -> Iterable[Reason]:
 
 
 def pest(bug_count: int, since_ns: int | None) -> Reason:
-    """That an inspection saw pests: critical if it counted any, else somebody should look."""
+    """The reason that an inspection saw pests: critical if it counted any, else stressed."""
     verdict = Verdict.CRITICAL if bug_count else Verdict.STRESSED
     return Reason(Kind.PEST, verdict, value=float(bug_count), since_ns=since_ns)
 
 
 def stopped(last_scan_ns: int | None, now_ns: int | None, once: int, tags: int) -> Reason | None:
-    """That nothing is scanned any more, where more than half of the tags were scanned `once`.
+    """The reason that scanning has stopped, if more than half of the tags were scanned only once.
 
-    Such a tag has no interval, and its readings hold for a day: nobody knows when it should be
-    scanned again. Where tags have intervals, these say what is overdue.
+    `once` is their number. When such a tag should be scanned again is not known: it has no scan
+    interval, and its readings are valid for a day. Tags with intervals become overdue.
     """
     if last_scan_ns is None or now_ns is None or 2 * once <= tags:
         return None
@@ -376,5 +375,5 @@ def stopped(last_scan_ns: int | None, now_ns: int | None, once: int, tags: int) 
 
 
 def is_overdue(health: Health) -> bool:
-    """Whether none of a tag's readings holds any more, or it never had one."""
+    """Whether all of a tag's readings are too old, or it never had one."""
     return any(reason.kind is Kind.OLD and not reason.sensor for reason in health.reasons)

@@ -1,1 +1,1 @@
-"""Notifications without a page: MQTT and a webhook."""
+"""Notifications without a page: MQTT, a webhook and Web Push."""

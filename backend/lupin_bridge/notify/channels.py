@@ -1,8 +1,8 @@
-"""All channels together, for the bridge: started, watched and stopped with it.
+"""All notification channels of a bridge, and the daily report that they send.
 
-The report of a day, sent once a day by one channel, also after a restart. What was sent last stands
-in a small file. A day that was missed is sent at the next start, up to a week of them; a message
-that is not taken is tried again as those of alarms are.
+Each channel sends the report once a day, also across restarts: a small file notes the last one
+sent. Missed days are sent at the next start, up to a week of them. A report that is not taken is
+retried as alarms are.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ from lupin_twin.core.past import NotRemembered, PastRefused
 log = logging.getLogger(__name__)
 
 POLL_S: Final = 2.0
-# For so long the log may lack the last moments of a day.
+# How long a report waits for the log to be complete up to the end of the day.
 LATE_NS: Final = 300 * 1_000_000_000
 MOST_DAYS: Final = 7
 
 
 @dataclass(frozen=True, slots=True)
 class DailyTarget:
-    """When a day ends for the operator, by which zone (None: this machine's), and where to note it.
+    """When the operator's day ends, in which zone (None: this machine's), and where to note it.
 
-    `folder` keeps a file for each channel and journal.
+    `folder` has a file for each channel and journal.
     """
 
     at: time
@@ -56,7 +56,7 @@ class DailyTarget:
     folder: Path
 
     def ended_ns(self, now_ns: int, days: int = 0) -> int:
-        """The end of the last day that is over at a moment, or of so many days after it."""
+        """The end of the last day that is over at a moment, or of the one `days` days later."""
         now = datetime.fromtimestamp(now_ns // 1_000_000_000, self.zone)
         passed = 0 if now.timetz().replace(tzinfo=None) >= self.at else 1
         day = now.date() + timedelta(days=days - passed)
@@ -64,13 +64,13 @@ class DailyTarget:
 
 
 class DailyReport(Periodic):
-    """Sends by one channel; what was not taken at its end is sent after the next start."""
+    """Sends reports by one channel; what was not taken before `stop` is sent after a restart."""
 
     def __init__(self, target: DailyTarget, channel: Mqtt | Webhook, of: Source) -> None:
         super().__init__(self._try, POLL_S, "the report of the day", first_s=0.0)
         self._target, self._channel, self._of = target, channel, of
         self._why = ""
-        # What was sent last: where that cannot be noted, it is not sent again and again.
+        # The last one sent, which is not sent again and again if that cannot be noted.
         self._sent: tuple[Path, int] | None = None
 
     async def _try(self) -> None:
@@ -83,7 +83,7 @@ class DailyReport(Periodic):
         self._why = why
 
     async def _look(self) -> str:
-        """Send what is due; returns why that cannot be, empty: nothing is wrong."""
+        """Send the report that is due; returns why it cannot be sent; empty: nothing is wrong."""
         of = self._of
         now_ns, journal, target = of.ros_time_ns, of.source.journal(), self._target
         if now_ns is None or not journal.journal_id:
@@ -142,7 +142,7 @@ def _read(file: Path) -> int | None:
 
 
 def _write(file: Path, sent_ns: int) -> None:
-    """Note it durably: what is not noted is sent again."""
+    """Note durably up to when reports were sent: what is not noted is sent again."""
     file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     new = file.with_suffix(".new")
     with new.open("w", encoding="ascii") as out:
@@ -156,10 +156,10 @@ def _write(file: Path, sent_ns: int) -> None:
 
 
 class DetachedThreads(ThreadPoolExecutor):
-    """Threads whose work is not waited for at the end.
+    """A thread pool whose work is not waited for at the end.
 
-    A name server that does not answer holds a thread for half a minute, and asyncio waits for all
-    of them as it ends. Here it goes on; what is left ends with the process (`runtime.process`).
+    A name server that does not answer blocks a thread for half a minute, and asyncio would wait for
+    it at its end. These threads are left behind, and end with the process (`runtime.process`).
     """
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: ARG002
@@ -168,9 +168,9 @@ class DetachedThreads(ThreadPoolExecutor):
 
 
 class Channels:
-    """The channels that the operator wants. They look at the state by themselves.
+    """The channels that the operator has set up. Belongs to the event loop.
 
-    `folder` is where it is noted which reports were sent. Belongs to the event loop.
+    `folder` has the notes of which reports were sent.
     """
 
     def __init__(
@@ -185,7 +185,7 @@ class Channels:
         self._reports: list[DailyReport] = []
 
     def start(self, source: Source, sensors: Sensors) -> None:
-        """Begin to notify."""
+        """Start the channels and the reports."""
         targets = self._targets
         reporting: list[Mqtt | Webhook] = []
         if targets.mqtt is not None:
@@ -208,7 +208,7 @@ class Channels:
             report.start()
 
     def on_alarms(self, change: Change) -> None:
-        """Alarms have changed: those that notify of each change do."""
+        """Pass on changed alarms to all channels but MQTT, which polls the state."""
         for channel in self._running:
             if isinstance(channel, Mqtt):
                 continue
@@ -218,15 +218,15 @@ class Channels:
                 log.exception("%s met an error in alarms that have changed", channel.name)
 
     async def stop(self) -> None:
-        """Stop all at once."""
+        """Stop all of them concurrently."""
         await asyncio.gather(*(it.stop() for it in (*self._reports, *self._running)))
 
     def status(self) -> Mapping[str, str]:
-        """What is wrong with each, in a line; empty: nothing."""
+        """By channel, what is wrong with it, in one line; empty: nothing."""
         return {it.name: it.condition.detail for it in self._running}
 
     def counts(self) -> Iterator[tuple[str, Mapping[str, int]]]:
-        """The same in numbers, by metric and channel."""
+        """Yield each metric with its values by channel."""
         conditions = {it.name: it.condition for it in self._running}
         yield "lupin_outward_connected", {k: int(it.is_connected) for k, it in conditions.items()}
         yield "lupin_outward_waiting", {k: it.waiting for k, it in conditions.items()}

@@ -72,7 +72,7 @@ class WebhookTarget(Endpoint):
 
 @dataclass(frozen=True, slots=True)
 class PushTarget:
-    """Who answers for what is pushed, and hosts that may be in a private network."""
+    """The contact for push services, and those of their hosts that may be in a private network."""
 
     contact: str
     private_hosts: frozenset[str]
@@ -93,7 +93,7 @@ class Targets:
         """As the settings have it.
 
         Raises:
-            SettingError: an address, a prefix or a secret that cannot be, or one without the other.
+            SettingError: an address, a prefix or a secret is invalid, or lacks what it needs.
 
         """
         mqtt, webhook = _mqtt(settings, secrets.mqtt_password), _webhook(settings, secrets)

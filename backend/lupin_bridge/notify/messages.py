@@ -1,9 +1,9 @@
-"""What channels have in common; and topics, payloads, and Home Assistant's discovery. Pure.
+"""MQTT topics, payloads, and Home Assistant's discovery; and what all channels share. Pure.
 
-A part of a topic is letters, digits, `-` and `_` alone: `/`, `+` and `#` mean something to a
-broker, and Home Assistant takes no other characters in what it discovers. A payload does not change
-while nothing happens, and is then not sent again: so it has no ages, but the moments that they
-count from. Discovery is one device a tag and one for the greenhouse, a message an entity:
+A level of a topic has only letters, digits, `-` and `_`. `/`, `+` and `#` are special to a broker,
+and Home Assistant's discovery takes no other characters. A payload has moments instead of ages, so
+it does not change while nothing happens, and is not sent again. Discovery has one device for each
+tag and one for the greenhouse, and a message for each entity:
 https://www.home-assistant.io/integrations/mqtt/#discovery-messages
 """
 
@@ -37,18 +37,18 @@ _UNSAFE: Final = re.compile(rb"[^A-Za-z0-9-]")
 
 @lru_cache(maxsize=50_000)
 def safe(name: str) -> str:
-    """The name as a part of a topic: no two names have the same.
+    """The name as a level of a topic, different for each name.
 
-    What is no letter, digit or `-` becomes `_` and two hexadecimal digits a byte of UTF-8. Of a
-    name that gets too long, the beginning is kept, and a digest of all of it stands behind `__`,
-    which no other has.
+    Each byte of UTF-8 that is no letter, digit or `-` becomes `_` and two hexadecimal digits. A
+    name that gets too long is cut off, and ends with `__`, which no other name contains, and a
+    digest of all of it.
     """
     raw = name.encode("utf-8", "surrogatepass")
     plain = _UNSAFE.sub(lambda found: b"_%02X" % found[0][0], raw).decode("ascii")
     if 0 < len(plain) <= MAX_PLAIN:
         return plain
     digest = hashlib.blake2b(raw, digest_size=16).hexdigest()
-    # Never half of an escape: the beginning is for people to read.
+    # Do not cut an escape in half: the beginning is for people to read.
     return f"{re.sub(r'_.?$', '', plain[:_PREFIX_OF_LONG])}__{digest}"
 
 
@@ -75,7 +75,7 @@ class Topics:
         return f"{self.prefix}/house/twin"
 
     def of(self, tag_id: str | None, what: str) -> str:
-        """Something of a tag, or of the greenhouse (None), such as `health`."""
+        """The topic of something of a tag, or of the greenhouse (None), such as `health`."""
         return f"{self.prefix}/{'house' if tag_id is None else f'tags/{safe(tag_id)}'}/{what}"
 
     def reading(self, tag_id: str, sensor: str) -> str:
@@ -83,11 +83,11 @@ class Topics:
         return self.of(tag_id, f"readings/{safe(sensor)}")
 
     def device(self, tag_id: str | None) -> str:
-        """What Home Assistant knows a tag, or the greenhouse (None), by."""
+        """Home Assistant's id for a tag, or for the greenhouse (None)."""
         return f"{safe(self.prefix)}_{'house' if tag_id is None else f'tag_{safe(tag_id)}'}"
 
     def config(self, component: str, tag_id: str | None, what: str) -> str:
-        """Where an entity is announced; `what` is a part of a topic already."""
+        """Where an entity is announced; `what` is a valid level of a topic."""
         place = "house" if tag_id is None else f"tag_{safe(tag_id)}"
         return f"{self.discovery}/{component}/{safe(self.prefix)}/{place}_-_{what}/config"
 
@@ -96,8 +96,7 @@ class Topics:
 class GreenhouseState:
     """The greenhouse as the bridge knows it at one moment.
 
-    `now_ns` is ROS time, None where it is not known; `holds_ns` is for how long each tag's readings
-    hold.
+    `now_ns` is ROS time; None: not known. `holds_ns` is how long each tag's readings are valid.
     """
 
     status: Status = NEVER_SEEN
@@ -108,17 +107,17 @@ class GreenhouseState:
 
     @property
     def tags(self) -> tuple[TagState, ...]:
-        """All of them; none, while no twin was heard."""
+        """All tags; none until a twin is received."""
         return self.status.update.snapshot.tags
 
     @property
     def knows_alarms(self) -> bool:
-        """Whether the past has been read that they are of."""
+        """Whether the past has been read, so that all alarms are known."""
         return self.board.source != "starting"
 
     @property
     def origin(self) -> Origin:
-        """Where what was observed comes from."""
+        """Where observations come from, as the twin reports."""
         return self.status.update.origin
 
 
@@ -131,7 +130,7 @@ class Source(Protocol):
     criteria: Criteria
 
     def seen(self) -> GreenhouseState:
-        """The state of now."""
+        """The current state."""
 
     @property
     def ros_time_ns(self) -> int | None:
@@ -143,7 +142,7 @@ class Source(Protocol):
 
 
 def holds(reading: Reading, holds_ns: int, now_ns: int | None) -> bool:
-    """Whether a reading still says something about now."""
+    """Whether a reading is still valid."""
     return (
         now_ns is not None
         and reading.observed_at_ns is not None
@@ -154,7 +153,7 @@ def holds(reading: Reading, holds_ns: int, now_ns: int | None) -> bool:
 def reading_payload(
     reading: Reading, sensor: Sensor, holds_ns: int, now_ns: int | None
 ) -> dict[str, Any]:
-    """One reading with its own time; `value` is null where it failed or does not hold any more."""
+    """One reading with its own time; `value` is null if it failed or is no longer valid."""
     is_known = holds(reading, holds_ns, now_ns) and math.isfinite(reading.value)
     observed_ns = reading.observed_at_ns
     return {
@@ -175,7 +174,7 @@ def health_payload(health: Health) -> dict[str, Any]:
 
 
 def greenhouse_payload(judged: Judged) -> dict[str, Any]:
-    """The same of the greenhouse, and whether it is day."""
+    """The greenhouse's verdict and its reasons, and whether it is day."""
     day = {"is_day": judged.day.is_day, "source": judged.day.source}
     return {**health_payload(judged.house), "day": day}
 
@@ -187,7 +186,7 @@ def twin_payload(status: Status) -> dict[str, Any]:
 
 
 def alarms_payload(count: int, worst: Iterable[Alarm], *, is_known: bool) -> dict[str, Any]:
-    """How many are active, and the worst of them; `state` is null before that is known."""
+    """How many alarms are active, and the worst; `state` is null until that is known."""
     return {
         "state": ("ON" if count else "OFF") if is_known else None,
         "count": count,
@@ -195,7 +194,7 @@ def alarms_payload(count: int, worst: Iterable[Alarm], *, is_known: bool) -> dic
     }
 
 
-# A class of Home Assistant's with the units that it takes for it; with another unit there is none.
+# Home Assistant's device class of a sensor, and the units that it allows; otherwise there is none.
 _CLASSES: Final = {
     "temperature": ("temperature", {"°C", "°F", "K"}),
     "dew_point": ("temperature", {"°C", "°F", "K"}),
@@ -205,20 +204,20 @@ _CLASSES: Final = {
     "light": ("illuminance", {"lx"}),
     "vpd": ("pressure", {"kPa", "Pa", "hPa"}),
 }
-# How long Home Assistant shows a reading that nothing follows, s. In steps, or a tag's rhythm would
-# have its entities announced anew after each scan.
+# How long Home Assistant shows a reading that is not followed by another, s. In steps, or changes
+# of a tag's scan interval would announce its entities anew after each scan.
 STEPS_S: Final = (
     *(minutes * 60 for minutes in (10, 15, 20, 30, 45, 60, 90)),
     *(hours * 3600 for hours in (2, 3, 4, 6, 8, 12, 18, 24, 48, 96, 168)),
 )
 _STATE: Final = "{{ value_json.state }}"
-# Its "unknown" is no option, but the absence of all.
+# Home Assistant's "unknown" is not an option, but the absence of a value.
 _VERDICT: Final = "{{ value_json.verdict if value_json.verdict != 'unknown' else None }}"
 _IS_LIVE: Final = "{{ 'online' if value_json.state == 'ON' else 'offline' }}"
 
 
 def expire_after_s(holds_ns: int) -> int:
-    """The step that is no shorter than readings hold; s."""
+    """The least step that covers how long readings are valid, s."""
     return next((step for step in STEPS_S if step * 1_000_000_000 >= holds_ns), STEPS_S[-1])
 
 
@@ -234,8 +233,8 @@ def tag_configs(
             "state_topic": topics.reading(tag_id, sensor.name),
             "state_class": "measurement",
             "value_template": "{{ value_json.value }}",
-            # The bridge publishes when a reading does not hold any more; this is for when it is
-            # not connected.
+            # The bridge publishes when a reading is no longer valid; this is for when it is not
+            # connected.
             "expire_after": expire_after_s(holds_ns),
             **({"unit_of_measurement": sensor.unit} if sensor.unit else {}),
             **({"device_class": found} if sensor.unit in units else {}),
@@ -245,7 +244,7 @@ def tag_configs(
 
 
 def greenhouse_configs(topics: Topics) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The same of the greenhouse."""
+    """Topic and payload of each entity of the greenhouse."""
     own = {
         "name": "Twin",
         "state_topic": topics.twin,
@@ -257,7 +256,7 @@ def greenhouse_configs(topics: Topics) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _device(topics: Topics, tag_id: str | None) -> dict[str, Any]:
-    """What Home Assistant shows of a tag, or of the greenhouse (None)."""
+    """Home Assistant's device of a tag, or of the greenhouse (None)."""
     device = {"identifiers": [topics.device(tag_id)], "manufacturer": "lupin-twin"}
     if tag_id is None:
         return {**device, "name": f"Greenhouse {topics.prefix}", "model": "Greenhouse"}
@@ -287,7 +286,7 @@ def _config(
 ) -> tuple[str, dict[str, Any]]:
     availability: list[dict[str, str]] = [{"topic": topics.status}]
     if tag_id is not None and what in ("verdict", "alarm"):
-        # Of a twin that is silent, nobody knows how its tags are.
+        # While the twin is silent, the state of its tags is not known.
         availability.append({"topic": topics.twin, "value_template": _IS_LIVE})
     return topics.config(component, tag_id, what), {
         "unique_id": f"{topics.device(tag_id)}_-_{what}",
@@ -301,18 +300,19 @@ def _config(
     }
 
 
-# --- how each channel does, and how long it waits -------------------------------------------------
+# --- a channel's condition, and its backoff -------------------------------------------------------
 
-# What the page and the log say of a failure is one short line, whatever a library has to say.
+# Longest reason of a failure on the page and in the log, however long a library's text is.
 MAX_DETAIL: Final = 200
 
 
 @dataclass(slots=True)
 class Condition:
-    """Counts since the start, and what is wrong: `detail` is empty where nothing is.
+    """A channel's counts since the start, and what is wrong (`detail`; empty: nothing).
 
-    `sent` was taken by the other side, `failed` are attempts that were not, `dropped` was given up
-    or gave way to something newer. `is_connected`: the last one was taken, or is about to be.
+    `sent` counts what the other side has taken, `failed` attempts that it has not, `dropped` what
+    was given up or replaced by something newer. `is_connected`: the last attempt succeeded; webhook
+    and push also begin so.
     """
 
     is_connected: bool = False
@@ -323,21 +323,21 @@ class Condition:
     dropped: int = 0
 
     def taken(self, number: int = 1) -> None:
-        """So many were taken by the other side."""
+        """Count messages that the other side has taken."""
         self.is_connected, self.detail = True, ""
         self.sent += number
 
     def failing(self, why: str) -> None:
-        """An attempt failed."""
+        """Count a failed attempt."""
         self.is_connected = False
         self.detail = " ".join(why.split())[:MAX_DETAIL] or "it failed without a reason"
         self.failed += 1
 
 
 class Backoff:
-    """Twice as long after each failure, from `first_s` up to `most_s`; a half of it by chance.
+    """Exponential backoff from `first_s` to `most_s`; up to half of each wait is random.
 
-    Chance keeps those that lost the same broker at the same time from coming back as one.
+    The randomness keeps those that lost the same broker from coming back at the same moment.
     """
 
     def __init__(self, first_s: float, most_s: float) -> None:
@@ -352,5 +352,5 @@ class Backoff:
         return whole_s * random.uniform(0.5, 1.0)  # noqa: S311
 
     def succeeded(self) -> None:
-        """The next failure is the first again."""
+        """Begin again with `first_s` at the next failure."""
         self._failures = 0

@@ -1,9 +1,9 @@
-"""MQTT: the state of the greenhouse, published to a broker by `aiomqtt`, with a last will.
+"""MQTT: publishes the state of the greenhouse to a broker by `aiomqtt`, with a last will.
 
-Nothing is retained but the report of a day, and the bridge's own `online`, which the broker itself
-turns into `offline`: a retained reading or verdict would outlive what it says. A later subscriber
-gets everything at Home Assistant's birth message, or with the next change. The bridge reads nothing
-else: anybody may write to a topic, so what is received is small, and its effects are rate-limited.
+Only the daily report and the bridge's own `online` are retained; the last will turns that into
+`offline`. A retained reading or verdict would outlive its truth. A later subscriber gets everything
+at Home Assistant's birth message, or with the next change. The bridge receives only that message:
+anybody may publish it, so its size is bounded, and its effects are rate-limited.
 """
 
 from __future__ import annotations
@@ -56,26 +56,26 @@ _NEVER: Final = 2**63 - 1
 _UNKNOWN: Final = Health(Verdict.UNKNOWN)
 # Topic and payload.
 Message = tuple[str, bytes]
-# Home Assistant takes an empty announcement for the end of the entity.
+# An empty announcement removes the entity from Home Assistant.
 _GONE: Final = b""
 
 
 @dataclass(slots=True)
 class _Published:
-    """What was published of a tag or the greenhouse: a digest a topic."""
+    """What was published of a tag or the greenhouse: a digest for each topic."""
 
     digests: dict[str, bytes] = field(default_factory=dict)
     # What its announcements were made of.
     announced: object = None
     configs: frozenset[str] = frozenset()
-    # When the first of its readings ceases to hold.
+    # When the first of its readings becomes too old.
     until_ns: int = _NEVER
 
 
 class Mirror:
-    """What a broker has, and what it needs next: the newest of each topic.
+    """Knows what a broker has, and what it needs next: the newest of each topic.
 
-    Tags wait for their turn, not payloads: one is written of what is known by then.
+    Tags are queued, not payloads: a payload is made from what is known at the tag's turn.
     """
 
     def __init__(self, topics: Topics, sensors: Sensors) -> None:
@@ -84,19 +84,19 @@ class Mirror:
         self._seen = GreenhouseState()
         self._tags: dict[str, TagState] = {}
         self._published: dict[str, _Published] = {}
-        # Tags in their turn, each with the state with which it came to wait; SITE: the greenhouse.
+        # Queued tags, each with its state when it was queued; SITE: the greenhouse.
         self._waiting: dict[str, TagState | None] = {SITE: None}
-        # Before that, no published reading ceases to hold.
+        # Until then, no published reading becomes too old.
         self._first_until_ns = _NEVER
         self.dropped = 0
 
     @property
     def waiting(self) -> int:
-        """How many tags wait, the greenhouse included."""
+        """How many tags are queued, the greenhouse included."""
         return len(self._waiting)
 
     def forget(self) -> None:
-        """The broker knows nothing any more: publish everything again."""
+        """Queue everything again: the broker knows nothing any more."""
         self._published = {
             tag_id: _Published(configs=published.configs)
             for tag_id, published in self._published.items()
@@ -105,7 +105,7 @@ class Mirror:
         self._waiting = {tag_id: self._tags.get(tag_id) for tag_id in every}
 
     def see(self, seen: GreenhouseState) -> None:
-        """Take the state of now; tags that have changed wait for their turn."""
+        """Take the current state, and queue the tags that have changed."""
         before, self._seen = self._seen, seen
         changed: dict[str, None] = {}
         if seen.tags != before.tags:
@@ -135,7 +135,7 @@ class Mirror:
         self._waiting.setdefault(SITE, None)
 
     def messages(self) -> Iterator[Message]:
-        """The messages of all that wait."""
+        """Yield the messages of all queued tags."""
         while self._waiting:
             tag_id = next(iter(self._waiting))
             del self._waiting[tag_id]
@@ -154,7 +154,7 @@ class Mirror:
             yield from ((topic, _GONE) for topic in sorted(published.configs))
             return
         said = self._of_greenhouse() if tag is None else self._of_tag(tag, published)
-        # With the origin of its data: nobody is called for a simulation.
+        # With the data's origin, so that nobody is called for a simulation.
         states = ((topic, {**it, "origin": self._seen.origin}) for topic, it in said)
         for topic, payload in chain(self._announced(tag, published), states):
             text = orjson.dumps(payload)
@@ -198,7 +198,7 @@ class Mirror:
     def _announced(
         self, tag: TagState | None, published: _Published
     ) -> Iterable[tuple[str, dict[str, Any]]]:
-        """The announcements, where they are of something else than before."""
+        """The announcements; none if nothing that they are made of has changed."""
         if not self._topics.discovery:
             return ()
         readings = () if tag is None else (*tag.readings, *derive(tag.readings))
@@ -220,28 +220,28 @@ class Mirror:
 
 FIRST_WAIT_S: Final = 1.0
 MOST_WAIT_S: Final = 60.0
-# A broker that answers nothing for so long is tried anew.
+# After this long without an answer, the broker is connected anew.
 ANSWER_S: Final = 10.0
 KEEPALIVE_S: Final = 15
 POLL_S: Final = 1.0
-# Messages without an acknowledgement, and in a second: to publish ten thousand tags for the first
-# time (18 messages each) takes some minutes, and does not block the loop.
+# Messages without acknowledgement, and messages a second, at most. The first publication of ten
+# thousand tags (18 messages each) takes some minutes, and does not block the loop.
 WINDOW: Final = 32
 MAX_PER_S: Final = 1_000.0
-# `online` is repeated so often: the will of an earlier process may come late.
+# Interval of repeating `online`: the last will of an earlier process may come late.
 STATUS_S: Final = 10.0
-# However often a birth message comes, everything is published again so often at most.
+# Everything is published again at most this often, however many birth messages come.
 REPEAT_S: Final = 5.0
-# Of what a broker sends: a birth message has some forty bytes, an acknowledgement fewer.
+# Limit of a broker's packets: a birth message has some forty bytes, an acknowledgement fewer.
 MAX_PACKET_BYTES: Final = 8_192
-# To publish `offline`: Ctrl-C ends within 2 s, broker or not.
+# Time to publish `offline`: Ctrl-C ends within 2 s, with or without a broker.
 LAST_MESSAGE_S: Final = 0.5
 ONLINE, OFFLINE = b"online", b"offline"
 AT_LEAST_ONCE: Final = 1
 
 
 class Mqtt:
-    """Belongs to the event loop."""
+    """Publishes to a broker, and reconnects. Belongs to the event loop."""
 
     name: Final = "mqtt"
 
@@ -250,7 +250,7 @@ class Mqtt:
         self._target, self._topics = target, target.topics
         self._mirror = mirror
         self._backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
-        # Of its own: two bridges with one name would throw each other out, for ever.
+        # Unique: two bridges with the same identifier would disconnect each other for ever.
         self._identifier = f"lupin-twin-{secrets.token_hex(6)}"
         self._has_to_repeat: bool
         self._reports: deque[tuple[bytes, asyncio.Future[bool]]] = deque()
@@ -262,13 +262,11 @@ class Mqtt:
     def start(self, source: Source) -> None:
         """Publish from now on."""
         self._look = source.seen
-        self._see()
-        self._count()
         self._task = asyncio.create_task(self._run(), name="mqtt")
 
     @property
     def called(self) -> str:
-        """The broker and where it publishes there."""
+        """The broker, and the prefix of the topics there."""
         return f"{self._target.called} {self._topics.prefix}"
 
     async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
@@ -284,7 +282,7 @@ class Mqtt:
         if self._task is None:
             return
         if self._is_connecting:
-            # Cut off in the midst of that, the library complains of the broker's answer.
+            # If cancelled while it connects, the library logs an error about the broker's answer.
             await asyncio.wait([self._task], timeout=LAST_MESSAGE_S)
         self._task.cancel()
         await asyncio.wait([self._task], timeout=2 * LAST_MESSAGE_S)
@@ -292,6 +290,9 @@ class Mqtt:
     async def _run(self) -> None:
         while True:
             try:
+                # What changes without a connection is seen to wait.
+                self._see()
+                self._count()
                 await self._one_connection()
             except MqttError as error:
                 self._failed(str(error))
@@ -406,7 +407,7 @@ class Mqtt:
             max_queued_incoming_messages=WINDOW,
         )
         client.pending_calls_threshold = 2 * WINDOW
-        # Looked at here: who waits for an answer does not, and asyncio would complain of that.
+        # Retrieve the exception: nobody else may do so, and asyncio would log that.
         client._disconnected.add_done_callback(  # noqa: SLF001
             lambda end: end.cancelled() or end.exception()
         )
@@ -427,13 +428,10 @@ class Mqtt:
         problem = self.condition.detail
         if problem != before:
             log.warning("MQTT: %s; it will be retried", problem)
-        # So that what changes meanwhile is seen to wait.
-        self._see()
-        self._count()
 
 
 def _take_no_more_than(client: Client, most: int) -> None:
-    """End the connection at a larger packet: paho has no limit, nor does every broker heed one."""
+    """End the connection at a larger packet: paho has no limit, and some brokers heed none."""
     paho = client._client  # noqa: SLF001
     receive = paho._sock_recv  # noqa: SLF001
 

@@ -1,10 +1,10 @@
 """Web Push (RFC 8030): critical alarms on the phones and browsers of people who want them.
 
-The address to post to comes from a browser, so it may be anybody's: only https on port 443, at
-addresses that the whole internet may reach, without redirects, and little is read of an answer. A
-message is encrypted for its browser alone (RFC 8291, by `http_ece`) and signed with a key of this
-bridge (VAPID, RFC 8292, by `py_vapid`). `pywebpush` is these two and a client that follows
-redirects, and goes to any address.
+The address to post to comes from a browser, so it may be any address. So posts go only by https to
+port 443 of public addresses, without redirects, and little of an answer is read. A message is
+encrypted for its browser alone (RFC 8291, by `http_ece`) and signed with a key of this bridge
+(VAPID, RFC 8292, by `py_vapid`). `pywebpush` adds to these two a client that follows redirects, and
+posts to any address.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 MAX_ENDPOINT: Final = 1_000
-# Alarms that come so soon after each other are one notification, s.
+# Alarms that come within this time of each other are one notification, s.
 TOGETHER_S: Final = 2.0
-# A phone that is off gets it for so long; what is older is on the page, s.
+# How long a push service keeps a message for a phone that is off, s; older ones are on the page.
 TTL_S: Final = 3_600
-# Attempts of one message: they take most of that hour, for a greenhouse may be offline for long.
+# Attempts to send a message: they take most of that hour, as a greenhouse may be offline for long.
 TRIES: Final = 66
 # Between the first two attempts, and between later ones, s.
 FIRST_WAIT_S: Final = 2.0
@@ -59,15 +59,18 @@ _KEY: Final = "vapid"
 
 
 class DeviceRefused(ValueError):
-    """It cannot be notified; the message names the field."""
+    """A device cannot be notified; the message names the field."""
 
 
 class DeviceGone(Exception):
-    """Its push service has it no more."""
+    """A device is no longer known to its push service."""
 
 
 class Push:
-    """Belongs to the event loop. `people` has the devices, `site` is whose alarms these are."""
+    """Sends critical alarms to devices. Belongs to the event loop.
+
+    `people` has the devices, `site` is the site of the alarms.
+    """
 
     name: Final = "push"
 
@@ -80,7 +83,7 @@ class Push:
         self._new: dict[str, Alarm] = {}
         self._is_news = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
-        # By endpoint: what is to be sent yet, and who does it.
+        # By endpoint: the alarms still to be sent, and the task that sends them.
         self._owed: dict[str, dict[str, Alarm]] = {}
         self._sending: dict[str, asyncio.Task[None]] = {}
         self._at_once = asyncio.Semaphore(AT_ONCE)
@@ -88,7 +91,7 @@ class Push:
         self._started_s = 0.0
 
     async def public_key(self) -> str:
-        """The key that a browser subscribes with, base64url; made with the first.
+        """The key that a browser subscribes with, base64url; it is made at the first call.
 
         Raises:
             AccountError, ClientLimitError: the file of people cannot be written.
@@ -118,7 +121,7 @@ class Push:
         self._task = asyncio.create_task(self._run(source), name="push")
 
     def on_alarms(self, change: Change) -> None:
-        """Alarms have changed."""
+        """Queue changed alarms that are critical, and new or worse."""
         source, since_ns = self._source, 0.0
         now_ns = source.ros_time_ns
         if change.is_past:
@@ -176,7 +179,7 @@ class Push:
         return await self._people.write(lambda it, _: it.devices(self._site))
 
     async def _serve(self, device: Device, source: Source) -> None:
-        """Send all that is owed to a browser; no other waits for it."""
+        """Send a browser all that is due to it; no other browser waits for that."""
         try:
             while owed := self._owed.pop(device.endpoint, None):
                 bodies = [alarm_json(alarm) for alarm in owed.values()]
@@ -193,7 +196,7 @@ class Push:
             self.condition.waiting = len(self._sending)
 
     async def _send(self, device: Device, message: bytes) -> None:
-        """Until its push service takes it, has it no more, or was tried enough."""
+        """Post until the push service takes it, no longer knows the device, or was tried enough."""
         host = urlsplit(device.endpoint).hostname or ""
 
         async def attempt() -> None:
@@ -249,7 +252,7 @@ class Push:
         }
 
     async def _endpoint(self, url: str) -> Endpoint:
-        """Where to connect to: an address that was looked at, and that no later look changes."""
+        """Where to connect to: an IP address that was checked, which no later lookup can change."""
         endpoint = parsed(url, self.target)
         try:
             found = await asyncio.get_running_loop().getaddrinfo(
@@ -266,10 +269,10 @@ class Push:
 
 
 def parsed(url: str, target: PushTarget) -> Endpoint:
-    """A push service's address as a browser gives it.
+    """The parts of a push service's address, which a browser gave.
 
     Raises:
-        DeviceRefused: it cannot be one.
+        DeviceRefused: it is invalid.
 
     """
     if len(url) > MAX_ENDPOINT or not url.isascii() or not url.isprintable() or " " in url:
@@ -289,10 +292,10 @@ def parsed(url: str, target: PushTarget) -> Endpoint:
 
 
 def check_device(device: Device, target: PushTarget) -> None:
-    """Refuse what can never be notified.
+    """Refuse a device that can never be notified.
 
     Raises:
-        DeviceRefused: the address or a key cannot be one.
+        DeviceRefused: the address or a key is invalid.
 
     """
     from cryptography.hazmat.primitives.asymmetric.ec import SECP256R1, EllipticCurvePublicKey  # noqa: PLC0415  # as above
@@ -301,7 +304,7 @@ def check_device(device: Device, target: PushTarget) -> None:
     if endpoint.host not in target.private_hosts:
         try:
             is_public = ip_address(endpoint.host).is_global
-        except ValueError:  # a name; where it leads to is looked at each time
+        except ValueError:  # a name, whose address is checked at each post
             is_public = "." in endpoint.host
         if not is_public:
             raise DeviceRefused("endpoint: expected a host that is reached over the internet")
@@ -341,7 +344,7 @@ def decoded(text: str) -> bytes:
     """From base64url, padded or not.
 
     Raises:
-        ValueError: it is none.
+        ValueError: it is not base64url.
 
     """
     plain = text.rstrip("=")

@@ -1,10 +1,10 @@
-"""The webhook: changes of alarms, one POST after the other, each until it is taken.
+"""The webhook: posts changes of alarms one after the other, each until it is taken.
 
-A change has one id however often it is sent, also after a restart: changes of the day before are
-sent once more, and a receiver drops the ids that it has had.
+A change has the same id however often it is sent, also after a restart. Then the changes of the
+last day are sent once more, and a receiver drops the ids that it has had.
 
-A POST has a connection of its own, and of its answer only the status is read. h11 is there for the
-server already: a client library would bring proxies, redirects, cookies and bodies of any size.
+Each POST has its own connection, and only the head of its answer is read. It uses h11, as the
+server does: a client library would add proxies, redirects, cookies and bodies of any size.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ log = logging.getLogger(__name__)
 MAX_WAITING: Final = 1_000
 # Alarms whose last change is known; far more than are active at once.
 MAX_KNOWN: Final = 20_000
-# Changes of so long before the start are sent again.
+# Changes since this long before the start are sent again.
 RESENT_NS: Final = 24 * 3600 * 1_000_000_000
 
 What = Literal["raised", "worse", "cleared", "withdrawn", "report"]
@@ -56,13 +56,13 @@ class Delivery:
     alarm: Alarm | None
     origin: Origin
     report: orjson.Fragment | None = None
-    # Whether it was taken, or given up.
+    # Set to whether it was taken, or given up.
     end: asyncio.Future[bool] | None = None
 
     def body(self, lost: int, origin: Origin) -> bytes:
-        """What is posted; `lost` changes were given up since the last one that was taken.
+        """The body to post; `lost` changes were given up since the last one that was taken.
 
-        `origin` is where observations come from now, for who did not know it then.
+        `origin` is where observations come from now, in case that was not known then.
         """
         alarm = self.alarm
         of = {"report": self.report} if alarm is None else {"alarm": alarm_json(alarm)}
@@ -71,21 +71,21 @@ class Delivery:
         return orjson.dumps({**head, **of, "lost": lost, "origin": origin})
 
     def ended(self, *, taken: bool) -> None:
-        """It was taken, or given up."""
+        """Note that it was taken, or given up."""
         if self.end is not None and not self.end.done():
             self.end.set_result(taken)
 
 
 class AlarmNews:
-    """What is to be sent of changes of alarms; it knows what was sent of each."""
+    """Turns changes of alarms into deliveries, and remembers what was sent of each alarm."""
 
     def __init__(self) -> None:
-        # Of each alarm that was sent: when it was cleared, None: it was active; and whether it was
-        # worse than as it was raised.
+        # By id, of each alarm that was sent: when it was cleared (None: it was active), and whether
+        # it had got worse since it was raised.
         self._sent: OrderedDict[str, tuple[int | None, bool]] = OrderedDict()
 
     def of(self, change: Change, now_ns: int | None, origin: Origin) -> Iterator[Delivery]:
-        """What is to be sent of a change; `now_ns` is ROS time, None: not known.
+        """Yield the deliveries of a change; `now_ns` is ROS time; None: not known.
 
         `origin` is where observations come from.
         """
@@ -105,7 +105,7 @@ class AlarmNews:
         before = self._sent.get(alarm.id)
         now = (alarm.cleared_at_ns, alarm.is_worse)
         if before == now:
-            return  # a new worst value alone is nothing that anybody has to be called for
+            return  # a new worst value alone is not worth a call
         self._sent[alarm.id] = now
         self._sent.move_to_end(alarm.id)
         if len(self._sent) > MAX_KNOWN:
@@ -141,13 +141,13 @@ def signed(secret: bytes, delivery_id: str, now_s: int, body: bytes) -> dict[str
 
 FIRST_WAIT_S: Final = 1.0
 MOST_WAIT_S: Final = 300.0
-# A twin elsewhere says once a second where observations come from, and one of before never does.
+# Longest wait for the origin: a remote twin reports it once a second, an old version never.
 ORIGIN_S: Final = 10.0
 ORIGIN_POLL_S: Final = 0.1
 
 
 class Webhook:
-    """Belongs to the event loop."""
+    """Sends deliveries to the receiver, in order. Belongs to the event loop."""
 
     name: Final = "webhook"
 
@@ -172,7 +172,7 @@ class Webhook:
         self._task = asyncio.create_task(self._run(), name="webhook")
 
     def on_alarms(self, change: Change) -> None:
-        """Alarms have changed."""
+        """Queue the deliveries of changed alarms."""
         source = self._source
         for delivery in self._news.of(change, source.ros_time_ns, source.origin):
             self._wait(delivery)
@@ -217,7 +217,7 @@ class Webhook:
                 self.condition.failing(f"{type(error).__name__} ({self._target.called})")
                 self.condition.dropped += 1
                 is_taken = False
-                # Whatever it was may be so with the next one too.
+                # The next one may meet the same error.
                 await asyncio.sleep(self._backoff.wait_s())
             delivery.ended(taken=is_taken)
             self._lost += -lost if is_taken else 1
@@ -234,7 +234,7 @@ class Webhook:
         return await until_taken(attempt, self.condition, self._backoff, what, where)
 
     async def _wait_for_origin(self) -> None:
-        """Until it is known; one that was not in its time is waited for no more."""
+        """Wait until the origin is known; after one time-out, it is never waited for again."""
         until_s = time.monotonic() + self._origin_s
         while self._source.origin == "unknown":
             if time.monotonic() >= until_s:
@@ -247,15 +247,15 @@ class Webhook:
 
 CONNECT_S: Final = 5.0
 ANSWER_S: Final = 10.0
-# Of the answer's head, with those of status 1xx before it. Its body is not read.
+# Limit of the answer's head, with those of status 1xx before it. The body is not read.
 MAX_HEAD_BYTES: Final = 16_384
 
 
 class PostError(RuntimeError):
-    """It was not taken; the message says why, in a few words.
+    """A POST was not taken; the message says why, in a few words.
 
-    `status` is the answer's, 0: there was none. `retry_after_s` is for how long the receiver wants
-    to be left alone, s.
+    `status` is the answer's; 0: there was none. `retry_after_s` is how long the receiver asks to
+    wait, s.
     """
 
     def __init__(self, why: str, status: int = 0, retry_after_s: int = 0) -> None:
@@ -264,10 +264,10 @@ class PostError(RuntimeError):
 
 
 async def post(target: Endpoint, headers: Mapping[str, str], body: bytes) -> None:
-    """Send it, and wait for the answer's head. Redirects are not followed.
+    """Post a body, and wait for the answer's head. Redirects are not followed.
 
     Raises:
-        PostError: no connection, no valid TLS, no answer in time, none of HTTP, or no success.
+        PostError: no connection, no valid TLS, no answer in time, not HTTP, or no success.
 
     """
     try:
@@ -296,12 +296,12 @@ async def post(target: Endpoint, headers: Mapping[str, str], body: bytes) -> Non
     except h11.RemoteProtocolError as error:
         raise PostError(f"no answer of HTTP: {error}") from None
     finally:
-        # At once: what more it has to say is not wanted.
+        # At once: the rest of the answer is not wanted.
         writer.transport.abort()
     if not 200 <= answer.status_code < 300:
         is_elsewhere = 300 <= answer.status_code < 400
         why = f"answered {answer.status_code}{', which is not followed' if is_elsewhere else ''}"
-        # As many digits as matter: Python reads no number of thousands.
+        # Only as many digits as matter: int() refuses thousands of them.
         given = dict(answer.headers).get(b"retry-after", b"")[:9]
         raise PostError(why, answer.status_code, int(given) if given.isdigit() else 0)
 
@@ -344,7 +344,7 @@ async def _exchange(
 
 
 def _words_of(error: OSError) -> str:
-    # asyncio and OpenSSL have words of their own, and errors of theirs have numbers of theirs.
+    # asyncio and OpenSSL use their own texts, and their own error numbers.
     if isinstance(error, ConnectionError) and error.errno:
         return os.strerror(error.errno)
     return error.strerror or str(error) or type(error).__name__
@@ -352,8 +352,8 @@ def _words_of(error: OSError) -> str:
 
 # --- how a message is tried until it is taken -----------------------------------------------------
 
-# What the receiver will not have, however often it comes: this message, not the receiver, is the
-# trouble. Others wait behind it, so it is given up.
+# Statuses with which a receiver rejects this message for good. Others wait behind it, so it is
+# given up after MAX_REFUSALS.
 REFUSALS: Final = frozenset({400, 405, 409, 410, 413, 414, 415, 422, 431})
 MAX_REFUSALS: Final = 5
 
@@ -367,9 +367,9 @@ async def until_taken(
     *,
     most_tries: float = math.inf,
 ) -> bool:
-    """Try again until it is taken; False: it was given up, which is counted and logged.
+    """Retry `post` until the message is taken; False: it was given up, and counted and logged so.
 
-    `what` and `where` are what the log calls it and its receiver.
+    `what` and `where` name the message and its receiver in the log.
     """
     tries = refusals = 0
     while True:

@@ -1,1 +1,1 @@
-"""The past over HTTP: queries, and the answers made of a source's."""
+"""The past over HTTP: queries of the log, and their answers."""

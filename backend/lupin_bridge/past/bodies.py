@@ -1,7 +1,7 @@
 """Bodies of answers about a period: a series and its gaps, a timeline, rows as CSV. Pure.
 
-The log may not hold some writes yet, or no more. So every answer says which part of its time is
-complete. Times are ns of ROS time.
+The log may lack recent writes, and old ones that were deleted. So every answer says which part of
+its time is complete. Times are ns of ROS time.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ KEPT_FROM: Final = "X-Kept-From"
 
 
 def complete_to(journal: Condition, until_ns: int) -> int | None:
-    """Up to when, of what lies before `until_ns`, all is in the log; None: it is not known."""
+    """Up to when the log is complete, at most `until_ns`; None: not known."""
     return None if journal.complete_ns is None else min(journal.complete_ns, until_ns)
 
 
 def kept_from(journal: Condition, at_ns: int) -> int | None:
-    """Since when all that leads to a moment is kept, from later on if none is; None: unknown."""
+    """Since when all rows up to a moment are kept; after it if they are not; None: unknown."""
     if journal.complete_ns is None:
         return None
     return next(
@@ -47,7 +47,7 @@ def moment_headers(journal: Condition, at_ns: int) -> dict[str, str]:
 
 
 def of_period(journal: Condition, start_ns: int, end_ns: int) -> tuple[int | None, int | None]:
-    """`complete_to` and `kept_from` for `start_ns <= t < end_ns`, within that."""
+    """`complete_to` and `kept_from` for `start_ns <= t < end_ns`, clipped to that."""
     until_ns = complete_to(journal, end_ns)
     since_ns = kept_from(journal, max(start_ns, end_ns - 1))
     if until_ns is None or since_ns is None:
@@ -81,7 +81,7 @@ def _completeness_headers(until_ns: int | None, since_ns: int | None) -> dict[st
     return {name: seconds(at_ns) for name, at_ns in known.items() if at_ns is not None}
 
 
-# A gap is longer than so many usual intervals between two readings.
+# A gap is longer than this many usual intervals between two readings.
 USUAL_INTERVALS: Final = 3
 
 Stretches = Sequence[tuple[int, int]]
@@ -145,9 +145,9 @@ def finite(value: float) -> float | None:
 def gaps(past: SeriesPast, now_ns: int | None) -> Stretches:
     """The stretches without a finite reading that are longer than usual, as (from, to) in ns.
 
-    Usual is three times the median interval between two readings, and at least a bucket. Those
+    Usual is three times the median interval between two readings, and at least a bucket. Stretches
     before the first reading and after the last count too, up to now. A period without any reading
-    is one gap; of a single reading the usual interval is unknown.
+    is one gap; a single reading gives no gaps, as the usual interval is unknown.
     """
     end_ns = past.end_ns if now_ns is None else min(past.end_ns, now_ns)
     width_ns = past.bucket_ns or 0
@@ -166,16 +166,15 @@ def gaps(past: SeriesPast, now_ns: int | None) -> Stretches:
     return [
         (since_ns, until_ns)
         for since_ns, until_ns in zip(ends, starts, strict=True)
-        # A bucket that is absent is a stretch of that length at least.
+        # An absent bucket is a stretch of at least that length.
         if until_ns - since_ns > usual_ns or 0 < usual_ns == width_ns == until_ns - since_ns
     ]
 
 
 def _usual_ns(known: Sequence[tuple[int, int]], width_ns: int) -> int | None:
-    """What no gap is shorter than; None: unknown.
+    """The least length of a gap, ns; None: unknown.
 
-    Of the readings of a bucket each is as far from the next as they share the time until the next
-    bucket.
+    The readings of a bucket count as evenly spaced until the next bucket.
     """
     intervals = sorted(((later - at_ns) // n, n) for (at_ns, n), (later, _) in pairwise(known))
     if not intervals:
@@ -187,17 +186,17 @@ def _usual_ns(known: Sequence[tuple[int, int]], width_ns: int) -> int | None:
 
 
 def _weighted_median(weighted: Sequence[tuple[int, int]]) -> int:
-    """The least of ascending (value, weight) with half of the weight on it and below."""
+    """The weighted median of ascending (value, weight): half of the weight is on it and below."""
     up_to = list(accumulate(weight for _, weight in weighted))
     return weighted[bisect_left(up_to, up_to[-1] / 2)][0]
 
 
 def _mean(mean: float, low: float, high: float) -> float:
-    """The mean, also where the sum of what it is of was past what a float holds."""
+    """The mean; if its sum overflowed a float, the middle between `low` and `high`."""
     return mean if math.isfinite(mean) else low / 2 + high / 2
 
 
-# What is counted, by its name in a bucket.
+# The events that are counted, by their names in a bucket.
 COUNTED: Final = {
     "scans": Event.SCANS,
     "failures": Event.FAILURES,
@@ -208,13 +207,13 @@ COUNTED: Final = {
 
 
 def timeline_period(start_ns: int, end_ns: int, points: int, runs: SeriesPast) -> Grid:
-    """The period of a query; the series of all runs knows the oldest moment (0), and now (0)."""
+    """The period of a query; a start or end of 0 is the oldest moment, or now, of all runs."""
     start_ns = start_ns or runs.start_ns
     return grid(start_ns, max(start_ns, end_ns or runs.end_ns), points)
 
 
 def coarsest(period: Grid, series: Iterable[SeriesPast]) -> Grid:
-    """The grid of the longest buckets in `series`, which all of it fits.
+    """The grid with the longest buckets of `series`, into which all of them fit.
 
     Frequent events come in whole hours, however short the buckets of the period could be.
     """
@@ -231,12 +230,12 @@ def timeline_body(
 ) -> dict[str, Any]:
     """`routes_schema.Timeline` in the buckets of `period`, which is the `coarsest`.
 
-    Silences may be too many and come in buckets. Then the longest of each is given, as if it began
-    with its bucket. What goes on ends with the period here: a period that is over has one answer.
+    Too many silences come in buckets: then the longest of each is given, as if it began with its
+    bucket. A run that goes on is cut at the period's end, so that a past period has one answer.
     """
 
     def until(at_ns: int, start_ns: int) -> int:
-        # A run's length is a float in s: of three years it is right to some 10 ns.
+        # A run's length is a float in s: after three years it is exact to some 10 ns.
         is_over = at_ns < runs.end_ns - 1_000
         return at_ns if is_over else max(start_ns, min(at_ns, period.end_ns))
 
@@ -271,7 +270,7 @@ def timeline_body(
 
 
 def _by_bucket(past: SeriesPast, period: Grid) -> Counter[int]:
-    """How many in which bucket, of events one by one or in the same or finer buckets."""
+    """The number of events in each bucket of `period`; `past` is single events or finer buckets."""
     found: Counter[int] = Counter()
     for at_ns, n in zip(past.stamps_ns, past.counts, strict=True):
         found[max(0, at_ns - period.start_ns) // period.bucket_ns] += n
@@ -286,13 +285,13 @@ CSV_TYPE: Final = "text/csv; charset=utf-8; header=present"
 CSV_HEADER: Final = b"time_iso,stamp,tag_id,x_m,y_m,sensor,unit,value,status,source\r\n"
 
 
-# Names come again and again: so many are kept as they are written, some 100 bytes each.
+# Names repeat: this many are cached as they are written, some 100 bytes each.
 _NAMES: Final = 20_000
 
 _NEEDS_QUOTES: Final = re.compile(r'[",;\r\n\t]')
-# A spreadsheet takes what begins so for a formula, at the beginning of a cell or, where it parts
-# cells by another sign than the comma, behind that one. Names come from the robot, and whoever
-# opens the file must not run what they say.
+# A spreadsheet takes what begins like this for a formula: at the start of a cell or, if it splits
+# cells at another sign than the comma, after that sign. Names come from the robot, and must not run
+# on the machine of whoever opens the file.
 _FORMULA: Final = re.compile(r"(^|[;\t\r\n])(?=[=+\-@\uff1d\uff0b\uff0d\uff20\t\r\n])")
 
 
@@ -330,7 +329,7 @@ def csv_cell(text: str) -> str:
 
 
 def csv_number(value: float) -> str:
-    """A number in the fewest digits that say exactly it; empty: not finite."""
+    """A number in the fewest digits that are exact; empty: not finite."""
     return repr(value) if value - value == 0.0 else ""
 
 

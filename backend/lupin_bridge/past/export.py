@@ -1,7 +1,7 @@
-"""Rows of a period in the formats of an export: CSV, and Parquet by pyarrow. No format waits.
+"""The formats of an export: CSV, and Parquet by pyarrow. They do no input or output.
 
-Rows are packed in the process that reads them, and written where they are sent: a Parquet file has
-a beginning and an end, so one writer has to see all of it. It holds one group of rows, no more.
+Rows are packed in the process that reads them, and written in the one that sends them: a Parquet
+file has a head and a tail, so one writer has to see all of it. It holds at most one group of rows.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.past import bodies
 from lupin_twin.core.past import PastRow
 
-# In one group of a Parquet file: some megabytes until they are written.
+# Rows in one group of a Parquet file: some megabytes until they are written.
 GROUP_ROWS: Final = 50_000
 
 
 class MissingPackageError(RuntimeError):
-    """A format needs a package that is not installed; the message says how to have it."""
+    """A format needs a package that is not installed; the message says how to install it."""
 
 
 class Csv:
-    """CSV is sent as it was packed: `begin`, then `add` for each packed lot, then `end`."""
+    """CSV, sent as it was packed: call `begin`, then `add` for each packed lot, then `end`."""
 
     name = "csv"
     media_type = bodies.CSV_TYPE
@@ -38,23 +38,23 @@ class Csv:
         self._has_site = has_site
 
     def begin(self) -> bytes:
-        """What comes first."""
+        """The bytes to send first."""
         header = bodies.CSV_HEADER
         return header.replace(b"\r", b",site\r") if self._has_site else header
 
     def add(self, packed: bytes) -> bytes:
-        """What there is to send once a lot is known, maybe nothing."""
+        """The bytes to send after one more lot; maybe none."""
         return packed
 
     def end(self) -> bytes:
-        """What comes last."""
+        """The bytes to send last."""
         return b""
 
 
 # --- Parquet --------------------------------------------------------------------------------------
 
 _OF_VALUES: Final = "see the column unit"
-# Attributes as CF has them, where it has such.
+# Attributes of the CF conventions, where these define any.
 _COLUMNS: Final[Mapping[str, Mapping[str, str]]] = {
     "time": {"standard_name": "time", "long_name": "ROS time of the scan"},
     "tag_id": {"long_name": "tag that was scanned"},
@@ -100,12 +100,12 @@ def _pack_columns(rows: Sequence[PastRow], sensors: Sensors, site: str | None = 
 
 
 class _Sink(io.BytesIO):
-    """Takes what pyarrow writes until that is sent."""
+    """Buffers what pyarrow writes until it is sent."""
 
     _sent = 0
 
     def tell(self) -> int:
-        """How much was written in all: by that pyarrow finds its columns again."""
+        """The bytes written in all: pyarrow records the offsets of columns by them."""
         return self._sent + super().tell()
 
     def take(self) -> bytes:
@@ -117,7 +117,7 @@ class _Sink(io.BytesIO):
 
 
 class Parquet:
-    """A group of rows is written at once; made, it may take as long as an import.
+    """Parquet, written group by group of rows; creating it may take as long as an import.
 
     Raises:
         MissingPackageError: pyarrow is not installed.
@@ -144,7 +144,7 @@ class Parquet:
             **dict.fromkeys(("x_m", "y_m", "value"), pyarrow.float64()),
         }
         known = {name: it.unit for name, it in sensors.by_name.items()}
-        # The values of one sensor alone have one unit.
+        # If there is only one sensor, all values have its unit.
         units = sensors.named(sensor).unit if sensor else _OF_VALUES
         described = {**_COLUMNS, "value": {**_COLUMNS["value"], "units": units}}
         self._schema = pyarrow.schema(

@@ -1,6 +1,6 @@
 """Fields of the newest state or as of a moment, and estimates.
 
-An estimate is of what the log has up to a moment, and of nothing else.
+An estimate uses only what the log has up to its moment.
 """
 
 from __future__ import annotations
@@ -45,19 +45,19 @@ from lupin_twin.runtime.workers import ShouldStop
 # Costs, s of one core, at worst: to write a cell or pixel, to judge a tag.
 _WRITE_CELL_S: Final = 50e-9
 _JUDGE_TAG_S: Final = 20e-6
-# Of a field too large to estimate, or one that will be refused.
+# The cost of a field that will be refused.
 _LARGE_S: Final = 1.0
-# Of the map in use: many fields are of the same one.
+# Cached for the map in use, which many fields share.
 _digest_of: Final = lru_cache(maxsize=1)(digest_of)
 
 
 @dataclass(frozen=True, slots=True)
 class Field(StateQuery):
-    """A field in a format (None: its quality), by these rules, on the map of now.
+    """A field in a format (None: its quality), by these rules, on the current map.
 
-    Without a box, it is that of the tags as they were pinned then. Quantities of a day are made of
-    each tag's readings of a day; whether it was day is decided by the clock. Live and past differ
-    in where the snapshot comes from, and in their ETags (`newest_etag`).
+    The default box is that of the tags as they were pinned then. Daily quantities are derived from
+    each tag's readings of a day; the clock decides whether it was day. Live and past fields differ
+    in the source of the snapshot, and in their ETags (`newest_etag`).
     """
 
     query: FieldQuery
@@ -89,7 +89,7 @@ class Field(StateQuery):
             return looked_s + _LARGE_S
 
     def newest_etag(self, revision: str) -> str:
-        """Of the newest state: of its revision, and nothing has to be looked at for it."""
+        """The ETag of the field of the newest state, by its revision: it takes no lookup."""
         name = "quality" if self.field_format is None else self.field_format.name
         rules, sensors = self.rules, self.criteria.sensors
         return etag_of(f"newest {name}", (revision, self.query, rules, sensors.text))
@@ -108,7 +108,7 @@ class Field(StateQuery):
         return self.plan(snapshot)
 
     def plan(self, snapshot: Snapshot, etag: str | None = None) -> Plan:
-        """See `StateQuery`; None: the ETag is made of content.
+        """See `StateQuery`; `etag` None: it is made of content.
 
         Raises:
             lupin_twin.field.engine.FieldRefused: a bad request.
@@ -146,7 +146,7 @@ class Field(StateQuery):
         return Plan(etag, write)
 
     def request(self, snapshot: Snapshot) -> FieldRequest:
-        """What is to be computed of a snapshot; see `check`."""
+        """The request for a snapshot; raises as `check` does."""
         places = [(tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None]
         box = default_box(places, self.rules.max_distance_m)
         request = self.query.request(box, self.rules.max_grid_cells)
@@ -169,7 +169,7 @@ def _answer(
     far_off: Sequence[str],
     kind: str = "Field",
 ) -> Answer:
-    """With headers for what a picture or an array cannot say, and how many tags are left out."""
+    """The answer, with its metadata as headers, and how many far-off tags are left out."""
     known = {**metadata, "Far-Off-Count": str(len(far_off))}
     headers = formats.headers(known, f"{sensor.name}.{field_format.name}", kind)
     return Answer(body, field_format.media_type, {**headers, "ETag": etag, **REVALIDATE})
@@ -212,9 +212,9 @@ def _quality(
 class Estimated(Field):
     """An estimate in a format; a day takes `day_length_s` of ROS time.
 
-    Without a moment it is that of now, `now_ns`. That is made for the newest reading or the last
-    whole minute of the day, whichever is later: a minute of the day changes nothing that anybody
-    could see, but of the same readings it is the same estimate throughout, to the last bit.
+    Without a moment it is the current estimate, as of `now_ns`. That is made for the newest reading
+    or the last whole minute of the day, whichever is later. A minute changes nothing visible, and
+    so the same readings give the same estimate, to the last bit.
     """
 
     query: EstimateQuery
@@ -238,7 +238,7 @@ class Estimated(Field):
         at_ns = self.now_ns if self.at_ns is None else self.at_ns
         snapshot: Snapshot = find(at_ns)
         box = self.request(snapshot)
-        # A minute more than a day: so none is missing for as long as this estimate is the same.
+        # A minute more than a day: so no reading is missing while the estimate stays the same.
         reach_s = self.day_length_s * (1.0 + 1.0 / MINUTES_A_DAY)
         up_to_ns = at_ns
         pasts: list[TagPast] = find(
@@ -273,7 +273,7 @@ class Estimated(Field):
 
 
 def _that_count(pasts: Sequence[TagPast], since_ns: int, sensor: Sensor) -> list[TagPast]:
-    """Without what is older, and what no sensor reads that works."""
+    """The readings without those that are older or implausible."""
 
     def counts(reading: tuple[int, float]) -> bool:
         return reading[0] >= since_ns and sensor.is_plausible(reading[1])

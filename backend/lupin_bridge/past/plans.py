@@ -1,8 +1,8 @@
 """Queries of the past: each looks up what it needs of the log, derives, and plans its answer.
 
-Queries are values: they are pickled and sent to the process that reads the log. Back come the ETag
-and the body, for clients without it. A moment that has passed does not change, and its ETag is made
-of content: it is the same in every replica and after a restart, until a late write changes both.
+Queries are values: they are pickled and sent to the process that reads the log. That returns the
+ETag, and the body for clients without it. The past does not change, so its ETag is made of content:
+it is the same in every replica and after a restart, until a late write changes both.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class NoSuchTag(LookupError):
 
 
 def tag_of(snapshot: Snapshot, tag_id: str) -> TagState:
-    """One tag of a snapshot, which may raise `NoSuchTag`."""
+    """One tag of a snapshot; raises `NoSuchTag` if it is not known."""
     for tag in snapshot.tags:
         if tag.tag_id == tag_id:
             return tag
@@ -78,7 +78,7 @@ def tag_of(snapshot: Snapshot, tag_id: str) -> TagState:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """An answer that is not written yet: its ETag, and how it is."""
+    """An answer that is not written yet: its ETag, and the function that writes it."""
 
     etag: str
     write: Callable[[ShouldStop], Answer]
@@ -88,10 +88,10 @@ class Query(Protocol):
     """A query of the past. Equal ones share one answer while it is made. It can be pickled."""
 
     def cost_s(self, tags: int) -> float:
-        """The cost of the lookups and of the answer with so many tags, s of one core."""
+        """The cost of the lookups and of the answer with this many tags, s of one core."""
 
     def look(self, find: Find) -> Plan:
-        """The plan of the answer, of what is found in the log."""
+        """Look up what is needed of the log, and plan the answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ class Answered:
 
 
 def answered(query: Query, if_none_match: str, find: Find, should_stop: ShouldStop) -> Answered:
-    """A `PastQuery`, of a client that has the answers of these ETags (see If-None-Match)."""
+    """A `PastQuery` for a client that has the answers of these ETags (see If-None-Match)."""
     plan = query.look(find)
     has_it = matches(if_none_match, plan.etag)
     return Answered(plan.etag, None if has_it else plan.write(should_stop))
@@ -123,7 +123,7 @@ class StateQuery:
         return tags * (STATE_S_PER_TAG + PLAN_TAG_S) + self.write_s(tags)
 
     def write_s(self, tags: int) -> float:
-        """The cost of writing the answer with so many tags, s of one core."""
+        """The cost of writing the answer with this many tags, s of one core."""
         return tags * _WRITE_TAG_S
 
     def look(self, find: Find) -> Plan:
@@ -167,7 +167,7 @@ class OneTag(StateQuery):
 class Health(StateQuery):
     """`schema.Judgement` by these criteria, and by what was recent in the log then.
 
-    Quantities of a day are made of all scans of that day: they follow from the log up to then, too.
+    Daily quantities are derived from all scans of their day, also from the log up to then.
     """
 
     criteria: Criteria = field(compare=False)
@@ -194,7 +194,7 @@ class Health(StateQuery):
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """One sensor of one tag, measured or derived, or one event."""
+    """`routes_schema.History`: one sensor of one tag, measured or derived, or one event."""
 
     request: SeriesRequest
     now_ns: int | None = field(compare=False)
@@ -226,7 +226,7 @@ class History:
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """What happened when."""
+    """`routes_schema.Timeline`: what happened when."""
 
     start_ns: int
     end_ns: int
@@ -251,7 +251,7 @@ class Timeline:
             # The wider period also holds single events outside the first one.
             period = coarsest
             counted = self._counted(find, period.start_ns, period.end_ns)
-        # What is not written yet may be no silence.
+        # Past what the log has so far, no silence is certain.
         until_ns = bodies.complete_to(self.journal, period.end_ns)
         until_ns = max(period.start_ns, period.end_ns if until_ns is None else until_ns)
         silences: SeriesPast = find(
@@ -271,7 +271,7 @@ class Timeline:
 class LatestOfTag:
     """`schema.TagHistory`: the last scans and attempts of a tag, `count` of each at most.
 
-    `newest` is its state now, where that is known: it may show what the log does not hold yet.
+    `newest` is its current state, if that is known, which may be ahead of the log.
     """
 
     tag_id: str
@@ -301,12 +301,12 @@ def plan_of(etag: str, write: Callable[[ShouldStop], bytes]) -> Plan:
 
 
 def of_content(answer: Answer) -> Plan:
-    """The plan of an answer that is there already."""
+    """The plan of an answer that is already written."""
     return Plan(answer.headers["ETag"], lambda _: answer)
 
 
 def of_json(body: Mapping[str, Any]) -> Plan:
-    """The plan of a JSON answer that is there already."""
+    """The plan of a JSON answer that is already made."""
     return of_content(content_answer(orjson.dumps(body)))
 
 
@@ -317,9 +317,9 @@ def etag_of(kind: str, content: object) -> str:
     return f'"{digest.hexdigest()}"'
 
 
-# --- what is derived, made of its parts: of readings, or of buckets of an hour at most ------------
+# --- derived series, from readings or from buckets of an hour at most -----------------------------
 
-# Buckets of a day are of a minute at least.
+# With this many points, the buckets of a day are a minute long at least.
 _POINTS_A_DAY: Final = DAY_NS // (60 * NANOSECONDS_PER_SECOND)
 # (ns of ROS time, value), oldest first; and with the period that they are of.
 Readings = list[tuple[int, float]]
@@ -330,12 +330,12 @@ FindSeries = Callable[[SeriesRequest], SeriesPast]
 def derived_series(
     request: SeriesRequest, sensors: Sensors, is_day: IsDay, find: FindSeries
 ) -> SeriesPast:
-    """Measured under that name, else derived of its parts; `PastRefused`: those are too many."""
+    """The series as measured, or else derived; raises `PastRefused` if it has too many parts."""
     measured = find(request)
     derived, daily = DERIVED.get(request.sensor_type), DAILY.get(request.sensor_type)
     if measured.stamps_ns:
         return measured
-    # Now is the same for all parts.
+    # All parts end at the same moment.
     request = replace(request, end_ns=measured.end_ns)
     if derived is not None:
         read = partial(_readings, derived, find)
@@ -363,7 +363,7 @@ def with_daily(
     is_day: IsDay,
     find: FindSeries,
 ) -> list[TagState]:
-    """The tags as of a moment, those of which it is known with a reading of the quantity too."""
+    """The tags as of a moment, with a reading of the daily quantity added where it is known."""
     found = []
     for tag in tags:
         names = {reading.name for reading in tag.readings}
@@ -381,7 +381,7 @@ def with_daily(
 def _of_days(
     daily: Daily, sensors: Sensors, is_day: IsDay, find: FindSeries, request: SeriesRequest
 ) -> OfPeriod:
-    """A value at the last reading of each hour."""
+    """The daily quantity at the last reading of each hour."""
     first_ns = max(1, request.start_ns - DAY_NS) if request.start_ns else 0
     part = find(
         replace(request, sensor_type=daily.sensor, start_ns=first_ns, max_points=MAX_POINTS)
@@ -398,7 +398,7 @@ def _of_days(
 
 
 def _readings_of(daily: Daily, sensors: Sensors, part: SeriesPast, until_ns: int) -> Readings:
-    """The readings of a series that count, of one stamp the last.
+    """The plausible readings of a series; for one stamp, the last.
 
     A bucket that has ended counts as its minimum and maximum at its start, and its mean throughout.
     """
@@ -423,7 +423,7 @@ def _readings_of(daily: Daily, sensors: Sensors, part: SeriesPast, until_ns: int
 
 
 def _readings(derived: Derived, find: FindSeries, request: SeriesRequest) -> OfPeriod:
-    """What can be derived: of readings of one moment, one scan."""
+    """The derived readings, each from two readings of one stamp: one scan."""
     parts: list[SeriesPast] = []
     for name in derived.sources:
         part = find(replace(request, sensor_type=name, max_points=MAX_READINGS))
@@ -435,7 +435,7 @@ def _readings(derived: Derived, find: FindSeries, request: SeriesRequest) -> OfP
             )
         parts.append(part)
     first, second = parts
-    # Of equal stamps, what was received last.
+    # For equal stamps, the reading received last counts.
     ones = dict(zip(first.stamps_ns, first.means, strict=True))
     others = dict(zip(second.stamps_ns, second.means, strict=True))
     readings = [

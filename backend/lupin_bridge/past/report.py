@@ -1,7 +1,7 @@
 """The shift report: what happened between two moments, as the log has it up to the second one.
 
-Whoever asks when, of which process, gets the same: nothing of it depends on what came later. What
-the robot observed is read in the order of time, in lots; between two of them the work can end.
+It is the same at any later time, and from any process: nothing in it depends on what came later.
+Observations are read in the order of time, in lots; the work can be cancelled between two lots.
 """
 
 from __future__ import annotations
@@ -46,18 +46,18 @@ from lupin_twin.core.past import (
 )
 from lupin_twin.core.state import STATUS_OK, Snapshot, TagState
 
-# Of a day at a scan a second there are 86,400. Each takes some 25 us to go through, and three times
-# that where alarms are worked out; an answer has ten seconds.
+# A day at one scan a second has 86,400. Each takes some 25 us, and three times that where alarms
+# are derived; an answer has ten seconds.
 MAX_WRITES: Final = 100_000
 ALARM_WRITES: Final = 40_000
-# Cleared alarms of each tag: of a month, more than a hundred a day.
+# Cleared alarms kept per tag: more than a hundred a day for a month.
 MAX_EPISODES: Final = 5_000
-# As far as before the period alarms are worked out: what began then may go on.
+# How long before the period alarms are derived: one that began then may go on.
 LEAD_NS: Final = 7 * 24 * HOUR_NS
 _LOT: Final = 2_000
 # Entries of each list; `left_out` counts the others.
 MAX_LISTED: Final = 500
-# What a report costs, about, s of one core.
+# Rough cost of a report, s of one core.
 REPORT_S: Final = 3.0
 
 Stretch = tuple[int, int]
@@ -74,7 +74,7 @@ class Report:
 
     @property
     def known_ns(self) -> int:
-        """Up to when that nothing was observed means that it was so."""
+        """Up to when the log is complete: until then, a silence in it was one."""
         return bodies.complete_to(self.journal, self.end_ns) or self.end_ns
 
     def cost_s(self, tags: int) -> float:  # noqa: ARG002
@@ -85,7 +85,7 @@ class Report:
         """See `plans.Query`.
 
         Raises:
-            PastRefused: more was observed in the period than one report may be of.
+            PastRefused: more was observed in the period than one report may cover.
 
         """
         hours = self._per_hour(find)
@@ -118,7 +118,7 @@ class Report:
         return found
 
     def _alarms_from(self, hours: Counter[int]) -> int:
-        """From which moment on alarms are worked out: of so much before the end, not of more."""
+        """From when on alarms are derived: from at most `ALARM_WRITES` before the end."""
         period = sum(n for at_ns, n in hours.items() if at_ns + HOUR_NS > self.start_ns)
         if period > MAX_WRITES:
             raise PastRefused(
@@ -135,7 +135,7 @@ class Report:
 
 
 def _stretches(hours: Counter[int], start_ns: int, end_ns: int) -> Iterator[Stretch]:
-    """All of a period, in stretches with about a lot in each."""
+    """Yield all of a period, in stretches with about a lot in each."""
     count, from_ns = 0, start_ns
     for at_ns in sorted(hours):
         if count and count + hours[at_ns] > _LOT and from_ns < at_ns < end_ns:
@@ -148,7 +148,7 @@ def _stretches(hours: Counter[int], start_ns: int, end_ns: int) -> Iterator[Stre
 
 @dataclass(slots=True)
 class _Extremes:
-    """The readings of one sensor; of equal ones the first counts."""
+    """Mean and extremes of one sensor's readings; of equal extremes, the first counts."""
 
     n: int = 0
     failed: int = 0
@@ -166,7 +166,7 @@ class _Extremes:
 
 
 class _Fold:
-    """What is taken in, in the order of time, and the body of the report that it leads to."""
+    """Takes writes in the order of time, and makes the body of the report from them."""
 
     def __init__(self, of: Report, alarms_ns: int) -> None:
         self._of = of
@@ -175,12 +175,12 @@ class _Fold:
         self._sensors: dict[str, _Extremes] = {}
         self._counts = Counter({"scans": 0, "failed": 0, "inspections": 0})
         self._scanned: set[str] = set()
-        # When anything was tried, and when at each tag's sensors; before the period too.
+        # The stamps of all attempts, and of those at each tag's sensors; before the period too.
         self._attempted_ns = array("q")
         self._attempted_at_ns: dict[str, array[int]] = {}
 
     def take(self, found: PastWrites) -> None:
-        """The next writes."""
+        """Take the next writes."""
         for write in found.writes:
             self._attempted_ns.append(write.stamp_ns)
             if write.kind != KIND_FLOWER:
@@ -192,12 +192,12 @@ class _Fold:
             self._follower = self._new(found.spans)
         self._follower.take(it for it in found.writes if it.stamp_ns >= self._alarms_ns)
         if found.writes:
-            # What is found later is the same; but so it is worked out lot by lot.
+            # The result is not used, but so the work is done lot by lot.
             self._follower.found(found.writes[-1].stamp_ns)
 
     def _new(self, spans: Sequence[RunSpan]) -> Follower:
         by, end_ns = self._of.criteria, self._of.end_ns
-        # What came later did not hold then.
+        # Without what came later: it was not known then.
         cut = [replace(it, end_ns=min(it.end_ns, end_ns)) for it in spans if it.start_ns < end_ns]
         return Follower(by, cut, kept=2 * MAX_WRITES, max_episodes=MAX_EPISODES)
 
@@ -209,7 +209,7 @@ class _Fold:
         else:
             self._counts["scans"] += 1
             self._scanned.add(write.tag_id)
-        # What failed may have brought some all the same.
+        # A failed attempt may have readings all the same.
         readings = readings_of([write])
         for reading in (*readings, *derive(readings)):
             of = self._sensors.setdefault(reading.name, _Extremes())
@@ -218,10 +218,10 @@ class _Fold:
             else:
                 of.failed += 1
 
-    # --- what it leads to -------------------------------------------------------------------------
+    # --- the body ---------------------------------------------------------------------------------
 
     def body(self, notes: Sequence[Note], known: Sequence[str]) -> dict[str, Any]:
-        """`routes_schema.ShiftReport`; `known` are the tags by then."""
+        """`routes_schema.ShiftReport`; `known` are the tags known at its end."""
         start_ns, end_ns = self._of.start_ns, self._of.end_ns
         notes = [note for note in notes if note.made_at_ns < end_ns]
         alarms = self._alarms()
@@ -271,7 +271,7 @@ class _Fold:
         }
 
     def _alarms(self) -> list[Alarm]:
-        """Those that were active at any time of the period, as they were at its end."""
+        """The alarms that were active at any time of the period, as they were at its end."""
         start_ns, end_ns = self._of.start_ns, self._of.end_ns
         if self._follower is None:
             return []
@@ -301,7 +301,7 @@ class _Fold:
         }
 
     def _silences(self) -> list[tuple[str, Stretch]]:
-        """Those of the greenhouse, and then of tags by themselves, the longest first."""
+        """The silences of the greenhouse, then those of single tags, each longest first."""
         start_ns, end_ns = self._of.start_ns, self._of.known_ns
         whole = list(silences(self._attempted_ns, end_ns))
         found = [
@@ -320,10 +320,10 @@ class _Fold:
 def silences(
     attempted_ns: Sequence[int], end_ns: int, but: Sequence[Stretch] = ()
 ) -> Iterator[Stretch]:
-    """Stretches without an attempt, longer than three times the usual interval and ten minutes.
+    """Yield stretches without an attempt, over three times the usual interval and ten minutes.
 
-    The time within `but`, stretches in their order, does not count. Before the first attempt there
-    is no silence.
+    Time within `but`, ascending stretches, does not count. Before the first attempt there is no
+    silence.
     """
     if not attempted_ns:
         return

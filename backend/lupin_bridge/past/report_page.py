@@ -1,7 +1,7 @@
-"""The shift report on paper: one page of HTML, A4, without scripts or anything from elsewhere.
+"""The shift report on paper: one page of HTML for A4, without scripts or external content.
 
 Its words by language are in `report_words.json`, its style in `report.css`, the names of sensors in
-the file of sensors.
+the sensors file.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _POLICY: Final = (
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 PAGE_HEADERS: Final = {"Content-Security-Policy": _POLICY}
-# Of all languages but English.
+# Decimal comma and thousands point, in all languages but English.
 _COMMA: Final = str.maketrans(".,", ",.")
 _EXTREMES: Final = ("sensor", "low*", "where", "mean*", "high*", "where", "count*", "bad*")
 # Alarms in one notification.
@@ -54,7 +54,7 @@ def _words() -> Mapping[str, Words]:
 
 
 def languages() -> Collection[str]:
-    """Those that there are words in."""
+    """The languages of the report."""
     return _words().keys()
 
 
@@ -74,10 +74,10 @@ def push_text(
 
 @dataclass(frozen=True, slots=True)
 class ReportPage(Report):
-    """The report as a page in the language `lang`; times are of `zone`, or the greenhouse's.
+    """The report as a page in the language `lang`; times are in `zone`; None: the greenhouse's.
 
-    `unknown_zone` is the one that was asked for, where this machine does not know it. `origin` is
-    where observations come from, `site` the greenhouse's name, where it has one.
+    `unknown_zone` is a requested zone that this machine does not know; empty: there is none.
+    `origin` is where observations come from; `site` is the greenhouse's name, if it has one.
     """
 
     lang: str = "en"
@@ -95,7 +95,7 @@ class ReportPage(Report):
 
 
 def refused_page(reason: str, lang: str) -> str:
-    """Why there is no report, and the way to ask for it again."""
+    """A page that says why there is no report, with a link to request it again."""
     words = _words()[lang]
     return (
         f"{_head(lang, words['refused'])}<p>{escape(reason)}</p>"
@@ -133,7 +133,7 @@ class _Page:
 
     def page(self, body: Entry, origin: Origin, site: str, unknown_zone: str) -> str:
         say, at = self.say, self._at
-        # Rows leave the first day out.
+        # Rows omit the date of the first day.
         day, comma, _ = at(body["from"]).rpartition(", ")
         self._day = f"{day}{comma}"
         period = say("period", **{"from": at(body["from"]), "to": at(body["to"])})
@@ -142,7 +142,7 @@ class _Page:
         known = [
             say(word, at=at(body[name]))
             for word, name in (("kept", "kept_from"), ("complete", "complete_to"))
-            # Where the log begins before the period, it is `from`.
+            # If the log begins before the period, `kept_from` equals `from`.
             if body[name] is not None and (name != "kept_from" or body[name] != body["from"])
         ]
         parts = [
@@ -304,7 +304,7 @@ class _Page:
         columns: Sequence[str],
         cells: Callable[[Entry], Iterable[str]],
     ) -> str:
-        """A list of the body."""
+        """A table of one list of the body, and how many entries are left out."""
         return self._list(title, name, body[name], columns, cells) + self._more(body, name)
 
     def _list(
@@ -346,7 +346,7 @@ class _Page:
     # --- words ------------------------------------------------------------------------------------
 
     def alarm(self, alarm: Entry) -> str:
-        """An alarm in a line."""
+        """An alarm on one line."""
         reason = alarm["reason"]
         verdict = self._words["verdicts"][reason["verdict"]]
         return f"{self._where(alarm['tag_id'])}: {self._what(reason)} ({verdict})"
@@ -373,7 +373,7 @@ class _Page:
         return self.say("house") if tag_id in (SITE, "site") else self.say("tag", name=tag_id)
 
     def _at(self, when: Mapping[str, int]) -> str:
-        """A moment as the page writes it; of a simulation, the time since its beginning."""
+        """A moment as the page writes it; in a simulation, the time since its beginning."""
         sec = when["sec"]
         wall_s = unix_s(sec * 1_000_000_000)
         if wall_s is None:
@@ -383,11 +383,11 @@ class _Page:
         return self.say("date", day=at.day, month=month, year=at.year, clock=f"{at:%H:%M}")
 
     def _clock(self, when: Mapping[str, int]) -> str:
-        """A moment in a row; one of the report's first day without that day."""
+        """A moment in a row, without the date if it is on the report's first day."""
         return self._at(when).removeprefix(self._day)
 
     def _number(self, value: float | None, sensor: str, limit: float | None = None) -> str:
-        """As the page writes it; what reads like the limit that it is beyond says on which side."""
+        """A value as the page writes it; if it rounds to its limit, with the side that it is on."""
         if value is None:
             return ""
         known = self._criteria.sensors
@@ -412,7 +412,7 @@ class _Page:
         return digits.replace("-", "\u2212")
 
     def _length(self, seconds: int) -> str:
-        """In its two largest units, as the page writes it."""
+        """A length of time in its two largest units, as the page writes it."""
         days, hours, minutes = seconds // 86_400, seconds // 3600 % 24, seconds // 60 % 60
         in_hours = f"{hours}\u00a0{self.say('hours')}"
         rest = f"{minutes}\u00a0min" if seconds >= 60 else f"{seconds}\u00a0s"

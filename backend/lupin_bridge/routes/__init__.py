@@ -1,1 +1,1 @@
-"""One module a group of routes."""
+"""The HTTP and WebSocket routes, one module for each group."""

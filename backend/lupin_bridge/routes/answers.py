@@ -1,4 +1,4 @@
-"""One path from a request to its response: known already, cached, under way, or computed.
+"""The path from a request to its response: not modified, cached, under way, or computed.
 
 A request is admitted first. Its answer is computed once for all clients that wait for the same one,
 within a time limit, and only while somebody waits. The cache serves later requests at no cost.
@@ -36,7 +36,7 @@ from lupin_twin.runtime.workers import SMALL_S, ShouldStop
 
 NEVER_STORE: Final = {"Cache-Control": "no-store"}
 NO_TWIN: Final = "nothing has been received from a twin yet"
-# For the few kB of a body.
+# Time to receive the few kB of a body.
 BODY_S: Final = 5.0
 # nginx's "client closed request"; nobody receives it.
 CLIENT_DISCONNECTED: Final = 499
@@ -58,7 +58,7 @@ def taking(body: type[BaseModel]) -> dict[str, Any]:
     return {"requestBody": {"required": True, "content": content}}
 
 
-# What `add_refusals` makes of refusals.
+# The responses that `add_refusals` makes of refusals, for the OpenAPI document.
 NOT_REMEMBERED: Final[Documented] = {
     304: {"description": "the ETag still holds"},
     **refusing(
@@ -93,20 +93,20 @@ def bridge_of(request: Request) -> Bridge:
 
 
 def newest_of(bridge: Bridge) -> Snapshot:
-    """The newest state; `TwinUnavailableError`: there is none."""
+    """The newest state; raises `TwinUnavailableError` if there is none."""
     if bridge.latest is None:
         raise TwinUnavailableError(NO_TWIN)
     return bridge.latest.snapshot
 
 
 def person_of(request: HTTPConnection) -> Person | None:
-    """Who makes a request, where that is known."""
+    """Who makes a request; None: not known."""
     found: Person | None = request.scope["state"].get(PERSON_KEY)
     return found
 
 
 class Refused(Exception):
-    """A request that the route does not take; the message names field, value and limit."""
+    """A request that the route refuses; the message names field, value and limit."""
 
     def __init__(
         self, message: str, status: int = 400, headers: Mapping[str, str] | None = None
@@ -116,10 +116,10 @@ class Refused(Exception):
 
 
 async def read_body(request: Request, model: type[ModelT]) -> ModelT:
-    """A request's JSON body, which the server holds to a few kB.
+    """A request's JSON body, which the server limits to a few kB.
 
     Raises:
-        Refused: no JSON, not the model's, or not there within `BODY_S`.
+        Refused: not JSON, not valid for the model, or not there within `BODY_S`.
 
     """
     media_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
@@ -220,7 +220,7 @@ async def respond(
     compute: Callable[[], Coroutine[Any, Any, Answer]],
     etag: str | None = None,
 ) -> Response:
-    """The answer under a key. `etag` names it in the cache, where it is known beforehand.
+    """The answer under a key. `etag` is its key in the cache, if it is known beforehand.
 
     Raises:
         AdmissionError: past a limit of the client.
@@ -248,7 +248,7 @@ def cached(bridge: Bridge, key: Hashable) -> CachedResponse | None:
 
 
 async def admitted(request: Request, work: Callable[[], Awaitable[Answer | Response]]) -> Response:
-    """What `work` gives. It counts as one request until the client has received it.
+    """The result of `work`. It counts as one request until the client has received it.
 
     Raises:
         AdmissionError: past a limit of the client.
@@ -277,7 +277,7 @@ def not_modified(etag: str) -> Response:
 
 
 async def within_time(limits: Limits, work: Awaitable[ResultT]) -> ResultT:
-    """What `work` gives, within `Limits.answer_timeout_s`.
+    """The result of `work`, within `Limits.answer_timeout_s`.
 
     Raises:
         TwinTimeoutError: it took longer; it is cancelled.
@@ -294,7 +294,7 @@ async def within_time(limits: Limits, work: Awaitable[ResultT]) -> ResultT:
 async def while_client_waits(
     request: Request, work: Coroutine[Any, Any, ResultT]
 ) -> ResultT | None:
-    """What `work` gives; None: the client has left, and the work was cancelled."""
+    """The result of `work`; None: the client has left, and the work was cancelled."""
     working = asyncio.create_task(work)
     disconnect = asyncio.create_task(client_left(request))
     try:
@@ -304,7 +304,7 @@ async def while_client_waits(
         disconnect.cancel()
         if not working.done():
             working.cancel()
-            # What it works on is free when this returns.
+            # Its resources are free when this returns.
             await asyncio.wait((working,))
             if not working.cancelled():
                 working.exception()
@@ -319,7 +319,7 @@ async def client_left(request: Request) -> None:
 async def on_worker(
     bridge: Bridge, work: Callable[[ShouldStop], ResultT], cost_s: float = 0.0
 ) -> ResultT:
-    """What `work(should_stop)` gives, off the loop."""
+    """The result of `work(should_stop)`, off the event loop."""
     return await asyncio.wrap_future(bridge.source.workers.submit(work, cost_s))
 
 
@@ -332,7 +332,7 @@ async def computed(
     cost_s: float = 0.0,
     headers: Mapping[str, str] = NEVER_STORE,
 ) -> Answer:
-    """What `write` makes on a worker, put into the cache.
+    """The answer that `write` makes on a worker, put into the cache.
 
     Raises:
         BusyError: one computation too many.
@@ -367,7 +367,7 @@ async def newest_field(bridge: Bridge, client: str, field: Field, etag: str) -> 
     """A field of the newest state, which is computed in this process, and cached.
 
     Raises:
-        AdmissionError: past a limit of the client that was the first to ask.
+        AdmissionError: past a limit of the client that was the first to request it.
         TwinUnavailableError: there is no state.
         lupin_twin.field.engine.FieldRefused: a bad request.
 
@@ -393,7 +393,7 @@ async def respond_as_of(request: Request, query: StateQuery) -> Response:
         Exception: what the source or the query raised.
 
     """
-    # Of before the answer. Headers, because the body stays the same when older rows are deleted.
+    # As of before the answer. In headers, as the body stays the same when older rows are deleted.
     headers = bodies.moment_headers(bridge_of(request).source.journal(), query.at_ns or 0)
     response = await respond_past(request, query, "state")
     response.headers.update(headers)
@@ -424,8 +424,8 @@ async def respond_past(request: Request, query: Query, kind: str) -> Response:
         return found
 
     async def work() -> Answer | Response:
-        # The other process need not write what is cached here. If that is dropped meanwhile, the
-        # query is repeated.
+        # The other process does not write an answer that is cached here. If the cache drops it
+        # meanwhile, the query is repeated.
         while True:
             has = ", ".join((header, *bridge.cache.newest_tags()))
             key = (kind, query, header, bridge.state_number)

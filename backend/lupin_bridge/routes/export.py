@@ -43,13 +43,13 @@ log = logging.getLogger(__name__)
 router = APIRouter()
 
 _ANSWERS = {status: what for status, what in NOT_REMEMBERED.items() if status != 304}
-# What to import a package, or to write a group of rows, takes at worst, s.
+# Worst-case time to import a package, or to write a group of rows, s.
 _WRITE_S = 0.5
-# An export's rows as they were packed, in lots.
+# The packed rows of an export, in lots.
 Lots = AsyncGenerator[bytes]
 Pack = Callable[[Sequence[PastRow]], bytes]
 Format = type[Csv] | type[Parquet]
-# Who writes, the lots behind the first, and that; None: there is none.
+# The writer, the lots after the first, and the first lot; None: there are no rows.
 Begun = tuple[Csv | Parquet, Lots, bytes | None]
 ResultT = TypeVar("ResultT")
 
@@ -75,9 +75,9 @@ def _content(media_type: str) -> dict[str, Any]:
     openapi_extra={"parameters": parameters_of(OfExport)},
 )
 async def csv_route(request: Request) -> Response:
-    """A row for each reading, and one without a sensor for each attempt that brought none.
+    """A row for each reading, and one without a sensor for each attempt that brought no reading.
 
-    It is streamed: one without HTTP's last chunk is not whole.
+    The answer is streamed: without HTTP's last chunk, it is incomplete.
     """
     return await _of_site(request, Csv)
 
@@ -112,7 +112,7 @@ async def _of_site(request: Request, kind: Format) -> Response:
 
 
 def span_of(given: OfExport, now_ns: int | None) -> tuple[int, int]:
-    """From when to when, ns."""
+    """Start and end of the period, ns of ROS time."""
     start_ns, end_ns = given.span(now_ns)
     return start_ns, end_ns or now_ns or MAX_SECONDS * NANOSECONDS_PER_SECOND
 
@@ -128,11 +128,11 @@ async def respond_export(
     known: Mapping[str, str],
     has_site: bool = False,
 ) -> Response:
-    """What `rows` gives, in a format; `known` are headers that say how far it is complete.
+    """Stream what `rows` yields, in a format; `known` are headers on how far it is complete.
 
     Raises:
         AdmissionError: past a limit.
-        Exception: what the first rows met.
+        Exception: whatever reading the first rows raised.
 
     """
     name = bodies.export_file_name(given, now_ns, kind.name)
@@ -159,7 +159,7 @@ async def respond_export(
         return writer, lots, await anext(lots, None)
 
     with ExitStack() as held:
-        # A response that has begun cannot be refused any more: so the first rows come before it.
+        # A response that has begun cannot be refused any more: so the first rows are read before.
         with of.admission.request(client, time.monotonic()):
             export = held.enter_context(of.admission.export(client, time.monotonic(), evict))
             try:
@@ -175,21 +175,21 @@ async def respond_export(
 
 
 async def _parts(of: Exporting, export: Export, kind: Format, begun: Begun) -> Lots:
-    """What is sent; the next lot is read when what was made of the one before has been."""
+    """Yield the parts to send; the next lot is read once the part before has been sent."""
     writer, lots, lot = begun
     async with aclosing(lots):
         yield writer.begin()
         while lot is not None:
             part = await _written(of, kind, partial(writer.add, lot))
             yield part
-            # Also where that is nothing yet: its reader is not slow.
+            # Also if there is nothing to send yet: the reader is not slow.
             export.take(len(part) or len(lot), time.monotonic())
             lot = await within_time(of.limits, anext(lots, None))
         yield await _written(of, kind, writer.end)
 
 
 def _facts(known: Mapping[str, str], given: OfExport, now_ns: int | None) -> dict[str, str]:
-    """What a file says of itself; moments in ISO 8601, or in ROS seconds as in the headers."""
+    """A file's metadata; moments are in ISO 8601, or in ROS seconds as in the headers."""
     facts = {name.removeprefix("X-").lower().replace("-", "_"): it for name, it in known.items()}
     start_ns, end_ns = span_of(given, now_ns)
     if start_ns:
@@ -198,14 +198,14 @@ def _facts(known: Mapping[str, str], given: OfExport, now_ns: int | None) -> dic
 
 
 async def _written(of: Exporting, kind: Format, write: Callable[[], ResultT]) -> ResultT:
-    """What is written, on a worker; CSV is passed on as it came, and takes no time."""
+    """The result of `write`, on a worker; CSV is passed on unchanged, which takes no time."""
     if kind is Csv:
         return write()
     return await asyncio.wrap_future(of.workers.submit(lambda _: write(), _WRITE_S))
 
 
 class ExportResponse(StreamingResponse):
-    """Parts, each sent when the socket has taken the one before; in the end `release` is called."""
+    """Sends each part when the socket has taken the one before, and calls `release` at the end."""
 
     def __init__(
         self, parts: Lots, release: Callable[[], None], headers: dict[str, str], media_type: str
@@ -215,7 +215,7 @@ class ExportResponse(StreamingResponse):
         self._release = release
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send it; where that fails, break the connection: a part must not pass for the whole."""
+        """Send the parts; on failure, break the connection: the client must see that parts miss."""
         request = Request(scope, receive)
         try:
             await while_client_waits(request, self.stream_response(send))
@@ -224,7 +224,7 @@ class ExportResponse(StreamingResponse):
             log.warning("an export ended before its end: %s", error, exc_info=not is_known)
             connection: HttpConnection = scope["state"][CONNECTION_KEY]
             connection.break_off()
-            await client_left(request)  # or the server would complain of an answer without an end
+            await client_left(request)  # or the server would log an answer without an end
         finally:
             self._release()
             await self._parts.aclose()

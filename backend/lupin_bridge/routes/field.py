@@ -1,4 +1,4 @@
-"""The field of one sensor as JSON, PNG or NPY, and the routes that answer in every format."""
+"""Routes of fields and estimates, as JSON, PNG or NPY; and of reports on estimates."""
 
 from __future__ import annotations
 
@@ -44,16 +44,16 @@ from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, ReportReque
 
 router = APIRouter()
 
-# Quantities of a day change slowly: now is the last whole minute.
+# Daily quantities change slowly: "now" is the last whole minute.
 _MINUTE_NS: Final = 60 * 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class InFormats:
-    """An answer in every format: a route for each, and one where Accept chooses.
+    """The routes of one answer in all formats: one for each, and one where Accept chooses.
 
-    It is refused as the ROS service refuses it. So `parameters` are read by hand, and a refusal has
-    the service's own body, of the type `model`.
+    Refusals are those of the ROS service: they have the service's own response as body, of the type
+    `model`. So `parameters` are parsed by hand.
     """
 
     name: str
@@ -63,7 +63,7 @@ class InFormats:
     model: type[BaseModel]
 
     def refusals(self) -> dict[int | str, dict[str, Any]]:
-        """What stands in the way of an answer, for the OpenAPI document."""
+        """The responses other than 200, for the OpenAPI document."""
         return {
             304: {"description": "the ETag still holds"},
             400: {"model": self.model, "description": "refused; error_message has the reason"},
@@ -208,7 +208,7 @@ async def _estimate(request: Request, field_format: FieldFormat) -> Response:
     estimated.check()
     if at_ns is not None:
         return await respond_as_of(request, estimated)
-    newest_of(bridge)  # or it is not known when now is
+    newest_of(bridge)  # without a state, the time is not known
     return await respond_past(request, estimated, "estimate")
 
 
@@ -245,7 +245,7 @@ QueryT = TypeVar("QueryT", QualityQuery, TagsQuery, AdviceQuery)
 
 _REPORTED: Final = {**NOT_REMEMBERED, **refusing({404: "only the site's own twin counts it"})}
 
-# What writing a tag takes.
+# Rough time to write a tag, s.
 _WRITE_TAG_S: Final = 10e-6
 
 
@@ -259,8 +259,8 @@ _WRITE_TAG_S: Final = 10e-6
 async def quality(request: Request) -> Response:
     """Each new scan is compared with the prediction from all tags but its own and those beside it.
 
-    So it shows how right the estimate is between tags: 9 of 10 are to lie inside. Counts are by
-    the hour, over the last day and week, since the twin was started.
+    So it shows how right the estimate is between tags: 9 of 10 scans should lie in the predicted
+    interval. Counts are by the hour, over the last day and week, since the twin was started.
     """
 
     async def body(bridge: Bridge, query: QualityQuery) -> bytes:
@@ -279,7 +279,7 @@ async def quality(request: Request) -> Response:
     openapi_extra={"parameters": parameters_of(TagsQuery)},
 )
 async def tags(request: Request) -> Response:
-    """By all other tags, and by the tag's own readings but for its last ones."""
+    """Predicted from all other tags, and from the tag's own readings except its last ones."""
 
     async def body(bridge: Bridge, query: TagsQuery) -> bytes:
         sensor = query.sensor_type
@@ -298,7 +298,7 @@ async def tags(request: Request) -> Response:
     openapi_extra={"parameters": parameters_of(AdviceQuery)},
 )
 async def advice(request: Request) -> Response:
-    """Of the free floor on the map, or about the tags without one; the best place first."""
+    """Places on the free floor of the map or, without a map, around the tags; the best first."""
 
     async def body(bridge: Bridge, query: AdviceQuery) -> bytes:
         wanted = ReportRequest(query.sensor_type, query.places)

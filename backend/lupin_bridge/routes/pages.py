@@ -1,4 +1,4 @@
-"""Pages of the bridge's own: sign-in, `/docs`, `/openapi.json`, the guide, `/` without a page."""
+"""The bridge's own pages: sign-in, `/docs`, `/openapi.json`, the guide, and `/` without the HMI."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ router = APIRouter()
 # In the application only where the page was not built.
 no_page_router = APIRouter()
 
-# What writing either document takes, roughly, s.
+# Rough time to write either document, s.
 _WRITE_S: Final = 0.02
 
 GUIDE_PATH: Final = "/docs/guide"
 _NO_GUIDE: Final = "the guide was not built: run `make docs` in the clone, or install a release"
-# Its theme has styles in the pages themselves; scripts are files, as everywhere.
+# The guide's theme has inline styles; scripts are files, as everywhere.
 _GUIDE_POLICY: Final = f"{CONTENT_POLICY}; style-src 'self' 'unsafe-inline'"
 
 HOW_TO_BUILD: Final = (
@@ -213,7 +213,7 @@ def add_guide(app: FastAPI, folder: Path) -> None:
 
 @read_route(no_page_router, "/", include_in_schema=False)
 async def no_page() -> Response:
-    """503: the page can be built."""
+    """503, with how to build the page."""
     return Response(_NO_PAGE, 503, NEVER_STORE, "text/html; charset=utf-8")
 
 
@@ -238,16 +238,16 @@ def _known_language(tag: str, known: Collection[str]) -> str | None:
     return name if name in known else None
 
 
-# Not in the folder of the HMI, which its build empties, and needed before the HMI may be read.
+# Not in the HMI's folder: its build empties that, and sign-in comes before the HMI may be read.
 _SIGNIN_FOLDER: Final = Path(__file__).parent / "signin_page"
 _ASSETS: Final = Path(__file__).parents[1] / "static" / "assets"
 
 
 @router.post("/api/signin", include_in_schema=False)
 async def sign_in(request: Request) -> Response:
-    """Trade a token, which `AccessControl` has looked at, or a password for a session cookie.
+    """Exchange a token, which `AccessControl` has checked, or a password for a session cookie.
 
-    For the page below: programs send `Authorization: Bearer` with every request instead.
+    Only the sign-in page uses this: programs send `Authorization: Bearer` with every request.
     """
     people, person = _access_of(request).people, person_of(request)
     if people is None or not people.is_on:
@@ -278,7 +278,7 @@ async def sign_in(request: Request) -> Response:
 
 @router.post("/api/signout", include_in_schema=False)
 async def sign_out(request: Request) -> Response:
-    """End the session that the request comes with, and everything that it has open."""
+    """End the session of the request, and all its open connections."""
     people, person = _access_of(request).people, person_of(request)
     if people is None or person is None:
         return error_response("this bridge needs no token: there is nothing to sign out of", 404)
@@ -296,7 +296,7 @@ async def sign_out(request: Request) -> Response:
     responses={200: {"model": routes_schema.Session}},
 )
 async def session_route(request: Request) -> Response:
-    """Who makes the request, and how long a session that it came with still lasts."""
+    """Who makes the request, and how much longer its session lasts, if it has one."""
     person = person_of(request) or SHARED
     # A fleet has no log of its own.
     source: TwinSource | None = getattr(request.app.state.bridge, "source", None)
@@ -314,7 +314,7 @@ async def session_route(request: Request) -> Response:
 
 @read_route(router, "/signin", include_in_schema=False)
 async def page(request: Request) -> Response:
-    """The page; where nobody needs to sign in, on to the HMI."""
+    """The sign-in page; a redirect to the HMI if nobody needs to sign in."""
     access = _access_of(request)
     if not access.is_closed:
         return Response(status_code=303, headers={"Location": "./", **NEVER_STORE})
@@ -337,7 +337,7 @@ _add_file("signin.js", "text/javascript; charset=utf-8")
 
 @read_route(router, "/font.woff2", include_in_schema=False)
 async def font() -> Response:
-    """The HMI's font, by a name that the report and the page above know."""
+    """The HMI's font, under a fixed name for the report and the sign-in page."""
     found = _font()
     if found is None:
         return error_response("the page was not built, and has no font", 404)
@@ -345,7 +345,7 @@ async def font() -> Response:
 
 
 def _set_cookie(request: Request, response: Response, name: str, value: str, lasts_s: int) -> None:
-    """Have a browser keep a cookie; 0 s: not any more."""
+    """Set the session cookie for `lasts_s`; 0 deletes it."""
     response.set_cookie(
         name,
         value,

@@ -1,13 +1,13 @@
 """The sockets of viewers: `/foxglove`, and `/rosbridge` for roslib clients.
 
-Foxglove and Lichtblick read the twin's topics as ROS has them on the wire. A client that does not
-read as fast as messages come gets the newest of each channel. Nothing more is read from one that
-has not taken the answer to its last message.
+Foxglove and Lichtblick read the twin's topics as ROS has them on the wire. A slow client gets the
+newest message of each channel. The bridge reads nothing more from a client that has not taken the
+answer to its last message.
 
-A roslib client reads the twin as it would through rosbridge. One connection has `MAX_OPEN_CALLS`
-calls under way at most, `MAX_RUNNING_CALLS` of them with the twin; others wait. A call ends with
-`result` false when it takes longer than `Limits.answer_timeout_s` or its own `timeout`, or is past
-the limits of computed answers, which are those of HTTP.
+A roslib client reads the twin as it would through rosbridge. A connection may have `MAX_OPEN_CALLS`
+calls open, of which `MAX_RUNNING_CALLS` run at once; others wait. A call ends with `result` false
+if it takes longer than `Limits.answer_timeout_s` or its own `timeout`. So does one past the limits
+of computed answers, which it shares with HTTP.
 
 A client that takes nothing for `Limits.client_timeout_s` is closed.
 """
@@ -84,14 +84,14 @@ class _Listened(Protocol):
     hub: Hub
 
     def join(self, client: Client) -> None:
-        """Add a listener; it has what there is when this returns."""
+        """Add a client; it has been sent the current data when this returns."""
 
     def serve(self, client: Client) -> None:
-        """A listener's socket is free again."""
+        """Send a client what it lacks: its socket is free again."""
 
 
 async def listen(websocket: WebSocket, to: _Listened, **options: Any) -> None:
-    """Send a listener what it lacks until it has gone; what it says is ignored."""
+    """Send a client what it lacks until it has gone; its messages are ignored."""
     if not await has_place(websocket, to.hub):
         return
     connection: Connection = getattr(websocket.state, CONNECTION_KEY)
@@ -123,7 +123,7 @@ class _Conversation:
         )
 
     async def run(self) -> None:
-        """Until the client has gone."""
+        """Serve the client until it has gone."""
         if not await has_place(self._websocket, self._bridge.hub):
             return
         self._connection.on_writable = self._on_writable
@@ -150,7 +150,7 @@ class _Conversation:
     async def _write_when_free(self, frame: bytes) -> None:
         """Write once the socket has taken all before; until then the client counts as blocked.
 
-        What waits counts for all clients together, see `Hub.hold`.
+        What waits counts towards the limit for all clients, see `Hub.hold`.
         """
         hub, client = self._bridge.hub, self._client
         if not self._connection.can_take:
@@ -185,9 +185,9 @@ class _FoxgloveConversation(_Conversation):
         super().__init__(websocket, bridge)
         self._offer = bridge.offer
         self._session = Session(bridge.offer.counts)
-        # What ends each subscription.
+        # By subscription, the function that ends it.
         self._close: dict[int, Callable[[], None]] = {}
-        # Messages that answer nothing, such as notes and advertisements.
+        # Messages that are no replies, such as notes and advertisements.
         self._due: deque[bytes] = deque()
         self._offer_is_due = False
 
@@ -357,7 +357,7 @@ class _RosbridgeConversation(_Conversation):
         deadline_s = asyncio.get_running_loop().time() + limit_s
         async with self._running:
             with ExitStack() as held:
-                # Only the frame waits here: what it was made of is as large, and freed.
+                # Only the frame is held here: the body, which is as large, has been freed.
                 await self._write_when_free(
                     await self._reply(field_call, limit_s, deadline_s, held)
                 )
@@ -374,7 +374,7 @@ class _RosbridgeConversation(_Conversation):
             text = f"{call.service} did not answer within {limit_s:g} s"
             response = service_failure(call.id, call.service, text)
         except FieldRefused as error:
-            # The service has answered, and the answer is no: as over ROS, `ok` says so.
+            # The service has answered with a refusal: as over ROS, only `ok` is false.
             values = refusal_json(GetFieldResponse, str(error))
             response = service_response(call.id, call.service, values, result=True)
         except (AdmissionError, TwinUnavailableError) as error:

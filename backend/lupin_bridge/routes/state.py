@@ -1,4 +1,4 @@
-"""The state: over WebSocket, as JSON, tag by tag; and the past."""
+"""Routes of the state, over WebSocket and as JSON, whole or tag by tag; and of the past."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ from lupin_bridge.stream import routes_schema, schema
 from lupin_bridge.stream.hub import CLOSE_POLICY
 from lupin_twin.core.past import EVERY_TAG, SeriesRequest
 
-# Of the reason in a close frame (RFC 6455, section 5.5).
+# Longest reason in a close frame (RFC 6455, section 5.5).
 MAX_REASON_BYTES: Final = 123
 
 
@@ -75,7 +75,7 @@ class ListenQuery:
 
 router = APIRouter()
 
-# How long the ages of an answer hold: they are shown in seconds.
+# How long the ages of an answer may be reused: they are shown in seconds.
 AGES_HOLD_S: Final = 0.2
 
 _NO_TAG = refusing({404: "no such tag"})
@@ -103,17 +103,17 @@ async def ws_state(websocket: WebSocket) -> None:
     openapi_extra={"parameters": parameters_of(query_string.OfMoment)},
 )
 async def state(request: Request) -> Response:
-    """TwinState with the message's own field names; the newest, with ages as of this answer.
+    """The newest TwinState, with the message's own field names, and ages as of this answer.
 
-    As of a moment that has passed, `header.stamp` is that moment, and ages are those of then.
+    With `at`, `header.stamp` is that moment, and ages are as of then.
     """
     bridge = bridge_of(request)
     at_ns = query_string.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
         return await respond_as_of(request, WholeState(at_ns))
     newest = newest_of(bridge)
-    # The newest state always, its ages a little older at most: so thousands of tags that thousands
-    # of clients request are written a few times a second.
+    # Always the newest state, with ages that may be a little older: so thousands of tags are
+    # written only a few times a second, even for thousands of clients.
     key = ("state", bridge.state_number, int(time.monotonic() / AGES_HOLD_S))
 
     async def compute() -> Answer:
@@ -126,8 +126,8 @@ async def state(request: Request) -> Response:
     return await respond(request, key, compute)
 
 
-# An id may hold a slash, which is decoded before the routes are tried: hence :path, and the longer
-# route first.
+# A tag_id may hold a slash, which is decoded before the routes are matched: hence :path, and the
+# longer route first.
 @read_route(
     router,
     "/api/tags/{tag_id:path}/history",
@@ -198,7 +198,7 @@ async def history_route(request: Request) -> Response:
     openapi_extra={"parameters": parameters_of(query_string.OfTimeline)},
 )
 async def timeline_route(request: Request) -> Response:
-    """Events counted in buckets of equal length, and how far back anything is remembered."""
+    """Events counted in buckets of equal length, and how far back the log reaches."""
     bridge = bridge_of(request)
     given = read(query_string.OfTimeline, request.query_params.multi_items())
     start_ns, end_ns = given.span(bridge.ros_time_ns)
@@ -228,7 +228,7 @@ async def report_route(request: Request) -> Response:
     openapi_extra={"parameters": parameters_of(query_string.OfReportPage)},
 )
 async def report_page_route(request: Request) -> Response:
-    """Without scripts. A browser gets a refusal as a page too."""
+    """The page has no scripts. A browser gets a refusal as a page too."""
     try:
         return await _report_page(request)
     except REFUSALS as error:

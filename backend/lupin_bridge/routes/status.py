@@ -1,4 +1,4 @@
-"""The greenhouse's map, status, sensors and alarms; health of the bridge itself, and metrics."""
+"""Routes of the map, the robot, health, sensors and alarms; and of the bridge's own condition."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from lupin_bridge.stream.state_json import alarms_body, header, judgement, pose,
 from lupin_twin.core.state import Pose
 from lupin_twin.field.explored import OccupancyMap
 
-# Grey of a free and of an occupied cell; unknown is transparent. The page decides what is below.
+# Grey of a free and of an occupied cell; an unknown one is transparent.
 _FREE_GREY = 236
 _OCCUPIED_GREY = 70
 _UNKNOWN_INDEX = 101
@@ -67,10 +67,10 @@ def map_json(occupancy: OccupancyMap) -> bytes:
 
 
 def map_png(occupancy: OccupancyMap) -> bytes:
-    """One pixel a cell, the grid's last row on top (the row flip), unknown transparent.
+    """A PNG of one pixel per cell, the grid's last row on top (the row flip), unknown transparent.
 
-    The picture is in the grid's own axes: a map whose origin has a yaw is turned by the viewer.
-    A map without a cell is one transparent pixel, for PNG knows no empty picture.
+    The picture is in the grid's own axes: the viewer rotates a map whose origin has a yaw.
+    A map without a cell is one transparent pixel, because PNG has no empty pictures.
     """
     # Pillow takes megabytes, and only a bridge with a map needs it.
     from PIL import Image  # noqa: PLC0415
@@ -90,7 +90,7 @@ def map_png(occupancy: OccupancyMap) -> bytes:
 
 router = APIRouter()
 
-# What drawing a cell takes, roughly and at worst.
+# Rough worst-case time to draw a cell, s.
 _DRAW_CELL_S: Final = 50e-9
 
 _NO_MAP = {
@@ -126,7 +126,7 @@ async def occupancy_map(request: Request) -> Response:
     },
 )
 async def map_picture(request: Request) -> Response:
-    """One pixel a cell, the grid's last row on top, unknown cells transparent."""
+    """One pixel per cell, the grid's last row on top, unknown cells transparent."""
     return await _map(request, "png")
 
 
@@ -161,7 +161,7 @@ async def _map(request: Request, kind: str) -> Response:
     responses={200: {"model": routes_schema.Robot}},
 )
 async def robot(request: Request) -> Response:
-    """From the robot's own topics, of now only: the journal does not hold it."""
+    """From the robot's own topics. Only current data: the journal does not have it."""
     known = bridge_of(request).robot.log
 
     async def compute() -> Answer:
@@ -171,7 +171,7 @@ async def robot(request: Request) -> Response:
 
 
 MAX_ALARMS: Final = 2_000
-# What going through an alarm and writing it take, roughly and at worst.
+# Rough worst-case time to examine an alarm and write it, s.
 _WRITE_ALARM_S: Final = 10e-6
 
 
@@ -187,10 +187,10 @@ _WRITE_ALARM_S: Final = 10e-6
     openapi_extra={"parameters": parameters_of(query_string.OfMoment)},
 )
 async def health(request: Request) -> Response:
-    """The verdicts that stand in the frames of `/ws/state`, with the reasons for each.
+    """The verdicts, as in the frames of `/ws/state`, with the reasons for each.
 
-    As of a moment that has passed, what was known then is judged by the ranges of now, and by the
-    scans of each tag up to then; a reason's `since` is the first observation with it.
+    With `at`, what was known then is judged by the current ranges, and by the scans of each tag up
+    to then. A reason's `since` is the last observation that shows it, not the first.
     """
     bridge = bridge_of(request)
     at_ns = query_string.at(request.query_params.multi_items(), bridge.ros_time_ns)
@@ -213,7 +213,7 @@ async def health(request: Request) -> Response:
     responses={200: {"content": {"application/json": {"schema": {"type": "object"}}}}},
 )
 async def sensors(request: Request) -> Response:
-    """`sensors.json`, or the file that the operator gave instead, as it stands."""
+    """`sensors.json`, or the file that the operator gave instead, unchanged."""
     answer = content_answer(bridge_of(request).criteria.sensors.text.encode())
     if has_etag(request, etag := answer.headers["ETag"]):
         return not_modified(etag)
@@ -230,7 +230,7 @@ async def sensors(request: Request) -> Response:
 async def alarms_route(request: Request) -> Response:
     """Alarms that were active at any time of the period, the newest first and 2,000 at most.
 
-    They follow from what was observed and the ranges of now, the same in every replica.
+    They are derived from the observations and the current ranges, the same in every replica.
     """
     bridge = bridge_of(request)
     given = read(query_string.OfAlarms, request.query_params.multi_items())
@@ -254,7 +254,7 @@ async def alarms_route(request: Request) -> Response:
 
 
 def _is_in(alarm: Alarm, start_ns: int, end_ns: int, active: str | None) -> bool:
-    """`active` as in the query, `end_ns` 0: now."""
+    """Whether an alarm matches a query; `active` is the query's; `end_ns` 0: now."""
     if active is not None and alarm.is_active != (active == "1"):
         return False
     if end_ns and alarm.raised_at_ns >= end_ns:
@@ -275,7 +275,7 @@ def _is_in(alarm: Alarm, start_ns: int, end_ns: int, active: str | None) -> bool
     },
 )
 async def healthz(request: Request) -> Response:
-    """503 when the ROS thread has ended or hangs in a callback, for whoever restarts services."""
+    """503 when the ROS thread has ended or hangs in a callback: a supervisor should restart it."""
     source = bridge_of(request).source
     wrong = ailment(source.thread)
     body = {
@@ -314,7 +314,7 @@ async def metrics(request: Request) -> Response:
 async def readyz(request: Request) -> Response:
     """The status as WebSocket clients receive it; 503 while the twin is offline.
 
-    A journal that cannot be written is reported, and no reason for 503: the twin goes on.
+    A journal that cannot be written is reported, but is no reason for 503: the twin goes on.
     """
     status = bridge_of(request).status
     return json_response(orjson.dumps(status.frame()), 200 if status.is_live else 503)

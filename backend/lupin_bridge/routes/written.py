@@ -1,7 +1,7 @@
-"""What is written: notes of people, readings of programs, devices that want notifications.
+"""Routes that write: notes of people, readings of programs, devices that want notifications.
 
-Notes are read here too, and who wrote what (the audit trail). The readings are the one route that
-leads to ROS, off unless a setting says otherwise.
+The routes that read notes and the audit trail are here too. Posting readings is the only route that
+writes to ROS; it is off by default.
 """
 
 from __future__ import annotations
@@ -54,10 +54,10 @@ router = APIRouter(default_response_class=Response)
 MAX_LISTED: Final = 2_000
 MAX_AUDITED: Final = 2_000
 _TOO_MANY_NOTES: Final = f"written more than {NOTE_BURST} notes and {NOTES_PER_MINUTE} a minute"
-# For how long at most an alarm is shelved, a critical one and others.
+# Longest time for which a critical alarm, and any other alarm, may be shelved.
 CRITICAL_SHELF_S: Final = 3_600
 SHELF_S: Final = 8 * 3_600
-# A page's clock may be so much ahead: it asks for an hour from its own now.
+# How far a page's clock may be ahead: it requests an hour from its own now on.
 _SLACK_S: Final = 10
 
 _WRITE_ANSWERS: Final = refusing(
@@ -111,11 +111,11 @@ async def notes_route(request: Request) -> Response:
     openapi_extra=taking(routes_schema.NoteDraft),
 )
 async def write_note(request: Request) -> Response:
-    """By an account with the role operator. Of two words on one alarm the later one stands."""
+    """It takes the role operator. Of two notes of one kind on an alarm, the later one counts."""
     bridge = bridge_of(request)
     person = _writer(request, bridge)
     draft = await read_body(request, routes_schema.NoteDraft)
-    # They may have taken their time with it.
+    # The session may have ended while the body was sent.
     people = request.app.state.access.people
     if people is not None and not people.still(person):
         raise Refused("the session has ended: sign in again", 401)
@@ -129,7 +129,7 @@ async def write_note(request: Request) -> Response:
     responses={200: {"model": routes_schema.Note}, **_WRITE_ANSWERS},
 )
 async def withdraw_note(request: Request, note_id: str) -> Response:
-    """By its author or an admin."""
+    """Its author, or an admin, may withdraw it."""
     bridge = bridge_of(request)
     person = _writer(request, bridge)
     notes = _known(bridge)
@@ -145,11 +145,11 @@ async def withdraw_note(request: Request, note_id: str) -> Response:
     return json_response(orjson.dumps(note_json(note, gone)))
 
 
-# --- who may, and what ------------------------------------------------------------------------
+# --- who may write, and what ------------------------------------------------------------------
 
 
 def _writer(request: Request, bridge: Bridge) -> Person:
-    """Who writes."""
+    """The person who writes; refuses whoever may not."""
     person = person_of(request)
     if person is None or not person.name:
         raise Refused(
@@ -179,7 +179,7 @@ def _now_ns(bridge: Bridge) -> int:
 
 
 def _checked(draft: routes_schema.NoteDraft, person: Person, bridge: Bridge) -> Note:
-    """The note, if it can be one."""
+    """The note of a draft; refuses one that is invalid."""
     now_ns = _now_ns(bridge)
     kind, _, name = draft.subject.partition(":")
     is_critical = False
@@ -203,7 +203,7 @@ def _checked(draft: routes_schema.NoteDraft, person: Person, bridge: Bridge) -> 
 
 
 def _until(draft: routes_schema.NoteDraft, now_ns: int, *, is_critical: bool) -> int | None:
-    """When a shelf ends, or what a comment is about; None: it ends now, or is about now."""
+    """When shelving ends, or the moment of a comment, ns; None: it ends now, or is about now."""
     if draft.kind == SHELVE and "until" not in draft.model_fields_set:
         raise Refused("until is missing: a moment, or null where it is not shelved any more")
     if draft.until is None:
@@ -244,7 +244,7 @@ async def _write(request: Request, bridge: Bridge, note: Note) -> Note:
     _paced(bridge.notes.pace, note.by, _TOO_MANY_NOTES)
     access: Access = request.app.state.access
     written = await bridge.source.write_note(note)
-    # It is in the log: whatever becomes of the rest, nobody is told that it is not.
+    # It is in the log: no failure from here on may report that it is not.
     with suppress(NotRemembered, PastRefused, TwinUnavailableError):
         await bridge.notes.look()
     if access.people is not None and access.people.has_file:
@@ -276,7 +276,7 @@ async def audit_route(request: Request) -> Response:
 
 # --- readings of programs -------------------------------------------------------------------------
 
-# A clock may be so much ahead; what is dated farther is of a clock that is wrong.
+# How far a clock may be ahead; a stamp farther ahead comes from a wrong clock.
 MAX_AHEAD_S: Final = 10
 
 
@@ -299,9 +299,9 @@ MAX_AHEAD_S: Final = 10
     openapi_extra=taking(routes_schema.ObservationDraft),
 )
 async def post_observation(request: Request) -> Response:
-    """By a token of the role writer. The same tag at the same `observed_at` counts once.
+    """It takes a token of the role writer. The same tag at the same `observed_at` counts once.
 
-    The twin goes by its own rules: what it drops is on `/diagnostics`.
+    The twin applies its own rules: it reports what it drops on `/diagnostics`.
     """
     bridge, person = bridge_of(request), person_of(request)
     if person is None or person.role != WRITER:
@@ -358,7 +358,7 @@ def _stamp_ns(observed_at: str | float | None, now_ns: int) -> int:
     responses={200: {"model": routes_schema.PushKey}},
 )
 async def key_route(request: Request) -> Response:
-    """For people with an account, where the bridge has `--push-contact`."""
+    """There is a key for people with an account, if the bridge has `--push-contact`."""
     push, person = bridge_of(request).outward.push, person_of(request)
     key = None
     if push is not None and person is not None and _has_account(request, person):
@@ -384,7 +384,7 @@ async def key_route(request: Request) -> Response:
     openapi_extra=taking(routes_schema.PushSubscription),
 )
 async def subscribe(request: Request) -> Response:
-    """Ten browsers of an account at most: the oldest makes room."""
+    """An account may have ten browsers: one more replaces the oldest."""
     push, person = bridge_of(request).outward.push, person_of(request)
     access: Access = request.app.state.access
     if push is None or access.people is None:
@@ -408,6 +408,6 @@ async def subscribe(request: Request) -> Response:
 
 
 def _has_account(request: Request, person: Person) -> bool:
-    """Not a token's or the shared token's: what they have could not be ended with an account."""
+    """Whether it is an account: the devices of a token could not be removed with an account."""
     people = request.app.state.access.people
     return people is not None and people.has_account(person)

@@ -1,1 +1,1 @@
-"""uvicorn's protocols, and the bounds on connections."""
+"""The web server: uvicorn's protocols for slow clients, and the limits on clients."""

@@ -1,10 +1,10 @@
 """What clients may cost: limits, rates, admission of computed answers, and their cache. Pure.
 
-A cached answer needs no admission. Nothing waits for a turn: a request past a bound is refused at
-once, so that nothing piles up. A client's own requests count until it has received the answer, all
-computations together until the answer is written: a client that does not read holds up nobody but
-itself. Large computations leave a quarter of the places to small ones: a flood of the dearest
-fields keeps nobody from a cheap answer. And no client takes more places than it leaves free.
+A cached answer needs no admission. Nothing is queued: a request past a limit is refused at once. A
+client's own requests count until it has received the answer. Computations count until the answer is
+written, so a client that does not read blocks only itself. Large computations leave a quarter of
+the slots to small ones: a flood of expensive fields does not block cheap answers. No client takes
+more slots than it leaves free.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from typing import Final
 
 # One entry is a key and a number: some hundred kilobytes when the table is full.
 MAX_KEYS: Final = 4_096
-# Sums of float intervals miss a whole burst by less than this.
+# Rounding errors of sums of intervals are smaller than this.
 _NOISE_S: Final = 1e-9
 
 
 class RateLimit:
     """At most `rate_hz` in the long run and `burst` at once, for each key by itself.
 
-    Generic cell rate algorithm (ITU-T I.371): what is kept of a key is the one moment at which its
-    bucket will be full again. A key that reached that moment is as one never seen; the least
-    recently active leaves a full table first.
+    Generic cell rate algorithm (ITU-T I.371): of each key, only the moment is kept at which its
+    bucket will be full again. After that moment, a key is as good as never seen. A full table drops
+    the least recently active key.
     """
 
     def __init__(self, rate_hz: float, burst: float, max_keys: int = MAX_KEYS) -> None:
@@ -43,13 +43,13 @@ class RateLimit:
         return len(self._full_at_s)
 
     def wait_s(self, key: Hashable, now_s: float, count: int = 1) -> float:
-        """How long until the key's next turns, s; 0: now."""
+        """How long until the key may take `count` turns, s; 0: now."""
         full_at = max(self._full_at_s.get(key, now_s), now_s) + (count - 1) * self._interval_s
         wait = full_at - self._slack_s - now_s
         return wait if wait > _NOISE_S else 0.0
 
     def take(self, key: Hashable, now_s: float, count: int = 1) -> float:
-        """Take turns if they are there; returns `wait_s`, and more than 0 means: not taken."""
+        """Take turns if there are any; returns `wait_s`: more than 0 means that none was taken."""
         wait = self.wait_s(key, now_s, count)
         if wait == 0.0:
             full_at = max(self._full_at_s.get(key, now_s), now_s)
@@ -65,19 +65,19 @@ class RateLimit:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Times in seconds.
+    """What clients may cost. Times in seconds.
 
-    `client_timeout_s`: a client that asks, or takes, nothing for so long is cut off.
-    `answer_timeout_s`: a computed answer that takes longer ends in 504, and its work with it.
-    `answers_per_s` may be computed for one client, and two seconds' worth at once: a page that is
-    dragged through the past asks for ten moments a second, each for a state and a field or two;
-    and behind one address there may be two such pages. `concurrency` of them may be under way for
-    one client (a browser has six at once), `total_concurrency` for all of them together, of
-    which large ones take three quarters. `frames_per_s` is what the state's listeners get at most,
-    on average. One token posts at most `observations_per_s`, and `observation_burst` at once: DDS
-    keeps 50 for a twin that is busy. Alarms are worked out from `alarm_days` before the start on.
-    The page over many sites has at most `open_sites` open at once, of some megabytes each.
-    `rejoin_after_s`: `web` joins ROS anew where its twin has been silent for so long.
+    `client_timeout_s`: a client that requests, or takes, nothing for this long is cut off.
+    `answer_timeout_s`: a computed answer that takes longer ends in 504, and its work is cancelled.
+    `answers_per_s` may be computed for one client, and two seconds' worth at once. A page that is
+    dragged through the past requests ten moments a second, each with a state and a field or two.
+    Two such pages may share an address. `concurrency` of them may be under way for one client
+    (a browser has six at once), `total_concurrency` for all clients; large ones may take three
+    quarters of that. `frames_per_s` is the mean rate of state frames at most. One token may post
+    `observations_per_s`, and `observation_burst` at once: DDS keeps 50 for a busy twin. Alarms are
+    derived from `alarm_days` before the start on. The fleet's page has at most `open_sites` open at
+    once, of some megabytes each. `rejoin_after_s`: `web` joins ROS anew after its twin has been
+    silent for this long.
     """
 
     client_timeout_s: float = 30.0
@@ -110,10 +110,10 @@ def client_key(address: str) -> str:
     return f"{IPv6Address(int(ip) >> 64 << 64)}/64"
 
 
-# A page that opens asks for several fields at once; seconds' worth of the rate.
+# The burst, in seconds' worth of the rate: a page that opens requests several fields at once.
 BURST_S: Final = 2.0
-# An export goes on for as long as its reader takes: one a client, and few that share the disk. Who
-# takes no more than 100 kB/s of it may go on until somebody else wants the place.
+# An export lasts as long as its reader takes: one per client, and few that share the disk. A reader
+# that takes less than 100 kB/s may go on until another client wants the slot.
 EXPORTS: Final = 4
 STRETCH_BYTES: Final = 500_000
 SLOW_STRETCH_S: Final = 5.0
@@ -133,16 +133,16 @@ class AdmissionError(RuntimeError):
 
 
 class ClientLimitError(AdmissionError):
-    """One client asks too much."""
+    """One client requests too much."""
 
 
 class BusyError(AdmissionError):
-    """All clients together ask too much."""
+    """All clients together request too much."""
 
 
 @dataclass(slots=True, eq=False)
 class Export:
-    """An export under way: since when its reader has been at the present stretch of it.
+    """An export under way; `since_s` is when its reader began its current `STRETCH_BYTES`.
 
     `end` breaks it off.
     """
@@ -152,7 +152,7 @@ class Export:
     taken_bytes: int = 0
 
     def take(self, size: int, now_s: float) -> None:
-        """Its reader has taken so many bytes more."""
+        """Note that its reader has taken `size` more bytes."""
         self.taken_bytes += size
         if self.taken_bytes >= STRETCH_BYTES:
             self.taken_bytes, self.since_s = 0, now_s
@@ -162,7 +162,7 @@ class Admission:
     """The requests in flight. Belongs to the event loop."""
 
     def __init__(self, limits: Limits) -> None:
-        # By why, as it is counted.
+        # By reason, for the metrics.
         self.refused: Counter[str] = Counter()
         self._limits = limits
         self._rate = RateLimit(limits.answers_per_s, limits.answers_per_s * BURST_S)
@@ -215,11 +215,11 @@ class Admission:
     def export(self, client: str, now_s: float, end: Callable[[], None]) -> Iterator[Export]:
         """A client's export, from its first row to its last; `end` breaks it off.
 
-        The slowest makes place for it where it has to.
+        If all slots are taken, the slowest export is ended, provided that it is slow.
 
         Raises:
             ClientLimitError: the client has one already.
-            BusyError: one more than there may be at once, and none is slow.
+            BusyError: all slots are taken, and no export is slow.
 
         """
         if client in self._exports:
@@ -240,12 +240,12 @@ class Admission:
 
     @contextmanager
     def computing(self, client: str, *, is_large: bool = False) -> Iterator[None]:
-        """What keeps the twin and the workers busy, once for all who wait for it.
+        """A computation, which counts once for all clients that wait for it.
 
-        `client` was the first to ask.
+        `client` was the first to request it.
 
         Raises:
-            BusyError: one more than there may be at once, or than the client leaves to others.
+            BusyError: all slots are taken, or the client would take more than it leaves free.
 
         """
         if self._computing.is_full_for(client):
@@ -265,7 +265,7 @@ class Admission:
 
 
 class _Places:
-    """So many for all clients, of which none takes more than it leaves free."""
+    """A number of slots for all clients, of which none takes more than it leaves free."""
 
     def __init__(self, limit: int) -> None:
         self.limit = limit
@@ -289,13 +289,13 @@ def _give_back(taken: Counter[str], client: str) -> None:
 
 
 MAX_BYTES: Final = 64_000_000
-# What an entry takes beside its body, roughly: the least that it counts.
+# Rough overhead of an entry, counted in addition to its body.
 ENTRY_BYTES: Final = 1_000
-# So many entries are looked through for the newest.
+# Entries that are searched for the newest ETags.
 MAX_NEWEST: Final = 64
 
 
-# Browsers and proxies keep what they got, and ask each time whether it still holds.
+# Browsers and proxies cache the answer, and check each time whether it is still valid.
 REVALIDATE: Final = {"Cache-Control": "no-cache"}
 
 
@@ -311,7 +311,7 @@ class Answer:
 def content_answer(
     body: bytes, media_type: str = "application/json", headers: Mapping[str, str] | None = None
 ) -> Answer:
-    """A body whose ETag is that of its content."""
+    """An answer whose ETag is a digest of its body."""
     etag = f'"{blake2b(body, digest_size=12).hexdigest()}"'
     return Answer(body, media_type, {"ETag": etag, **REVALIDATE, **(headers or {})})
 
@@ -329,8 +329,8 @@ class _Entry:
 class AnswerCache:
     """Answers by their keys, the least recently used dropped first. Belongs to one thread.
 
-    A key stands for everything that its answer depends on. An answer that is being sent counts and
-    is not dropped: slow readers hold what is cached, and never more than the bound.
+    A key stands for everything that its answer depends on. An answer that is being sent counts, and
+    is not dropped: so slow readers never hold more than the cache's limit.
     """
 
     def __init__(self, max_bytes: int = MAX_BYTES) -> None:
@@ -342,7 +342,7 @@ class AnswerCache:
         return len(self._entries)
 
     def put(self, key: Hashable, answer: Answer, instead_of: Hashable | None = None) -> None:
-        """Cache an answer if there is room, or can be made; the one it replaces goes first."""
+        """Cache an answer if room can be made; the one under `instead_of` is dropped first."""
         for old in (key, instead_of):
             entry = self._entries.get(old)
             if entry is not None and not entry.readers:
@@ -375,7 +375,7 @@ class AnswerCache:
         return entry.answer, release
 
     def newest_tags(self) -> list[str]:
-        """The ETags that were put or lent last, of those that are keys."""
+        """The most recently used keys that are ETags."""
         newest = islice(reversed(self._entries), MAX_NEWEST)
         return [key for key in newest if isinstance(key, str)]
 

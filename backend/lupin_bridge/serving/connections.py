@@ -1,12 +1,12 @@
-"""Connections below their protocols: accepted, evicted, bounded, torn down.
+"""Accepts, evicts, bounds and tears down connections, below their protocols.
 
-Connections are taken off the listening socket as long as there are files for them. asyncio's own
-server knows no limit: out of files, it logs an error for each place in its backlog and tries all of
-them again a second later, 97 MB of log in half a minute.
+Connections are accepted as long as there are file descriptors for them. asyncio's own server has no
+limit. Out of descriptors, it logs an error for each entry in its backlog, and retries all of them a
+second later: 97 MB of log in half a minute.
 
-An open connection costs a file. A connection that has requested nothing yet, or does not take what
-it requested, is evicted before any new one is refused. The address with the most connections loses
-its own first, so however many it opens, it evicts none but itself.
+A connection that has requested nothing yet, or does not take what it requested, is evicted before
+any new one is refused. The address with the most connections loses its own first, so however many
+it opens, it evicts only itself.
 """
 
 from __future__ import annotations
@@ -60,12 +60,12 @@ def refusal(status: int, detail: str, *headers: str) -> bytes:
     return "\r\n".join((*head, "", "")).encode() + body
 
 
-# What the kernel may hold that the network has not taken; what is under way does not count. On its
-# own it would hold 4 MB (tcp_wmem): for a slow reader, minutes of old states.
+# Unsent bytes that the kernel may buffer, apart from those in flight. Its default is 4 MB
+# (tcp_wmem): for a slow reader, minutes of old states.
 UNSENT_BYTES: Final = 128 * 1024
 
-# How long a client may read the reason for a close before its socket is torn down. Closed at once,
-# with more of the client's bytes on their way, the socket would be reset, and the reason lost.
+# How long a client may read the reason for a close before its socket is torn down. If closed at
+# once while the client is still sending, the socket would be reset, and the reason lost.
 CLOSE_GRACE_S: Final = 1.0
 
 
@@ -79,7 +79,7 @@ def bound_unsent(transport: asyncio.BaseTransport) -> None:
 def tear_down(transport: asyncio.WriteTransport) -> None:
     """End a connection now; one whose other side does not read is reset.
 
-    Closed, its socket would go on offering what nobody reads for another four minutes.
+    If only closed, its socket would keep the unread data for another four minutes.
     """
     if transport.get_write_buffer_size() > 0:
         reset(transport)
@@ -88,7 +88,7 @@ def tear_down(transport: asyncio.WriteTransport) -> None:
 
 
 def reset(transport: asyncio.WriteTransport) -> None:
-    """End a connection now, and so that its other side takes it for no proper end."""
+    """End a connection now with a TCP reset, so that the other side sees that it was cut off."""
     no_lingering = struct.pack("ii", 1, 0)
     connection: socket.socket | None = transport.get_extra_info("socket")
     if connection is not None and connection.fileno() >= 0:  # else it has ended already
@@ -104,8 +104,8 @@ def _close_tls_once(transport: _SSLProtocolTransport) -> None:
         _close_tls(transport)
 
 
-# A second `close`, of which uvicorn has several, would have it forget its connection: nothing could
-# end that any more, as long as its other side does not answer the first.
+# uvicorn may call `close` several times. A second call would make the transport forget its
+# connection, which nothing could end any more until the other side answers the first.
 _SSLProtocolTransport.close = _close_tls_once  # type: ignore[assignment,method-assign]
 
 
@@ -127,8 +127,8 @@ class Evictable(Protocol):
 def choose_evicted(connections: Iterable[Evictable], number: int) -> list[Evictable]:
     """At most `number` waiting connections: of the largest addresses, the longest waiting first.
 
-    After each one its address has one less. Of two addresses with as many connections, the one with
-    the longest waiting connection comes first.
+    Each choice counts as one connection less for its address. Of two addresses with equally many,
+    the one with the longest waiting connection comes first.
     """
     sizes: Counter[str] = Counter()
     waiting: defaultdict[str, list[tuple[float, int, Evictable]]] = defaultdict(list)
@@ -137,7 +137,7 @@ def choose_evicted(connections: Iterable[Evictable], number: int) -> list[Evicta
         since_s = connection.waiting_since_s
         if since_s is not None:
             waiting[connection.address].append((since_s, order, connection))
-    # The next of an address is evicted when the address is smaller by those before it.
+    # Each connection ranks by the size of its address without those chosen before it.
     ranked = [
         (earlier - sizes[address], *entry)
         for address, own in waiting.items()
@@ -149,18 +149,18 @@ def choose_evicted(connections: Iterable[Evictable], number: int) -> list[Evicta
 
 # Files that stay free for the rest of the process: DDS, the page's files.
 SPARE_FILES: Final = 64
-# However few files there are: with fewer connections the bridge would serve nobody.
+# Even if there are fewer files: with fewer connections, the bridge would serve nobody.
 MIN_CONNECTIONS: Final = 8
 # Connections accepted in one turn of the event loop.
 AT_ONCE: Final = 64
 # Share of connections evicted at once when full: each choice looks at all of them.
 EVICTED_SHARE: Final = 1 / 16
-# asyncio's buffer for each connection over TLS, from its first moment on. Its default is 256 kB,
-# which a stranger could have thousands of times. A record of TLS has 16 kB at most.
+# asyncio's buffer for each TLS connection, allocated at once. Its default is 256 kB, which a
+# stranger could have allocated thousands of times. A TLS record has 16 kB at most.
 TLS_BUFFER_BYTES: Final = 32 * 1024
 RETRY_S: Final = 0.25
 WARNING_PERIOD_S: Final = 30.0
-# What room helps against: no files, no memory.
+# Errors that eviction may mend: no file descriptors, no memory.
 _NO_ROOM: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
 
 
@@ -224,7 +224,7 @@ class Acceptor:
             handshake.abort()
 
     async def wait_closed(self) -> None:
-        """Until they have ended."""
+        """Wait until the handshakes have ended."""
         tasks = [handshake.task for handshake in self._handshakes if handshake.task is not None]
         await asyncio.gather(*tasks, return_exceptions=True)
 

@@ -1,14 +1,14 @@
-"""HTTP with slow clients: what waits for one is a piece, and an idle client is cut off.
+"""HTTP for slow clients: answers are buffered one piece at a time, and idle clients are cut off.
 
-uvicorn takes an answer whole and keeps what the socket does not take, and it waits for the rest of
-a request, for as long as the client likes. A few hundred connections that request a large field and
-never read would fill the memory, and some thousand that never finish a request use up all sockets.
-The times hold for the connection, and so for whatever is sent: answers of routes, and refusals of
-access control, of the framework and of this protocol alike.
+uvicorn buffers all of an answer that the socket does not take, and waits for the rest of a request
+without limit. A few hundred connections that request a large field and never read would fill the
+memory; some thousand that never finish a request would use up all sockets. The time limits are the
+connection's, and so cover all that is sent: answers of routes, and refusals by access control, the
+framework and this protocol alike.
 
-The parser gets one whole head at a time, of bounded size and number of lines. Few routes want a
-body, of bounded size and of a length that is said before; a request with any other body is refused
-before any of that is read.
+The parser gets one whole head at a time, of bounded size and number of lines. Only a few routes
+take a body, of bounded size and declared length; a request with any other body is refused before
+the body is read.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from lupin_bridge.serving.connections import CLOSE_GRACE_S, bound_unsent, refusa
 
 log = logging.getLogger(__name__)
 
-# The request's line and all header lines. The parser's own limit is one for what is incomplete: all
-# that comes at once, it would take, up to asyncio's 256 kB.
+# The request's line and all header lines. The parser's own limit is only for incomplete heads: it
+# would take one that comes at once, up to asyncio's 256 kB.
 MAX_HEAD_BYTES: Final = 32 * 1024
-# As many as the parser of WebSocket handshakes takes. What a head costs goes by its lines: 8,000
-# tiny ones take 23 ms to parse. A continued line (RFC 9112, section 5.2) counts as two.
+# As many as the parser of WebSocket handshakes takes. The cost of a head depends on its lines:
+# 8,000 tiny ones take 23 ms to parse. A continued line (RFC 9112, section 5.2) counts as two.
 MAX_HEADERS: Final = 128
 MAX_LINES: Final = 1 + MAX_HEADERS + 1  # the request's line, and the blank one
-# From here on the next piece has to wait. asyncio's own value, but over TLS, where it is 512 kB.
+# With more than this unsent, the next piece waits. asyncio's default, except 512 kB over TLS.
 HIGH_WATER_BYTES: Final = 64 * 1024
-# Where a body is taken, and how much of it: a note of 500 characters, each of them escaped; 64
+# The routes that take a body, and its largest size: a note of 500 characters, all escaped, or 64
 # readings.
 BODIES: Final = (b"/api/notes", b"/api/observations", b"/api/push", b"/api/signin")
 MAX_BODY_BYTES: Final = 8 * 1024
-# Where a request's scope has its connection, among the state.
+# The key of the connection in the state of a request's scope.
 CONNECTION_KEY: Final = "http_connection"
 
 # h11's own: where a head ends.
@@ -51,19 +51,19 @@ _BLANK_LINE: Final = re.compile(rb"\n\r?\n")
 
 
 class _Requests(h11.Connection):
-    """h11's parser, for requests of a small body, if any, and for a target that is a path.
+    """h11's parser, which takes only a path as target, and a small body, if any.
 
-    `left` is what of the body is still to come, bytes.
+    `left` is how much of the body is still to come, bytes.
     """
 
     left = 0
 
     def next_event(self) -> Any:
-        """As h11; what is not served here is refused as what is no HTTP is."""
+        """As h11; a request that is not served here is refused like invalid HTTP."""
         event = super().next_event()
         if isinstance(event, h11.Request):
-            # RFC 9112, section 3.2.2, would have us take a whole address too. Only a client that
-            # takes us for its proxy sends one, and two names of the host are one too many.
+            # RFC 9112, section 3.2.2, demands that absolute URLs are taken too. Only a client that
+            # takes us for its proxy sends one, and then there are two names of the host.
             if not event.target.startswith(b"/"):
                 raise h11.RemoteProtocolError(
                     f"the request's target is {event.target[:128].decode('latin-1')!r}, expected a "
@@ -75,9 +75,9 @@ class _Requests(h11.Connection):
 
 
 def _body_of(event: h11.Request, most: int) -> int:
-    """How long the body is; h11 has seen to it that one length is given, in few digits.
+    """The length of the body, bytes; h11 has checked that there is one length, of few digits.
 
-    RFC 9112, section 6: these two headers, and nothing else, say that there is a body.
+    RFC 9112, section 6: only these two headers announce a body.
     """
     length = 0
     for name, value in event.headers:
@@ -94,10 +94,10 @@ def _body_of(event: h11.Request, most: int) -> int:
 
 
 class HttpConnection(H11Protocol):
-    """uvicorn's protocol, with an end to every wait.
+    """uvicorn's protocol, with a limit on every wait.
 
-    A client has uvicorn's `timeout_keep_alive` for a whole request, from its connection or its last
-    answer on, however often it sends a byte; and as long to take a piece of an answer.
+    A client has uvicorn's `timeout_keep_alive` to send a whole request, counted from its connection
+    or its last answer, however often it sends a byte. It has as long to take a piece of an answer.
     """
 
     def __init__(
@@ -156,14 +156,14 @@ class HttpConnection(H11Protocol):
         self._reader_deadline = self.loop.call_later(self.timeout_keep_alive, self._give_up)
 
     def resume_writing(self) -> None:
-        """It has taken it."""
+        """Stop waiting: the client has taken the piece."""
         super().resume_writing()
         if self._reader_deadline is not None:
             self._reader_deadline.cancel()
             self._reader_deadline = None
 
     def handle_websocket_upgrade(self, event: Any) -> None:
-        """Hand the connection over: it is not ours any more."""
+        """Hand the connection over to the WebSocket protocol."""
         self._is_handed_over = True
         self._stop_waiting()
         super().handle_websocket_upgrade(event)
@@ -174,7 +174,7 @@ class HttpConnection(H11Protocol):
         super().connection_lost(exc)
 
     def send_400_response(self, msg: str) -> None:
-        """Answer what the parser does not take, and end; uvicorn calls this from its `except`."""
+        """Refuse what the parser rejects, and close; uvicorn calls this from its `except`."""
         error = sys.exception()
         if isinstance(error, h11.RemoteProtocolError):
             self._refuse(error.error_status_hint, str(error)[:500])
@@ -182,7 +182,7 @@ class HttpConnection(H11Protocol):
             self._refuse(400, msg)
 
     def shutdown(self) -> None:
-        """End once the answer has gone; who is refused has an answer that h11 knows nothing of."""
+        """Close once the answer is sent; a refusal, unknown to h11, closes by itself."""
         if not self._is_refused:
             super().shutdown()
 
@@ -191,20 +191,20 @@ class HttpConnection(H11Protocol):
         tear_down(self.transport)
 
     def break_off(self) -> None:
-        """End an answer in its middle: its client must not take the part for the whole.
+        """Abort an answer, so that its client does not take the part for the whole.
 
-        Of HTTP/1.0, where an answer ends with its connection, that goes for nothing but a reset.
+        In HTTP/1.0, where the end of the connection ends an answer, only a reset can show that.
         """
         reset(self.transport)
 
     def end_waiting(self) -> None:
-        """Who waits for an answer is told that none comes; an answer that has begun goes on."""
+        """Refuse a request that waits for its answer; an answer that has begun goes on."""
         cycle = cast("RequestResponseCycle | None", self.cycle)
         if cycle is not None and not cycle.response_started:
-            # To the application, its client has left: it ends its work.
+            # For the application, its client has left: it cancels its work.
             cycle.disconnected = True
             cycle.message_event.set()
-            # Whoever restarts services takes about as long.
+            # A restart takes about this long.
             self._refuse(503, "the bridge is shutting down", "Retry-After: 3")
 
     def _should_upgrade(self) -> bool:
@@ -212,13 +212,13 @@ class HttpConnection(H11Protocol):
         return self.scope["http_version"] == "1.1" and super()._should_upgrade()
 
     def _refuse(self, status: int, detail: str, *headers: str) -> None:
-        """Answer, and end; no other answer is under way now."""
+        """Send a refusal, and close; no other answer may be under way."""
         self._is_refused = True
         self.transport.write(refusal(status, detail, *headers))
-        # Closed at once, with more of the client's still on its way, the connection would be
-        # reset, and the answer lost.
+        # If closed at once while the client is still sending, the connection would be reset, and
+        # the answer lost.
         if self.transport.can_write_eof():
-            with suppress(OSError):  # the client has left, and nobody has read that yet
+            with suppress(OSError):  # the client has left, which has not been noticed yet
                 self.transport.write_eof()
         self.loop.call_later(CLOSE_GRACE_S, self.transport.close)
         self._wait_for_request()
@@ -242,7 +242,7 @@ class HttpConnection(H11Protocol):
             elif blank is None and end == MAX_HEAD_BYTES:
                 self._refuse(431, f"the request's head is longer than {MAX_HEAD_BYTES} bytes")
             elif blank is None and self._unparsed[0] > 0x20:
-                return  # the rest is on its way; a smaller byte begins no request, but TLS, say
+                return  # the rest is on its way; a byte up to 0x20 begins no request, but maybe TLS
             else:
                 head = bytes(self._unparsed[:end])
                 del self._unparsed[:end]
@@ -284,7 +284,7 @@ class HttpConnection(H11Protocol):
 
 # --- an answer, piece by piece --------------------------------------------------------------------
 
-# Of a body, for a slow reader: the next piece follows when the socket has taken this one.
+# Size of a piece of a body: the next one follows when the socket has taken it.
 PIECE_BYTES: Final = 64 * 1024
 
 
@@ -294,15 +294,15 @@ def pieces_of(message: Message) -> Iterator[Message]:
     if len(body) <= PIECE_BYTES:
         yield message
         return
-    body = memoryview(body)  # a piece is a view: of one body for a hundred readers there is one
+    body = memoryview(body)  # pieces are views: a hundred readers share one body
     for start in range(0, len(body), PIECE_BYTES):
         yield {**message, "body": body[start : start + PIECE_BYTES], "more_body": True}
-    # uvicorn waits before it writes: the empty end waits for the last piece.
+    # uvicorn waits before it writes: the empty last message waits for the last piece.
     yield {**message, "body": b""}
 
 
 class PieceByPiece:
-    """An answer returns when its reader has taken all but the last piece."""
+    """ASGI middleware that sends an answer in pieces, each when its reader has taken the last."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

@@ -1,4 +1,4 @@
-"""The web server: uvicorn, its signals, its TLS certificate, and the service manager's."""
+"""The web server: uvicorn, its signals and TLS certificate, and notifications to systemd."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from lupin_twin.runtime import process
 
 log = logging.getLogger(__name__)
 
-# How often the files are looked at. Certificates are renewed weeks before they end.
+# Interval of checking the certificate's files. Certificates are renewed weeks before they expire.
 WATCH_PERIOD_S: Final = 2.0
 
 
@@ -39,7 +39,7 @@ def check_pair(cert_file: str, key_file: str) -> None:
     """Load a certificate chain and its private key, both PEM, and forget them again.
 
     Raises:
-        SettingError: a file that cannot be read, or is not what it should be, or no pair.
+        SettingError: a file cannot be read or is invalid, or the two are no pair.
 
     """
     for option, path in (("--tls-cert", cert_file), ("--tls-key", key_file)):
@@ -68,10 +68,10 @@ def check_pair(cert_file: str, key_file: str) -> None:
 
 
 class Certificates:
-    """A pair that is served, and follows its files: who connects later gets what they hold by then.
+    """The certificate and key that are served, reloaded for new connections when the files change.
 
-    Connections that are open keep what they have. A new pair that cannot be served is logged once,
-    and the old one goes on until the files hold one that can.
+    Open connections keep theirs. A new pair that is invalid is logged once, and the old one stays
+    in use until the files hold a valid one.
     """
 
     def __init__(self, cert_file: str, key_file: str, context: ssl.SSLContext) -> None:
@@ -81,18 +81,18 @@ class Certificates:
         self._warned = ""
 
     async def watch(self) -> NoReturn:
-        """Look at the files now and then, for ever."""
+        """Check the files periodically, for ever."""
         while True:
             await asyncio.sleep(WATCH_PERIOD_S)
             self.look()
 
     def look(self) -> None:
-        """Serve what the files hold, if that is something else by now and will do."""
+        """Serve what the files hold, if that has changed and is valid."""
         version = self._version()
         if version == self._served:
             return
         try:
-            # Not into the live context: a pair that is none would leave it with neither.
+            # Checked apart from the live context, which a wrong pair would leave without any.
             check_pair(*self._files)
             self._context.load_cert_chain(*self._files)
         except (SettingError, OSError) as error:  # ssl.SSLError is an OSError
@@ -115,25 +115,25 @@ def _stamp(path: str) -> tuple[int, ...] | None:
     return status.st_mtime_ns, status.st_ino, status.st_size
 
 
-# Clients have nothing to say: what they send is read and thrown away, and bounded.
+# Largest WebSocket message from a client: clients send little.
 MAX_INBOUND_BYTES = 65_536
 PING_PERIOD_S = 20.0
-# Files open beside the clients' sockets: DDS, plain HTTP requests, those who are turned away.
+# Files open besides the clients' sockets: DDS, plain HTTP requests, clients that are refused.
 SPARE_FILES = 512
-# Ctrl-C ends within 2 s: so much for the clients to take the last messages and what they are being
-# sent, the rest for the ROS thread (`ros_thread.STOP_TIMEOUT_S`). Should a request outlive even its
+# Ctrl-C ends within 2 s: clients have this long to take the last messages and what they are being
+# sent; the rest is for the ROS thread (`ros_thread.STOP_TIMEOUT_S`). If a request outlives even its
 # connection, uvicorn cancels it.
 CLOSE_AFTER_S = 0.5
 GRACEFUL_SHUTDOWN_S = 1
-# Who comes while the loop is busy waits in the kernel; whom that has no place for tries again a
-# second later. All clients come at once when a bridge is started anew.
+# Connections that may wait in the kernel while the loop is busy; others try again a second later.
+# When a bridge is restarted, all clients come at once.
 BACKLOG = 2_048
-# uvicorn's main loop.
+# Ticks of uvicorn's main loop.
 TICKS_PER_S = 10
 
 
 class BridgeServer(uvicorn.Server):
-    """uvicorn's server: its clients learn of the shutdown, and no signal is raised again."""
+    """uvicorn's server, which announces a shutdown to its clients, and raises no signal again."""
 
     def __init__(
         self,
@@ -161,13 +161,13 @@ class BridgeServer(uvicorn.Server):
                 timeout_graceful_shutdown=GRACEFUL_SHUTDOWN_S,
             )
         )
-        # Called first as it ends.
+        # Called first at the shutdown.
         self._announcements = announcements
         # Connections that are being closed, and since when, s.
         self._closing_since_s: dict[Any, float] = {}
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """As uvicorn, with a door of our own in front of each socket."""
+        """As uvicorn, but an `Acceptor` of our own accepts the connections of each socket."""
         await super().startup(sockets=[])
         state, lifespan = self.server_state, self.lifespan
 
@@ -188,13 +188,13 @@ class BridgeServer(uvicorn.Server):
         self.servers.extend(acceptors)
 
     async def on_tick(self, counter: int) -> bool:
-        """Ten times a second: see that what is being closed ends."""
+        """Once a second, end connections that are being closed; uvicorn calls this at each tick."""
         if counter % TICKS_PER_S == 0:
             self._end_the_closing(asyncio.get_running_loop().time())
         return await super().on_tick(counter)
 
     def _end_the_closing(self, now_s: float) -> None:
-        """Tear down what has been closed, and whose client does not take the last bytes."""
+        """Tear down closing connections whose client does not take the last bytes."""
         since_s = self._closing_since_s
         self._closing_since_s = {
             connection: since_s.get(connection, now_s)
@@ -207,9 +207,9 @@ class BridgeServer(uvicorn.Server):
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Stop on SIGINT and SIGTERM, and return: raised again, they would kill the clean-up.
+        """Stop on SIGINT and SIGTERM without raising them again, which would kill the clean-up.
 
-        The command holds both back from its first moment on; here, and only here, they get in.
+        The command blocks both from its start on; only here are they unblocked.
         """
         with super().capture_signals():
             held_back = signal.pthread_sigmask(signal.SIG_UNBLOCK, HANDLED_SIGNALS)
@@ -220,13 +220,13 @@ class BridgeServer(uvicorn.Server):
                 self._captured_signals.clear()
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:  # noqa: ARG002
-        """A stop signal has come: end, soon, and whatever hangs, a stuck loop included."""
+        """Begin the shutdown; the process then ends soon, even if the event loop is stuck."""
         process.must_end()
-        # At a second SIGINT uvicorn would cancel all that goes on, each with a trace in the log.
+        # At a second SIGINT uvicorn would cancel all requests, each with a trace in the log.
         super().handle_exit(signal.SIGTERM, frame)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Tell the clients, then close.
+        """Notify the clients, then close.
 
         uvicorn would wait a second for the answers under way and then cancel them, each with a
         trace in the log and a bare 500.
@@ -251,7 +251,7 @@ def listen(host: str, port: int) -> socket.socket:
     for a moment instead of being refused. A Unix socket is for its owner and group alone.
 
     Raises:
-        OSError: the address cannot be had.
+        OSError: the address cannot be bound.
 
     """
     path = unix_path(host)
@@ -281,7 +281,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Of two who start at once, the second would take the first's new socket for one left over."""
+    """Lock a folder: of two processes that start at once, one could remove the other's socket."""
     file = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(file, fcntl.LOCK_EX)
@@ -291,7 +291,7 @@ def _locked(folder: Path) -> Iterator[None]:
 
 
 def _remove_left(path: Path) -> None:
-    """Remove the socket of a process that has ended: nobody could listen there again."""
+    """Remove the socket of a process that has ended, which would block the address."""
     with socket.socket(socket.AF_UNIX) as probe, suppress(OSError):
         probe.settimeout(1.0)
         try:
@@ -302,12 +302,12 @@ def _remove_left(path: Path) -> None:
 
 
 def allow_connections(number: int) -> int:
-    """Raise this process's limit on open files to what so many clients need.
+    """Raise this process's limit on open files to what `number` clients need.
 
     The usual limit of 1,024 is there for programs that use select(2), which this is not.
 
-    Returns how many clients it will do for: fewer than `number` where the limit cannot be raised as
-    far, so that there is room beside them for plain requests, and for refusals.
+    Returns how many clients may connect: fewer than `number` if the limit cannot be raised that
+    far, so that there is room for plain requests and refusals besides them.
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = number + SPARE_FILES
@@ -337,9 +337,9 @@ def address_of(listener: socket.socket, scheme: str = "http") -> str:
     return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"
 
 
-# --- what the service manager is told -------------------------------------------------------------
+# --- notifications to the service manager ---------------------------------------------------------
 
-# The manager acts when nothing has come for the whole time: two messages may be lost.
+# The manager acts when nothing has come for its whole time-out: two messages may be lost.
 _MESSAGES_A_TIMEOUT: Final = 3
 
 
@@ -368,11 +368,11 @@ class Supervisor:
         self._has_failed = False
 
     def ready(self, status: str) -> None:
-        """It serves from now on; `status` is a line for people."""
+        """Notify that the bridge serves from now on; `status` is a line for people."""
         self._notify(f"READY=1\nSTATUS={status}")
 
     def stopping(self) -> None:
-        """It is about to end."""
+        """Notify that the bridge is about to end."""
         self._notify("STOPPING=1")
 
     async def send_watchdog(self, ailment: Callable[[], str | None]) -> None:
@@ -395,7 +395,7 @@ class Supervisor:
             self._has_failed = True
 
 
-# --- say where, and serve until a signal ----------------------------------------------------------
+# --- serve until a signal -------------------------------------------------------------------------
 
 
 async def serve(
@@ -405,8 +405,8 @@ async def serve(
     supervisor: Supervisor,
     ailment: Callable[[], str | None],
 ) -> None:
-    """Serve until a signal ends it; `ailment` tells the supervisor what only a restart helps."""
-    # The 100,000 objects of all modules are here to stay. Each full collection would walk through
+    """Serve until a signal ends it; `ailment` returns a fault that only a restart mends."""
+    # The 100,000 objects of all modules stay for good. Each full collection would walk through
     # them, 30 to 50 ms during which nobody is served.
     gc.collect()
     gc.freeze()

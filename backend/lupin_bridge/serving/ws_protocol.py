@@ -1,7 +1,7 @@
-"""WebSocket: what a client may send as JSON, and connections as the fan-out needs them.
+"""WebSocket connections that never wait for slow clients, with limits on what clients send.
 
-uvicorn gives an application `send()` alone, which waits for a slow client. The fan-out must not
-wait: it asks whether one is full, and keeps the newest frame for the moment at which it is not.
+uvicorn offers an application only `send()`, which waits for a slow client. The fan-out must not
+wait: it checks whether a socket is full, and keeps the newest frame until it is not.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from lupin_bridge.serving.connections import CLOSE_GRACE_S, refusal, tear_down
 
 # --- a client's JSON ------------------------------------------------------------------------------
 
-# No message that we serve has more than some hundred bytes.
+# The messages that we understand have some hundred bytes at most.
 MAX_MESSAGE_LENGTH: Final = 16_384
 
 
 def members_of(message: str | bytes) -> dict[str, Any]:
-    """The members of an object.
+    """The members of a JSON object.
 
     Raises:
-        ValueError: it is none, or past a limit; the text names which.
+        ValueError: not an object, or past a limit; the text says which.
 
     """
     if isinstance(message, bytes):
@@ -49,19 +49,19 @@ def members_of(message: str | bytes) -> dict[str, Any]:
 
 
 def shown(value: object) -> str:
-    """A value as a refusal quotes it: short, and never its inside."""
+    """A value as a refusal quotes it: short, and without what is inside it."""
     if isinstance(value, dict | list):
         return "an object" if isinstance(value, dict) else "an array"
     text = repr(value)
     return text if len(text) <= 64 else text[:63] + "…"
 
 
-# --- a large message as a row of small frames, whose payloads are views of it ---------------------
+# --- a large message as a series of small frames, whose payloads are views of it ------------------
 
-# asyncio copies what a socket does not take. Of a map for a hundred clients that do not read,
-# that would be a hundred copies; so each gets the next piece when it has taken the one before,
-# and all of them share the message. A ping, its answer and a close may come between two pieces
-# (RFC 6455, section 5.4).
+# asyncio copies what a socket does not take: a map for a hundred clients that do not read, a
+# hundred times. So each client gets the next piece when it has taken the one before, and all of
+# them share the message. A ping, its answer and a close may come between two pieces (RFC 6455,
+# section 5.4).
 PIECE_BYTES: Final = 131_072
 
 # A frame's head, perhaps with the beginning of its payload, and what follows it.
@@ -75,9 +75,9 @@ _CONTINUATION: Final = 0
 
 
 def pieces(frame: bytes, rest: bytes = b"") -> Iterator[Piece]:
-    """A whole message as frames of `PIECE_BYTES` at most; one that is small stays as it is.
+    """Yield a whole message as frames of `PIECE_BYTES` at most; a small one stays as it is.
 
-    `frame` is unmasked and its head has the length of all, `rest` what is not yet in it.
+    `frame` is unmasked; its head has the whole length. `rest` is the payload that is not in it.
     """
     if len(frame) + len(rest) <= PIECE_BYTES:
         yield frame, rest
@@ -94,7 +94,7 @@ def pieces(frame: bytes, rest: bytes = b"") -> Iterator[Piece]:
 
 
 def frame_head(first: int, length: int) -> bytes:
-    """What stands before so many bytes of payload; a server does not mask (RFC 6455, 5.1)."""
+    """The head of a frame of `length` payload bytes; a server does not mask (RFC 6455, 5.1)."""
     if length < 126:
         return bytes((first, length))
     if length < 1 << 16:
@@ -106,15 +106,15 @@ def frame_head(first: int, length: int) -> bytes:
 
 CONNECTION_KEY = "connection"
 
-# Clients have next to nothing to say, and everybody else waits while a frame of theirs is parsed:
-# 3 ms at a time, of the smallest frames. A page subscribes a few times as it opens, a layout with
-# twenty panels twenty times, and both hardly ever from then on; more fields than 50 a second nobody
-# gets anyway.
+# Limits on input: clients send little, and all others wait while it is parsed, 3 ms for
+# `READ_BYTES` of the smallest frames. A page subscribes a few times as it opens, a layout with
+# twenty panels twenty times, and both hardly ever after that. Nobody gets more than 50 fields a
+# second anyway.
 READ_BYTES = 8_192
 FRAMES_PER_S = 100
 FRAMES_AT_ONCE = 500
-# Of one message. The parser bounds what they weigh, and not how many they are: empty ones without
-# an end would be kept, every one.
+# Fragments of one message. The parser bounds their size, not their number: it would keep an endless
+# series of empty ones.
 MAX_PIECES = 400
 
 
@@ -122,7 +122,7 @@ _READ_BUFFER = memoryview(bytearray(READ_BYTES))
 
 
 class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
-    """uvicorn's protocol, that also puts itself into `scope["state"]["connection"]`.
+    """uvicorn's protocol, which also puts itself into `scope["state"]["connection"]`.
 
     Buffered, so that each client is read in small parts, in turn.
     """
@@ -136,10 +136,10 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
     ) -> None:
         super().__init__(config, server_state, {**app_state, CONNECTION_KEY: self}, _loop)
         self.address = ""
-        # uvicorn's own, which is for the client's answer to a close: ten seconds.
+        # uvicorn's time-out for the client's answer to a close, by default ten seconds.
         self.close_timeout = CLOSE_GRACE_S
-        # Since when it is being closed, with time left for its client to read why, s; an open one
-        # is not evicted for others.
+        # Since when it is being closed, with time for its client to read why, s; None: it is open,
+        # and is not evicted for others.
         self.waiting_since_s: float | None = None
         self.on_writable: Callable[[], None] | None = None
         self._pace = RateLimit(FRAMES_PER_S, FRAMES_AT_ONCE)
@@ -149,22 +149,22 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         self._opening: asyncio.TimerHandle
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Stop at the first bytes that the socket does not take: what is queued is one frame.
+        """Have the socket count as full at its first unsent byte: one frame is queued at most.
 
-        Over TLS, asyncio keeps another 64 kB below the limit that can be set.
+        Over TLS, asyncio buffers another 64 kB below the limit that can be set.
         """
         super().connection_made(transport)
         if self.client is not None:
             self.address = client_key(self.client[0])
-        # uvicorn does so later. Over TLS something may be unsent when the limits are set: HTTP's
+        # uvicorn does so later. Over TLS something may be unsent when the limits are set: the HTTP
         # protocol would be notified, wait for a reader not its own, and cut the client off.
         self.transport.set_protocol(self)
         # Not 0: asyncio's TLS transport stops at the limit, not past it, and would stop on nothing.
         self.transport.set_write_buffer_limits(high=1, low=0)
-        # An earlier answer over HTTP may still fill the socket. Then HTTP's protocol was notified.
+        # An earlier HTTP answer may still fill the socket. Then the HTTP protocol was notified.
         if self.transport.get_write_buffer_size() > 0:
             self.pause_writing()
-        # Until it is taken, the handshake has no answer, and the client no place with us.
+        # Until the handshake is answered, the client counts towards no limit of ours.
         timeout_s = self.config.timeout_keep_alive
         self._opening = self.loop.call_later(timeout_s, self._end_unless_open)
 
@@ -186,17 +186,17 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         """Take bytes: first of all the whole request for the handshake, which may be refused."""
         super().data_received(data)
         if not self.handshake_initiated and not self.transport.is_closing():
-            # It is all there, and no request for the parser: uvicorn would wait for more, for ever.
+            # The request is complete, but the parser rejects it: uvicorn would wait for ever.
             self.handshake_complete = self.close_sent = True
             self.transport.write(_refusal_of(self.conn.handshake_exc))
             self.transport.close()
 
     def get_buffer(self, sizehint: int) -> memoryview:  # noqa: ARG002  # asyncio's suggestion
-        """Where the next bytes go; shared by all connections, for they are read at once."""
+        """The buffer for the next bytes; all connections share it, as they are read at once."""
         return _READ_BUFFER
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Bytes have come."""
+        """Take the bytes that have come."""
         self.data_received(bytes(_READ_BUFFER[:nbytes]))
 
     def handle_events(self) -> None:
@@ -209,12 +209,12 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
             )
 
     def pause_writing(self) -> None:
-        """The socket takes no more."""
+        """Note that the socket takes no more."""
         self._is_full = True
         super().pause_writing()
 
     def resume_writing(self) -> None:
-        """The socket has taken everything: time for the next piece, or the newest frame."""
+        """Write the next piece, or the newest frame: the socket has taken everything."""
         self._is_full = False
         self._write_pieces()
         if self._is_full:
@@ -224,9 +224,9 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
             self.on_writable()
 
     async def send(self, message: Any) -> None:
-        """Pass on; a handshake that was answered with a refusal counts as complete.
+        """Pass a message on; a handshake that was refused counts as complete.
 
-        uvicorn would take it for one that the application forgot, and log an error for each.
+        Otherwise uvicorn would think that the application forgot it, and log an error for each.
         """
         await super().send(message)
         if self.close_sent:
@@ -252,7 +252,7 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
             self.transport.write(pong)
 
     def handle_parser_exception(self) -> None:
-        """Answer what breaks the protocol or a limit with the reason; the rest is thrown away."""
+        """Close with the reason, if input breaks the protocol or a limit; drop further input."""
         close = self.conn.close_sent
         if close is None or self.close_sent:
             return  # the parser repeats its complaint with whatever else comes
@@ -271,7 +271,7 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         self.transport.write(wire)
 
     def write_shared(self, frame: bytes, rest: bytes = b"") -> None:
-        """Write a message that others get too, without a copy of it; see `pieces`. Never waits."""
+        """Write a message that others get too, without copying it; see `pieces`. Never waits."""
         self._pieces.extend(pieces(frame, rest))
         self._write_pieces()
 
@@ -304,16 +304,16 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
             self.waiting_since_s = self.loop.time()
 
     def _send_close(self) -> None:
-        """Write the close frame that the protocol has ready, and end after the grace."""
+        """Write the close frame that the parser has ready, and tear down after `CLOSE_GRACE_S`."""
         self._pieces.clear()
         self.transport.write(b"".join(self.conn.data_to_send()))
         self.close_sent = True
         self._note_closing()
-        # uvicorn's own: with it, the end of the application is not yet that of the connection.
+        # uvicorn's attribute: while it is set, the application's end does not end the connection.
         self.close_timer = self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)
 
 
-# By their names, which are not the same ones in all versions.
+# Status by the name of the error's class: these classes differ between versions of websockets.
 _REFUSED_AS: Final = {
     "RequestLineTooLong": 414,
     "HeaderLineTooLong": 431,

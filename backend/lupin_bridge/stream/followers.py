@@ -1,8 +1,8 @@
-"""What is asked of the twin now and then: what estimates are worth, what the robot says of itself.
+"""Polls the twin for the quality of its estimates, and for what the robot reports of itself.
 
-As types of the web contract (see `schema`), as JSON text, and followed on the loop.
+Has the types of both for the web contract (see `schema`), their JSON, and the polling loops.
 
-Nothing here is on the way of a frame: what was found is passed to the judge when it is there.
+No state frame waits for this: the judge gets a result when it has come.
 """
 
 from __future__ import annotations
@@ -48,14 +48,14 @@ class GetEstimateResponse(Contract):
 
 
 class Graded(Contract):
-    """New scans that were predicted without their tag, and those in the interval for 9 of 10."""
+    """New scans that were predicted from other tags, and those inside the 90 % interval."""
 
     scans: int
     inside: int
 
 
 class EstimateQuality(Contract):
-    """How often a sensor's estimates were right; a day is one of the twin's `day_length_s`."""
+    """How often a sensor's estimates were right; a day lasts the twin's `day_length_s`."""
 
     fitted_at: Time | None = Field(description="null: no model was fitted yet")
     fit_problem: str = Field(description="why the last fit came to nothing; empty: it did not")
@@ -91,7 +91,7 @@ class ExpectedReading(Contract):
 
 
 class ExpectedTags(Contract):
-    """`/api/estimate/tags`: what was expected of each tag with a place, as of a moment."""
+    """`/api/estimate/tags`: the expected reading of each tag with a place, as of a moment."""
 
     sensor_type: str
     at: Time
@@ -124,7 +124,7 @@ def qualities(reports: Mapping[str, Report]) -> bytes:
 
 
 def tags(sensor_type: str, report: Report) -> bytes:
-    """`ExpectedTags`; of thousands of tags it takes a while, so call it on a worker."""
+    """`ExpectedTags`. Call it on a worker: thousands of tags take a while."""
     found = {
         tag.tag_id: {
             "measured": tag.measured,
@@ -163,19 +163,19 @@ def _quality(report: Report) -> dict[str, Any]:
 
 log = logging.getLogger(__name__)
 
-# A report serves for 30 s at least (`estimate_service.REST_S`).
+# The twin makes a new report at most every 30 s (`estimate_service.REST_S`).
 PERIOD_S: Final = 15.0
-# A greenhouse has a handful of sensors; of more, the first in the alphabet.
+# A greenhouse has a handful of sensors; past this limit, the alphabetically first ones are taken.
 MAX_SENSORS: Final = 32
 
-# By tag and sensor: the reading since which it holds, ns of ROS time.
+# By tag and sensor: the time of the reading since which the sensor has changed, ns of ROS time.
 Changed = Mapping[str, Mapping[str, int]]
 
 
 class EstimateFollower(Periodic):
-    """Fetches reports from `start` to `stop`. Belongs to the event loop.
+    """Fetches every sensor's estimate report, from `start` to `stop`. Belongs to the event loop.
 
-    `snapshot` gives the newest state; `on_changed` gets the tags that have changed.
+    `snapshot` returns the newest state; `on_changed` gets the tags whose sensors have changed.
     """
 
     def __init__(
@@ -208,7 +208,7 @@ class EstimateFollower(Periodic):
 
 
 def sensors_of(snapshot: Snapshot) -> list[str]:
-    """Those that estimates can be made of, at most `MAX_SENSORS`; 2 ms for 10,000 tags."""
+    """The sensors that can be estimated, at most `MAX_SENSORS`; 2 ms for 10,000 tags."""
     names = {
         reading.name
         for tag in snapshot.tags
@@ -220,7 +220,7 @@ def sensors_of(snapshot: Snapshot) -> list[str]:
 
 
 def changed_of(known: Mapping[str, Report]) -> Changed:
-    """The tags that estimates do without, by tag and sensor."""
+    """The changed sensors, which estimates leave out, by tag and sensor."""
     changed: dict[str, dict[str, int]] = {}
     for sensor, report in known.items():
         for tag in report.tags:
@@ -229,7 +229,7 @@ def changed_of(known: Mapping[str, Report]) -> Changed:
     return changed
 
 
-# --- what the robot says of itself ----------------------------------------------------------------
+# --- the robot ------------------------------------------------------------------------------------
 
 
 def robot_body(known: RobotLog) -> bytes:
@@ -259,15 +259,15 @@ def _point(at: Position) -> dict[str, Any]:
     return {"x": round(at.x, 2), "y": round(at.y, 2), "observed_at": stamp(at.at_ns)}
 
 
-# How often the newest message of each topic is taken: no frame comes more often.
+# Interval of polling the robot's topics: its frames come no more often.
 ROBOT_PERIOD_S: Final = 1.0
 
 
 class RobotFollower(Periodic):
-    """Keeps what is known of the robot; a frame goes out when anything is another.
+    """Keeps what is known of the robot, and publishes a frame when any of it has changed.
 
-    `now_ns()` is the twin's time, None: not known; `clock` tells seconds and never jumps. Belongs
-    to the event loop.
+    `now_ns()` is the twin's time; None: not known. `clock` returns monotonic seconds. Belongs to
+    the event loop.
     """
 
     def __init__(
@@ -288,7 +288,7 @@ class RobotFollower(Periodic):
         now_ns = self._now_ns()
         try:
             heard = await self._source.robot(now_ns)
-        except TwinUnavailableError:  # its thread has ended, which others tell
+        except TwinUnavailableError:  # the ROS thread has ended, which the status reports
             return
         if heard is not None and self.log.take(heard, now_ns):
             frame = orjson.dumps({"type": "robot", **_now(self.log.now)})

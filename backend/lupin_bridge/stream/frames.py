@@ -1,9 +1,9 @@
-"""WebSocket frames of the state: each written once, and shared by every client.
+"""WebSocket frames of the state, each serialized once for all clients; and the twin's status.
 
-Pure. A frame is written when the first client asks for it, and kept for the others.
+Pure. A frame is serialized when the first client needs it, and cached for the others.
 
-And the status: whether the twin behind the bridge is alive, as one value that everything else
-tells. The time is an argument, seconds of a clock that never jumps.
+`Status` alone decides whether the twin behind the bridge is alive; all else reports that. Time is
+an argument, s of a monotonic clock.
 """
 
 from __future__ import annotations
@@ -76,11 +76,11 @@ NO_UPDATE = TwinUpdate(Snapshot(0, "", ()), "")
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """`reason` says why the twin counts as live or offline; `state_age_s` is None: never.
+    """Whether the twin is live, and why; with what else a status frame reports.
 
-    `update` is the twin's newest. `outward` is by channel that tells others by itself what is wrong
-    with it, in a line; empty: nothing. `day_length_s` is how long the twin's day takes, s of ROS
-    time: a demo's is shorter.
+    `state_age_s` is the age of the last state, s; None: none has come. `update` is the twin's
+    newest. `outward` maps each channel of notifications to its fault, in one line; empty: none.
+    `day_length_s` is the length of the twin's day, s of ROS time: a demo's is shorter.
     """
 
     reason: Reason
@@ -96,7 +96,7 @@ class Status:
 
     @property
     def message(self) -> str:
-        """What to tell a person."""
+        """The status in words, for a person."""
         twins = self.update.twin_count
         if self.is_live and twins > 1:
             return (
@@ -106,21 +106,21 @@ class Status:
         return _MESSAGES[self.reason]
 
     def is_news_after(self, before: Status | None) -> bool:
-        """Whether clients have to be told, who were told `before`."""
+        """Whether clients that were sent `before` must be notified."""
         return before is None or before.news() != self.news()
 
     def has_more_detail_than(self, before: Status) -> bool:
-        """Whether a person has to be told, who was told `before`."""
+        """Whether people who were shown `before` must be notified."""
         return (before.reason, before.message) != (self.reason, self.message)
 
     def news(self) -> tuple[object, ...]:
-        """What is told at once: how far behind a journal is changes all the time."""
+        """What is sent at once when it changes; not a journal's backlog, which always changes."""
         now, journal = self.update, self.update.journal
         return (
             self.reason,
             self.message,
             now.occupancy_map is None,
-            # How often each, roughly: a stream of drops is no stream of statuses.
+            # The order of magnitude of each count: many drops must not cause many frames.
             {drop.reason: drop.count.bit_length() for drop in now.drops},
             journal.state,
             "" if journal.state == JournalState.SLOW else journal.detail,
@@ -175,7 +175,7 @@ def _journal(journal: Condition) -> dict[str, Any]:
 class Liveness:
     """The twin's newest update, when that came, and whether the thread still runs.
 
-    `world()` is what is observed, as far as it is known without an update.
+    `world()` is what the twin observes, as far as it is known without an update.
     """
 
     world: Callable[[], World] = lambda: World("unknown")
@@ -187,10 +187,10 @@ class Liveness:
     shutting_down: bool = False
 
     def silent_s(self, now_s: float) -> float | None:
-        """For how long the twin has said nothing; None: it never has."""
+        """For how long the twin has been silent, s; None: nothing has ever come."""
         if self.update is None:
             return None
-        # Of an archive's site, it had been silent as that came.
+        # A site of an archive may have been silent already when its update came.
         return max(0.0, now_s - self.updated_s) + self.update.silent_s
 
     def status(self, now_s: float) -> Status:
@@ -218,7 +218,7 @@ def text_frame(payload: bytes) -> bytes:
 
 
 def alarms_message(now: Board, now_ns: int | None, notes: tuple[Note, ...], count: int) -> bytes:
-    """`schema.AlarmsFrame`: the alarms, and what people said of them; `count` notes in all."""
+    """`schema.AlarmsFrame`: the alarms with their notes; `count` is the number of all notes."""
     said = notes_of_alarms(now.alarms, notes, now_ns)
     body = alarms_body(alarms_in_frame(now, now_ns), now.source, now.since_ns, said)
     return text_frame(orjson.dumps({"type": "alarms", "notes": count, **body}))
@@ -226,9 +226,9 @@ def alarms_message(now: Board, now_ns: int | None, notes: tuple[Note, ...], coun
 
 @dataclass(slots=True, eq=False)
 class StateFrame:
-    """One state on its way to every client.
+    """One numbered state, with its serialized forms for all clients.
 
-    `base` is the frame before it, whose own base is cut off: a delta goes back by one.
+    `base` is the frame before it, without a base of its own: a delta goes back by one frame.
     """
 
     seq: int
@@ -241,12 +241,12 @@ class StateFrame:
 
     @property
     def message_json(self) -> bytes:
-        """The state as JSON of lupin_msgs/TwinState, for who reads the message itself."""
+        """The state as JSON of lupin_msgs/TwinState, for clients of the ROS message."""
         snapshot, writer = self.snapshot, self._writer.message_json
         return self._once("message", lambda: writer.state(snapshot, snapshot.now_ns))
 
     def let_go(self) -> None:
-        """Keep only what a delta needs: or every frame ever made would stay in memory."""
+        """Keep only what a delta needs; else every frame ever made would stay in memory."""
         self.base = None
         self._written.clear()
 
@@ -255,7 +255,7 @@ class StateFrame:
         return self.wire("full", self._full)
 
     def delta(self) -> bytes:
-        """`schema.DeltaFrame` as a WebSocket frame: only what is not as in `base`."""
+        """`schema.DeltaFrame` as a WebSocket frame: only what differs from `base`."""
         return self.wire("delta", self._delta)
 
     def wire(self, kind: str, payload: Callable[[], bytes]) -> bytes:
@@ -276,7 +276,7 @@ class StateFrame:
         )
 
     def _delta(self) -> bytes:
-        assert self.base is not None  # the hub asks only then
+        assert self.base is not None  # the hub calls this only with a base
         changed, removed = difference(self.base.snapshot.tags, self.snapshot.tags)
         stamp_ns = self.snapshot.stamp_ns
         return (
@@ -296,10 +296,10 @@ class StateFrame:
 def difference(
     before: Sequence[TagState], after: Sequence[TagState]
 ) -> tuple[list[TagState], list[str]]:
-    """The tags of `after` that are not the very same in `before`, and the tag_ids that are gone.
+    """The tags of `after` that are not the same objects in `before`, and the removed tag_ids.
 
-    Tags keep their places for as long as a twin lives, new ones come behind them: place by place,
-    10,000 tags take 0.3 ms. Only a twin that was restarted makes a look-up by name necessary.
+    A running twin keeps the order of its tags, and appends new ones. So they are compared by
+    position: 0.3 ms for 10,000 tags. Only after a restart are they looked up by tag_id.
     """
     pairs = [(old, new) for old, new in zip(before, after, strict=False) if old is not new]
     if len(after) >= len(before) and all(old.tag_id == new.tag_id for old, new in pairs):
@@ -310,7 +310,7 @@ def difference(
 
 
 class FrameWriter:
-    """Numbers the frames; `seq` starts at 1 and grows by one a frame."""
+    """Makes and numbers the frames; `seq` starts at 1 and grows by one per frame."""
 
     def __init__(self) -> None:
         self.json = StateJson()
@@ -320,7 +320,7 @@ class FrameWriter:
     def state(
         self, snapshot: Snapshot, revision: str, judged: Judged = NOTHING_JUDGED
     ) -> StateFrame:
-        """The next state frame, and what is to be said of that state."""
+        """The next state frame, with the judgement of that state."""
         base = self._newest
         if base is not None:
             base.let_go()

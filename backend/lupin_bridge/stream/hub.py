@@ -1,12 +1,11 @@
-"""Fan-out of state frames: one frame for all, and for a slow client only ever the newest.
+"""Fan-out of state frames: all clients share one frame, and a slow client gets only the newest.
 
-The policy for slow clients, in full: a frame is written to a client whose socket has taken all of
-the one before. To any other client nothing is written and nothing queued; when its socket is free
-again it gets the newest frame there is, and sees from `seq` what it skipped. A client that cannot
-take a frame for `Limits.client_timeout_s` is closed.
+The full policy for slow clients: a frame is written only to a client whose socket has taken all of
+the previous one. For any other client, nothing is written or queued. When its socket is free again,
+it gets the newest frame, and sees from `seq` what it skipped. A client that cannot take a frame for
+`Limits.client_timeout_s` is closed.
 
-No input or output here and no clock: connections and times (seconds of a clock that never jumps)
-are arguments.
+No I/O and no clock here: connections and times (s of a monotonic clock) are arguments.
 """
 
 from __future__ import annotations
@@ -22,26 +21,26 @@ from lupin_bridge.stream.frames import StateFrame, Status, text_frame
 
 # Large messages that wait for sockets, of all clients together. Pure; belongs to one thread.
 #
-# One that many wait for counts once: they share it. So what is counted are the messages that are
-# superseded already and kept alive by nobody but readers that take their time. Past the bound, who
-# has waited longest is to go: no other message is older.
+# A message that many clients share counts once. So the total is mostly superseded messages, which
+# only slow readers keep alive. Past the bound, the client that has waited longest is closed: its
+# message is the oldest.
 
 
 MAX_BYTES: Final = 256_000_000
 
 
 class Unsent:
-    """Who holds which messages. `bytes`: what all of them together have."""
+    """Which client holds which messages; `bytes` is the size of them all."""
 
     def __init__(self, max_bytes: int = MAX_BYTES) -> None:
         self.bytes = 0
         self.max_bytes = max_bytes
-        # In the order in which they began to wait; of each the messages by their ids.
+        # In the order in which they began to wait; for each its messages, by `id`.
         self._holders: dict[Client, dict[int, bytes]] = {}
         self._shares: Counter[int] = Counter()
 
     def hold(self, holder: Client, message: bytes) -> list[Client]:
-        """Count a message that a holder waits for; returns who is to go, and counts no more."""
+        """Count a message that a client waits for; returns the clients to close, uncounted."""
         held = self._holders.setdefault(holder, {})
         key = id(message)
         if key not in held:
@@ -57,7 +56,7 @@ class Unsent:
         return gone
 
     def let_go(self, holder: Client) -> None:
-        """A holder waits no more; harmless if it does not."""
+        """Forget a client that waits no more; harmless if it is unknown."""
         for key, message in self._holders.pop(holder, {}).items():
             self._shares[key] -= 1
             if not self._shares[key]:
@@ -70,23 +69,23 @@ CLOSE_POLICY: Final = 1008
 CLOSE_TRY_AGAIN_LATER: Final = 1013
 
 
-# What is smaller is not worth counting, of what waits for sockets.
+# Smaller messages that wait for sockets are not counted.
 LARGE_BYTES: Final = 131_072
 
-# A client that was sent nothing for so long gets the status again: a silent twin sends no states,
-# and a browser that receives nothing for seconds takes the connection for dead.
+# A client that was sent nothing for this long gets the status again: a silent twin sends no states,
+# and a browser that receives nothing for seconds considers the connection dead.
 REMINDED_AFTER_S: Final = 1.0
 
-# Frames come a little early or late; so much of an interval is forgiven.
+# Lateness of a frame that does not delay the next one, as a share of the interval.
 BEAT_SLACK: Final = 0.1
 
 
 def next_beat_s(due_s: float, now_s: float, interval_s: float) -> float:
-    """When the next frame is due after one at `now_s`, that was due at `due_s`.
+    """When the next frame is due, after one sent at `now_s` that was due at `due_s`.
 
-    A beat, not a distance from this frame on: or of a source that keeps to the rate, a client would
-    miss the frame after each one that was a little late. After a pause the beat begins anew: what
-    was not sent then is not made up for.
+    The schedule is fixed, not relative to the last frame. Otherwise, if the source has the same
+    rate, a client would miss the frame after each late one. After a pause, the schedule starts
+    anew, without catching up.
     """
     return max(due_s, now_s - BEAT_SLACK * interval_s) + interval_s
 
@@ -106,7 +105,7 @@ class Writable(Protocol):
 
 
 def plain_wire(client: Client, frame: StateFrame) -> bytes:
-    """A frame for a listener of `/ws/state`: a delta where it asked for them and has the base."""
+    """A frame for a client of `/ws/state`: a delta if it requested deltas and has the base."""
     base = frame.base
     if client.delta and base is not None and base.seq == client.sent_seq:
         return frame.delta()
@@ -115,11 +114,11 @@ def plain_wire(client: Client, frame: StateFrame) -> bytes:
 
 @dataclass(slots=True, eq=False)
 class Client:
-    """One listener: what it asked for, what it has got, and since when its socket is full.
+    """One client: what it requested, what it was sent, and since when its socket is full.
 
-    `min_interval_s` is the time between two frames: now and then a tenth less, on average right;
-    never less where `strict_interval`. `wire` writes a frame as this client reads it. `address` is
-    the one whose share of the places it takes. `written_s` is when it was written to last.
+    `min_interval_s` is the mean time between two frames; a frame may come a tenth earlier, unless
+    `strict_interval` is set. `wire` serializes a frame for this client. `address` is the one whose
+    share of the connections it counts towards. `written_s` is the time of the last write.
     """
 
     connection: Writable
@@ -135,7 +134,7 @@ class Client:
     next_due_s: float = 0.0
     status_due: bool = True
     alarms_due: bool = True
-    # Whoever wants alarms gets the robot too, as often as it wants states.
+    # A client that wants alarms gets the robot too, at its rate of states.
     robot_due: bool = True
     robot_next_s: float = 0.0
     written_s: float = 0.0
@@ -154,7 +153,7 @@ class Hub:
         self.bytes_sent = 0
         self.clients_dismissed = 0
         self.client_timeout_s = client_timeout_s
-        # In the order in which they came.
+        # In the order in which they joined.
         self._clients: dict[Client, None] = {}
         self.unsent = Unsent()
         self._parties: Counter[str] = Counter()
@@ -169,10 +168,10 @@ class Hub:
         return len(self._clients)
 
     def make_place(self, address: str) -> bool:
-        """Whether a client from this address may join.
+        """Whether a client from this address may join, which may evict another one.
 
-        One address may have all places that nobody else wants. Where they are all taken, the
-        newest client of the address with the most gives its own to who has at least two fewer.
+        One address may take all free places. When none is free, the address with the most clients
+        loses its newest one to an address that has at least two fewer.
         """
         if len(self._clients) < self.max_clients:
             return True
@@ -186,7 +185,7 @@ class Hub:
         return True
 
     def turn_out(self, client: Client, reason: str) -> None:
-        """Close a client for what others need; it may try again."""
+        """Close a client to make room for others; it may try again."""
         self.leave(client)
         self.clients_dismissed += 1
         client.connection.dismiss(CLOSE_TRY_AGAIN_LATER, reason)
@@ -198,7 +197,7 @@ class Hub:
 
     @property
     def blocked(self) -> int:
-        """How many clients have a socket that takes nothing just now."""
+        """How many clients have a full socket."""
         return sum(client.blocked_since_s is not None for client in self._clients)
 
     def join(self, client: Client, now_s: float) -> None:
@@ -217,26 +216,26 @@ class Hub:
                 del self._parties[client.address]
 
     def hold(self, client: Client, message: bytes) -> None:
-        """A large message of another kind waits for a client's socket, until that is free again.
+        """Count a large message other than a frame, until the client's socket is free again.
 
-        If all that wait are too much, who has waited longest gives way.
+        Past the limit for all of them, the client that has waited longest is closed.
         """
         if len(message) >= LARGE_BYTES and client in self._clients:
             for slowest in self.unsent.hold(client, message):
                 self.turn_out(slowest, "slow to take what it requested, and others need the memory")
 
     def is_free(self, client: Client) -> None:
-        """A client's socket has taken everything."""
+        """Note that a client's socket has taken everything."""
         client.blocked_since_s = None
         self.unsent.let_go(client)
 
     def publish(self, frame: StateFrame, now_s: float) -> None:
-        """Make this the newest frame and give it to everyone who can take it."""
+        """Make this the newest frame, and send it to every client that can take it."""
         self._frame = frame
         self.serve_all(now_s)
 
     def announce(self, now_s: float) -> None:
-        """The status is another one: give it to everyone who can take it."""
+        """Send the status, which has changed, to every client that can take it."""
         self._status_wire = None
         for client in self._clients:
             client.status_due = True
@@ -245,7 +244,7 @@ class Hub:
     def remind(self, now_s: float) -> None:
         """Have clients that were sent nothing for a second get the status when next served.
 
-        A client that asked for fewer frames gets it as seldom as that.
+        A client with a longer frame interval gets it at that interval.
         """
         for client in self._clients:
             silence_s = max(REMINDED_AFTER_S, client.min_interval_s)
@@ -253,26 +252,26 @@ class Hub:
                 client.status_due = True
 
     def publish_alarms(self, wire: bytes, now_s: float) -> None:
-        """The alarms are others: give this frame to everyone who can take it."""
+        """Send this frame of changed alarms to every client that can take it."""
         self._alarms = wire
         for client in self._clients:
             client.alarms_due = True
         self.serve_all(now_s)
 
     def publish_robot(self, wire: bytes, now_s: float) -> None:
-        """What the robot says of itself is another: give this frame to everyone who can take it."""
+        """Send this frame of changed robot data to every client that can take it."""
         self._robot = wire
         for client in self._clients:
             client.robot_due = True
         self.serve_all(now_s)
 
     def serve_all(self, now_s: float) -> None:
-        """Give everyone what they lack and can take now."""
+        """Send every client what it lacks and can take now."""
         for client in self._clients:
             self.serve(client, now_s)
 
     def serve(self, client: Client, now_s: float) -> None:
-        """Give a client what it lacks, as far as its socket takes it and its rate allows."""
+        """Send a client what it lacks, as far as its socket and its rate allow."""
         if client.status_due and client.wants_status:
             if not self._write(client, self._status_at_once(now_s), now_s):
                 return
@@ -282,7 +281,7 @@ class Hub:
                 self._mark_blocked(client, now_s)
             return
         self._serve_state(client, now_s)
-        # Behind a state: alarms are of tags that a listener knows then, and ages count from it.
+        # Only after a state, so that the client knows the alarms' tags and the time for ages.
         if not (client.wants_alarms and client.sent_seq):
             return
         if client.alarms_due and self._alarms is not None:
@@ -326,8 +325,8 @@ class Hub:
         return len(stuck)
 
     def _status_at_once(self, now_s: float) -> bytes:
-        # Written once for all who get it at the same moment, and never kept for later: it tells an
-        # age, and who joins a twin long dead must not take its tags for seconds old.
+        # Shared by clients served at the same moment, but not cached for later, as it has an age:
+        # a client that joins when the twin is long dead must not think its tags seconds old.
         if self._status_wire is None or now_s != self._status_wire_s:
             self._status_wire = text_frame(orjson.dumps(self._status_at(now_s).frame()))
             self._status_wire_s = now_s

@@ -1,4 +1,4 @@
-"""What the routes of people, of the robot and of the past carry, as types; see `schema`."""
+"""The web contract of the routes for people, the robot and the past; see `schema`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 from lupin_bridge.stream.schema import Alarm, Contract, HistoryReading, Time
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TEXT_LENGTH
 
-# Of a note, characters; no control character but tab and newline is in it.
+# Characters in a note at most; tab and newline are its only control characters.
 MAX_TEXT: Final = 500
 _Text = Annotated[
     str,
@@ -19,7 +19,7 @@ _Text = Annotated[
 ]
 Role = Literal["viewer", "operator", "admin"]
 
-# A text of ROS ends at its first NUL.
+# ROS ends a string at its first NUL.
 _Name = Annotated[
     str,
     StringConstraints(
@@ -33,7 +33,7 @@ class _Given(BaseModel):
 
 
 class SignIn(_Given):
-    """The body of `POST /api/signin`, of an account."""
+    """The body of `POST /api/signin`, for an account."""
 
     name: str
     password: str
@@ -46,7 +46,7 @@ class _Keys(_Given):
 
 
 class PushSubscription(_Given):
-    """The body of `POST /api/push`: a browser's own, as its `toJSON()` gives it."""
+    """The body of `POST /api/push`: a browser's subscription, as its `toJSON()` returns it."""
 
     endpoint: str = Field(max_length=1_000, description="the push service's address")
     keys: _Keys | None = Field(default=None, description="null: notify it no more")
@@ -54,7 +54,7 @@ class PushSubscription(_Given):
 
 
 class PushKey(Contract):
-    """`/api/push`: whether notifications can be had, and by which key."""
+    """`/api/push`: whether push notifications are available, and the key to subscribe with."""
 
     public_key: str | None = Field(description="base64url; null: not here, or not for them")
 
@@ -94,7 +94,7 @@ class ObservationDraft(_Given):
 
 
 class PublishedObservation(Contract):
-    """What was published of it."""
+    """The answer to `POST /api/observations`: what was published."""
 
     tag_id: str
     observed_at: Time
@@ -102,7 +102,7 @@ class PublishedObservation(Contract):
 
 
 class Note(Contract):
-    """What somebody wrote; it is never changed. Times are ROS time."""
+    """A note of a person or a program; it is never changed. Times are ROS time."""
 
     id: str = Field(description="opaque")
     kind: Literal["acknowledge", "shelve", "comment"]
@@ -154,7 +154,7 @@ class Audit(Contract):
 
 
 class RobotPoint(Contract):
-    """A place of the robot's, m in the map frame, and when it was there."""
+    """A position of the robot, m in the map frame, and when it was there."""
 
     x: float
     y: float
@@ -162,7 +162,7 @@ class RobotPoint(Contract):
 
 
 class RobotPosition(RobotPoint):
-    """Where the robot was last."""
+    """The robot's last known position."""
 
     heading: float | None = Field(
         description="where it faces, rad from x towards y; null: not reported"
@@ -170,7 +170,7 @@ class RobotPosition(RobotPoint):
 
 
 class RobotPlan(Contract):
-    """The way that the robot means to take."""
+    """The path that the robot plans to take."""
 
     points: list[list[float]] = Field(
         description="of each x and y, m in the map frame; at most 60, the last is where it ends"
@@ -179,14 +179,14 @@ class RobotPlan(Contract):
 
 
 class RobotBattery(Contract):
-    """How full the robot's battery was."""
+    """The charge of the robot's battery."""
 
     percent: float = Field(description="0 to 100")
     observed_at: Time
 
 
 class RobotNow(Contract):
-    """What the robot says of itself; null: nothing that still holds."""
+    """What the robot reports of itself; null: not reported, or no longer valid."""
 
     position: RobotPosition | None
     plan: RobotPlan | None
@@ -200,7 +200,7 @@ class RobotFrame(RobotNow):
 
 
 class Robot(RobotNow):
-    """`/api/robot`: the same, and where the robot has been."""
+    """`/api/robot`: what the robot reports of itself, and where it has been."""
 
     trail: list[RobotPoint] = Field(
         description="the last hour as this process received it, oldest first; at most 720 points"
@@ -211,14 +211,14 @@ class Robot(RobotNow):
 
 
 class Period(Contract):
-    """A stretch of time, `from` <= t < `to`."""
+    """A period of time, `from` <= t < `to`."""
 
     from_: Time = Field(alias="from")
     to: Time
 
 
 class PastPeriod(Period):
-    """What the log has of a period, and of which part of it all."""
+    """A period, and how much of it the log covers."""
 
     complete_to: Time | None = Field(
         description="all that was received before this is in the journal; null: not known"
@@ -229,7 +229,7 @@ class PastPeriod(Period):
 
 
 class Bucket(Contract):
-    """The readings of a stretch of `bucket_s`; only finite ones count."""
+    """The readings within `bucket_s` from `start`; only finite ones count."""
 
     start: Time
     n: int
@@ -257,7 +257,7 @@ class History(PastPeriod):
 
 
 class TimelineBucket(Contract):
-    """What happened within `bucket_s`."""
+    """What happened within `bucket_s` from `start`."""
 
     start: Time
     scans: int = Field(description="scans that succeeded")
@@ -268,13 +268,13 @@ class TimelineBucket(Contract):
 
 
 class ClockRun(Period):
-    """A run of the clock: a simulated one that starts over begins another."""
+    """A run of the clock; each time a simulated clock starts over, a new run begins."""
 
     is_simulated: bool
 
 
 class Timeline(PastPeriod):
-    """What happened over a period, and what of the past is remembered at all."""
+    """What happened in a period, and how far back the log reaches."""
 
     bucket_s: float = Field(description="s, length of a bucket")
     reach: Period | None = Field(
@@ -303,7 +303,7 @@ class ReportCounts(Contract):
 
 
 class ReportSilence(Period):
-    """A stretch without an attempt; a tag's does not count while the whole greenhouse paused."""
+    """A period without an attempt; a tag's does not count while the whole greenhouse paused."""
 
     tag_id: str = Field(description="empty: the whole greenhouse")
 
@@ -317,7 +317,7 @@ class ReportExtreme(Contract):
 
 
 class ReportSensor(Contract):
-    """The readings of a sensor, or of a quantity that is derived of each scan."""
+    """The readings of a sensor, or of a quantity that is derived from each scan."""
 
     sensor_type: str
     unit: str

@@ -1,8 +1,8 @@
-"""The web contract as types: what each route and each WebSocket frame carries.
+"""The web contract as pydantic models: the content of each route and each WebSocket frame.
 
-Names are those of the ROS messages (`lupin_msgs`), whose own fields are always there; beside them
-stands what `/twin/times` says. A field that may be absent says what that means. The OpenAPI
-document and the browser types are generated from here; a test holds the bytes against them.
+Names are those of the ROS messages (`lupin_msgs`). A message's own fields are always present; those
+of `/twin/times` are added. A field that may be absent states what that means. The OpenAPI document
+and the browser's types are generated from here; a test compares real bytes with them.
 Positions are metres in the map frame; numbers that ROS carries as NaN or infinity are null.
 """
 
@@ -17,7 +17,7 @@ from lupin_twin.core.diagnostics import Origin
 
 
 class Contract(BaseModel):
-    """Base of all: frozen, and a field that the contract does not name is an error."""
+    """Base of all models: frozen; a field that the contract does not name is an error."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -30,7 +30,7 @@ class Time(Contract):
 
 
 class Header(Contract):
-    """When, and in which frame the positions are."""
+    """The time of the data, and the frame of its positions."""
 
     stamp: Time
     frame_id: str
@@ -158,7 +158,7 @@ class HealthReason(Contract):
 
 
 class TagHealth(Contract):
-    """The verdict of a tag: that of its worst reason; healthy: something recent was judged."""
+    """A tag's verdict: that of its worst reason; healthy only if a recent value was judged."""
 
     verdict: Literal["critical", "stressed", "unknown", "healthy"]
     reasons: list[HealthReason] = Field(
@@ -167,14 +167,14 @@ class TagHealth(Contract):
 
 
 class Day(Contract):
-    """Whether the ranges of the day hold or those of the night, and by what that was decided."""
+    """Whether the ranges of the day or of the night apply, and by what that was decided."""
 
     is_day: bool
     source: Literal["light", "clock", "assumed"]
 
 
 class Patrol(Contract):
-    """What the greenhouse is doing; nothing of it is a verdict."""
+    """How the scanning of the greenhouse goes; none of this is a verdict."""
 
     interval_s: float | None = Field(
         description="median of the last intervals between scans, whatever tag they were of; "
@@ -185,7 +185,7 @@ class Patrol(Contract):
 
 
 class HouseHealth(TagHealth):
-    """The greenhouse is its worst tag; unknown where more than half of its tags are."""
+    """The greenhouse's verdict: that of its worst tag; unknown if more than half of them are."""
 
     day: Day
     patrol: Patrol
@@ -201,8 +201,8 @@ class Judgement(Contract):
 class Alarm(Contract):
     """One episode: what was wrong, where, from when to when, and how bad at worst.
 
-    It follows from what was observed and from the ranges: the same in every replica and after
-    every restart.
+    It is derived from the observations and the ranges alone, so it is the same in every replica and
+    after every restart.
     """
 
     id: str = Field(description="opaque; made of what, where and since when")
@@ -228,10 +228,10 @@ class Alarm(Contract):
 
 
 class Alarms(Contract):
-    """`/api/alarms`: what the past and now give.
+    """`/api/alarms`: the alarms of the past and of now.
 
-    `starting`: the past is still being read; `heard`: there is no journal, and only what this
-    process received since its start is in it.
+    `starting`: the past is still being read. `heard`: there is no journal, and the alarms are only
+    from what this process has received since its start.
     """
 
     alarms: list[Alarm] = Field(description="newest first")
@@ -247,7 +247,7 @@ class AlarmsFrame(Alarms):
 
 
 class StateFrame(Contract):
-    """WebSocket frame: the state. `seq` grows by one a frame; a gap shows what was skipped."""
+    """WebSocket frame: the state. `seq` grows by one per frame; a gap shows what was skipped."""
 
     type: Literal["state"]
     seq: int
@@ -257,10 +257,10 @@ class StateFrame(Contract):
 
 
 class DeltaFrame(Contract):
-    """WebSocket frame (`?delta=1`): what is not as in the frame numbered `base`.
+    """WebSocket frame (`?delta=1`): what differs from the frame numbered `base`.
 
     A client that has `base` replaces the `changed` tags, appends those it did not know, in this
-    order, and drops the `removed` ones. In an unchanged tag, its age is `header.stamp` less its
+    order, and drops the `removed` ones. The age of an unchanged tag is `header.stamp` minus its
     `last_observed`. A client that skipped a frame gets a full `StateFrame` instead.
     """
 
@@ -283,14 +283,14 @@ class RecentDrop(Contract):
 
 
 class Stretch(Contract):
-    """From one moment of ROS time to another."""
+    """A period of ROS time."""
 
     start: Time
     end: Time
 
 
 class Journal(Contract):
-    """How the twin's journal does. Only while it is `recording` is everything kept."""
+    """The condition of the twin's journal. Everything is kept only while it is `recording`."""
 
     state: Literal[
         "unknown", "off", "starting", "upgrading", "recording", "slow", "failing", "doubting",
@@ -304,7 +304,7 @@ class Journal(Contract):
 
 
 class Outward(Contract):
-    """How a channel of notifications does: MQTT, the webhook, phones."""
+    """The condition of a channel of notifications: MQTT, the webhook or phones."""
 
     channel: Literal["mqtt", "webhook", "push"]
     is_failing: bool
@@ -366,7 +366,7 @@ class TagError(Contract):
 
 
 class FieldQuality(Contract):
-    """What an honest map should also show: its leave-one-out error and how much of it is known."""
+    """The quality of a field: its leave-one-out error, and how much of it is known."""
 
     sensor_type: str
     unit: str
@@ -436,7 +436,7 @@ class TagHistory(Contract):
 
 
 class Health(Contract):
-    """`/healthz`: whether the ROS thread lives, and what its callbacks went through."""
+    """`/healthz`: whether the ROS thread is alive, and how many errors its callbacks had."""
 
     ok: bool
     message: str

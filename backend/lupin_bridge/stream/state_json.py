@@ -1,10 +1,8 @@
-"""Snapshot to JSON text: the names of the ROS messages, NaN and infinity as null.
+"""Snapshots, alarms and judgements as JSON, with the names of the ROS messages.
 
-Pure. A tag's text is kept until the tag changes, but for its age, which changes in every frame.
-What the web contract has beside the message's own fields is left out where it is as usual, as
-`schema` tells: every browser gets it ten times a second.
-
-What the judge says as JSON text: `schema.Judgement`, whole or only what has changed.
+Pure. NaN and infinity are null. A tag's text is cached until the tag changes, except for its age,
+which changes in every frame. What the web contract adds to the message's own fields is omitted
+where it has its usual value (see `schema`): every browser gets it ten times a second.
 """
 
 from __future__ import annotations
@@ -27,26 +25,26 @@ from lupin_twin.core.state import (
     age_seconds,
 )
 
-if TYPE_CHECKING:  # who only wants a moment as JSON does without
+if TYPE_CHECKING:  # not loaded by modules that only need `moment`
     from lupin_bridge.alarms.board import AlarmNotes, Board
     from lupin_bridge.judge.episodes import Alarm
     from lupin_bridge.judge.judging import Judged
     from lupin_bridge.judge.verdict import Health, Reason
 
-# It cannot occur inside a string: there the quotes of the key would be escaped.
+# It cannot occur inside a JSON string, where its quotes would be escaped.
 _NO_AGE: Final = b'"stale_seconds":null'
 
 
 class StateJson:
     """Writes snapshots as JSON and keeps the text of unchanged tags.
 
-    `has_times`: as the web contract has it, with the time of each reading, the last look and the
-    last try; without, as the ROS message has it.
+    `has_times`: as in the web contract, with the times of each reading, the last inspection and the
+    last attempt; False: as in the ROS message.
     """
 
     def __init__(self, *, has_times: bool = True) -> None:
         self._has_times = has_times
-        # What stands before a tag's age and behind it.
+        # By tag_id: the tag, and its text before and after the age.
         self._cache: dict[str, tuple[TagState, bytes, bytes]] = {}
 
     def state(self, snapshot: Snapshot, now_ns: int | None) -> bytes:
@@ -69,7 +67,7 @@ class StateJson:
         return b'%b"stale_seconds":%.3f%b' % (kept[1], age_s, kept[2])
 
     def keep_only(self, snapshot: Snapshot) -> None:
-        """Forget the tags that are not in it: a restarted twin may know others."""
+        """Forget tags that are not in the snapshot: a restarted twin may know others."""
         if len(self._cache) > len(snapshot.tags):
             ids = {tag.tag_id for tag in snapshot.tags}
             self._cache = {tag_id: kept for tag_id, kept in self._cache.items() if tag_id in ids}
@@ -142,7 +140,7 @@ def point(x: float, y: float, z: float) -> dict[str, float]:
 
 
 def short(value: float) -> float:
-    """The same number, which JSON writes without `.0` where it is whole: many are."""
+    """The same number, as an int if it is whole, which saves `.0` in JSON: many are."""
     return int(value) if float(value).is_integer() and abs(value) < 1e15 else value
 
 
@@ -153,7 +151,7 @@ def stamp(stamp_ns: int) -> dict[str, int]:
 
 
 def moment(stamp_ns: int | None) -> dict[str, int] | None:
-    """`schema.Time`, or None for what never was, or when is not known."""
+    """`schema.Time`; None: it never happened, or its time is not known."""
     return None if stamp_ns is None else stamp(stamp_ns)
 
 
@@ -187,11 +185,11 @@ def history(tag_id: str, past: TagHistory) -> dict[str, Any]:
     }
 
 
-# --- what the judge says --------------------------------------------------------------------------
+# --- alarms and judgements ------------------------------------------------------------------------
 
 
 def alarm_json(alarm: Alarm, said: AlarmNotes | None = None) -> dict[str, Any]:
-    """`schema.Alarm`; what nobody said is left out."""
+    """`schema.Alarm`; notes that nobody wrote are left out."""
     found = {
         "id": alarm.id,
         "reason": reason_json(alarm.reason),
@@ -211,7 +209,7 @@ def alarm_json(alarm: Alarm, said: AlarmNotes | None = None) -> dict[str, Any]:
 
 
 def note_json(note: Note, gone: Mapping[str, Note]) -> dict[str, Any]:
-    """`routes_schema.Note`; `gone` as `withdrawals` has it."""
+    """`routes_schema.Note`; `gone` is from `core.notes.withdrawals`."""
     by = gone.get(note.id)
     return {
         "id": note.id,
@@ -235,7 +233,7 @@ def alarms_body(
     since_ns: int | None,
     said: Mapping[str, AlarmNotes] = _NOTHING,
 ) -> dict[str, Any]:
-    """`schema.Alarms`; `said` is by the alarm's id."""
+    """`schema.Alarms`; `said` maps alarm ids to notes."""
     return {
         "alarms": [alarm_json(alarm, said.get(alarm.id)) for alarm in alarms],
         "source": source,
@@ -243,13 +241,13 @@ def alarms_body(
     }
 
 
-# In a frame: the active ones first of all, and what else was so lately.
+# Alarms in a frame at most: the active ones take precedence over those cleared recently.
 MAX_IN_FRAME: Final = 1_000
 RECENT_NS: Final = 86_400 * NANOSECONDS_PER_SECOND
 
 
 def alarms_in_frame(board: Board, now_ns: int | None) -> list[Alarm]:
-    """What a frame tells of all alarms: those active now or within 24 h, newest first as they."""
+    """The alarms of a frame: those active now or within the last 24 h, newest first."""
     since_ns = 0 if now_ns is None else now_ns - RECENT_NS
     active = board.active[:MAX_IN_FRAME]
     over = islice(
@@ -264,12 +262,12 @@ def alarms_in_frame(board: Board, now_ns: int | None) -> list[Alarm]:
 
 
 def judgement(judged: Judged) -> bytes:
-    """The greenhouse and every tag."""
+    """`schema.Judgement` of the greenhouse and every tag."""
     return _text(judged, judged.tags)
 
 
 def judgement_since(before: Judged, now: Judged) -> bytes:
-    """The greenhouse, and the tags that are not as `before`; one that is gone is absent."""
+    """`schema.Judgement` of the greenhouse and the tags that differ from `before`."""
     known = before.tags
     return _text(now, [key for key, one in now.tags.items() if known.get(key) is not one])
 

@@ -1,1 +1,1 @@
-"""Programs with protocols of their own: roslib by rosbridge, Foxglove and Lichtblick."""
+"""Viewers with protocols of their own: roslib by rosbridge, Foxglove and Lichtblick."""

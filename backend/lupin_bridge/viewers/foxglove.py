@@ -1,17 +1,14 @@
-"""The read-only part of Foxglove's WebSocket protocol: what came in, what goes out.
+"""The read-only part of Foxglove's WebSocket protocol: its messages, channels and sessions.
 
-A client may `subscribe` and `unsubscribe`. Whatever else the protocol has (to publish, parameters,
+A client may `subscribe` and `unsubscribe`. All else in the protocol (publishing, parameters,
 services, assets, the graph) is refused with a `status` message of level error, and changes nothing:
 none of it is among the capabilities that `serverInfo` names. Payloads are CDR, schemas `ros2msg`.
 
 https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md
 
-The channels for Foxglove's clients, and one client: its subscriptions, and what waits for it.
-
-Channels are a twin's topics, and the layers that somebody publishes now. They are looked up while
-there are clients, once for all of them. A slow client gets the newest message of each subscription
-next: older ones that could not be written are dropped. The time is an argument, seconds that never
-jump.
+Channels are a twin's topics, and the layers that are published now. They are looked up while there
+are clients, once for all of them. A slow client gets the newest message of each subscription next:
+older ones that could not be written are dropped.
 """
 
 from __future__ import annotations
@@ -36,8 +33,8 @@ from lupin_bridge.serving.ws_protocol import members_of, shown
 from lupin_twin.core import interfaces
 from lupin_twin.core.interfaces import Topic
 
-# Of the same content. The newer one is what Foxglove asks for today, the older one what Lichtblick
-# does; a client that offers both gets the first that it names.
+# Both have the same content. Foxglove requests the newer one today, Lichtblick the older one; a
+# client that offers both gets the first that it names.
 SUBPROTOCOLS: Final = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 
 MAX_SUBSCRIPTIONS: Final = 128
@@ -68,7 +65,7 @@ def parse(message: str | bytes) -> tuple[list[tuple[int, int]], list[int]]:
     """Read one message: subscriptions to begin (the client's own id, the channel's), or to end.
 
     Raises:
-        ValueError: it is none that is served; the text names the member, the value and the limit.
+        ValueError: it is not served; the text names the member, the value and the limit.
 
     """
     if isinstance(message, bytes):
@@ -110,7 +107,7 @@ def _id(name: str, value: Any) -> int:
 
 
 def server_info(session_id: str, *, has_time: bool) -> bytes:
-    """The first message; `session_id` is another one after a restart."""
+    """The first message; `session_id` changes with a restart."""
     return orjson.dumps(
         {
             "op": "serverInfo",
@@ -123,12 +120,12 @@ def server_info(session_id: str, *, has_time: bool) -> bytes:
 
 
 def status(level: int, text: str) -> bytes:
-    """A message about a message, or about a channel."""
+    """A status message about a request, or about a channel."""
     return orjson.dumps({"op": "status", "level": level, "message": text})
 
 
 def advertise(channels: Iterable[Channel]) -> bytes:
-    """Channels that are offered now."""
+    """The message that offers channels."""
     entries = [
         {
             "id": channel.id,
@@ -144,7 +141,7 @@ def advertise(channels: Iterable[Channel]) -> bytes:
 
 
 def unadvertise(ids: Iterable[int]) -> bytes:
-    """Channels that are offered no more."""
+    """The message that withdraws channels."""
     return orjson.dumps({"op": "unadvertise", "channelIds": sorted(ids)})
 
 
@@ -153,13 +150,13 @@ def unadvertise(ids: Iterable[int]) -> bytes:
 log = logging.getLogger(__name__)
 
 # The largest message that one client is sent: a map of 4,000 × 4,000 cells has 16 MB, a layer of a
-# million points 20. What waits for one that does not read is one such message.
+# million points 20. At most one such message waits for a client that does not read.
 MAX_MESSAGE_BYTES: Final = 24_000_000
 
 
 @dataclass(slots=True)
 class Counts:
-    """Messages that were written to clients, and those that gave way to newer ones."""
+    """Messages that were written to clients, and those replaced by newer ones before that."""
 
     sent: int = 0
     skipped: int = 0
@@ -175,7 +172,7 @@ class Reaction:
 
 
 class Session:
-    """The state of one connection; `time_ns` is simulated time that it has yet to hear of."""
+    """The state of one connection; `time_ns` is simulated time that is still to be sent."""
 
     def __init__(self, counts: Counts) -> None:
         self._counts = counts
@@ -194,9 +191,9 @@ class Session:
         return self._unsubscribe(ended) if ended else self._subscribe(begun)
 
     def offer(self, channels: Mapping[int, Channel]) -> Reaction:
-        """What the client needs of the channels that there are now.
+        """Take the current channels; the replies offer new ones, and withdraw old ones.
 
-        Subscriptions to those that are gone end.
+        Subscriptions to withdrawn channels end.
         """
         gone = self._advertised.keys() - channels.keys()
         new = [it for channel_id, it in channels.items() if channel_id not in self._advertised]
@@ -216,18 +213,18 @@ class Session:
         return self._subscriptions.get(subscription_id) is channel
 
     def end(self, subscription_id: int) -> None:
-        """It is served no more; harmless if there is none."""
+        """End a subscription; harmless if there is none."""
         self._subscriptions.pop(subscription_id, None)
         self._waiting.pop(subscription_id, None)
 
     def put(self, subscription_id: int, sample: Sample) -> bytes | None:
-        """A message has come for a subscription; returns a reply, if there is something to say."""
+        """Queue a message for a subscription; returns a warning to send, if there is one."""
         channel = self._subscriptions.get(subscription_id)
         if channel is None:
             return None
         if len(sample.data) > MAX_MESSAGE_BYTES:
             if channel.id in self._too_large:
-                return None  # said once
+                return None  # reported once
             self._too_large.add(channel.id)
             return status(
                 WARNING,
@@ -235,7 +232,7 @@ class Session:
                 f"{MAX_MESSAGE_BYTES} bytes: this one has {len(sample.data)}",
             )
         self._counts.skipped += subscription_id in self._waiting
-        # Behind the others that wait: one fast channel must not keep them from their turn.
+        # After the others that wait: one fast channel must not starve them.
         self._waiting.pop(subscription_id, None)
         self._waiting[subscription_id] = sample
         return None
@@ -281,13 +278,13 @@ class Session:
 
 
 def _errors(errors: list[str]) -> tuple[bytes, ...]:
-    # One for all: the answer is never longer than the request.
+    # One message for all errors: the answer is never longer than the request.
     return (status(ERROR, "; ".join(errors)),) if errors else ()
 
 
 # How often layers are looked for, s.
 POLL_S: Final = 2.0
-# How often simulated time is sent, s: often enough to look as if it ran.
+# How often simulated time is sent, s: often enough to look smooth.
 TICK_S: Final = 0.1
 MAX_LAYERS: Final = 64
 
@@ -295,7 +292,7 @@ MAX_LAYERS: Final = 64
 class Offer:
     """What clients may subscribe to; belongs to the event loop.
 
-    `channels` go by their ids. `has_time`: time is simulated.
+    `channels` are by id. `has_time`: time is simulated.
     """
 
     def __init__(self, source: TwinSource) -> None:
@@ -313,9 +310,9 @@ class Offer:
 
     @asynccontextmanager
     async def followed(self, on_news: Callable[[int | None], None]) -> AsyncIterator[None]:
-        """Have `on_news` called when channels come or go (None), or time does (ROS time, ns).
+        """Have `on_news` called when channels change (None), or simulated time does (ns).
 
-        Of time that stands, at once: the others have it, and it may never go on.
+        The last time sent to others is passed at once: if time stands still, none may follow.
         """
         self._followers[on_news] = None
         if len(self._followers) == 1:
@@ -373,7 +370,7 @@ class Offer:
             return
         try:
             now_ns = (await self._source.relay.time()).now_ns
-        except TwinUnavailableError:  # its thread has ended, which others tell
+        except TwinUnavailableError:  # the ROS thread has ended, which the status reports
             return
         if now_ns not in (0, self._sent_ns):  # 0: there is no time yet
             self._sent_ns = now_ns

@@ -1,23 +1,21 @@
-"""The read-only part of the rosbridge v2 protocol, as values: what came in, what goes out.
+"""The read-only part of the rosbridge v2 protocol: parses requests, and makes replies. Pure.
 
-Pure. Served at `/rosbridge` are `subscribe` and `unsubscribe` (the twin's topics), and
-`call_service` (GetField and a little of rosapi): what roslib's clients use to read, with `args` as
-an object. Any other operation is refused with a `status` message that names it.
+`/rosbridge` serves `subscribe` and `unsubscribe` (the twin's topics), and `call_service` (GetField
+and a little of rosapi): what roslib clients use to read, with `args` as an object. Any other
+operation is refused with a `status` message that names it.
 
-How the options meet our policy, which keeps the newest for a client and queues no more:
+How the options fit our policy, which keeps only the newest for a client:
 
 - `throttle_rate` (ms) is honoured; of several subscriptions the smallest counts. When it has
   passed, the newest state follows by itself (rosbridge would wait for the next message).
-- `queue_length` is the policy's, whatever is asked for: the newest, and of observations and
-  discovered tags the newest 50. `compression` is none: plain JSON, which every client reads.
+- `queue_length` is ignored: the queue has the newest message, or the newest 50 of observations and
+  discovered tags. `compression` is ignored: replies are plain JSON, which every client reads.
 - `id` is a string or an integer. null counts as not given, everywhere. Members that are not named
   here are ignored, as rosbridge does.
 
-Its services and values: GetField, a part of rosapi, messages as JSON.
-
-A call of GetField is only checked here, and computed by the caller. rosapi's requests are about
-names that are known, and answered at once. `type`, where a call gives it, is checked for GetField;
-rosapi's packages have other names in ROS 1 than in ROS 2, and rosbridge does not look at it at all.
+A call of GetField is only checked here, and computed by the caller. Calls of rosapi are answered at
+once, from the known names. `type`, if a call has it, is checked only for GetField: rosapi's
+packages have other names in ROS 1 than in ROS 2, and rosbridge does not check it at all.
 
 In JSON, arrays of bytes (uint8, char) are base64, all others lists; a number that is not finite is
 null. A time is `{sec, nanosec}`, as any other message.
@@ -62,7 +60,7 @@ class Refused(ValueError):
 
 
 class _Request(BaseModel):
-    """What every operation may have."""
+    """The base of all operations."""
 
     model_config = ConfigDict(strict=True, frozen=True)
 
@@ -116,7 +114,7 @@ def parse(message: str | bytes) -> Request:
         raise Refused(str(error)) from None
     members = {name: value for name, value in given.items() if value is not None}
     op, message_id, service = (members.get(name) for name in ("op", "id", "service"))
-    # Of a wrong kind, they are not repeated.
+    # An id of the wrong type is not repeated.
     message_id = message_id if _is_short(message_id) or type(message_id) is int else None
     kind = _OPERATIONS.get(op) if isinstance(op, str) else None
     if kind is None:
@@ -142,7 +140,7 @@ def _is_short(value: object) -> bool:
 
 
 def status(level: Level, text: str, message_id: Id = None) -> bytes:
-    """A message about a message; `message_id` is that of the one it is about."""
+    """A status message about a request; `message_id` is the id of that."""
     return orjson.dumps({"op": "status", **_id_member(message_id), "level": level, "msg": text})
 
 
@@ -152,7 +150,7 @@ def publish(topic: str, message: bytes) -> bytes:
 
 
 def service_response(message_id: Id, service: str, values: bytes, *, result: bool) -> bytes:
-    """The end of a call; `values` is JSON: the response, or, where `result` is false, why not."""
+    """The end of a call; `values` is JSON: the response or, if `result` is false, the reason."""
     head = orjson.dumps({"op": "service_response", **_id_member(message_id), "service": service})
     return b'%b,"values":%b,"result":%b}' % (head[:-1], values, b"true" if result else b"false")
 
@@ -175,7 +173,7 @@ _BYTES: Final = frozenset(("uint8", "char"))
 _NUMBERS: Final = frozenset(
     ("uint16", "uint32", "uint64", "int8", "int16", "int32", "int64", "float", "double")
 )
-# Numbers that are written as JSON in one go: a millisecond's worth.
+# Numbers per call of orjson: a millisecond's worth.
 _PART: Final = 65_536
 _PLAIN: Final = _NUMBERS | _BYTES | {"boolean"}
 
@@ -194,8 +192,8 @@ def json_of(message: Any) -> bytes:
 
 
 def _array(values: Any) -> orjson.Fragment:
-    # Not by a list, of which a map of millions of cells would make as many objects; and in parts,
-    # for while orjson writes no other thread runs.
+    # Not through a list: a map of millions of cells would become as many objects. In parts, because
+    # no other thread runs while orjson writes.
     numbers = np.asarray(values)
     parts = (
         orjson.dumps(numbers[start : start + _PART], option=orjson.OPT_SERIALIZE_NUMPY)[1:-1]
@@ -211,7 +209,7 @@ def _message(message: Any) -> Any:
 
 @cache
 def _members(message_type: Any) -> Converter:
-    """Makes a dict of a message. Its fields are read once for each type."""
+    """A function that converts a message of this type to a dict; made once for each type."""
     kinds = message_type.get_fields_and_field_types()
     converters = [(name, _converter(kind)) for name, kind in kinds.items()]
 
@@ -321,7 +319,7 @@ def _checked(name: str, value: Any, default: str | float) -> str | float:
 
 
 def _rosapi(service: str, args: Mapping[str, Any], names: TwinNames) -> dict[str, Any]:
-    """What rosapi says of names and types it does not know: nothing, and that is no error."""
+    """The answer of rosapi; for unknown names and types it is empty, which is no error."""
     topics = {topic.name: topic.type_name for topic in topics_of(names)}
     services = {names.field_service: FIELD_TYPE}
     services |= {name: f"rosapi_msgs/srv/{kind}" for name, (kind, _) in _ROSAPI.items()}

@@ -1,9 +1,8 @@
-"""One rosbridge client: its subscriptions, how fast it may send, and the ROS topics that it gets.
+"""One rosbridge client: its subscriptions, their rates, and the ROS topics that it gets.
 
-A message of a ROS topic is written once for all its clients, by a worker: a map of millions of
-cells takes tenths of a second. Of what waits for a client, the topic's depth is kept: the newest
-map, the newest 50 observations; of a topic that is throttled the newest alone. Nor is it more than
-the topic's bytes. The time is an argument, seconds of a clock that never jumps.
+A message of a ROS topic is serialized once for all its clients, by a worker: a map of millions of
+cells takes tenths of a second. Messages that wait for a client are bounded by the topic's depth and
+bytes: the newest map, the newest 50 observations. Of a throttled topic, only the newest one waits.
 """
 
 from __future__ import annotations
@@ -79,7 +78,7 @@ class Session:
     def __init__(self, names: TwinNames) -> None:
         self._names = names
         self._topics = {topic.name: topic for topic in topics_of(names)}
-        # By (topic as the client spells it, subscription's id); the last made is the last.
+        # By (topic as the client spells it, subscription's id), in the order of subscribing.
         self._subscriptions: dict[tuple[str, Id], Subscribe] = {}
 
     @property
@@ -89,7 +88,7 @@ class Session:
 
     @property
     def min_interval_s(self) -> float:
-        """The least time between two states: that of the subscription in the greatest hurry."""
+        """The least time between two states: that of the fastest subscription."""
         wanted = self._states()
         return min((self._interval_s(name) for name in wanted), default=0.0)
 
@@ -136,7 +135,7 @@ class Session:
     def wire(self, frame: StateFrame) -> bytes:
         """A state as this client reads it: once under each spelling of the topic it subscribed to.
 
-        Written once for all clients that spell it alike.
+        Serialized once for all clients that use the same spelling.
         """
         return b"".join(
             frame.wire(f"rosbridge {topic}", lambda of=topic: publish(of, frame.message_json))  # type: ignore[misc]
@@ -184,12 +183,12 @@ class Session:
 
 # The largest message that is sent, bytes of CDR: twice as much in JSON, and more.
 MAX_MESSAGE_BYTES: Final = 24_000_000
-# What writing takes, roughly and at worst, s a byte of CDR.
+# Rough worst-case time to serialize, s per byte of CDR.
 _WRITE_S: Final = 1e-7
 
 
 class Writer:
-    """Samples as frames; belongs to the event loop, and one to all clients."""
+    """Serializes samples as frames; all clients share one. Belongs to the event loop."""
 
     def __init__(self, relay: Relay, workers: Workers) -> None:
         self.relay = relay
@@ -197,10 +196,10 @@ class Writer:
         self._writing: Shared[bytes] = Shared()
 
     async def frame(self, feed: Feed, sample: Sample) -> bytes:
-        """The sample as that feed's client reads it; all who want it now get the same.
+        """The sample as a frame for a feed; concurrent requests for the same one share it.
 
         Raises:
-            ValueError: it is none of its type, or too large.
+            ValueError: not a message of the topic's type, or too large.
 
         """
 
@@ -226,7 +225,7 @@ class Feeds:
         self._logged: set[tuple[str, bool]] = set()
 
     def follow(self, feeds: dict[str, Feed], renewed: str | None) -> None:
-        """Have these, by their spelling, and no others; one that is `renewed` begins anew."""
+        """Run exactly these feeds, by their spelling; restart the one that is `renewed`."""
         for name, (feed, task) in list(self._tasks.items()):
             if feeds.get(name) != feed or name == renewed:
                 task.cancel()

@@ -77,7 +77,7 @@ test('of a cause how many are how bad, and the value farthest beyond', () => {
       { ...cold(1), worst: 4.2 },
       { ...cold(2), worst: 5.5 },
       { ...cold(3), cleared_at: { sec: 120, nanosec: 0 }, worst: 3.1 },
-      // The lowest, whatever the limit of its plants.
+      // The lowest value, whatever its plants' limit.
       alarm('4', { tag_id: '4', reason: { limit: 4, value: 3 }, worst: 2.9, cleared: 130 }),
     ],
     NOTHING_KEPT,
@@ -135,7 +135,7 @@ test('the worst cause first, then what nobody has seen to, then what most have',
   expect(order(NOTHING_KEPT)).toEqual(['worst 1', 'dry 7', 'hot 5']);
   const seen = many(dry, 7).map((each) => ({ alarm: each, verdict: 'stressed' }) as const);
   expect(order(acknowledge(NOTHING_KEPT, seen, AT))).toEqual(['worst 1', 'hot 5', 'dry 7']);
-  // Few are no block: the worst of all of them is first.
+  // Too few for a block: the worst alarm is first.
   expect(order(NOTHING_KEPT, [...many(dry, 2), ...hots.slice(0, 1)])).toEqual(['hot 3']);
 });
 

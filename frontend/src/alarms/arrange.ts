@@ -1,4 +1,4 @@
-/** The list of alarms as somebody wants to see it: filtered, sorted, grouped by cause and area; and as a file. Pure. */
+/** Views of the alarm list: filtered, sorted, grouped by cause and area, or as CSV. Pure. */
 import type { Alarm, WireTime } from '../contract/types';
 import { type Cell, csv, finder, shown } from '../domain/text';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
@@ -20,20 +20,20 @@ import {
 } from './words';
 
 export const ORDERS = ['cause', 'newest', 'tag'] as const;
-/** By cause the worst comes first. */
+/** "cause" puts the worst first. */
 export type Order = (typeof ORDERS)[number];
 
-/** Tags that a cause names. */
+/** Most tags named per cause. */
 const MOST_NAMED = 8;
 
-/** Alarms in a row; with a cause they are many, all of that cause. */
+/** Consecutive alarms; with a cause, more than `MOST_LOOSE` that all share it. */
 export interface Block<T extends Wrong = Item> {
   readonly key: string;
   readonly cause: string | null;
   readonly items: readonly T[];
 }
 
-/** Those in whose words all of the text's occur (`finder`). */
+/** The alarms whose words contain all words of `text` (`finder`). */
 export function filtered(
   list: AlarmList,
   text: string,
@@ -54,7 +54,7 @@ export function filtered(
   };
 }
 
-/** `items` come the worst first, or what was resolved last. */
+/** Blocks in the given order. `items` come worst first, or last resolved first. */
 export function arranged(items: readonly Item[], order: Order, speech: Speech): readonly Block[] {
   if (order !== 'cause') {
     const by =
@@ -66,7 +66,7 @@ export function arranged(items: readonly Item[], order: Order, speech: Speech): 
   return byCause(items, speech);
 }
 
-/** Many of one cause in one block, where the worst of them stands. */
+/** Groups items that share a cause into one block, at the place of the worst one. */
 export function byCause<T extends Wrong>(items: readonly T[], speech: Speech): readonly Block<T>[] {
   const causes = groupedBy(items, ({ alarm }) => causeOf(alarm, speech));
   const blocks: (Block<T> & { readonly items: T[] })[] = [];
@@ -95,7 +95,7 @@ function causeWords(alarm: Wrong['alarm'], speech: Speech): string {
   return `${shown(speech.sensors.named(reason.sensor).label, 32)} ${beyond}`;
 }
 
-/** At which tags something is; of many, some by name. The last one left has its name too. */
+/** Lists tags by name, up to `MOST_NAMED`; instead of "1 more", it names that tag too. */
 export function tagsText(ids: readonly string[]): string {
   const count = ids.length <= MOST_NAMED + 1 ? ids.length : MOST_NAMED;
   const named = ids.slice(0, count).map((id) => shown(id, 16));
@@ -103,8 +103,8 @@ export function tagsText(ids: readonly string[]): string {
 }
 
 /**
- * Of many alarms of one cause: how many are how bad now, and the furthest value now and at worst; empty:
- * none. Of those that are all as bad the cause's own word says it.
+ * Facts about alarms that share a cause: the number per verdict now, and the most extreme value now and
+ * at worst; empty: none. No counts if all have the same verdict, which the heading already shows.
  */
 export function causeFacts(
   items: readonly Item[],
@@ -114,12 +114,12 @@ export function causeFacts(
   const all = items.map(({ alarm, verdict }) => {
     const now = nowOf(alarm);
     const known = now?.kind === 'known' ? now : null;
-    // What has no value is as it was said; of another, an old reading says nothing of now.
+    // An alarm without a value keeps its verdict; otherwise an unknown value means an unknown verdict.
     const current = known?.verdict ?? (now === null ? verdict : 'unknown');
     return { alarm, now, verdict: current, value: known?.value ?? null };
   });
   const [one] = items;
-  // All of one cause are on the same side.
+  // A cause lies on one side of the range.
   const isBelow = one && isOfRange(one.alarm.reason) && sideOf(one.alarm.reason) === 'below';
   const furthest = (valueOf: (each: (typeof all)[number]) => number | null) => {
     const found = all
@@ -153,7 +153,7 @@ export function causeFacts(
 const iso = (at: WireTime | null): string | null =>
   at && new Date(secondsOf(at) * 1000).toISOString();
 
-/** As a file for programs: named the same in every language, values in the units that the page shows. */
+/** CSV for programs: the same column names in every language, values in the page's units. */
 export function alarmsCsv(
   list: AlarmList,
   { sensors, unit }: Speech,

@@ -93,7 +93,7 @@ describe('follow', () => {
     });
     act(withList('alarms'));
     showAlarm(silent);
-    // No card says it.
+    // Without a tag, no card opens.
     expect(store.get().view).toMatchObject({ moment: null, selected: null, pane: 'map' });
     goToStart(silent);
     expect(store.get().view).toMatchObject({

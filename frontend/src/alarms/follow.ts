@@ -1,4 +1,4 @@
-/** The ways from an alarm: to its tag as it is now, and to the moment when it began. */
+/** Navigation from an alarm: to its tag live, and to the moment when it was raised. */
 import { now } from '../clock';
 import type { Alarm } from '../contract/types';
 import { type Period, secondsOf, spanOf } from '../domain/time';
@@ -7,12 +7,12 @@ import { act, store } from '../store/app';
 import { rosNow } from '../store/moment';
 import type { ViewState } from '../store/view';
 
-/** Of the bar, what lies before the moment: how it came to it is to be seen as well. */
+/** Share of the time bar before the moment, so that the lead-up is visible too. */
 const LEAD = 0.1;
 
 /**
- * The period that has the moment and something before it: the present one, else the last hour, else
- * one that just reaches from there to now.
+ * A period that contains the moment and some time before it. The current one if it does, else the last
+ * hour, else the shortest one that reaches to now. All times in ROS seconds.
  */
 export function periodWith(
   period: Period,
@@ -30,17 +30,17 @@ export function periodWith(
   );
 }
 
-/** Shows the tag as it is now; its card lies over the list, which is there again when it closes. */
+/** Shows the tag live; on a narrow screen, its card covers the list until closed. */
 export const showAlarm = (alarm: Alarm): void => {
   look(alarm, { moment: null, ...(alarm.tag_id === '' && { pane: 'map' }) });
 };
 
-/** Shows the moment when it began. */
+/** Shows the moment when the alarm was raised. */
 export function goToStart(alarm: Alarm): void {
   const nowS = rosNow(store.get(), now());
   const { period } = store.get().view;
   const oldest = store.get().twin.remembered.value?.reach?.from ?? null;
-  // To the millisecond that holds the observation, and not to the one before it.
+  // Round up to the millisecond: rounding down would miss the observation.
   const at = Math.ceil(secondsOf(alarm.raised_at) * 1000) / 1000;
   if (nowS === null || at > nowS) return;
   look(alarm, { moment: at, period: periodWith(period, at, nowS, oldest), pane: 'map' });

@@ -44,7 +44,7 @@ describe('order', () => {
     expect(ids(list(over).resolved)).toEqual(['late', 'early']);
     expect(ids(listOf(over, NOTHING_KEPT, far - 1, AT).resolved)).toEqual(['late', 'early']);
     expect(ids(listOf(over, NOTHING_KEPT, far, AT).resolved)).toEqual(['late']);
-    // Of a twin that has no time nobody knows how long ago that was.
+    // Without the twin's time, the age of resolved alarms is unknown.
     expect(listOf(over, NOTHING_KEPT, null, AT).resolved).toHaveLength(2);
   });
 
@@ -63,7 +63,7 @@ describe('acknowledged and shelved', () => {
     expect(calling(list([mild.alarm]))).toHaveLength(1);
     expect(calling(list([mild.alarm], kept))).toEqual([]);
     expect(list([mild.alarm], kept).active[0]?.isAcknowledged).toBe(true);
-    // Of equals it comes after what nobody has seen yet.
+    // At equal verdicts, it comes after unacknowledged ones.
     const older = alarm('older', { raised: 1, reason: stressed });
     expect(ids(list([mild.alarm, older], kept).active)).toEqual(['older', 'a']);
     const worse = { ...mild.alarm, reason: reason() };
@@ -79,7 +79,7 @@ describe('acknowledged and shelved', () => {
     expect(listOf([mild.alarm], kept, NOW_S, AT + 1_000).shelved).toEqual([]);
     const worse = list([{ ...mild.alarm, reason: reason() }], kept);
     expect(calling(worse)).toHaveLength(1);
-    // The same thing that comes again is still shelved.
+    // The same fault, raised again, is still shelved.
     expect(list([alarm('later', { raised: 990, reason: stressed })], kept).active).toEqual([]);
   });
 });

@@ -1,4 +1,4 @@
-/** The list of alarms: what is active, shelved and resolved, in its order. Pure. */
+/** The alarm list: active, shelved and resolved alarms, each sorted. Pure. */
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import { isOfRange, severity, sideOf } from '../domain/health';
 import { groupedBy, withParts } from '../domain/memo';
@@ -7,43 +7,43 @@ import { compareIds, equal } from '../domain/twin';
 import { isShelfHeld, isWorse, whatOf, type Kept, type Shelf } from './own';
 import type { Speech } from './words';
 
-/** What is resolved stays listed for so long, seconds. */
+/** How long a resolved alarm stays listed, seconds. */
 export const LISTED_S = 86_400;
 
-/** More alarms than this of one cause stand below one heading. */
+/** Above this many, alarms that share a cause are grouped under one heading. */
 export const MOST_LOOSE = 4;
 
-/** What is wrong where: an alarm, or what has none yet. */
+/** A fault at a tag: an alarm, or a reason without an alarm yet. */
 export interface Wrong {
   readonly alarm: Pick<Alarm, 'id' | 'tag_id' | 'reason'>;
 }
 
 export interface Item {
   readonly alarm: Alarm;
-  /** The worst that was said of it. */
+  /** The worst verdict so far. */
   readonly verdict: Verdict;
   readonly isAcknowledged: boolean;
-  /** Null: it is not shelved. */
+  /** Null: not shelved. */
   readonly shelf: Shelf | null;
 }
 
 export interface AlarmList {
-  /** Active and not shelved: the worst first (`severity`). */
+  /** Active and not shelved, the worst first (`severity`). */
   readonly active: readonly Item[];
   /** Active and shelved, in the same order. */
   readonly shelved: readonly Item[];
-  /** What was resolved last first. */
+  /** The last resolved first. */
   readonly resolved: readonly Item[];
 }
 
-/** Where it belongs by now; in a list that is held it may still stand elsewhere. */
+/** The group where the alarm belongs; a held list may still show it in another. */
 export const groupOf = ({ alarm, shelf }: Item): keyof AlarmList =>
   alarm.cleared_at !== null ? 'resolved' : shelf !== null ? 'shelved' : 'active';
 
 export const EMPTY_LIST: AlarmList = { active: [], shelved: [], resolved: [] };
 
 /**
- * `nowS` is the twin's time (ROS seconds; null: nobody knows), `at` the browser's, ms since the epoch.
+ * `nowS` is the twin's time (ROS seconds; null: unknown), `at` the browser's, ms since the epoch.
  */
 export function listOf(
   alarms: readonly Alarm[],
@@ -80,14 +80,14 @@ const isListed = (end: number, nowS: number | null): boolean =>
 
 const endOf = ({ cleared_at }: Alarm): number => (cleared_at ? secondsOf(cleared_at) : Infinity);
 
-/** In the order of `severity`, by the reasons that are given; of equals it is the same each time. */
+/** Sorted by the `severity` of the given reasons; ties by tag and id, so that the order is stable. */
 const inOrder = (items: readonly Item[], reasonOf: (item: Item) => HealthReason): readonly Item[] =>
   items
     .map((item) => ({ item, rank: rankOf(reasonOf(item), item.isAcknowledged) }))
     .sort((a, b) => b.rank - a.rank || byName(a.item, b.item))
     .map(({ item }) => item);
 
-/** An alarm's `severity`, for that reason. */
+/** An alarm's `severity`, if it has that reason. */
 const rankOf = (reason: HealthReason, isAcknowledged: boolean): number =>
   severity({ verdict: reason.verdict, reasons: [reason] }, isAcknowledged);
 
@@ -95,8 +95,8 @@ const byName = ({ alarm: a }: Item, { alarm: b }: Item): number =>
   compareIds(a.tag_id, b.tag_id) || (a.id < b.id ? -1 : 1);
 
 /**
- * By how bad each is, then whether it is not acknowledged (both are the whole part of `severity`), then by
- * how many its block has: a block stands where the first of it does. In a block as `inOrder`.
+ * Sorted by verdict and acknowledgement (the integer part of `severity`), then by size of the cause's
+ * block. A block takes the place of its first alarm. Within a block, as `inOrder`.
  */
 export function causesFirst(
   items: readonly Item[],
@@ -118,28 +118,28 @@ export function causesFirst(
     .map(({ item }) => item);
 }
 
-/** What is wrong in which area, by whatever limit. */
+/** Key of a cause: kind, sensor, side and area, whatever the limit. */
 export const causeOf = ({ reason, tag_id }: Wrong['alarm'], { sensors }: Speech): string =>
   [
     ...[reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : ''],
     sensors.areaOf(tag_id),
   ].join('|');
 
-/** The one that was raised first. */
+/** The alarm raised first. */
 export const oldestOf = (items: readonly Item[]): Alarm | undefined =>
   items
     .map(({ alarm }) => alarm)
     .sort((a, b) => secondsOf(a.raised_at) - secondsOf(b.raised_at))[0];
 
-/** Neither acknowledged nor shelved; in a list that is held, both still stand where they were. */
+/** Items neither acknowledged nor shelved; a held list may contain both. */
 export const unacknowledged = (items: readonly Item[]): readonly Item[] =>
   items.filter(({ isAcknowledged, shelf }) => !isAcknowledged && shelf === null);
 
-/** Those that call for somebody: active, not acknowledged, not shelved. */
+/** Items that need attention: active, not acknowledged, not shelved. */
 export const calling = ({ active }: AlarmList): readonly Item[] =>
   unacknowledged(active).filter(({ alarm }) => alarm.cleared_at === null);
 
-/** The alarm of why a tag is as it is; that it is too cold is not that it was too warm. */
+/** The alarm of a tag's reason; "too cold" and "too warm" are different alarms. */
 export const alarmOf = (
   items: readonly Item[],
   tagId: string,
@@ -150,15 +150,15 @@ export const alarmOf = (
     ({ alarm }) => alarm.tag_id === tagId && whatOf(alarm) === whatOf({ tag_id: tagId, reason }),
   );
 
-/** Whether a second scan that says the same raises the alarm of a reason. */
+/** Whether a reason's alarm waits for a second scan to confirm it. */
 export const isAwaited = ({ kind, release }: HealthReason): boolean =>
   kind === 'reading_failed' || (kind === 'range' && release === undefined);
 
-/** What is new between two lists, to be told once. */
+/** Changes between two lists, to be announced once. */
 export interface News {
-  /** New, come back, or worse than before; the worst first. */
+  /** New, back from shelved or acknowledged, or worse than before; the worst first. */
   readonly raised: readonly Item[];
-  /** Active before, and resolved since. */
+  /** Resolved since, after being active. */
   readonly cleared: readonly Item[];
 }
 
@@ -174,9 +174,9 @@ export function newsOf(before: AlarmList, now: AlarmList): News {
   };
 }
 
-/** A list whose order is held, and what has become active since. */
+/** A list whose order is held, and the alarms that have become active since. */
 export interface HeldList {
-  /** The rows of then as they are now: none comes, goes or moves. */
+  /** The held rows with current content: none is added, removed or moved. */
   readonly shown: AlarmList;
   readonly added: readonly Item[];
 }
@@ -202,7 +202,7 @@ export const itemsOf = ({ active, shelved, resolved }: AlarmList): readonly Item
   ...resolved,
 ];
 
-/** The very same as before where it is: what follows from it is kept then. */
+/** `now`, reusing equal objects of `before`, so that what is memoised on them stays valid. */
 export function sharedList(before: AlarmList, now: AlarmList): AlarmList {
   const known = new Map(itemsOf(before).map((item) => [item.alarm.id, item]));
   const share = (was: readonly Item[], is: readonly Item[]): readonly Item[] => {

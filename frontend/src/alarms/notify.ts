@@ -1,4 +1,4 @@
-/** For who looks at something else: notifications and sounds on wish, and the page's icon. */
+/** Alarms while nobody looks at the page: opt-in notifications and sounds, and the page's icon. */
 import { now } from '../clock';
 import { ask } from '../contract/api';
 import { postPush } from '../contract/people';
@@ -15,8 +15,8 @@ import { alarmList, onNews } from './watch';
 import { severalText } from './words';
 
 /**
- * What the browser says to it. "asks": it will ask the operator. "insecure": it allows them only on
- * https or localhost. "none": it has none, or only such as a page cannot make by itself.
+ * The browser's permission. "asks": it will ask the operator. "insecure": it allows notifications only
+ * on https or localhost. "none": it has none, or does not let a page show them.
  */
 export type NotifyState = 'granted' | 'asks' | 'refused' | 'insecure' | 'none';
 
@@ -29,7 +29,7 @@ function stateNow(): NotifyState {
 
 export const notifyState = createStore<NotifyState>('none');
 
-/** The operator's wish, told by a click: only then the browser is asked. */
+/** Turns notifications on or off, on a click: only then may the page ask for permission. */
 export async function wishNotify(isWished: boolean): Promise<void> {
   notifyState.set(stateNow());
   if (isWished && notifyState.get() === 'asks') {
@@ -38,15 +38,15 @@ export async function wishNotify(isWished: boolean): Promise<void> {
   }
   const isOn = isWished && notifyState.get() === 'granted';
   preferTold({ notify: isOn });
-  // Beside it: the page notifies by itself while it is open.
+  // In addition: an open page notifies without Web Push.
   await wishPush(isOn).catch(() => {
-    // No push service, or a bridge that is gone meanwhile: the page still notifies.
+    // No push service, or the bridge is unreachable: the page still notifies.
   });
 }
 
 let last: Notification | null = null;
 
-/** One for all that is new, in whichever tabs of the browser; a later one takes its place. */
+/** Shows one notification for all new alarms, shared by all tabs; a later one replaces it. */
 function show(raised: readonly Item[]): void {
   const [first] = raised;
   if (!first) return;
@@ -61,7 +61,7 @@ function show(raised: readonly Item[]): void {
     last?.close();
     const shown = new Notification(origin === null ? title : `${S.origin[origin]}: ${title}`, {
       body,
-      // Other news has another name: under the same one a browser does so in silence.
+      // New alarms get a new tag: browsers replace the same tag silently.
       tag: `lupin-twin.alarms ${first.alarm.id} ${first.verdict}`,
     });
     last = shown;
@@ -71,13 +71,13 @@ function show(raised: readonly Item[]): void {
       shown.close();
     };
   } catch {
-    // Some browsers let no page make them, and say so only now.
+    // Some browsers refuse the constructor to pages, and throw only here.
     notifyState.set('none');
     preferTold({ notify: false });
   }
 }
 
-/** Tells of what is new where that is wished and nobody looks; returns the way to stop. */
+/** Notifies of new alarms if enabled and the page is not in use; returns a stop function. */
 export function startNotify(): () => void {
   notifyState.set(stateNow());
   return onNews(({ raised }) => {
@@ -91,7 +91,7 @@ interface Key {
   public_key: string | null;
 }
 
-/** Subscribes this browser at the bridge, or ends that. Harmless where there is no Web Push. */
+/** Subscribes this browser to the bridge's Web Push, or unsubscribes it; without Web Push, does nothing. */
 export async function wishPush(isWished: boolean): Promise<void> {
   if (!('serviceWorker' in navigator)) return;
   const registration = await navigator.serviceWorker.getRegistration();
@@ -111,7 +111,7 @@ export async function wishPush(isWished: boolean): Promise<void> {
   try {
     subscription = await pushManager.subscribe(options);
   } catch (error) {
-    // One with another key, of a bridge that was here before.
+    // An existing subscription has another key, from an earlier bridge at this address.
     if (!known) throw error;
     await known.unsubscribe();
     subscription = await pushManager.subscribe(options);
@@ -119,15 +119,15 @@ export async function wishPush(isWished: boolean): Promise<void> {
   await postPush(subscription.toJSON());
 }
 
-/** The browser's bar of tabs follows no theme of ours: white on these is legible on any. */
+/** White text on these colours is legible on any tab bar, which does not follow our theme. */
 const COLOURS = { critical: '#b3261e', other: '#855300' } as const;
 
-/** The page's icon, which says how many alarms are active, and how bad the worst is; null: that without any. */
+/** The favicon as a data URL: number of active alarms and the worst verdict; null: no alarms, plain icon. */
 export function badgeOf(count: number, worst: Verdict): string | null {
   if (count === 0) return null;
   const text = count > 9 ? '9+' : String(count);
   const colour = worst === 'critical' ? COLOURS.critical : COLOURS.other;
-  // Critical has corners, as its sign has in the page: told without colour.
+  // Critical has corners, like its mark on the page, so that it reads without colour.
   const shape =
     worst === 'critical'
       ? '<path d="M9.500 1h13L31 9.500v13L22.500 31h-13L1 22.500v-13Z"'
@@ -140,7 +140,7 @@ export function badgeOf(count: number, worst: Verdict): string | null {
   return `data:image/svg+xml,${encodeURIComponent(svg)}`;
 }
 
-/** Keeps the icon so; returns the way to stop. */
+/** Keeps the favicon up to date; returns a stop function. */
 export function startBadge(): () => void {
   const link = document.querySelector<HTMLLinkElement>('link[rel=icon]');
   if (!link) return () => undefined;
@@ -154,24 +154,24 @@ export function startBadge(): () => void {
   return alarmList.subscribe(update);
 }
 
-/** At most one in so long, ms. */
+/** Least time between two sounds, ms. */
 export const QUIET_MS = 10_000;
 
 /**
- * "waits": the browser lets no page be heard before somebody has clicked in it. "none": it cannot
- * make a sound.
+ * "waits": the browser blocks sound until the user has clicked in the page. "none": it has no Web
+ * Audio.
  */
 export type SoundState = 'ready' | 'waits' | 'none';
 
 export const soundState = createStore<SoundState>('waits');
 
-/** Notes of a critical alarm and of any other: Hz, one after the other. */
+/** Note sequences for a critical and any other alarm, Hz. */
 const NOTES = { critical: [880, 660, 880, 660], other: [660, 880] } as const;
 const NOTE_S = 0.14;
-/** Loud enough across a room, far from the loudest. */
+/** Loud enough across a room, far below the maximum of 1. */
 const GAIN = 0.25;
 
-/** Plays notes with soft ends, so that nothing clicks. */
+/** Plays notes, faded in and out to avoid clicks. */
 export function play(context: AudioContext, notes: readonly number[]): void {
   for (const [index, hz] of notes.entries()) {
     const begin = context.currentTime + index * NOTE_S;
@@ -190,7 +190,7 @@ export function play(context: AudioContext, notes: readonly number[]): void {
 let context: AudioContext | null = null;
 let playedAt = -Infinity;
 
-/** Makes what sounds, or wakes it: within a click, or the browser refuses. */
+/** Creates or resumes the audio context; the browser allows it only within a user gesture. */
 async function wake(make: () => AudioContext): Promise<void> {
   try {
     context ??= make();
@@ -209,7 +209,7 @@ function sound(notes: readonly number[]): void {
   play(context, notes);
 }
 
-/** The operator's wish, told by a click: it is heard at once what it sounds like. */
+/** Turns sound on or off, on a click; plays a sample at once when turned on. */
 export async function wishSound(
   isWished: boolean,
   make: () => AudioContext = () => new AudioContext(),
@@ -221,9 +221,9 @@ export async function wishSound(
   sound(NOTES.other);
 }
 
-/** Sounds for what is new where that is wished; returns the way to stop. */
+/** Plays a sound for new alarms if enabled; returns a stop function. */
 export function startSound(make: () => AudioContext = () => new AudioContext()): () => void {
-  // Kept from another day: the first click or key lets it be heard.
+  // Enabled on an earlier visit: the first click or key unlocks the sound.
   const onGesture = (): void => {
     if (own.get().sound && context?.state !== 'running') void wake(make);
   };

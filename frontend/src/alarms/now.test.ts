@@ -10,10 +10,10 @@ import { nowOf, reasonNow } from './words';
 const cold = alarm('a', { worst: 4 });
 const state = (value: number | null, ...reasons: readonly Partial<HealthReason>[]): TagThen => ({
   tag: tag({ readings: readings({ temperature: value }) }),
-  // What this is about reads the reasons alone, but where there are none.
+  // The code under test reads the verdict only if there are no reasons.
   health: { verdict: reasons.length > 0 ? 'unknown' : 'healthy', reasons: reasons.map(reason) },
 });
-/** As without a clock. */
+/** A tag that the bridge did not judge, as without a clock. */
 const unjudged: TagThen = { ...state(8), health: { verdict: 'unknown', reasons: [] } };
 const old = { kind: 'old', verdict: 'unknown', value: null } as const;
 
@@ -66,10 +66,10 @@ test('another sensor’s age does not matter, but of what is derived', () => {
   const dry = alarm('b', { reason: vpd });
   expect(nowOf(dry, state(8, vpd), null, true)).toMatchObject({ kind: 'known', value: 1.7 });
   expect(nowOf(dry, state(8, vpd, others), null, true)).toMatchObject({ kind: 'unknown' });
-  // Of what is within its range nothing is said: the tag counts as healthy, and so does this.
+  // A derived value in range has no reason: like its tag, it counts as healthy.
   expect(nowOf(dry, state(8), null, true)).toMatchObject({ value: null, verdict: 'healthy' });
   expect(nowOf(dry, state(8, others), null, true)).toMatchObject({ kind: 'unknown', last: null });
-  // Without one of the readings that it is computed of, nothing is said of it either.
+  // If one of its input readings failed, it has no reason either.
   const failed = { kind: 'reading_failed', verdict: 'stressed', sensor: 'humidity' } as const;
   expect(nowOf(dry, state(8, failed), null, true)).toMatchObject({ kind: 'unknown', last: null });
 });

@@ -1,47 +1,47 @@
 /**
- * What this browser keeps about alarms, the same in every tab: which are acknowledged, which are shelved,
- * and whether it may make itself heard. What who has signed in does, `people.ts` says to the bridge too. Moments
- * are ms since the epoch.
+ * This browser's alarm state, shared by its tabs: acknowledged and shelved alarms, and whether sound and
+ * notifications are on. For a signed-in user, `people.ts` also sends actions to the bridge. Times are ms
+ * since the epoch.
  */
 import { timeOfDay } from '../clock';
 import type { Alarm, Verdict } from '../contract/types';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
 import { createStore } from '../store/create';
 
-/** What was acknowledged and is listed no more is forgotten after this long, ms. */
+/** An acknowledgement of an alarm no longer listed is deleted after this long, ms. */
 export const FORGET_MS = 7 * 86_400_000;
-/** For how long an alarm can be shelved, minutes: a critical one not as long. */
+/** How long an alarm can be shelved, minutes; a critical one for less. */
 export const shelfMinutes = (verdict: Verdict): readonly number[] =>
   verdict === 'critical' ? [15, 60] : [15, 60, 480];
 
-/** Nothing is shelved for longer, ms. */
+/** Longest shelf time, ms. */
 const longestShelfMs = (verdict: Verdict): number => Math.max(...shelfMinutes(verdict)) * 60_000;
 
-/** A reason is a short one, characters. */
+/** Longest reason, characters. */
 export const LONGEST_REASON = 120;
 
-/** Nobody shelves a critical alarm by the way: it takes a word why. */
+/** Shelving a critical alarm needs a reason, so that it is deliberate. */
 export const needsReason = (verdict: Verdict): boolean => verdict === 'critical';
 
 interface Acknowledgement {
-  /** How bad it was when it was acknowledged. */
+  /** The alarm's verdict when acknowledged. */
   readonly verdict: Verdict;
-  /** When it was acknowledged. */
+  /** Time of the acknowledgement. */
   readonly at: number;
 }
 
 export interface Shelf {
-  /** How bad it was when it was shelved. */
+  /** The alarm's verdict when shelved. */
   readonly verdict: Verdict;
   readonly until: number;
-  /** In the operator's words; may be empty. */
+  /** The operator's own words; may be empty. */
   readonly reason: string;
 }
 
 export interface Kept {
-  /** By the alarm's id. */
+  /** By alarm id. */
   readonly acknowledged: ReadonlyMap<string, Acknowledgement>;
-  /** By `whatOf`: an alarm that comes back is as unwelcome as before. */
+  /** By `whatOf`, so that the shelf still holds if the alarm is raised again. */
   readonly shelved: ReadonlyMap<string, Shelf>;
   readonly sound: boolean;
   readonly notify: boolean;
@@ -58,11 +58,11 @@ export const NOTHING_KEPT: Kept = {
 export const isWorse = (a: Verdict, b: Verdict): boolean =>
   VERDICTS.indexOf(a) < VERDICTS.indexOf(b);
 
-/** What is wrong and where, whenever it is: too cold is not too warm. */
+/** Key of what is wrong and where, independent of time; "too cold" and "too warm" differ. */
 export const whatOf = ({ tag_id, reason }: Pick<Alarm, 'tag_id' | 'reason'>): string =>
   JSON.stringify([tag_id, reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : '']);
 
-/** An alarm and how bad it is by now. */
+/** An alarm and its current verdict. */
 export interface Rated {
   readonly alarm: Alarm;
   readonly verdict: Verdict;
@@ -89,7 +89,7 @@ export const shelve = (
 const without = <Value>(map: ReadonlyMap<string, Value>, key: string): ReadonlyMap<string, Value> =>
   new Map([...map].filter(([each]) => each !== key));
 
-/** The same without shelves that ended, and what was acknowledged long ago and is not listed. */
+/** `kept` without ended shelves and without old acknowledgements of unlisted alarms. */
 export function pruned(kept: Kept, listed: ReadonlySet<string>, at: number): Kept {
   const acknowledged = [...kept.acknowledged].filter(
     ([id, each]) => listed.has(id) || Math.abs(at - each.at) < FORGET_MS,
@@ -102,19 +102,19 @@ export function pruned(kept: Kept, listed: ReadonlySet<string>, at: number): Kep
     : { ...kept, acknowledged: new Map(acknowledged), shelved: new Map(shelved) };
 }
 
-/** Not for ever where somebody sets the clock back. */
+/** Whether a shelf is still running; the upper limit ends it if the clock is set back. */
 const isAhead = ({ verdict, until }: Shelf, at: number): boolean =>
   until > at && until - at <= longestShelfMs(verdict);
 
 export const isShelfHeld = (shelf: Shelf, verdict: Verdict, at: number): boolean =>
   isAhead(shelf, at) && !isWorse(verdict, shelf.verdict);
 
-/** When the next shelf ends; infinite: there is none. */
+/** When the next shelf ends; Infinity: there is none. */
 export const nextEnd = (kept: Kept, at: number): number =>
   Math.min(...[...kept.shelved.values()].map(({ until }) => until).filter((until) => until > at));
 
 const KEY = 'lupin-twin.alarms';
-/** Reads what was kept; anything damaged counts as not kept. */
+/** Reads the stored state; a damaged one counts as empty. */
 export function readKept(storage: Pick<Storage, 'getItem'>): Kept {
   try {
     const {
@@ -135,7 +135,7 @@ export function readKept(storage: Pick<Storage, 'getItem'>): Kept {
   }
 }
 
-/** As it is stored. */
+/** Stored form of `Kept`. */
 interface KeptRows {
   readonly acknowledged: readonly (readonly [id: string, Verdict, at: number])[];
   readonly shelved: readonly (readonly [what: string, Verdict, until: number, reason?: string])[];
@@ -158,28 +158,28 @@ export function writeKept(storage: Pick<Storage, 'setItem'>, kept: Kept): void {
   try {
     storage.setItem(KEY, JSON.stringify(rows));
   } catch {
-    // Storage is full or forbidden: it then lasts as long as the page.
+    // Storage is full or blocked: the state then lasts as long as the page.
   }
 }
 
 export const own = createStore<Kept>(NOTHING_KEPT);
 
-/** For so long the last action can be undone where it was done, ms; later in the list. */
+/** How long the last action can be undone in place, ms; later, through the alarm's menu. */
 export const UNDO_MS = 10_000;
 
-/** What the operator has just done. */
+/** The operator's last action. */
 export interface Done {
   readonly what: 'acknowledge' | 'unacknowledge' | 'shelve' | 'unshelve';
-  /** Alarms that it was done to. */
+  /** Number of alarms affected. */
   readonly count: number;
-  /** What was kept before. */
+  /** State before the action. */
   readonly before: Kept;
 }
 
-/** The last action, as long as it can be undone; null: there is none. */
+/** The last action while it can be undone; null: none. */
 export const done = createStore<Done | null>(null);
 
-/** Told of what is done here, with what was kept before and after; null: it stays here. */
+/** Called with the state before and after each action, to share it; null: it stays in this browser. */
 export const acting: { tell: ((before: Kept, next: Kept) => void) | null } = { tell: null };
 
 let timer: ReturnType<typeof setTimeout> | undefined;
@@ -215,7 +215,7 @@ export const unshelveAlarm = (alarm: Alarm): void => {
   change('unshelve', 1, { ...kept, shelved: without(kept.shelved, whatOf(alarm)) });
 };
 
-/** Takes the last action back. */
+/** Undoes the last action. */
 export function undo(): void {
   const last = done.get();
   if (!last) return;
@@ -230,13 +230,13 @@ export const preferTold = (way: Partial<Pick<Kept, 'sound' | 'notify'>>): void =
   own.set({ ...own.get(), ...way });
 };
 
-/** Takes what was kept, and keeps what is done from now on; returns the way to stop. */
+/** Loads the stored state, and stores every change; returns a stop function. */
 export function startOwn(storage: Pick<Storage, 'getItem' | 'setItem'>): () => void {
   own.set(readKept(storage));
   const stop = own.subscribe(() => {
     writeKept(storage, own.get());
   });
-  // Another tab has kept something: to undo what was done here would undo that as well.
+  // Another tab changed the state: undoing here would undo its change too.
   const onStorage = ({ key }: StorageEvent): void => {
     if (key !== KEY && key !== null) return;
     own.set(readKept(storage));

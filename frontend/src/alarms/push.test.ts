@@ -4,7 +4,7 @@ import { wishPush } from './notify';
 
 afterEach(() => vi.unstubAllGlobals());
 
-/** A browser with a service worker, and a bridge that has this key; what happened, in order. */
+/** Sets up a browser with a service worker and a bridge with this key; returns the log of calls. */
 function stage(key: string | null, { known = false, fails = false } = {}): unknown[] {
   const log: unknown[] = [];
   const subscription = {

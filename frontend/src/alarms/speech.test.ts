@@ -17,7 +17,7 @@ const { active } = listOf(
   0,
 );
 
-/** How each tag is now: its temperature, and what it has yet to pass where it is back. */
+/** The action, given each tag's temperature and, if it is back in range, its release limit. */
 const todo = (...now: readonly (readonly [value: number, release?: number])[]): string => {
   const tags = IDS.map((tag_id, at) =>
     wireTag({ tag_id, readings: readings({ temperature: now[at]?.[0] ?? null }) }),

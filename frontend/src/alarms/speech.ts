@@ -1,4 +1,4 @@
-/** In whose words alarms are told: the sensors in force, and the operator's unit; and of what state. */
+/** Connects the alarms' words to the app state: sensor catalogue, unit, and the latest values. */
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import type { AppState } from '../store/app';
 import { selectCatalogue, selectNewestHealth } from '../store/derived';
@@ -17,7 +17,7 @@ const speech = memoLast((sensors: Speech['sensors'], unit: Speech['unit']): Spee
 export const selectSpeech = (state: AppState): Speech =>
   speech(selectCatalogue(state), state.settings.unit);
 
-/** What an alarm is about as it is now, whatever moment is shown; null: there is no such value. */
+/** An alarm's value now, whatever moment is shown; null: it has no value. */
 export function selectNow(
   state: AppState,
   alarm: Alarm,
@@ -32,13 +32,13 @@ export function selectNow(
 const reasonIn = (state: AppState, alarm: Alarm): HealthReason =>
   reasonNow(alarm, selectNow(state, alarm, null));
 
-/** The worst of some alarms as they are now; null: there is none. */
+/** The worst current verdict of some alarms; null: no alarms. */
 export function worstNow(state: AppState, items: readonly Item[]): Verdict | null {
   const verdicts = items.map(({ alarm }) => reasonIn(state, alarm).verdict);
   return VERDICTS.find((each) => verdicts.includes(each)) ?? null;
 }
 
-/** What to do first about some alarms of one cause, as they are now. */
+/** What to do first about some alarms that share a cause, by their current values. */
 export function todoNow(state: AppState, items: readonly Item[]): string {
   const verdict = worstNow(state, items);
   const todos = items
@@ -48,12 +48,12 @@ export function todoNow(state: AppState, items: readonly Item[]): string {
   return todos.find((text) => text !== '') ?? '';
 }
 
-/** What is worst now first, many of one cause together. */
+/** Sorted by current verdict, the worst first; alarms that share a cause stay together. */
 export function worstNowFirst(state: AppState, items: readonly Item[]): readonly Item[] {
   const reasons = new Map(items.map((item) => [item, reasonIn(state, item.alarm)]));
   return causesFirst(items, (item) => reasons.get(item) ?? item.alarm.reason, selectSpeech(state));
 }
 
-/** An alarm in one line, as it is now. */
+/** An alarm in one line, with its current value. */
 export const textNow = (state: AppState, alarm: Alarm): string =>
   alarmText(alarm, selectSpeech(state), selectNow(state, alarm));

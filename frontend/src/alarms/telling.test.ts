@@ -1,4 +1,4 @@
-/** How alarms come to who is not looking: title, icon, voices, sound, notification. */
+/** Alarms outside the list: title, icon, voices, sound, notification. */
 import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import type { Alarm } from '../contract/types';
@@ -38,7 +38,7 @@ let stops: (() => void)[];
 
 const start = (...starts: (() => () => void)[]): void => {
   stops = [startAlarms, ...starts].map((each) => each());
-  // What the page opens with.
+  // The alarms that the page starts with.
   tellAlarms();
 };
 
@@ -117,7 +117,7 @@ describe('voices', () => {
     tellAlarms(cold, warm, alarm('other', { tag_id: '3' }));
     expect(said()[1]).toMatch(/^New: Tag 1: [^;]*; Tag 3: [^;]*$/);
     expect(keys()).toBe(before + 2);
-    // A frame without news, and a state, are no change.
+    // Neither a frame without news nor a state announces anything.
     tellAlarms(cold, warm, alarm('other', { tag_id: '3' }));
     showTags([wireTag()]);
     expect(keys()).toBe(before + 2);
@@ -131,7 +131,7 @@ describe('voices', () => {
   });
 });
 
-/** As much of the browser's Web Audio as the sound touches: jsdom has none. */
+/** The part of Web Audio that the sound uses, which jsdom lacks. */
 class Audio {
   state: 'suspended' | 'running';
   notes = 0;
@@ -173,7 +173,7 @@ describe('sound', () => {
   test('only on wish, at once when it is wished, and then at most one in ten seconds', async () => {
     const audio = new Audio(true);
     const make = (): AudioContext => audio as unknown as AudioContext;
-    const at = Math.ceil(performance.now()); // or ten seconds later is a hair less than that
+    const at = Math.ceil(performance.now()); // otherwise ten seconds later rounds to slightly less
     const clock = vi.spyOn(performance, 'now').mockReturnValue(at);
     vi.spyOn(Date, 'now').mockReturnValue(1_800_000_000_000);
     start(() => startSound(make));
@@ -231,7 +231,7 @@ describe('sound', () => {
 describe('notification', () => {
   const shown: { title: string; body: string; onclick?: () => void; close: () => void }[] = [];
   const tags: string[] = [];
-  /** As the browser's own: jsdom has none. */
+  /** Stand-in for the browser's Notification, which jsdom lacks. */
   const browser = (permission: string, answer = permission): { asked: number } => {
     const log = { asked: 0 };
     class Shown {

@@ -130,7 +130,7 @@ test('each action can be undone for a while; another tab’s word ends that', ()
   shelveAlarm(item('b'), 15, 'x');
   expect(last()).toEqual(['shelve', 1]);
   undo();
-  // The last alone: what was done before it stands.
+  // Only the last action is undone; earlier ones stand.
   expect(ids()).toEqual(['b']);
   unacknowledgeAlarm(item('a').alarm);
   expect(ids()).toEqual(['a', 'b']);

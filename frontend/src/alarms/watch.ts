@@ -1,5 +1,5 @@
 /**
- * Keeps the list of alarms up to date, whatever moment the page shows, and reports what is new: to the page, its
+ * Keeps the alarm list up to date, whatever moment the page shows. Announces changes to the page, its
  * title and screen readers.
  */
 import { now, timeOfDay } from '../clock';
@@ -23,23 +23,23 @@ import {
 import { textNow } from './speech';
 import { severalText } from './words';
 
-/** The alarms of now. */
+/** The current alarms. */
 export const alarmList = createStore<AlarmList>(EMPTY_LIST);
 
 type Listener = (news: News) => void;
 const listeners = new Set<Listener>();
 
-/** Calls back with what is new, once each; returns the way to stop. */
+/** Calls `listener` once per change; returns a stop function. */
 export function onNews(listener: Listener): () => void {
   listeners.add(listener);
   return () => listeners.delete(listener);
 }
 
-/** What is resolved leaves the list so late at most, ms. */
+/** Longest delay before an expired resolved alarm leaves the list, ms. */
 const SWEEP_MS = 60_000;
 
 export function startAlarms(): () => void {
-  /** What was told of; null: nothing has come, and what comes first is no news. */
+  /** The list last announced; null: none received yet, and the first one is no news. */
   let told: AlarmList | null = null;
   let looked = own.get();
   let timer: ReturnType<typeof setTimeout> | undefined;
@@ -56,7 +56,7 @@ export function startAlarms(): () => void {
     if (!alarms) return;
     const list = listOf(alarms.alarms, kept, rosNow(state, now()), at);
     const news = told && !isOwnDoing ? newsOf(told, list) : null;
-    // While the past is gone through, what is missing from the list is not resolved.
+    // While the bridge replays the past, alarms missing from the list are not resolved.
     if (alarms.source !== 'starting') told = list;
     alarmList.set(sharedList(alarmList.get(), list));
     if (news && news.raised.length + news.cleared.length > 0) {
@@ -78,11 +78,11 @@ export function startAlarms(): () => void {
   };
 }
 
-/** Until the past has been gone through nobody knows what is listed. */
+/** Ids of the listed alarms. */
 const idsOf = (alarms: Alarms | null): ReadonlySet<string> =>
   new Set(alarms?.alarms.map(({ id }) => id));
 
-/** Alarms that have come since somebody looks at another moment, the worst first; without those that were acknowledged or shelved since, or are resolved. */
+/** Alarms raised while a past moment is shown that still need attention (`calling`), the worst first. */
 export const meanwhile = createStore<readonly Item[]>([]);
 
 export function startMeanwhile(): () => void {
@@ -109,14 +109,14 @@ export function startMeanwhile(): () => void {
   };
 }
 
-/** The name of the page's tab: how many alarms are active, what else is to be known, and which moment is shown. */
+/** The page title: number of active alarms, a note on the connection, and the shown moment. */
 export const titleOf = (count: number, moment: number | null, note = ''): string => {
   const shown = moment === null ? S.product : S.pastTitle(rosText(moment));
   const title = note === '' ? shown : `${note} · ${shown}`;
   return count === 0 ? title : `(${count}) ${title}`;
 };
 
-/** Behind other tabs, one that is cut off would pass for one that has no alarms. */
+/** In the background, a disconnected tab would look as if it had no alarms. */
 const noteOf = (state: AppState): string | undefined =>
   selectIsCut(state)
     ? S.phase[state.twin.phase]
@@ -124,7 +124,7 @@ const noteOf = (state: AppState): string | undefined =>
       ? S.origin.recorded
       : undefined;
 
-/** Keeps the tab's name so; returns the way to stop. */
+/** Keeps the page title up to date; returns a stop function. */
 export function startTitle(): () => void {
   const update = (): void => {
     const state = store.get();
@@ -139,9 +139,9 @@ export function startTitle(): () => void {
   };
 }
 
-/** To screen readers: waits until what is being read is read. */
+/** For screen readers: waits for the current speech to end. */
 export const politeVoice = createVoice();
-/** Cuts in. */
+/** For screen readers: interrupts. */
 export const urgentVoice = createVoice();
 
 function newsText({ raised, cleared }: News): string {
@@ -161,7 +161,7 @@ function newsText({ raised, cleared }: News): string {
   return [...text(raised, S.alarmsRaised), ...text(cleared, S.alarmsCleared)].join('. ');
 }
 
-/** Announces what is new; returns the way to stop. */
+/** Announces changes to screen readers; returns a stop function. */
 export const startVoices = (): (() => void) =>
   onNews((news) => {
     const isUrgent = news.raised.some(({ verdict }) => verdict === 'critical');
@@ -169,7 +169,7 @@ export const startVoices = (): (() => void) =>
   });
 
 export function startAlarmsAndTelling(storage: Pick<Storage, 'getItem' | 'setItem'>): () => void {
-  // What was kept comes first: nothing is told of that was acknowledged on another day.
+  // Stored state first, so that alarms acknowledged on an earlier visit are not announced.
   const stops = [startOwn(storage), startAlarms(), startTitle(), startVoices(), startMeanwhile()];
   return () => {
     for (const stop of stops.reverse()) stop();

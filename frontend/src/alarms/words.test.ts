@@ -20,7 +20,7 @@ import {
 const C = { sensors: CATALOGUE, unit: 'C' } as const;
 const F = { ...C, unit: 'F' } as const;
 
-/** Noon on the operator's own clock, ROS seconds. */
+/** Noon in the browser's time zone, ROS seconds. */
 const NOON = new Date(2026, 10, 14, 12).getTime() / 1000;
 
 const known = (value: number | null, verdict: Verdict): Now => ({
@@ -131,10 +131,10 @@ test('of a pest how many: now, at worst and at first', () => {
   expect(valuesOf(pest, C, known(3, 'critical'))).toMatchObject({ ...texts, now: 'now 3 pests' });
   expect(valuesOf(pest, C, known(0, 'critical')).now).toBe('now seen');
   expect(valuesOf(pest, C, known(null, 'healthy')).now).toBe('now none seen');
-  // What is derived, and said nothing of.
+  // A derived value without a reason.
   const dry = alarm('b', { reason: { sensor: 'vpd', value: 1.7, limit: 1.3 } });
   expect(valuesOf(dry, C, known(null, 'healthy')).now).toBe('now in range');
-  // Seen, and not counted.
+  // Pest seen, but not counted.
   expect(valuesOf(alarm('a', { worst: 0, reason }), C, known(0, 'stressed')).worst).toBeNull();
 });
 
@@ -164,7 +164,7 @@ test('for how long comes first, with the day only where it is another, and the e
     length: '10\u00a0min',
     note: 'resolved 12:10',
   });
-  // Of a simulation's clock there are no days.
+  // A simulated clock has no days.
   expect(timesOf(alarm('a', { raised: 100 }), 160, false)).toEqual({
     length: '1\u00a0min',
     note: '',

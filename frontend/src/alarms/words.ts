@@ -1,4 +1,4 @@
-/** An alarm in words: what, where, how bad now and at worst, since when, until when. Pure. */
+/** An alarm in words: what, where, value now and at worst, since when, until when. Pure. */
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import { isOldReading, trendOf, type TagThen } from '../domain/difference';
 import {
@@ -14,15 +14,15 @@ import { shown } from '../domain/text';
 import { dayFormat, hasDate, secondsOf, shortRosText, type When } from '../domain/time';
 import { S } from '../strings';
 
-/** Of a name that some robot made up. */
+/** Longest tag name, characters: names come from the robot. */
 const LONGEST_NAME = 24;
-/** So many by name in one breath; the list has the rest. */
+/** Most alarms named in one message; the list has the rest. */
 const MOST_NAMED = 3;
 
 export const whereText = ({ tag_id }: Alarm): string =>
   tag_id === '' ? S.alarmHouse : S.card(shown(tag_id, LONGEST_NAME));
 
-/** What its words need beside it: the sensors in force, and what temperatures are read in. */
+/** What the words need besides the alarm: the sensor catalogue and the temperature unit. */
 export interface Speech {
   readonly sensors: Catalogue;
   readonly unit: TemperatureUnit;
@@ -31,23 +31,23 @@ export interface Speech {
 /** What is wrong, without its value, which changes. */
 export function whatText({ reason }: Pick<Alarm, 'reason'>, { sensors, unit }: Speech): string {
   if (isOfRange(reason)) return beyondText(sensors, reason, unit);
-  // Of a pest how many, and of a changed sensor its reading, is told as it is now.
+  // A pest count and a changed sensor's reading are reported as current values.
   const value = reason.kind === 'pest' ? 0 : reason.kind === 'changed' ? null : reason.value;
   return reasonText(sensors, { ...reason, value }, unit, null);
 }
 
-/** What and where in one line: of whatever moment it is read. */
+/** What and where in one line, independent of time. */
 export const nameText = (alarm: Alarm, speech: Speech): string =>
   S.alarmWhat(whereText(alarm), whatText(alarm, speech));
 
-/** An alarm's values in words that do not contradict each other, nor its limit. */
+/** An alarm's values in words, rounded so that they contradict neither each other nor the limit. */
 export interface Values {
   readonly what: string;
-  /** What somebody does about it; empty: nothing. */
+  /** What to do about it; empty: nothing. */
   readonly todo: string;
-  /** Null: it is not of a value, or resolved. */
+  /** Null: the alarm has no value, or is resolved. */
   readonly now: string | null;
-  /** Null: there is no such value, or it is that of now. */
+  /** Null: no value, or the same as now. */
   readonly worst: string | null;
   readonly first: string | null;
 }
@@ -85,24 +85,24 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
   };
 }
 
-/** What and where in one line, as it is now, and how bad at worst where that differs. */
+/** What, where and the current value in one line; the worst value if it differs. */
 export function alarmText(alarm: Alarm, speech: Speech, now: Now | null): string {
   const { what, now: nowText, worst } = valuesOf(alarm, speech, now);
   const isKnown = now?.kind === 'known';
   const texts = [
     what,
-    // What has no value says by itself how it is.
+    // Text without a value already says how it is.
     isKnown && nowText !== null && now.value !== null ? rated(nowText, now.verdict) : nowText,
     worst === null ? null : rated(worst, alarm.reason.verdict),
   ];
   return S.alarmWhat(whereText(alarm), texts.filter((text) => text !== null).join(', '));
 }
 
-/** With how bad it is; where nothing is said, it is out of its range. */
+/** Appends a critical or healthy verdict; no suffix means out of range. */
 const rated = (text: string, verdict: Verdict): string =>
   verdict === 'critical' || verdict === 'healthy' ? `${text} (${S.alarmStatus[verdict]})` : text;
 
-/** That what it is about is not known now, and what was known last. */
+/** Says that the value now is unknown, and gives the last known one. */
 export function unknownText(
   { reason: { sensor: name } }: Alarm,
   { sensors, unit }: Speech,
@@ -113,7 +113,7 @@ export function unknownText(
   return S.alarmNowUnknown(reading, age === null ? null : ageText(age));
 }
 
-/** From when to when. `nowS` is the twin's time, ROS seconds; null: nobody knows. */
+/** Begin, end and duration. `nowS` is the twin's time, ROS seconds; null: unknown. */
 export function spanText({ raised_at, cleared_at }: Alarm, nowS: number | null): string {
   const from = secondsOf(raised_at);
   const begin = whenText(from, nowS);
@@ -125,7 +125,7 @@ export function spanText({ raised_at, cleared_at }: Alarm, nowS: number | null):
   return S.alarmUntil(begin, end, lengthText(until - from));
 }
 
-/** For how long it has been so, or was; and the day that it began on, if it is another; `isOver`: when it was resolved. */
+/** Duration, and the day it began, if not today; with `isOver`, the time it was resolved instead. */
 export function timesOf(
   { raised_at, cleared_at }: Alarm,
   nowS: number | null,
@@ -142,10 +142,10 @@ export function timesOf(
 
 const lengthText = (seconds: number): string => inOnePiece(ageText(Math.max(0, seconds)));
 
-/** A line does not break in it. */
+/** Makes the first space non-breaking. */
 export const inOnePiece = (text: string): string => text.replace(' ', '\u00a0');
 
-/** A moment to the minute: of today the time alone; an alarm's year goes without saying. */
+/** A time to the minute, with the date unless it is today; the year is omitted. */
 export function whenText(at: number, nowS: number | null): string {
   if (!hasDate(at)) return shortRosText(at);
   const isToday = nowS !== null && isSameDay(at, nowS);
@@ -155,12 +155,12 @@ export function whenText(at: number, nowS: number | null): string {
 const isSameDay = (a: number, b: number): boolean =>
   hasDate(a) && hasDate(b) && dayOf(a) === dayOf(b);
 
-/** On the operator's own clock. */
+/** Calendar day in the browser's time zone. */
 const dayOf = (at: number): string => new Date(at * 1000).toDateString();
 
 const clockOf = (at: number): string => minuteText(at * 1000);
 
-/** Some alarms in one breath; `text` is that of one. */
+/** Some alarms in one message; `text` words a single one. */
 export function severalText(
   alarms: readonly Alarm[],
   text: (alarm: Alarm) => string,
@@ -173,21 +173,21 @@ export function severalText(
 export type Now =
   | {
       readonly kind: 'known';
-      /** In the sensor's unit; null: it is derived, and in range. Of a pest how many were counted, null: none. */
+      /** In the sensor's unit; null: a derived value in range. For a pest, the count; null: none. */
       readonly value: number | null;
-      /** How bad that is. */
+      /** The value's verdict. */
       readonly verdict: Verdict;
-      /** Why; null: it is in its range. */
+      /** Why; null: in range. */
       readonly reason: HealthReason | null;
-      /** What it is less what it was an hour ago; null: not known, or the same reading. */
+      /** Change over the last hour; null: unknown, or the same reading. */
       readonly trend: number | null;
     }
-  /** Too old, no reading, or the twin is silent. */
+  /** The reading is too old or missing, or the twin is silent. */
   | {
       readonly kind: 'unknown';
       readonly last: number | null;
       readonly lastAt: When;
-      /** How it was when the twin fell silent; null: not known then either. */
+      /** Value when the twin fell silent; null: unknown then too. */
       readonly before?: Extract<Now, { kind: 'known' }> | null;
     };
 
@@ -198,9 +198,9 @@ const unknown = (
 ): Now => ({ kind: 'unknown', last, lastAt, before });
 
 /**
- * `tag` and `hourAgo` are the alarm's tag as the bridge judged it last, and an hour before; null: not
- * known. `isLive`: false, and what was received last says nothing about now. Null: the alarm has no
- * value, or is resolved.
+ * An alarm's value now; null: the alarm has no value, or is resolved. `tag` and `hourAgo` are its tag as
+ * last judged by the bridge, and an hour earlier; null: unknown. If not `isLive`, the last received
+ * value says nothing about now.
  */
 export function nowOf(
   alarm: Alarm,
@@ -221,7 +221,7 @@ export function nowOf(
   }
   const { readings, readAt } = tag.tag;
   const { reasons } = tag.health;
-  // Not judged, as without a clock: that nothing is said of it does not make it well.
+  // Not judged, for example without a clock: no reasons does not mean healthy.
   if (tag.health.verdict === 'unknown' && reasons.length === 0) {
     return unknown(readings.get(sensor) ?? null, readAt.get(sensor) ?? 'unknown');
   }
@@ -231,10 +231,10 @@ export function nowOf(
     const value = said ? (said.value ?? 0) : null;
     return { kind: 'known', value, verdict, reason: said ?? null, trend: null };
   }
-  // What is derived has no reading: what there is of it stands in its reason.
+  // A derived value has no reading: only its reason holds the value.
   const isDerived = readings.size > 0 && !readings.has(sensor);
   const last = isDerived ? (said?.value ?? null) : (readings.get(sensor) ?? null);
-  // Of what is within its range nothing is said, nor what it is.
+  // A derived value in range has no reason, and so no known value.
   const lacks = ({ kind: why, verdict: how }: HealthReason): boolean =>
     how === 'unknown' || why === 'reading_failed';
   if (isDerived && !said && !reasons.some(lacks)) {
@@ -253,11 +253,11 @@ export function nowOf(
   };
 }
 
-/** How it is now, or was when the twin fell silent; nothing: nobody knows. */
+/** The value now, or when the twin fell silent; null or undefined: unknown. */
 export const lastKnown = (now: Now | null): Extract<Now, { kind: 'known' }> | null | undefined =>
   now?.kind === 'unknown' ? now.before : now;
 
-/** Why, as it is now, and how bad that is; as it was said last where nobody knows, or it has no value. */
+/** The reason with its current value and verdict; the last reported one if unknown or without a value. */
 export function reasonNow({ reason }: Alarm, now: Now | null): HealthReason {
   const known = lastKnown(now);
   if (!known) return reason;
@@ -266,7 +266,7 @@ export function reasonNow({ reason }: Alarm, now: Now | null): HealthReason {
     : { ...reason, verdict: known.verdict };
 }
 
-/** Its worst value, never better than that of now, which may come first; null: there is none. */
+/** The worst value, never better than the current one, which may arrive before it; null: none. */
 export function worstOf({ reason, worst }: Alarm, now: Now | null): number | null {
   const known = worst ?? (isOfRange(reason) ? reason.value : null);
   const current = now?.kind === 'known' ? now.value : null;

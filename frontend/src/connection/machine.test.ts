@@ -23,7 +23,7 @@ const status = (twin: StatusFrame['twin']): StatusFrame =>
 const step = (connection: Connection, event: ConnectionEvent): ReturnType<typeof stepBy> =>
   stepBy(connection, event, 1);
 
-/** Runs events one after another. */
+/** Applies events in order. */
 function run(...events: ConnectionEvent[]): { connection: Connection; commands: Command[] } {
   const commands: Command[] = [];
   const connection = events.reduce((current, event) => {
@@ -54,7 +54,7 @@ describe('phases', () => {
     const heard = step(live, { type: 'heard', now: 25 + SILENCE_MS - 1 }).connection;
     expect(phaseOf(heard, 25 + SILENCE_MS)).toBe('live');
     expect(phaseOf(live, 25 + SILENCE_MS)).toBe('stale');
-    // It has waited for a page that stood still, as any other frame.
+    // The page was suspended: this frame may be old too.
     expect(step(live, { type: 'heard', now: 25 + DEAD_MS }).command).toBe('reopen');
     expect(step(INITIAL, { type: 'heard', now: 1 }).connection).toBe(INITIAL);
   });

@@ -1,16 +1,16 @@
 /**
- * The connection's states and what leads from one to another. Pure: time and chance are
- * arguments, sockets and timers live in `socket.ts`.
+ * The connection's state machine. Pure: time and randomness are arguments; sockets and timers live in
+ * `socket.ts`.
  */
 import type { StatusFrame } from '../contract/types';
 
-/** No frame for this long: what is on the page is not to be taken for the present any more. */
+/** No frame for this long: the page's data no longer counts as live. */
 export const SILENCE_MS = 3_000;
-/** No frame for this long: the connection is dead although nobody said so; make a new one. */
+/** No frame for this long: the connection is dead, even if the socket looks open. */
 export const DEAD_MS = 8_000;
-/** An attempt that takes longer is given up. */
+/** Timeout of an attempt to connect. */
 export const OPENING_MS = 6_000;
-/** A connection that held this long starts the back-off afresh when it breaks. */
+/** A connection that lasted this long resets the back-off when it breaks. */
 const PROVEN_MS = 5_000;
 
 export type Phase = 'connecting' | 'live' | 'stale' | 'offline' | 'reconnecting';
@@ -22,38 +22,38 @@ type Socket =
       readonly kind: 'open';
       readonly since: number;
       readonly lastFrameAt: number | null;
-      /** A state came on this connection; what the page shows from before it is not live. */
+      /** A state was received on this connection; until then, the page's data is not live. */
       readonly hasState: boolean;
     };
 
 export interface Connection {
   readonly socket: Socket;
-  /** Grows by one with each connection that opened; what was fetched before is out of date. */
+  /** Increases with each opened connection; earlier fetched data is out of date. */
   readonly epoch: number;
   readonly failures: number;
   readonly closeCode: number | null;
-  /** The bridge's last word about the twin, on this connection. */
+  /** The last status received on this connection. */
   readonly status: StatusFrame | null;
 }
 
 /** All times are ms on the monotonic clock. */
 export type ConnectionEvent =
   | { readonly type: Plain; readonly now: number }
-  /** A status frame brings its status, a state frame none. */
+  /** `status` is null for a state frame. */
   | { readonly type: 'frame'; readonly now: number; readonly status: StatusFrame | null }
   | { readonly type: 'closed'; readonly now: number; readonly code: number | null };
 
 /**
- * - start: make a new connection, whatever there is; after a lapse what still comes may be old
- * - heard: what came is neither status nor state, a sign of life alone
- * - broken: what came cannot be used, the two sides have lost each other
- * - wake: the tab became visible, or the operator does not want to wait
- * - online: the network returned, and an attempt that is under way began without it
+ * - start: make a new connection in any state; after a lapse, the old one may deliver old frames
+ * - heard: a frame other than status and state, which only shows that the bridge is alive
+ * - broken: an unusable frame; later deltas would build on it
+ * - wake: the tab became visible, or the operator wants to retry now
+ * - online: the network is back; restart a running attempt, which began without it
  * - tick: a deadline of `nextDeadline` may have passed
  */
 export type Plain = 'start' | 'opened' | 'heard' | 'broken' | 'wake' | 'online' | 'tick';
 
-/** What the shell has to do. "reopen": drop the socket, if any, and make a new one. */
+/** What `socket.ts` must do. "reopen": drop the socket, if any, and make a new one. */
 export type Command = 'reopen' | 'drop' | null;
 
 export const INITIAL: Connection = {
@@ -64,7 +64,7 @@ export const INITIAL: Connection = {
   status: null,
 };
 
-/** `random`: from 0 to 1. */
+/** The next state after an event; `random` from 0 to 1. */
 export function step(
   connection: Connection,
   event: ConnectionEvent,
@@ -85,7 +85,7 @@ export function step(
     case 'frame':
     case 'heard': {
       if (socket.kind !== 'open') return stay(connection);
-      // It has waited for a page that stood still, nobody knows how long.
+      // The page was suspended: the frame may be old.
       if (silence(socket, now) >= DEAD_MS) return open(connection, now);
       const heard = { ...socket, lastFrameAt: now };
       if (event.type !== 'frame') return stay({ ...connection, socket: heard });
@@ -109,7 +109,7 @@ export function step(
         : step(connection, { type: 'wake', now }, random);
     case 'wake':
       if (socket.kind === 'closed') return open(connection, now);
-      // After a sleep the socket often looks open and is not.
+      // After sleep, a socket often looks open but is dead.
       return socket.kind === 'open' && silence(socket, now) >= SILENCE_MS
         ? open(connection, now)
         : stay(connection);
@@ -167,7 +167,7 @@ export function phaseOf(connection: Connection, now: number): Phase {
   if (socket.kind === 'open' && socket.lastFrameAt !== null) {
     if (silence(socket, now) >= SILENCE_MS) return 'stale';
     if (status?.twin === 'offline') return 'offline';
-    // How old the state is that comes first, its status says.
+    // Live needs a status too: it tells the age of the first state.
     if (socket.hasState && status) return 'live';
   }
   const first = connection.epoch <= (socket.kind === 'open' ? 1 : 0) && connection.failures === 0;
@@ -176,16 +176,16 @@ export function phaseOf(connection: Connection, now: number): Phase {
 
 const FIRST_MS = 500;
 const LONGEST_MS = 15_000;
-/** Pause after the server said that it is full: it needs room more than we need haste. */
+/** Least pause before the random part, after the server said that it is full. */
 const CROWDED_MS = 10_000;
 
 /** WebSocket close code 1013, "try again later": the server has too many clients. */
 export const TRY_AGAIN_LATER = 1013;
 
 /**
- * Pause before the next attempt: doubled at each failure up to 15 s, and then anything from half
- * of that to all of it, so that a hundred screens do not return to a restarted server at once.
- * `failures` in a row, from 1; `random` from 0 to 1.
+ * Pause before the next attempt, ms: doubled with each failure up to 15 s. A random factor of 0.5 to 1
+ * keeps a hundred screens from returning to a restarted server all at once. `failures` in a row, from
+ * 1; `random` from 0 to 1.
  */
 export function backoffMs(failures: number, random: number, closeCode: number | null): number {
   const doubled = FIRST_MS * 2 ** Math.min(failures - 1, 10);

@@ -12,18 +12,18 @@ import {
 } from './machine';
 
 interface ConnectionHandlers {
-  /** The connection changed, or a deadline passed and its phase may have. */
+  /** The connection changed, or a deadline passed and its phase may have changed. */
   readonly onConnection: (connection: Connection) => void;
   readonly onFrame: (frame: Frame, connection: Connection) => void;
-  /** A message came that is no frame of the contract, and why it is none; it has been dropped. */
+  /** A message that violates the contract was dropped; `why` says how. */
   readonly onBad: (why: string) => void;
-  /** A socket closed that never opened: the server is away, or it wants to know who is there. */
+  /** A socket closed without opening: the server is down, or requires sign-in. */
   readonly onRefused: () => void;
 }
 
 export type Link = ReturnType<typeof connect>;
 
-/** The thin shell around `machine.ts`: one socket, one timer, the browser's wake-up events. */
+/** Runs `machine.ts` with one socket, one timer and the browser's wake-up events. */
 export function connect(url: string, handlers: ConnectionHandlers) {
   let connection = INITIAL;
   let socket: WebSocket | null = null;
@@ -44,7 +44,7 @@ export function connect(url: string, handlers: ConnectionHandlers) {
     send({ type, now: now() });
   };
 
-  // Handlers are taken off before closing: a dropped socket that still speaks is not heard.
+  // Remove the handlers before closing, so that a dropped socket delivers nothing more.
   const drop = (): void => {
     if (!socket) return;
     socket.onopen = socket.onmessage = socket.onclose = null;
@@ -56,7 +56,7 @@ export function connect(url: string, handlers: ConnectionHandlers) {
     let isOpened = false;
     const own = new WebSocket(url);
     socket = own;
-    // A look at the clock may find that time has lapsed, and end this very socket.
+    // Reading the clock may detect a lapse, which replaces this very socket.
     const look = (): number | null => {
       const at = now();
       return socket === own ? at : null;
@@ -80,8 +80,8 @@ export function connect(url: string, handlers: ConnectionHandlers) {
       if (parsed.kind === 'passed over') return;
       if (parsed.kind === 'bad') {
         handlers.onBad(parsed.why);
-        // What it would have changed is lost, and later deltas build on it: a new connection
-        // begins with a full state.
+        // Its changes are lost, and later deltas build on them: reconnect, which starts with a
+        // full state.
         if (parsed.isDelta) tell('broken');
         return;
       }
@@ -116,8 +116,8 @@ export function connect(url: string, handlers: ConnectionHandlers) {
 }
 
 /**
- * Leaves for the sign-in page if the server asks for a token: a refused WebSocket does not tell a
- * page why, so one more question does. A server that is merely away changes nothing.
+ * Goes to the sign-in page if the server requires a token. A refused WebSocket does not say why, so this
+ * asks over HTTP; a server that is merely down changes nothing.
  */
 export async function signInIfAsked(leave: (url: URL) => void = goTo): Promise<void> {
   const answer = await fetch(route('readyz'), { cache: 'no-store' }).catch(() => null);

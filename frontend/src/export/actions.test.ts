@@ -11,7 +11,7 @@ import { readings, stateFrame, wireTag } from '../testing/tags';
 import { drawFooter, type Footer, FOOTER_PX, saveMap, saveTable } from './actions';
 import { fileName } from './save';
 
-// Half an hour off the full one, and set before any module looks at the clock.
+// A half-hour offset, set before any module reads the clock.
 vi.hoisted(() => {
   vi.stubEnv('TZ', 'Asia/Kolkata');
 });
@@ -89,7 +89,7 @@ describe('table as a file', () => {
 test('a picture is taken of layers that are as on paper', async () => {
   const layer = document.createElement('canvas');
   layer.dataset['layer'] = 'still';
-  // As the map leaves it where the table is in front: drawn twice as fine, and of no size.
+  // A hidden map's canvas: drawn at twice the resolution, but without a layout size.
   layer.width = layer.height = 20;
   layer.style.width = '10px';
   document.body.append(layer);
@@ -108,7 +108,7 @@ test('a picture is taken of layers that are as on paper', async () => {
     return canvas ? (FakeContext.recordOf(canvas)?.named('drawImage').length ?? 0) : 0;
   };
   await saveMap();
-  // Nobody draws a map here, so nothing was shown to take.
+  // No map is mounted, so there was nothing to draw.
   expect(drawn()).toBe(0);
   const take = (draw: () => void): void => {
     draw();
@@ -138,7 +138,7 @@ describe('of another moment', () => {
 });
 
 test('a file’s name sorts by time and is legal everywhere', () => {
-  // On the clock of who saves it, like the time in the picture.
+  // In the browser's time zone, like the time in the picture.
   expect(fileName('map', 'png', Date.UTC(2026, 4, 1, 8, 33, 22))).toBe(
     'lupin-twin-map-2026-05-01T14-03-22.png',
   );
@@ -166,7 +166,7 @@ const texts = (): unknown[] => context.named('fillText').map(({ args }) => args[
 test('says what, of when, between which values, and how long a metre is', () => {
   drawFooter(context.asContext(), 360, footer, colours);
   expect(texts()).toEqual(['Temperature', footer.time, '1 m', '20.0', '31.0\u00a0°C']);
-  // The bar is as long as the metre that it stands for.
+  // The scale bar is one metre long: 40 pixels.
   const [from] = context.named('moveTo').map(({ args }) => Number(args[0]));
   const to = Math.max(...context.named('lineTo').map(({ args }) => Number(args[0])));
   expect(to - (from ?? NaN)).toBe(40);
@@ -192,7 +192,7 @@ test('nothing of it leaves a phone’s width or covers anything else', () => {
   drawFooter(context.asContext(), 360, { ...footer, scale: 69 }, colours);
   const ends = context.named('fillText').at(-1)?.args ?? [];
   const left = Math.min(...context.named('moveTo').map(({ args }) => Number(args[0])));
-  // The fake letters are 6 pixels wide.
+  // The fake context's letters are 6 pixels wide.
   expect(Number(ends[1]) + 6 * String(ends[0]).length).toBeLessThan(left);
   for (const { args } of context.named('fillText')) {
     expect(Number(args[2])).toBeLessThan(FOOTER_PX);

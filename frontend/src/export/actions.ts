@@ -1,4 +1,4 @@
-/** The exports, as buttons and menu call them. */
+/** Export actions, for buttons and the menu. */
 import { epochOf, now as pageNow, timeZone } from '../clock';
 import { differenceText, divergingColours, signedText } from '../domain/difference';
 import { readingText, valueText, written } from '../domain/format';
@@ -27,8 +27,8 @@ import { LANGUAGE, S } from '../strings';
 import { fileName, save, saveCsv } from './save';
 
 /**
- * The table as the operator sees it, filtered and sorted; ages are those of the state's time. Asked
- * for in the page's first moments, it comes once the sensors' own names and units are there.
+ * Saves the table as shown, filtered and sorted; ages are as of the state's time. If called before the
+ * sensors' names and units are loaded, it waits for them.
  */
 export function saveTable(): void {
   const isKnown = (): boolean => store.get().twin.sensors.state !== 'waiting';
@@ -58,14 +58,14 @@ function writeTable(): void {
   saveCsv('tags', text, epochOf(snapshot.takenAt), moment);
 }
 
-/** The map as the operator sees it, with a footer that says what, when and how large. */
+/** Saves the map as shown, with a footer: title, time, colours and scale bar. */
 export async function saveMap(): Promise<void> {
   const layers = [...document.querySelectorAll<HTMLCanvasElement>('canvas[data-layer]')];
   const [first] = layers;
   const state = store.get();
   const { snapshot, moment } = selectShown(state);
   if (!first || first.width === 0 || !snapshot) return;
-  // Not as it is laid out: behind the table of a phone it has no size.
+  // Not from the layout: on a phone, the map has no size behind the table.
   const ratio = first.width / (parseFloat(first.style.width) || first.width);
   const style = getComputedStyle(document.documentElement);
   const canvas = newCanvas(first.width, first.height + FOOTER_PX * ratio);
@@ -82,13 +82,13 @@ export async function saveMap(): Promise<void> {
   const label = shown(sensor.label, 32);
   const { difference, range: change } = selectHeat(state) ?? {};
   const origin = selectOrigin(state);
-  // Of a run with a time of its own: that, and not when it came here.
+  // A recording or simulation has its own time: use that, not when the data arrived.
   const then = moment ?? (selectHasOwnTime(state) ? secondsOf(snapshot.at) : null);
   const time = then === null ? dateText(takenAt) : S.asOf(rosText(then));
   const colour = sensorColour(sensor);
   const footer: Footer = {
     scale: state.viewport.view.scale,
-    // The pins' colours above those of the heat map, as in the page's legend.
+    // Pin colours above heat-map colours, as in the page's legend.
     ramps: [1, sensor.maxAlpha].map((most) => [rgbText(colour, 0), rgbText(colour, most)]),
     ...(difference && change
       ? {
@@ -125,7 +125,7 @@ export async function saveMap(): Promise<void> {
   if (blob) save(blob, fileName('map', 'png', takenAt, moment));
 }
 
-/** Below the map in a saved picture. */
+/** Height of the footer below a saved map. */
 export const FOOTER_PX = 56;
 const EDGE_PX = 14;
 const GAP_PX = 8;
@@ -136,15 +136,15 @@ const FONT = '13px "Inter Variable", system-ui, sans-serif';
 export interface Footer {
   readonly title: string;
   readonly time: string;
-  /** The ramp's two ends, the upper one with its unit; null: there is no reading. */
+  /** Values at the ramp's ends, the upper one with its unit; null: no reading. */
   readonly ends: readonly [low: string, high: string] | null;
-  /** Below each other, each from the lowest to the highest. */
+  /** Stacked from the top, each from the lowest to the highest colour. */
   readonly ramps: readonly (readonly string[])[];
-  /** Pixels a metre. */
+  /** Pixels per metre. */
   readonly scale: number;
 }
 
-/** Draws in a strip `width` wide and FOOTER_PX high, whose upper left corner is the origin. */
+/** Draws the footer into a strip of `width` × FOOTER_PX, from the origin. */
 export function drawFooter(
   context: CanvasRenderingContext2D,
   width: number,
@@ -207,17 +207,17 @@ function drawRamp(
   context.strokeRect(x - 0.5, y - 0.5, width + 1, height + 1);
 }
 
-/** Of the view as it is: that of the page comes behind, and waits while the past is played. */
+/** The current view's URL; the address bar lags behind it, and waits during playback. */
 export function viewAddress(): URL {
   const url = new URL(window.location.href);
   url.hash = toFragment(store.get().view);
   return url;
 }
 
-/** Copies the address of this view; true when the clipboard took it. */
+/** Copies the view's URL; false if there is no clipboard or it refused. */
 export async function copyLink(): Promise<boolean> {
-  // Only secure contexts have a clipboard, and a greenhouse's plain http is none: hence the
-  // look at a property whose type claims that it is always there.
+  // Only secure contexts have a clipboard, and a greenhouse's plain http is none; the type claims
+  // that it always exists.
   const clipboard = navigator.clipboard as Clipboard | undefined;
   if (!clipboard) return false;
   return clipboard.writeText(viewAddress().href).then(
@@ -227,10 +227,10 @@ export async function copyLink(): Promise<boolean> {
 }
 
 const SHIFT_S = 8 * 3_600;
-/** The bridge reports of no longer a period. */
+/** Longest period that the bridge reports on. */
 const LONGEST_S = 31 * 86_400;
 
-/** The address of the shift report: of the period chosen on the time bar, else of the last eight hours. */
+/** URL of the shift report, for the period chosen on the time bar, else the last eight hours. */
 export function reportLink(): string {
   const state = store.get();
   const now = rosNow(state, pageNow());
@@ -245,7 +245,7 @@ export function reportLink(): string {
   return `api/report.html?${query.toString()}`;
 }
 
-/** In whole seconds; what is to come is no part of it. */
+/** The report's span in whole seconds, clipped to now and `LONGEST_S`. */
 export function reported(span: Span | null, now: number): Span {
   const to = Math.max(1, Math.floor(Math.min(span?.to ?? now, now)));
   const from = Math.floor(span?.from ?? to - SHIFT_S);

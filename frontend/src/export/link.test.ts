@@ -13,7 +13,7 @@ test('without a clipboard copying says no instead of failing', async () => {
   vi.stubGlobal('navigator', { clipboard: { writeText } });
   expect(await copyLink()).toBe(true);
   expect(writeText).toHaveBeenLastCalledWith(window.location.href);
-  // While the past is played, the address of the page waits.
+  // The address bar waits during playback.
   act(withTag('a/b #'));
   act({ moment: 9 });
   await copyLink();

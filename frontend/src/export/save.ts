@@ -6,7 +6,7 @@ export function save(blob: Blob, name: string): void {
   link.href = URL.createObjectURL(blob);
   link.download = name;
   link.click();
-  // The download has its own reference by then; a minute is ample for a slow one to start.
+  // By then the download holds its own reference; a minute is enough for a slow start.
   setTimeout(() => {
     URL.revokeObjectURL(link.href);
   }, 60_000);
@@ -25,8 +25,8 @@ export const saveCsv = (
 };
 
 /**
- * A name that sorts by time and is legal everywhere, local time: 2026-05-01T14-03-22. `moment`, ROS
- * seconds: of what was then, and the name says so.
+ * A file name that sorts by time and is valid on every system, in local time: 2026-05-01T14-03-22.
+ * With a past `moment`, ROS seconds, it has that time and "-past".
  */
 export function fileName(
   kind: string,

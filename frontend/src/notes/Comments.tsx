@@ -10,16 +10,16 @@ import { selectShown } from '../store/moment';
 import { Disclosure, useClose } from '../widgets/controls';
 import { C, standingNotes, type StandingNote } from './NoteMarks';
 
-/** Of one subject, the newest. */
+/** Most comments shown per subject: the newest. */
 const MOST_SHOWN = 20;
 
-/** What was said of a subject until the moment that is shown; who may write says more. */
+/** A subject's comments up to the shown moment, and a form for users who may write. */
 export function Comments({
   subject,
   name,
 }: {
   subject: string;
-  /** What it is about, for a screen reader. */
+  /** The subject's name, for screen readers. */
   name: string;
 }): JSX.Element {
   const mayWrite = useSelected(person, (who) => who?.can_write_notes === true);
@@ -57,7 +57,7 @@ export function Comments({
   );
 }
 
-/** What was said of a subject until a moment, ROS seconds; null: until now. */
+/** A subject's comments up to a moment, ROS seconds; null: up to now. */
 export function CommentList({
   subject,
   moment,
@@ -125,7 +125,7 @@ export function CommentField({
   onDone,
 }: {
   subject: string;
-  /** What the comment is about, ROS seconds; null: now. */
+  /** The time that the comment is about, ROS seconds; null: now. */
   moment: number | null;
   onDone: () => void;
 }): JSX.Element {
@@ -163,7 +163,7 @@ export function CommentField({
           }}
           onKeyDown={(event) => {
             if (event.key !== 'Escape') return;
-            // It has been of use here, and is not to close the tag's card too.
+            // Handled here: it must not close the tag card too.
             event.preventDefault();
             onDone();
           }}
@@ -177,7 +177,7 @@ export function CommentField({
   );
 }
 
-/** Beside the time bar: a word about the greenhouse, at the moment that the page shows. */
+/** Beside the time bar: a comment about the greenhouse at the shown moment. */
 export function SiteComment(): JSX.Element | null {
   const mayWrite = useSelected(person, (it) => it?.can_write_notes === true);
   if (!mayWrite) return null;

@@ -1,4 +1,4 @@
-/** The notes of the log, fetched whenever there are more of them, and their marks above a time axis. */
+/** The journal's notes, fetched whenever their number grows, and their marks above a time axis. */
 import { type JSX, useMemo } from 'react';
 
 import { fetchNotes } from '../contract/people';
@@ -12,7 +12,7 @@ import { COMMENTS } from '../words/comments';
 
 export type StandingNote = ReturnType<typeof standing>[number];
 
-/** What stands, the oldest moment first. */
+/** Notes that were not withdrawn, the oldest moment first. */
 export const standingNotes = createStore<readonly StandingNote[]>([]);
 
 export const standing = (notes: readonly Note[]) =>
@@ -20,9 +20,9 @@ export const standing = (notes: readonly Note[]) =>
     .filter(({ withdrawn_by: by }) => by === null)
     .map(({ id, kind, subject, text, by, made_at: made, until }) => ({
       ...{ id, kind, subject, by, text: text.replace(/\s+/g, ' ') },
-      /** The moment that it is about, ROS seconds. */
+      /** The time that the note is about, ROS seconds. */
       at: secondsOf((kind === 'comment' ? until : null) ?? made),
-      /** Of `shelve` its end, ROS seconds; null: the alarm is not shelved any more. */
+      /** End of a `shelve`, ROS seconds; null: the alarm was unshelved. */
       until: until && secondsOf(until),
     }))
     .reverse()
@@ -39,14 +39,14 @@ export const startNotes = (): (() => void) =>
       },
     },
     ({ twin: { alarms, connection } }) =>
-      // A log without notes is not asked for any.
+      // A journal without notes needs no request.
       alarms?.notes ? { key: `${connection.epoch}|${alarms.notes}`, run: fetchNotes } : undefined,
   );
 
-/** Nearer than this, as a share of the span, marks would cover each other. */
+/** Marks closer than this share of the span would overlap. */
 const NEAR = 0.02;
 
-/** Those so near to each other that one mark stands for them; from the oldest, as `found` is. */
+/** Clusters of notes that share one mark; sorted from the oldest, like `found`. */
 export function clustersOf(found: readonly StandingNote[], { from, to }: Span) {
   const clusters: { at: number; notes: StandingNote[] }[] = [];
   for (const one of found) {
@@ -61,7 +61,7 @@ export function clustersOf(found: readonly StandingNote[], { from, to }: Span) {
 
 export const C = COMMENTS[LANGUAGE];
 
-/** Which tag it is about; null: the greenhouse, or an alarm that the page does not know. */
+/** The tag of a note's subject; null: the greenhouse, or an alarm unknown to the page. */
 export function tagIdOf(subject: string, alarms: readonly Alarm[]): string | null {
   const [kind, id] = [
     subject.slice(0, subject.indexOf(':')),
@@ -87,18 +87,18 @@ function noteText({ kind, text, until }: StandingNote): string {
   return text === '' ? what : `${what}: ${text}`;
 }
 
-/** Notes that the text of one mark holds. */
+/** Most notes in the text of one mark. */
 const MOST_NOTES = 5;
 const LONGEST = 160;
 const NO_ALARMS = [] as const;
 
-/** Above a time axis: who said, acknowledged or shelved what, and when. A click goes there. */
+/** Marks above a time axis: who commented, acknowledged or shelved what; a click goes to that moment. */
 export function NoteMarks({
   span,
   tagIds,
 }: {
   span: Span;
-  /** Of these tags and of the greenhouse; none: all. */
+  /** Limits the notes to these tags and the greenhouse; undefined: all. */
   tagIds?: readonly string[];
 }): JSX.Element | null {
   const all = useSelected(standingNotes);

@@ -45,7 +45,7 @@ beforeEach(() => {
   });
 });
 
-/** A frame: the log has so many notes. */
+/** Receives a frame saying that the journal has this many notes. */
 const tell = (count: number): void => {
   flush(() => {
     receive({ alarms: { ...alarms([alarm('cold')]), notes: count } });

@@ -175,7 +175,7 @@ describe('legend', () => {
     render(<Legend kiosk={false} />);
     expect((await screen.findByTestId('error-high')).textContent).toBe(`±${NBSP}3.3${NBSP}°C`);
     expect(text('error-scale')).toContain('Uncertainty of the estimate');
-    // Its sensor is named once.
+    // The sensor is named once.
     expect(text('legend').match(/Temperature/g)).toHaveLength(1);
     expect(screen.queryByTestId('ideal-scale')).toBeNull();
     expect(screen.queryByTestId('estimate-key')).toBeNull();

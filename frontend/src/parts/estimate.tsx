@@ -33,7 +33,7 @@ import { estimateWordsOf } from '../words/estimate';
 
 const NOT_FOUND = 404;
 
-/** How sure the estimate in view is, and how well it has foretold; or why there is none. */
+/** The shown estimate's uncertainty and prediction record; or why there is no estimate. */
 export function EstimateFacts(): JSX.Element {
   const sensor = useApp(selectSensor);
   const unit = useApp((state) => state.settings.unit);
@@ -78,7 +78,7 @@ function Missing({ why, grade }: { why: NoEstimate; grade: Grade | null }): JSX.
   );
 }
 
-/** Of fewer than ten scans each counts. */
+/** "n of ten" predictions that held; with fewer than ten scans, of their number. */
 function foretoldText({ day, share_day: share }: Grade): string {
   if (share === null) return E.foretoldNone;
   return day.scans < 10
@@ -101,14 +101,14 @@ function Foretold({ grade, isNow }: { grade: Grade; isNow: boolean }): JSX.Eleme
           {E.notTrusted(Math.floor(least * 10))}
         </strong>
       )}
-      {/* Of now, whatever moment is shown: beside another one it would be taken for that of then. */}
+      {/* The grade is always current: beside a past moment, it would be taken for that moment's. */}
       {isNow && <span data-testid="foretold">{foretoldText(grade)}</span>}
       <More label={E.about} text={behind.join(' ')} />
     </>
   );
 }
 
-/** The estimate at a point with its error, and what it has to go by there. */
+/** The estimate at a point with its error, and the number and age of the readings near it. */
 export function EstimateReadout({
   point,
   field,
@@ -117,7 +117,7 @@ export function EstimateReadout({
 }: {
   point: MapPoint;
   field: Field;
-  /** Of the cell that holds the point; null: it is not known. */
+  /** Value of the cell at the point; null: unknown. */
   value: number | null;
   isError: boolean;
 }): JSX.Element {
@@ -149,12 +149,12 @@ export function EstimateReadout({
   );
 }
 
-/** As far as what is read at one place is usually like what is read at another, metres. */
+/** Distance within which readings are usually alike, metres. */
 export const NEAR_M = 2.5;
 
 /**
- * The tags with a reading of the sensor within reach, and when the oldest of these was made; "never": there is none.
- * Not those that the estimate leaves out.
+ * Number of tags with a reading within `NEAR_M`, and the time of the oldest one; "never": there is none.
+ * Readings left out of the estimate do not count.
  */
 export function nearTo(
   point: MapPoint,
@@ -202,7 +202,7 @@ export function ErrorScale(): JSX.Element {
   );
 }
 
-/** What was measured at a tag against what all else foretells for it, and what was left out. */
+/** A tag's reading beside the estimate from all other readings, and readings left out of the estimate. */
 export function CardEstimate({
   tag,
   health,
@@ -213,7 +213,7 @@ export function CardEstimate({
   const sensor = useApp(selectSensor);
   const catalogue = useApp(selectCatalogue);
   const unit = useApp((state) => state.settings.unit);
-  // Of the past nobody tells what was expected.
+  // Expected values exist for now only.
   const isNow = useApp((state) => selectShown(state).moment === null);
   const expected = useAsked('ExpectedTags', 'tags').value?.tags ?? {};
   const own = isNow && Object.hasOwn(expected, tag.id) ? expected[tag.id] : undefined;
@@ -242,10 +242,10 @@ export function CardEstimate({
   );
 }
 
-/** More nobody buys at once. */
+/** Number of suggested places: few buy more sensors at once. */
 const PLACES = 5;
 
-/** Where another tag would help: numbers on the map, which are a list to who does not see it. */
+/** Where another tag would help: numbers on the map, a list for screen readers. */
 export function AdviceMarks(): JSX.Element {
   const isNow = useApp((state) => selectShown(state).moment === null);
   const { value, state, message } = useAsked('Advice', 'advice', PLACES);
@@ -279,7 +279,7 @@ function Mark({ place, number }: { place: Place; number: number }): JSX.Element 
       data-side={x > width / 2 ? 'left' : 'right'}
       data-in-view={isInView}
     >
-      {/* A button, so that the keyboard comes to what a mouse that rests on it is told. */}
+      {/* A button, so that the keyboard reaches the text that a mouse shows by hovering. */}
       <button type="button" aria-label={`${number}. ${text}`}>
         <span aria-hidden="true">{number}</span>
       </button>
@@ -296,13 +296,13 @@ const Note = ({ text }: { text: string }): JSX.Element => (
   </p>
 );
 
-/** As exact as a value, unless nothing would be left of it. */
+/** Rounded like a value, unless that would round it to zero. */
 function errorNumber(sensor: Sensor, sd: number, unit: TemperatureUnit): string {
   const text = differenceNumber(sensor, plusMinus(sd), unit);
   return /[1-9]/.test(text) ? text : numberText(differenceToShown(sensor, plusMinus(sd), unit));
 }
 
-/** Half the width of the range that nine of ten values lie in: "1.3 °C". */
+/** Half the width of the 90 % interval: "1.3 °C". */
 export const errorText = (sensor: Sensor, sd: number, unit: TemperatureUnit): string =>
   withUnit(sensor, errorNumber(sensor, sd, unit), unit);
 
@@ -319,12 +319,12 @@ export const estimateText = (
     unit,
   );
 
-/** What the twin says of its estimate changes slowly. */
+/** Polling interval: the twin's answers about its estimate change slowly. */
 const EVERY_MS = 10_000;
 
 /**
- * What the bridge answers about the sensor in view, asked again now and then while it is connected:
- * one question at a time, beside the frames. Of another sensor nothing is left.
+ * The bridge's answer about the shown sensor, polled over HTTP while connected, one request at a time.
+ * The answer about another sensor is dropped.
  */
 function useAsked<Name extends 'EstimateQualities' | 'ExpectedTags' | 'Advice'>(
   name: Name,

@@ -16,11 +16,11 @@ import { S } from '../strings';
 import { Check } from '../widgets/controls';
 import { useTicking } from '../widgets/useNow';
 
-/** A position that is older never looks like one of now, s. */
+/** An older position never looks live, s. */
 const LIVE_S = 10;
 const FADE_S = 10;
 
-/** Where the robot is, has been and will be; to who does not see it, `RobotFact` says so. */
+/** The robot's position, trail and plan; `RobotFact` has them in words for screen readers. */
 export function RobotLayer(): ReactPortal | null {
   const { position, plan } = useRobot();
   const view = useApp((state) => state.viewport.view);
@@ -35,7 +35,7 @@ export function RobotLayer(): ReactPortal | null {
   const cutAt = useApp((state) =>
     selectIsCut(state) ? selectNewest(state).snapshot?.takenAt : undefined,
   );
-  // Cut off, the banner says how old all is: only what was old by then has more to say.
+  // Without a connection, the banner gives the age; the mark ages only if it was old before.
   const isLive = useTicking((now) => ((ageAt(cutAt ?? now) ?? LIVE_S) < LIVE_S ? 'live' : 'old'));
   const time = useTicking((now) => {
     const known = timeOf(store.get(), now);
@@ -51,7 +51,7 @@ export function RobotLayer(): ReactPortal | null {
     points.map((point) => point.join(',')).join(' ');
   const map = document.getElementById('map-view');
   if (!map) return null;
-  // Within the map: below all that stands on it.
+  // Inside the map, below everything drawn over it.
   return createPortal(
     <>
       <svg className="robot-layer" aria-hidden="true" data-testid="robot" data-looks={looks}>
@@ -93,7 +93,7 @@ export function RobotLayer(): ReactPortal | null {
 
 const metres = (value: number): string => written(value.toFixed(1));
 
-/** All of it in words: for the legend, and for who does not see the map. */
+/** Position and battery in words, for the legend and screen readers. */
 export function robotText({ position, battery }: RobotNow, time: number | null): string {
   const ago = (age: number | null): string =>
     age === null ? S.robotAgeUnknown : S.agoSuffix(ageText(age));
@@ -138,20 +138,20 @@ const NOTHING: RobotNow = { position: null, plan: null, battery: null };
 
 export const useRobot = (): RobotNow => useSelected(robotFrame, (frame) => frame ?? NOTHING);
 
-/** The twin's time, ROS seconds; null where no age is known. */
+/** The twin's time, ROS seconds; null: ages are unknown. */
 const timeOf = (state: AppState, now: number): number | null =>
   selectShown(state).ageing.kind === 'unknown' ? null : rosNow(state, now);
 
-/** Seconds; null: nobody knows. */
+/** Age in seconds; null: unknown. */
 export function ageOf(stamp: WireTime, time: number | null): number | null {
   const at = secondsOf(stamp);
   return time === null || at === 0 ? null : ageSeconds(at * 1_000, time * 1_000);
 }
 
-/** Between two tries to get the trail, ms. */
+/** Pause between attempts to fetch the trail, ms. */
 const PACE_MS = 5_000;
 
-/** Where the robot has been: as the bridge has it, and what was heard since. */
+/** The robot's trail: fetched from the bridge, then extended by received positions. */
 function useTrail(): readonly TrailPoint[] {
   const [trail, setTrail] = useState<readonly TrailPoint[]>([]);
   useEffect(() => {
@@ -181,18 +181,18 @@ function useTrail(): readonly TrailPoint[] {
 
 type Position = NonNullable<RobotNow['position']>;
 
-/** As the bridge keeps them: no closer in place, nor in time. */
+/** Least distance and time between two points of the trail, as in the bridge. */
 const STEP_M = 0.1;
 const STEP_S = 1;
-/** Longer, and the trail of a patrol hides what it crosses. */
+/** Length of the trail: a longer one hides what the patrol crosses. */
 const TRAIL_S = 120;
-/** More than the bridge keeps of an hour; past it the oldest go. */
+/** Most points, more than the bridge retains for an hour; beyond it, the oldest are dropped. */
 const MOST_POINTS = 2_000;
-/** Where nothing was heard for so long, and it is far away then, nobody knows how it went there. */
+/** After a gap longer and farther than this, the way between is unknown: the line breaks. */
 const GAP_S = 60;
 const GAP_M = 1;
 
-/** ROS seconds, metres. */
+/** Position in metres, time in ROS seconds. */
 export type TrailPoint = ReturnType<typeof trailPoint>;
 
 const trailPoint = ({ x, y, observed_at: at }: Robot['trail'][number]) => ({
@@ -201,11 +201,11 @@ const trailPoint = ({ x, y, observed_at: at }: Robot['trail'][number]) => ({
   at: secondsOf(at),
 });
 
-/** The trail with one position more; the same one where that is too near. */
+/** The trail with one more position; unchanged if that is too close in place or time. */
 export function extended(trail: readonly TrailPoint[], position: Position): readonly TrailPoint[] {
   const next = trailPoint(position);
   const last = trail.at(-1);
-  // A clock that went back: what was later is of no time any more.
+  // The clock went back, so later points have no valid time.
   if (last && next.at < last.at - GAP_S) return [next];
   if (last && (next.at < last.at + STEP_S || apart(last, next) < STEP_M)) return trail;
   return [...trail.slice(1 - MOST_POINTS), next];
@@ -214,8 +214,8 @@ export function extended(trail: readonly TrailPoint[], position: Position): read
 export const STEPS = 6;
 
 /**
- * The trail in lines that are alike in age, from step 0, now, to 5, two minutes ago. Null: the time is not
- * known, and all is the oldest.
+ * The trail as lines of similar age, from step 0 (now) to 5 (two minutes ago). `now` null: the time is
+ * unknown, and everything counts as oldest.
  */
 export function trailLines(trail: readonly TrailPoint[], now: number | null) {
   const lines: { points: [number, number][]; step: number }[] = [];
@@ -237,7 +237,7 @@ export function trailLines(trail: readonly TrailPoint[], now: number | null) {
   return lines.filter(({ points }) => points.length > 1);
 }
 
-/** What is left of the way from where the robot is: from the part of it that it is nearest to. */
+/** The rest of the plan, from the robot's position and the segment nearest to it. */
 export function wayAhead(
   points: readonly (readonly number[])[],
   position: { readonly x: number; readonly y: number } | null,
@@ -260,7 +260,7 @@ export function wayAhead(
 
 type Place = readonly [number, number];
 
-/** How far a point is from a stretch between two others. */
+/** Distance from a point to a line segment. */
 function distanceTo({ x, y }: { x: number; y: number }, from: Place, to: Place): number {
   const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
   const length = dx * dx + dy * dy;

@@ -51,7 +51,7 @@ test('a pest is no ring, one that is gone is; who needs somebody is on top', () 
   const cleared = drawn({ buckets: [{ ...both, pests_seen: 0 }] });
   expect(marks(cleared)).toEqual(['cleared']);
   expect(cleared.querySelector('circle')).not.toBeNull();
-  // Beside it without room, before it or behind.
+  // Too close to fit, before it or after it.
   const close = [
     { ...NOTHING, start: 149.4, pests_cleared: 1 },
     { ...NOTHING, start: 150, pests_seen: 1 },
@@ -86,7 +86,7 @@ test('a clock that began anew is a line of its own', () => {
   ];
   expect(marks(drawn({ runs }))).toEqual(['run']);
   expect(marks(drawn({}))).toEqual([]);
-  // Nor does one stay of a bar that had no width yet.
+  // No stale marks after a first render without width.
   const timeline = timelineWith({ runs: [...runs, { from: 180, to: 200 }] });
   const bar = (width: number): JSX.Element => (
     <Bar axis={{ ...AXIS, width }} timeline={timeline} columns={[]} />

@@ -4,7 +4,7 @@ import { hasDate } from '../domain/time';
 import { type Tick, type Timeline, timeTicks } from '../domain/timeline';
 import { type Axis, type Column, runStarts, stretchesOf, xOf } from './axis';
 
-/** Heights from the top, CSS pixels: marks of pests, bars of scans, bars of failures, times. */
+/** Heights from the top, CSS pixels: pest marks, scan bars, failure bars, times. */
 const MARKS_PX = 14;
 const SCANS_PX = 24;
 const FAILURES_PX = 8;
@@ -14,18 +14,18 @@ export const BAR_PX = MARKS_PX + SCANS_PX + FAILURES_PX + TICKS_PX;
 const BASE_PX = MARKS_PX + SCANS_PX;
 const FLOOR_PX = BASE_PX + FAILURES_PX;
 const MARK_WIDTH_PX = 10;
-/** Room that the text of a time needs, CSS pixels; and one of its letters, of the page's text. */
+/** Room for one time, CSS pixels; and the width of one of its characters, rem. */
 const TICK_ROOM_PX = 76;
 const LETTER = 0.4;
 
-/** The bar's picture. Each mark has a shape and a place of its own; colour comes on top. */
+/** The time bar's picture. Marks differ by shape and place, not by colour alone. */
 export const Bar = memo(function Bar({
   axis,
   timeline,
   columns,
 }: {
   axis: Axis;
-  /** Null: it has not come yet. */
+  /** Null: not loaded yet. */
   timeline: Timeline | null;
   columns: readonly Column[];
 }): JSX.Element {
@@ -82,7 +82,7 @@ function Counts({ column }: { column: Column }): JSX.Element {
   return (
     <>
       {scans > 0 && <rect {...bar} y={BASE_PX - scans} height={scans} data-mark="scans" />}
-      {/* Without a gap: side by side they are one low mark, and no row of teeth. */}
+      {/* Without a gap, so that neighbours form one low mark instead of a row of teeth. */}
       {failures > 0 && (
         <rect {...{ x, width }} y={BASE_PX + 1} height={failures} data-mark="failures" />
       )}
@@ -90,13 +90,13 @@ function Counts({ column }: { column: Column }): JSX.Element {
   );
 }
 
-/** Where they have no room beside each other, that which needs somebody stays. */
+/** Pest marks that fit; where two would overlap, the one that needs attention stays. */
 function marksOf(columns: readonly Column[], barWidth: number) {
   const marks: { readonly kind: 'pest' | 'cleared'; readonly at: number }[] = [];
   for (const kind of ['pest', 'cleared'] as const) {
     for (const { x, width, pests_seen, pests_cleared } of columns) {
       const count = kind === 'pest' ? pests_seen : pests_cleared;
-      // Whole, also at the end of the bar.
+      // Not cut off at the bar's end.
       const at = Math.min(x + width / 2, barWidth - 5);
       if (count === 0 || marks.some((other) => Math.abs(other.at - at) < MARK_WIDTH_PX)) continue;
       marks.push({ kind, at });
@@ -120,13 +120,13 @@ const Times = ({ axis, ticks }: { axis: Axis; ticks: readonly Tick[] }): JSX.Ele
   </>
 );
 
-/** Where the text of each begins; null: it has no room. */
+/** Ticks with their text's left edge; null: no room for the text. */
 function timesOf(axis: Axis, ticks: readonly Tick[]) {
   const letterPx = LETTER * (parseFloat(getComputedStyle(document.documentElement).fontSize) || 16);
   let free = 0;
   return ticks.map((tick) => {
     const x = Math.round(xOf(axis, tick.at)) + 0.5;
-    // The date stands beside the first time of a day.
+    // The date goes beside a day's first time.
     const text = tick.text.split('\n').reverse().join(' ');
     const width = text.length * letterPx;
     const left = Math.min(axis.width - width, Math.max(0, x - width / 2));

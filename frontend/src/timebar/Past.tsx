@@ -17,11 +17,11 @@ import {
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
 
-/** In the header while the page shows another moment: which one, and the way back. */
+/** In the header while a past moment is shown: the moment, and a button back to live. */
 export function PastHeader(): JSX.Element | null {
   const moment = useApp((state) => selectShown(state).moment);
   const isLooking = useApp((state) => state.view.moment !== null);
-  // Of a twin that has no time nobody knows how long ago.
+  // Without the twin's time, it is unknown how long ago.
   const ago = useTicking((now) => {
     const nowS = rosNow(store.get(), now);
     return nowS === null || moment === null ? null : ageText(Math.max(0, nowS - moment));
@@ -32,14 +32,14 @@ export function PastHeader(): JSX.Element | null {
   return (
     <div className="past-header" data-testid="past-header">
       <span className="past-word">{S.past}</span>
-      {/* In place of the header's own mark, where a phone has no room for it. */}
+      {/* Replaces the header's origin note, which a phone has no room for. */}
       {origin !== null && (
         <span className="past-origin" aria-hidden="true">
           {S.origin[origin]}
         </span>
       )}
       <strong>{rosText(moment)}</strong>
-      {/* What counts on by itself is not read out each second. */}
+      {/* A running count must not be read out every second. */}
       {ago !== null && hasTime && (
         <span className="past-ago" aria-hidden="true">
           {S.agoSuffix(ago)}
@@ -66,12 +66,12 @@ function useOwnTime(): string | null {
   });
 }
 
-/** In the header: that what is shown is no robot's, or not of now; and of a recording, of when. */
+/** In the header: says that the data is simulated or recorded; for a recording, with its time. */
 export function OriginNote(): JSX.Element | null {
   const origin = useApp(selectOrigin);
   const isPast = useApp((state) => selectShown(state).moment !== null);
   const time = useOwnTime();
-  // In a demo a short one.
+  // Shortened in a demo.
   const dayS = useApp(selectDayS);
   if (origin === null) return null;
   return (
@@ -81,7 +81,7 @@ export function OriginNote(): JSX.Element | null {
         {dayS < DAY_S && <span className="origin-day"> · {S.originDay(intervalText(dayS))}</span>}
       </span>
       <span className="unseen">{S.originHint[origin]}</span>
-      {/* What counts on by itself is not read out each second. */}
+      {/* A running count must not be read out every second. */}
       {origin === 'recorded' && time !== null && !isPast && (
         <strong aria-hidden="true">{time}</strong>
       )}
@@ -89,7 +89,7 @@ export function OriginNote(): JSX.Element | null {
   );
 }
 
-/** Around the map, for eyes: the header tells everybody. */
+/** Frame around the map while not live; decorative, because the header says it in words. */
 export function PastFrame(): JSX.Element | null {
   const moment = useApp((state) => selectShown(state).moment);
   const isRecorded = useApp(selectIsRecorded);

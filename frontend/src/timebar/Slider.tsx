@@ -34,7 +34,7 @@ export function Slider({
   nowS: number;
 }): JSX.Element {
   const [pointed, setPointed] = useState<number | null>(null);
-  /** While it is dragged the bar stays where it is. */
+  /** Span held while dragging, so that the bar does not move. */
   const [held, setHeld] = useState<Span | null>(null);
   const element = useRef<HTMLDivElement>(null);
   const { width } = useSize(element);
@@ -78,7 +78,7 @@ export function Slider({
     const step = stepOf(event, axis);
     if (event.key === 'Home') go(from);
     else if (event.key === 'End') {
-      // What was fetched may end a moment before now, also where the period goes on with the time.
+      // A live period ends in now, even if the fetched span ends slightly before it.
       go(endsNow(store.get().view.period) || to >= nowS ? null : to);
     } else if (step !== null) go(stepped(axis, moment, step, nowS));
     else return;
@@ -141,7 +141,7 @@ export function Slider({
   );
 }
 
-/** What a key is worth, seconds; null: it is none of the bar's. */
+/** A key's step, seconds; null: the bar does not handle it. */
 function stepOf({ key, shiftKey }: KeyboardEvent, axis: Axis): number | null {
   const step = pixelS(axis) * (shiftKey ? FAR : 1);
   const page = (axis.to - axis.from) / PAGES;

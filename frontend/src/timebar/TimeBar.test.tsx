@@ -20,7 +20,7 @@ const remember = (from: number, to: number): void => {
   receive({ remembered: { value, state: 'ready', message: '' } });
 };
 
-/** A bar as wide as a screen. */
+/** Stub ResizeObserver: the bar is as wide as a screen. */
 class Laid {
   constructor(private readonly tell: (entries: readonly object[]) => void) {}
   observe = (): void => {
@@ -30,7 +30,7 @@ class Laid {
 }
 
 beforeEach(() => {
-  // The page's clock stands still.
+  // Freeze the page's clock.
   vi.spyOn(performance, 'now').mockReturnValue(performance.now());
   vi.stubGlobal('ResizeObserver', Laid);
   showTags([wireTag()]);
@@ -216,7 +216,7 @@ test('what could not be loaded is told, beside what is known', () => {
   render(<TimeBar />);
   expect(screen.getByTestId('timebar').textContent).toContain('too busy');
   expect(slider()).not.toBeNull();
-  // Cut off, the page says so above.
+  // Without a connection, the banner says so instead.
   flush(goLost);
   expect(screen.getByTestId('timebar').textContent).not.toContain('too busy');
 });
@@ -227,7 +227,7 @@ test('before the twin has told its time there is no bar', () => {
   expect(container.childElementCount).toBe(0);
 });
 
-// Half an hour off the full one, and set before any module looks at the clock.
+// A half-hour offset, set before any module reads the clock.
 vi.hoisted(() => {
   vi.stubEnv('TZ', 'Asia/Kolkata');
 });

@@ -14,7 +14,7 @@ import { useNow } from '../widgets/useNow';
 import { Slider } from './Slider';
 import { chooseSpeed, playback, SPEEDS, togglePlayback } from './playback';
 
-/** Under the map: when what happened, and the way to another moment. */
+/** The time bar below the map: what happened when, and a slider to other moments. */
 export function TimeBar(): JSX.Element | null {
   const remembered = useApp((state) => state.twin.remembered);
   const period = useApp((state) => state.view.period);
@@ -40,7 +40,7 @@ export function TimeBar(): JSX.Element | null {
       {period.kind === 'own' && <OwnPeriod period={period} isSimulated={!hasDate(nowS)} />}
       <NoteMarks span={span} />
       <Slider span={span} timeline={remembered.value} nowS={nowS} />
-      {/* Cut off, the banner says so. */}
+      {/* Without a connection, the banner says so. */}
       {remembered.state === 'failed' && !isCut && (
         <p className="timebar-note" role="status">
           {S.chartFailed(shown(remembered.message, 160))}
@@ -82,7 +82,7 @@ function Player(): JSX.Element {
   );
 }
 
-/** Where the bar stands: the moment that is wanted, which may still be on its way. The header has its year. */
+/** The chosen moment, which may still be loading; without its year, which the header has. */
 function When(): JSX.Element {
   const moment = useApp((state) => state.view.moment);
   const word = useApp(newestWord);
@@ -103,7 +103,7 @@ function PeriodChoice({ period, nowS }: { period: Period; nowS: number }): JSX.E
       options={[...PERIOD_KINDS, 'own'] as const}
       text={(kind) => S.timebarPeriods[kind]}
       onChange={(kind) => {
-        // An own period begins as what is in view.
+        // An own period starts as the visible span.
         const { from, to } = barSpan(store.get(), nowS);
         const own = { kind: 'own', from: Math.floor(from), to: Math.ceil(to) } as const;
         act({ period: kind === 'own' ? own : { kind } });
@@ -144,13 +144,13 @@ type Own = Extract<Period, { kind: 'own' }>;
 
 type Typed = Readonly<Record<'from' | 'to', string>>;
 
-/** Null: what is typed makes no period. */
+/** The typed period; null: invalid. */
 function periodOf(typed: Typed, isSimulated: boolean): Own | null {
   const [from, to] = [momentOf(typed.from, isSimulated), momentOf(typed.to, isSimulated)];
   return from === null || to === null || from >= to ? null : { kind: 'own', from, to };
 }
 
-/** From when to when; what makes no period is not in use, and says so. */
+/** Fields for an own period; an invalid one is not applied, and says so. */
 function OwnPeriod({ period, isSimulated }: { period: Own; isSimulated: boolean }): JSX.Element {
   const inForce = {
     of: period,
@@ -158,7 +158,7 @@ function OwnPeriod({ period, isSimulated }: { period: Own; isSimulated: boolean 
     to: fieldOf(period.to, isSimulated),
   };
   const [last, setTyped] = useState(inForce);
-  // A chart or a link may have chosen another period since.
+  // A chart or link may have set another period since.
   const typed = last.of === period ? last : inForce;
   const isPeriod = periodOf(typed, isSimulated) !== null;
   const take = (next: Typed): void => {
@@ -192,11 +192,11 @@ function OwnPeriod({ period, isSimulated }: { period: Own; isSimulated: boolean 
   );
 }
 
-/** "2026-11-14T03:12:40" on the operator's clock; of a simulation "1:02:03". */
+/** "2026-11-14T03:12:40" in local time; in a simulation "1:02:03". */
 export const fieldOf = (at: number, isSimulated: boolean): string =>
   isSimulated ? countText(at) : momentText(Math.floor(at) * 1000).replace(' ', 'T');
 
-/** ROS seconds; null: that is no time. */
+/** The typed time, ROS seconds; null: invalid. */
 export function momentOf(text: string, isSimulated: boolean): number | null {
   if (isSimulated) {
     const parts = /^(\d{1,6}):([0-5]\d)(?::([0-5]\d))?$/.exec(text.trim());

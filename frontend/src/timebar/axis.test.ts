@@ -34,7 +34,7 @@ test('a bar that has no width yet divides by nothing', () => {
 test('the end of a bar that ends now is now, six pixels wide', () => {
   expect(chosenAt(AXIS, 493, 2_000)).toBe(1_986);
   expect(chosenAt(AXIS, 494, 2_000)).toBeNull();
-  // The last bucket goes a bit beyond now.
+  // The last bucket reaches slightly beyond now.
   expect(chosenAt(AXIS, 480, 1_960)).toBeNull();
   expect(chosenAt(AXIS, 499, 1_960)).toBeNull();
 });
@@ -48,7 +48,7 @@ test('a step goes from where it stands, ends at now, and does not leave the bar 
   expect(stepped(AXIS, null, -2, 1_999)).toBe(1_997);
   expect(stepped(AXIS, 1_998, 2, 2_000)).toBeNull();
   expect(stepped(AXIS, 1_001, -20, 2_000)).toBe(1_000);
-  // A link's moment may lie before the bar; the way to the bar is open.
+  // A link's moment may lie before the bar; a step forward is allowed, back is not.
   expect(stepped(AXIS, 400, 10, 2_000)).toBe(410);
   expect(stepped(AXIS, 400, -10, 2_000)).toBe(400);
 });

@@ -1,13 +1,13 @@
-/** Where a moment lies on the bar, and what the bar shows where. Pure. */
+/** Maps moments to positions on the time bar, and lays out its columns. Pure. */
 import type { Span } from '../domain/time';
 import type { Happened, Timeline } from '../domain/timeline';
 
-/** The bar's stretch of time, ROS seconds, over its width in CSS pixels. */
+/** The bar's time span, ROS seconds, and its width, CSS pixels. */
 export interface Axis extends Span {
   readonly width: number;
 }
 
-/** A drag to so few pixels from the right end of a period that ends now is a drag to now. */
+/** A drag that ends within this distance of now snaps to now. */
 const NOW_PX = 6;
 
 export const xOf = ({ from, to, width }: Axis, at: number): number =>
@@ -19,8 +19,8 @@ export const momentAt = ({ from, to, width }: Axis, x: number): number =>
 export const pixelS = ({ from, to, width }: Axis): number => (to - from) / Math.max(1, width);
 
 /**
- * The moment that a point of the bar stands for; null: now. `now` is the twin's time, which may
- * lie beyond the bar.
+ * The moment at a point of the bar; null: now. `now` is the twin's time, ROS seconds, and may lie
+ * beyond the bar.
  */
 export function chosenAt(axis: Axis, x: number, now: number): number | null {
   const at = momentAt(axis, x);
@@ -28,7 +28,7 @@ export function chosenAt(axis: Axis, x: number, now: number): number | null {
   return at >= now || (nowX <= axis.width + NOW_PX && x >= nowX - NOW_PX) ? null : at;
 }
 
-/** A step from where the bar stands; null: now. It never leaves the bar but into now. */
+/** The moment one step on; null: now. A step never leaves the bar, except into now. */
 export function stepped(
   axis: Axis,
   from: number | null,
@@ -40,14 +40,14 @@ export function stepped(
   return Math.max(Math.min(axis.from, from ?? axis.from), at);
 }
 
-/** CSS pixels; narrower columns cannot be told apart. */
+/** Least column width, CSS pixels: narrower ones cannot be told apart. */
 const LEAST_COLUMN_PX = 3;
 
-/** What happened within a few pixels. */
+/** Sum of the events within a few pixels. */
 export type Column = ReturnType<typeof columnsOf>[number];
 
 /**
- * A few scans beside many would vanish; by their root they stay in sight. The smallest is a tenth.
+ * Height as a share of the tallest. The square root, and at least 0.1, keep small counts visible.
  */
 const height = (count: number, most: number): number =>
   count === 0 ? 0 : Math.max(0.1, Math.sqrt(count / most));
@@ -65,14 +65,14 @@ export function columnsOf({ buckets, bucketS }: Timeline, axis: Axis) {
   const most = Math.max(1, ...all.map(({ scans, failures }) => Math.max(scans, failures)));
   return all.map((sum) => {
     const x = xOf(axis, sum.start);
-    // None beyond the end of the bar, which is mostly now.
+    // Not beyond the end of the bar, which is usually now.
     const end = Math.min(sum.start + wide, axis.to);
     return {
       ...sum,
       end,
       x,
       width: Math.max(1, xOf(axis, end) - x),
-      // Of the tallest column, 0 to 1; any scan at all can be seen.
+      // Shares of the tallest column, 0 to 1.
       scanHeight: height(sum.scans, most),
       failureHeight: height(sum.failures, most),
     };
@@ -88,7 +88,7 @@ const added = (sum: Happened | undefined, bucket: Happened, start: number): Happ
   pests_cleared: (sum?.pests_cleared ?? 0) + bucket.pests_cleared,
 });
 
-/** The parts of spans that lie on the bar; what is less than a pixel is shown as one. */
+/** Spans clipped to the bar, CSS pixels; at least one pixel wide. */
 export function stretchesOf(spans: readonly Span[], axis: Axis) {
   return spans
     .filter(({ from, to }) => to > axis.from && from < axis.to)
@@ -98,7 +98,7 @@ export function stretchesOf(spans: readonly Span[], axis: Axis) {
     });
 }
 
-/** Where a run of the clock begins that is not the first, in pixels. */
+/** Start of each run of the clock except the first, CSS pixels. */
 export function runStarts({ runs }: Timeline, axis: Axis): readonly number[] {
   const first = Math.min(...runs.map(({ from }) => from));
   return runs

@@ -10,7 +10,7 @@ import { chooseSpeed, pause, play, playback, togglePlayback } from './playback';
 beforeEach(() => {
   vi.useFakeTimers();
   showTags([wireTag()]);
-  // Far enough from the beginning of time for an hour to lie before now.
+  // Late enough for an hour to fit before now.
   const latest = stateFrame([], { sec: 100_000 });
   receive(withState(latest, performance.now()));
   chooseSpeed(300);
@@ -40,7 +40,7 @@ describe('playback', () => {
     vi.advanceTimersByTime(1_000);
     stop();
     expect(moments.size).toBe(10);
-    // The page was busy for three seconds: the clock was not.
+    // The page was busy for three seconds while the clock went on.
     const at = performance.now();
     vi.spyOn(performance, 'now').mockReturnValue(at + 3_000);
     vi.advanceTimersByTime(100);

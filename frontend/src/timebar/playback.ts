@@ -1,13 +1,13 @@
 /**
- * Plays the past: the moment goes on by a clock of its own, whatever has come of it by then. What
- * comes too late is dropped, so that it never lags. It ends in now.
+ * Plays the past. The moment follows its own clock and never waits for data: late answers are dropped.
+ * Playback ends at now.
  */
 import { now } from '../clock';
 import { act, store } from '../store/app';
 import { createStore } from '../store/create';
 import { barSpan, twinNow } from '../store/moment';
 
-/** Seconds of the past a second. */
+/** Past seconds per second. */
 export const SPEEDS = [60, 300, 900, 3_600] as const;
 type Speed = (typeof SPEEDS)[number];
 
@@ -20,7 +20,7 @@ export const playback = createStore<{ isPlaying: boolean; speed: Speed }>({
 
 let timer: ReturnType<typeof setInterval> | undefined;
 let unsubscribe: () => void = () => undefined;
-/** The moment that was last played, ROS seconds, and when that was, ms. */
+/** The last played moment, ROS seconds, and when it was played, ms. */
 let at = 0;
 let since = 0;
 
@@ -30,7 +30,7 @@ export function pause(): void {
   if (playback.get().isPlaying) playback.set({ ...playback.get(), isPlaying: false });
 }
 
-/** From the moment that is shown; from now, from the beginning of the bar. */
+/** Plays from the shown moment; if live, from the start of the bar. */
 export function play(): void {
   const nowS = twinNow();
   if (nowS === null) return;
@@ -39,7 +39,7 @@ export function play(): void {
   go(state.view.moment ?? barSpan(state, nowS).from);
   playback.set({ ...playback.get(), isPlaying: true });
   timer = setInterval(tick, TICK_MS);
-  // Whoever takes the moment elsewhere has taken over.
+  // Any other change of the moment stops playback.
   unsubscribe = store.subscribe(() => {
     const { moment } = store.get().view;
     if (moment === null || Math.abs(moment - at) > 0.001) pause();

@@ -14,7 +14,7 @@ type Format = (seconds: number) => string;
 
 const agoText: Format = (seconds) => S.agoSuffix(ageText(seconds));
 
-/** An age that goes on as the moment that is shown says; null: there is none to tell. */
+/** The age as text, counting on where the shown moment does; null: unknown. */
 function useAgeText(when: When, format: Format): string | null {
   const ageing = useApp((state) => selectShown(state).ageing);
   return useTicking((now) => {
@@ -23,13 +23,13 @@ function useAgeText(when: When, format: Format): string | null {
   });
 }
 
-/** How old something looks. */
+/** Age step, for styling. */
 export function useAgeStep(when: When): ReturnType<typeof ageStep> {
   const ageing = useApp((state) => selectShown(state).ageing);
   return useTicking((now) => ageStep(ageSeconds(when, now, ageing)));
 }
 
-/** Seconds tick here alone, so that a table of hundreds is not rendered anew each second. */
+/** An age whose seconds tick in here, so that a table of hundreds of rows does not re-render. */
 export function Age({ when, format = agoText }: { when: When; format?: Format }): JSX.Element {
   const text = useAgeText(when, format);
   const isWhole = useApp((state) => selectShown(state).snapshot?.isWhole ?? true);
@@ -62,7 +62,7 @@ export const AgeFact = ({ label, when }: { label: string; when: When }): JSX.Ele
   </Fact>
 );
 
-/** A try that came to nothing: when, and why. */
+/** A failed attempt: when, and why. */
 export function Tried({ failed }: { failed: FailedTry }): JSX.Element {
   const age = useAgeText(failed.at, ageText);
   const outcome = S.tried[tryKind(failed.status)];

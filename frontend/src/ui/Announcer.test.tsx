@@ -31,7 +31,7 @@ const house = (temperatures: readonly number[]): ReturnType<typeof wireTag>[] =>
     wireTag({ tag_id: String(index + 1), readings: readings({ temperature }) }),
   );
 
-/** As a judge might have it. */
+/** A judgement with these temperatures, °C, one tag each. */
 const judged = (temperatures: readonly number[]): ReturnType<typeof judgement> =>
   judgement(
     Object.fromEntries(

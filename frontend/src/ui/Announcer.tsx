@@ -3,7 +3,7 @@ import type { JSX } from 'react';
 import { politeVoice, urgentVoice } from '../alarms/watch';
 import { createVoice, useSelected, type Announcement, type Store } from '../store/create';
 
-/** A voice each, so that none cuts off another; only a critical alarm may cut in. */
+/** One live region per voice, so none cuts off another; only a critical alarm may interrupt. */
 export function Announcer(): JSX.Element {
   return (
     <div className="unseen">
@@ -26,11 +26,11 @@ function Voice({
   const { text, key } = useSelected(of);
   return (
     <div role={role} data-testid={testId}>
-      {/* Anew each time, or the same words twice would be no change to tell of. */}
+      {/* A new element each time: repeating the same text would not be announced. */}
       <p key={key}>{text}</p>
     </div>
   );
 }
 
-/** The tag that a key has chosen. */
+/** The tag selected by keyboard. */
 export const chosenTag = createVoice();

@@ -89,7 +89,7 @@ describe('page', () => {
     const sensors = screen.getByRole('group', { name: 'Sensor' });
     fireEvent.click(within(sensors).getByRole('radio', { name: /CO₂/ }));
     expect(store.get().view.sensor).toBe('co2');
-    // Nobody measures it.
+    // No tag measures humidity.
     expect(within(sensors).queryByRole('radio', { name: /Humidity/ })).toBeNull();
   });
 

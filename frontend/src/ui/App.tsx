@@ -79,7 +79,7 @@ export function App({
 
 const NO_WISH: CycleWish = { seconds: null, refused: null };
 
-/** By hand, because the fragment of the address belongs to the permalink. */
+/** Moves the focus in code, because the URL fragment belongs to the permalink. */
 function skipToTable(event: React.MouseEvent): void {
   event.preventDefault();
   act(withList('tags'));

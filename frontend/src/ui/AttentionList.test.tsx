@@ -40,7 +40,7 @@ test('lists who needs somebody and why, the worst first', () => {
     '2 pests seen',
     'Temperature 6.6\u00a0°C, below 10.0',
   ]);
-  // Each in a piece of its own: no line begins or ends with what stands between two.
+  // One element per task, so that no line starts or ends with the separator.
   const todos = [...first.querySelectorAll('.attention-do strong .dotted > *')];
   expect(todos.map(({ textContent }) => textContent)).toEqual([
     'Inspect and treat the plants',

@@ -19,21 +19,21 @@ import { useFitting } from './fitting';
 import { HealthShape } from './HealthMark';
 import { Reasons, useReasonText } from './Reasons';
 
-/** Lines that a screen on the wall may have room for. */
+/** Most lines that a wall screen can hold. */
 const MOST_LINES = 40;
-/** More tags than this stand by their causes. */
+/** Above this many, tags are grouped by cause. */
 const MANY_TAGS = 12;
-/** Of each tag. */
+/** Reasons shown per tag. */
 const MOST_REASONS = 2;
 
 interface Line {
   readonly key: string;
-  /** Null: it is of one tag. */
+  /** Null: the line is about a single tag. */
   readonly cause: string | null;
   readonly tags: readonly [Urgent, ...Urgent[]];
 }
 
-/** For a wall screen: the tags that need somebody, in the order of `useUrgent`. */
+/** For a wall screen: the tags that need attention, in the order of `useUrgent`. */
 export function AttentionList(): JSX.Element {
   const urgent = useUrgent();
   const lines = useLines(urgent);
@@ -56,7 +56,7 @@ export function AttentionList(): JSX.Element {
   );
 }
 
-/** A line for each tag; of many, one for what ails more than a few of them. */
+/** One line per tag; with many tags, one line per cause that several share. */
 function useLines(urgent: readonly Urgent[]): readonly Line[] {
   const speech = useApp(selectSpeech);
   const ofOne = (each: Urgent): Line => ({ key: each.tagId, cause: null, tags: [each] });
@@ -74,7 +74,7 @@ function useLines(urgent: readonly Urgent[]): readonly Line[] {
   });
 }
 
-/** Where, what ails it and what to do; of many tags how many, where it is worst, and at which. */
+/** Where, what is wrong and what to do; for a group: how many, the worst tag, and which tags. */
 function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.Element {
   const badness = ({ reasons: [reason] }: Urgent): number =>
     severity({ verdict: reason.verdict, reasons: [reason] });
@@ -111,7 +111,7 @@ function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.
   );
 }
 
-/** What to do about each of them, no word twice; of some nothing. */
+/** What to do about the reasons, without duplicates; some have nothing to do. */
 function Todo({ reasons }: { reasons: readonly HealthReason[] }): JSX.Element {
   return (
     <strong>
@@ -131,18 +131,18 @@ function Dotted({ texts }: { texts: readonly string[] }): JSX.Element | null {
   );
 }
 
-/** Null: all of it is shelved, there is no tag yet, or the greenhouse's own reason says more. */
+/** Null: everything is shelved, there is no tag yet, or the greenhouse's own reason says more. */
 function noneText({ verdict, reasons, counts: { unknown } }: HouseHealth): string | null {
   if (isBad(verdict) || reasons.length > 0) return null;
-  // Of whom nothing is known, nobody knows that he needs nothing.
+  // A tag without data may need attention.
   if (unknown > 0) return S.attentionNoneKnown(unknown);
   return verdict === 'healthy' ? S.attentionNone : null;
 }
 
-/** Longest part of a wish that is told back. */
+/** Most characters of a refused cycle setting that are quoted. */
 const LONGEST_WISH = 12;
 
-/** In the header of a wall screen: the time, which sensor is shown until when, and how to leave. */
+/** In a wall screen's header: the time, the sensor and time to the next one, and how to leave. */
 export function KioskNote({ wish }: { wish: CycleWish }): JSX.Element {
   const next = useSelected(nextSensor);
   const sensor = useApp(selectSensor);
@@ -171,13 +171,13 @@ export function KioskNote({ wish }: { wish: CycleWish }): JSX.Element {
   );
 }
 
-/** To the same view, to be operated; Back leads to the wall screen again. */
+/** Opens the same view with controls; the browser's Back returns to the wall screen. */
 function leaveKiosk(): void {
   const { search, hash } = window.location;
   window.location.assign(addressOfPage(search, hash));
 }
 
-/** The key that the note names. */
+/** Handles Esc, the key that `KioskNote` names. */
 export function startLeaving(): () => void {
   const onKeyDown = (event: KeyboardEvent): void => {
     if (event.key === 'Escape' && !event.defaultPrevented) leaveKiosk();

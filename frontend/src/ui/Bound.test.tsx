@@ -44,7 +44,7 @@ describe('one end of a fixed range', () => {
   test('passing through changes nothing, not even by rounding', () => {
     fireEvent.focus(field());
     fireEvent.blur(field());
-    // There and back: a field that is set to what it holds has not changed.
+    // Typed back to the applied value: nothing has changed.
     type('5');
     type('50');
     fireEvent.blur(field());

@@ -44,7 +44,7 @@ export function CompareControl(): JSX.Element {
   );
 }
 
-/** "own" begins with the moment that is shown: look back, choose it, and go back to now. */
+/** "own" starts at the shown moment: go to the past, choose "own", and return to live. */
 function compareFor(choice: Choice, dayS: number): Compare | null {
   switch (choice) {
     case 'none':
@@ -60,7 +60,7 @@ function compareFor(choice: Choice, dayS: number): Compare | null {
   }
 }
 
-/** While it is typed a year is none yet, and is not to be taken away for that. */
+/** Keeps a half-typed date, which is not valid yet, in the field. */
 function OwnMoment({ at }: { at: number }): JSX.Element {
   const inForce = { of: at, text: fieldOf(at, false) };
   const [typed, setTyped] = useState(inForce);
@@ -84,7 +84,7 @@ function OwnMoment({ at }: { at: number }): JSX.Element {
   );
 }
 
-/** What the colours of the heat map mean while it is a difference; null: it is none. */
+/** Legend of the heat map while it shows a difference; null: it shows none. */
 export function DifferenceLegend(): JSX.Element | null {
   const compare = useApp((state) => state.view.compare);
   const sensor = useApp(selectSensor);

@@ -18,23 +18,23 @@ import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { selectAreAlarmsKnown, useReasonText } from './Reasons';
 
-/** Beside the map; the table has the rest. */
+/** Tags listed beside the map; the table has the rest. */
 const MOST_TAGS = 2;
-/** Of other tags that need the same, so many by name. */
+/** Most other tags with the same action that are named. */
 const MOST_ALSO = 3;
 
-/** A tag that needs somebody. */
+/** A tag that needs attention. */
 export interface Urgent {
   readonly tagId: string;
-  /** Without what is shelved; the first is what it needs somebody for. */
+  /** Shelved ones excluded; the first is why it needs attention. */
   readonly reasons: readonly [HealthReason, ...HealthReason[]];
-  /** Somebody sees to that one. */
+  /** Whether the first reason's alarm is acknowledged. */
   readonly isAcknowledged: boolean;
 }
 
 /**
- * Tags that need somebody, and what of each, in the order of `severity`; what is back in its range
- * comes last. What is only old needs the robot, which comes again.
+ * Tags that need attention, with reasons, most severe first; values back in range come last.
+ * Old readings do not count: they wait for the robot's next visit.
  */
 export function useUrgent(): readonly Urgent[] {
   const tags = useApp(selectTags);
@@ -68,8 +68,8 @@ export function useUrgent(): readonly Urgent[] {
 }
 
 /**
- * Since when the alarm of a reason is active, that somebody has acknowledged it, or that there is none
- * yet. Null: nobody knows, another moment is shown, or the banner says of when all this is.
+ * Text: how long a reason's alarm has been active, that it is acknowledged, or that there is none yet.
+ * Null: unknown, a past moment is shown, or the banner already dates the data.
  */
 export function useSince(tagId: string, reason: HealthReason): string | null {
   const isNow = useApp((state) => selectShown(state).moment === null);
@@ -82,20 +82,20 @@ export function useSince(tagId: string, reason: HealthReason): string | null {
   return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
 }
 
-/** What has to be done first: where, why, what, and since when; else how the greenhouse is. */
+/** What to do first: where, why, what, and since when; otherwise the greenhouse's status. */
 export function DoNow({
   most = MOST_TAGS,
   id = 'health-driver',
 }: {
   most?: number;
-  /** Of its first line, for tests. */
+  /** Test id of the first line. */
   id?: string;
 }): JSX.Element {
   const health = useApp(selectHealth);
   const urgent = useUrgent();
   const isNow = useApp((state) => selectShown(state).moment === null);
   const hasOwn = health.reasons.length > 0;
-  // Of a twin that is not heard, what had to be done stays.
+  // While the twin is silent, its last tasks stay listed.
   const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict) || isSilent(health));
   const count = hasOwn && most > 1 ? most - 1 : most;
   const lines = (isNow ? byTodo(urgent) : urgent.map((each) => [each] as const)).slice(0, count);
@@ -147,7 +147,7 @@ export function DoNow({
   );
 }
 
-/** Of tags that need the same the first stands for all, but not of those that somebody sees to. */
+/** Groups tags by action, the first one leading; acknowledged tags form groups of their own. */
 function byTodo(urgent: readonly Urgent[]): readonly (readonly [Urgent, ...Urgent[]])[] {
   const found = new Map<string, [Urgent, ...Urgent[]]>();
   for (const each of urgent) {
@@ -160,7 +160,7 @@ function byTodo(urgent: readonly Urgent[]): readonly (readonly [Urgent, ...Urgen
   return [...found.values()];
 }
 
-/** Some by name; those that are less bad come behind the sign of it. */
+/** Other tags of the group, some by name; the verdict's mark precedes a name where it changes. */
 function Also({ of, than }: { of: readonly Urgent[]; than: Verdict }): JSX.Element {
   const more = of.length - MOST_ALSO;
   const verdicts = [than, ...of.map(({ reasons: [{ verdict }] }) => verdict)];
@@ -191,13 +191,13 @@ function Todo({
 }: {
   tagId: string;
   reason: HealthReason;
-  /** Other tags that need the same. */
+  /** Other tags with the same action. */
   also: readonly Urgent[];
   id: string | undefined;
 }): JSX.Element {
   const why = S.healthDriver(shown(tagId, 24), useReasonText(reason, true));
   const since = useSince(tagId, reason);
-  // What was to be done then is no order now.
+  // A past moment's action is not an instruction for now.
   const isNow = useApp((state) => selectShown(state).moment === null);
   return (
     <>
@@ -213,7 +213,7 @@ function Todo({
   );
 }
 
-/** How the greenhouse is, where no tag makes it so. */
+/** The greenhouse's status, where no single tag explains it. */
 export function Overall({
   health,
   id = 'health-driver',
@@ -223,7 +223,7 @@ export function Overall({
 }): JSX.Element | null {
   const [own] = health.reasons;
   const reason = useReasonText(own ?? null);
-  // Of now, as the list of alarms is.
+  // The alarm list is always live.
   const isNow = useApp((state) => selectShown(state).moment === null);
   const active = useSelected(alarmList, (list) => list.active.length);
   const shelved = useSelected(alarmList, (list) => list.shelved.length);
@@ -238,10 +238,10 @@ export function Overall({
   );
 }
 
-/** How much is shelved, where something is wrong: it has no line of its own. */
+/** Number of shelved alarms, shown while something is wrong: shelved ones have no line of their own. */
 export function ShelvedCount({ disabled = false }: { disabled?: boolean }): JSX.Element | null {
   const isWrong = useApp((state) => isBad(selectHealth(state).verdict));
-  // Of now, as the list of alarms is.
+  // The alarm list is always live.
   const isNow = useApp((state) => selectShown(state).moment === null);
   const count = useSelected(alarmList, (list) => list.shelved.length);
   if (!isWrong || !isNow || count === 0) return null;
@@ -259,7 +259,7 @@ export function ShelvedCount({ disabled = false }: { disabled?: boolean }): JSX.
   );
 }
 
-/** Null: its tags say it. */
+/** Null: the tags' own lines say it. */
 function overallText({ verdict, counts }: HouseHealth, alarms: number): string | null {
   if (isBad(verdict)) return null;
   if (verdict === 'healthy') return alarms > 0 ? S.healthDespite(alarms) : S.healthAllWell;
@@ -269,7 +269,7 @@ function overallText({ verdict, counts }: HouseHealth, alarms: number): string |
   return 2 * unknown > all ? S.healthMostUnknown : S.healthSomeUnknown(unknown);
 }
 
-/** Above the map of a phone, where the table is a tab away: the first of what has to be done. */
+/** The most urgent task, above the map on a phone, where the table is a tab away. */
 export function HealthStrip(): JSX.Element {
   const verdict = useApp((state) => selectHealth(state).verdict);
   const isHere = useApp(selectIsHere);

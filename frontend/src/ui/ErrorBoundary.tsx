@@ -9,7 +9,7 @@ interface Props {
   readonly children: ReactNode;
 }
 
-/** In place of a page that has failed: a word, and a way out. Never a blank screen. */
+/** Replaces a page that has failed with the error and a reload button: never a blank screen. */
 export class ErrorBoundary extends Component<Props, Readonly<{ why: string | null }>> {
   override state: Readonly<{ why: string | null }> = { why: null };
 
@@ -24,7 +24,7 @@ export class ErrorBoundary extends Component<Props, Readonly<{ why: string | nul
 }
 
 function Failed({ why, kiosk }: { why: string; kiosk: boolean }): JSX.Element {
-  // Nobody is there to press a button on a wall screen.
+  // On a wall screen, nobody can press the button.
   useEffect(() => (kiosk ? reloadByItself() : undefined), [kiosk]);
   return (
     <main className="failed-page" role="alert" data-testid="failed-page">

@@ -10,7 +10,7 @@ import { wireTag } from '../testing/tags';
 import { ConnectionBadge } from './Header';
 import { FrozenBanner } from './Troubles';
 
-// The time of the last frame is read from two clocks, which go on between two looks.
+// The last frame's time is read from two clocks, which would advance between the reads.
 beforeEach(() => {
   vi.useFakeTimers({ toFake: ['Date', 'performance'] });
 });

@@ -8,7 +8,7 @@ import { OriginNote, PastHeader } from '../timebar/Past';
 import { Disclosure, Icon } from '../widgets/controls';
 import { WithParts } from './later';
 
-/** Which of a fleet's greenhouses the page shows; a page of one greenhouse is below no `/sites/`. */
+/** The fleet's greenhouse that the page shows; undefined outside a fleet (no `/sites/` in the path). */
 function siteName(): string | undefined {
   return /\/sites\/([^/]+)\/$/.exec(location.pathname)?.[1];
 }
@@ -35,7 +35,7 @@ export function Header({ kiosk, children }: { kiosk: boolean; children?: ReactNo
   );
 }
 
-/** The connection's state in a shape and a word; told to screen readers when it changes. */
+/** The connection's state as a shape and a word; screen readers announce changes. */
 export function ConnectionBadge(): JSX.Element {
   const phase = useApp((state) => state.twin.phase);
   const isPast = useApp((state) => selectShown(state).moment !== null);
@@ -75,17 +75,17 @@ export function ConnectionBadge(): JSX.Element {
   );
 }
 
-/** Where the simulated past ends, if the moment that is shown lies in it, and not all is simulated; ROS seconds. */
+/** End of the simulated past, ROS seconds; null: the shown moment is outside it, or all is simulated. */
 function selectSimulatedUntil(state: AppState): number | null {
   const { moment } = selectShown(state);
   const simulated = state.twin.connection.status?.journal.simulated;
-  // Of a simulation what comes after is no more real.
+  // In a pure simulation, later data is no more real.
   if (moment === null || !simulated || selectOrigin(state) === 'simulated') return null;
   const end = secondsOf(simulated.end);
   return moment < end ? end : null;
 }
 
-/** Says that what is shown was not observed: a demo begins with days that a simulation made. */
+/** Says that the shown data was not observed: a demo starts with simulated days. */
 export function SimulatedNote(): JSX.Element {
   const until = useApp(selectSimulatedUntil);
   return (

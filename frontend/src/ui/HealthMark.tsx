@@ -4,7 +4,7 @@ import type { Verdict } from '../contract/types';
 import { MARKS } from '../domain/marks';
 import { S } from '../strings';
 
-/** The same mark as the tag's pin has: one shape each, so that it is told without colour. */
+/** The mark of a tag's pin: one shape per verdict, so it reads without colour. */
 export function HealthShape({ verdict }: { verdict: Verdict }): JSX.Element {
   return (
     <span className="health-mark" data-health={verdict}>
@@ -19,7 +19,7 @@ export function HealthMark({
   text = S.health[verdict],
 }: {
   verdict: Verdict;
-  /** Without the word to see, it is still there to hear. */
+  /** False: the word is for screen readers only. */
   word?: boolean;
   text?: string | undefined;
 }): JSX.Element {
@@ -34,7 +34,7 @@ export function HealthMark({
 function VerdictMark({ verdict }: { verdict: Verdict }): JSX.Element {
   const { outline, sign } = MARKS[verdict];
   return (
-    // As large as leaves room for its line.
+    // The view box leaves room for the stroke.
     <svg viewBox="-1.2 -1.2 2.4 2.4" width="16" height="16" aria-hidden="true">
       <path d={outline} className="body" />
       {sign !== '' && <path d={sign} className="sign" />}

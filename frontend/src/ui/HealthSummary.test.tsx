@@ -52,13 +52,13 @@ test('says what to do first, and since when', () => {
   act(() => {
     acknowledgeAlarms(calling(alarmList.get()));
   });
-  // Somebody sees to it: of what is as bad, what nobody has seen comes first.
+  // At equal severity, unacknowledged comes first.
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
-    // One inspection raises an alarm: it waits for no second one.
+    // A single inspection raises an alarm; none is awaited.
     'CriticalTag 1: Pest seenInspect and treat the plants ',
     expect.stringMatching(/^CriticalTag 5: .*treat the plants acknowledged/),
   ]);
-  // Not before what is worse, of one tag and of many; last is what is back in its range.
+  // Never before something worse, for one tag or many; values back in range come last.
   const back = reason({ verdict: 'stressed', value: 18.1, limit: 18, ...held(18.5) });
   const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
   const tags = ['1', '2', '5'].map((tag_id) => wireTag({ tag_id }));
@@ -91,7 +91,7 @@ test('nobody is called for what is shelved, and all the rest is counted', () => 
   expect(todo.textContent).toMatch(
     /^CriticalTag 1: .*also tags Stressed 2, 3 .*StressedTag 4: .*\+ 1 more$/,
   );
-  // Those are beside the table, with a count of their own: this one leads to the tags that it counts.
+  // Alarms have their own count beside the table: this button leads to the tags that it counts.
   look({ list: 'alarms' });
   fireEvent.click(screen.getByRole('button', { name: '+ 1 more' }));
   expect(store.get().view.list).toBe('tags');
@@ -102,7 +102,7 @@ test('nobody is called for what is shelved, and all the rest is counted', () => 
   expect(todo.textContent).toMatch(/^StressedTag 4: .*StressedTag 2: .*also tag 3 .*\+ 1 more$/);
   fireEvent.click(screen.getByRole('button', { name: '+ 1 more' }));
   expect(store.get().view.list).toBe('tags');
-  // That it is left out is said, as the heading and the numbers have it.
+  // Heading and counts include the shelved one, so its omission here is stated.
   fireEvent.click(screen.getByRole('button', { name: 'Shelved (1)' }));
   expect(store.get().view.list).toBe('alarms');
   act(() => {
@@ -167,7 +167,7 @@ test('of tags that need the same done the worst stands for all, some by name', (
     expect.stringMatching(/^CriticalTag 1: .*Heat, or close the vents also tags 2, 3, 4 \+ 1 $/),
     expect.stringMatching(/^StressedTag 6: Humidity/),
   ]);
-  // Those that are less bad come behind their sign.
+  // Less severe tags follow their own mark.
   const mild = [reason({ verdict: 'stressed', value: 12, limit: 18 })];
   act(() => {
     showTags(tags, judgement({ ...all, 3: mild, 4: mild, 5: mild }));
@@ -202,14 +202,14 @@ test('all is well, hardly anything is known, and nothing is', () => {
   });
   expect(house().dataset['health']).toBe('unknown');
   expect(driver().textContent).toMatch(/^More than half/);
-  // What is only old waits for the robot.
+  // A tag with only old readings waits for the robot.
   const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
   const old = { ...failed, kind: 'old' } as const;
   act(() => {
     showTags(TAGS, judgement({ 1: 'healthy', 5: [old] }));
   });
   expect(driver().textContent).toBe('1 tag cannot be assessed');
-  // A failed scan is said with its tag, whoever is old beside it.
+  // A failed scan is named with its tag, even if readings are old too.
   act(() => {
     showTags(TAGS, judgement({ 1: 'healthy', 5: [failed, old] }));
   });
@@ -242,7 +242,7 @@ test('a house that is not heard of is unknown, whatever was said last', () => {
   render(<HealthSummary kiosk={false} />);
   expect(house().dataset['health']).toBe('unknown');
   expect(driver().textContent).toMatch(/^No data from the twin.* Check the twin, the server/);
-  // Its tags are not known to be unknown: that is another word.
+  // "Not current" is not "unknown": the tags' last statuses still count.
   expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Not current');
   expect(screen.getByRole('button', { name: /^2 Healthy/ })).toBeTruthy();
 });

@@ -12,7 +12,7 @@ import { useTicking } from '../widgets/useNow';
 import { DoNow, Overall, ShelvedCount } from './DoNow';
 import { HealthMark, HealthShape } from './HealthMark';
 
-/** How the house is, why, and how many tags are how. */
+/** The greenhouse's status, the reason for it, and the number of tags per status. */
 export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
   const health = useApp(selectHealth);
   const filter = useApp((state) => state.view.health);
@@ -68,18 +68,18 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
   );
 }
 
-/** Whose ranges hold, and how that is known. */
+/** Whether the day or night ranges apply, and how that is known. */
 function dayText({ day }: HouseHealth): string | undefined {
   return day ? S.healthDay(day.is_day, S.healthDaySource[day.source]) : undefined;
 }
 
-/** Of tags that report by themselves, all at once: no rhythm of anything. */
+/** Shorter intervals come from tags that report on their own, all at once: not a scan interval. */
 const LEAST_INTERVAL_S = 0.1;
-/** No scan for longer than this, and than so many usual intervals: the robot may stand still. */
+/** No scan for longer than both this, s, and ten usual intervals: the robot may have stopped. */
 const LATE_S = 60;
 const LATE_INTERVALS = 10;
 
-/** What the house is doing, as the bridge tells it: how often it is scanned, when last, who is overdue. */
+/** The patrol as the bridge reports it: scan interval, last scan, and overdue tags. */
 export function HouseLine(): JSX.Element | null {
   const health = useApp(selectHealth);
   const { patrol } = health;
@@ -94,7 +94,7 @@ export function HouseLine(): JSX.Element | null {
     const age = ageOf(now);
     return age === null ? null : ageText(age);
   });
-  // A moment of the past, and a clock that is paused, have no robot that could be looked after.
+  // In the past, or while the clock is paused, nobody can check on the robot.
   const isLate = useTicking((now) =>
     hasInterval &&
     ageing.kind === 'growing' &&
@@ -104,13 +104,13 @@ export function HouseLine(): JSX.Element | null {
   );
   if (!patrol || !snapshot || snapshot.tags.length === 0 || isSilent(health)) return null;
   const { last_scan: lastScan, overdue } = patrol;
-  // Scanned, and nobody knows when.
+  // Scanned, but at an unknown time.
   if (lastScan === null && snapshot.tags.some(({ readings }) => readings.size > 0)) return null;
   if (isLate && last !== null) {
     return (
       <p className="house-line" data-testid="house-line">
         <span data-overdue>{S.houseLate(last, intervalText(interval))}</span>
-        {/* Else its own reason says so. */}
+        {/* Otherwise the greenhouse's own reason says so. */}
         {health.reasons.length === 0 && <strong> · {S.todo.stopped}</strong>}
       </p>
     );

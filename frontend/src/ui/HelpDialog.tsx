@@ -24,7 +24,7 @@ export function openHelp(): void {
 export function HelpDialog(): JSX.Element {
   const dialog = useRef<HTMLDialogElement>(null);
   const shortcuts = useApp((state) => state.settings.shortcuts);
-  // A click on the backdrop is one on the dialog itself, outside its content.
+  // The backdrop's clicks arrive at the dialog itself, not at its content.
   useEffect(() => {
     const element = dialog.current;
     const onClick = (event: MouseEvent): void => {
@@ -85,7 +85,7 @@ function Keys({
   );
 }
 
-/** What a key that was pressed stands for. */
+/** Handles a pressed key. */
 export function onKey(event: KeyboardEvent): void {
   if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
   if (document.querySelector('dialog[open]')) return;
@@ -111,19 +111,19 @@ function escape(event: KeyboardEvent): void {
     act({ filter: '' });
     return;
   }
-  // What lies on top goes first.
+  // Close the topmost layer first.
   const { chart, selected } = store.get().view;
   if (chart) act(withChart(null));
   else if (selected !== null) act(withTag(null));
   else backToLive();
 }
 
-/** Whether the space bar is the element's own: it presses buttons, and opens the nearest tag. */
+/** Whether the element uses the space bar itself, as buttons and the map do. */
 const takesSpace = (target: EventTarget | null): boolean =>
   target instanceof Element &&
   target.closest('button, a, input, select, [role=application]') !== null;
 
-/** Does what a key stands for; false: nothing. */
+/** Runs a key's shortcut; false: the key did nothing. */
 function runKey(key: string): boolean {
   const state = store.get();
   const { settings, view } = state;
@@ -135,7 +135,7 @@ function runKey(key: string): boolean {
   switch (key.toLowerCase()) {
     case '/':
       act(withList('tags'));
-      // The pane may only now become visible.
+      // The pane may become visible only in the next frame.
       requestAnimationFrame(() => document.getElementById(FILTER_ID)?.focus());
       return true;
     case 'f':
@@ -180,14 +180,14 @@ function runKey(key: string): boolean {
   }
 }
 
-/** Opens the charts of the chosen tag, or closes them; false: no tag is chosen. */
+/** Opens or closes the selected tag's charts; false: no tag is selected. */
 function toggleCharts({ chart, selected }: ViewState): boolean {
   if (!chart && selected === null) return false;
   act(withChart(chart ? null : { by: 'tag', tagIds: [selected ?? ''] }));
   return true;
 }
 
-/** The tag after or before the chosen one, in the table's order. */
+/** Selects the next or previous tag, in the table's order. */
 function stepTag(by: 1 | -1): void {
   const state = store.get();
   const rows = selectRows(state);

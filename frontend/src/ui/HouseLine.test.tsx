@@ -18,7 +18,7 @@ const line = (patrol: Judgement['house']['patrol']): string | undefined => {
 };
 
 test('tells the rhythm, the last scan and who is overdue', () => {
-  // The builders' states are seconds old, whatever their stamp says.
+  // Built states are seconds old, whatever their stamp.
   const told = line({ interval_s: 40, last_scan: { sec: 0, nanosec: 1 }, overdue: 2 });
   expect(told).toMatch(/^2 tags overdue · last scan .+ ago · a scan every 40\u00a0s$/);
 });
@@ -85,7 +85,7 @@ test.each([
   showTags([wireTag()]);
   render(<HouseLine />);
   expect(show()).toMatch(told);
-  // The clock stands still, and nobody knows for how long.
+  // The clock is paused, for an unknown time.
   expect(show(status({ reason: 'paused' }))).toMatch(/^no tag overdue/);
   const then = { ...NO_HOUSE, snapshot: snapshotOf(latest, 0, null), health };
   act(() => {

@@ -186,7 +186,7 @@ describe('legend', () => {
       'sensor failed',
       'pest seen',
     ]);
-    // The very marks that the map has.
+    // The same marks as on the map.
     expect(keys[0]?.querySelector('[data-health=critical] .body')).not.toBeNull();
   });
 });

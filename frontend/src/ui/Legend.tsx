@@ -132,7 +132,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   );
 }
 
-/** As the map is where nothing is known, or faintly coloured where it is too old. */
+/** The map's hatching for unknown areas; faintly coloured, for areas with only old values. */
 function HatchedSign({ isFaint = false }: { isFaint?: boolean }): JSX.Element {
   return (
     <svg viewBox="0 0 16 12" width="20" height="12" aria-hidden="true" className="key-hatched">
@@ -142,7 +142,7 @@ function HatchedSign({ isFaint = false }: { isFaint?: boolean }): JSX.Element {
   );
 }
 
-/** How far off the field is where a tag could be guessed from the others. */
+/** The field's leave-one-out error: each tag is predicted from the others. */
 function Quality({
   quality,
   sensor,
@@ -166,7 +166,7 @@ function Quality({
   );
 }
 
-/** The ideal range in words; a limit that stands at an end of the ramp is not told again. */
+/** The ideal range in words; a limit already shown at an end of the ramp is not repeated. */
 function idealNote(
   sensor: Sensor,
   ideal: Span,
@@ -180,7 +180,7 @@ function idealNote(
   return isHigh ? `${part} ${S.legendAbove(low)}` : S.legendIdeal(part, low, high);
 }
 
-/** The colours of the heat map from the lowest to the highest value. */
+/** The heat map's colours, from the lowest to the highest value. */
 function Ramp({
   sensor,
   range,
@@ -223,14 +223,14 @@ function Ramp({
   );
 }
 
-/** What the colours mean while they tell how values lie against their ideal. */
+/** Legend of the colours that compare values with their ideal range. */
 function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
   const unit = useApp((state) => state.settings.unit);
   const { ideal } = sensor;
   const colours = idealParts(IDEAL_ALPHA);
   const part = S.idealParts[sensor.part ?? 'any'];
   const species = useApp((state) => idealsText(sensor, selectTags(state), unit));
-  // Of one range alone the limits stand beside the colours: each plant is coloured by its own.
+  // Limits are shown for a single range only: with several species, each plant uses its own.
   const low = species === '' && ideal && valueText(sensor, ideal[0], unit);
   const high = species === '' && ideal && readingText(sensor, ideal[1], unit);
   const step = (
@@ -257,8 +257,8 @@ function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
 }
 
 /**
- * What the heat map is made of; in the link. On a narrow screen it is among the layers, elsewhere in
- * the legend.
+ * Chooses how the heat map is computed; part of the permalink. It is in the layers menu on a narrow
+ * screen, elsewhere in the legend.
  */
 export function HeatControl({ place }: { place: 'legend' | 'layers' }): JSX.Element {
   const heat = useApp((state) => state.view.heat);
@@ -277,7 +277,7 @@ export function HeatControl({ place }: { place: 'legend' | 'layers' }): JSX.Elem
   );
 }
 
-/** How the heat map is coloured; in the link, and by one click. */
+/** Chooses how the heat map is coloured; part of the permalink. */
 function ColouringControl(): JSX.Element {
   const colouring = useApp((state) => state.view.colouring);
   return (

@@ -23,7 +23,7 @@ import { HeatControl, Legend } from './Legend';
 import { Notices } from './Notices';
 import { SensorPicker } from './SensorPicker';
 
-// Charts come after the first paint, and their library with them.
+// Charts and their library load after the first paint.
 const ChartView = inTime(async () => (await import('../charts/ChartView')).default);
 
 export function MapPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
@@ -78,7 +78,7 @@ function MapControls(): JSX.Element {
   );
 }
 
-/** Of a robot there may be none. */
+/** There may be no robot: `RobotChoice` adds its layer. */
 const LISTED = LAYERS.filter((layer) => layer !== 'robot');
 
 function LayerList(): JSX.Element {
@@ -107,7 +107,7 @@ function LayerList(): JSX.Element {
   );
 }
 
-/** The field's value at the point that mouse or crosshair is on. */
+/** The field's value under the mouse or crosshair. */
 export function Readout(): JSX.Element | null {
   const point = useSelected(pointedAt);
   const heat = useApp(selectHeat);
@@ -144,7 +144,7 @@ export function Readout(): JSX.Element | null {
   );
 }
 
-/** What a difference is to; of a day or a week ago the time of day says it, if they are real ones. */
+/** What a difference is relative to; for a real day or week ago, the time of day is enough. */
 function sinceText(against: string, compare: Compare | null): string {
   const seconds = compare?.by === 'ago' ? compare.seconds : null;
   const clock = against.slice(-8, -3);
@@ -154,13 +154,13 @@ function sinceText(against: string, compare: Compare | null): string {
 
 const LONGEST_BAR_PX = 110;
 
-/** A round length and how long it is on the map. */
+/** A round length, drawn to the map's scale. */
 export function ScaleBar(): JSX.Element {
   const scale = useApp((state) => state.viewport.view.scale);
   const bar = scaleBar(scale, LONGEST_BAR_PX);
   const length = written(lengthText(bar.metres));
   return (
-    // The view that is fitted keeps clear of the place, which must not depend on that view.
+    // Fitting the view keeps this place clear, so its size must not depend on the view.
     <div className="scale-place" data-over-map>
       <div className="scale-bar" role="img" aria-label={S.scaleBar(length)}>
         <span className="bar" style={{ width: `${bar.pixels}px` }} />

@@ -13,7 +13,7 @@ import { inLanguage, LANGUAGE_NAMES, LANGUAGES, type Language } from '../words/l
 import { openHelp } from './HelpDialog';
 import { say } from './toast';
 
-/** What the menu of the header holds. */
+/** The header menu's content. */
 export function Menu(): JSX.Element {
   const close = useClose();
   const { theme, unit } = useApp((state) => state.settings);
@@ -83,7 +83,7 @@ export function Menu(): JSX.Element {
   );
 }
 
-/** The same view in the same language, on a wall. */
+/** The wall-screen URL of the same view and language. */
 function kioskLink(): string {
   const url = viewAddress();
   url.searchParams.set('kiosk', '1');
@@ -102,7 +102,7 @@ async function saveMapOrSay(): Promise<void> {
   }
 }
 
-/** The page's language: another one is another address, which keeps all else of the link. */
+/** Chooses the language by loading the same link with another language. */
 function LanguageChoice(): JSX.Element {
   return (
     <label className="language">
@@ -124,7 +124,7 @@ function LanguageChoice(): JSX.Element {
   );
 }
 
-/** The menu's last entry, where there is a session to end. */
+/** The menu's last entry, if there is a session to end. */
 export function SignOut({
   close,
   leave = goTo,
@@ -136,7 +136,7 @@ export function SignOut({
   useEffect(() => {
     const abort = new AbortController();
     fetchSession(abort.signal).then(setSession, () => {
-      // Without an answer there is nothing to offer.
+      // Without a session there is nothing to offer.
     });
     return () => {
       abort.abort();

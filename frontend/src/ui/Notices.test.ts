@@ -33,7 +33,7 @@ describe('the most basic lack is told first', () => {
   test('no tags; a twin that was heard is there, whatever it lacks', () => {
     showTags([]);
     expect(id()).toBe('no-tags');
-    // Nothing that a lost connection, which the banner tells, makes untrue.
+    // No hint that is untrue without a connection; the banner reports the loss.
     expect(noticeFor(store.get())?.hint).not.toContain('running');
     goLive(status({ twin: 'offline', reason: 'no_clock' }));
     expect(noticeFor(store.get())).toMatchObject({
@@ -62,7 +62,7 @@ describe('the most basic lack is told first', () => {
   test('a field that could not be loaded, with the server’s reason', () => {
     receive(withField({ value: null, state: 'failed', message: 'too many cells' }));
     expect(noticeFor(store.get())?.title).toContain('too many cells');
-    // Why nothing loads without a connection, the banner says.
+    // The banner says why nothing loads without a connection.
     goLost();
     expect(id()).toBeUndefined();
   });

@@ -14,13 +14,13 @@ interface Notice {
   readonly id: string;
   readonly title: string;
   readonly hint?: string;
-  /** What only who looks after the machines needs. */
+  /** Detail for whoever maintains the system. */
   readonly more?: string;
   /** In the middle of an otherwise empty map. */
   readonly large?: boolean;
 }
 
-/** What is missing, and what to do about it; the most basic lack first and alone. */
+/** What is missing, and what to do about it; only the most basic problem. */
 export function noticeFor(state: AppState): Notice | null {
   const { phase, connection } = state.twin;
   const { snapshot, field, map, moment } = selectShown(state);
@@ -47,7 +47,7 @@ export function noticeFor(state: AppState): Notice | null {
         };
   }
   if (snapshot.tags.length === 0) {
-    // It was heard: what is wrong with it is told, and not that there is none.
+    // The twin was received before: report its fault, not that there is none.
     if (phase === 'offline') return { ...offline, title: S.emptyNoTags };
     return {
       id: 'no-tags',
@@ -66,7 +66,7 @@ export function noticeFor(state: AppState): Notice | null {
     const label = shown(selectSensor(state).label, 32);
     return { id: 'no-reading', title: S.emptyNoReading(label), hint: S.emptyNoReadingHint };
   }
-  // Without a connection nothing loads, as the banner says.
+  // Without a connection nothing loads; the banner says so.
   if (field.state === 'failed' && phase === 'live') {
     return { id: 'field-failed', title: S.fieldFailed(shown(field.message, 160)) };
   }
@@ -76,7 +76,7 @@ export function noticeFor(state: AppState): Notice | null {
   return null;
 }
 
-/** Of a moment in the past there is nothing to show: not yet, not at all, or because it was so. */
+/** A past moment has nothing to show: still loading, failed, or no tag was known then. */
 function pastNotice({ twin }: AppState, moment: number, came: Snapshot | null): Notice {
   const { pastFault, remembered } = twin;
   const when = rosText(moment);
@@ -99,7 +99,7 @@ function pastNotice({ twin }: AppState, moment: number, came: Snapshot | null): 
   };
 }
 
-/** In the middle of an empty map, or at the edge of one that has something to show. */
+/** The notice: in the middle of an empty map, or at the edge of one with content. */
 export function Notices({ place }: { place: 'middle' | 'edge' }): JSX.Element | null {
   const id = useApp((state) => noticeFor(state)?.id);
   const title = useApp((state) => noticeFor(state)?.title);
@@ -121,7 +121,7 @@ export function Notices({ place }: { place: 'middle' | 'edge' }): JSX.Element | 
   );
 }
 
-/** In place of the rows of a table that has none. */
+/** Replaces the rows of an empty table. */
 export function EmptyTable(): JSX.Element | null {
   const isEmpty = useApp((state) => selectTags(state).length === 0);
   const title = useApp((state) => noticeFor(state)?.title);

@@ -37,7 +37,7 @@ test('paper says when it was, when it was printed, and what is on it', () => {
     act(withRange({ low: 0, high: 100 }));
   });
   expect(line()).toMatch(/Temperature 32\.0 – 212\.0\u00a0°F$/);
-  // What comes after the print was begun is on it, and not later than it.
+  // Data that arrives after printing began is printed, and not dated after the print.
   vi.advanceTimersByTime(3_000);
   flush(() => {
     showTags([wireTag()]);
@@ -46,6 +46,6 @@ test('paper says when it was, when it was printed, and what is on it', () => {
   flush(() => {
     goLive(status({ origin: 'recorded' }));
   });
-  // Not when it was played.
+  // The recording's own time, not when it was played.
   expect(line()).toMatch(/^As of sim \d\d:\d\d:\d\d \(Recording\), printed 1 May 2026, 14:04:27/);
 });

@@ -17,13 +17,13 @@ import {
 } from '../store/moment';
 import { S } from '../strings';
 
-/** What and when, on paper alone: "Live" and "5 s" mean nothing an hour later. */
+/** Printed only: what is shown, and as of when; "Live" and "5 s" mean nothing an hour later. */
 export function PaperLine(): JSX.Element | null {
   const [printedAt, setPrintedAt] = useState(() => timeOfDay());
   const takenAt = useApp((state) => selectSnapshot(state)?.takenAt);
   const moment = useApp((state) => selectShown(state).moment);
   const origin = useApp(selectOrigin);
-  // Of a run with a time of its own: that, and not when it came here.
+  // A recording or simulation has its own time: print that, not when the data arrived.
   const ownAt = useApp((state) => {
     const snapshot = selectHasOwnTime(state) ? selectSnapshot(state) : null;
     return snapshot && secondsOf(snapshot.at);
@@ -36,7 +36,7 @@ export function PaperLine(): JSX.Element | null {
   const ideals = useApp((state) => idealsText(sensor, selectTags(state), unit));
   useEffect(() => {
     const onPrint = (): void => {
-      // Not with the next frame: a page on its way to the printer gets none.
+      // Render synchronously: a page being printed gets no further frame.
       flushSync(() => {
         setPrintedAt(timeOfDay());
       });
@@ -50,7 +50,7 @@ export function PaperLine(): JSX.Element | null {
   const label = shown(sensor.label, 32);
   const scale = isIdeal && ideal ? { low: ideal[0], high: ideal[1] } : range;
   const then = moment ?? ownAt;
-  // On its way to the printer the page goes on to live.
+  // Data may still arrive while the print dialog is open.
   const printed = then === null && printedAt < epochOf(takenAt) ? epochOf(takenAt) : printedAt;
   const time = then === null ? dateText(epochOf(takenAt)) : rosText(then);
   const taken = origin === null ? time : `${time} (${S.origin[origin]})`;

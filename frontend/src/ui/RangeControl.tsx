@@ -8,7 +8,7 @@ import { fixedRange, withRange } from '../store/view';
 import { S } from '../strings';
 import { Segmented } from '../widgets/controls';
 
-/** Automatic colours follow the data; a fixed range lets two moments be compared. */
+/** Chooses the colour range: automatic follows the data, fixed makes two moments comparable. */
 export function RangeControl({
   sensor,
   range,
@@ -75,7 +75,7 @@ export function RangeControl({
   );
 }
 
-/** What is in use now, rounded outwards; without one, the ideal range. */
+/** The range in use, rounded outwards; without one, the ideal range. */
 export function startingRange({ ideal }: Sensor, range: Range | null): Range {
   if (range && range.high > range.low) return rounded(range);
   if (ideal) return { low: ideal[0], high: ideal[1] };
@@ -83,9 +83,9 @@ export function startingRange({ ideal }: Sensor, range: Range | null): Range {
 }
 
 /**
- * One end of a fixed range. What is typed comes into force with Enter or on leaving, if it can;
- * until then the field says why it cannot. On leaving it shows what is in force again: a number
- * on display that the map does not follow would be a lie.
+ * One end of a fixed range. Enter or leaving the field applies a valid input; an invalid one shows
+ * the reason. After leaving, the field shows the applied value again: it never shows a number that
+ * the map does not use.
  */
 export function Bound({
   label,
@@ -98,15 +98,15 @@ export function Bound({
   label: string;
   sensor: Sensor;
   unit: TemperatureUnit;
-  /** In force now, in the sensor's unit, and so are all values here. */
+  /** The applied value; like all values here, in the sensor's unit. */
   value: number;
-  /** Why a value cannot be; null: it can. */
+  /** Why a value is invalid; null: it is valid. */
   refusal: (value: number) => string | null;
   onChange: (value: number) => void;
 }): JSX.Element {
   const id = useId();
   const text = String(Number(toShown(sensor, value, unit).toFixed(2)));
-  // null: nothing has been typed since the last value came into force.
+  // null: nothing typed since the last applied value.
   const [typed, setTyped] = useState<string | null>(null);
   const wanted = typed === null || typed.trim() === '' ? NaN : Number(typed);
   const next = fromShown(sensor, wanted, unit);
@@ -142,7 +142,7 @@ export function Bound({
           }
           if (event.key === 'Escape' && typed !== null) {
             setTyped(null);
-            // It has been of use here, and is not to close the tag's card too.
+            // Handled here: it must not close the tag card too.
             event.preventDefault();
           }
         }}

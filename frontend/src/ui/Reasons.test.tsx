@@ -1,4 +1,4 @@
-/** The table of states of the bridge's own tests: the page says what the judge says, in words. */
+/** The bridge tests' table of states: the page words what the judge decides. */
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 
@@ -37,7 +37,7 @@ const WORDS: Readonly<Record<Verdict, string>> = {
   unknown: 'Unknown',
   healthy: 'Healthy',
 };
-/** What has to be read in the words for each kind. */
+/** What the words of each kind must contain. */
 const SAYS: Readonly<Record<HealthReason['kind'], RegExp>> = {
   range: /, (below|above) [\d.,]+( \(critical\))?$/,
   reading_failed: /: (the sensor returns no value|not a plausible value)$/,
@@ -84,13 +84,13 @@ test.each(CASES)('$name', (state) => {
     expect(line?.querySelector('.health-mark')?.getAttribute('data-health')).toBe(verdict);
     if (kind !== 'range' || value === null || limit === null) continue;
     expect(line?.textContent).toContain(value < limit ? 'below' : 'above');
-    // The reading that is out of range is marked where it stands, and no other one.
+    // Only the out-of-range reading is marked, in its own cell.
     const marks = [...(row?.querySelectorAll('.beyond') ?? [])];
     const cell = row?.querySelector(`[data-sensor="${sensor}"]`);
     if (!state.readings[sensor]) continue;
     const mark = marks.find((each) => cell?.contains(each));
     expect(mark?.textContent).toMatch(value < limit ? /^low / : /^high /);
-    // Arrows are the trend's alone.
+    // Arrows are reserved for trends.
     expect(cell?.querySelector('svg')).toBeNull();
   }
   const ranged = told.filter(({ kind, sensor }) => kind === 'range' && state.readings[sensor]);

@@ -14,7 +14,7 @@ import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
 import { HealthShape } from './HealthMark';
 
-/** A reason in words, with its age as of the moment that is shown. */
+/** A reason in words, with its age at the shown moment. */
 export function useReasonText(reason: HealthReason | null, isMarked = false): string {
   const { snapshot, ageing } = useApp(selectShown);
   const unit = useApp((state) => state.settings.unit);
@@ -26,12 +26,12 @@ export function useReasonText(reason: HealthReason | null, isMarked = false): st
   });
 }
 
-/** Beside its sign. */
+/** A reason's text, for use beside its mark. */
 export function Reason({ reason }: { reason: HealthReason }): JSX.Element {
   return <>{useReasonText(reason, true)}</>;
 }
 
-/** Why a tag has its verdict, the worst first; nothing where there is no reason. */
+/** Reasons for a tag's verdict, the worst first. */
 export function Reasons({
   health,
   most = Infinity,
@@ -39,7 +39,7 @@ export function Reasons({
 }: {
   health: TagHealth;
   most?: number;
-  /** Of this tag, with what to do about each. */
+  /** The tag's id, to add what to do about each reason. */
   todoAt?: string | undefined;
 }): JSX.Element | null {
   const { reasons } = health;
@@ -60,7 +60,7 @@ export function Reasons({
   );
 }
 
-/** What to do about a reason, and that it has no alarm yet; of what is shelved, nothing. */
+/** What to do about a reason, and whether its alarm is still pending; nothing while shelved. */
 function Todo({ tagId, reason }: { tagId: string; reason: HealthReason }): JSX.Element | null {
   const { active, shelved } = useSelected(alarmList);
   const isKnown = useApp(selectAreAlarmsKnown);
@@ -74,6 +74,6 @@ function Todo({ tagId, reason }: { tagId: string; reason: HealthReason }): JSX.E
   );
 }
 
-/** Whether it is known which alarms there are. */
+/** Whether the current alarms are known. */
 export const selectAreAlarmsKnown = ({ twin: { alarms } }: AppState): boolean =>
   alarms !== null && alarms.source !== 'starting';

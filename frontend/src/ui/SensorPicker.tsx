@@ -8,12 +8,12 @@ import { selectSensors } from '../store/derived';
 import { S } from '../strings';
 import { Segmented } from '../widgets/controls';
 
-/** Which sensor the map shows. */
+/** Chooses the sensor that the map shows. */
 export function SensorPicker(): JSX.Element {
   const sensors = useApp(selectSensors);
   const sensor = useApp((state) => state.view.sensor);
   const root = useRef<HTMLDivElement>(null);
-  // The chosen one may be out of sight: by a link, by its key, or in a narrower window.
+  // A link, a shortcut or a narrower window may leave the selected sensor out of view.
   const showChosen = (): void => {
     root.current
       ?.querySelector('input:checked')
@@ -32,7 +32,7 @@ export function SensorPicker(): JSX.Element {
       showChosen();
       look();
     });
-    // A mouse wheel turns one way only, and the row goes the other.
+    // A mouse wheel scrolls vertically; the row is horizontal.
     const turn = ({ deltaX, deltaY }: WheelEvent): void => {
       if (deltaX === 0) row.scrollLeft += deltaY;
     };
@@ -69,13 +69,13 @@ export function SensorPicker(): JSX.Element {
   );
 }
 
-/** In short where the name is long: the full one to be heard, and to be had by pointing at it. */
+/** A long sensor name in short; screen readers and the tooltip have the full name. */
 export function SensorLabel({
   sensor,
   most = 0,
 }: {
   sensor: Sensor;
-  /** A name of so many letters is none of the long ones. */
+  /** Names up to this many characters are not shortened. */
   most?: number;
 }): JSX.Element {
   const label = shown(sensor.label, 32);

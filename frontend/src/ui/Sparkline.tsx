@@ -17,7 +17,7 @@ const WIDTH = 96;
 const HEIGHT = 26;
 const PAD = 3;
 
-/** Points of the line, oldest first, by time along x; gaps (no number) split it into pieces. */
+/** Points by time along x, oldest first; values of null split the line into pieces. */
 export function sparkLines(values: Values): SparkPoint[][] {
   const { low, high } = rangeOf(values.map(({ value }) => value)) ?? { low: 0, high: 0 };
   const seconds = values.map(({ stamp }) => stamp.sec + stamp.nanosec / 1e9);
@@ -31,7 +31,7 @@ export function sparkLines(values: Values): SparkPoint[][] {
       return;
     }
     if (piece.length === 0) pieces.push(piece);
-    // A clock that jumped back has no order by time; then the scans are spread evenly.
+    // If the clock jumped back, times are no order: space the scans evenly.
     const along =
       length > 0
         ? ((seconds[index] ?? start) - start) / length

@@ -8,7 +8,7 @@ import { isColumnShown, withColumn, type Settings } from '../store/settings';
 import { S } from '../strings';
 import { Check, Segmented } from '../widgets/controls';
 
-/** What can be chosen of the table: its columns, and how high its rows are. */
+/** Table settings: columns, grouping by area, and row height. */
 export function TableChoices(): JSX.Element {
   const sensors = useApp(selectColumns);
   const chosen = useApp((state) => state.view.sensor);

@@ -41,17 +41,17 @@ import { Sparkline } from './Sparkline';
 import { CardEstimate, inTime } from './inTime';
 import { Reasons } from './Reasons';
 
-// Charts come after the first paint, and their library with them.
+// Charts and their library load after the first paint.
 const CardChart = inTime(async () => (await import('../charts/CardChart')).default);
 
-/** Everything about one tag, over the map. */
+/** Everything about the selected tag. */
 export function TagCard({ tagId }: { tagId: string }): JSX.Element {
   const tag = useApp((state) => selectTag(state, tagId));
   const health = useApp((state) => selectHealth(state).byTag.get(tagId));
   const unit = useApp((state) => state.settings.unit);
   const moment = useApp((state) => selectShown(state).moment);
   const isHere = useApp(selectIsHere);
-  // What is newest says whether there is more to fetch, whatever moment is shown.
+  // The latest observation decides whether to fetch again, whatever moment is shown.
   const newest = useApp((state) =>
     JSON.stringify(selectNewestTag(state, tagId)?.wire.last_observed),
   );
@@ -103,7 +103,7 @@ function CardBody({
   history: TagHistory | null;
 }): JSX.Element {
   const { at } = tag;
-  // Where nobody asks for the estimate, only what it left out is of interest.
+  // Without the estimate on the map, only readings left out of it are worth showing.
   const isEstimated = useApp((state) => state.view.heat !== 'nearest');
   const hasChanged = health?.reasons.some(({ kind }) => kind === 'changed') ?? false;
   const isCharted = useApp((state) => state.view.chart !== null);
@@ -136,7 +136,7 @@ function CardBody({
           <CardChart tagId={tag.id} />
         </div>
       )}
-      {/* Above what comes later: nothing moves under a finger that is about to press. */}
+      {/* Above what loads later, so that its buttons do not move under a finger. */}
       <Comments subject={`tag:${tag.id}`} name={S.card(shown(tag.id, 24))} />
       <dl className="card-facts">
         {area !== '' && (
@@ -190,7 +190,7 @@ function CardBody({
   );
 }
 
-/** Fixed sensors and a robot's visits in words, any other source as it names itself. */
+/** Fixed sensors and a robot's visits in words; any other source by its own name. */
 function sourceText(source: string): string {
   if (source === 'adapt/fixed') return S.cardFixed;
   return source === 'adapt' ? S.cardVisited : shown(source, 40);
@@ -252,7 +252,7 @@ function CardReading({
 
 const LONGEST = 5;
 
-/** The last scans and looks of a tag, newest first, those that came to nothing too. */
+/** A tag's last scans and inspections, newest first, failed ones included. */
 export function Tries({ tries }: { tries: readonly PastAttempt[] }): JSX.Element | null {
   const snapshot = useApp(selectSnapshot);
   if (!snapshot || tries.length === 0) return null;
@@ -283,7 +283,7 @@ export function Tries({ tries }: { tries: readonly PastAttempt[] }): JSX.Element
 const kindOf = (kind: number | null): string =>
   kind === 0 ? S.cardTryKinds.scan : kind === 1 ? S.cardTryKinds.look : S.cardTryKinds.any;
 
-/** Of the last scans and tries those that had been made by then, ROS seconds; null: now. */
+/** The history up to `moment`, ROS seconds; null: all of it. */
 export const asOf = memoLast((history: TagHistory, moment: number | null): TagHistory => {
   if (moment === null) return history;
   const wasMade = ({ stamp }: { readonly stamp: WireTime }): boolean => secondsOf(stamp) <= moment;
@@ -294,13 +294,13 @@ export const asOf = memoLast((history: TagHistory, moment: number | null): TagHi
   };
 });
 
-/** Whoever stands at a tag that is scanned over and over does not ask each time, ms. */
+/** Least time between two fetches while a tag is scanned over and over, ms. */
 const PACE_MS = 500;
 
-/** The last scans of a tag, fetched anew after each observation; null until they are here. */
+/** A tag's last scans, fetched again after each observation; null until loaded. */
 function useHistory(tagId: string, observation: string | undefined): TagHistory | null {
   const { value } = useFetched<TagHistory>(
-    // A tag that a link names and the twin does not know.
+    // A link may name a tag that the twin does not know.
     observation === undefined
       ? null
       : { key: observation, group: tagId, run: (signal) => fetchHistory(tagId, signal) },

@@ -30,20 +30,20 @@ import { Age, Tried, useAgeStep } from './Age';
 import { HealthMark } from './HealthMark';
 
 interface Props {
-  /** Its place among all rows, from 0. */
+  /** Position among all rows, from 0. */
   readonly index: number;
   readonly tag: Tag;
   readonly health: TagHealth;
   readonly catalogue: Catalogue;
-  /** Empty: in none, or its head says it. */
+  /** Empty: in no area, or the area's heading says it. */
   readonly area: string;
-  /** Those that have a column. */
+  /** Sensors that have a column. */
   readonly sensors: readonly Sensor[];
   readonly chosen: string;
   readonly unit: TemperatureUnit;
-  /** Columns that are not wanted. */
+  /** Hidden columns. */
   readonly hidden: readonly string[];
-  /** What was known an hour before; null: not known. */
+  /** State an hour ago; null: unknown. */
   readonly then: HourAgo | null;
   readonly selected: boolean;
   readonly hovered: boolean;
@@ -65,10 +65,10 @@ export const TagRow = memo(function TagRow({
 }: Props): JSX.Element {
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
   const all = reasonsText(catalogue, health.reasons, unit);
-  // A failed scan is said once, with its age.
+  // Mention a failed scan once, with its age.
   const others = health.reasons.filter(({ kind }) => !tag.failedTry || kind !== 'scan_failed');
   const texts = others.map((reason, place): ReactNode =>
-    // The mark of the verdict is that of the worst.
+    // The row's mark already gives the worst reason's verdict.
     reasonText(catalogue, reason, unit, null, place === 0),
   );
   if (tag.failedTry) {
@@ -77,7 +77,7 @@ export const TagRow = memo(function TagRow({
         <Tried failed={tag.failedTry} />
       </span>
     );
-    // First what the verdict beside it is about.
+    // The verdict's own reason comes first.
     if (worstReason(health)?.kind === 'scan_failed') texts.unshift(tried);
     else texts.push(tried);
   }
@@ -93,7 +93,7 @@ export const TagRow = memo(function TagRow({
       data-hovered={hovered}
     >
       <th scope="row">
-        {/* Its click is heard by the table (TagTable), as is one anywhere in the row. */}
+        {/* The table (TagTable) handles clicks anywhere in the row, this button's too. */}
         <button type="button" className="row-button" aria-pressed={selected}>
           <bdi>{shown(tag.id, 24)}</bdi>
           {area !== '' && <small className="faint">{shown(area, 24)}</small>}
@@ -175,7 +175,7 @@ export const TagRow = memo(function TagRow({
   );
 });
 
-/** A value that looks as old as it is; one that is older than its row's age says its own. */
+/** A value styled by its age; one older than the row's scan also shows its own age. */
 function TableReading({
   sensor,
   tag,
@@ -210,7 +210,7 @@ function TableReading({
   );
 }
 
-/** Readings of one scan come together; more than this apart they are of two, ms. */
+/** Readings further apart than this come from different scans, ms. */
 const ONE_SCAN_MS = 60_000;
 
 const isOlder = (when: When, row: When): boolean =>
@@ -262,7 +262,7 @@ function Reading({
 
 export const ARROWS = { up: '\u2197', down: '\u2198', level: '\u2192' } as const;
 
-/** A reading against an hour ago: an arrow and the difference, or why there is none. */
+/** A reading's change over an hour: an arrow and the difference, or why there is none. */
 function TrendLine({
   sensor,
   tag,
@@ -273,7 +273,7 @@ function TrendLine({
   sensor: Sensor;
   tag: Tag;
   health: TagHealth;
-  /** Null: nobody knows what was an hour ago. */
+  /** Null: the state an hour ago is unknown. */
   then: HourAgo | null;
   unit: TemperatureUnit;
 }): JSX.Element | null {
@@ -288,7 +288,7 @@ function TrendLine({
           {S.trendSame}
         </span>
       );
-    // Only to be heard: with a young memory it would stand in every row.
+    // For screen readers only: with a short history, every row would show it.
     return <span className="unseen">{then ? S.trendNone : S.trendUnknown}</span>;
   }
   const { way, text } = differenceShown(sensor, trend.by, unit);

@@ -152,7 +152,7 @@ describe('table', () => {
   test('temperatures follow the chosen unit', () => {
     prefer({ unit: 'F' });
     render(<TagTable />);
-    // In short to be seen, whole to be heard.
+    // Short on screen, full for screen readers.
     expect(head(/^Temperature/).textContent).toBe('Temp.Temperature °F');
     expect(row('9').querySelector('[data-sensor="temperature"] .reading')?.textContent).toBe(
       '68.0',
@@ -174,7 +174,7 @@ describe('table', () => {
     showTags(tags, health);
     render(<TagTable />);
     expect(trends()).toEqual(['an hour ago: unknown', 'an hour ago: unknown']);
-    // What is not to be seen takes no room: the value stands in the middle of its row.
+    // Hidden text takes no room: the value stays centred in its row.
     expect(document.querySelector('.trend')).toBeNull();
     const before = tag({
       tag_id: 'a',
@@ -195,12 +195,12 @@ describe('table', () => {
       '\u2197 Temperature compared with an hour ago: +1.5\u00a0°C',
       'no reading an hour ago',
     ]);
-    // No hour of the clock, where a day is a short one.
+    // With shortened days, an hour is not a clock hour.
     goLive(status({ day_length_s: 1_440 }));
     hourBefore();
     expect(trends()[0]).toContain('compared with a greenhouse hour (1\u00a0min) ago: ');
     goLive(status());
-    // An answer of long ago is none.
+    // An outdated answer does not count.
     flush(() => {
       hourAgo.set({ of: at.sec - 601, isNow: true, tags: new Map() });
     });

@@ -28,7 +28,7 @@ import { SensorLabel } from './SensorPicker';
 import { TagRow } from './TagRow';
 import { partsOf, SHORT_TABLE, useChosenInSight, useHeldRows, useVisibleRows } from './visibleRows';
 
-/** Every tag, also those without a pin and those whose scan failed. */
+/** All tags, including those without a pin and those whose scan failed. */
 export function TagTable(): JSX.Element {
   const catalogue = useApp(selectCatalogue);
   const sensors = useApp(selectShownColumns);
@@ -49,8 +49,8 @@ export function TagTable(): JSX.Element {
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
   const body = useRef<HTMLTableSectionElement>(null);
   const sight = useVisibleRows(body, lines.length);
-  // A row that has the focus stays, or the focus would be lost with it; and the rows beside it,
-  // where the Tab key leads, past the head of an area.
+  // The focused row stays rendered, or the focus would be lost. So do two rows either side, so
+  // that Tab can move on, even past an area's heading.
   const [focused, setFocused] = useState<string | null>(null);
   const places = useMemo(
     () =>
@@ -64,8 +64,8 @@ export function TagTable(): JSX.Element {
   const held = placeOf(focused);
   const single = [placeOf(selected), held - 2, held - 1, held, held + 1, held + 2];
   return (
-    // Keyboard and screen reader use the button in each row; for the pointer the whole row is
-    // its target. One listener here, because a layer per row makes a long table slow.
+    // Keyboards and screen readers use each row's button; for the pointer, the whole row is the
+    // target. One listener here, because an overlay per row makes a long table slow.
     // eslint-disable-next-line jsx-a11y/click-events-have-key-events, jsx-a11y/no-noninteractive-element-interactions
     <table
       className={lines.length > SHORT_TABLE ? 'tags long' : 'tags'}
@@ -76,7 +76,7 @@ export function TagTable(): JSX.Element {
         setFocused(rowTag(event));
       }}
       onBlur={({ currentTarget, relatedTarget }) => {
-        // On its way to another row, which is to be still there when it arrives.
+        // Focus moving to another row must find that row still rendered.
         if (!currentTarget.contains(relatedTarget)) setFocused(null);
       }}
       onClick={onClick}
@@ -181,7 +181,7 @@ export function TagTable(): JSX.Element {
   );
 }
 
-/** Above the rows of an area: a heading to go to, and how the worst of them is. */
+/** Heading above an area's rows, with the worst verdict among them. */
 function AreaRow({
   head: { area, count, worst },
   index,
@@ -202,7 +202,7 @@ function AreaRow({
   );
 }
 
-/** The tag whose row an event hit; null in a head. */
+/** The tag whose row received an event; null in a heading. */
 function rowTag(event: SyntheticEvent): string | null {
   const row = event.target instanceof Element ? event.target.closest('tr') : null;
   return row?.dataset['tagId'] ?? null;
@@ -224,7 +224,7 @@ function onPointerLeave(): void {
 
 const letters = (count: number): CSSProperties => ({ '--letters': count }) as CSSProperties;
 
-/** How many letters the longest word of a label has. */
+/** Length of a label's longest word, in characters. */
 const longestWord = (label: string): number =>
   Math.max(
     ...shown(label, 24)

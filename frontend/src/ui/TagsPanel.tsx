@@ -32,7 +32,7 @@ export function TagsPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
   );
 }
 
-/** The table in a frame of its own. What is filtered anew is shown from its first row. */
+/** The table in its scroll frame; a new filter scrolls back to the first row. */
 function Rows(): JSX.Element {
   const filter = useApp(({ view }) => view.filter);
   const status = useApp(({ view }) => view.health);
@@ -41,7 +41,7 @@ function Rows(): JSX.Element {
     if (frame.current) frame.current.scrollTop = 0;
   }, [filter, status]);
   return (
-    // Scrolls by itself, so the keyboard must be able to reach it.
+    // A scroll container, so the keyboard must be able to reach it.
     <div
       ref={frame}
       className="table-scroll"
@@ -63,7 +63,7 @@ const saveTable = (): void => {
   });
 };
 
-/** Where paper ends, the table does not. */
+/** On paper: says that the table has more rows than are printed. */
 function PaperRest(): JSX.Element | null {
   const count = useApp((state) => selectRows(state).length);
   if (count <= LONGEST_ON_PAPER) return null;

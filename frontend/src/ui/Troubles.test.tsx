@@ -125,7 +125,7 @@ test.each([
   expect(lines()[0]).toContain(title);
   expect(lines()[0]).toMatch(hint);
   expect(lines()[0]).toContain('Database or disk is full.');
-  // It heals by itself.
+  // It clears by itself.
   journal({});
   expect(lines()).toEqual([]);
 });

@@ -15,12 +15,12 @@ import { More } from '../widgets/controls';
 import { useNow } from '../widgets/useNow';
 import { later } from './later';
 
-/** Something that an operator should know of while the page goes on. */
+/** A problem that the operator should know about while the page keeps working. */
 export interface Trouble {
   readonly id: string;
   readonly title: string;
   readonly detail?: string;
-  /** What only who looks after the machines needs. */
+  /** Detail for whoever maintains the system. */
   readonly more?: string;
 }
 
@@ -52,7 +52,7 @@ function troublesOf(
   }
   troubles.push(...journalTroubles(status?.journal));
   troubles.push(...outwardTroubles(status?.outward ?? []));
-  // Where nothing is shown at all, the page says why in the place of the map.
+  // If nothing is shown at all, the notice on the map says why.
   if (pastFault && moment !== null && pastFault.at !== moment) {
     troubles.push({
       id: 'past',
@@ -74,12 +74,12 @@ function troublesOf(
   return troubles;
 }
 
-/** So long is what a twin says of an input: its remedy stands at the end. */
+/** Longest input problem that the twin reports, in characters: its end says what to do. */
 const MAX_PROBLEM = 500;
 
 const TOLD = new Map<string, { title: string; hint: string }>(Object.entries(S.journal));
 
-/** What is not kept, or was lost sight of. */
+/** A journal that does not record, or a damaged one that was quarantined. */
 function journalTroubles(journal: Journal | undefined): readonly Trouble[] {
   if (!journal) return [];
   const troubles: Trouble[] = [];
@@ -102,7 +102,7 @@ function journalTroubles(journal: Journal | undefined): readonly Trouble[] {
 
 const CHANNELS = new Map<string, string>(Object.entries(S.outward));
 
-/** Who is not told outside of the page. A channel that this page does not know is called by name. */
+/** Failing notification channels. A channel unknown to this page is called by its name. */
 function outwardTroubles(channels: readonly Outward[]): readonly Trouble[] {
   return channels
     .filter((it) => it.is_failing)
@@ -118,13 +118,13 @@ function sentence(text: string, most = 240): string {
   return said && `${said.charAt(0).toUpperCase()}${said.slice(1)}.`;
 }
 
-/** A line each, below the header. */
+/** Problems below the header, one per line. */
 export function Troubles(): JSX.Element {
   const twin = useApp((state) => state.twin);
   const moment = useApp((state) => selectShown(state).moment);
   const isLate = useSelected(later, (it) => it.isLate);
   return (
-    // There before there is something to tell, or a screen reader would not hear it.
+    // Rendered even when empty: screen readers announce only changes in an existing region.
     <div role="status" className="troubles" data-testid="troubles">
       {troublesOf(twin, moment, isLate).map(({ id, title, detail, more }) => (
         <div key={id} data-trouble={id}>
@@ -136,16 +136,16 @@ export function Troubles(): JSX.Element {
   );
 }
 
-/** Why the bridge calls the twin offline, for a person. */
+/** Why the bridge calls the twin offline, in words for an operator. */
 export function offlineReason(status: StatusFrame | null): string {
   return (status && S.offlineWhy[status.reason]) || S.frozenWhy.offline;
 }
 
-/** The same for whoever looks after the machines; empty: there is nothing to add. */
+/** The same for whoever maintains the system; empty: nothing to add. */
 export const offlineMore = (status: StatusFrame | null): string =>
   status ? S.offlineMore[status.reason] : '';
 
-/** Across the page whenever what it shows is not the present. */
+/** Banner across the page while it is not live. */
 export function FrozenBanner(): JSX.Element | null {
   const phase = useApp((state) => state.twin.phase);
   const takenAt = useApp((state) => selectNewest(state).snapshot?.takenAt);
@@ -157,7 +157,7 @@ export function FrozenBanner(): JSX.Element | null {
   return (
     <div className="frozen" role="alert" data-testid="frozen">
       <strong>{(isPast ? S.frozenBehindPast : S.frozenSince)(clockText(epochOf(takenAt)))}</strong>
-      {/* What counts on by itself is not read out each second. */}
+      {/* A running count must not be read out every second. */}
       {!isTimeLost && (
         <span aria-hidden="true" className="frozen-age">
           {S.agoSuffix(ageText(Math.max(0, now - takenAt) / 1000))}

@@ -1,6 +1,6 @@
 /**
- * What the first view can do without, in one piece that comes right behind it: cards, lists and
- * tools that somebody has to ask for first. Only `later.tsx` loads it.
+ * What the first view does not need, as one chunk loaded right after it: cards, lists and tools that
+ * open on request. Only `later.tsx` loads it.
  */
 import '../styles/card.css';
 import '../styles/hover.css';
@@ -12,7 +12,7 @@ import '../styles/attention.css';
 import '../styles/comments.css';
 import '../styles/bound.css';
 import '../styles/paper.css';
-// Last, as it takes back what the others say.
+// Last, as it overrides the others.
 import '../styles/print.css';
 
 export { startBadge, startNotify, startSound } from '../alarms/notify';

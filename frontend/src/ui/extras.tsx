@@ -1,4 +1,4 @@
-/** What comes behind the first view at three places of it; of a robot only where there is one. */
+/** Parts loaded after the first view, on the map, in its legend and layers; the robot's only if there is one. */
 import { useLayoutEffect, useMemo, useRef, type JSX, type ReactNode } from 'react';
 
 import { readingText, shortAgeText } from '../domain/format';
@@ -30,7 +30,7 @@ const RobotChoice = inTime(async () => (await robot()).RobotChoice);
 
 const useHasRobot = (): boolean => useSelected(robotFrame, (frame) => frame !== null);
 
-/** A robot is of now: whoever looks back sees none. */
+/** Whether to show the robot: it is known live only, so the past shows none. */
 function useRobot(): boolean {
   const isShown = useApp(
     (state) => state.view.layers.has('robot') && selectShown(state).moment === null,
@@ -54,19 +54,19 @@ export const InLegend = (): JSX.Element => (
 
 export const InLayers = (): JSX.Element | null => (useHasRobot() ? <RobotChoice /> : null);
 
-/** A tag may carry any number of sensors; the card that opens with a click has them all. */
+/** A tag may have any number of sensors; the card that a click opens shows them all. */
 const MOST_READINGS = 8;
 const MOST_REASONS = 3;
 
 /**
- * A tag in short, beside the pin that the mouse is on. For eyes alone: card and table tell the
- * same to everybody, and a mouse on its way to somewhere else is not to be held up.
+ * A tag in short, beside the pin under the mouse. Hidden from screen readers, because card and table
+ * have the same; it takes no pointer events, so that it never blocks the mouse.
  */
 export function HoverCard(): JSX.Element | null {
   const pin = useSelected(pinUnderMouse);
   const selected = useApp((state) => state.view.selected);
   const tag = useApp((state) => (pin ? selectTag(state, pin.tagId) : undefined));
-  // The chosen tag's own card is open already.
+  // The selected tag's card is open already.
   if (!pin || !tag || pin.tagId === selected) return null;
   return <Brief key={tag.id} pin={pin} tag={tag} />;
 }
@@ -77,7 +77,7 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
   const unit = useApp((state) => state.settings.unit);
   const catalogue = useApp(selectCatalogue);
   const chosen = useApp((state) => state.view.sensor);
-  // Where it fits depends on its size, which is known once it is there and before it is seen.
+  // Placed by its size, which is known after layout and before paint.
   useLayoutEffect(() => {
     const card = root.current;
     if (!card) return;
@@ -137,13 +137,13 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
   );
 }
 
-/** What pins and dots mean; a pin is the mark of its tag's verdict. */
+/** Key to pins and dots; a pin is the mark of its tag's verdict. */
 export function Keys(): JSX.Element {
   const tags = useApp(selectTags);
   const species = useMemo(() => [...speciesLooks(speciesOf(tags))], [tags]);
   const unknown = tags.some((tag) => tag.blooms.some((bloom) => bloom.species === ''));
   return (
-    // May scroll on a phone, so the keyboard must be able to reach it.
+    // Scrolls on a phone, so the keyboard must be able to reach it.
     // eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex
     <ul className="legend-keys" aria-label={S.legend} tabIndex={0}>
       {VERDICTS.map((verdict) => (

@@ -1,9 +1,9 @@
-/** How many entries of a list fit where nobody scrolls, with the line that counts the rest. */
+/** How many list entries fit where nobody can scroll, with a last line that counts the rest. */
 import { useLayoutEffect, useState, type RefObject } from 'react';
 
 /**
- * `bottoms`: where each entry ends, pixels from the top; `all` may be more than have been laid out.
- * The line of the rest needs room for itself, and only where there is a rest.
+ * `bottoms`: bottom edge of each laid-out entry, pixels from the top; `all` may count more entries.
+ * If not all fit, the line that counts the rest needs room too.
  */
 export function fitting(
   bottoms: readonly number[],
@@ -15,7 +15,7 @@ export function fitting(
   return bottoms.length === all && fit(height) === all ? all : fit(height - lineHeight);
 }
 
-/** Lays out the entries of `list` within its parent; of `all` in the data. Gives how many fit. */
+/** How many of `all` entries fit into the parent of `list`; measured again on each resize. */
 export function useFitting(list: RefObject<HTMLElement | null>, all: number): number {
   const [count, setCount] = useState(all);
   useLayoutEffect(() => {

@@ -1,10 +1,10 @@
-/** What is loaded when it is first shown, and not by who never looks at it. */
+/** Components that load when first shown. */
 import { createElement, lazy, Suspense, type ComponentType, type JSX } from 'react';
 
 import type * as EstimateParts from '../parts/estimate';
 import { S } from '../strings';
 
-/** A component that cannot be loaded says so; the rest of the page goes on. */
+/** A lazy component; if it cannot be loaded, it says so and the rest of the page keeps working. */
 export function inTime<Props extends object>(
   load: () => Promise<ComponentType<Props>>,
 ): (props: Props) => JSX.Element {

@@ -1,9 +1,9 @@
 import { route } from '../contract/api';
 
-/** Over https, the page can be installed and opens also where the bridge cannot be reached. */
+/** Over https, makes the page installable, and able to open while the bridge is unreachable. */
 export function startShell(): void {
   if (window.location.protocol !== 'https:') return;
   navigator.serviceWorker.register(route('sw.js')).catch(() => {
-    // A browser that keeps none, or a certificate that it does not trust: the page is as before.
+    // No service workers, or an untrusted certificate: the page works as before.
   });
 }

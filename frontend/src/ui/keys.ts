@@ -1,6 +1,6 @@
 import { later, loadParts } from './later';
 
-/** Listens for the keys that work anywhere; one that comes before what it is for waits for that. */
+/** Listens for the global shortcuts; a key pressed before its parts are loaded waits for them. */
 export function startKeys(): () => void {
   const onKeyDown = (event: KeyboardEvent): void => {
     const { parts } = later.get();

@@ -40,7 +40,7 @@ test('where they do not come it is told, and they are asked for again, ever less
     expect(load).toHaveBeenCalledTimes(tries);
     expect(later.get()).toEqual({ parts: null, isLate: true });
   }
-  // 4, 8, 16 s, and from then on every 30 s.
+  // 4, 8, 16 s, then every 30 s.
   await vi.advanceTimersByTimeAsync(28_000);
   expect(load).toHaveBeenCalledTimes(6);
   await vi.advanceTimersByTimeAsync(60_000);

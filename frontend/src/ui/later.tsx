@@ -1,4 +1,4 @@
-/** Loads what the first view can do without (`behind.ts`), and keeps trying where it does not come. */
+/** Loads what the first view does not need (`behind.ts`), with retries. */
 import type { JSX } from 'react';
 
 import { pause } from '../clock';
@@ -7,22 +7,22 @@ import type * as everyPart from './behind';
 
 export type Parts = typeof everyPart;
 
-/** What has come of it. */
+/** State of loading. */
 export interface Later {
   readonly parts: Parts | null;
-  /** It did not come when it was last asked for. */
+  /** The last attempt to load failed. */
   readonly isLate: boolean;
 }
 
 export const later = createStore<Later>({ parts: null, isLate: false });
 
-/** Between two tries, ms: doubled each time, up to the longest. */
+/** Pause between attempts, ms: doubled each time, up to the longest. */
 const FIRST_MS = 1_000;
 const LONGEST_MS = 30_000;
 
 let coming: Promise<Parts> | null = null;
 
-/** Asks for them once, however often it is called; comes back with them. */
+/** Loads the parts, once for all callers. */
 export const loadParts = (load = (): Promise<Parts> => import('./behind')): Promise<Parts> =>
   (coming ??= tried(load));
 
@@ -39,7 +39,7 @@ async function tried(load: () => Promise<Parts>): Promise<Parts> {
   }
 }
 
-/** What needs the parts that come behind the first view; nothing until they are here. */
+/** Renders children that need the later parts; nothing until those are loaded. */
 export function WithParts({
   children,
 }: {

@@ -1,4 +1,4 @@
-/** Given another moment, every part of the page shows that moment. */
+/** Every part of the page shows the chosen moment. */
 import { act as flush, render, screen } from '@testing-library/react';
 import { beforeEach, expect, test, vi } from 'vitest';
 

@@ -1,30 +1,30 @@
-/** How a page that has failed comes back by itself, and never in a hot loop. */
+/** Automatic reload of a page that has failed, with back-off. */
 import { timeOfDay } from '../clock';
 
 const KEY = 'lupin-twin.reload';
 const FIRST_MS = 5_000;
 const LONGEST_MS = 300_000;
-/** A page that held this long starts the back-off afresh when it fails. */
+/** A page that worked for this long restarts the back-off when it fails, ms. */
 const PROVEN_MS = 600_000;
 
 interface Kept {
   readonly failures: number;
-  /** When the last of them was, ms since the epoch: a reload begins every other clock anew. */
+  /** Time of the last failure, ms since the epoch: a reload resets every other clock. */
   readonly at: number;
 }
 
 type Session = Pick<Storage, 'getItem' | 'setItem'>;
 
 /**
- * Notes a failure and gives the pause before the page is to be loaded anew: doubled with each one
- * in a row, up to five minutes, and half of it left to chance, so that the screens of a house do not
- * come all at once. Where nothing can be kept every pause is the longest.
+ * Records a failure and returns the pause before the reload, ms. It doubles with each failure in a
+ * row, up to five minutes. Half of it is random, to keep a greenhouse's screens from reloading at
+ * once. Without storage, every pause is the longest.
  *
  * @param random from 0 to 1
  */
 export function pauseAfterFailure(session: Session, now: number, random: number): number {
   const before = read(session);
-  // A clock that was set back says nothing about how long the page has held.
+  // A clock set back says nothing about how long the page worked.
   const failures = before && now - before.at < PROVEN_MS ? before.failures + 1 : 1;
   const isKept = keep(session, { failures, at: now });
   const doubled = FIRST_MS * 2 ** Math.min(failures - 1, 10);
@@ -50,7 +50,7 @@ function keep(session: Session, kept: Kept): boolean {
   }
 }
 
-/** The tab's own storage, which a reload survives; where it is forbidden, one that refuses. */
+/** The tab's session storage, which survives a reload; if it is blocked, a stand-in that throws. */
 function openSession(): Session {
   const refuse = (): never => {
     throw new Error('no session storage');
@@ -63,8 +63,8 @@ function openSession(): Session {
 }
 
 /**
- * Loads the page anew after the pause that is due. Only while its server answers: a browser's own
- * error page would stay for ever.
+ * Reloads the page after the due pause, but only once its server answers: the browser's own error
+ * page would stay for ever.
  */
 export function reloadByItself(
   session: Session = openSession(),

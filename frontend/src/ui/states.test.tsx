@@ -1,4 +1,4 @@
-/** The table of states of the bridge's own tests, as two of the page's languages tell it. */
+/** The bridge tests' table of states, worded in two of the page's languages. */
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 
@@ -33,13 +33,13 @@ const { alike, states } = JSON.parse(readFileSync(FILE, 'utf8')) as {
   readonly states: readonly State[];
 };
 
-/** What a reader has to find, whatever else is said. */
+/** Words that must appear, whatever else does. */
 interface Language {
   readonly verdicts: Readonly<Record<Verdict, string>>;
   readonly sensors: Readonly<Record<string, string>>;
   readonly sides: readonly [below: string, above: string];
   readonly says: Readonly<Record<HealthReason['kind'], RegExp>>;
-  /** Of an alarm, whose value is that of now. */
+  /** An alarm's words, with its value now. */
   readonly alarms: Readonly<Record<'range' | 'pest', RegExp>>;
   readonly tag: string;
   readonly house: string;
@@ -129,7 +129,7 @@ const reasonOf = ([kind, verdict, sensor, value, limit]: Told): HealthReason => 
 describe.each(['en', 'de'] as const)('%s', (language) => {
   const words = LANGUAGES[language];
 
-  /** The page's modules, which took their words as they were loaded. */
+  /** The page's modules, loaded again because they bind their language on import. */
   const load = async () => ({
     ...(await import('../testing/page')),
     ...(await import('../testing/tags')),
@@ -153,7 +153,7 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
     vi.stubGlobal('fetch', () => Promise.reject(new Error('no server')));
   });
 
-  /** Whether a text says what a reason is about. */
+  /** Asserts that a text names a reason's kind, sensor and side. */
   const expectSaid = (
     text: string,
     [kind, , sensor, value, limit]: Told,
@@ -204,7 +204,7 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
     const summary = container.querySelector<HTMLElement>('[data-testid=house-health]');
     expect(summary?.dataset['health']).toBe(house.verdict);
     expect(summary?.textContent).toContain(words.verdicts[house.verdict]);
-    // Not more is said to be unknown than is.
+    // "Most unknown" only if most are unknown.
     const unknown = tags.filter(([, { verdict }]) => verdict === 'unknown').length;
     const isMost = 2 * unknown > tags.length;
     if (house.verdict === 'unknown' && house.reasons.length === 0 && unknown > 0) {
@@ -214,7 +214,7 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
     for (const [id, { verdict, reasons }] of tags) {
       const row = container.querySelector<HTMLElement>(`tr[data-tag-id="${id}"]`);
       expect(row?.dataset['health']).toBe(verdict);
-      // Its sign, whose shape and colour are the verdict's, and its word.
+      // The verdict's mark (shape and colour) and word.
       const mark = row?.querySelector('.health-mark');
       expect(mark?.getAttribute('data-health')).toBe(verdict);
       expect(mark?.textContent).toContain(words.verdicts[verdict]);

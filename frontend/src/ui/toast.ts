@@ -1,6 +1,6 @@
 import { createStore } from '../store/create';
 
-/** A short word to the operator after something that shows no other effect. */
+/** A short message to the operator after an action without another visible effect. */
 export const toast = createStore('');
 
 let timer: ReturnType<typeof setTimeout> | undefined;

@@ -47,7 +47,7 @@ test('the range in sight holds every row of the window, and follows the scrollin
     expect(to).toBeGreaterThanOrEqual((900 - top) / 45);
     expect(to - from).toBeLessThan(70);
   }
-  // Far below the window: nothing but what is spare.
+  // Far below the window: spare rows only.
   expect(rangeInSight(5_000, 45, 900).to).toBe(0);
 });
 
@@ -109,7 +109,7 @@ describe('a long table', () => {
     settle(() => {
       act(withTag(null));
     });
-    // With its neighbours, for the Tab key, past the head of an area.
+    // With its neighbours, so that Tab can pass an area heading.
     expect(indices().slice(-5)).toEqual([7776, 7777, 7778, 7779, 7780]);
     expect(document.activeElement).toBe(button);
     settle(() => button?.blur());
@@ -127,14 +127,14 @@ describe('a long table', () => {
   });
 
   test('a heartbeat that changes nothing renders nothing; one scan renders its own row', () => {
-    // On a busy machine a second passes in between, and ages would be others.
+    // On a busy machine, a second could pass in between and change the ages.
     vi.useFakeTimers({ toFake: ['performance', 'setInterval', 'clearInterval'] });
     show(1_000);
     const before = commits;
     hear(house(1_000), nextStamp());
     expect(commits).toBe(before);
 
-    // Read by a row alone, each time that it is rendered.
+    // Only a row reads this property, once per render.
     const rendered: string[] = [];
     for (const tag of store.get().twin.latest.snapshot?.tags ?? []) {
       const confidence = tag.speciesConfidence;

@@ -1,4 +1,4 @@
-/** Which rows of a long table are in the page: those in sight, some around them, and some more. */
+/** Windowing of a long table: renders the rows in view, some around them, and a few others. */
 import { useEffect, useMemo, useState, type RefObject } from 'react';
 import { flushSync } from 'react-dom';
 
@@ -6,15 +6,15 @@ import { inAreas, withHeads, type Line, type Row } from '../domain/table';
 import { useApp } from '../store/app';
 import { selectAreaOf, selectRows } from '../store/derived';
 
-/** Up to so many rows all of them are in the page. */
+/** Up to this many rows, all are rendered. */
 export const SHORT_TABLE = 100;
-/** Rows beyond each edge of the window, for the Tab key and for a quick hand. */
+/** Rows beyond each edge of the window, for the Tab key and fast scrolling. */
 const SPARE = 12;
-/** Rows come and go by so many at once. */
+/** Rows added or removed at once. */
 const STEP = 8;
-/** More rows than this take a browser minutes to lay out for paper. */
+/** Most rows on paper: a browser takes minutes to lay out more. */
 export const LONGEST_ON_PAPER = 1_000;
-/** Until one has been measured, pixels. */
+/** Row height until one has been measured, pixels. */
 const USUAL_HEIGHT = 45;
 
 export interface Range {
@@ -23,12 +23,12 @@ export interface Range {
   readonly to: number;
 }
 
-/** A row by its index, or the height of rows that are not in the page. */
+/** A row by its index, or a number of rows that are not rendered. */
 export type Part =
   | { readonly kind: 'row'; readonly index: number }
   | { readonly kind: 'gap'; readonly rows: number };
 
-/** The rows of a range, and single ones outside of it, with what is left out between them. */
+/** The rows of a range and single ones outside it, with gaps for the rows between. */
 export function partsOf(count: number, range: Range, single: readonly number[]): Part[] {
   const from = Math.min(Math.max(0, range.from), count);
   const to = Math.min(Math.max(from, range.to), count);
@@ -47,7 +47,7 @@ export function partsOf(count: number, range: Range, single: readonly number[]):
   return parts;
 }
 
-/** The rows in sight of a table whose first row begins at `top` in a window of that height. */
+/** Rows to render if the first row begins at `top`, pixels from the window's top; exceeds the view by `SPARE`. */
 export function rangeInSight(top: number, rowHeight: number, windowHeight: number): Range {
   const down = (row: number): number => Math.floor(row / STEP) * STEP;
   return {
@@ -61,7 +61,7 @@ interface Visible extends Range {
   readonly rowHeight: number;
 }
 
-/** Follows whatever scrolls, and paper, which has as many rows as it can take. */
+/** The rows to render, updated on scroll, resize and print. */
 export function useVisibleRows(
   body: RefObject<HTMLTableSectionElement | null>,
   count: number,
@@ -79,7 +79,7 @@ export function useVisibleRows(
     const look = (): void => {
       const { top } = rows.getBoundingClientRect();
       const row = rows.querySelector('tr[data-tag-id]');
-      // None in a half of the page that is not shown.
+      // Zero in a pane that is not shown.
       const measured = row?.getBoundingClientRect().height ?? 0;
       const rowHeight = measured > 0 ? measured : USUAL_HEIGHT;
       const { from, to } = rangeInSight(top, rowHeight, window.innerHeight);
@@ -89,7 +89,7 @@ export function useVisibleRows(
           : { from, to, rowHeight },
       );
     };
-    // Told at once, and whenever a filter, the window or the font changes the table's size.
+    // Fires at once, and whenever a filter, the window or the font changes the table's size.
     const size = new ResizeObserver(look);
     size.observe(rows);
     const frame = rows.closest('.table-scroll');
@@ -107,12 +107,12 @@ export function useVisibleRows(
   return sight;
 }
 
-/** Whether the page is on its way to the printer. */
+/** Whether the page is being printed. */
 export function usePaper(): boolean {
   const [isPaper, setPaper] = useState(false);
   useEffect(() => {
     const onPrint = ({ type }: Event): void => {
-      // Not with the next frame: a page on its way to the printer gets none.
+      // Render synchronously: a page being printed gets no further frame.
       flushSync(() => {
         setPaper(type === 'beforeprint');
       });
@@ -128,9 +128,9 @@ export function usePaper(): boolean {
 }
 
 /**
- * In view once its card has taken its place, and again once the rows have been measured: there may
- * be thousands above it. A chart that comes into the card later takes its room from the table.
- * `place`: as rows sort anew, none that is chosen stays half below the head.
+ * Scrolls the selected row into view once its card is laid out, and again once rows are measured:
+ * thousands may be above it. It stays in view as the frame's height changes (a chart loads into the
+ * card later), and as `place` changes (rows are sorted again).
  */
 export function useChosenInSight(
   body: RefObject<Element | null>,
@@ -170,14 +170,14 @@ const NEAREST = { block: 'nearest' } as const;
 
 const rowOf = (frame: Element, chosen: string): Element | null => {
   const id = CSS.escape(chosen);
-  // Of several alarms the one that was clicked.
+  // A tag may have several alarms: prefer the clicked one.
   return (
     frame.querySelector(`[data-where="${id}"]:focus-within`) ??
     frame.querySelector(`tr[data-tag-id="${id}"], [data-where="${id}"]`)
   );
 };
 
-/** Who has scrolled elsewhere is left there. */
+/** Keeps the selected row in view, unless the user has scrolled it out of view. */
 function keep(frame: Element, chosen: string, height: number): void {
   const row = rowOf(frame, chosen);
   const down = row && row.getBoundingClientRect().bottom - frame.getBoundingClientRect().top;
@@ -185,13 +185,13 @@ function keep(frame: Element, chosen: string, height: number): void {
 }
 
 interface HeldRows {
-  /** Rows, and heads of areas between them. */
+  /** Rows, with area headings between them. */
   readonly lines: readonly Line[];
   readonly onPointerEnter: () => void;
   readonly onPointerLeave: () => void;
 }
 
-/** The table's rows. While a pointer or a finger is on them none moves; what is new comes last. */
+/** The table's rows. While a pointer is on them, none moves and new ones come last. */
 export function useHeldRows(): HeldRows {
   const rows = useApp(selectRows);
   const areaOf = useApp(selectAreaOf);

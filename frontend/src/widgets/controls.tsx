@@ -38,7 +38,7 @@ const PATHS = {
 
 export type IconName = keyof typeof PATHS;
 
-/** A line drawing; always beside a text or inside a labelled button, so hidden from readers. */
+/** A line icon; always beside text or in a labelled button, so hidden from screen readers. */
 export function Icon({ name, size = 20 }: { name: IconName; size?: number }): JSX.Element {
   return (
     <svg className="icon" viewBox="0 0 24 24" width={size} height={size} aria-hidden="true">
@@ -52,7 +52,7 @@ interface IconButtonProps extends ComponentProps<'button'> {
   readonly label: string;
 }
 
-/** A button that is a picture, with its word for who does not see it. */
+/** An icon button with an accessible name. */
 export const IconButton = ({ icon, label, ...rest }: IconButtonProps): JSX.Element => (
   <button type="button" className="icon-button" aria-label={label} title={label} {...rest}>
     <Icon name={icon} />
@@ -79,7 +79,7 @@ export const Check = ({ label, isOn, onChange, ...rest }: CheckProps): JSX.Eleme
   </label>
 );
 
-/** What only who looks after the machines needs to read, behind a word that opens it. */
+/** Collapsed detail for whoever maintains the system. */
 export function More({ label, text }: { label: string; text: string }): JSX.Element | null {
   if (text === '') return null;
   return (
@@ -98,7 +98,7 @@ interface SegmentedProps<Value extends string> {
   readonly className?: string;
 }
 
-/** A choice of one among a few, as native radio buttons: arrow keys and screen readers know them. */
+/** A choice among a few, as native radio buttons, which arrow keys and screen readers support. */
 export function Segmented<Value extends string>({
   legend,
   options,
@@ -138,7 +138,7 @@ interface SelectProps<Value extends string | number> extends Omit<
   readonly onChange: (value: Value) => void;
 }
 
-/** A choice of one among more than fit beside each other. */
+/** A choice among more options than fit side by side. */
 export function Select<Value extends string | number>({
   options,
   text,
@@ -164,7 +164,7 @@ export function Select<Value extends string | number>({
 
 const Close = createContext<() => void>(() => undefined);
 
-/** Closes the panel that the caller is in, and gives the focus back to its button. */
+/** Closes the caller's panel, and returns the focus to its button. */
 export const useClose = (): (() => void) => useContext(Close);
 
 interface DisclosureProps {
@@ -175,7 +175,7 @@ interface DisclosureProps {
   readonly children: ReactNode;
 }
 
-/** A button that opens a panel beside it; Escape, a click elsewhere or leaving it closes. */
+/** A button that opens a panel; Escape, a click elsewhere or moving the focus out closes it. */
 export function Disclosure({
   label,
   button,
@@ -200,7 +200,7 @@ export function Disclosure({
       byFinger = event.pointerType === 'touch';
       if (!byFinger && isOutside(event)) setOpen(false);
     };
-    // A finger that closes a panel does nothing else: it cannot see what it would press behind it.
+    // A tap that closes a panel does nothing else: the panel hid what it would press.
     const onClick = (event: MouseEvent): void => {
       if (!byFinger || !isOutside(event)) return;
       event.preventDefault();
@@ -239,13 +239,13 @@ export function Disclosure({
         aria-expanded={open}
         aria-controls={id}
         onClick={(event) => {
-          // The second of a double click opens nothing that the first has closed, nor closes it.
+          // The second click of a double click must not reverse the first.
           if (event.detail < 2) setOpen(!open);
         }}
       >
         {button}
       </button>
-      {/* Takes the focus of a click beside its controls: else what scrolls behind it would. */}
+      {/* Focusable, to take a click beside its controls: otherwise the scroll area behind it would. */}
       <div
         id={id}
         className="disclosure-panel"
@@ -261,8 +261,8 @@ export function Disclosure({
 }
 
 /**
- * Where a panel opened from gets the focus back, if it is still somewhere in the panel: asked before
- * that is taken out of the page, and the focus with it.
+ * Returns the focus to where the panel was opened from, if it is still in the panel. A layout effect,
+ * because its cleanup runs before the panel leaves the page, and the focus with it.
  */
 export function useFocusBack(panel: RefObject<HTMLElement | null>): void {
   useLayoutEffect(() => {

@@ -9,7 +9,7 @@ const listeners = new Set<() => void>();
 function subscribe(listener: () => void): () => void {
   listeners.add(listener);
   if (timer === undefined) {
-    // Nobody has looked for a while.
+    // Without listeners the clock stood still.
     ticked = now();
     timer = setInterval(() => {
       ticked = now();
@@ -24,12 +24,12 @@ function subscribe(listener: () => void): () => void {
   };
 }
 
-/** The monotonic clock in ms, ticking once a second for everyone at the same moment. */
+/** The monotonic clock, ms, ticking once a second for all components together. */
 export function useNow(): number {
   return useSyncExternalStore(subscribe, () => ticked);
 }
 
-/** Something that follows from the time; renders when it changes, not with each tick. */
+/** A value derived from the time; re-renders when it changes, not on each tick. */
 export function useTicking<Part extends string | null>(part: (now: number) => Part): Part {
   return useSyncExternalStore(subscribe, () => part(ticked));
 }

@@ -1,4 +1,4 @@
-/** The words about what people say, which come with what shows them; few, so all languages in one place. */
+/** Texts about comments, bundled with their components; few, so all languages are in one file. */
 import type { Language } from './languages';
 
 export const COMMENTS = {

@@ -1,4 +1,4 @@
-/** English, whose words say what there is to be said: the other languages have their shape. */
+/** English: the reference catalogue, whose shape the other languages follow. */
 import { ALARMS, HEALTH } from './en/alarms';
 import { CHARTS, MAP, TAGS } from './en/map';
 import { PAGE, PAST } from './en/page';

@@ -1,4 +1,4 @@
-/** The words of the estimate, which come with it; the same in English where they cannot be had. */
+/** The estimate's texts, loaded with it; English if the language fails to load. */
 import { ESTIMATE } from './en/estimate';
 import type { Language } from './languages';
 import { partOf } from './load';

@@ -1,4 +1,4 @@
-/** The words of the page over all greenhouses; few enough that every language comes along. */
+/** Texts of the fleet page; few, so all languages are bundled. */
 import type { Language } from './languages';
 import type { In } from './shape';
 

@@ -1,4 +1,4 @@
-/** The words of what the page over all greenhouses loads when asked for: alarms, comparison, report. */
+/** Texts of the fleet page's views that load on request: alarms, comparison, report. */
 import type { Language } from './languages';
 import type { In } from './shape';
 

@@ -8,16 +8,16 @@ import { chosenLanguage, inLanguage, LANGUAGE_NAMES, LANGUAGES } from './languag
 test.each([
   ['', ['de-AT', 'en'], { language: 'de', locale: 'de-AT', unknown: null }],
   ['', ['nl'], { language: 'nl', locale: 'nl-NL', unknown: null }],
-  // The first that the page speaks, not the first.
+  // The first supported language, not the first one listed.
   ['', ['fr-FR', 'es-MX', 'de'], { language: 'es', locale: 'es-MX', unknown: null }],
   ['', ['fr', 'pl'], { language: 'en', locale: 'en-GB', unknown: null }],
   ['', [], { language: 'en', locale: 'en-GB', unknown: null }],
   ['?lang=nl', ['de-DE'], { language: 'nl', locale: 'nl-NL', unknown: null }],
   ['?lang=DE-ch', ['en-US'], { language: 'de', locale: 'de-CH', unknown: null }],
   ['?kiosk=1&lang=de', ['fr', 'de-CH'], { language: 'de', locale: 'de-CH', unknown: null }],
-  // No region writes English dates the other way round.
+  // English dates have one format, whatever the region.
   ['?lang=en-US', ['de'], { language: 'en', locale: 'en-GB', unknown: null }],
-  // What is not spoken is said, and the browser's own language is not what was asked for either.
+  // An unsupported ?lang= is reported; the browser's language does not replace it.
   ['?lang=xx', ['de'], { language: 'en', locale: 'en-GB', unknown: 'xx' }],
   ['?lang=', ['de'], { language: 'en', locale: 'en-GB', unknown: '' }],
   ['?lang=de-!', [], { language: 'de', locale: 'de-DE', unknown: null }],

@@ -1,10 +1,10 @@
-/** The languages that the page speaks, and which of them somebody gets. Pure. */
+/** The supported languages, and which one a user gets. Pure. */
 
 export const LANGUAGES = ['en', 'de', 'nl', 'es'] as const;
 
 export type Language = (typeof LANGUAGES)[number];
 
-/** Each in its own words: who looks for theirs reads no other. */
+/** Each language's name in itself, so that its speakers find it. */
 export const LANGUAGE_NAMES: Readonly<Record<Language, string>> = {
   en: 'English',
   de: 'Deutsch',
@@ -13,8 +13,8 @@ export const LANGUAGE_NAMES: Readonly<Record<Language, string>> = {
 };
 
 /**
- * How numbers and dates are written where the browser names no region. English has the day before
- * the month and a clock of 24 hours in every region: "3/4" and "2:00" must not be read two ways.
+ * Locale for numbers and dates if the browser names no region. English always has day before month and
+ * a 24-hour clock: "3/4" and "2:00" must not be ambiguous.
  */
 const LOCALES: Readonly<Record<Language, string>> = {
   en: 'en-GB',
@@ -25,13 +25,13 @@ const LOCALES: Readonly<Record<Language, string>> = {
 
 export interface Choice {
   readonly language: Language;
-  /** For `Intl`: the language, and the region where one is known. */
+  /** For `Intl`: the language, with the region if known. */
   readonly locale: string;
-  /** What `?lang=` asks for and the page does not speak; null: nothing. */
+  /** The unsupported value of `?lang=`; null: none. */
   readonly unknown: string | null;
 }
 
-/** By `?lang=`, else the first of the browser's languages that the page speaks, else English. */
+/** The language of `?lang=`, else the browser's first supported language, else English. */
 export function chosenLanguage(search: string, preferred: readonly string[]): Choice {
   const asked = new URLSearchParams(search).get('lang');
   const spoken = asked === null ? null : languageOf(asked);
@@ -44,13 +44,13 @@ export function chosenLanguage(search: string, preferred: readonly string[]): Ch
   };
 }
 
-/** "de-AT" and "DE" are German; null: the page does not speak it. */
+/** "de-AT" and "DE" are German; null: not supported. */
 function languageOf(tag: string): Language | null {
   const name = tag.split('-')[0]?.toLowerCase();
   return LANGUAGES.find((each) => each === name) ?? null;
 }
 
-/** In Switzerland and Mexico the point is a point, also to who reads German and Spanish. */
+/** The browser's locale of that language: Swiss and Mexican numbers have a decimal point, for example. */
 function localeFor(language: Language, preferred: readonly string[]): string {
   if (language === 'en') return LOCALES.en;
   const regional = preferred.find((tag) => languageOf(tag) === language && tag.includes('-'));
@@ -61,7 +61,7 @@ function localeFor(language: Language, preferred: readonly string[]): string {
   }
 }
 
-/** The address of the same view in another language. */
+/** The URL of the same view in another language. */
 export function inLanguage(
   { pathname, search, hash }: Pick<Location, 'pathname' | 'search' | 'hash'>,
   language: Language,

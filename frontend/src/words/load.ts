@@ -1,11 +1,11 @@
-/** One language's words. All but English come over the network, and only to whom they are for. */
+/** Loads one language's texts. English is bundled; the others are separate chunks. */
 import { ENGLISH } from './en';
 import type { Language } from './languages';
 import type { Words } from './shape';
 
 type Loads<Part> = Readonly<Record<Exclude<Language, 'en'>, () => Promise<Part>>>;
 
-/** A part of the words; null: it could not be had. */
+/** A part of the texts; null: it could not be loaded. */
 export async function partOf<Part>(
   language: Language,
   english: Part,

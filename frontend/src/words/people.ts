@@ -1,4 +1,4 @@
-/** The words about people, which come with what shows them; few, so all languages in one place. */
+/** Texts about people, bundled with their components; few, so all languages are in one file. */
 import type { Language } from './languages';
 
 export const PEOPLE = {

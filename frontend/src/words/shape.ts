@@ -1,7 +1,7 @@
-/** What a language has to say: as much as English, of the same kind, and nothing more. */
+/** Type of a language's catalogue: exactly the keys and kinds of the English one. */
 import type { ENGLISH } from './en';
 
-/** The same in other words: texts are any texts, what makes a text takes the same to make it of. */
+/** `T` with any text in place of each text; functions keep their parameters. */
 export type In<T> = T extends string
   ? string
   : T extends (...of: infer Of) => string

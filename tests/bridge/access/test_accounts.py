@@ -179,6 +179,17 @@ def test_a_file_that_has_gone_opens_nothing(path: Path) -> None:
     assert people.by_token(TOKEN) is None
 
 
+def test_a_file_that_was_there_at_the_start_and_one_that_cannot_be_looked_for_open_nothing(
+    path: Path,
+) -> None:
+    add(path, "token", scada="viewer")
+    people = People(path)
+    path.unlink()
+    assert people.is_on
+    path.symlink_to(path)
+    assert People(path).is_on
+
+
 def test_whom_a_proxy_names_is_asked_after_again(path: Path) -> None:
     add(path, anna="operator")
     people = People(path, is_proxied=True)

@@ -117,6 +117,22 @@ async def test_it_reads_the_past_once_then_what_is_new_and_another_journal_from_
         assert [alarm.worst for alarm in board.now.alarms] == [4.0]
 
 
+async def test_an_error_over_a_silence_does_not_end_the_alarms() -> None:
+    async with following() as (feed, board, source):
+
+        def fail_once(_: Change) -> None:
+            board.on_change = lambda _: None
+            raise RuntimeError("a fault of a test")
+
+        board.on_change, source.is_removed = fail_once, True
+        feed.on_silence(is_silent=True, last_ns=NOW)
+        await changed(board)
+        source.is_removed, source.writes_now = False, [pest(1, 4)]
+        feed.on_state(told(1))
+        await changed(board)
+        assert len(board.now.active) == 2
+
+
 async def test_what_is_written_is_read_also_where_the_state_stays_as_it_is() -> None:
     async with following() as (feed, board, source):
         source.writes_now, source.written = [pest(1, 2)], 1

@@ -224,7 +224,7 @@ def test_what_is_compared_can_be_chosen(every: All) -> None:
         ("compare?sensor_type=a&from=0&to=2678401", 400, "31.0 days apart, the limit is 31"),
         ("compare?sensor_type=a&from=5&to=4", 400, "to is 4.000000000 s, before from"),
         ("compare?sensor_type=a&from=soon", 400, "from is 'soon'"),
-        ("alarms?sites=nowhere", 404, "there is no site 'nowhere' in the archive (10 others are)"),
+        ("alarms?sites=nowhere", 404, "there is no site 'nowhere' in the archive, which has 10"),
         ("compare?sensor_type=a&sites=gh1,nowhere", 404, "there is no site 'nowhere'"),
     ],
 )

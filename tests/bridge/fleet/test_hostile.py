@@ -54,6 +54,7 @@ def page(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iter
         wait_for(lambda: {*running.sites()} == {*SITES}, "all sites")
         yield running
         assert "Traceback" not in running.process.output
+        assert "shutting down" not in running.process.output
         assert running.process.exit_code is None
 
 

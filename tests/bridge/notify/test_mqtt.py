@@ -30,8 +30,10 @@ class House:
     def __init__(self) -> None:
         self.now = seen(tag("a", temperature=20.0))
         self._number = 0
+        self.is_faulty = False
 
     def seen(self) -> GreenhouseState:
+        assert not self.is_faulty
         return self.now
 
     def scan(self) -> float:
@@ -205,6 +207,19 @@ async def test_a_broker_that_is_absent_comes_and_is_killed_knows_the_newest(
             await until(lambda: not channel.condition.is_connected, "the end of the broker")
             house.scan()
         await until(lambda: channel.condition.waiting == 2, "the tag and the house")
+
+
+async def test_a_house_that_cannot_be_looked_at_for_a_while_is_told_of_again(
+    shared: Broker,
+) -> None:
+    house = House()
+    with Subscriber(shared) as heard:
+        async with telling(shared, house) as channel:
+            await told(heard, 20.0)
+            house.is_faulty = True
+            await until(lambda: "AssertionError" in channel.condition.detail, "the fault")
+            house.is_faulty = False
+            await told(heard, house.scan())
 
 
 async def test_a_broker_that_hangs_is_tried_anew_and_told_the_newest(tmp_path: Path) -> None:

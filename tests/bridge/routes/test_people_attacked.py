@@ -187,11 +187,15 @@ def test_a_stop_amid_a_sign_in_is_no_error(tmp_path: Path) -> None:
         assert "ERROR" not in running.process.output
 
 
-def test_without_the_accounts_nobody_is_let_in_and_what_is_open_ends(tmp_path: Path) -> None:
+def test_what_is_open_ends_with_the_first_account_and_when_the_accounts_have_gone(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "accounts.sqlite"
-    add(path, "token", scada="viewer")
     with served("--accounts", str(path)) as live:
         ws = f"{live.url.replace('http', 'ws', 1)}/ws/state"
+        with open_websocket(ws) as stream:
+            add(path, "token", scada="viewer")
+            assert "sign in again" in end_of(stream)
         with open_websocket(ws, additional_headers=BEARER) as stream:
             path.unlink()
             refused = live.get("/api/state", BEARER)

@@ -209,7 +209,8 @@ def test_check_says_what_comes_from_the_broker(domain: int, tmp_path: Path) -> N
             client.publish("plain/bench/co2", "800")
             spin()
             line = next(line for _, line in report(node, 0.0))
-            return line.startswith("ok    MQTT: connected; received ") and "used 0" not in line
+            is_there = "zigbee2mqtt/{tag} nothing yet, plain/{tag}/{sensor} bench co2 800" in line
+            return line.startswith("ok    MQTT: connected; received ") and is_there
 
         wait_for(is_right, "what the broker says")
         node.destroy_node()

@@ -138,6 +138,12 @@ def test_what_is_said_of_the_journal_is_read_again() -> None:
         assert (read.complete_ns, read.kept_ns) == (1 if stretch == "1" else None, ())
 
 
+@pytest.mark.parametrize("own", ["../accounts", "/etc/passwd", "a/b", "..", "j\u00fc", "x" * 600])
+def test_a_journal_whose_name_could_lead_to_another_file_has_none(own: str) -> None:
+    values = {"state": "recording", "id": own}
+    assert self_report([Finding("journal", OK, "", values)]).journal.journal_id == ""
+
+
 def test_who_says_nothing_is_not_said_to_have_dropped_nothing() -> None:
     assert self_report(()) == SelfReport(None, None)
     assert self_report([Finding("clock", OK, "", {"state": "well"})]) == SelfReport(None, None)

@@ -98,6 +98,11 @@ def test_a_lot_that_was_broken_off_leaves_the_file_as_it_was(source: Path, tmp_p
     assert follow.followed(target).last == follow.followed(target).last < 999
 
 
+def test_a_lot_changes_the_name_of_no_journal(tmp_path: Path) -> None:
+    lot = Lot("a" * 32, ('["meta","journal_id","../accounts"]',), 0, True)
+    assert follow.write(tmp_path / "web.sqlite", lot, NOW).journal == lot.journal
+
+
 @pytest.mark.parametrize("key", ["purged_ns:1", "purged_seq", "forgotten:1"])
 def test_a_copy_that_says_nonsense_of_itself_is_damaged(
     key: str, source: Path, tmp_path: Path

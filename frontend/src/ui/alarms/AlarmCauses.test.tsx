@@ -29,7 +29,7 @@ const group = (name: string): Element[] => [
 
 test('of many of one cause five, then a hundred more at a time', () => {
   tell(...Array.from({ length: 150 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) })));
-  // By their text: to look for a role among hundreds of buttons takes seconds here.
+  // By text: a role query over hundreds of buttons takes seconds.
   expect(screen.getByText('Active (150)')).toBeTruthy();
   expect(group('active')).toHaveLength(0);
   fireEvent.click(screen.getByText(/150 alarms/));
@@ -48,6 +48,6 @@ test('many of one cause that are resolved have nothing to do, and no time in com
   fireEvent.click(screen.getByText('Resolved in the last 24 h (5)'));
   const heading = screen.getByRole('button', { name: /Temperature too low · 5 alarms/ });
   expect(heading.querySelector('.alarm-do, [data-fact=since]')).toBeNull();
-  // The place of what is to press is kept, for the columns.
+  // The empty tools cell stays, to align the columns.
   expect(heading.parentElement?.querySelector('.alarm-tools')?.children).toHaveLength(0);
 });

@@ -26,17 +26,17 @@ interface ValuesNow extends Values {
   readonly state: Now | null;
 }
 
-/** An alarm's values as the newest state has them. */
+/** An alarm's values in the latest state. */
 export function useValues(alarm: Alarm): ValuesNow {
   const last = useSelected(hourAgo);
   const speech = useApp(selectSpeech);
-  // As a text: a state that says the same of this tag renders nothing anew.
+  // As text: a new state with the same values for this tag does not re-render.
   const key = useApp((state) => JSON.stringify(selectNow(state, alarm, last)));
   const state = JSON.parse(key) as Now | null;
   return { ...valuesOf(alarm, speech, state), state };
 }
 
-/** For how long, and how bad it is; the day that it began on, if it is another, or when it was resolved. */
+/** Duration and verdict; also the day it began, if not today, or when it was resolved. */
 export function AlarmTimes({
   alarm,
   first,
@@ -66,7 +66,7 @@ export function AlarmTimes({
   );
 }
 
-/** How it is now, and how it was at worst: a column each. */
+/** The value now and the worst value, in a column each. */
 export function AlarmFacts({
   item: { alarm, verdict },
   values: { state, now: current, worst },
@@ -100,14 +100,14 @@ function Fact({
 }): JSX.Element {
   return (
     <span data-fact={name} data-status={verdict} title={text}>
-      {/* That of now is the row's own. */}
+      {/* The row itself already marks the verdict now. */}
       {name === 'worst' && <HealthMark verdict={verdict} word={false} />} {text}
       {children && <> {children}</>}
     </span>
   );
 }
 
-/** What was received last, where that says nothing about now. */
+/** The last received value, if it says nothing about now. */
 function NotKnown({
   alarm,
   state,
@@ -127,7 +127,7 @@ function NotKnown({
   );
 }
 
-/** Up, down or level against an hour before. */
+/** Up, down or level compared with an hour ago. */
 function Trend({ alarm, by }: { alarm: Alarm; by: number }): JSX.Element {
   const { sensors, unit } = useApp(selectSpeech);
   const sensor = sensors.named(alarm.reason.sensor);

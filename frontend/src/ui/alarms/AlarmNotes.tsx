@@ -24,7 +24,7 @@ import { selectAreAlarmsKnown } from '../Reasons';
 import { once } from './AlarmRow';
 import { whoseWord } from './people';
 
-/** At how many tags something waits for a second scan; null: none, or nobody knows. */
+/** How many tags have a reason that waits for a second scan; null: none, or unknown. */
 export function AlarmsWait(): JSX.Element | null {
   const isKnown = useApp(selectIsKnown);
   const listed = useSelected(alarmList);
@@ -39,17 +39,17 @@ export function AlarmsWait(): JSX.Element | null {
   return <p data-note="wait">{S.alarmsWait(waiting)}</p>;
 }
 
-// Of a silent twin the bridge goes on to tell: that is an alarm itself.
+// With a silent twin, alarms stay known: the silence itself is an alarm.
 const selectIsKnown = (state: AppState): boolean =>
   selectAreAlarmsKnown(state) && !selectIsCut(state);
 
-/** What the list is about, and what it does not know. */
+/** Notes above the list: what it covers, and what is unknown. */
 export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
   const alarms = useApp((state) => state.twin.alarms);
   const moment = useApp((state) => selectShown(state).moment);
   const isStarting = alarms?.source === 'starting';
   const isKnown = useApp(selectIsKnown);
-  // Of when, the banner says.
+  // The banner says from when.
   const isLast = useApp((state) => selectIsCut(state) && selectNewest(state).snapshot !== null);
   return (
     <div className="alarm-notes">
@@ -72,13 +72,13 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
   );
 }
 
-/** Below the list: whether what is done here is this browser's own, or everybody's. */
+/** Below the list: whether actions stay in this browser or are shared. */
 export function WhoseWord(): JSX.Element {
   const who = useSelected(person);
   return <p className="alarms-mine faint">{whoseWord(who)}</p>;
 }
 
-/** Says that an alarm has come while another moment is shown, and leads to now. */
+/** Says that alarms were raised while a past moment is shown, and links back to live. */
 export function Meanwhile(): JSX.Element | null {
   const items = useSelected(meanwhile);
   const [worst] = items;
@@ -100,16 +100,16 @@ export function Meanwhile(): JSX.Element | null {
   );
 }
 
-/** Above the list, in a place of its own: what is new in a list that is held, and what can be undone. */
+/** Line above the list: new alarms that a held list does not show yet, and the last action to undo. */
 export function DoneLine({
   added,
   onShow,
   children,
 }: {
-  /** Alarms that are new and not listed yet. */
+  /** Number of new alarms not listed yet. */
   added: number;
   onShow: () => void;
-  /** What can be done to the whole list. */
+  /** Actions on the whole list. */
   children: ReactNode;
 }): JSX.Element {
   const last = useSelected(done);
@@ -135,7 +135,7 @@ export function DoneLine({
   );
 }
 
-/** What is to be said of it; asked for anew each time, for words come in several languages. */
+/** The hint for a state of the sound. */
 const soundHint = (state: SoundState): string =>
   ({ ready: S.alarmSoundHint, waits: S.alarmSoundWaits, none: S.alarmSoundNone })[state];
 
@@ -148,7 +148,7 @@ const notifyHint = (state: NotifyState): string =>
     none: S.alarmNotifyNone,
   })[state];
 
-/** How alarms come to who is not looking: nothing but what is wished. */
+/** Opt-in sound and notifications for alarms while nobody is looking at the page. */
 export function TellMe(): JSX.Element {
   const kept = useSelected(own);
   const sound = useSelected(soundState);
@@ -160,7 +160,7 @@ export function TellMe(): JSX.Element {
         label={S.alarmSound}
         isOn={kept.sound && sound !== 'none'}
         isPossible={sound !== 'none'}
-        // Until it is wished, nothing has to wait.
+        // While sound is off, "waits" does not apply.
         hint={soundHint(kept.sound || sound === 'none' ? sound : 'ready')}
         onChange={wishSound}
       />

@@ -37,7 +37,7 @@ const first = (name: string): HTMLElement => {
   if (!row) throw new Error(`no row in ${name}`);
   return row;
 };
-/** What stands in the place of a row's one button. */
+/** Text in the place of a row's acknowledge button. */
 const status = (tag: string): string | null | undefined =>
   document.querySelector(`[data-where='${tag}'] > .alarm-tools > :first-child`)?.textContent;
 const fact = (row: HTMLElement, name: string): HTMLElement => {
@@ -50,7 +50,7 @@ const notes = (): (string | undefined)[] =>
 const press = (name: RegExp | string): void => {
   fireEvent.click(screen.getByRole('button', { name }));
 };
-/** What the menu of a tag's row offers. */
+/** Entries in the menu of a tag's row. */
 const actions = (tag: string): (string | null)[] => {
   press(new RegExp(`^Actions: Tag ${tag}`));
   return [...document.querySelectorAll('.row-actions button')].map((each) => each.textContent);
@@ -99,7 +99,7 @@ test('the value of now follows the newest state, with its own severity', () => {
   const now = fact(first('active'), 'now');
   expect([now.textContent, now.dataset['status']]).toEqual([' now 12.3\u00a0°C', 'stressed']);
   expect(fact(first('active'), 'worst').dataset['status']).toBe('critical');
-  // A connection that is lost makes nothing worse.
+  // A lost connection makes nothing worse.
   flush(goLost);
   expect(fact(first('active'), 'since').textContent).toContain('Stressed');
 });
@@ -167,7 +167,7 @@ test('acknowledged, shelved, and back', () => {
   press(/^Acknowledge: Tag 5/);
   expect(acknowledged()).toEqual(['true', 'false']);
   expect([status('5'), status('6')]).toEqual(['acknowledged', 'Acknowledge']);
-  // In its place, which does nothing more.
+  // The status in the button's place does nothing when pressed.
   press('acknowledged');
   expect(acknowledged()).toEqual(['true', 'false']);
   press('Undo');
@@ -198,10 +198,10 @@ test('a critical alarm takes a reason, and is shelved for no more than an hour',
   expect(document.activeElement).toBe(reason);
   fireEvent.change(reason, { target: { value: ' fan is being mended ' } });
   press('For 1 h');
-  // As long as the focus is in the list, no row moves.
+  // No row moves while the focus is in the list.
   fireEvent.blur(screen.getByTestId('alarms'));
   expect(first('shelved').textContent).toMatch(/shelved until [\d:]+: fan is being mended/);
-  // Somebody has decided that nothing is to be done for now.
+  // A shelved alarm shows no action.
   expect(document.querySelector('.alarm-do')).toBeNull();
   tell(alarm('a', { tag_id: '5', shelved_by: 'anna' }));
   expect(first('shelved').textContent).toMatch(/shelved by anna until [\d:]+: fan is being mended/);
@@ -215,7 +215,7 @@ test('what is shelved while the list is held says so where it stands, and all is
   fireEvent.change(screen.getByLabelText(/^Reason/), { target: { value: 'fan' } });
   press('For 1 h');
   expect(status('5')).toMatch(/^shelved until \d\d:\d\d$/);
-  // Why, in the place of what to do, and as somebody's words.
+  // The reason replaces the action, as a quotation.
   expect(first('active').querySelector('.alarm-do')).toBeNull();
   expect(first('active').querySelector('q')?.textContent).toBe('fan');
   expect(group('active').map(({ textContent }) => textContent.includes('shelved until'))).toEqual([
@@ -224,7 +224,7 @@ test('what is shelved while the list is held says so where it stands, and all is
   ]);
   const text = first('active').querySelector('.alarm-text');
   expect(text?.textContent).not.toContain('shelved until');
-  // The heading counts it no more.
+  // The heading no longer counts it.
   expect(group('active').map(({ dataset }) => dataset['elsewhere'])).toEqual(['true', 'false']);
   press('Acknowledge all (1)');
 });
@@ -271,7 +271,7 @@ test('while the pointer is in the list no row moves, and what is new is counted 
   const ids = (): (string | undefined)[] => group('active').map(({ dataset }) => dataset['alarm']);
   const list = screen.getByTestId('alarms');
   const a = alarm('a', { reason: { verdict: 'stressed' } });
-  // Where there is no row, none can move.
+  // An empty list has nothing to hold.
   fireEvent.pointerEnter(list);
   tell(a);
   expect(ids()).toEqual(['a']);
@@ -315,9 +315,9 @@ test('without an alarm it says so; where that is not known it says that', () => 
   const wait = '1 tag waiting for a second scan: no alarm yet';
   expect(notes()).toEqual(['none', 'wait']);
   expect(screen.getByText(wait)).toBeTruthy();
-  // Beside the alarm of another tag as well, and not beside its own.
+  // Also shown beside another tag's alarm, but not beside its own.
   tell(alarm('a', { tag_id: '5' }));
-  // Below the rows: it comes and goes.
+  // Below the rows, so that they do not move.
   expect(screen.getByText(wait).previousElementSibling).toBe(first('active').closest('section'));
   const ofTag = alarm('a', { tag_id: '1' });
   tell(ofTag);
@@ -351,7 +351,7 @@ test('it is of now, and says so while another moment is shown', () => {
 test('many of one cause are one heading, which is acknowledged as one and names the worst', () => {
   const bad = Array.from({ length: 5 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) }));
   tell(...bad, alarm('b', { tag_id: '9', reason: { sensor: 'humidity', verdict: 'stressed' } }));
-  // Nobody opens anything on paper.
+  // On paper everything is expanded.
   fireEvent(window, new Event('beforeprint'));
   expect(group('active')).toHaveLength(6);
   fireEvent(window, new Event('afterprint'));

@@ -40,16 +40,16 @@ import { Acknowledge, AlarmRow, once } from './AlarmRow';
 import { ALARMS_ID, ListChoice } from './ListChoice';
 import { useIsRefused } from './people';
 
-/** Rows of one cause at first; of others, and with each wish for more, as many as a page draws at once. */
+/** Rows shown first for a shared cause; for others, and with each "more", `MOST_ROWS`. */
 const MOST_OF_CAUSE = 5;
 const MOST_ROWS = 100;
 
 const isTag = (id: string): boolean => selectNewestTag(store.get(), id) !== undefined;
 
-/** The alarms of now, beside the map: active, shelved, and resolved. */
+/** The current alarms, beside the map: active, shelved and resolved. */
 export function AlarmPanel(): JSX.Element {
   const listed = useSelected(alarmList);
-  // As a text: what does not change it renders nothing anew.
+  // As text: states that keep the order do not re-render.
   const ids = useApp((state) =>
     worstNowFirst(state, listed.active)
       .map(({ alarm }) => alarm.id)
@@ -64,7 +64,7 @@ export function AlarmPanel(): JSX.Element {
   const [order, setOrder] = useState<Order>('cause');
   const { shown, added, release, ...hold } = useHeldOrder(all);
   const seen = filtered(shown, filter, speech, isTag);
-  // As elsewhere in the page, whatever order is held.
+  // Counts follow the live list, like all others on the page, even while the order is held.
   const counted = filtered(all, filter, speech, isTag);
   const waiting = calling(seen);
   const isAble = useSelected(person, mayAct);
@@ -97,7 +97,7 @@ export function AlarmPanel(): JSX.Element {
             onKeyDown={(event) => {
               if (event.key !== 'Escape' || filter === '') return;
               setFilter('');
-              // It has been of use here, and is not to close what lies over the map too.
+              // Handled here: it must not close charts or the tag card too.
               event.preventDefault();
             }}
           />
@@ -145,7 +145,7 @@ export function AlarmPanel(): JSX.Element {
         id={ALARMS_ID}
         role="region"
         aria-label={S.alarms}
-        // Scrolls by itself, so the keyboard must be able to reach it.
+        // A scroll container, so the keyboard must be able to reach it.
         // eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex
         tabIndex={0}
         data-testid="alarms"
@@ -166,7 +166,7 @@ export function AlarmPanel(): JSX.Element {
                 blocks={arranged(seen[name], order, speech)}
               />
             )}
-            {/* Below the rows: it comes and goes. */}
+            {/* Below the rows, so that they do not move as it comes and goes. */}
             {name === 'active' && hasAny && <AlarmsWait />}
           </Fragment>
         ))}
@@ -176,7 +176,7 @@ export function AlarmPanel(): JSX.Element {
   );
 }
 
-/** What is resolved is opened by its heading: nothing has to be done about it. */
+/** One group of the list; "resolved" starts collapsed, because it needs no action. */
 function Group({
   name,
   count,
@@ -211,7 +211,7 @@ function Group({
   );
 }
 
-/** Alarms in a row; many of one cause are opened by their heading. */
+/** Alarm rows of a block; alarms with a shared cause start collapsed under its heading. */
 function Rows({
   block: { cause, items },
   group,
@@ -221,7 +221,7 @@ function Rows({
 }): JSX.Element {
   const [wished, setMost] = useState(cause === null ? MOST_ROWS : MOST_OF_CAUSE);
   const [isOpen, setOpen] = useState(false);
-  // Nobody opens anything on paper.
+  // On paper everything is expanded.
   const isPaper = usePaper();
   const most = isPaper ? items.length : wished;
   const rest = items.length - most;
@@ -262,7 +262,7 @@ function Rows({
   );
 }
 
-/** What is wrong at many tags, how bad it is there, and at which. */
+/** Heading of a shared cause: what is wrong, how bad it is, and at which tags. */
 function CauseHeading({
   cause,
   items,
@@ -277,9 +277,9 @@ function CauseHeading({
   onToggle: () => void;
 }): JSX.Element | null {
   const speech = useApp(selectSpeech);
-  // While the order is held, others may still stand here.
+  // While the order is held, alarms that left the group are still listed.
   const own = items.filter((item) => groupOf(item) === group);
-  // As a text: what does not change it renders nothing anew.
+  // As text: states that do not change it do not re-render.
   const facts = useApp((state) =>
     causeFacts(own, speech, (alarm) => selectNow(state, alarm)).join('\n'),
   );
@@ -313,7 +313,7 @@ function CauseHeading({
         <span data-fact="now">{current}</span>
         <span data-fact="worst">{worst}</span>
       </button>
-      {/* Also where there is nothing to press: the columns are those of the rows. */}
+      {/* Rendered even without a button, to align with the rows' columns. */}
       <div className="alarm-tools">
         {group === 'active' && (
           <Acknowledge
@@ -333,7 +333,7 @@ function CauseHeading({
 }
 
 interface HeldOrder extends HeldList {
-  /** Shows what is new, and holds that. */
+  /** Shows the new alarms, and holds that order. */
   readonly release: () => void;
   readonly onPointerEnter: () => void;
   readonly onPointerLeave: () => void;
@@ -341,13 +341,13 @@ interface HeldOrder extends HeldList {
   readonly onBlur: (event: FocusEvent) => void;
 }
 
-/** While a pointer, a finger or the keyboard's focus is in the list, no row of it moves. */
+/** Holds the order while the pointer or keyboard focus is in the list: no row moves. */
 function useHeldOrder(list: AlarmList): HeldOrder {
   const [hasPointer, setPointer] = useState(false);
   const [hasFocus, setFocus] = useState(false);
   const [held, setHeld] = useState<AlarmList | null>(null);
   const isHeld = hasPointer || hasFocus;
-  // Where there is no row, none can move.
+  // An empty list has nothing to hold.
   const hasRows = held !== null && itemsOf(held).length > 0;
   if (isHeld ? !hasRows && held !== list : held !== null) setHeld(isHeld ? list : null);
   return {
@@ -361,7 +361,7 @@ function useHeldOrder(list: AlarmList): HeldOrder {
     onPointerLeave: () => {
       setPointer(false);
     },
-    // A button that was clicked keeps the focus, and holds nothing once the pointer has left.
+    // A clicked button keeps the focus; without `:focus-visible` it holds nothing once the pointer leaves.
     onFocus: ({ target, currentTarget }) => {
       setFocus(target !== currentTarget && target.matches(':focus-visible'));
     },

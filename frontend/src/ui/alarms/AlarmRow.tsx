@@ -23,13 +23,13 @@ import { Disclosure, Icon, useClose } from '../../widgets/controls';
 import { AlarmFacts, AlarmTimes, useValues } from './AlarmFacts';
 import { useIsRefused, useWhoAcknowledged } from './people';
 
-/** One alarm: for how long, what and where, now and at worst; it leads to its tag as it is now. */
+/** One alarm: duration, what, where, value now and at worst; a click shows its tag live. */
 export const AlarmRow = memo(function AlarmRow({
   item,
   group,
 }: {
   item: Item;
-  /** Where the row stands: while the order is held, not where the alarm belongs by now. */
+  /** The group that lists the row; while the order is held, the alarm may belong to another. */
   group: keyof AlarmList;
 }): JSX.Element {
   const { alarm, verdict, isAcknowledged } = item;
@@ -59,7 +59,7 @@ export const AlarmRow = memo(function AlarmRow({
           alarm={alarm}
           first={values.first}
           verdict={current}
-          // Meanwhile, a row that is held gets no line more.
+          // Not from the alarm itself: a held row must not gain a line.
           isOver={group === 'resolved'}
         />
         <span className="alarm-text">
@@ -70,7 +70,7 @@ export const AlarmRow = memo(function AlarmRow({
             {': '}
             {values.what}
           </span>
-          {/* While the order is held, it has no other line for that. */}
+          {/* A row held in "active" has no other line for the shelving reason. */}
           {group === 'active' && item.shelf?.reason && <q className="faint">{item.shelf.reason}</q>}
           {group === 'active' && !item.shelf && (
             <span className="alarm-do" data-again={current === 'healthy' || undefined}>
@@ -111,7 +111,7 @@ export const AlarmRow = memo(function AlarmRow({
   );
 });
 
-/** What has been done about it, or that it is over where it still stands above; null: nothing. */
+/** What was done about the alarm, or that a held row is resolved; null: neither. */
 function useStatus(item: Item, group: keyof AlarmList): string | null {
   const { alarm, isAcknowledged, shelf } = item;
   const who = useWhoAcknowledged(alarm);
@@ -123,7 +123,7 @@ function useStatus(item: Item, group: keyof AlarmList): string | null {
   return isAcknowledged ? (who ?? S.healthAcknowledged) : null;
 }
 
-/** What else can be done to an alarm. */
+/** An alarm's menu of further actions. */
 function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
   const { alarm, isAcknowledged, shelf } = item;
   const [form, setForm] = useState<'shelve' | 'comment' | null>(null);
@@ -175,7 +175,7 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
   );
 }
 
-/** Shelves an alarm for a while; a critical one for a shorter while, and with a reason. */
+/** Form to shelve an alarm; a critical one for a shorter time, and only with a reason. */
 function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
   const [reason, setReason] = useState('');
   const close = useClose();
@@ -183,7 +183,7 @@ function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
   const field = useRef<HTMLInputElement>(null);
   const isNeeded = needsReason(item.verdict);
   useLayoutEffect(() => {
-    // What is typed at once is the reason, and no shortcut.
+    // Focused at once, so that typing fills in the reason instead of running shortcuts.
     (isNeeded ? field : root).current?.focus({ preventScroll: true });
   }, [isNeeded]);
   const given = reason.trim();
@@ -224,7 +224,7 @@ function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
   );
 }
 
-/** The button that acknowledges, and in its place what has been done already: nothing moves for it. */
+/** The acknowledge button, or in the same place what was already done, so that nothing moves. */
 export function Acknowledge({
   label,
   text,
@@ -233,7 +233,7 @@ export function Acknowledge({
 }: {
   label: string;
   text: string;
-  /** What has been done; null: there is something to acknowledge. */
+  /** What was done; null: there is something to acknowledge. */
   status: string | null;
   onAcknowledge: () => void;
 }): JSX.Element | null {
@@ -246,7 +246,7 @@ export function Acknowledge({
       </span>
     );
   }
-  // It stays the same button, and keeps the focus: a keyboard goes on from here.
+  // The same element in both states, so that the keyboard focus stays here.
   return (
     <button
       type="button"
@@ -264,15 +264,15 @@ export function Acknowledge({
   );
 }
 
-/** A second click at the same place within so many ms is none of its own. */
+/** A second click at the same place within this time, ms, belongs to a double click. */
 const AGAIN_MS = 600;
 const SAME_PLACE_PX = 5;
 
 let last = { at: -Infinity, x: 0, y: 0 };
 
 /**
- * Heeds the first click of a double click alone: the second would take back what the first did, or
- * do the same to what has come there since.
+ * Ignores the second click of a double click: it would undo the first, or hit whatever has moved
+ * there since.
  */
 export const once =
   (act: () => void) =>
@@ -280,7 +280,7 @@ export const once =
     const isAgain =
       timeStamp - last.at < AGAIN_MS &&
       Math.hypot(clientX - last.x, clientY - last.y) < SAME_PLACE_PX;
-    // By a key it is meant each time.
+    // Each key press counts (detail 0).
     if (detail > 0 && isAgain) return;
     last = { at: timeStamp, x: clientX, y: clientY };
     act();

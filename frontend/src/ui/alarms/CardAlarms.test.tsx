@@ -146,7 +146,7 @@ test('the count of alarms is of all behind the sign of the worst, and none of no
   expect([sign(), count()]).toEqual([undefined, '(now 3)']);
   flush(goLost);
   expect(screen.queryByTestId('alarm-count')).toBeNull();
-  // Of a list that was empty nobody knows whether it still is.
+  // Whether an empty list is still empty is unknown.
   flush(() => {
     act({ moment: null });
     tellAlarms();
@@ -169,6 +169,6 @@ test('the alarms of a page that looks back are the current ones, as long as anyb
   expect(notes()).toEqual(['now']);
   flush(goLost);
   expect(notes()).toEqual(['lost']);
-  // Of when that is, the banner says.
+  // The banner gives the time.
   expect(screen.queryByText(/\d\d:\d\d/)).toBeNull();
 });

@@ -14,7 +14,7 @@ import { useTicking } from '../../widgets/useNow';
 import { once } from './AlarmRow';
 import { useIsRefused, useWhoAcknowledged } from './people';
 
-/** A tag's alarms: since when they are active, or until when shelved; for whoever stands at the tag. */
+/** A tag's alarms on its card: active since when, or shelved until when. */
 export function CardAlarms({ tagId }: { tagId: string }): JSX.Element {
   return (
     <>
@@ -57,7 +57,7 @@ function Active({ tagId }: { tagId: string }): JSX.Element | null {
   );
 }
 
-/** How many are acknowledged; of one, by whom and when. */
+/** How many are acknowledged; for a single one, by whom and when. */
 function Acknowledged({ items }: { items: readonly Item[] }): JSX.Element {
   const [only, ...others] = items.map(({ alarm }) => alarm);
   const who = useWhoAcknowledged(only && others.length === 0 ? only : null);
@@ -66,7 +66,7 @@ function Acknowledged({ items }: { items: readonly Item[] }): JSX.Element {
   );
 }
 
-/** What somebody has shelved: until when, why, and the way back. */
+/** Shelved alarms: until when, why, and a button to unshelve. */
 function Shelved({ tagId }: { tagId: string }): JSX.Element {
   const shelved = useSelected(alarmList, (list) => list.shelved);
   const speech = useApp(selectSpeech);

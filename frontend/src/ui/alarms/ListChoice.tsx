@@ -12,13 +12,13 @@ import { Segmented } from '../../widgets/controls';
 import { HealthShape } from '../HealthMark';
 import { selectAreAlarmsKnown } from '../Reasons';
 
-/** Of the list of alarms, once it is there. */
+/** Element id of the alarm list, once it is loaded. */
 export const ALARMS_ID = 'alarms';
 
-/** Of the field that filters the table, for what moves the focus there. */
+/** Element id of the table's filter field, to move the focus there. */
 export const FILTER_ID = 'tag-filter';
 
-/** What stands beside the map; a narrow screen has tabs for it at its foot. */
+/** Chooses the list beside the map; a narrow screen has tabs at its foot instead. */
 export function ListChoice(): JSX.Element {
   const list = useApp((state) => state.view.list);
   return (
@@ -38,8 +38,8 @@ export function ListChoice(): JSX.Element {
 }
 
 /**
- * "Alarms (7)", those that are active, behind the sign of the worst now until all are acknowledged.
- * Who looks back reads that they are those of now, as long as that is known.
+ * "Alarms (7)": the number of active alarms, after the worst verdict's mark until all are acknowledged.
+ * While a past moment is shown, it says that the number is of now, if that is known.
  */
 export function AlarmsLabel(): JSX.Element {
   const list = useSelected(alarmList);

@@ -32,7 +32,7 @@ test('a shelf is taken over with its reason, and goes with the word of who shelv
   });
   expect(merged(kept, [SHELVED], () => 61_000)).toBe(kept);
   expect(merged(kept, [COLD], until).shelved.size).toBe(0);
-  // Also where something before it is another.
+  // Also after an alarm that differs.
   const said = { ...SAID, id: 'other', tag_id: '2' };
   expect(merged(kept, [said, COLD], until).shelved.size).toBe(0);
 });
@@ -150,7 +150,7 @@ test('what the bridge has taken holds here before the frame that says so', async
   await vi.waitFor(() => {
     expect(isAnswered).toBe(true);
   });
-  // Whatever follows an answer has been done by the next turn of the loop.
+  // The answer's callbacks have run by the next event-loop turn.
   await new Promise((resolve) => setTimeout(resolve));
   expect(own.get().acknowledged.size).toBe(1);
   tellAlarms(COLD);

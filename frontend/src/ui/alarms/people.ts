@@ -1,7 +1,6 @@
 /**
- * What people have said of alarms, by the bridge, and what is done here, to it. What stands there
- * is kept in `own` as well, so that the list, its sound and its counts know it; where nobody has
- * signed in, that stays this browser's own.
+ * Syncs acknowledgements and shelves with the bridge, in both directions. `own` mirrors them, so that
+ * the list, its sound and its counts see them. Without a signed-in user, `own` stays in this browser.
  */
 import { now, timeOfDay } from '../../clock';
 import { fetchSession, postNote, withdrawNote } from '../../contract/people';
@@ -24,13 +23,13 @@ export const P = PEOPLE[LANGUAGE];
 
 const PACE_MS = 500;
 
-/** What was said here and is not there yet: until it is, the bridge's word is an older one. */
+/** Requests still being sent: until they are done, the bridge's state is older than ours. */
 let pending = 0;
 
-/** A shelf's end is told in whole ROS seconds and kept by this browser's clock: near is the same. */
+/** Tolerance for a shelf's end, ms: the bridge has ROS time, we keep it by this browser's clock. */
 const SAME_MS = 3_000;
 
-/** `kept` with what the bridge says; what it does not say does not hold here either. */
+/** `kept`, updated to the bridge's alarms; what the bridge does not have is removed. */
 export function merged(
   kept: Kept,
   alarms: readonly Alarm[],
@@ -78,7 +77,7 @@ function take(): void {
   own.set(merged(own.get(), alarmsNow(), endOf));
 }
 
-/** What has to be said for what was done here. */
+/** The requests that tell the bridge what changed here. */
 export function wordsFor(
   before: Kept,
   next: Kept,
@@ -111,11 +110,11 @@ async function tell(before: Kept, next: Kept): Promise<void> {
     nowS === null ? null : nowS + (until - at) / 1000,
   );
   const { alarms } = store.get().twin;
-  // What nobody answers is not even sent: until it failed, it would look done.
+  // Without a connection, do not send: it would look done until the request failed.
   let failure = selectIsCut(store.get()) ? S.serverBusy : null;
   pending += 1;
   try {
-    // One behind the other, in the order of the list: of two words the later one stands.
+    // Sequential, in list order: of two conflicting requests, the later one wins.
     if (failure === null) for (const word of words) await word();
   } catch (error) {
     failure = failureText(error);
@@ -125,11 +124,11 @@ async function tell(before: Kept, next: Kept): Promise<void> {
     say(P.failed(failure));
     done.set(null);
   }
-  // The frame that has them may come later than the answer: the one of before would take them back.
+  // The frame with the changes may follow the answer; merging the old frame would revert them.
   if (failure !== null || store.get().twin.alarms !== alarms) take();
 }
 
-/** Asks who has signed in, on each connection anew; returns the way to stop. */
+/** Fetches the signed-in user on each connection; returns a stop function. */
 export function startPeople(): () => void {
   const session = createFetcher<Session>({
     paceMs: PACE_MS,
@@ -139,11 +138,11 @@ export function startPeople(): () => void {
       take();
     },
     onError: () => {
-      // It is tried again; until there is an answer everything stays as it is.
+      // The fetcher retries; until then everything stays as it is.
     },
   });
   const update = (): void => {
-    // The first connection is made while this is fetched, and to the same bridge.
+    // The first connection opens during this fetch, to the same bridge: no need to fetch again.
     const epoch = Math.max(1, store.get().twin.connection.epoch);
     session.want({ key: String(epoch), group: 'session', run: fetchSession });
   };
@@ -160,20 +159,20 @@ export function startPeople(): () => void {
   };
 }
 
-/** Whether what is done here would be refused: it is everybody's, and the bridge does not answer. */
+/** Whether actions would be refused: they are shared, and the bridge does not answer. */
 export function useIsRefused(): boolean {
   const isShared = useSelected(person, (who) => who?.can_write_notes === true);
   return useApp(selectIsCut) && isShared;
 }
 
-/** Whether what is done here is this browser's own, or everybody's. */
+/** Says whether actions stay in this browser or are shared. */
 export function whoseWord(who: Session | null): string {
   if (!who?.name) return S.alarmsMine;
   if (who.can_write_notes) return P.shared(who.name);
   return (who.role === 'viewer' ? P.reads : P.elsewhere)(who.name);
 }
 
-/** Who acknowledged an alarm, and when; null: no name is known. */
+/** Who acknowledged an alarm, and when; null: no name known. */
 export function useWhoAcknowledged(alarm: Alarm | null): string | null {
   const name = alarm?.acknowledged_by;
   const at = alarm?.acknowledged_at;

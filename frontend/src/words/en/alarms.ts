@@ -4,7 +4,7 @@ import { counted } from './counted';
 export const ALARMS = {
   alarms: 'Alarms',
   listChoice: 'Beside the map',
-  /** Beside the word, to hear. */
+  /** For screen readers, after the word. */
   alarmsCount: (unseen: number, active: number): string =>
     active === 0 ? 'none active' : `${active} active, ${unseen} not acknowledged`,
   /** How many, or "some/all" while the list is filtered. */
@@ -19,11 +19,11 @@ export const ALARMS = {
     length === null ? `since ${when}` : `since ${when} (${length})`,
   alarmUntil: (from: string, until: string, length: string): string =>
     `${from} until ${until} (${length})`,
-  /** Its value now, at worst, and when it was raised. */
+  /** An alarm's value now, at worst, and when raised. */
   alarmNow: (reading: string): string => `now ${reading}`,
   alarmNowUnknown: (last: string | null, age: string | null): string =>
     last === null ? 'now unknown' : `now unknown, last ${last}${age === null ? '' : ` ${age} ago`}`,
-  /** Of a pest, in place of how many. */
+  /** For a pest, instead of a count. */
   alarmPests: { none: 'none seen', seen: 'seen' },
   alarmWorst: {
     below: (reading: string): string => `worst ${reading}`,
@@ -32,7 +32,7 @@ export const ALARMS = {
   },
   alarmFirst: (reading: string): string => `${reading} when raised`,
   alarmStatus: { critical: 'critical', healthy: 'in range' },
-  /** Of an alarm that is still active. */
+  /** For an alarm that is still active, although its value is back in range. */
   alarmBack: 'Back to normal',
   alarmShow: 'Show this tag now',
   alarmStart: 'Go to start',
@@ -54,7 +54,7 @@ export const ALARMS = {
   alarmUnshelve: 'Unshelve',
   alarmResolved: 'resolved',
   alarmUndo: 'Undo',
-  /** What the operator has just done. */
+  /** The operator's last action. */
   alarmDone: {
     acknowledge: (count: number): string => `${counted(count, 'alarm', 'alarms')} acknowledged`,
     unacknowledge: (count: number): string =>
@@ -103,7 +103,7 @@ export const ALARMS = {
   alarmNotifyNone: 'This browser does not support notifications.',
   alarmNotifyTitle: (count: number): string => counted(count, 'new alarm', 'new alarms'),
 
-  /** To hear, and while another moment is looked at. */
+  /** For screen readers and notifications; `alarmsMeanwhile` while a past moment is shown. */
   alarmsRaised: (alarms: readonly string[], more: number): string =>
     `New: ${alarms.join('; ')}${more > 0 ? ` and ${more} more` : ''}`,
   alarmsCleared: (alarms: readonly string[], more: number): string =>
@@ -112,7 +112,7 @@ export const ALARMS = {
     `New alarm: ${alarm}${more > 0 ? ` and ${counted(more, 'more alarm', 'more alarms')}` : ''}`,
 } as const;
 
-/** Of one tag, and beside a number of them. */
+/** For one tag, and after a number of tags. */
 const ONE_OR_MANY = {
   healthy: 'Healthy',
   stressed: 'Stressed',
@@ -124,13 +124,13 @@ const ONE_OR_MANY = {
 export const HEALTH = {
   health: ONE_OR_MANY,
   healthMany: ONE_OR_MANY,
-  /** Why a tag or the house has its verdict. */
+  /** Why a tag or the greenhouse has its verdict. */
   reasons: {
     sides: { below: 'below', above: 'above' },
     wasBeyond: (side: string, limit: string): string => `was ${side} ${limit}`,
-    /** What was out of its range counts as that until it is well within. */
+    /** A value that was out of range keeps its status until it is well within (hysteresis). */
     heldUntil: (status: string, until: string): string => `${status} until ${until}`,
-    /** Of a value that reads like the limit that it is beyond. */
+    /** For a value beyond its limit that rounds to the limit. */
     just: {
       below: (limit: string): string => `just below ${limit}`,
       above: (limit: string): string => `just above ${limit}`,
@@ -141,7 +141,7 @@ export const HEALTH = {
       `Last scan failed: ${outcome}${age === null ? '' : `, ${age} ago`}`,
     pest: (count: number): string =>
       count > 0 ? `${counted(count, 'pest', 'pests')} seen` : 'Pest seen',
-    /** An empty sensor: none of the tag's has a reading that holds. */
+    /** An empty `sensor`: no sensor of the tag has a valid reading. */
     old: (sensor: string, age: string | null, holds: string | null, isDated: boolean): string => {
       const since = !isDated
         ? sensor === ''
@@ -160,7 +160,7 @@ export const HEALTH = {
     stopped: 'No tag is being scanned: the robot has stopped, or its data is lost',
     other: (kind: string, sensor: string): string => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
-  /** What somebody does about a reason: of a sensor that growers know by what lies beyond which limit. */
+  /** What to do about a reason; for well-known sensors, by sensor and side of the range. */
   todo: {
     sensors: {
       temperature: { below: 'Heat, or close the vents', above: 'Ventilate or shade' },
@@ -197,7 +197,7 @@ export const HEALTH = {
     clock: 'by the clock, as no light is measured',
     assumed: 'assumed, as neither light nor time is known',
   },
-  /** "any": by day and by night it is the same. */
+  /** "any": the same by day and by night. */
   idealParts: { any: 'ideal', day: 'daytime ideal', night: 'night-time ideal' },
   healthIdeal: (ideal: string, low: string, high: string, unit: string): string =>
     `${ideal} ${low} to ${high} ${unit}`.trim(),
@@ -207,7 +207,7 @@ export const HEALTH = {
       ? '1 alarm is still active: two good scans resolve it'
       : `${alarms} alarms are still active: two good scans resolve each`,
   healthAcknowledged: 'acknowledged',
-  /** In place of a verdict, where nobody knows how it is now. */
+  /** Replaces the verdict while the current status is unknown. */
   healthNotCurrent: 'Not current',
   healthNothing: 'No reading to assess yet',
   healthFilter: ', show only these tags',
@@ -218,7 +218,7 @@ export const HEALTH = {
     `No scan for ${age} (usually every ${interval})`,
   houseOverdue: (count: number): string =>
     count === 0 ? 'no tag overdue' : counted(count, 'tag overdue', 'tags overdue'),
-  /** Told to screen readers. */
+  /** For screen readers. */
   tagChosen: (tag: string, health: string, row: number, rows: number): string =>
     `Tag ${tag}, ${health}, ${row} of ${rows}`,
   attention: 'Needs attention',

@@ -1,6 +1,6 @@
-/** A number of things, its thousands set apart. */
+/** A count with thousands separators. */
 export const whole = (count: number): string => count.toLocaleString('en');
 
-/** A number and the word for so many. */
+/** A count with its noun in the singular or plural. */
 export const counted = (count: number, one: string, many: string): string =>
   `${whole(count)} ${count === 1 ? one : many}`;

@@ -1,4 +1,4 @@
-/** The estimate: how sure it is, how well it has foretold, and where another tag would help. */
+/** The estimate: its uncertainty, how well it has predicted, and where another tag would help. */
 import { counted, whole } from './counted';
 
 export const ESTIMATE = {
@@ -13,7 +13,7 @@ export const ESTIMATE = {
   computed: 'A computed quantity has no estimate: the nearest readings are shown',
   noModel: 'No estimate yet: it needs ten scans of a sensor',
   unsure: (error: string): string => `Hatched: less certain than ±${error}. No colour: no data`,
-  /** Beside the colours of the error. */
+  /** Beside the error's colour scale. */
   error: 'Uncertainty of the estimate',
   foretold: (inside: number, scans: number): string =>
     `${whole(inside)} of ${counted(scans, 'scan', 'scans')} within the predicted range`,

@@ -1,4 +1,4 @@
-/** The map: its controls, legend, colour range, and what is compared on it. */
+/** The map: its controls, legend, colour range and comparison. */
 import { counted, whole } from './counted';
 
 const SHORT = new Map([
@@ -56,7 +56,7 @@ export const MAP = {
   colouring: 'Colours by',
   colourings: { ideal: 'Ideal', value: 'Value' },
   legendNoIdeal: 'No ideal range for now: coloured by value',
-  /** In the bar of sensors and the heads of the table; a site's own name stays as it is. */
+  /** Short sensor name for the sensor picker and table headings; a site's own name stays as it is. */
   sensorShort: (label: string): string => SHORT.get(label) ?? label,
   legendBelow: (value: string): string => `below ${value}`,
   legendAbove: (value: string): string => `above ${value}`,
@@ -106,7 +106,7 @@ export const MAP = {
   robotReported: (percent: string, ago: string): string => `battery ${percent}, reported ${ago}`,
 } as const;
 
-/** The tags: their table and the card of one. */
+/** The tags: their table, and a tag's card. */
 export const TAGS = {
   tags: 'Tags',
   tableCaption: 'All tags with their latest readings',
@@ -152,7 +152,7 @@ export const TAGS = {
   sensorFailedLong: 'The sensor returned no value',
   confidence: (percent: string): string => `${percent} certain`,
   notSure: 'uncertain',
-  /** Those that many greenhouses grow, by the name on the wire; others are shown as they came. */
+  /** Common species, by their name on the wire; others are shown as received. */
   speciesNames: {
     lupin: 'lupin',
     tulip: 'tulip',
@@ -171,7 +171,7 @@ export const TAGS = {
   tableByArea: 'Group by area',
   areaNone: 'No area',
   trend: 'Trend',
-  /** `hour` is how long a greenhouse's hour is; null: one of the clock. */
+  /** `hour` is the length of a shortened greenhouse hour; null: a normal hour. */
   trendTitle: (sensor: string, hour: string | null): string =>
     `${sensor} compared with ${hour ? `a greenhouse hour (${hour})` : 'an hour'} ago`,
   trendNone: 'no reading an hour ago',
@@ -221,7 +221,7 @@ export const CHARTS = {
     `${counted(count, 'reading', 'readings')}, the latest ${latest} (${at}), ` +
     `between ${low} and ${high}, ${gaps === 0 ? 'no gap' : counted(gaps, 'gap', 'gaps')}.`,
   chartEmpty: 'No reading in this period.',
-  /** Of a quantity of a day. `known`: how far back anything is known; null: a day, with a gap. */
+  /** For a daily quantity. `known`: how far back data reaches; null: a day, but with a gap. */
   chartNeedsDay: (known: string | null): string =>
     known === null
       ? 'Needs 24 h of readings without a gap of over 3 h'

@@ -1,4 +1,4 @@
-/** The page itself: connection, troubles, menu, help, what is taken away. */
+/** The page itself: connection, troubles, menu, help, exports. */
 import { counted } from './counted';
 
 export const PAGE = {
@@ -27,7 +27,7 @@ export const PAGE = {
   retryNow: 'Try now',
   frozenSince: (clock: string): string => `Last data at ${clock}`,
   agoSuffix: (age: string): string => `${age} ago`,
-  /** As an age has it: "1 h 18 min". */
+  /** The unit within an age: "1 h 18 min". */
   hours: 'h',
   frozenWhy: {
     stale: 'The connection is open, but no data arrives.',
@@ -47,7 +47,7 @@ export const PAGE = {
     thread_dead: 'The server has lost the twin and must be restarted.',
     shutting_down: 'The server is shutting down.',
   },
-  /** For whoever looks after the machines; empty: there is nothing to add. */
+  /** For whoever maintains the system; empty: nothing to add. */
   offlineMore: {
     live: '',
     paused: '',
@@ -60,7 +60,7 @@ export const PAGE = {
     shutting_down: '',
   },
 
-  /** In place of what the server says, where it may answer soon. */
+  /** Replaces the server's error if it may recover soon. */
   serverBusy: 'The server is busy or unreachable.',
   unread: (count: number): string =>
     count === 1
@@ -73,7 +73,7 @@ export const PAGE = {
   inputProblem: 'Not all data arrives here.',
   drops: (count: number): string =>
     `The twin dropped ${counted(count, 'message', 'messages')} in the last few minutes.`,
-  /** What to tell of a journal that does not keep what happens, and what to do. */
+  /** For a journal that does not record: the problem, and what to do. */
   journal: {
     off: {
       title: 'Nothing is recorded.',
@@ -104,7 +104,7 @@ export const PAGE = {
       hint: 'Nothing in it was changed. Give the twin another file, or move this one.',
     },
   },
-  /** What to tell of a channel by which others are told, and are not. */
+  /** For a notification channel that fails. */
   outward: {
     mqtt: 'Home automation (MQTT) receives no updates.',
     webhook: 'The webhook receives no alarms.',
@@ -113,7 +113,7 @@ export const PAGE = {
   outwardOther: (channel: string): string => `${channel} receives no updates.`,
   outwardHint: 'The server keeps trying. This page is not affected.',
   journalMore: 'The file is named by the twin’s parameter “journal”; “off” records nothing.',
-  /** What the twin observes where that is no robot's, or not of now. */
+  /** Origin of the data, unless it is a real robot's, live. */
   origin: { simulated: 'Simulated', recorded: 'Recording', sim_time: 'Simulated time' },
   originDay: (length: string): string => `1 greenhouse day = ${length}`,
   originHint: {
@@ -214,7 +214,7 @@ export const PAGE = {
   asOf: (moment: string): string => `as of ${moment}`,
 } as const;
 
-/** Another moment than now, and the bar of time. */
+/** Past moments, and the time bar. */
 export const PAST = {
   past: 'Past',
   pastTitle: (moment: string): string => `${moment} (past) · Lupin twin`,

@@ -80,7 +80,7 @@ def _run(config: Config) -> int:
 
     node = AdaptNode(config)
     node.get_logger().info(
-        f"adapting {len(config.sensors)} sensors for {len(config.tags)} tags; "
+        f"adapting sensors for {len(config.tags)} tags; "
         "what comes and what is dropped is on /diagnostics"
     )
     return run_until_signal(node)

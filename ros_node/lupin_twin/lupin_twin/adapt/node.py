@@ -101,7 +101,8 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if config.broker is not None:
             arrived = self.create_guard_condition(self.utilities.guarded("MQTT", self._on_mqtt))
             self._mqtt = MqttClient(config.broker, waker(arrived))
-            self._sources[MQTT] = Source(MQTT)
+            topics = (it.topic for it in config.broker.patterns if not it.is_availability)
+            self._sources[MQTT] = Source(MQTT, shown=dict.fromkeys(topics, "nothing yet"))
             self._mqtt.start()
         self.utilities.every(None, 1.0, "the second", self._each_second)
 
@@ -354,6 +355,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for name, value in said.readings:
             if self._scans.take(name, said.tag, value, stamp_ns, now_ns):
                 self._sources[MQTT].used += 1
+                self._sources[MQTT].shown[pattern.topic] = f"{said.tag} {name} {value:g}"
             else:
                 self._drop(Reason.SIZE, topic, "it is of one tag or sensor too many", case="many")
 
@@ -425,9 +427,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if source.type_name not in types:
             return f"it is published as {', '.join(types)}, configured is {source.type_name}"
         durability = DurabilityPolicy.TRANSIENT_LOCAL
-        if is_static and all(
-            publisher.qos_profile.durability != durability for publisher in publishers
-        ):
+        if is_static and all(it.qos_profile.durability != durability for it in publishers):
             return "its QoS is VOLATILE, expected TRANSIENT_LOCAL"
         return f"nothing for {quiet_s:.0f} s"
 

@@ -315,6 +315,7 @@ def _journal(finding: Finding) -> Condition:
         return UNKNOWN_JOURNAL
     simulated = _read_stretches(values.get("simulated", ""))
     complete = values.get("complete to", "")
+    own = shown(values.get("id", ""))
     return Condition(
         state,
         shown(finding.message),
@@ -327,7 +328,8 @@ def _journal(finding: Finding) -> Condition:
         simulated_ns=simulated[0] if len(simulated) == 1 else None,
         complete_ns=int(complete) if _are_stamps(complete) else None,
         kept_ns=_read_stretches(values.get("kept", "")),
-        journal_id=shown(values.get("id", "")),
+        # A copy's file is named by it, so it must not be a path.
+        journal_id=own if own.isascii() and own.isalnum() else "",
     )
 
 

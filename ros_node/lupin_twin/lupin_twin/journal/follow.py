@@ -196,9 +196,10 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
             last, purged = _last(connection), _purged(connection)
             if last < behind:
                 raise NotALotError(f"rows behind number {behind} for a file that ends before it")
-            set_meta(connection, "journal_id", lot.journal)
             try:
                 _put(connection, lot)
+                # Overrides what the rows say: the file is named by it.
+                set_meta(connection, "journal_id", lot.journal)
                 _followed(connection)
                 gone, begun = _gone_seq(connection), int(get_meta(connection, _BEGUN) or 0)
             except _UNUSABLE as error:

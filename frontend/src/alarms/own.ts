@@ -89,10 +89,10 @@ export const shelve = (
 const without = <Value>(map: ReadonlyMap<string, Value>, key: string): ReadonlyMap<string, Value> =>
   new Map([...map].filter(([each]) => each !== key));
 
-/** `kept` without ended shelves and without old acknowledgements of unlisted alarms. */
-export function pruned(kept: Kept, listed: ReadonlySet<string>, at: number): Kept {
+/** `kept` without ended shelves and old acknowledgements of unlisted alarms; null: not known what is listed. */
+export function pruned(kept: Kept, listed: ReadonlySet<string> | null, at: number): Kept {
   const acknowledged = [...kept.acknowledged].filter(
-    ([id, each]) => listed.has(id) || Math.abs(at - each.at) < FORGET_MS,
+    ([id, each]) => !listed || listed.has(id) || Math.abs(at - each.at) < FORGET_MS,
   );
   const shelved = [...kept.shelved].filter(([, shelf]) => isAhead(shelf, at));
   const isSame =

@@ -7,6 +7,7 @@ import { wireTag } from '../testing/tags';
 import {
   acknowledgeAlarms,
   done,
+  FORGET_MS,
   NOTHING_KEPT,
   own,
   shelveAlarm,
@@ -105,6 +106,19 @@ test('acknowledged holds after a reload, and what is done here is no news', () =
   tellAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
   expect(ids()).toEqual(['b']);
   expect(told).toEqual([]);
+});
+
+test('acknowledged long ago, a lasting alarm stays so while the list is not there yet', () => {
+  tellAlarms(alarm('a'));
+  acknowledgeAlarms([item('a')]);
+  stop();
+  vi.setSystemTime(Date.now() + FORGET_MS);
+  own.set(NOTHING_KEPT);
+  receive({ alarms: null });
+  start();
+  receive({ alarms: alarms([], { source: 'starting', since: null }) });
+  tellAlarms(alarm('a'));
+  expect(ids()).toEqual([]);
 });
 
 test('what was shelved comes back by itself when its time is over, and is told', () => {

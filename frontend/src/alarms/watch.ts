@@ -78,9 +78,9 @@ export function startAlarms(): () => void {
   };
 }
 
-/** Ids of the listed alarms. */
-const idsOf = (alarms: Alarms | null): ReadonlySet<string> =>
-  new Set(alarms?.alarms.map(({ id }) => id));
+/** Ids of the listed alarms; null: not known, or not yet all. */
+const idsOf = (alarms: Alarms | null): ReadonlySet<string> | null =>
+  alarms && alarms.source !== 'starting' ? new Set(alarms.alarms.map(({ id }) => id)) : null;
 
 /** Alarms raised while a past moment is shown that still need attention (`calling`), the worst first. */
 export const meanwhile = createStore<readonly Item[]>([]);

@@ -163,15 +163,6 @@ def test_a_copy_of_a_journal_that_was_put_back_from_a_backup_is_made_anew(
     assert contents(target) == contents(source)
 
 
-def test_a_lot_is_never_cut_between_a_series_and_its_first_row(source: Path) -> None:
-    with reading(source) as connection:
-        for most in range(1, 6):
-            after = 0
-            while not (lot := follow.read(connection, after, most)).is_all:
-                assert lot.last > after
-                after = lot.last
-
-
 @pytest.mark.parametrize(
     "name", [name for name in NAMES if name in {"day", "runs", "late", "purged"}]
 )

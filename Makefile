@@ -164,7 +164,7 @@ bench: setup $(DONE)/tools ## all benchmarks but bench-live (ARGS=bench_field: o
 	@$(BENCH_ENV) $(BIN)/python -m tests.bench $(ARGS)
 
 bench-live: setup ## benchmark of the live bridge with up to 5,000 clients
-	@$(BENCH_ENV) $(BIN)/python -m tests.bench.bench_live $(ARGS)
+	@$(BENCH_ENV) $(BIN)/python -m tests.bench bench_live
 
 soak: setup ## endurance: 50 kills under load, of the archive too, and eight hours of writing
 	@$(TEST_ENV) $(BIN)/python -m tests.soak $(ARGS)

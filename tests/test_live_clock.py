@@ -1,9 +1,8 @@
 """A twin whose clock does not run, or is wrong, says so: over DDS, in `serve` and in `web`.
 
-`web` knows it, and what the twin dropped, from `/diagnostics`.
+`web` knows it from `/diagnostics`.
 """
 
-import re
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -168,49 +167,3 @@ def test_a_clock_that_contradicts_the_journal_is_told_beside_what_was_known(tmp_
         for name in ("/lupin_twin: clock", "/lupin_twin: journal"):
             peer.until(lambda name=name: levels().get(name) == DiagnosticStatus.ERROR, name)  # type: ignore[misc]
         assert "contradicts the journal" in lives[0].process.output
-
-
-def drops(live: Bridge) -> dict[str, tuple[str, int]]:
-    told = live.get("/readyz").json()["drops"]  # 503 without a clock
-    return {drop["reason"]: (drop["message"], drop["count"]) for drop in told}
-
-
-def dropped(live: Bridge, metric: str = "lupin_dropped_total") -> dict[str, float]:
-    text = live.get("/metrics").text
-    lines = re.findall(rf'^{metric}{{reason="(\w+)"}} (\S+)$', text, re.MULTILINE)
-    return {reason: float(count) for reason, count in lines}
-
-
-def test_two_houses_in_one_domain_have_their_own_clocks_and_drops(domain: int) -> None:
-    with (
-        bridge("--ros-args", "-r", "__ns:=/gh1", domain=domain) as first,
-        bridge(*SIM_TIME, "-r", "__ns:=/gh2", domain=domain) as second,
-        lupin_twin(domain, "web", "--ros-args", "-r", "__ns:=/gh1") as one,
-        lupin_twin(domain, "web", "--ros-args", "-r", "__ns:=/gh2") as two,
-        attached(one, first.peer) as first_web,
-        attached(two, second.peer) as second_web,
-    ):
-        robot = first.peer
-        until = robot.until
-        odom = scan("1", frame_id="odom")
-        nameless = scan("")
-        for _ in range(2):
-            robot.publish("/gh1/floranova/observations", odom)
-        for _ in range(3):
-            robot.publish("/gh2/floranova/observations", nameless)
-        for serve, web, reason_of, count in (
-            (first, first_web, "frame", 2),
-            (second, second_web, "tag_id", 3),
-        ):
-            until(lambda s=serve, r=reason_of, n=count: drops(s).get(r, ("", 0))[1] == n, "drops")  # type: ignore[misc]
-            until(lambda s=serve, w=web: drops(w) == drops(s), "the same of web")  # type: ignore[misc]
-            assert set(drops(web)) == {reason_of}
-            assert dropped(web) == dropped(serve)
-            assert dropped(web)[reason_of] == count
-            # What web itself did not take is told apart.
-            assert set(dropped(web, "lupin_web_dropped_total").values()) == {0.0}
-            assert dropped(serve, "lupin_web_dropped_total") == {}
-        for live in (first, first_web):
-            until(lambda live=live: reason(live) == (200, "live"), "a clock that runs")  # type: ignore[misc]
-        for live in (second, second_web):
-            until(lambda live=live: reason(live) == (503, "no_clock"), "no clock")  # type: ignore[misc]

@@ -1,7 +1,6 @@
-"""What the journal does not hold, yet or no more, is marked in every answer, and not denied."""
+"""What the journal does not hold yet is marked in every answer, and not denied."""
 
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,11 +9,9 @@ from typing import Any
 import httpx
 import pytest
 
-from lupin_twin.core.state import Write
 from tests.support.disk import Disk, build
 from tests.support.domains import own_domain, ros_env
-from tests.support.journal import SECOND, kept, pin, select
-from tests.support.journal import scan as row
+from tests.support.journal import select
 from tests.support.live import attached, wait_until_ready
 from tests.support.messages import scan
 from tests.support.processes import OFTEN, Process, limits, lupin_twin, patrols_of
@@ -77,6 +74,9 @@ def test_with_a_full_disk_answers_say_up_to_when_they_are_complete(tmp_path: Pat
         serve.peer.observe(scan("a", {"co2": 999.0}))
         for live in lives:
             wait_for(lambda live=live: journal_of(live) == "failing", "the full disk")  # type: ignore[misc]
+            assert "\nlupin_journal_recording 0.0" in live.get("/metrics").text
+            # What is observed now is shown whatever the journal does.
+            live.tag("a", lambda tag: tag["readings"][0]["value"] == 999.0)
         at_s = wait_for(lambda: at if (at := now_s(serve)) > before_s + 3.0 else None, "3 s later")
         assert at_s is not None
         for live in lives:
@@ -85,6 +85,14 @@ def test_with_a_full_disk_answers_say_up_to_when_they_are_complete(tmp_path: Pat
             # The value from before is no news, and is not sold as one.
             [reading] = told.json()["tags"][0]["readings"]
             assert reading["value"] == 400.0
+            etag = {"If-None-Match": told.headers["etag"]}
+            never = as_of(live, "/api/tags/gone", at_s - 0.5)
+            for answer, status in (
+                (live.get("/api/state", etag, at=f"{at_s - 0.5:.3f}"), 304),
+                (never, 404),
+            ):
+                assert (answer.status_code, TO in answer.headers) == (status, True)
+            assert "is complete only up to" in never.json()["detail"]
             for path in ROUTES:
                 headers = as_of(live, path, at_s - 0.5).headers
                 assert before_s - 1.5 <= float(headers[TO]) <= before_s + 1.0, path
@@ -115,48 +123,6 @@ def test_with_a_full_disk_answers_say_up_to_when_they_are_complete(tmp_path: Pat
             )
             [reading] = as_of(live, "/api/state", at_s).json()["tags"][0]["readings"]
             assert reading["value"] == 999.0
-
-
-def test_of_what_was_deleted_it_is_said_since_when_it_is_kept(tmp_path: Path) -> None:
-    journal = tmp_path / "j.sqlite"
-    last_s = int(time.time()) - 3_600
-    stamps_s = [last_s - DAY_S // 4 * number for number in range(20)][::-1]
-    rows: list[Write] = [pin("a", stamps_s[0] * SECOND), row("gone", stamps_s[0] * SECOND, co2=1.0)]
-    # A round of deletion, the first at the start, takes an hour of data at most.
-    rows += [row("a", (stamps_s[0] + 60) * SECOND, co2=1.0)]
-    rows += [row("a", at_s * SECOND, co2=float(n)) for n, at_s in enumerate(stamps_s)]
-    kept(journal, rows)
-    with both(journal, "-p", "journal_days:=2.0") as lives:
-        kept_s = 0.0
-        for live in lives:
-
-            def deleted(live: Bridge = live) -> bool:
-                headers = as_of(live, "/api/state", last_s).headers
-                return float(headers.get(FROM, 0)) > stamps_s[0]
-
-            wait_for(deleted, "some that is deleted")
-            for path in ROUTES:
-                answer = as_of(live, path, stamps_s[0] + 1)
-                kept_s = float(answer.headers[FROM])
-                assert stamps_s[0] < kept_s <= last_s
-            never = as_of(live, "/api/tags/gone", stamps_s[0] + 1)
-            assert never.status_code == 404
-            assert "is not kept" in never.json()["detail"]
-            assert float(never.headers[FROM]) == kept_s
-            # Whoever has the answer already is told, too.
-            answer = as_of(live, "/api/state", last_s)
-            again = live.get("/api/state", {"If-None-Match": answer.headers["etag"]}, at=last_s)
-            assert (again.status_code, float(again.headers[FROM])) == (304, kept_s)
-            for path, more in (
-                ("/api/history", {"tag_id": "a", "sensor_type": "co2"}),
-                ("/api/timeline", {}),
-            ):
-                whole: Any = {"from": stamps_s[0], "to": last_s}
-                body = live.json(path, **more, **whole)
-                assert seconds(body["kept_from"]) == pytest.approx(kept_s, abs=1.0)
-                assert seconds(body["complete_to"]) == seconds(body["to"])
-                late = live.json(path, **more, **{"from": kept_s + 3_600, "to": last_s})
-                assert late["kept_from"] == late["from"]
 
 
 MODULES = ("lupin_twin", "lupin_bridge", "lupin_patrol", "greenhouse_sim", "numpy", "orjson")

@@ -5,18 +5,16 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.stream.frames import STALE_AFTER_S
 from tests.support.domains import own_domain
 from tests.support.live import attached, field_of, wait_until_ready
 from tests.support.messages import discovered, look, occupancy_grid, pose, scan
-from tests.support.processes import OFTEN, constants, limits, lupin_twin, twin_node
+from tests.support.processes import OFTEN, constants, faults, limits, lupin_twin, twin_node
 from tests.support.ros import Peer
-from tests.support.sabotage import sabotaged
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, Frame, Listener, listener, tag_ids
 
 # Errors are counted with each heartbeat.
-CLI = ("tests.support.limited", *constants(**{"lupin_bridge.feed.ros_thread:BEAT_PERIOD_S": 0.1}))
+BEATS = constants(**{"lupin_bridge.feed.ros_thread:BEAT_PERIOD_S": 0.1})
 FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.5}
 
 
@@ -61,6 +59,9 @@ def test_a_twin_is_killed_and_its_successor_knows_fewer_tags(domain: int) -> Non
             assert "silent" in said["message"]
             assert live.json("/healthz")["ok"], "the bridge itself is well"
             assert tag_ids(live.json("/api/state")) == ["a", "b"], "the last that is known"
+            old_s = live.tag("a")["stale_seconds"]
+            wait_for(lambda: live.tag("a")["stale_seconds"] > old_s + 1.0, "it to grow old")
+            assert live.json("/api/tags/a")["stale_seconds"] > old_s + 1.0
 
             with twin_node(domain):
                 robot.observe(scan("c", {"co2": 3.0}, (2, 0)))
@@ -120,35 +121,6 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
         )
 
 
-def test_who_joins_a_silent_twin_is_told_how_long_it_has_been_silent(domain: int) -> None:
-    with (
-        lupin_twin(domain, "web") as process,
-        Peer(domain) as robot,
-        twin_node(domain) as twin,
-        attached(process, robot) as live,
-    ):
-        wait_until_ready(live)
-        robot.observe(scan("a", {"co2": 1.0}, (0, 0)))
-        live.tag("a")
-        twin.kill()
-
-        def silent_s() -> float:
-            return float(live.get("/readyz").json()["state_age_seconds"])
-
-        wait_for(lambda: silent_s() > STALE_AFTER_S, "silence")
-        tag_s, first_s = live.tag("a")["stale_seconds"], silent_s()
-        # Past the moment at which those who were there were told.
-        wait_for(lambda: silent_s() > first_s + 2.0, "a longer silence")
-        before_s = silent_s()
-        with live.listen() as late:
-            status, state = late.next(), late.next()
-        assert status["reason"] == "stale"
-        assert status["state_age_seconds"] >= before_s
-        assert tag_ids(state["state"]) == ["a"]
-        for answer in (live.tag("a"), live.json("/api/tags/a")):
-            assert answer["stale_seconds"] >= tag_s + before_s - first_s - 0.01  # rounded
-
-
 def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
     soon = constants(**{"lupin_twin.ros.inputs:LEFT_OVER_S": 2.0})
     with (
@@ -176,7 +148,8 @@ def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
 
 @pytest.fixture(scope="module")
 def sabotaged_serve() -> Iterator[Bridge]:
-    faults = (
+    failing = faults(
+        "--raise",
         "lupin_twin.core.state:TwinStore.record:boom-scan",
         "lupin_twin.core.state:TwinStore.record_inspection:boom-look",
         "lupin_twin.core.state:TwinStore.pin:boom-find",
@@ -186,11 +159,10 @@ def sabotaged_serve() -> Iterator[Bridge]:
         # Called for listeners, by the heartbeat and by the state's timer.
         "lupin_twin.core.state:TwinStore.snapshot:boom-snapshot:3",
     )
-    options = [part for fault in faults for part in ("--raise", fault)]
     with (
         own_domain() as domain,
         # The few states that are lost make no silence.
-        sabotaged(domain, options, *CLI, "serve", "--port", "0", *OFTEN) as process,
+        lupin_twin(domain, "serve", *failing, *BEATS, *OFTEN) as process,
         Peer(domain) as robot,
         attached(process, robot) as live,
     ):
@@ -200,16 +172,16 @@ def sabotaged_serve() -> Iterator[Bridge]:
 
 @pytest.fixture(scope="module")
 def sabotaged_web() -> Iterator[Bridge]:
-    faults = (
+    failing = faults(
+        "--raise",
         "lupin_twin.ros.convert:snapshot_of:boom-web",
         "lupin_twin.ros.convert:map_of:width=13",
     )
-    options = [part for fault in faults for part in ("--raise", fault)]
     with (
         own_domain() as domain,
         # The one state that is lost makes no silence.
         twin_node(domain, *OFTEN),
-        sabotaged(domain, options, *CLI, "web", "--port", "0") as process,
+        lupin_twin(domain, "web", *failing, *BEATS) as process,
         Peer(domain) as robot,
         attached(process, robot) as live,
     ):

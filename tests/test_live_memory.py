@@ -4,7 +4,7 @@ import random
 from pathlib import Path
 
 from tests.support.journal import is_whole, select
-from tests.support.killing import kill_and_look
+from tests.support.killing import TWICE, kill_and_look
 
 ROUNDS = 3
 
@@ -15,7 +15,4 @@ def test_a_killed_twin_knows_all_that_was_shown_100_ms_before(domain: int, tmp_p
         number = kill_and_look(domain, journal, chance, number)
     assert number > 100
     assert is_whole(journal)
-    twice = (
-        "SELECT 1 FROM scan WHERE is_copy = 0 GROUP BY series, stamp_ns, source HAVING count(*) > 1"
-    )
-    assert select(journal, twice) == []
+    assert select(journal, TWICE) == []

@@ -4,6 +4,7 @@ import base64
 
 import httpx
 
+from lupin_twin.core.interfaces import SERVICES
 from tests.bridge.routes.test_foxglove import play
 from tests.support.foxglove import reader_of
 from tests.support.messages import look, occupancy_grid, scan
@@ -74,6 +75,14 @@ def test_two_houses_in_one_domain_do_not_mix(domain: int) -> None:
         theirs, field = answers(second, "two")
         assert (theirs, field["value_max"]) == (["two"], 900.0)
         assert viewed(web, "/gh1") == ("one", [0, 0, 0, 0])
+        # What a twin dropped its own `web` knows, from `/diagnostics`.
+        robot.publish("/gh1/floranova/observations", scan("nowhere", frame_id="odom"))
+        with httpx.Client(base_url=url_of(web), timeout=PATIENCE_S) as http:
+            drops = wait_for(lambda: http.get("/readyz").json()["drops"], "what was dropped")
+            assert [(drop["reason"], drop["count"]) for drop in drops] == [("frame", 1)]
+            metrics = http.get("/metrics").text
+        assert '\nlupin_dropped_total{reason="frame"} 1.0' in metrics
+        assert '\nlupin_web_dropped_total{reason="frame"} 0.0' in metrics
         # What it hears and tells is the first that a twin says.
         first.wait_for_output("/gh1/lupin_twin in ROS domain")
         for name in ("/gh1/floranova/observations", "/gh1/perception/discovered_tags", "/gh1/map"):
@@ -83,6 +92,8 @@ def test_two_houses_in_one_domain_do_not_mix(domain: int) -> None:
         graph = dict(robot.node.get_topic_names_and_types())
         assert {"/gh1/twin/state", "/gh1/twin/times", "/gh2/twin/state"} <= graph.keys()
         assert "/twin/state" not in graph
+        services = dict(robot.node.get_service_names_and_types())
+        assert {f"/gh1/{service.name}" for service in SERVICES} <= services.keys()
 
 
 def test_the_demo_below_a_namespace_takes_its_patrol_along(domain: int) -> None:

@@ -9,7 +9,7 @@ from tests.support.messages import look, scan
 from tests.support.mosquitto import PASSWORD, USER, Broker, Subscriber
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
 from tests.support.processes import OFTEN, lupin_twin, twin_node
-from tests.support.receiver import receiver, silence, status
+from tests.support.receiver import receiver, status
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 from tests.support.web import bridge, filled
@@ -100,21 +100,3 @@ def test_a_webhook_of_web_says_at_once_that_it_is_a_robot(tmp_path: Path) -> Non
         with lupin_twin(domain, "web", *to, **secrets):
             wait_for(lambda: hook.posted, "the alarm")
     assert hook.posted[0].json["origin"] == "robot"
-
-
-def test_frames_flow_and_it_ends_while_a_broker_and_a_receiver_hang(tmp_path: Path) -> None:
-    broker = Broker(tmp_path)
-    secrets: Any = {"LUPIN_WEBHOOK_SECRET": "s" * 16}
-    with broker.running() as process, receiver(silence) as hook:
-        process.freeze()
-        to = ("--mqtt-url", broker.url, "--webhook-url", f"http://127.0.0.1:{hook.port}/")
-        with bridge(*to, **secrets) as live, live.listen() as page:
-            live.peer.observe(look("pest", anomaly=True))
-            wait_for(lambda: hook.posted, "the post that hangs")
-            for number in range(20):
-                live.peer.observe(scan(f"{number}", {"co2": 500.0}))
-                page.until_tag(f"{number}")
-            assert not any(told["is_failing"] for told in live.json("/readyz")["outward"])
-            assert live.process.stop(signal.SIGINT) == 0
-            assert "Traceback" not in live.process.output
-            assert " ERROR " not in live.process.output

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +24,13 @@ T = 1_700_000_000
 
 @pytest.fixture(scope="module")
 def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
-    """A twin at the root, and one in a namespace that has heard nothing."""
-    with ExitStack() as stack:
-        domain = stack.enter_context(own_domain())
-        folder = tmp_path_factory.mktemp("journals")
-        for name, namespace in (("root", "/"), ("other", "/gh2")):
-            path = folder / f"{name}.sqlite"
-            ros_args = (*OFTEN, "-p", f"journal:={path}", "-r", f"__ns:={namespace}")
-            stack.enter_context(twin_node(domain, *ros_args))
-        peer = stack.enter_context(Peer(domain))
+    """A twin that has heard all this."""
+    path = tmp_path_factory.mktemp("journal") / "j.sqlite"
+    with (
+        own_domain() as domain,
+        twin_node(domain, *OFTEN, "-p", f"journal:={path}"),
+        Peer(domain) as peer,
+    ):
         peer.wait_for_twin()
         peer.discover(discovered({"pinned": pose(5.0, 6.0)}))
         peer.observe(
@@ -47,7 +44,7 @@ def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
         )
         peer.tag("late")
         wait_for(
-            lambda: select(folder / "root.sqlite", "SELECT count(*) FROM scan") == [(5,)],
+            lambda: select(path, "SELECT count(*) FROM scan") == [(5,)],
             "all of it in the journal",
         )
         yield peer
@@ -141,14 +138,6 @@ def test_readings_are_told_one_by_one_or_in_buckets(peer: Peer) -> None:
     assert told(series(peer, "a", "ph")) == []
     assert told(series(peer, "*", "~looks")) == [(10.0, 3.0), (300.0, 0.0)]
     assert list(series(peer, "*", "~runs").minima) == [0.0], "by no simulated clock"
-
-
-def test_a_namespace_has_services_and_a_past_of_its_own(peer: Peer) -> None:
-    response = peer.ask(GetStateAt, "/gh2/twin/get_state_at", at=stamp(T + 50.0))
-    assert response.ok
-    assert len(response.state.tags) == 0
-    response = peer.ask(GetHistory, "/gh2/twin/get_history", tag_id="a", sensor_type="co2")
-    assert (response.ok, list(response.stamps)) == (True, [])
 
 
 SITE, OBSERVED, RATE, AT_ONCE = 300, 400, 200, 8

@@ -12,10 +12,6 @@ beforeEach(() => {
       }
     },
   );
-  Object.defineProperty(document, 'fonts', {
-    configurable: true,
-    value: new EventTarget(),
-  });
   localStorage.clear();
   document.body.innerHTML = '<div id="root"></div>';
 });

@@ -1,6 +1,7 @@
 """`make bench`: every benchmark in turn; ratios side by side, nothing asserted."""
 
 import importlib
+import os
 import sys
 
 from tests.support.state_home import use_own
@@ -27,6 +28,8 @@ BENCHES = (
 def main() -> int:
     """Run the benchmarks named on the command line, or all."""
     use_own()
+    # As in the twin, and before anything imports numpy.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     for name in sys.argv[1:] or BENCHES:
         print(f"\n=== {name}", flush=True)
         importlib.import_module(f"tests.bench.{name}").main()

@@ -172,7 +172,3 @@ def main() -> None:
         alarms_of(tags)
         loop_of(tags)
     ordinary()
-
-
-if __name__ == "__main__":
-    main()

@@ -3,11 +3,9 @@
 Of each field: the error (RMSE) as a ratio to that of IDW over the cells that IDW paints; the share
 of all cells of the floor whose truth lies in the 90 % interval; the CRPS as a ratio to IDW's error.
 `narrow` is the share of fields with a coverage under 0.7, `worse` that of fields with a larger
-error than IDW's. Numbers were chosen on other seeds (`--choosing`) than these.
+error than IDW's.
 """
 
-import argparse
-import sys
 from collections import defaultdict
 from collections.abc import Iterator
 from math import erf, exp, pi, sqrt
@@ -21,7 +19,7 @@ from lupin_twin.estimate.kernel import Readings
 from lupin_twin.estimate.model import Model, fit
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.idw import compute_idw_field
-from tests.bench.other_worlds import CHOOSING, HOUR_S, JUDGING, SORTS, Floats, World, world_of
+from tests.bench.other_worlds import HOUR_S, JUDGING, SORTS, Floats, World, world_of
 
 CELL_M = 0.25
 INTERVAL_SDS = 1.645
@@ -49,10 +47,10 @@ class Case(NamedTuple):
     idw: Floats
 
 
-def cases(seeds: range, sorts: Iterator[str] | None = None) -> Iterator[tuple[str, str, Case]]:
+def cases() -> Iterator[tuple[str, str, Case]]:
     """(sort, phase, case)."""
-    for sort in sorts or SORTS:
-        for seed in seeds:
+    for sort in SORTS:
+        for seed in JUDGING:
             world = world_of(sort, seed)
             for phase in PHASES:
                 yield sort, phase, case_of(world, phase, seed)
@@ -66,20 +64,25 @@ def case_of(world: World, phase: str, seed: int) -> Case:
     width, height = (int(side / CELL_M) for side in world.size_m)
     x, y = (np.arange(width) + 0.5) * CELL_M, (np.arange(height) + 0.5) * CELL_M
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    newest = {int(tag): row for row, tag in enumerate(all_read.tag)}
-    idw = compute_idw_field(
-        [(*world.xy[tag].tolist(), float(all_read.value[row])) for tag, row in newest.items()],
+    idw = idw_of(all_read, width * CELL_M, height * CELL_M, CELL_M)
+    truth = world.truth(places, np.full(len(places), at_s))
+    return Case(world, as_received(all_read, at_s), 0.0, places, truth, idw)
+
+
+def idw_of(read: Readings, width_m: float, height_m: float, cell_m: float) -> Floats:
+    """The plain field of the newest readings over a floor, cell by cell."""
+    newest = {int(tag): row for row, tag in enumerate(read.tag)}
+    return compute_idw_field(
+        [(*read.xy[tag].tolist(), float(read.value[row])) for tag, row in newest.items()],
         bbox_min_x=0.0,
         bbox_min_y=0.0,
-        bbox_max_x=width * CELL_M,
-        bbox_max_y=height * CELL_M,
-        resolution=CELL_M,
+        bbox_max_x=width_m,
+        bbox_max_y=height_m,
+        resolution=cell_m,
         falloff_radius_m=RULES.falloff_radius_m,
         max_distance_m=RULES.max_distance_m,
         power=RULES.idw_power,
     ).values.astype(np.float64)
-    truth = world.truth(places, np.full(len(places), at_s))
-    return Case(world, as_received(all_read, at_s), 0.0, places, truth, idw)
 
 
 def as_received(read: Readings, at_s: float) -> Readings:
@@ -133,19 +136,12 @@ def line(name: str, fields: list[Field]) -> str:
     )
 
 
-def main(arguments: list[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--choosing", action="store_true", help="the seeds that are for choosing")
-    options = parser.parse_args([] if arguments is None else arguments)
+def main() -> None:
     rows: dict[str, list[Field]] = defaultdict(list)
-    for sort, phase, case in cases(CHOOSING if options.choosing else JUDGING):
+    for sort, phase, case in cases():
         field = judged(case)
         for name in (sort, phase, "all"):
             rows[name].append(field)
     print(f"{'':<26}{'fields':>7}{'to IDW':>9}{'covers':>9}{'CRPS':>9}{'narrow':>8}{'worse':>8}")
     for name in (*SORTS, *PHASES, "all"):
         print(line(name, rows[name]))
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -7,8 +7,6 @@ beside it say; what it is worth is the mean coverage of all cells in these round
 greenhouses the air becomes restless as they begin: what was learnt of a calm day is wrong then.
 """
 
-import argparse
-import sys
 from collections import Counter
 
 import numpy as np
@@ -19,7 +17,6 @@ from lupin_twin.estimate.model import fit
 from lupin_twin.estimate.posterior import Posterior
 from tests.bench.bench_estimate import INTERVAL_SDS, case_of
 from tests.bench.other_worlds import (
-    CHOOSING,
     DAY_S,
     HOUR_S,
     JUDGING,
@@ -78,15 +75,12 @@ def trust(world: World, all_read: Readings) -> tuple[bool | None, float]:
     return Record(0, tally, tally).is_trusted, float(np.mean(covers))
 
 
-def main(arguments: list[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--choosing", action="store_true", help="the seeds that are for choosing")
-    options = parser.parse_args([] if arguments is None else arguments)
+def main() -> None:
     found: Counter[int] = Counter()
     houses = alarms = tags = 0
     said: Counter[tuple[str, bool | None, bool]] = Counter()
     for sort in SORTS:
-        for seed in CHOOSING if options.choosing else JUDGING:
+        for seed in JUDGING:
             world = world_of(sort, seed)
             all_read = world.read(AT_S + (max(AFTER) + 2) * world.round_s + 4 * HOUR_S, seed)
             for name, one in (("as usual", world), ("restless", restless(world, AT_S, seed))):
@@ -106,7 +100,3 @@ def main(arguments: list[str] | None = None) -> None:
         what = "under 0.7" if is_narrow else "0.7 or more"
         count = said[name, trusted, is_narrow]
         print(f"{name}: is_trusted {trusted}, coverage {what}: {count}")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -5,19 +5,14 @@ and in how their day goes, under clouds that pass. Of each field as in `bench_es
 readings that the node would choose: of a day, and of the first six hours.
 """
 
-import os
 from collections.abc import Callable
-from typing import Any
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-import numpy as np  # its threads are counted when it is loaded
+import numpy as np
 
 from lupin_twin.estimate.engine import thinned
 from lupin_twin.estimate.kernel import Readings
 from lupin_twin.estimate.model import fit
-from lupin_twin.field.idw import compute_idw_field
-from tests.bench.bench_estimate import INTERVAL_SDS, RULES, rmse
+from tests.bench.bench_estimate import INTERVAL_SDS, idw_of, rmse
 from tests.bench.other_worlds import DAY_S, HOUR_S, Floats
 
 # Tags, m of the greenhouse's side.
@@ -82,18 +77,18 @@ def judged(tags: int, metres: float, seed: int, phase: str) -> list[float]:
     truth, heard = house(tags, metres, seed, passes)
     readings = thinned(heard, silent_s, DAY_S)
     cell_m = metres / CELLS
-    box: dict[str, Any] = {"bbox_min_x": 0.0, "bbox_min_y": 0.0}
-    box |= {"bbox_max_x": metres, "bbox_max_y": metres}
-    newest = {int(tag): row for row, tag in enumerate(heard.tag)}
-    field = compute_idw_field(
-        [(*heard.xy[tag].tolist(), float(heard.value[row])) for tag, row in newest.items()],
-        **box,
-        resolution=cell_m,
-        falloff_radius_m=RULES.falloff_radius_m,
-        max_distance_m=RULES.max_distance_m,
-        power=RULES.idw_power,
-    ).values.ravel()
-    grid = fit(readings).posterior(readings, silent_s).grid(**box, resolution=cell_m)
+    field = idw_of(heard, metres, metres, cell_m).ravel()
+    grid = (
+        fit(readings)
+        .posterior(readings, silent_s)
+        .grid(
+            bbox_min_x=0.0,
+            bbox_min_y=0.0,
+            bbox_max_x=metres,
+            bbox_max_y=metres,
+            resolution=cell_m,
+        )
+    )
     centres = (np.arange(CELLS) + 0.5) * cell_m
     places = np.stack(np.meshgrid(centres, centres), axis=-1).reshape(-1, 2)
     true = truth(places, np.full(len(places), silent_s))
@@ -123,7 +118,3 @@ def main() -> None:
                 f"{label:<44}{count:>6}{ratio:>8.2f}{covers.mean():>8.2f}{covers.min():>8.2f}",
                 flush=True,
             )
-
-
-if __name__ == "__main__":
-    main()

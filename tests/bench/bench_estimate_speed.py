@@ -1,12 +1,9 @@
 """What an estimate costs beside IDW on the same grid: ms of one core, the best of several."""
 
-import os
 import time
 from collections.abc import Callable
 from functools import partial
 from typing import TypeVar
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from lupin_twin.estimate.engine import thinned
 from lupin_twin.estimate.model import fit
@@ -76,7 +73,3 @@ def main() -> None:
     for tags, each, metres, side in HOUSES:
         label = f"{tags} x {each}, {side} x {side} in {metres:g} m"
         print(f"{label:<34}" + "".join(f"{one:>10.1f}" for one in costs(tags, each, metres, side)))
-
-
-if __name__ == "__main__":
-    main()

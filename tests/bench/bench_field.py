@@ -1,7 +1,5 @@
 """How fast fields are made, each beside the plain loop of the same run.
 
-    python tests/bench/bench_field.py
-
 The loop is `tests/oracle_idw.py`, the definition written down. Where it would take minutes it runs
 over a sample of the cells, and the table says so. Times are the best of several runs.
 """
@@ -9,16 +7,12 @@ over a sample of the cells, and the table says so. Times are the best of several
 import sys
 import time
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "ros_node" / "lupin_twin")]
-
-from lupin_twin.field.grid import FieldGrid, cell_centres  # noqa: E402
-from lupin_twin.field.idw import FieldSample, compute_idw_field  # noqa: E402
-from tests.oracle_idw import value_at  # noqa: E402
+from lupin_twin.field.grid import FieldGrid, cell_centres
+from lupin_twin.field.idw import FieldSample, compute_idw_field
+from tests.oracle_idw import value_at
 
 REACH_M = 1.5
 LOOP_PAIRS = 2_000_000
@@ -106,7 +100,3 @@ def main() -> None:
     """Print every table."""
     print(f"Python {sys.version.split()[0]}, numpy {np.__version__}")
     compare_fields()
-
-
-if __name__ == "__main__":
-    main()

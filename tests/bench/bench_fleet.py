@@ -2,11 +2,10 @@
 
 Lag: from the arrival of a scan at its twin until the archive has committed it. Journals, forwarders
 and PostgreSQL (fsync on) share this machine; forwarders are threads of a few processes, which run
-the code of `lupin-twin forward`. Growth: rows as forwarders write them, made by SQL, five sensors,
-a scan of each of 30 tags every two minutes. `--quick`: a few sites, few days.
+the code of `lupin-twin forward`. Growth: rows of a site as it is forwarded, five sensors, a scan of
+each of 30 tags every two minutes; further sites have the same.
 """
 
-import argparse
 import json
 import random
 import sqlite3
@@ -18,6 +17,7 @@ import threading
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import psycopg
@@ -29,17 +29,17 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import SiteLog
-from tests.support.archive import Archive
+from tests.bench.journal_double import BEGUN_NS, House, filled
+from tests.support.archive import Archive, forward_once
 from tests.support.journal import SECOND, kept, scan
 from tests.support.postgres import server
 
-TAGS, EVERY_S, PROCESSES = 30, 120, 2
+TAGS, PROCESSES = 30, 2
 SENSORS = ("temperature", "humidity", "co2", "light", "moisture")
 # What comes before is not counted: 200 connections, and journals that are just begun.
 WARM_S, MEASURED_S = 15.0, 20.0
-DAY = 86_400 * SECOND
-# A midnight.
-BEGUN = 1_767_225_600 * SECOND
+HOUR = 3_600 * SECOND
+DAY = House(tags=TAGS, days=1.0, every_s=120.0, look_days=0.0, failing=0)
 
 
 # --- lag ------------------------------------------------------------------------------------------
@@ -128,14 +128,7 @@ def lag(sites: int) -> None:
         processes = []
         for n in range(PROCESSES):
             urls = [archive.url(name) for name in names[n::PROCESSES]]
-            words = [
-                sys.executable,
-                "-m",
-                "tests.bench.bench_fleet",
-                "--forward",
-                str(folder),
-                *urls,
-            ]
+            words = [sys.executable, "-m", "tests.bench.bench_fleet", str(folder), *urls]
             processes.append(
                 stack.enter_context(
                     subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
@@ -157,39 +150,10 @@ def lag(sites: int) -> None:
 
 # --- growth ---------------------------------------------------------------------------------------
 
-_SCANS = f"""
-INSERT INTO scan SELECT %(site)s, %(first)s + n, series, %(begun)s + n * {EVERY_S * SECOND // TAGS},
-    NULL, %(begun)s + n * {EVERY_S * SECOND // TAGS} + 200000, 0, 'robot', 'm1', '', 0,
-    format('[%%s,%%s,%%s,%%s,%%s]', round((20 + 5 * random())::numeric, 2),
-        round((50 + 9 * random())::numeric, 1), round((400 + 99 * random())::numeric),
-        round((300 * random())::numeric, 1), round((40 + random())::numeric, 2))
-FROM generate_series(1, %(count)s) AS n
-JOIN series ON site = %(site)s AND run = 1 AND kind = 0 AND tag = (n %% {TAGS})::text
-"""
-_HOURS = """
-INSERT INTO hour SELECT site, series, %(hour)s + n, '[30,30,30,30,30]',
-    '[675.21,1634.2,13485,4501.3,1215.22]', '[20.01,50.1,400,0.2,40.01]', '[24.9,58.8,499,299,40.9]'
-FROM series, generate_series(0, %(hours)s - 1) AS n WHERE site = %(site)s ON CONFLICT DO NOTHING
-"""
-
-
-def grow(archive: Archive, site: str, days: range) -> None:
-    """Add days to a site, as they would be after forwarding."""
-    count = 86_400 // EVERY_S * TAGS
-    with psycopg.connect(archive.owner, autocommit=True) as connection:
-        for day in days:
-            begun = BEGUN + day * DAY
-            connection.execute("SELECT make_months(%s)", (begun // SECOND,))
-            connection.execute(
-                _SCANS,
-                {"site": site, "first": 10_000 + day * count, "begun": begun, "count": count},
-            )
-            connection.execute(_HOURS, {"site": site, "hour": begun // (DAY // 24), "hours": 24})
-
 
 def measure(archive: Archive, sites: int, days: int) -> None:
     """Print rows, bytes, and what questions take."""
-    chance = random.Random(7)
+    chance, end_ns = random.Random(7), replace(DAY, days=float(days)).end_ns
     with psycopg.connect(archive.owner, autocommit=True) as connection:
         connection.execute("VACUUM ANALYZE")
         ((size,),) = connection.execute(
@@ -199,16 +163,16 @@ def measure(archive: Archive, sites: int, days: int) -> None:
         states, past = [], []
         for _ in range(40):
             log = SiteLog(connection, f"gh{chance.randrange(sites)}")
-            at_ns = BEGUN + DAY // 24 + int(chance.random() * (days * DAY - DAY // 12))
+            at_ns = BEGUN_NS + HOUR + int(chance.random() * (end_ns - BEGUN_NS - 2 * HOUR))
             start = time.perf_counter()
             found = state_at(log, at_ns, "map")  # type: ignore[arg-type]  # queries are of both
             states.append((time.perf_counter() - start) * 1e3)
             assert len(found.tags) == TAGS, len(found.tags)
-            asked = SeriesRequest("7", "co2", BEGUN, BEGUN + days * DAY, 500)
+            asked = SeriesRequest("7", "co2", BEGUN_NS, end_ns, 500)
             start = time.perf_counter()
-            series(log, asked, BEGUN + days * DAY)
+            series(log, asked, end_ns)
             past.append((time.perf_counter() - start) * 1e3)
-    rows = sites * days * 86_400 // EVERY_S * TAGS
+    rows = sites * days * DAY.scans * TAGS
     print(
         f"{sites:>5}{days:>6}{rows:>12,}{float(size) / 1e6:>9.0f}{float(size) / rows:>8.0f}"
         f"{min(states):>13.1f}{statistics.median(states):>9.1f}{min(past):>12.1f}",
@@ -216,55 +180,31 @@ def measure(archive: Archive, sites: int, days: int) -> None:
     )
 
 
-def growth(*, quick: bool) -> None:
+def growth() -> None:
     """Print how the archive grows with days and with sites; of a sensor the least time too, ms."""
     print(
         "sites  days       scans       MB  B/scan  state ms: least, median  a sensor, all days",
         flush=True,
     )
-    few, many = (2, 5) if quick else (10, 100)
-    with server(fsync=True) as postgresql, tempfile.TemporaryDirectory() as folder:
-        for of_days in (True, False):
-            archive, done = Archive(postgresql, "gh0"), 0
-            for count in (1, few, many):
-                for number in range(done, count):
-                    site = "gh0" if of_days else f"gh{number}"
-                    if number == 0 or not of_days:
-                        begin(archive, site, Path(folder) / f"{of_days}{site}")
-                    grow(archive, site, range(number, number + 1) if of_days else range(1))
-                done = count
-                measure(archive, *((1, count) if of_days else (count, 1)))
+    with server(fsync=True) as postgresql:
+        for days in (1, 10, 100):
+            archive = Archive(postgresql, "gh0")
+            forward_once(archive, filled(replace(DAY, days=float(days))).path)
+            measure(archive, 1, days)
+            archive.drop()
+        archive, done = Archive(postgresql, "gh0"), 1
+        forward_once(archive, filled(DAY).path)
+        for sites in (10, 100):
+            archive.copy_site(*(f"gh{number}" for number in range(done, sites)))
+            measure(archive, sites, 1)
+            done = sites
 
 
-def begin(archive: Archive, site: str, journal: Path) -> None:
-    """Forward a first scan of each tag: the run, and its series."""
-    own = archive.of_site(site)
-    values = dict.fromkeys(SENSORS, 20.0)
-    clock = Clock(BEGUN, BEGUN, is_simulated=False)
-    kept(
-        journal,
-        [scan(str(tag), BEGUN + tag, source="robot", **values) for tag in range(TAGS)],
-        clock,
-    )
-    assert Forwarder(own.url(), site, lambda: journal, lambda _: None).run(once=True)
-
-
-def main(arguments: Sequence[str] = ()) -> None:
+def main() -> None:
     """Print the figures."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--lag", action="store_true", help="this alone")
-    parser.add_argument("--growth", action="store_true", help="this alone")
-    parser.add_argument("--forward", nargs="+", help=argparse.SUPPRESS)
-    options = parser.parse_args(arguments)
-    if options.forward:
-        forward(Path(options.forward[0]), options.forward[1:])
-        return
-    if not options.growth:
-        lag(20 if options.quick else 200)
-    if not options.lag:
-        growth(quick=options.quick)
+    lag(200)
+    growth()
 
 
-if __name__ == "__main__":
-    main(sys.argv[1:])
+if __name__ == "__main__":  # in a process of its own
+    forward(Path(sys.argv[1]), sys.argv[2:])

@@ -6,11 +6,10 @@ But for the heartbeat it is thread time of all tasks, so what else runs there do
 import time
 from collections.abc import Callable
 
-from playwright.sync_api import Browser, CDPSession, Page, sync_playwright
+from playwright.sync_api import CDPSession, Page
 
-from tests.bench.bench_page import page_of
+from tests.bench.bench_page import chromium, page_of
 from tests.bench.house_double import house_of
-from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
 from tests.support.web import bridge
 
 SIZES = (1_000, 10_000)
@@ -43,17 +42,7 @@ SETTLED = "() => new Promise((r) => requestAnimationFrame(() => setTimeout(r, 50
 
 def main() -> None:
     """Measure both sizes and print them."""
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
-        )
-        with chromium:
-            print_large_houses(chromium)
-
-
-def print_large_houses(browser: Browser) -> None:
-    """Heartbeat, small change, mouse, sort, filter and first paint, each for both sizes."""
-    with bridge() as running:
+    with chromium() as browser, bridge() as running:
         for count in SIZES:
             with page_of(browser) as page:
                 page.add_init_script(FIRST_ROW)
@@ -120,7 +109,3 @@ def busy_s(session: CDPSession) -> float:
     """Time that the page's main thread has spent in tasks so far, s."""
     metrics = session.send("Performance.getMetrics")["metrics"]
     return float(next(each["value"] for each in metrics if each["name"] == "TaskDuration"))
-
-
-if __name__ == "__main__":
-    main()

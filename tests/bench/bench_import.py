@@ -1,10 +1,9 @@
 """A CSV of a million rows of two readings, by `lupin-twin import`: a look, then into a journal.
 
 Rows a second of CPU time, the command's start included, beside what Python's own csv reader takes
-for the same file. `--quick`: a fifth of the rows.
+for the same file.
 """
 
-import argparse
 import csv
 import random
 import resource
@@ -12,40 +11,36 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
-TAGS = 100
+ROWS, TAGS = 1_000_000, 100
 MAP = """time: time
 tag: bench
 sensors: {temperature: temp_c, humidity: {column: rh, factor: 100, min: 0, max: 100}}
 """
 
 
-def main(arguments: Sequence[str] = ()) -> None:
+def main() -> None:
     """Print the figures."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--quick", action="store_true")
-    rows = 200_000 if parser.parse_args(arguments).quick else 1_000_000
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "columns.yaml").write_text(MAP)
-        _write(folder / "readings.csv", rows)
+        _write(folder / "readings.csv")
         begun_s = time.process_time()
         with (folder / "readings.csv").open(newline="") as file:
-            assert sum(1 for _ in csv.reader(file)) == rows + 1
+            assert sum(1 for _ in csv.reader(file)) == ROWS + 1
         plain_s = time.process_time() - begun_s
-        print(f"csv.reader alone: {rows / plain_s:,.0f} rows a second")
+        print(f"csv.reader alone: {ROWS / plain_s:,.0f} rows a second")
         for what, more in (("a look", ()), ("--write", ("--write",)), ("again", ("--write",))):
             took_s = _import(folder, *more)
-            print(f"{what}: {rows / took_s:,.0f} rows a second, {took_s / plain_s:.1f} x as long")
+            print(f"{what}: {ROWS / took_s:,.0f} rows a second, {took_s / plain_s:.1f} x as long")
 
 
-def _write(path: Path, rows: int) -> None:
+def _write(path: Path) -> None:
     some = random.Random(1)
     with path.open("w") as file:
         file.write("time,bench,temp_c,rh\n")
-        for n in range(rows):
+        for n in range(ROWS):
             at = 1_714_558_200 + n // TAGS * 60
             file.write(
                 f"{at},b{n % TAGS},{some.uniform(20, 25):.2f},{some.uniform(0.5, 0.7):.3f}\n"
@@ -64,7 +59,3 @@ def _import(folder: Path, *more: str) -> float:
     )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -2,13 +2,11 @@
 
 Times are those of one core; the first call over a connection of its own, and the median of more.
 A greenhouse of 30 tags with five sensors is scanned for a year, every 48 minutes; one of 10,000
-tags in two days, four times. `--quick`: a month, and fewer scans written.
+tags in two days, four times.
 """
 
-import argparse
 import sqlite3
 import statistics
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -30,7 +28,6 @@ from lupin_twin.runtime.memory import Memory
 from tests.bench.journal_double import BEGUN_NS, LIMITS, Filled, House, filled
 
 YEAR: Final = House(tags=30, days=365.0, every_s=2880.0)
-QUICK: Final = House(tags=30, days=30.0, every_s=2880.0)
 # The largest: 10,000 tags with five sensors each, every ten minutes.
 MANY: Final = House(tags=10_000, days=2.0, every_s=43_200.0, look_days=0.0, failing=0)
 DAY: Final = House(tags=10_000, days=1.0, every_s=600.0)
@@ -43,14 +40,11 @@ TIMELINE: Final = (
 )  # fmt: skip
 
 
-def main(arguments: Sequence[str] = ()) -> None:
+def main() -> None:
     """Print the figures beside those that are asked for."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--quick", action="store_true")
-    is_quick = parser.parse_args(arguments).quick
     with tempfile.TemporaryDirectory(prefix="lupin-twin-log-") as folder:
-        write(Path(folder), SCANS // 10 if is_quick else SCANS)
-    ask(filled(QUICK if is_quick else YEAR), filled(MANY))
+        write(Path(folder))
+    ask(filled(YEAR), filled(MANY))
     restart(filled(MANY))
 
 
@@ -58,11 +52,11 @@ def report(what: str, figure: str, asked: str) -> None:
     print(f"{what:58}{figure:>26}   (asked {asked})", flush=True)
 
 
-def write(folder: Path, scans: int) -> None:
+def write(folder: Path) -> None:
     heard = DAY.rows()
     # The first scan of each tag makes its series; it is made once.
     before = list(islice(heard, DAY.tags * 2))
-    told = list(islice(heard, scans))
+    told = list(islice(heard, SCANS))
     paced = list(islice(heard, 2_000))
     path = folder / "log.sqlite"
     file = JournalFile(path, LIMITS, is_sound=True)
@@ -159,7 +153,3 @@ def restart(many: Filled) -> None:
     finally:
         journal.close(60.0)
     report("restart with 10,000 tags, s; of one core", f"{took[0]:.2f}; {took[1]:.2f}", "1.6")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -3,25 +3,22 @@
 A real page over a real archive, and a real browser; all share this machine.
 """
 
-import argparse
 import statistics
 import tempfile
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
-from playwright.sync_api import Browser, Playwright, sync_playwright
 from playwright.sync_api import Page as BrowserPage
 
 from lupin_twin.core.state import Write
-from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
+from tests.bench.bench_page import chromium
 from tests.support.archive import Archive, forward_once
-from tests.support.fleet import Page, fleet, write
-from tests.support.journal import SECOND, pin, scan
+from tests.support.fleet import Page, fleet, scans_lately, write
+from tests.support.journal import SECOND, scan
 from tests.support.postgres import server
 from tests.support.waiting import wait_for
 
-TAGS, SCANS = 30, 3
+SITES, TAGS, SCANS = 1_000, 30, 3
 # Frames of a browser that took longer than so many ms.
 LATE_MS = 50
 _SCROLL = """async () => {
@@ -38,24 +35,19 @@ _SCROLL = """async () => {
 def rows() -> list[Write]:
     """Tags in a row, of which one is too warm."""
     now_ns = time.time_ns()
-    pins = [pin(str(tag), now_ns - 900 * SECOND, float(tag)) for tag in range(TAGS)]
-    scans = [
-        scan(str(tag), now_ns - ago * 60 * SECOND + tag, temperature=45.0 if tag == 3 else 22.0)
-        for ago in range(SCANS, 0, -1)
-        for tag in range(TAGS)
-    ]
-    return [*pins, *scans]
+    hot = [scan("3", now_ns - ago * SECOND, temperature=45.0) for ago in (2, 1)]
+    return [*scans_lately(tags=TAGS, scans=SCANS), *hot]
 
 
-def serve(page: Page, sites: int) -> None:
+def serve(page: Page) -> None:
     """Print what the server takes."""
     begun_s = time.monotonic()
     wait_for(
-        lambda: sum(it["active_alarms"] is not None for it in page.sites().values()) == sites,
+        lambda: sum(it["active_alarms"] is not None for it in page.sites().values()) == SITES,
         "all sites to be judged",
         timeout_s=600,
     )
-    print(f"{sites} sites judged within {time.monotonic() - begun_s:.0f} s", flush=True)
+    print(f"{SITES} sites judged within {time.monotonic() - begun_s:.0f} s", flush=True)
     for path in ("/api/sites", "/api/alarms", "/api/sites/gh0/map.svg"):
         took = []
         for _ in range(30):
@@ -66,10 +58,10 @@ def serve(page: Page, sites: int) -> None:
         print(f", {len(body):,} bytes")
 
 
-def paint(page: BrowserPage, url: str, sites: int) -> None:
+def paint(page: BrowserPage, url: str) -> None:
     """Print what a browser takes."""
     page.goto(url, wait_until="commit")
-    page.locator(".fleet-site").nth(sites - 1).wait_for(state="attached")
+    page.locator(".fleet-site").nth(SITES - 1).wait_for(state="attached")
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => setTimeout(done)))")
     print(f"painted {page.evaluate('performance.now()'):.0f} ms after the navigation began")
     gaps = page.evaluate(_SCROLL)
@@ -80,34 +72,21 @@ def paint(page: BrowserPage, url: str, sites: int) -> None:
     print(f", {late} of {len(gaps)} over {LATE_MS} ms")
     page.wait_for_selector(".fleet-map img")
     loaded = "[...document.images].filter((it) => it.complete && it.naturalWidth).length"
-    print(f"small maps fetched: {page.evaluate(loaded)} of {sites}")
+    print(f"small maps fetched: {page.evaluate(loaded)} of {SITES}")
 
 
-def _chromium(playwright: Playwright) -> Browser:
-    return playwright.chromium.launch(
-        executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
-    )
-
-
-def main(arguments: Sequence[str] = ()) -> None:
+def main() -> None:
     """Print the figures."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--quick", action="store_true", help="fifty sites")
-    sites = 50 if parser.parse_args(arguments).quick else 1_000
     with tempfile.TemporaryDirectory() as folder, server() as postgresql:
         archive = Archive(postgresql, "gh0")
         archive.add_user("page", "lupin_page")
         write(Path(folder) / "journal", rows())
         forward_once(archive, Path(folder) / "journal")
-        archive.copy_site(*(f"gh{number}" for number in range(1, sites)))
+        archive.copy_site(*(f"gh{number}" for number in range(1, SITES)))
         archive.keep_live()
-        with fleet(archive) as served, sync_playwright() as playwright:
-            serve(served, sites)
-            with _chromium(playwright) as browser:
+        with fleet(archive) as served:
+            serve(served)
+            with chromium() as browser:
                 for _ in range(3):
                     with browser.new_context() as context:
-                        paint(context.new_page(), served.url, sites)
-
-
-if __name__ == "__main__":
-    main()
+                        paint(context.new_page(), served.url)

@@ -61,13 +61,21 @@ async (seconds) => {
 def main() -> None:
     """Measure both and print them."""
     expect.set_options(timeout=PATIENCE_MS)
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
+    with chromium() as browser:
+        print_first_paint(browser)
+        print_panning(browser)
+
+
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """The browser that the tests have."""
+    with (
+        sync_playwright() as playwright,
+        playwright.chromium.launch(
             executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
-        )
-        with chromium:
-            print_first_paint(chromium)
-            print_panning(chromium)
+        ) as browser,
+    ):
+        yield browser
 
 
 @contextmanager
@@ -169,7 +177,3 @@ def processor_s(browser: Browser) -> float:
     processes = session.send("SystemInfo.getProcessInfo")["processInfo"]
     session.detach()
     return float(sum(process["cpuTime"] for process in processes))
-
-
-if __name__ == "__main__":
-    main()

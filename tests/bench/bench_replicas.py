@@ -3,12 +3,10 @@
 All is real: a journal that a plain program writes, its forwarder, PostgreSQL, three `lupin-twin
 fleet`, and browsers in further processes, which share this machine. They follow the site's page, a
 third of them each replica. The delay is from before the record in the journal until a browser has
-read the frame. `--quick`: few browsers.
+read the frame.
 """
 
-import argparse
 import os
-import sys
 import tempfile
 import threading
 import time
@@ -25,7 +23,6 @@ from tests.support.fleet import fleet, write
 from tests.support.journal import SECOND, pin, scan
 from tests.support.postgres import server
 from tests.support.proc_stat import cpu_s, resident_mb
-from tests.support.state_home import use_own
 
 REPLICAS, TAGS, MEASURED_S = 3, 30, 10.0
 COUNTS = (300, 1_500, 3_000, 6_000)
@@ -67,13 +64,8 @@ def measure(ports: Sequence[int], pids: Sequence[int], count: int) -> None:
     )
 
 
-def main(arguments: Sequence[str] = ()) -> None:
+def main() -> None:
     """Print the figures."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--counts", nargs="+", type=int, default=COUNTS)
-    options = parser.parse_args(arguments)
-    use_own()
     print(
         " browsers  delivered %  median ms   p99 ms  joined s  cores a replica  MB a replica  load"
     )
@@ -103,9 +95,5 @@ def main(arguments: Sequence[str] = ()) -> None:
         stack.callback(recording.join)
         stack.callback(ending.set)
         ports = [urlsplit(page.url).port or 0 for page in pages]
-        for count in (60,) if options.quick else options.counts:
+        for count in COUNTS:
             measure(ports, [page.process.pid for page in pages], count)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -10,9 +10,6 @@ It connects all clients at the monotonic time T and prints one JSON object a lin
     {"delays_s": [...], "received": {"seq": count}, "frame_bytes": n}
                                   after `measure T0 T1` on standard input; about the frames whose
                                   beat was published from T0 to T1
-    {"closed_s": [...]}           after `closed` on standard input: when the server ended a client
-
-With `--deaf` the clients ask for frames and never read one.
 """
 
 import argparse
@@ -46,13 +43,12 @@ class Stream:
 class Clients:
     """All clients of this process and what they saw."""
 
-    def __init__(self, path: str, port: int, deaf: bool) -> None:
-        self._path, self._port, self._deaf = path, port, deaf
+    def __init__(self, path: str, port: int) -> None:
+        self._path, self._port = path, port
         self._poll = select.epoll()
         self._streams: dict[int, Stream] = {}
         self._window = (float("inf"), float("inf"))
         self._joined: list[float] = []
-        self._closed: list[float] = []
         self._delays: list[float] = []
         self._received: Counter[int] = Counter()
         self._bytes = 0
@@ -72,7 +68,7 @@ class Clients:
     def run(self, count: int) -> None:
         """Serve until standard input ends."""
         self._poll.register(sys.stdin, select.EPOLLIN)
-        has_told = self._deaf
+        has_told = False
         while True:
             events = self._poll.poll(0.5)
             for fd, event in events:
@@ -80,23 +76,16 @@ class Clients:
                     command = sys.stdin.readline().split()
                     if not command:
                         return
-                    self._obey(command)
+                    self._window = (float(command[1]), float(command[2]))
                 elif event & select.EPOLLOUT:
                     self._upgrade(self._streams[fd])
-                elif self._deaf or not self._read(self._streams[fd]):
-                    self._closed.append(time.monotonic() - self._connected_at)
+                elif not self._read(self._streams[fd]):
                     self._poll.unregister(fd)
             if not has_told and len(self._joined) == count:
                 has_told = True
                 tell(joined_s=self._joined)
             if time.monotonic() > self._window[1] + DRAIN_S:
                 self._report()
-
-    def _obey(self, command: list[str]) -> None:
-        if command[0] == "measure":
-            self._window = (float(command[1]), float(command[2]))
-        else:
-            tell(closed_s=self._closed)
 
     def _report(self) -> None:
         frames = sum(self._received.values())
@@ -118,8 +107,7 @@ class Clients:
             "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
             "Sec-WebSocket-Version: 13\r\n\r\n".encode()
         )
-        # Errors and hang-ups are told without being asked for.
-        self._poll.modify(stream.socket, 0 if self._deaf else select.EPOLLIN)
+        self._poll.modify(stream.socket, select.EPOLLIN)
 
     def _read(self, stream: Stream) -> bool:
         """Read what is there; False at the end of the connection."""
@@ -209,11 +197,10 @@ def main() -> None:
     parser.add_argument("--path", default="/ws/state")
     parser.add_argument("--clients", type=int, required=True)
     parser.add_argument("--connect-at", type=float, required=True)
-    parser.add_argument("--deaf", action="store_true")
     options = parser.parse_args()
     hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-    clients = Clients(options.path, options.port, options.deaf)
+    clients = Clients(options.path, options.port)
     # All processes have one moment: who waited for the others would come after them.
     time.sleep(max(0.0, options.connect_at - time.monotonic()))
     clients.connect(options.clients)

@@ -44,16 +44,11 @@ class Seen:
         """A quantile of the delays, ms."""
         return 1e3 * self.delays_s[min(len(self.delays_s) - 1, int(share * len(self.delays_s)))]
 
-    def delays(self) -> str:
-        """The delays, for a person."""
-        return f"median {self.delay_ms(0.5):.1f} ms, p99 {self.delay_ms(0.99):.1f} ms"
-
 
 class Clients:
     """The client processes of one load."""
 
-    def __init__(self, port: int, count: int, path: str = "/ws/state", *, deaf: bool = False):
-        self.count = count
+    def __init__(self, port: int, count: int, path: str = "/ws/state"):
         self._processes = []
         number = -(-count // CLIENTS_A_PROCESS)
         connect_at = time.monotonic() + HEAD_START_S
@@ -62,7 +57,6 @@ class Clients:
             arguments = [
                 *("--port", port, "--path", path),
                 *("--clients", share, "--connect-at", connect_at),
-                *(["--deaf"] if deaf else []),
             ]
             self._processes.append(
                 subprocess.Popen(
@@ -87,7 +81,10 @@ class Clients:
 
     def measure(self, start_s: float, end_s: float) -> Seen:
         """Measure changes published in a stretch of the monotonic clock."""
-        self._command(f"measure {start_s} {end_s}")
+        for process in self._processes:
+            assert process.stdin is not None
+            process.stdin.write(f"measure {start_s} {end_s}\n")
+            process.stdin.flush()
         seen = Seen([], Counter(), 0.0)
         for told in self._told():
             seen.delays_s += told["delays_s"]
@@ -95,17 +92,6 @@ class Clients:
             seen.frame_bytes = max(seen.frame_bytes, told["frame_bytes"])
         seen.delays_s.sort()
         return seen
-
-    def closed_s(self) -> list[float]:
-        """When the server closed clients, s after they connected."""
-        self._command("closed")
-        return sorted(at for told in self._told() for at in told["closed_s"])
-
-    def _command(self, text: str) -> None:
-        for process in self._processes:
-            assert process.stdin is not None
-            process.stdin.write(text + "\n")
-            process.stdin.flush()
 
     def _told(self) -> Iterator[dict[str, Any]]:
         for process in self._processes:

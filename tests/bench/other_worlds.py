@@ -3,7 +3,7 @@
 A world is one sensor's truth over a floor and days on end, and a robot that reads it: in each
 round every tag once, always in the same order. All begin plain (a level, a day, places that differ
 by waves, weather, noise); each sort then adds what a model with smooth daily courses does not
-expect. Seeds for choosing numbers and seeds for judging them are kept apart.
+expect.
 """
 
 from collections.abc import Callable
@@ -17,8 +17,7 @@ from lupin_twin.estimate.kernel import Readings
 
 HOUR_S: Final = 3_600.0
 DAY_S: Final = 86_400.0
-# Whatever is chosen is chosen on the former, and published of the latter.
-CHOOSING: Final = range(4)
+# What is published is of these; constants were chosen on 0 to 3.
 JUDGING: Final = range(1_000, 1_004)
 _UNTIL_S: Final = 3 * DAY_S
 

@@ -7,12 +7,9 @@ from pathlib import Path
 
 from tests.support.domains import own_domain
 from tests.support.journal import is_whole, select
-from tests.support.killing import RATE, SAFE_S, kill_and_look
+from tests.support.killing import RATE, SAFE_S, TWICE, kill_and_look
 
 ROUNDS = 50
-_TWICE = (
-    "SELECT 1 FROM scan WHERE is_copy = 0 GROUP BY series, stamp_ns, source HAVING count(*) > 1"
-)
 
 
 def main() -> bool:
@@ -35,7 +32,7 @@ def main() -> bool:
                 lost += 1
             if round_ % 10 == 0:
                 print(f"{round_} rounds", flush=True)
-        twice = len(select(journal, _TWICE))
+        twice = len(select(journal, TWICE))
         ((rows, runs),) = select(
             journal, "SELECT count(*), count(DISTINCT run) FROM scan JOIN series USING (series)"
         )

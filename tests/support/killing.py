@@ -11,6 +11,8 @@ from tests.support.proc_stat import waited_s
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
 
+# What a journal must not have.
+TWICE = "SELECT 1 FROM scan WHERE is_copy = 0 GROUP BY series, stamp_ns, source HAVING count(*) > 1"
 TAGS = 30
 RATE = 200
 # What a client was shown so long before is safe.

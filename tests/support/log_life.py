@@ -14,39 +14,20 @@ from hypothesis import strategies as st
 
 from lupin_twin.core.history import KNOWN_BY_NOTHING, kind_of
 from lupin_twin.core.past import EVERY_TAG, Event, PastRow, SeriesPast, SeriesRequest
-from lupin_twin.core.state import (
-    NO_FLOWER,
-    STATUS_OK,
-    Flower,
-    Inspection,
-    Pin,
-    Pose,
-    Reading,
-    Scan,
-    Write,
-)
+from lupin_twin.core.state import STATUS_OK, Flower, Inspection, Pin, Scan, Write
 from lupin_twin.journal.appending import Appender
 from lupin_twin.journal.retention import Limits, purge_step
 from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import open_writer, transaction
+from tests.support.journal import NOW, SECOND, look, pin, scan
 
-SECOND = 1_000_000_000
 MINUTE = 60 * SECOND
 HOUR = 60 * MINUTE
-BEGUN = 1_763_700_000 * SECOND // HOUR * HOUR
+BEGUN = NOW // HOUR * HOUR
 LATEST = 400  # minutes
 TAGS = ("7", "8", "ü 9")
 SILENCE_NS = 600 * SECOND
 Entry = tuple[int, int, float]  # stamp, number, value
-
-
-def scan(tag: str = "7", at_ns: int = BEGUN, *, source: str = "robot", **values: float) -> Scan:
-    """A scan that worked."""
-    readings = (values or {"temperature": 21.5}).items()
-    return Scan(
-        tag, at_ns, tuple(Reading(name, value) for name, value in readings),
-        source=source, mission="m1", arrival_ns=at_ns + 1000,
-    )  # fmt: skip
 
 
 def failure(
@@ -57,22 +38,9 @@ def failure(
     return Inspection(tag, at_ns, None, *reported) if kind else Scan(tag, at_ns, (), *reported)
 
 
-def look(tag: str = "7", at_ns: int = BEGUN, *, anomaly: bool = False) -> Inspection:
-    """A look at flowers."""
-    flower = replace(
-        NO_FLOWER, species="lupin", confidence=0.9, anomaly=anomaly, bug_count=int(anomaly)
-    )
-    return Inspection(tag, at_ns, flower, source="robot", mission="m1", arrival_ns=at_ns + 2000)
-
-
 def _seen(row: Write) -> Flower | None:
     """What an inspection saw."""
     return row.flower if isinstance(row, Inspection) else None
-
-
-def pin(tag: str = "7", at_ns: int = BEGUN, x: float = 1.5) -> Pin:
-    """A place."""
-    return Pin(tag, Pose(x, 2.5, 0.0, 0.0, 0.0, 0.0, 1.0), at_ns, at_ns + 1000)
 
 
 @dataclass

@@ -48,6 +48,7 @@ class MadeUp:
     snapshot: Snapshot = field(default_factory=lambda: Snapshot(0, "map", ()))
     error: Exception | None = None
     asked: list[object] = field(default_factory=list)
+    costs: list[float] = field(default_factory=list)
     lots_taken: int = 0
     is_closed: bool = False
 

@@ -53,14 +53,6 @@ def _target(descriptor: Path) -> str:
         return ""
 
 
-def tcp_buffers_mb() -> float:
-    """What the kernel holds in the buffers of all TCP sockets of this machine, MB."""
-    for line in Path("/proc/net/sockstat").read_text(encoding="ascii").splitlines():
-        if line.startswith("TCP:"):
-            return int(line.split()[-1]) * _PAGE_BYTES / 1e6
-    raise AssertionError("/proc/net/sockstat has no line TCP:")
-
-
 def reset_peak(pid: int) -> None:
     """Let `peak_mb` start anew (proc_pid_clear_refs(5))."""
     Path(f"/proc/{pid}/clear_refs").write_text("5", encoding="ascii")

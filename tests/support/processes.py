@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Literal, Self
 
 from tests.support.domains import ros_env
 from tests.support.template import Forked, Template
@@ -187,10 +187,12 @@ def twin_node(domain: int, *ros_args: str, afresh: bool = False, **env: str) -> 
 
 def lupin_twin(domain: int, role: str, *args: str, afresh: bool = False, **env: str) -> Process:
     """`lupin-twin ROLE` on a free port; ask `url_of` for its address."""
-    is_other = {"--limit", "--world", "--constant"} & {*args}
+    has_faults = bool({"--raise", "--hang"} & {*args})
+    is_other = has_faults or {"--limit", "--world", "--constant"} & {*args}
     module = "tests.support.limited" if is_other else "lupin_bridge.cli.command"
     command = [sys.executable, "-m", module, role, "--port", "0", *args]
-    return Process(command, ros_env(domain, **env), afresh=afresh)
+    # What fails has to do so before anybody has imported it.
+    return Process(command, ros_env(domain, **env), afresh=afresh or has_faults)
 
 
 def limits(**values: float) -> tuple[str, ...]:
@@ -203,6 +205,11 @@ def constants(**values: float) -> tuple[str, ...]:
     """Arguments of `lupin_twin` for other constants of modules, by `module:NAME`."""
     pairs = [f"{name}={value!r}" for name, value in values.items()]
     return tuple(word for pair in pairs for word in ("--constant", pair))
+
+
+def faults(kind: Literal["--raise", "--hang"], *places: str) -> tuple[str, ...]:
+    """Arguments of `lupin_twin` for functions that fail or hang (`limited`)."""
+    return tuple(word for place in places for word in (kind, place))
 
 
 def free_port() -> int:

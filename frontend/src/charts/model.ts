@@ -1,4 +1,6 @@
 /** What one chart shows: one sensor, as one or several tags read it. Pure. */
+import uPlot from 'uplot';
+
 import { fetchSeries, fetchTimeline } from '../contract/past';
 import { type Catalogue, type Catalogues, type Ranges, rangesFor } from '../domain/sensors';
 import { type TemperatureUnit, toShown } from '../domain/format';
@@ -76,23 +78,13 @@ export const hasMarks = ({ lines }: PlotModel): boolean =>
   lines.some(({ marks }) => marks.length > 0);
 
 /** Common times, and per `drawnOf` its values: null is a break, undefined not of this line. */
-type Aligned = [number[], ...(number | null | undefined)[][]];
-
-export function aligned({ lines, sensor, unit }: PlotModel): Aligned {
-  const all = drawnOf({ lines }).map(({ series }) =>
-    pointsOf(series, (value) => toShown(sensor, value, unit)),
+export const aligned = ({ lines, sensor, unit }: PlotModel): uPlot.AlignedData =>
+  uPlot.join(
+    drawnOf({ lines }).map(({ series }) => {
+      const points = pointsOf(series, (value) => toShown(sensor, value, unit));
+      return [points.map(({ at }) => at), points.map(({ value }) => value)];
+    }),
   );
-  const times = [...new Set(all.flatMap((points) => points.map(({ at }) => at)))].sort(
-    (a, b) => a - b,
-  );
-  const place = new Map(times.map((time, index) => [time, index]));
-  const values = all.map((points) => {
-    const column = new Array<number | null | undefined>(times.length).fill(undefined);
-    for (const { at, value } of points) column[place.get(at) ?? 0] = value;
-    return column;
-  });
-  return [times, ...values];
-}
 
 /** Room above and below the values, as a share of how far they spread. */
 const ROOM = 0.08;
@@ -136,8 +128,10 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
   return [toShown(sensor, low - room, unit), toShown(sensor, high + room, unit)];
 }
 
-/** A limit that is named at the picture's edge, and where its line lies. */
-/** Those of the end of the span: the ideal range's, of one out of sight the nearer, and critical ones in sight. */
+/**
+ * The limits that are named at the picture's edge, and where their lines lie. Those of the end of the
+ * span: the ideal range's, of one out of sight the nearer, and critical ones in sight.
+ */
 export function limitsOf(model: PlotModel) {
   const { ideal, critical } = model.bands.at(-1)?.ranges ?? {};
   const [low, high] = valueRange(model);

@@ -150,11 +150,8 @@ function useSpeciesOf(tagIds: readonly string[]): readonly string[] {
 }
 
 function inOrder({ all }: Catalogue, names: readonly string[]): readonly string[] {
-  const place = (name: string): number => {
-    const index = all.findIndex((sensor) => sensor.name === name);
-    return index < 0 ? all.length : index;
-  };
-  return [...names].sort((a, b) => place(a) - place(b) || (a < b ? -1 : 1));
+  const declared = all.map(({ name }) => name).filter((name) => names.includes(name));
+  return [...declared, ...names.filter((name) => !declared.includes(name)).sort()];
 }
 
 /** A bucket of fewer pixels is a line that nobody can tell from the next. */

@@ -31,7 +31,6 @@ export interface Connection {
   /** Increases with each opened connection; earlier fetched data is out of date. */
   readonly epoch: number;
   readonly failures: number;
-  readonly closeCode: number | null;
   /** The last status received on this connection. */
   readonly status: StatusFrame | null;
 }
@@ -60,7 +59,6 @@ export const INITIAL: Connection = {
   socket: { kind: 'closed', retryAt: 0 },
   epoch: 0,
   failures: 0,
-  closeCode: null,
   status: null,
 };
 
@@ -143,7 +141,7 @@ function fail(
   const proven = socket.kind === 'open' && now - socket.since >= PROVEN_MS;
   const failures = proven ? 1 : connection.failures + 1;
   const retryAt = now + backoffMs(failures, random, closeCode);
-  return { ...connection, failures, closeCode, socket: { kind: 'closed', retryAt } };
+  return { ...connection, failures, socket: { kind: 'closed', retryAt } };
 }
 
 const silence = (socket: Socket & { kind: 'open' }, now: number): number =>

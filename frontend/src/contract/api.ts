@@ -149,7 +149,6 @@ export async function fetchEstimate(query: FieldQuery, signal: AbortSignal) {
     mean: values.subarray(0, cells),
     sd: values.subarray(cells),
     sdKnown: header('Sd-Known'),
-    readingCount: header('Reading-Count'),
   };
 }
 

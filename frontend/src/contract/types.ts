@@ -104,7 +104,6 @@ export interface Sureness {
   readonly sd: Float32Array;
   /** Below this a cell counts as known. */
   readonly sdKnown: number;
-  readonly readingCount: number;
 }
 
 /** Why a field is not the estimate that was asked for. */

@@ -2,7 +2,7 @@
 import type { Field, TagHealth } from '../contract/types';
 import { S } from '../strings';
 import { differenceNumber, type TemperatureUnit, withUnit } from './format';
-import { fraction, mix, paint, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
+import { fraction, mix, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
 import type { Ranges, Sensor } from './sensors';
 import type { Tag } from './twin';
 
@@ -60,29 +60,24 @@ const SAME: Rgb = [128, 128, 128];
 const FAINTEST = 0.2;
 const STRONGEST = 0.8;
 
-export function divergingColour(range: Range, value: number): { rgb: Rgb; alpha: number } {
-  const signed = range.high > 0 ? 2 * fraction(range, value) - 1 : 0;
-  const size = Math.abs(signed);
-  return {
-    rgb: mix(SAME, signed < 0 ? LESS : MORE, Math.sqrt(size)),
-    alpha: FAINTEST + (STRONGEST - FAINTEST) * size,
+export const divergingShade =
+  (range: Range): Shade =>
+  (value) => {
+    const signed = range.high > 0 ? 2 * fraction(range, value) - 1 : 0;
+    const size = Math.abs(signed);
+    return {
+      rgb: mix(SAME, signed < 0 ? LESS : MORE, Math.sqrt(size)),
+      alpha: FAINTEST + (STRONGEST - FAINTEST) * size,
+    };
   };
-}
 
 const STOPS = [-1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1];
 
 export const divergingColours = (): string[] =>
   STOPS.map((stop) => {
-    const { rgb, alpha } = divergingColour({ low: -1, high: 1 }, stop);
+    const { rgb, alpha } = divergingShade({ low: -1, high: 1 })(stop, 0);
     return rgbText(rgb, alpha);
   });
-
-export const divergingShade =
-  (range: Range): Shade =>
-  (data, at, value) => {
-    const { rgb, alpha } = divergingColour(range, value);
-    paint(data, at, rgb, alpha);
-  };
 
 /** A difference with its sign, without its unit; no sign where nothing is left to show. */
 export function signedText(sensor: Sensor, value: number, unit: TemperatureUnit): string {

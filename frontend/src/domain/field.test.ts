@@ -148,11 +148,7 @@ describe('how sure a cell is', () => {
   });
 
   test('more error is more colour, and none is still to be seen', () => {
-    const alpha = (value: number): number => {
-      const data = new Uint8ClampedArray(4);
-      errorShade({ low: 0, high: 2 })(data, 0, value, 0);
-      return data[3] ?? 0;
-    };
+    const alpha = (value: number): number => errorShade({ low: 0, high: 2 })(value, 0).alpha;
     expect(alpha(0)).toBeGreaterThan(0);
     expect(alpha(1)).toBeGreaterThan(alpha(0));
     expect(alpha(2)).toBeGreaterThan(alpha(1));
@@ -161,7 +157,7 @@ describe('how sure a cell is', () => {
 
 describe('the field of an estimate', () => {
   const grid = { width: 3, height: 1, originX: 0, originY: 0, resolution: 1 };
-  const counts = { sdKnown: 1, sampleCount: 3, readingCount: 40 };
+  const counts = { sdKnown: 1, sampleCount: 3 };
 
   test('what is too unsure is not known, and has no say in the range', () => {
     const mean = Float32Array.of(20, 22, 90);

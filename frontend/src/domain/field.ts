@@ -2,7 +2,7 @@ import type { Estimate } from '../contract/api';
 import type { Field, Sureness } from '../contract/types';
 import { type Bounds, mapPoint, type MapPoint } from '../geometry/coordinates';
 import type { MapPicture } from '../geometry/image';
-import { fraction, paint, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
+import { fraction, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
 
 /** The cell that holds the point; null outside the grid. */
 export function cellAt(field: Field, point: MapPoint): number | null {
@@ -49,7 +49,11 @@ export function fieldPixels(field: Field, shade: Shade, detail: number) {
           ? (field.values[y * field.width + x] ?? NaN)
           : interpolate(field, (x + 0.5) / detail - 0.5, (y + 0.5) / detail - 0.5);
       if (Number.isNaN(value)) continue;
-      shade(data, at, value, row + Math.floor(x / detail));
+      const { rgb, alpha } = shade(value, row + Math.floor(x / detail));
+      data[at] = rgb[0];
+      data[at + 1] = rgb[1];
+      data[at + 2] = rgb[2];
+      data[at + 3] = 255 * alpha;
     }
   }
   return { width, height, data };
@@ -182,13 +186,11 @@ export const errorColours = (): string[] =>
 
 export const errorShade =
   (range: Range): Shade =>
-  (data, at, value) => {
-    paint(data, at, ERROR, errorAlpha(fraction(range, value)));
-  };
+  (value) => ({ rgb: ERROR, alpha: errorAlpha(fraction(range, value)) });
 
 /** A field of an estimate as it came: what is too unsure is not known. Pure. */
 export function estimatedField(sensor: string, estimate: Estimate): Field {
-  const { mean, sd, sdKnown, readingCount, ...grid } = estimate;
+  const { mean, sd, sdKnown, ...grid } = estimate;
   const values = mean.map((value, cell) =>
     stepOf(sd[cell] ?? NaN, sdKnown) < NOT_KNOWN_STEP ? value : NaN,
   );
@@ -199,7 +201,7 @@ export function estimatedField(sensor: string, estimate: Estimate): Field {
     valueMin: known?.low ?? 0,
     valueMax: known?.high ?? 0,
     values,
-    sureness: { sd, sdKnown, readingCount },
+    sureness: { sd, sdKnown },
   };
 }
 

@@ -149,13 +149,10 @@ test('each cell has the ranges of the nearest tag’s plants', () => {
 
 test('is painted by them: the same value is right here and too high there', () => {
   const zones = zonesOf(grid, [site(-0.9, 3, 'tulip'), site(2.9, 3, 'rose')], temperature);
-  const data = new Uint8ClampedArray(8);
   const shade = idealShade(zones);
   const row = 10 * grid.width;
-  shade(data, 0, 22, row);
-  shade(data, 4, 22, row + grid.width - 1);
-  const alpha = Math.round(255 * IDEAL_ALPHA);
-  expect([...data]).toEqual([...idealColour(0.25), alpha, ...idealColour(0), alpha]);
+  expect(shade(22, row)).toEqual({ rgb: idealColour(0.25), alpha: IDEAL_ALPHA });
+  expect(shade(22, row + grid.width - 1)).toEqual({ rgb: idealColour(0), alpha: IDEAL_ALPHA });
 });
 
 const vpd = sensorNamed('vpd');
@@ -253,18 +250,13 @@ test('thousands of tags cost as little as a few', () => {
 });
 
 test('what is too old is faint under its hatching, and bare where nothing is hatched', () => {
-  const shade: Shade = (data, at) => {
-    data.set([1, 2, 3, 200], at);
-  };
-  const painted = (isHatched: boolean): number[] => {
-    const data = new Uint8ClampedArray(8);
+  const shade: Shade = () => ({ rgb: [1, 2, 3], alpha: 0.5 });
+  const alphas = (isHatched: boolean): number[] => {
     const mixed = withOld(shade, Uint8Array.of(0, 1), isHatched);
-    mixed(data, 0, 22, 0);
-    mixed(data, 4, 22, 1);
-    return [...data];
+    return [0, 1].map((cell) => mixed(22, cell).alpha);
   };
-  expect(painted(true)).toEqual([1, 2, 3, 200, 1, 2, 3, 44]);
-  expect(painted(false)).toEqual([1, 2, 3, 200, 0, 0, 0, 0]);
+  expect(alphas(true)).toEqual([0.5, 0.11]);
+  expect(alphas(false)).toEqual([0.5, 0]);
 });
 
 test('a part of a field has its other cells not known', () => {

@@ -4,7 +4,7 @@ import type { MapPoint } from '../geometry/coordinates';
 import { S } from '../strings';
 import { differenceNumber, rangeText, type TemperatureUnit, withUnit } from './format';
 import { speciesText } from './marks';
-import { mix, paint, type Rgb, rgbText, type Shade } from './ramp';
+import { mix, type Rgb, rgbText, type Shade } from './ramp';
 import { partsOf, type Ranges, rangesFor, type Sensor, type Span } from './sensors';
 import type { Tag } from './twin';
 
@@ -160,9 +160,9 @@ function nearestSites(grid: CellGrid, sites: readonly { readonly at: MapPoint }[
 
 export const idealShade =
   (zones: Zones): Shade =>
-  (data, at, value, cell) => {
+  (value, cell) => {
     const ranges = rangesAt(zones, cell);
-    paint(data, at, idealColour(ranges ? excess(ranges, value) : null), IDEAL_ALPHA);
+    return { rgb: idealColour(ranges ? excess(ranges, value) : null), alpha: IDEAL_ALPHA };
   };
 
 export type ReadSite = ReturnType<typeof readSites>[number];
@@ -201,11 +201,7 @@ const FAINT = 0.22;
 /** Colours what is too old faintly: it is hatched besides, and `isHatched` false leaves it bare. */
 export const withOld =
   (shade: Shade, old: Uint8Array, isHatched: boolean): Shade =>
-  (data, at, value, cell) => {
-    if (old[cell] === 0) {
-      shade(data, at, value, cell);
-    } else if (isHatched) {
-      shade(data, at, value, cell);
-      data[at + 3] = (data[at + 3] ?? 0) * FAINT;
-    }
+  (value, cell) => {
+    const { rgb, alpha } = shade(value, cell);
+    return { rgb, alpha: old[cell] === 0 ? alpha : isHatched ? alpha * FAINT : 0 };
   };

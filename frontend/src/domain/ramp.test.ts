@@ -3,7 +3,7 @@ import { describe, expect, test } from 'vitest';
 import { sensorNamed } from '../testing/sensors';
 import { numberText } from './format';
 import {
-  fieldAlpha,
+  fieldShade,
   fraction,
   heldRange,
   hslToRgb,
@@ -34,17 +34,18 @@ test('the sensors have the colours that the bridge’s pictures have', () => {
 });
 
 describe('alpha of the heat map', () => {
-  const range = { low: 10, high: 20 };
+  const shade = fieldShade(sensorNamed('temperature'), { low: 10, high: 20 });
+  const alpha = (value: number): number => shade(value, 0).alpha;
 
   test('is 0 at the minimum, 60 % at the maximum, linear between', () => {
-    expect(fieldAlpha(sensorNamed('temperature'), range, 10)).toBe(0);
-    expect(fieldAlpha(sensorNamed('temperature'), range, 15)).toBeCloseTo(0.3);
-    expect(fieldAlpha(sensorNamed('temperature'), range, 20)).toBeCloseTo(0.6);
+    expect(alpha(10)).toBe(0);
+    expect(alpha(15)).toBeCloseTo(0.3);
+    expect(alpha(20)).toBeCloseTo(0.6);
   });
 
   test('is clamped outside a fixed range', () => {
-    expect(fieldAlpha(sensorNamed('temperature'), range, -5)).toBe(0);
-    expect(fieldAlpha(sensorNamed('temperature'), range, 99)).toBeCloseTo(0.6);
+    expect(alpha(-5)).toBe(0);
+    expect(alpha(99)).toBeCloseTo(0.6);
   });
 
   test('a range of no width shows its value', () => {

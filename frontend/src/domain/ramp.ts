@@ -35,26 +35,13 @@ export function fraction(range: Range, value: number): number {
   return Math.min(1, Math.max(0, (value - range.low) / width));
 }
 
-/** Alpha of the heat map, 0 to 1: transparent at the minimum, `maxAlpha` at the maximum. */
-export function fieldAlpha({ maxAlpha }: Sensor, range: Range, value: number): number {
-  return maxAlpha * fraction(range, value);
-}
+/** The colour of a pixel, by the value that it stands for and the cell it lies in. */
+export type Shade = (value: number, cell: number) => { readonly rgb: Rgb; readonly alpha: number };
 
-/** Colours one pixel, RGBA from `at` on, by the value that it stands for and the cell it lies in. */
-export type Shade = (data: Uint8ClampedArray, at: number, value: number, cell: number) => void;
-
-export function paint(data: Uint8ClampedArray, at: number, colour: Rgb, alpha: number): void {
-  data[at] = colour[0];
-  data[at + 1] = colour[1];
-  data[at + 2] = colour[2];
-  data[at + 3] = 255 * alpha;
-}
-
+/** Transparent at the minimum. */
 export function fieldShade(sensor: Sensor, range: Range): Shade {
-  const colour = sensorColour(sensor);
-  return (data, at, value) => {
-    paint(data, at, colour, fieldAlpha(sensor, range, value));
-  };
+  const rgb = sensorColour(sensor);
+  return (value) => ({ rgb, alpha: sensor.maxAlpha * fraction(range, value) });
 }
 
 export function mix(from: Rgb, to: Rgb, share: number): Rgb {

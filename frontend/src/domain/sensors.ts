@@ -137,8 +137,6 @@ function sensorOf(
         rangesOf(ranges, isDay),
       ]),
     ),
-    /** All that the file has of it, of day, night and species. */
-    ideals: idealsOf([entry]),
   };
 }
 
@@ -148,15 +146,12 @@ function rangesOf(entry: SensorRanges, isDay: boolean): Ranges {
   return { ideal: spanOf(ideal), critical: spanOf(critical) };
 }
 
-const idealsOf = (entries: readonly (SensorEntry | undefined)[]): Span[] =>
-  entries
-    .flatMap((entry) => [entry, ...Object.values(entry?.species ?? {})])
-    .flatMap((ranges) => [spanOf(ranges?.ideal), spanOf(ranges?.night?.ideal)])
-    .filter((span) => span !== null);
-
 /** Those that tell the largest limit to about three figures: 1.30 kPa, 26.0 °C, 1500 ppm. */
 function digitsOf(entries: readonly (SensorEntry | undefined)[]): number | null {
-  const most = Math.max(0, ...idealsOf(entries).flat().map(Math.abs));
+  const limits = entries
+    .flatMap((entry) => [entry, ...Object.values(entry?.species ?? {})])
+    .flatMap((ranges) => [...(ranges?.ideal ?? []), ...(ranges?.night?.ideal ?? [])]);
+  const most = Math.max(0, ...limits.map(Math.abs));
   return most > 0 ? Math.max(0, Math.min(6, 3 - Math.ceil(Math.log10(most)))) : null;
 }
 

@@ -75,7 +75,7 @@ export function shortRosText(at: number): string {
 export const dateText = (epochMs: number): string =>
   `${date.format(epochMs)}, ${clockText(epochMs)}`;
 
-export const two = (value: number): string => String(value).padStart(2, '0');
+const two = (value: number): string => String(value).padStart(2, '0');
 
 /** "1:02:03" since a simulation began. */
 export function countText(seconds: number): string {

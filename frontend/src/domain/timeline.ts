@@ -1,8 +1,9 @@
 /** What happened when, and how far back anything is remembered. Times are ROS seconds. */
 import type { Timeline as WireTimeline } from '../contract/types';
 import { LOCALE } from '../strings';
+import { clockText, minuteText } from './format';
 import type { Shared } from './memo';
-import { countText, dayFormat, secondsOf, type Span, two } from './time';
+import { countText, dayFormat, secondsOf, type Span } from './time';
 
 /** What happened in one bucket, from when it begins, ROS seconds. */
 export type Happened = Timeline['buckets'][number];
@@ -30,9 +31,7 @@ export function timelineOf(wire: WireTimeline, nowS: number) {
   };
 }
 
-/** The parts of a period that an answer does not vouch for: nobody may take them for silence. */
-
-/** A stretch of which something may have been received that the answer does not have. */
+/** A stretch of which something may have been received that the answer does not have; it is no silence. */
 export interface Missing extends Span {
   readonly why: 'not_kept' | 'not_recorded';
 }
@@ -93,7 +92,7 @@ export function timeTicks(span: Span, most: number, isSimulated: boolean): reado
     }
     const date = new Date(at * 1000);
     const below = step < DAY ? dayFormat.format(date) : String(date.getFullYear());
-    const text = step < DAY ? clockText(date, step) : dateText(date, step);
+    const text = tickText(date, step);
     const isNew = below !== before;
     before = below;
     return { at, text: isNew ? `${text}\n${below}` : text };
@@ -137,10 +136,7 @@ const daysOf = (day: Date): number =>
 
 const monthFormat = new Intl.DateTimeFormat(LOCALE, { month: 'short' });
 
-function clockText(date: Date, step: number): string {
-  const text = `${two(date.getHours())}:${two(date.getMinutes())}`;
-  return step < MINUTE ? `${text}:${two(date.getSeconds())}` : text;
+function tickText(date: Date, step: number): string {
+  if (step >= DAY) return (step >= 30 * DAY ? monthFormat : dayFormat).format(date);
+  return (step < MINUTE ? clockText : minuteText)(date.getTime());
 }
-
-const dateText = (date: Date, step: number): string =>
-  (step >= 30 * DAY ? monthFormat : dayFormat).format(date);

@@ -50,7 +50,7 @@ test('a bloom without a place is left out, a NaN reading is kept as null', () =>
     ['co2', null],
     ['light', 800],
   ]);
-  expect(made.blooms).toEqual([{ at: { x: 1, y: 1 }, species: 'rose', anomaly: true }]);
+  expect(made.blooms).toEqual([{ at: { x: 1, y: 1 }, species: 'rose' }]);
 });
 
 describe('snapshot', () => {

@@ -86,7 +86,7 @@ export function tagOf(wire: TwinTagState, state: TakenState) {
     bugCount: wire.bug_count,
     blooms: wire.flowers.flatMap((flower) => {
       const at = pointOf(flower.position);
-      return at ? [{ at, species: flower.species, anomaly: flower.anomaly }] : [];
+      return at ? [{ at, species: flower.species }] : [];
     }),
     /** Outline of the planter box. */
     footprint: wire.box_footprint.points.flatMap((point) => pointOf(point) ?? []),

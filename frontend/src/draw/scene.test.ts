@@ -13,23 +13,19 @@ import { sensorNamed } from '../testing/sensors';
 const scene = (
   tags: readonly Tag[],
   now = 0,
-  before: Scene | null = null,
   health = NOBODY,
   listed: ReadonlySet<string> | null = null,
   sensor = 'temperature',
 ): Scene =>
-  buildScene(
-    {
-      tags,
-      health: houseHealth(tags, health, true),
-      sensor: sensorNamed(sensor),
-      unit: 'C',
-      now,
-      ageing: GROWING,
-      listed,
-    },
-    before,
-  );
+  buildScene({
+    tags,
+    health: houseHealth(tags, health, true),
+    sensor: sensorNamed(sensor),
+    unit: 'C',
+    now,
+    ageing: GROWING,
+    listed,
+  });
 
 /** On a square of ten by ten, 1 m apart. */
 const at = (index: number): WireTag['pose'] => ({
@@ -56,7 +52,7 @@ describe('pins', () => {
       { temperature: 20, humidity: null },
       { humidity: 50 },
     ].map((values) => {
-      const [pin] = scene([tag({ readings: readings(values) })], 0, null, NOBODY, null, 'vpd').pins;
+      const [pin] = scene([tag({ readings: readings(values) })], 0, NOBODY, null, 'vpd').pins;
       return [pin?.kind, pin?.texts];
     });
     expect(kinds).toEqual([
@@ -73,28 +69,20 @@ describe('pins', () => {
     const first = buildScene({ ...input, sensor: unread, health: houseHealth(tags, NOBODY, true) });
     expect(first.pins[0]).toMatchObject({ kind: 'lacking', verdict: 'unknown' });
     const health = houseHealth(tags, judgement({ '1': 'healthy' }), true);
-    const [pin] = buildScene({ ...input, sensor: sensorNamed('vpd'), health }, first).pins;
+    const [pin] = buildScene({ ...input, sensor: sensorNamed('vpd'), health }).pins;
     expect(pin).toMatchObject({ kind: 'value', verdict: 'healthy' });
   });
 
   test('has the verdict that was given, unknown where none was', () => {
     const tags = ['1', '2', '3'].map((tag_id) => tag({ tag_id }));
     const said = judgement({ '1': 'critical', '2': 'healthy' });
-    const verdicts = scene(tags, 0, null, said).pins.map(({ verdict }) => verdict);
+    const verdicts = scene(tags, 0, said).pins.map(({ verdict }) => verdict);
     expect(verdicts).toEqual(['critical', 'healthy', 'unknown']);
-  });
-
-  test('another verdict makes another pin, and only of that tag', () => {
-    const tags = [tag(), tag({ tag_id: '2' })];
-    const before = scene(tags, 0, null, judgement({ '1': 'healthy', '2': 'healthy' }));
-    const after = scene(tags, 0, before, judgement({ '1': 'stressed', '2': 'healthy' }));
-    expect(after.pins[0]?.verdict).toBe('stressed');
-    expect(after.pins[1]).toBe(before.pins[1]);
   });
 
   test('what the filter leaves out is faint, and has neither label nor pest', () => {
     const tags = [tag({ anomaly: true }), tag({ tag_id: '2' })];
-    const [out, listed] = scene(tags, 0, null, NOBODY, new Set(['2'])).pins;
+    const [out, listed] = scene(tags, 0, NOBODY, new Set(['2'])).pins;
     expect(out).toMatchObject({ pest: false, texts: [] });
     expect(out?.strength).toBeLessThan(0.2);
     expect(listed?.texts).toEqual(['2']);
@@ -116,9 +104,9 @@ describe('pins', () => {
     'one that is %s never fades out of sight',
     (verdict) => {
       const tags = [tag({ readings: readings({ temperature: 20 }) })];
-      const [pin] = scene(tags, 86_400_000, null, judgement({ '1': verdict })).pins;
+      const [pin] = scene(tags, 86_400_000, judgement({ '1': verdict })).pins;
       expect(pin?.strength).toBeGreaterThan(0.8);
-      const [well] = scene(tags, 86_400_000, null, judgement({ '1': 'healthy' })).pins;
+      const [well] = scene(tags, 86_400_000, judgement({ '1': 'healthy' })).pins;
       expect(well?.strength).toBeLessThan(0.5);
     },
   );
@@ -142,7 +130,7 @@ describe('pins', () => {
   test('what is computed is as old as the oldest that it is computed of', () => {
     const old = readings({ temperature: 20 }, -3_495);
     const tags = [tag({ readings: [...old, ...readings({ humidity: 50 }, 104)] })];
-    expect(scene(tags, 0, null, NOBODY, null, 'vpd').pins[0]?.strength).toBeLessThan(0.5);
+    expect(scene(tags, 0, NOBODY, null, 'vpd').pins[0]?.strength).toBeLessThan(0.5);
   });
 
   test('a pest is marked and its label comes first', () => {
@@ -181,18 +169,4 @@ test('blooms carry their species’ look', () => {
   const [a, b, c] = blooms.map(({ look }) => String(look.colour));
   expect(a).toBe(c);
   expect(a).not.toBe(b);
-});
-
-test('what looks the same is the same object: the scene, or of its pins those that do', () => {
-  const value = (tag_id: string, temperature: number): Tag =>
-    tag({ tag_id, readings: readings({ temperature }) });
-  const tags = [value('1', 20), value('2', 21)];
-  const first = scene(tags, 0);
-  expect(scene(tags, 5_000, first)).toBe(first);
-  const next = scene([value('1', 20), value('2', 29)], 5_000, first);
-  expect(next).not.toBe(first);
-  expect(next.pins[0]).toBe(first.pins[0]);
-  expect(next.pins[1]).not.toBe(first.pins[1]);
-  // Half an hour later they have faded.
-  expect(scene(tags, 1_800_000, first)).not.toBe(first);
 });

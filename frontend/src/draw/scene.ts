@@ -7,7 +7,7 @@ import { memoLast, memoOne, type Shared } from '../domain/memo';
 import { partsOf, type Sensor } from '../domain/sensors';
 import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/marks';
 import { shown } from '../domain/text';
-import { equal, type Tag } from '../domain/twin';
+import type { Tag } from '../domain/twin';
 import { boundsOf, type MapPoint } from '../geometry/coordinates';
 
 /** Steps of fading; more cannot be told apart. */
@@ -50,22 +50,9 @@ const planted = memoOne((tags: readonly Tag[]): Pick<Scene, 'blooms' | 'boxes'> 
   return { blooms, boxes: [...boxes.values()] };
 });
 
-/** The scene; the one before if that looks the very same, and of its pins those that do. */
-export function buildScene(input: SceneInput, before: Scene | null = null): Scene {
-  const known = new Map(before?.pins.map((pin) => [pin.id, pin]));
-  const pins: Pin[] = [];
-  for (const tag of input.tags) {
-    if (!tag.at) continue;
-    const pin = pinOf(tag, tag.at, input);
-    const old = known.get(tag.id);
-    pins.push(old && equal(old, pin) ? old : pin);
-  }
-  const { blooms, boxes } = planted(input.tags);
-  const isSame =
-    before?.blooms === blooms &&
-    before.pins.length === pins.length &&
-    pins.every((pin, index) => pin === before.pins[index]);
-  return isSame ? before : { pins, blooms, boxes, spacing: spacingOf(pins) };
+export function buildScene(input: SceneInput): Scene {
+  const pins = input.tags.flatMap((tag) => (tag.at ? [pinOf(tag, tag.at, input)] : []));
+  return { ...planted(input.tags), pins, spacing: spacingOf(pins) };
 }
 
 /** Fewer pins never hide what lies below them. */

@@ -2,7 +2,7 @@ import { describe, expect, test } from 'vitest';
 
 import { mapPoint } from '../geometry/coordinates';
 import { FakeContext } from '../testing/canvas';
-import { estimated, fieldWith, sureness } from '../testing/field';
+import { estimated, fieldWith } from '../testing/field';
 import { penOn } from '../testing/pen';
 import {
   drawAreas,
@@ -10,12 +10,11 @@ import {
   drawEdges,
   drawGridLabels,
   drawPicture,
-  drawUnsure,
   floorOf,
+  hatchedOf,
   Hatching,
   knownOf,
   placedField,
-  unsureOf,
 } from './still';
 import { canvasOfPixels, newCanvas } from './surface';
 
@@ -120,23 +119,27 @@ test('hatching is cut to the inside of the house, and out of what is known', () 
 
 test('what an estimate is unsure of is hatched, the denser the less it is sure', () => {
   const sd = [0.5, 1.1, 1.4, 2];
-  const parts = unsureOf(estimated([20, 20, 20, NaN], sd), sureness(sd));
-  expect(parts.map((part) => part && pixelsOf(part))).toEqual([
+  const [less, least, ...others] = hatchedOf(estimated([20, 20, 20, NaN], sd), null);
+  expect([less, least].map((part) => part && pixelsOf(part.cells))).toEqual([
     [0, 255, 0, 0],
-    null,
     [0, 0, 255, 0],
   ]);
-  const strokes = (index: number): number => {
+  expect(others).toEqual([]);
+  const strokes = (gap: number | undefined): number => {
     const context = new FakeContext();
     const placement = { originX: 0, originY: 0, yaw: 0, resolution: 1, width: 4, height: 1 };
-    const picture = newCanvas(1, 1);
-    const steps = [0, 1, 2].map((each) => (each === index ? { picture, placement } : null));
-    drawUnsure(penOn(context), steps, new Hatching());
+    new Hatching().draw(penOn(context), { picture: newCanvas(1, 1), placement }, null, gap);
     const [drawn] = context.named('drawImage');
     return FakeContext.recordOf(drawn?.args[0] as HTMLCanvasElement)?.named('moveTo').length ?? 0;
   };
-  expect(strokes(1)).toBeGreaterThan(1.8 * strokes(0));
-  expect(strokes(2)).toBeGreaterThan(1.8 * strokes(1));
+  // Step by step twice as dense, so that each has all strokes of the one before.
+  expect(strokes(least?.gap)).toBeGreaterThan(3.6 * strokes(less?.gap));
+});
+
+test('what is too old to say is hatched where it is told at all', () => {
+  const parts = hatchedOf(fieldWith([[20, 20, NaN]]), Uint8Array.of(0, 1, 1));
+  expect(parts.map(({ cells }) => pixelsOf(cells))).toEqual([[0, 255, 0]]);
+  expect(hatchedOf(fieldWith([[20]]), null)).toEqual([]);
 });
 
 test('an edge is drawn where it is in sight', () => {

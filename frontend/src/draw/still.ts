@@ -1,5 +1,5 @@
 /** What changes only with the data or the view: ground, SLAM map, heat map, grid, boxes. */
-import type { Field, Sureness } from '../contract/types';
+import type { Field } from '../contract/types';
 import { written } from '../domain/format';
 import { stepsIn } from '../domain/field';
 import type { AreaOnMap } from '../domain/table';
@@ -232,16 +232,14 @@ const isKnown =
 
 export const knownOf = (field: Field): HTMLCanvasElement => cellsOf(field, isKnown(field));
 
-/**
- * The cells of each step of being unsure, from the first that is hatched to the last that is still
- * known; null: none is so.
- */
-export function unsureOf(field: Field, sureness: Sureness): (HTMLCanvasElement | null)[] {
+/** The cells that are hatched over their colours: what is `old`, or what an estimate is unsure of. */
+export function hatchedOf(field: Field, old: Uint8Array | null) {
   const known = isKnown(field);
-  const steps = stepsIn(sureness).map((step, cell) => (known(cell) ? step : 0));
-  return UNSURE_GAPS_PX.map((_, index) =>
-    steps.includes(index + 1) ? cellsOf(field, (cell) => steps[cell] === index + 1) : null,
-  );
+  const steps = old ?? (field.sureness && stepsIn(field.sureness));
+  return (old ? [GAP_PX] : UNSURE_GAPS_PX).flatMap((gap, index) => {
+    const isIn = (cell: number): boolean => steps?.[cell] === index + 1 && known(cell);
+    return steps?.includes(index + 1) ? [{ gap, cells: cellsOf(field, isIn) }] : [];
+  });
 }
 
 /** Keeps the one canvas that the hatching is cut out on. */
@@ -270,13 +268,6 @@ export class Hatching {
     }
     pen.context.drawImage(this.#canvas, 0, 0, size.width, size.height);
   }
-}
-
-export function drawUnsure(pen: Pen, steps: readonly (Placed | null)[], hatching: Hatching): void {
-  UNSURE_GAPS_PX.forEach((gap, index) => {
-    const step = steps[index];
-    if (step) hatching.draw(pen, step, null, gap);
-  });
 }
 
 function strokes({ context, size, view, colour }: Pen, gap: number): void {

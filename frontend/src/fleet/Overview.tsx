@@ -59,8 +59,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
   const alarms = useMemo(() => alarmCount(sites.values()), [sites]);
   // Before, there is nothing to count.
   const isHere = seen.archive !== null;
-  const names = groupNames(sites.values()).join();
-  const groups = useMemo(() => (names ? names.split(',') : []), [names]);
+  const groups = useMemo(() => groupNames(sites.values()), [sites]);
   const shown = useMemo(() => chosen(sites, filter, search, group), [sites, filter, search, group]);
 
   useEffect(() => {

@@ -90,10 +90,6 @@ beforeEach(() => {
   vi.spyOn(window, 'matchMedia').mockImplementation((query) =>
     Object.assign(matchMedia(query), { matches: query.includes('reduced-motion') && calm }),
   );
-  Object.defineProperty(document, 'fonts', {
-    configurable: true,
-    value: new EventTarget(),
-  });
   element = document.createElement('div');
   document.body.append(element);
   showTags([tagAt('a', 1, 1), tagAt('b', 3, 2)]);

@@ -167,9 +167,7 @@ export function runMap(
       });
     }
     const sameContent = !changedTags && sameMap && house.field === last.field;
-    if (view.camera !== before.view.camera || !sameContent) {
-      camera.goTo(view.camera, content(state), covered);
-    }
+    if (view.camera !== before.view.camera || !sameContent) goToContent();
   };
 
   /** Of the moment that is shown and of now: whoever drags through time keeps the same view. */

@@ -171,4 +171,15 @@ describe('painter', () => {
     expect(named(canvases.still, 'fillText').map(({ args }) => args[0])).toEqual(['Bay 1']);
     expect(named(canvases.still, 'strokeRect')).toHaveLength(1);
   });
+
+  test('what looks the same is the very same scene, and what has faded is not', () => {
+    const now = performance.now();
+    const first = painter.scene(store.get(), now);
+    act({ sensor: 'humidity' });
+    expect(painter.scene(store.get(), now)).not.toBe(first);
+    act({ sensor: 'temperature' });
+    const again = painter.scene(store.get(), now);
+    expect(painter.scene(store.get(), now + 5_000)).toBe(again);
+    expect(painter.scene(store.get(), now + 1_800_000)).not.toBe(again);
+  });
 });

@@ -37,13 +37,12 @@ import {
   drawGridLines,
   drawGround,
   drawPicture,
-  drawUnsure,
   floorOf,
+  hatchedOf,
   Hatching,
   knownOf,
   placedField,
   tintMap,
-  unsureOf,
 } from '../draw/still';
 import type { Box, Size, View } from '../geometry/coordinates';
 import { placeLabels, type Room } from '../geometry/clear';
@@ -68,16 +67,11 @@ const FADE_TICK_MS = 5_000;
 
 const edges = memoOne(edgesOf);
 const knownPart = memoOne(knownOf);
-const unsureParts = memoOne((field: Field) =>
-  field.sureness ? unsureOf(field, field.sureness) : [],
-);
+const hatched = memoLast(hatchedOf);
 const floor = memoOne(({ pixels }: MapPicture) => floorOf(pixels));
-/** Of what a field tells the part that holds, and the part that is too old to say. */
+/** Of what a field tells, what is not too old to say. */
 const holding = memoLast((field: Field, old: Uint8Array | null) =>
   old ? cellsWhere(field, (cell) => old[cell] === 0) : field,
-);
-const tooOld = memoLast((field: Field, old: Uint8Array) =>
-  cellsOf(field, (cell) => old[cell] !== 0 && !Number.isNaN(field.values[cell])),
 );
 const whole = memoOne((field: Field) => cellsOf(field, () => true));
 
@@ -102,7 +96,6 @@ export class Painter {
   /** Where labels found their places when the map last came to rest, and at which scale. */
   #room: RoomAt | null = null;
   readonly #keptRoom = keeping<RoomAt>(equal);
-  #lastScene: Scene | null = null;
   #paintedScene: Scene | null = null;
   readonly #hatching = new Hatching();
   readonly #stillBuffer = new PanBuffer();
@@ -184,11 +177,9 @@ export class Painter {
       const coloured = this.#heatPicture(heat, selectSensor(state), detail, isTold);
       drawPicture(pen, placedField(heat.field, coloured));
       if (isTold && !heat.isError) {
-        const unsure = unsureParts(heat.field).map((part) => part && placedField(heat.field, part));
-        drawUnsure(pen, unsure, this.#hatching);
-      }
-      if (isTold && heat.old) {
-        this.#hatching.draw(pen, placedField(heat.field, tooOld(heat.field, heat.old)), null);
+        for (const { cells, gap } of hatched(heat.field, heat.old)) {
+          this.#hatching.draw(pen, placedField(heat.field, cells), null, gap);
+        }
       }
       if (isTold) drawEdges(pen, edges(holding(heat.field, heat.old)));
     }
@@ -282,10 +273,9 @@ export class Painter {
   }
 
   readonly #sceneInput = keeping<SceneInput>();
-  readonly #scene = memoOne((input: SceneInput) => {
-    this.#lastScene = buildScene(input, this.#lastScene);
-    return this.#lastScene;
-  });
+  /** The very same where nothing looks otherwise: labels stay in their places then. */
+  readonly #keptScene = keeping<Scene>(equal);
+  readonly #scene = memoOne((input: SceneInput) => this.#keptScene(buildScene(input)));
 
   readonly #labels = memoLast(
     (

@@ -44,9 +44,8 @@ export function toFragment(view: Linked): string {
   for (const [sensor, { low, high }] of view.ranges) {
     parts.set(rangeKey(sensor, view.sensor), `${short(low)},${short(high)}`);
   }
-  if (!sameLayers(view.layers, DEFAULT_LAYERS)) {
-    parts.set('layers', LAYERS.filter((layer) => view.layers.has(layer)).join(','));
-  }
+  const layers = layersText(view.layers);
+  if (layers !== layersText(DEFAULT_LAYERS)) parts.set('layers', layers);
   const { column, descending } = view.sort;
   const usual = DEFAULT_VIEW.sort;
   if (column !== usual.column || descending !== usual.descending) {
@@ -61,7 +60,7 @@ export function toFragment(view: Linked): string {
 /** Reads a fragment; a part that makes no sense counts as left out. */
 export function fromFragment(fragment: string): Linked {
   const parts = new URLSearchParams(fragment.replace(/^#/, ''));
-  const layers = parts.get('layers');
+  const layers = parts.get('layers')?.split(',');
   const sensor = parts.get('sensor') || DEFAULT_VIEW.sensor;
   const [moment] = numbers(parts.get('at'), 1) ?? [];
   return {
@@ -75,7 +74,7 @@ export function fromFragment(fragment: string): Linked {
     heat: HEATS.find((kind) => kind === parts.get('heat')) ?? DEFAULT_VIEW.heat,
     colouring: parts.get('colour') === 'value' ? 'value' : 'ideal',
     ranges: rangesOf(parts, sensor),
-    layers: layers === null ? DEFAULT_LAYERS : new Set(layers.split(',').filter(isLayer)),
+    layers: layers ? new Set(LAYERS.filter((layer) => layers.includes(layer))) : DEFAULT_LAYERS,
     sort: sortOf(parts.get('sort')),
     filter: (parts.get('filter') ?? '').slice(0, LONGEST_FILTER),
     health: VERDICTS.find((verdict) => verdict === parts.get('health')) ?? null,
@@ -147,11 +146,8 @@ function numbers(text: string | null, count: number): readonly number[] | null {
 
 const short = (value: number): string => String(Number(value.toPrecision(6)));
 
-const isLayer = (name: string): name is Layer => (LAYERS as readonly string[]).includes(name);
-
-function sameLayers(a: ReadonlySet<Layer>, b: ReadonlySet<Layer>): boolean {
-  return a.size === b.size && [...a].every((layer) => b.has(layer));
-}
+const layersText = (layers: ReadonlySet<Layer>): string =>
+  LAYERS.filter((layer) => layers.has(layer)).join(',');
 
 /** Browsers refuse more than about a hundred changes of the address in half a minute. */
 const SETTLE_MS = 400;

@@ -168,7 +168,7 @@ const oldBy = memoLast(oldCells);
  */
 function selectOld(state: AppState, field: Field): Uint8Array | null {
   const { health } = selectShown(state);
-  if (!health || field.sensor !== state.view.sensor) return null;
+  if (!health) return null;
   return oldBy(gridOf(field), readBy(selectTags(state), health.tags, selectSensor(state)));
 }
 
@@ -181,8 +181,9 @@ function selectField(state: AppState): Field | null {
   const { field, map } = selectShown(state);
   const { value } = field;
   // The one of before is none of what is wanted: under its name it would be taken for it.
-  const isEstimate = Boolean(value?.sureness ?? value?.noEstimate);
-  if (!value || isEstimate !== (sourceOf(state) === 'estimate')) return null;
+  if (value?.sensor !== state.view.sensor) return null;
+  const isEstimate = Boolean(value.sureness ?? value.noEstimate);
+  if (isEstimate !== (sourceOf(state) === 'estimate')) return null;
   return onMap(value)(map.value);
 }
 
@@ -200,7 +201,7 @@ export function selectHeat(state: AppState): Heat | null {
   if (compare) {
     const { value } = state.twin.difference;
     const field = value?.field;
-    if (!field || field.sampleCount === 0) return null;
+    if (field?.sensor !== state.view.sensor || field.sampleCount === 0) return null;
     const old = sourceOf(state) === 'nearest' ? selectOld(state, field) : null;
     const range = keptDifference(symmetricRange(field, selectSensor(state)));
     return keptHeat({ ...PLAIN, field, range, difference: value, old });
@@ -210,7 +211,7 @@ export function selectHeat(state: AppState): Heat | null {
   if (error) return keptHeat({ ...PLAIN, field: error, range: errorRange(error), isError: true });
   const range = selectRange(state);
   if (!field || !range || field.sampleCount === 0) return null;
-  const isIdeal = selectColouring(state) === 'ideal' && field.sensor === state.view.sensor;
+  const isIdeal = selectColouring(state) === 'ideal';
   const old = field.sureness ? null : selectOld(state, field);
   return keptHeat({
     ...PLAIN,
@@ -224,9 +225,7 @@ export function selectHeat(state: AppState): Heat | null {
 /** The field whose known part is shown, empty ones too; null: none of the sensor is here. */
 export function selectMapped(state: AppState): Field | null {
   const heated = selectHeat(state);
-  if (heated || state.view.compare) return heated?.field ?? null;
-  const value = selectField(state);
-  return value?.sensor === state.view.sensor ? value : null;
+  return heated || state.view.compare ? (heated?.field ?? null) : selectField(state);
 }
 
 const filtered = memoLast(

@@ -5,10 +5,10 @@
 import { now } from '../clock';
 import { differenceOf, otherMoment, type Compare } from '../domain/difference';
 import type { Snapshot } from '../domain/twin';
-import { type Bounds, widened } from '../geometry/coordinates';
+import type { Bounds } from '../geometry/coordinates';
 import { keepFetched, receive, type AppState } from './app';
 import { sourceOf } from './derived';
-import { ASSUMED_MARGIN_M, boundsOfPins, fetchHeat, fieldResolution } from './heat';
+import { boxOfPins, fetchHeat, fieldResolution } from './heat';
 import { rosNow, selectNewest, selectShown } from './moment';
 import { DRAG_PACE_MS, failed, NOTHING, ready, type Wish } from './fetcher';
 import { type Difference } from './twin';
@@ -76,11 +76,11 @@ function wishFor(state: AppState, compare: Compare): Wish<Difference> | undefine
 
 /** Around all pins, in whole cells: both fields lie on the same ones. */
 function boxOf(snapshot: Snapshot | null, resolution: number): Bounds | null {
-  const bounds = boundsOfPins(snapshot);
+  const bounds = boxOfPins(snapshot);
   if (!bounds) return null;
   const down = (metres: number): number => round(Math.floor(metres / resolution) * resolution);
   const up = (metres: number): number => round(Math.ceil(metres / resolution) * resolution);
-  const { minX, minY, maxX, maxY } = widened(bounds, ASSUMED_MARGIN_M);
+  const { minX, minY, maxX, maxY } = bounds;
   return { minX: down(minX), minY: down(minY), maxX: up(maxX), maxY: up(maxY) };
 }
 

@@ -42,20 +42,23 @@ const inPlace = (noEstimate: NoEstimate, query: FieldQuery, signal: AbortSignal)
   fetchField(query, signal).then((field) => ({ ...field, noEstimate }));
 
 /** The server's box is that of the pinned tags widened by its max_distance_m. */
-export const ASSUMED_MARGIN_M = 1.5;
+const ASSUMED_MARGIN_M = 1.5;
 /** Finer cells than this cannot be told apart on a screen, and cost the Wi-Fi. */
 const MAX_CELLS = 60_000;
 /** As the server has it, where no tag has a place. */
 const DEFAULT_RESOLUTION_M = 0.1;
 
-const boundsIn = memoOne((tags: readonly Tag[]) => boundsOf(tags.flatMap(({ at }) => at ?? [])));
+const boxOf = memoOne((tags: readonly Tag[]) => {
+  const bounds = boundsOf(tags.flatMap(({ at }) => at ?? []));
+  return bounds && widened(bounds, ASSUMED_MARGIN_M);
+});
 
-export const boundsOfPins = (snapshot: Snapshot | null): Bounds | null =>
-  snapshot && boundsIn(snapshot.tags);
+/** As far as a field reaches; null: nothing is pinned. */
+export const boxOfPins = (snapshot: Snapshot | null): Bounds | null =>
+  snapshot && boxOf(snapshot.tags);
 
 /** The side of a cell, in metres, for the field of a house as large as this one. */
 export function fieldResolution(snapshot: Snapshot | null): number {
-  const bounds = boundsOfPins(snapshot);
-  if (!bounds) return DEFAULT_RESOLUTION_M;
-  return resolutionFor(widened(bounds, ASSUMED_MARGIN_M), MAX_CELLS);
+  const box = boxOfPins(snapshot);
+  return box ? resolutionFor(box, MAX_CELLS) : DEFAULT_RESOLUTION_M;
 }

@@ -8,7 +8,7 @@ import { act, type AppState, keepFetched, onChange, receive, store } from './app
 import { withField, withLatest } from './twin';
 import { sourceOf } from './derived';
 import { failed, NOTHING, ready, type Wish } from './fetcher';
-import { boundsOfPins, fetchHeat, fieldResolution } from './heat';
+import { boxOfPins, fetchHeat, fieldResolution } from './heat';
 import { selectNewest } from './moment';
 import { DEFAULT_VIEW } from './view';
 
@@ -22,7 +22,7 @@ const QUALITY_INTERVAL_MS = 3_000;
 export function startLoaders(): () => void {
   forgetOld();
   const stops = [
-    onChange((state) => [state.twin, state.view.sensor], forgetOld),
+    onChange((state) => [state.twin], forgetOld),
     keepFetched<Field>(
       {
         paceMs: FIELD_INTERVAL_MS,
@@ -81,7 +81,7 @@ function fieldWish(state: AppState): Wish<Field> | null {
   const { sensor } = state.view;
   const { snapshot } = selectNewest(state);
   const base = baseKey(state);
-  if (base === null || !boundsOfPins(snapshot)) return null;
+  if (base === null || !boxOfPins(snapshot)) return null;
   const source = sourceOf(state);
   const isEstimate = source === 'estimate';
   const resolution = fieldResolution(snapshot);
@@ -98,14 +98,9 @@ function fieldWish(state: AppState): Wish<Field> | null {
 function forgetOld(): void {
   const state = store.get();
   const { field, map, snapshot } = selectNewest(state);
-  const isKnown = baseKey(state) !== null;
-  const isEmpty = isKnown && !boundsOfPins(snapshot);
-  if (field.value && (field.value.sensor !== state.view.sensor || isEmpty)) {
-    receive(withField(NOTHING));
-    receive(withLatest({ quality: null }));
-  }
-  if (map.value && isKnown && !state.twin.lastStatus?.has_map)
-    receive(withLatest({ map: NOTHING }));
+  if (baseKey(state) === null) return;
+  if (field.value && !boxOfPins(snapshot)) receive(withField(NOTHING));
+  if (map.value && !state.twin.lastStatus?.has_map) receive(withLatest({ map: NOTHING }));
 }
 
 /**

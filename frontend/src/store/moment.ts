@@ -146,11 +146,8 @@ export const selectHasOwnTime = (state: AppState): boolean =>
 /** The newest moment there is where that is not the time on the wall, ROS seconds; else null. */
 export function ownTime(state: AppState, at: number): number | null {
   if (!selectHasOwnTime(state)) return null;
-  const { snapshot } = selectNewest(state);
-  if (!snapshot) return null;
-  const taken = secondsOf(snapshot.at);
-  if (taken === 0) return null;
-  return isHeardNow(state) ? rosNow(state, at) : taken;
+  // Of one that is silent, that which was heard last.
+  return rosNow(state, isHeardNow(state) ? at : -Infinity);
 }
 
 /** What is drawn is what was fetched; until then it is what was asked for. */

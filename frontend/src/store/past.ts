@@ -42,7 +42,7 @@ export function startPast(): () => void {
   };
 
   const wish = (state: AppState): Wish<Past> | null => {
-    const { moment, sensor } = state.view;
+    const { moment } = state.view;
     const past = selectPast(state);
     if (moment === null) {
       clearTimeout(patience);
@@ -55,11 +55,6 @@ export function startPast(): () => void {
     if (!past && !selectNewest(state).snapshot) showNothing(moment);
     else if (!past) patience ??= setTimeout(losePatience, PATIENCE_MS);
     else patience = undefined;
-    const { value } = past?.house.field ?? NOTHING;
-    if (past && value && value.sensor !== sensor) {
-      // No colours of one sensor under the scale of another.
-      receive(withPast(withoutField(past)));
-    }
     const { epoch, socket } = state.twin.connection;
     // Each connection asks anew: another server may be behind it, or more was heard meanwhile.
     if (socket.kind === 'open') heardOn = epoch;
@@ -94,7 +89,7 @@ function qualityWish(state: AppState): Wish<FieldQuality> | null {
   const past = selectPast(state);
   const field = past?.house.field.value;
   if (!past || !field || field.sureness || past.house.quality) return null;
-  if (past.at !== state.view.moment) return null;
+  if (past.at !== state.view.moment || field.sensor !== state.view.sensor) return null;
   const key = `${past.at}|${field.sensor}`;
   return {
     key,
@@ -106,11 +101,6 @@ function qualityWish(state: AppState): Wish<FieldQuality> | null {
     },
   };
 }
-
-const withoutField = (past: Past): Past => ({
-  ...past,
-  house: { ...past.house, field: NOTHING, quality: null },
-});
 
 function wishFor(state: AppState, at: number, epoch: number): Wish<Past> {
   const { sensor } = state.view;

@@ -2,16 +2,13 @@ import { expect, test, vi } from 'vitest';
 
 import { asFound } from './asFound';
 
-const counts = globalThis as unknown as { counted?: number };
-
-test('what a file sets, replaces, adds and starts is gone with it', async () => {
+test('what a file adds, starts and puts in the place of global things is gone with it', async () => {
   const before = Object.entries(window);
   const putBack = asFound();
   const heard = vi.fn();
   const rung = vi.fn();
-  counts.counted = 1;
-  window.matchMedia = vi.fn();
-  Object.defineProperty(document, 'hidden', { value: true, configurable: true });
+  vi.stubGlobal('matchMedia', vi.fn());
+  vi.spyOn(document, 'hidden', 'get').mockReturnValue(true);
   window.addEventListener('online', heard);
   document.addEventListener('keydown', heard);
   setInterval(rung, 1);
@@ -29,7 +26,6 @@ test('what a file sets, replaces, adds and starts is gone with it', async () => 
   await putBack();
   window.dispatchEvent(new Event('online'));
   document.dispatchEvent(new Event('keydown'));
-  expect(counts.counted).toBeUndefined();
   expect(Object.entries(window)).toEqual(before);
   expect(document.hidden).toBe(false);
   expect(document.documentElement.outerHTML).toBe('<html><head></head><body></body></html>');

@@ -1,37 +1,9 @@
 /**
  * Test files share one process, and those of the page one window: to make these for each takes
- * longer than most files' tests. So each file leaves everything as it found it.
+ * longer than most files' tests. So each file leaves everything as it found it: what it sets on
+ * global things, it sets with `vi`, which puts that back.
  */
 import { vi } from 'vitest';
-
-/** What is set, replaced or removed on `thing` itself is put back by what this returns. */
-function ownAsFound(thing: object): () => void {
-  const before = Reflect.ownKeys(thing).map(
-    (key) => [key, Reflect.getOwnPropertyDescriptor(thing, key) ?? {}] as const,
-  );
-  const known = new Set<PropertyKey>(before.map(([key]) => key));
-  return () => {
-    for (const key of Reflect.ownKeys(thing)) {
-      if (!known.has(key)) Reflect.deleteProperty(thing, key);
-    }
-    for (const [key, was] of before) {
-      const is = Reflect.getOwnPropertyDescriptor(thing, key);
-      if (is?.value !== was.value || is?.get !== was.get) Reflect.defineProperty(thing, key, was);
-    }
-  };
-}
-
-/** The window's own things are behind accessors here, which keep what is put in their place. */
-function replacedAsFound(): () => void {
-  const found = Object.entries(Object.getOwnPropertyDescriptors(globalThis))
-    .filter(([, its]) => 'get' in its && 'set' in its)
-    .map(([name]) => [name, Reflect.get(globalThis, name) as unknown] as const);
-  return () => {
-    for (const [name, was] of found) {
-      if (Reflect.get(globalThis, name) !== was) Reflect.set(globalThis, name, was);
-    }
-  };
-}
 
 /** Timers that still run when the file ends would call into the next one's window. */
 function timersEnd(): () => void {
@@ -55,14 +27,16 @@ function timersEnd(): () => void {
 /** Listeners on what outlives a file: no module of the last one hears the next one's events. */
 function listenersEnd(target: EventTarget): () => void {
   const stops: (() => void)[] = [];
-  const add = target.addEventListener.bind(target);
+  // eslint-disable-next-line @typescript-eslint/unbound-method
+  const { addEventListener } = target;
   target.addEventListener = (...given: Parameters<EventTarget['addEventListener']>) => {
-    add(...given);
+    addEventListener.apply(target, given);
     stops.push(() => {
       target.removeEventListener(given[0], given[1], given[2]);
     });
   };
   return () => {
+    target.addEventListener = addEventListener;
     for (const stop of stops) stop();
   };
 }
@@ -73,13 +47,7 @@ function emptied(element: Element): void {
 }
 
 function pageAsFound(): () => void {
-  const ends = [
-    listenersEnd(window),
-    listenersEnd(document),
-    replacedAsFound(),
-    ownAsFound(document),
-    ownAsFound(navigator),
-  ];
+  const ends = [listenersEnd(window), listenersEnd(document)];
   return () => {
     for (const end of ends) end();
     emptied(document.head);
@@ -96,7 +64,7 @@ function pageAsFound(): () => void {
 
 /** Looks round; what it returns puts everything back as it was. */
 export function asFound(): () => Promise<void> {
-  const globals = ownAsFound(globalThis);
+  const { setTimeout, setInterval } = globalThis;
   const page = typeof document === 'undefined' ? () => undefined : pageAsFound();
   const timers = timersEnd();
   return async () => {
@@ -111,6 +79,6 @@ export function asFound(): () => Promise<void> {
     // The page's modules keep state; each file has its own.
     vi.resetModules();
     page();
-    globals();
+    Object.assign(globalThis, { setTimeout, setInterval });
   };
 }

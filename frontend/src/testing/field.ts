@@ -64,7 +64,6 @@ export const npyEstimate = (
 export const sureness = (sd: readonly number[]): Sureness => ({
   sd: Float32Array.from(sd),
   sdKnown: 1,
-  readingCount: 40,
 });
 
 /** A row of cells from the origin on, 1 m each. */

@@ -20,6 +20,8 @@ window.matchMedia = (query: string) =>
   }) as unknown as MediaQueryList;
 
 Element.prototype.scrollIntoView = () => undefined;
+Element.prototype.setPointerCapture = () => undefined;
+Object.defineProperty(document, 'fonts', { configurable: true, value: new EventTarget() });
 
 HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement) {
   return FakeContext.of(this);

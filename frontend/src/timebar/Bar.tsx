@@ -1,7 +1,7 @@
 import { type JSX, memo } from 'react';
 
 import { hasDate } from '../domain/time';
-import { type Tick, type Timeline, timeTicks } from '../domain/timeline';
+import { type Timeline, timeTicks } from '../domain/timeline';
 import { type Axis, type Column, runStarts, stretchesOf, xOf } from './axis';
 
 /** Heights from the top, CSS pixels: pest marks, scan bars, failure bars, times. */
@@ -49,7 +49,16 @@ export const Bar = memo(function Bar({
           ),
         ),
       )}
-      <Times axis={axis} ticks={timeTicks(axis, width / TICK_ROOM_PX, !hasDate(to))} />
+      {timesOf(axis).map(({ at, x, text, left }) => (
+        <g key={at}>
+          <path className="timebar-tick" d={`M${x} ${MARKS_PX}V${FLOOR_PX + 3}`} />
+          {left !== null && (
+            <text x={left} y={BAR_PX - 3}>
+              {text}
+            </text>
+          )}
+        </g>
+      ))}
       <path className="timebar-base" d={`M0 ${BASE_PX + 0.5}H${width}`} />
       {columns.map((column) => (
         <Counts key={column.start} column={column} />
@@ -105,26 +114,11 @@ function marksOf(columns: readonly Column[], barWidth: number) {
   return marks;
 }
 
-const Times = ({ axis, ticks }: { axis: Axis; ticks: readonly Tick[] }): JSX.Element => (
-  <>
-    {timesOf(axis, ticks).map(({ at, x, text, left }) => (
-      <g key={at}>
-        <path className="timebar-tick" d={`M${x} ${MARKS_PX}V${FLOOR_PX + 3}`} />
-        {left !== null && (
-          <text x={left} y={BAR_PX - 3}>
-            {text}
-          </text>
-        )}
-      </g>
-    ))}
-  </>
-);
-
 /** Ticks with their text's left edge; null: no room for the text. */
-function timesOf(axis: Axis, ticks: readonly Tick[]) {
+function timesOf(axis: Axis) {
   const letterPx = LETTER * (parseFloat(getComputedStyle(document.documentElement).fontSize) || 16);
   let free = 0;
-  return ticks.map((tick) => {
+  return timeTicks(axis, axis.width / TICK_ROOM_PX, !hasDate(axis.to)).map((tick) => {
     const x = Math.round(xOf(axis, tick.at)) + 0.5;
     // The date goes beside a day's first time.
     const text = tick.text.split('\n').reverse().join(' ');

@@ -38,7 +38,6 @@ beforeEach(() => {
   receive(withState(latest, performance.now()));
   act({ period: { kind: 'hour' } });
   remember(9_000, NOW);
-  HTMLElement.prototype.setPointerCapture = () => undefined;
 });
 
 const slider = (): HTMLElement => screen.getByRole('slider', { name: 'Time shown' });

@@ -20,10 +20,6 @@ beforeAll(() => loadParts());
 
 beforeEach(() => {
   vi.stubGlobal('fetch', () => Promise.reject(new Error('no server')));
-  Object.defineProperty(document, 'fonts', {
-    configurable: true,
-    value: new EventTarget(),
-  });
   showTags(
     [
       wireTag({ tag_id: '1', readings: readings({ temperature: 20 }) }),

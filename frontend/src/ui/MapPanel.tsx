@@ -115,7 +115,7 @@ export function Readout(): JSX.Element | null {
   const sensor = useApp(selectSensor);
   const unit = useApp((state) => state.settings.unit);
   const difference = heat?.difference;
-  const value = point && heat?.field.sensor === sensor.name ? valueAt(heat.field, point) : null;
+  const value = point && heat ? valueAt(heat.field, point) : null;
   const isOld = Boolean(point && heat?.old?.[cellAt(heat.field, point) ?? -1]);
   const ranges = useApp((state) => {
     if (!point || !heat || heat.difference || heat.isError) return null;

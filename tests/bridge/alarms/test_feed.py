@@ -1,4 +1,4 @@
-"""The feed by itself: with journals and replicas it is in test_live_alarms."""
+"""The feed of alarms by itself; `test_live_notes` has it in `serve` and in `web`."""
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager

@@ -6,6 +6,7 @@ import signal
 import socket
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -13,9 +14,8 @@ import pytest
 from lupin_bridge.serving.server import Supervisor
 from tests.support.access import BEARER, TOKEN
 from tests.support.messages import scan
-from tests.support.processes import constants, lupin_twin, patrols_of, url_of
+from tests.support.processes import constants, faults, lupin_twin, patrols_of, url_of
 from tests.support.ros import Peer
-from tests.support.sabotage import sabotaged
 from tests.support.waiting import PATIENCE_S, wait_for
 
 
@@ -125,11 +125,10 @@ def test_the_bridge_is_ready_when_it_serves_and_says_when_it_stops(
 def test_a_callback_that_hangs_is_told_to_health_checks_and_ends_the_watchdogs_words(
     domain: int, listening: Manager
 ) -> None:
-    faults = ("--hang", "lupin_twin.core.state:TwinStore.record:hang me")
-    env = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "1500000"}
+    hangs = faults("--hang", "lupin_twin.core.state:TwinStore.record:hang me")
+    env: Any = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "1500000"}
     soon = constants(**{"lupin_bridge.feed.source:STUCK_AFTER_S": 2.0})
-    serve = ("tests.support.limited", *soon, "serve", "--port", "0")
-    with sabotaged(domain, faults, *serve, **env) as process, Peer(domain) as peer:
+    with lupin_twin(domain, "serve", *hangs, *soon, **env) as process, Peer(domain) as peer:
         url = url_of(process)
 
         def health() -> httpx.Response:

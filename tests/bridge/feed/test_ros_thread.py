@@ -17,9 +17,8 @@ from lupin_bridge.feed.ros_thread import RosThread, forward
 from lupin_bridge.feed.source import STUCK_AFTER_S, ThreadState, TwinUnavailableError, ailment
 from tests.support.inprocess import ros_domain
 from tests.support.messages import scan
-from tests.support.processes import url_of
+from tests.support.processes import faults, lupin_twin, url_of
 from tests.support.ros import Peer
-from tests.support.sabotage import sabotaged
 from tests.support.waiting import until
 
 
@@ -255,7 +254,7 @@ def test_a_thread_that_only_a_restart_helps_is_told() -> None:
 
 # --- what nodes log -------------------------------------------------------------------------------
 
-BROKEN = ("--raise", "lupin_twin.core.state:TwinStore.record:boom")
+BROKEN = faults("--raise", "lupin_twin.core.state:TwinStore.record:boom")
 
 
 def entries(output: str) -> list[dict[str, Any]]:
@@ -265,9 +264,9 @@ def entries(output: str) -> list[dict[str, Any]]:
 
 
 def test_of_a_bridge_that_logs_json_every_line_is_an_object(domain: int) -> None:
-    arguments = ("serve", "--port", "0", "--log-format", "json", "--ros-args", "-p", "idw_power:=3")
+    arguments = ("--log-format", "json", "--ros-args", "-p", "idw_power:=3")
     with (
-        sabotaged(domain, BROKEN, "lupin_bridge.cli.command", *arguments) as process,
+        lupin_twin(domain, "serve", *BROKEN, *arguments) as process,
         Peer(domain) as robot,
     ):
         url_of(process)

@@ -4,69 +4,28 @@ import io
 import signal
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import httpx
-import psycopg
 import pytest
 from PIL import Image
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from lupin_twin.core.history import LatestRequest
-from lupin_twin.core.past import RecentRequest, ScansRequest, SeriesRequest, WritesRequest
 from lupin_twin.field.explored import OccupancyMap, text_of
-from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.queries import series
-from lupin_twin.journal.received import recent, scans, writes
-from lupin_twin.journal.retention import kept
-from lupin_twin.journal.rows import latest
-from lupin_twin.journal.schema import SiteLog, open_reader
 from tests.support import maps
 from tests.support.archive import Archive, forwarder
 from tests.support.docs import block_named
 from tests.support.fleet import Page, fleet, forward, scans_lately, write
-from tests.support.journal import look, opened, scan
+from tests.support.journal import opened, scan
 from tests.support.nginx import nginx
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.ws_client import open_websocket
 
 MINUTE_NS = 60_000_000_000
-
-
-def test_every_query_of_a_journal_is_answered_alike(archive: Archive, tmp_path: Path) -> None:
-    journal = tmp_path / "journal.sqlite"
-    now_ns = time.time_ns()
-    rows = [*scans_lately(), look("1", now_ns - MINUTE_NS, anomaly=True), look("7", now_ns)]
-    forward(
-        archive, journal, [*rows, scan("3", now_ns - 2 * MINUTE_NS, temperature=1.5, humidity=40.0)]
-    )
-    archive.site = "gh2"
-    archive.add_user("gh2")
-    forward(archive, journal, [scan("other", now_ns)])
-    with closing(open_reader(journal)) as local, psycopg.connect(archive.owner) as remote:
-        logs = local, SiteLog(remote, "gh2")
-        for at_ns in (now_ns, now_ns - 2 * MINUTE_NS, now_ns - 5 * MINUTE_NS, 0):
-            one, other = (state_at(log, at_ns, "map") for log in logs)  # type: ignore[arg-type]
-            assert one == other
-            one_recent, other_recent = (recent(log, RecentRequest(at_ns)) for log in logs)
-            assert one_recent == other_recent
-            between = ScansRequest(at_ns - 3 * MINUTE_NS, at_ns, frozenset({"temperature"}))
-            one_part, other_part = (scans(log, between) for log in logs)
-            assert one_part == other_part
-            assert bool(one_part) is bool(at_ns)
-        assert recent(local, RecentRequest(now_ns))
-        first, second = (writes(log, WritesRequest(0, 86_400.0, 1000, 100)) for log in logs)
-        assert first.writes == second.writes
-        asked = SeriesRequest("3", "temperature", now_ns - 10 * MINUTE_NS, now_ns, 5)
-        assert series(logs[0], asked, now_ns) == series(logs[1], asked, now_ns)
-        for tag in ("1", "3", "7", "none"):
-            one_tag, other_tag = (latest(log, LatestRequest(tag, 4)) for log in logs)  # type: ignore[arg-type]
-            assert one_tag == other_tag
-        assert kept(local) == kept(logs[1])  # type: ignore[arg-type]
 
 
 def test_a_greenhouse_is_also_judged_by_its_last_day_as_on_its_own_page(

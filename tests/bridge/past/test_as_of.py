@@ -69,6 +69,17 @@ def test_a_field_is_that_of_the_tags_of_then_over_the_box_of_then() -> None:
     assert (found["sample_count"], found["rmse"]) == (2, 100.0)
 
 
+def test_a_tag_that_a_lost_robot_pinned_far_away_is_left_out_and_named() -> None:
+    lost = replace(SITE, tags=(*SITE.tags, tag("c", 0.5, 450.0), tag("lost", 5_000.0, 40.0)))
+    written = field_of(lost, asked(), JSON).write(lambda: False)
+    found = json.loads(written.body)
+    assert (found["origin_x"], found["width"], found["value_min"]) == (-1.5, 40, 400.0)
+    assert written.headers["X-Field-Far-Off-Count"] == "1"
+    assert body(field_of(lost, asked()))["far_off_tags"] == ["lost"]
+    there = asked(resolution=0.5, bbox_min_x=4_999, bbox_min_y=-1, bbox_max_x=5_001, bbox_max_y=1)
+    assert set(body(field_of(lost, there, JSON))["values"]) == {40.0}
+
+
 def test_a_broken_sensor_is_no_part_of_a_field() -> None:
     broken = replace(SITE, tags=(*SITE.tags, tag("c", 0.5, -1.0)))
     assert (

@@ -1,4 +1,4 @@
-"""What `/api/alarms` takes and refuses; what it tells is held in test_live_alarms."""
+"""What `/api/alarms` takes and refuses, and what it tells of a journal."""
 
 from __future__ import annotations
 

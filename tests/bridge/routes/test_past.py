@@ -35,7 +35,8 @@ async def remembering(past: MadeUp, limits: Limits | None = None) -> AsyncIterat
         twin = it.twin
         twin.rows = past.rows  # type: ignore[method-assign]
 
-        async def ask(question: PastQuery[Any], cost_s: float) -> Any:  # all alike
+        async def ask(question: PastQuery[Any], cost_s: float) -> Any:
+            past.costs.append(cost_s)
             return await look_up(question, past, twin.workers)
 
         twin.ask = ask  # type: ignore[method-assign]
@@ -183,10 +184,12 @@ async def test_a_client_that_leaves_takes_its_question_along(domain: int) -> Non
             await until(lambda: it.bridge.admission.being_computed == 0, "its place")
 
 
-async def test_questions_are_timed_by_their_kind(domain: int) -> None:
-    async with remembering(MadeUp()) as it:
+async def test_questions_say_what_they_cost_and_are_timed_by_their_kind(domain: int) -> None:
+    past = MadeUp()
+    async with remembering(past) as it:
         for path in (HISTORY, "/api/timeline", "/api/timeline?to=5"):
             assert (await it.http.get(path)).status_code == 200
+        assert min(past.costs) > 0, "by which a dear one gives way to a cheap one"
         text = (await it.http.get("/metrics")).text
         assert 'lupin_past_seconds_count{question="history"} 1.0' in text
         assert 'lupin_past_seconds_count{question="timeline"} 2.0' in text

@@ -30,9 +30,8 @@ from lupin_twin.runtime.process import END_S, IDLE_WORKERS_END_S
 from tests.support import raw_http
 from tests.support.inprocess import running
 from tests.support.live import attached, wait_until_ready
-from tests.support.processes import Process, lupin_twin, twin_node, url_of
+from tests.support.processes import Process, faults, lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
-from tests.support.sabotage import sabotaged
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Listener, bridge, deaf_client, listener, overfill
 
@@ -198,9 +197,9 @@ HANGS = (
 
 
 def test_fields_that_take_for_ever_do_not_hold_up_the_end(domain: int) -> None:
-    faults = [word for hang, _ in HANGS for word in ("--hang", hang)]
+    hangs = faults("--hang", *(hang for hang, _ in HANGS))
     with (
-        sabotaged(domain, faults, "lupin_bridge.cli.command", "serve", "--port", "0") as process,
+        lupin_twin(domain, "serve", *hangs) as process,
         listener(url_of(process)) as healthy,
         ExitStack() as stack,
     ):

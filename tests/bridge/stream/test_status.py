@@ -158,7 +158,9 @@ def test_how_the_journal_does_is_told_when_that_changes() -> None:
     recording = status(JournalState.RECORDING, written=1)
     assert recording.is_news_after(failing)
     assert not status(JournalState.RECORDING, written=2, waiting=3).is_news_after(recording)
-    assert status(JournalState.RECORDING, set_aside="/old").is_news_after(recording)
+    aside = status(JournalState.RECORDING, set_aside="/old")
+    assert aside.is_news_after(recording)
+    assert schema.StatusFrame.model_validate(aside.frame()).journal.set_aside == "/old"
     # How far behind it is changes every second.
     slow = status(JournalState.SLOW, "2 s behind")
     assert not status(JournalState.SLOW, "3 s behind").is_news_after(slow)

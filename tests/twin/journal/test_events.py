@@ -4,7 +4,8 @@ from sqlite3 import Connection
 from lupin_twin.core.past import EVERY_TAG, Event, SeriesPast, SeriesRequest
 from lupin_twin.journal.hours import SILENCE_NS
 from lupin_twin.journal.queries import series
-from tests.support.log_life import BEGUN, HOUR, LATEST, MINUTE, SECOND, lived, look, scan
+from tests.support.journal import SECOND, look, scan
+from tests.support.log_life import BEGUN, HOUR, LATEST, MINUTE, lived
 
 END = BEGUN + (LATEST + 200) * MINUTE
 

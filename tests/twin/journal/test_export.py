@@ -6,7 +6,8 @@ import pytest
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.journal.received import LOT, Export, rows
 from lupin_twin.journal.schema import open_reader
-from tests.support.log_life import BEGUN, LATEST, MINUTE, SECOND, lived, scan
+from tests.support.journal import SECOND, scan
+from tests.support.log_life import BEGUN, LATEST, MINUTE, lived
 
 END = BEGUN + (LATEST + 200) * MINUTE
 

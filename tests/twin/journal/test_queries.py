@@ -4,7 +4,8 @@ import pytest
 
 from lupin_twin.core.past import SeriesPast, SeriesRequest
 from lupin_twin.journal.queries import series
-from tests.support.log_life import BEGUN, LATEST, MINUTE, SECOND, lived, scan
+from tests.support.journal import SECOND, scan
+from tests.support.log_life import BEGUN, LATEST, MINUTE, lived
 
 END = BEGUN + (LATEST + 200) * MINUTE
 

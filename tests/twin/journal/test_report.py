@@ -24,7 +24,8 @@ from lupin_twin.core.past import PastWrite, RunSpan
 from lupin_twin.core.state import Inspection, Pin, Reading
 from lupin_twin.journal.runs import runs, spans
 from tests.support.alarms_reference import Plain, alarms
-from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, scan, steps
+from tests.support.journal import scan
+from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, steps
 from tests.support.past import answered_by
 from tests.twin.journal.conftest import Engines, Living
 

@@ -12,7 +12,7 @@ from builtin_interfaces.msg import Time
 from lupin_msgs.srv import GetEstimate
 from PIL import Image
 
-from lupin_bridge.stream.followers import GetEstimateResponse
+from lupin_bridge.stream.pollers import GetEstimateResponse
 from tests.support.messages import scan
 from tests.support.processes import limits
 from tests.support.waiting import wait_for

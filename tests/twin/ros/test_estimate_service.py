@@ -17,7 +17,7 @@ from lupin_twin.core.state import TwinStore
 from lupin_twin.estimate.engine import Grades, Record, TagPast, Tally
 from lupin_twin.ros import estimate_service
 from lupin_twin.ros.estimate_service import EstimateService
-from lupin_twin.runtime.estimates import Known, Report, ReportRequest
+from lupin_twin.runtime.estimates import LastResult, Report, ReportRequest
 from lupin_twin.runtime.workers import MAX_QUERIES, JobQueue, Workers
 from tests.support import messages
 from tests.support.domains import own_domain
@@ -169,7 +169,7 @@ def test_a_report_serves_for_a_while_and_what_is_wrong_is_said_once(
     assert (said.level, said.message) == (WARN, f"co2: {report().fit_problem}")
     assert said.values == {"fits failed": "1"}
     graded = Record(1, Tally(40, 10), Tally(40, 10))
-    narrow = Known(Report(at_ns, at_ns, "", graded), Grades(86_400.0))
+    narrow = LastResult(Report(at_ns, at_ns, "", graded), Grades(86_400.0))
     said = replace(service, _known={"light": narrow}).finding()
     assert (said.level, said.message[:26]) == (WARN, "light: too sure of itself,")
     assert replace(service, _known={}).finding().message == "nothing is wrong"

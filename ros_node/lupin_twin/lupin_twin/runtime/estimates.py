@@ -81,7 +81,7 @@ def are_enough(pasts: Sequence[TagPast]) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class TagCheck:
-    """A tag's latest reading, and what was expected of it; see `cholesky.Change`."""
+    """A tag's latest reading, and what was expected of it; see `solution.Change`."""
 
     tag_id: str
     measured: float

@@ -36,8 +36,8 @@ from lupin_bridge.routes.answers import (
     respond_past,
 )
 from lupin_bridge.serving.admission import Answer, ClientLimitError, content_answer
-from lupin_bridge.stream import followers, schema
-from lupin_bridge.stream.followers import sensors_of
+from lupin_bridge.stream import pollers, schema
+from lupin_bridge.stream.pollers import sensors_of
 from lupin_twin.core.past import PastRefused
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, ReportRequest
@@ -188,7 +188,7 @@ ESTIMATE: Final = InFormats(
 It uses the journal up to a moment, for the model too. Without `at`, that moment is the newest
 reading or the last whole minute, whichever is later; the ETag changes with it.""",
     parameters=parameters_of(EstimateQuery),
-    model=followers.GetEstimateResponse,
+    model=pollers.GetEstimateResponse,
 )
 
 
@@ -252,7 +252,7 @@ _WRITE_TAG_S: Final = 10e-6
     router,
     "/api/estimate/quality",
     summary="How often the estimates of each sensor were right",
-    responses={**_REPORTED, 200: {"model": followers.EstimateQualities}},
+    responses={**_REPORTED, 200: {"model": pollers.EstimateQualities}},
     openapi_extra={"parameters": parameters_of(QualityQuery)},
 )
 async def quality(request: Request) -> Response:
@@ -265,7 +265,7 @@ async def quality(request: Request) -> Response:
     async def body(bridge: Bridge, query: QualityQuery) -> bytes:
         names = [query.sensor_type] if query.sensor_type else sensors_of(newest_of(bridge))
         reports = {name: await bridge.source.estimate_report(ReportRequest(name)) for name in names}
-        return followers.qualities(reports)
+        return pollers.qualities(reports)
 
     return await _report(request, QualityQuery, body)
 
@@ -274,7 +274,7 @@ async def quality(request: Request) -> Response:
     router,
     "/api/estimate/tags",
     summary="The expected value of each tag's newest reading, and which tags have changed",
-    responses={**_REPORTED, 200: {"model": followers.ExpectedTags}},
+    responses={**_REPORTED, 200: {"model": pollers.ExpectedTags}},
     openapi_extra={"parameters": parameters_of(TagsQuery)},
 )
 async def tags(request: Request) -> Response:
@@ -284,7 +284,7 @@ async def tags(request: Request) -> Response:
         sensor = query.sensor_type
         report = await bridge.source.estimate_report(ReportRequest(sensor))
         cost_s = len(report.tags) * _WRITE_TAG_S
-        return await on_worker(bridge, lambda _: followers.tags(sensor, report), cost_s)
+        return await on_worker(bridge, lambda _: pollers.tags(sensor, report), cost_s)
 
     return await _report(request, TagsQuery, body)
 
@@ -293,7 +293,7 @@ async def tags(request: Request) -> Response:
     router,
     "/api/estimate/advice",
     summary="Where an additional tag would help the estimate most",
-    responses={**_REPORTED, 200: {"model": followers.Advice}},
+    responses={**_REPORTED, 200: {"model": pollers.Advice}},
     openapi_extra={"parameters": parameters_of(AdviceQuery)},
 )
 async def advice(request: Request) -> Response:
@@ -301,7 +301,7 @@ async def advice(request: Request) -> Response:
 
     async def body(bridge: Bridge, query: AdviceQuery) -> bytes:
         wanted = ReportRequest(query.sensor_type, query.places)
-        return followers.advice(query.sensor_type, await bridge.source.estimate_report(wanted))
+        return pollers.advice(query.sensor_type, await bridge.source.estimate_report(wanted))
 
     return await _report(request, AdviceQuery, body)
 

@@ -109,6 +109,6 @@ def test_it_is_on_record_what_was_forgotten_by_whom_and_when(path: Path, journal
     assert "has no tag 'lost'" in journal("forget", LOST).stderr
     told = journal("info").stdout
     by = getpass.getuser()
-    assert f"forgotten      the pose of tag 'lost', by {by}, 20" in told
+    assert f"forgotten    the pose of tag 'lost', by {by}, 20" in told
     assert f"forgotten    all of tag 'lost', by {by}, 20" in told
     assert told.count("forgotten") == 2

@@ -270,26 +270,16 @@ class AccessControl:
         scope = {**scope, "headers": [line for line in scope["headers"] if line[0] != b"cookie"]}
         if person is not None:
             scope["state"] = {**scope.get("state", {}), PERSON_KEY: person}
-        if person == SHARED or scope["type"] == "http":
+        people = self._access.people
+        if people is None or person == SHARED or scope["type"] == "http":
             await self._app(scope, receive, send)
             return
-        looking = asyncio.create_task(self._end_with(person, scope["state"][CONNECTION_KEY]))
+        connection: Connection = scope["state"][CONNECTION_KEY]
+        looking = asyncio.create_task(_end_with(people, person, connection))
         try:
             await self._app(scope, receive, send)
         finally:
             looking.cancel()
-
-    async def _end_with(self, person: Person | None, connection: Connection) -> None:
-        """Close the connection when the session ends; without a person, at the first account."""
-        people = self._access.people
-        if people is None:
-            return
-        try:
-            while not people.is_on if person is None else people.still(person):
-                await asyncio.sleep(_POLL_S)
-        except AccountError as error:
-            log.warning("%s: the open connections of %s are closed", error, person and person.name)
-        connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")
 
     def _check_credentials(self, request: HTTPConnection) -> Response | Person | None:
         """Who makes the request; None: no credentials are needed here; or a refusal."""
@@ -407,3 +397,13 @@ def _with_cors(send: Send, foreign: str | None) -> Send:
         await send(message)
 
     return send_with_cors
+
+
+async def _end_with(people: People, person: Person | None, connection: Connection) -> None:
+    """Close the connection when the session ends; without a person, at the first account."""
+    try:
+        while not people.is_on if person is None else people.still(person):
+            await asyncio.sleep(_POLL_S)
+    except AccountError as error:
+        log.warning("%s: the open connections of %s are closed", error, person and person.name)
+    connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")

@@ -177,7 +177,7 @@ async def test_a_day_with_too_much_in_it_holds_up_no_other(
     async with begun(tmp_path, status(200)) as (house, at):
         house.error = PastRefused("about 200000 scans, the limit is 100000")
         house.ros_time_ns = ns("2026-05-02T07:00Z")
-        await until(lambda: "20260502T060000Z is left out" in caplog.text, "the word of it")
+        await until(lambda: "20260502T060000Z is skipped" in caplog.text, "the word of it")
         house.error, house.ros_time_ns = None, ns("2026-05-03T07:00Z")
         await until(lambda: at.posted, "the next one")
     assert periods(at) == [[ns("2026-05-02T06:00Z"), ns("2026-05-03T06:00Z")]]

@@ -191,6 +191,6 @@ async def test_questions_say_what_they_cost_and_are_timed_by_their_kind(domain: 
             assert (await it.http.get(path)).status_code == 200
         assert min(past.costs) > 0, "by which a dear one gives way to a cheap one"
         text = (await it.http.get("/metrics")).text
-        assert 'lupin_past_seconds_count{query="history"} 1.0' in text
-        assert 'lupin_past_seconds_count{query="timeline"} 2.0' in text
+        assert 'lupin_past_seconds_count{question="history"} 1.0' in text
+        assert 'lupin_past_seconds_count{question="timeline"} 2.0' in text
         assert "lupin_exports_running 0.0" in text

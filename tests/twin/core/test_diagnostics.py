@@ -55,7 +55,7 @@ def test_a_twin_that_is_well_is_ok_in_all() -> None:
         ("clock", {"clock": "stopped"}, ERROR, "stopped"),
         ("clock", {"clock": "none"}, ERROR, "no ROS time"),
         ("inputs", {"observed_ago_s": None}, STALE, "no observation"),
-        ("inputs", {"inputs": {"/map": 0}}, WARN, "nobody publishes /map"),
+        ("inputs", {"inputs": {"/map": 0}}, WARN, "nothing publishes /map"),
         ("inputs", {"observed_ago_s": None, "input_problems": ("use UDP",)}, WARN, "use UDP"),
         ("drops", {"counts": Counts({"frame": 40}, 0, (FRAME,))}, WARN, "12 recently"),
         ("drops", {"counts": Counts({"frame": 40})}, OK, "nothing recently"),

@@ -28,7 +28,7 @@ const RULES = [
   'src/draw/colours.test.ts',
   'src/store/{create,fetcher,twin,view}.test.ts',
   'src/timebar/axis.test.ts',
-  'src/ui/{fitting,later}.test.ts',
+  'src/ui/{fitting,loadDeferred}.test.ts',
   'src/words/languages.test.ts',
 ];
 

@@ -19,7 +19,7 @@ import { Select } from '../widgets/controls';
 import { isStroked, lookOf, markerPath } from './layers';
 import type { Line, PlotModel } from './model';
 import { type PlotHandlers, usePlot } from './plot';
-import { type Asked, useSensorsOf } from './useLines';
+import { type RequestedLines, useSensorsOf } from './useLines';
 import { zoomTo } from './zoom';
 import { DAY_S } from '../domain/difference';
 
@@ -47,7 +47,7 @@ export function PlotView({
 }): JSX.Element {
   const place = useRef<HTMLDivElement>(null);
   const ofBar = useSelected(pointedTime, pointedBy('bar'));
-  const { at } = useTold();
+  const { at } = useReadoutTime();
   const only = isAlone ? model.lines[0] : undefined;
 
   const plot = usePlot(place, model, height, hasTimes, HANDLERS, onThemeChange);
@@ -88,7 +88,7 @@ export function PlotView({
 }
 
 /** The time that charts tell of: under the mouse, else the moment that the page shows; null: newest. */
-function useTold(): { at: number | null; isPointed: boolean } {
+function useReadoutTime(): { at: number | null; isPointed: boolean } {
   const pointed = useSelected(pointedTime, (it) => it?.at ?? null);
   // Beside a house of the past, the newest value would pass for one of then.
   const moment = useApp((state) => state.view.moment);
@@ -103,7 +103,7 @@ export function LineValue({
   line: Line;
   model: PlotModel;
 }): JSX.Element {
-  const { at, isPointed } = useTold();
+  const { at, isPointed } = useReadoutTime();
   const point = (isPointed ? pointAt : lastUntil)(line.series, at ?? Infinity);
   const value = point?.value ?? null;
   const was = beforeAt(line, at)?.value ?? null;
@@ -163,7 +163,7 @@ export function MarksKey({ marks }: { marks: readonly Mark[] }): JSX.Element | n
     <p className="marks-key" data-testid="marks-key">
       {looks > 0 && (
         <span data-mark="look">
-          <span aria-hidden="true">○</span> {S.chartLooks(looks)}
+          <span aria-hidden="true">○</span> {S.chartInspections(looks)}
         </span>
       )}
       {failures > 0 && (
@@ -176,11 +176,11 @@ export function MarksKey({ marks }: { marks: readonly Mark[] }): JSX.Element | n
 }
 
 export function ChartState({
-  asked: { state, message, span },
+  requested: { state, message, span },
   hasLines,
   lacks,
 }: {
-  asked: Asked;
+  requested: RequestedLines;
   hasLines: boolean;
   /** What there is nothing of to chart; null: there is something. */
   lacks: string | null;

@@ -135,6 +135,6 @@ function eventText({ kind, at, to, n }: SeriesRow): string {
     case 'failure':
       return S.chartFailures(n ?? 0);
     case 'look':
-      return S.chartLooks(n ?? 0);
+      return S.chartInspections(n ?? 0);
   }
 }

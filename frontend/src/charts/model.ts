@@ -162,7 +162,7 @@ export type Lines = Awaited<ReturnType<typeof fetchLines>>;
 
 export const NO_LINES: Lines = { series: new Map(), before: new Map(), marks: new Map() };
 
-interface Question {
+interface LinesQuery {
   readonly pairs: readonly Pair[];
   readonly span: Span;
   /** The twin's time, ROS seconds: the span may end later. */
@@ -177,7 +177,7 @@ interface Question {
 const MARK_POINTS = 200;
 
 export async function fetchLines(
-  { pairs, span, nowS, points, dayS }: Question,
+  { pairs, span, nowS, points, dayS }: LinesQuery,
   signal: AbortSignal,
 ) {
   const tagIds = [...new Set(pairs.map(({ tagId }) => tagId))];

@@ -7,13 +7,13 @@ import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { wireTime } from '../testing/timeline';
 import { pairKey } from './model';
-import { useLines, type Asked } from './useLines';
+import { useLines, type RequestedLines } from './useLines';
 
 const pair = { tagId: '1', sensor: 'co2' };
 /** The last hour is looked at anew each 15 s from here on. */
 const NOW_S = 99_990;
 
-let asked: URL[] = [];
+let requested: URL[] = [];
 let refuse: Response | null = null;
 
 /** A bridge that has one reading, and one failed try at the beginning. */
@@ -21,10 +21,10 @@ function answer(url: URL): Response {
   if (refuse) return refuse.clone();
   const query = url.searchParams;
   const [from, to] = [Number(query.get('from')), Number(query.get('to'))];
-  const told = { from: wireTime(from), to: wireTime(to), complete_to: null, kept_from: null };
+  const bounds = { from: wireTime(from), to: wireTime(to), complete_to: null, kept_from: null };
   if (url.pathname.endsWith('/history')) {
     return Response.json({
-      ...told,
+      ...bounds,
       tag_id: query.get('tag_id'),
       sensor_type: query.get('sensor_type'),
       unit: 'ppm',
@@ -38,7 +38,7 @@ function answer(url: URL): Response {
   }
   const bucket = { start: wireTime(from), scans: 1, failures: 1, looks: 0 };
   return Response.json({
-    ...told,
+    ...bounds,
     bucket_s: 10,
     reach: null,
     buckets: [{ ...bucket, pests_seen: 0, pests_cleared: 0 }],
@@ -61,12 +61,12 @@ const passed = (ms: number): Promise<void> =>
   });
 
 const sinceOf = (path: string): number[] =>
-  asked
+  requested
     .filter(({ pathname }) => pathname === path)
     .map(({ searchParams }) => Number(searchParams.get('from')));
 const histories = (): number[] => sinceOf('/api/history');
 
-function show(hasDayBefore = false): { readonly current: Asked } {
+function show(hasDayBefore = false): { readonly current: RequestedLines } {
   const pairs = [pair];
   return renderHook(() => useLines(pairs, 300, hasDayBefore)).result;
 }
@@ -75,10 +75,10 @@ beforeAll(() => {
   vi.useFakeTimers();
 });
 beforeEach(() => {
-  asked = [];
+  requested = [];
   refuse = null;
   vi.stubGlobal('fetch', (url: URL) => {
-    asked.push(url);
+    requested.push(url);
     return Promise.resolve(answer(url));
   });
   showTags([]);
@@ -93,7 +93,7 @@ test('a line is asked for once, with its tag’s timeline', async () => {
   const shown = show();
   expect(shown.current.state).toBe('waiting');
   await passed(100);
-  expect(asked.map(({ pathname }) => pathname)).toEqual(['/api/history', '/api/timeline']);
+  expect(requested.map(({ pathname }) => pathname)).toEqual(['/api/history', '/api/timeline']);
   const { state, lines } = shown.current;
   const from = NOW_S - 3_600;
   expect(state).toBe('ready');

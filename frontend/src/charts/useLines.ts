@@ -7,7 +7,7 @@ import { type AppState, store, useApp } from '../store/app';
 import { createStore, useSelected } from '../store/create';
 import { selectCatalogue, selectCatalogues } from '../store/derived';
 import { useFetched } from '../store/fetcher';
-import { rosNow, selectDayS, selectNewestTag, selectTag } from '../store/moment';
+import { rosNow, selectDayS, selectLatestTag, selectTag } from '../store/moment';
 import { turnOf } from '../store/remembered';
 import { useNow } from '../widgets/useNow';
 import { fetchLines, type Lines, modelOf, NO_LINES, type Pair, pairKey, type Plan } from './model';
@@ -18,7 +18,7 @@ const PACE_A_LINE_MS = 1_000;
 /** What was heard is in the journal within 100 ms, and in another host's copy of it soon after. */
 const WRITTEN_MS = 1_000;
 
-export type Asked = ReturnType<typeof useLines>;
+export type RequestedLines = ReturnType<typeof useLines>;
 
 /**
  * What these lines have over the period of the time bar: asked for again when one of the tags was
@@ -47,8 +47,11 @@ export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = 
             if (answered.current === group) await pause(WRITTEN_MS);
             // The twin's time has gone on since this was wished for.
             const atS = rosNow(store.get(), now()) ?? nowS;
-            const asked = spanOf(period, atS, oldest);
-            const lines = await fetchLines({ pairs, span: asked, nowS: atS, points, dayS }, signal);
+            const requested = spanOf(period, atS, oldest);
+            const lines = await fetchLines(
+              { pairs, span: requested, nowS: atS, points, dayS },
+              signal,
+            );
             answered.current = group;
             return lines;
           },
@@ -78,8 +81,8 @@ export function useCharts(plans: readonly Plan[], points: number, hasDayBefore =
     () => plans.flatMap(({ sensor, tagIds }) => tagIds.map((tagId) => ({ tagId, sensor }))),
     [plans],
   );
-  const asked = useLines(pairs, points, hasDayBefore);
-  const { lines, span, nowS } = asked;
+  const requested = useLines(pairs, points, hasDayBefore);
+  const { lines, span, nowS } = requested;
   const models = useMemo(
     () =>
       span
@@ -89,7 +92,7 @@ export function useCharts(plans: readonly Plan[], points: number, hasDayBefore =
         : [],
     [catalogue, both, plans, species, lines, span, unit, moment, nowS],
   );
-  return { asked, models };
+  return { requested, models };
 }
 
 /** Changes when one of the tags was visited: not in the past, nor for a period that has ended. */
@@ -105,7 +108,7 @@ function useVisits(pairs: readonly Pair[]): string {
 const visitsOf = (state: AppState, pairs: readonly Pair[]): string =>
   JSON.stringify(
     pairs.map(({ tagId }) => {
-      const wire = selectNewestTag(state, tagId)?.wire;
+      const wire = selectLatestTag(state, tagId)?.wire;
       return [wire?.last_observed, wire?.last_try];
     }),
   );

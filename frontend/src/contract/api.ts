@@ -40,7 +40,7 @@ export const momentParameter = (at: number): string => Math.max(0, at).toFixed(3
 
 /** An answer of the bridge. The browser asks with its ETag each time, and a 304 costs no body. */
 export const get = (path: string, signal: AbortSignal): Promise<Response> =>
-  ask(path, { signal, cache: 'no-cache' });
+  request(path, { signal, cache: 'no-cache' });
 
 /** An answer, checked against the server's schema of that name. */
 export const answer = async <Name extends keyof Schemas>(
@@ -51,7 +51,7 @@ export const answer = async <Name extends keyof Schemas>(
 ): Promise<Schemas[Name]> => read(name, await get(query ? withQuery(path, query) : path, signal));
 
 /** A refusal is thrown with its reason. */
-export async function ask(path: string, init: RequestInit): Promise<Response> {
+export async function request(path: string, init: RequestInit): Promise<Response> {
   const response = await fetch(route(path), init);
   if (!response.ok) {
     const wait = Number(response.headers.get('Retry-After') ?? NaN);

@@ -273,8 +273,8 @@ describe('filled', () => {
     vi.stubGlobal('fetch', (url: URL) =>
       Promise.resolve(Response.json(url.pathname === '/api/health' ? health : state)),
     );
-    const told = await fetchStateAt(12, new AbortController().signal);
-    expect(told).toMatchObject({ state: { tags: filled }, health: verdicts });
+    const received = await fetchStateAt(12, new AbortController().signal);
+    expect(received).toMatchObject({ state: { tags: filled }, health: verdicts });
   });
 });
 

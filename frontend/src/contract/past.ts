@@ -22,9 +22,11 @@ export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Lat
     answer('Judgement', signal, 'api/health', query),
   ]);
   const { sec, nanosec } = state.header.stamp;
-  const told = sec + nanosec / 1e9;
-  if (Math.abs(told - at) > SAME_MOMENT_S) {
-    throw new Error(`the answer is about ${told.toFixed(3)} s, asked was ${at.toFixed(3)} s`);
+  const answered = sec + nanosec / 1e9;
+  if (Math.abs(answered - at) > SAME_MOMENT_S) {
+    throw new Error(
+      `the answer is about ${answered.toFixed(3)} s, requested was ${at.toFixed(3)} s`,
+    );
   }
   return {
     seq: 0,
@@ -38,10 +40,10 @@ export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Lat
 /** Whether all is in the journal that leads up to a moment; a server that does not say has it. */
 function holdsAll({ headers }: Response, at: number): boolean {
   const complete = headers.get('X-Complete-To');
-  const kept = headers.get('X-Kept-From');
+  const keptFrom = headers.get('X-Kept-From');
   return (
     (complete === null || Number(complete) >= at - SAME_MOMENT_S) &&
-    (kept === null || Number(kept) <= at + SAME_MOMENT_S)
+    (keptFrom === null || Number(keptFrom) <= at + SAME_MOMENT_S)
   );
 }
 
@@ -66,26 +68,30 @@ export const fetchTimeline = (
 const MAX_POINTS = 5_000;
 
 /** Times are ROS seconds. */
-interface Asked {
+interface SeriesQuery {
   readonly tagId: string | undefined;
   readonly sensor: string | undefined;
   readonly from: number;
   readonly to: number;
 }
 
-const parameters = ({ tagId, sensor, from, to }: Asked) => ({
+const parameters = ({ tagId, sensor, from, to }: SeriesQuery) => ({
   tag_id: tagId,
   sensor_type: sensor,
   from: momentParameter(from),
   to: momentParameter(to),
 });
 
-export const fetchSeries = (asked: Asked, points: number, signal: AbortSignal): Promise<History> =>
+export const fetchSeries = (
+  query: SeriesQuery,
+  points: number,
+  signal: AbortSignal,
+): Promise<History> =>
   answer('History', signal, 'api/history', {
-    ...parameters(asked),
+    ...parameters(query),
     points: Math.min(MAX_POINTS, points),
   });
 
 /** Where every reading and try of a period is to be had, of one tag and of one sensor if named. */
-export const exportAddress = (asked: Asked): string =>
-  route(withQuery('api/export.csv', parameters(asked))).href;
+export const exportAddress = (query: SeriesQuery): string =>
+  route(withQuery('api/export.csv', parameters(query))).href;

@@ -1,5 +1,5 @@
 /** The bridge's routes for people: who is signed in, and what they say. */
-import { answer, ask } from './api';
+import { answer, request } from './api';
 import type { Note, Session } from './types';
 
 /** A header of our own: no form and no picture of another page can send one. */
@@ -10,7 +10,7 @@ export const fetchSession = (signal: AbortSignal): Promise<Session> =>
 
 /** Ends the session, and with it the sockets that it has open. */
 export async function signOut(): Promise<void> {
-  await ask('api/signout', { method: 'POST', headers: OWN });
+  await request('api/signout', { method: 'POST', headers: OWN });
 }
 
 interface Draft {
@@ -23,7 +23,7 @@ interface Draft {
 
 const post = async (path: string, body: object): Promise<void> => {
   const headers = { ...OWN, 'Content-Type': 'application/json' };
-  await ask(path, { method: 'POST', headers, body: JSON.stringify(body) });
+  await request(path, { method: 'POST', headers, body: JSON.stringify(body) });
 };
 
 export const postNote = (note: Draft): Promise<void> => post('api/notes', note);
@@ -44,5 +44,5 @@ export const fetchNotes = async (signal: AbortSignal): Promise<readonly Note[]> 
   (await answer('Notes', signal, 'api/notes')).notes;
 
 export async function withdrawComment(id: string): Promise<void> {
-  await ask(`api/notes/${encodeURIComponent(id)}`, { method: 'DELETE', headers: OWN });
+  await request(`api/notes/${encodeURIComponent(id)}`, { method: 'DELETE', headers: OWN });
 }

@@ -165,12 +165,12 @@ export const plusMinus = (sd: number): number => NINE_OF_TEN * sd;
 /** The error alone, as a field: plus or minus what, also where it is too large to be known. */
 export function errorField(field: Field, { sd }: Sureness): Field {
   const values = sd.map(plusMinus);
-  const told = values.filter((value) => !Number.isNaN(value));
+  const finite = values.filter((value) => !Number.isNaN(value));
   return {
     ...field,
     values,
     valueMin: 0,
-    valueMax: told.reduce((most, value) => Math.max(most, value), 0),
+    valueMax: finite.reduce((most, value) => Math.max(most, value), 0),
   };
 }
 

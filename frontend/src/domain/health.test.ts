@@ -17,11 +17,11 @@ import {
   worstReason,
 } from './health';
 
-const house = (said: Parameters<typeof judgement>[0], isHeard = true): HouseHealth =>
+const house = (said: Parameters<typeof judgement>[0], isReceiving = true): HouseHealth =>
   houseHealth(
     Object.keys(said).map((tag_id) => tag({ tag_id })),
     judgement(said),
-    isHeard,
+    isReceiving,
   );
 
 describe('house', () => {
@@ -213,8 +213,8 @@ describe('a reason in words', () => {
       'No tag is being scanned: the robot has stopped, or its data is lost',
     ],
     [{ kind: 'door_open' as never, sensor: '', value: null, limit: null }, null, 'door open'],
-  ] as const)('%o', (over, age, told) => {
-    expect(text(over, age)).toBe(told);
+  ] as const)('%o', (over, age, expected) => {
+    expect(text(over, age)).toBe(expected);
   });
 
   test('follows the unit that is chosen', () => {

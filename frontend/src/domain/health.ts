@@ -36,10 +36,14 @@ const SILENT: HealthReason = {
 };
 
 /**
- * The house as it was judged. `isHeard`: false, and nothing is known of it as a whole, whatever
+ * The house as it was judged. `isReceiving`: false, and nothing is known of it as a whole, whatever
  * was said last; of its tags that stands, with the age of their readings beside it.
  */
-export function houseHealth(tags: readonly Tag[], judgement: Judgement | null, isHeard: boolean) {
+export function houseHealth(
+  tags: readonly Tag[],
+  judgement: Judgement | null,
+  isReceiving: boolean,
+) {
   const counts = { critical: 0, stressed: 0, unknown: 0, healthy: 0 };
   const byTag = new Map<string, TagHealth>();
   for (const { id } of tags) {
@@ -47,7 +51,7 @@ export function houseHealth(tags: readonly Tag[], judgement: Judgement | null, i
     byTag.set(id, health);
     counts[health.verdict] += 1;
   }
-  const { verdict, reasons } = isHeard ? (judgement?.house ?? NOT_JUDGED) : UNHEARD;
+  const { verdict, reasons } = isReceiving ? (judgement?.house ?? NOT_JUDGED) : NOT_RECEIVED;
   return {
     verdict,
     reasons,
@@ -66,7 +70,7 @@ export const isBad = (verdict: Verdict): boolean =>
 /** Whether nobody knows how it is now, of all its tags. */
 export const isSilent = ({ reasons }: TagHealth): boolean => reasons[0]?.kind === 'silent';
 
-const UNHEARD: TagHealth = { verdict: 'unknown', reasons: [SILENT] };
+const NOT_RECEIVED: TagHealth = { verdict: 'unknown', reasons: [SILENT] };
 
 /**
  * The one order of what is wrong, of tags and of alarms; more is worse. By verdict, then what nobody
@@ -154,7 +158,10 @@ export function reasonText(
         ? R.readingFailed(label)
         : R.implausible(`${label} ${readingText(sensor, value, unit)}`);
     case 'scan_failed':
-      return R.scanFailed(S.tried[tryKind(value ?? NaN)], age === null ? null : shortAgeText(age));
+      return R.scanFailed(
+        S.attemptOutcomes[attemptOutcome(value ?? NaN)],
+        age === null ? null : shortAgeText(age),
+      );
     case 'pest':
       return R.pest(value ?? 0);
     case 'old':
@@ -220,9 +227,9 @@ export const reasonsText = (
 ): string => reasons.map((reason) => reasonText(sensors, reason, unit, null)).join('; ');
 
 /** What became of a try, by the status of its observation (lupin_msgs/Observation). */
-type TryKind = 'ok' | 'unreachable' | 'undecoded' | 'skipped' | 'failed';
+type AttemptOutcome = 'ok' | 'unreachable' | 'undecoded' | 'skipped' | 'failed';
 
-const KINDS: readonly TryKind[] = ['ok', 'unreachable', 'undecoded', 'skipped'];
+const KINDS: readonly AttemptOutcome[] = ['ok', 'unreachable', 'undecoded', 'skipped'];
 
 /** A status that is not known yet is a failure of some kind. */
-export const tryKind = (status: number): TryKind => KINDS[status] ?? 'failed';
+export const attemptOutcome = (status: number): AttemptOutcome => KINDS[status] ?? 'failed';

@@ -59,7 +59,7 @@ describe('excess', () => {
 });
 
 describe('words', () => {
-  const told = (name: string, value: number, unit: 'C' | 'F' = 'C'): string | null => {
+  const described = (name: string, value: number, unit: 'C' | 'F' = 'C'): string | null => {
     const sensor = sensorNamed(name);
     return idealText(sensor, sensor, value, unit);
   };
@@ -71,7 +71,7 @@ describe('words', () => {
     ['temperature', 26.000_01, 'C', 'too high'],
     ['dew_point', 5, 'C', null],
   ] as const)('%s %f %s: %s', (name, value, unit, text) => {
-    expect(told(name, value, unit)).toBe(text);
+    expect(described(name, value, unit)).toBe(text);
   });
 });
 

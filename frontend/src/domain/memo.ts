@@ -41,10 +41,10 @@ export function withParts<Whole extends object>(whole: Whole, parts: Partial<Who
 }
 
 /** What it was given last time, as long as that is the same: by its parts, or as `isSame` says. */
-export function keeping<Kept extends object>(
-  isSame = (last: Kept, next: Kept): boolean => withParts(last, next) === last,
-): (next: Kept) => Kept {
-  let last: Kept | null = null;
+export function retainEqual<Value extends object>(
+  isSame = (last: Value, next: Value): boolean => withParts(last, next) === last,
+): (next: Value) => Value {
+  let last: Value | null = null;
   return (next) => (last = last && isSame(last, next) ? last : next);
 }
 

@@ -13,7 +13,7 @@ import {
   rgbText,
   rounded,
   sensorColour,
-  toldApart,
+  withDistinctEnds,
   withIdeal,
 } from './ramp';
 
@@ -84,11 +84,11 @@ test('of values that nobody can tell apart its ends are told apart', () => {
     [0.3, 0.3],
     [1013, 1013],
   ] as const) {
-    const range = toldApart({ low, high });
+    const range = withDistinctEnds({ low, high });
     expect(numberText(range.high)).not.toBe(numberText(range.low));
     expect(Math.abs(fraction(range, low) - 0.5)).toBeLessThan(0.1);
   }
-  expect(toldApart({ low: 20, high: 22 })).toEqual({ low: 20, high: 22 });
+  expect(withDistinctEnds({ low: 20, high: 22 })).toEqual({ low: 20, high: 22 });
 });
 
 test('values that come and go at its edge do not make it flicker', () => {

@@ -108,7 +108,7 @@ export function withIdeal({ low, high }: Range, ideal: Span | null): Range {
 }
 
 /** Where both ends would read the same it is wider, on both sides: they are rounded to a tenth, or more. */
-export function toldApart({ low, high }: Range): Range {
+export function withDistinctEnds({ low, high }: Range): Range {
   const middle = (low + high) / 2;
   const size = Math.abs(middle);
   const least = Math.max(0.01 * size, 0.2 * Math.min(1, size)) || 0.2;

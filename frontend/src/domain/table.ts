@@ -3,7 +3,7 @@ import type { TagHealth, Verdict, WireTime } from '../contract/types';
 import { S } from '../strings';
 import { ageSeconds } from './time';
 import { type Cell, csv, finder } from './text';
-import { type HouseHealth, reasonsText, severity, tryKind } from './health';
+import { type HouseHealth, reasonsText, severity, attemptOutcome } from './health';
 import { groupedBy, memoLast, memoOne } from './memo';
 import { speciesText } from './marks';
 import type { Catalogue, Sensor } from './sensors';
@@ -137,7 +137,7 @@ function haystackOf(tag: Tag, health: TagHealth, sensors: Catalogue): string {
     tag.anomaly ? S.pest : '',
     tag.at ? '' : tag.farOff ? S.farOff : S.notOnMap,
     tag.scannedAt === 'never' ? S.neverObserved : '',
-    tag.failedTry ? S.tried[tryKind(tag.failedTry.status)] : '',
+    tag.failedAttempt ? S.attemptOutcomes[attemptOutcome(tag.failedAttempt.status)] : '',
     ...[...tag.readings.keys()].map((name) => `${name} ${sensors.named(name).label}`),
   ]
     .join(' ')

@@ -41,13 +41,13 @@ const SLACK_S = 5;
 
 /** `nowS` is the twin's time at which it was told: of what comes later nothing is missing. */
 export function missingOf(
-  told: Pick<WireTimeline, 'from' | 'to' | 'complete_to' | 'kept_from'>,
+  wire: Pick<WireTimeline, 'from' | 'to' | 'complete_to' | 'kept_from'>,
   nowS: number,
 ): readonly Missing[] {
-  const [from, to] = [secondsOf(told.from), Math.min(secondsOf(told.to), nowS)];
+  const [from, to] = [secondsOf(wire.from), Math.min(secondsOf(wire.to), nowS)];
   const missing: Missing[] = [];
-  if (told.kept_from) missing.push({ from, to: secondsOf(told.kept_from), why: 'not_kept' });
-  const complete = told.complete_to && secondsOf(told.complete_to);
+  if (wire.kept_from) missing.push({ from, to: secondsOf(wire.kept_from), why: 'not_kept' });
+  const complete = wire.complete_to && secondsOf(wire.complete_to);
   if (complete !== null && to - complete > SLACK_S) {
     missing.push({ from: Math.max(from, complete), to, why: 'not_recorded' });
   }

@@ -161,12 +161,12 @@ describe('times of their own', () => {
       last_try_detail: 'dark',
     });
     const tag = tagOf(wire, { at, takenAt: 0 });
-    expect(tag.lookedAt).toBe(-9_500);
-    expect(tag.failedTry).toEqual({ at: -120_000, status: 2, detail: 'dark' });
-    expect(tagOf({ ...wire, last_try_status: 0 }, { at, takenAt: 0 }).failedTry).toBeNull();
+    expect(tag.inspectedAt).toBe(-9_500);
+    expect(tag.failedAttempt).toEqual({ at: -120_000, status: 2, detail: 'dark' });
+    expect(tagOf({ ...wire, last_try_status: 0 }, { at, takenAt: 0 }).failedAttempt).toBeNull();
     // Without a clock there is no age.
     const timeless = tagOf(wire, { at: { sec: 0, nanosec: 0 }, takenAt: 0 });
-    expect([timeless.lookedAt, timeless.failedTry?.at]).toEqual(['unknown', 'unknown']);
+    expect([timeless.inspectedAt, timeless.failedAttempt?.at]).toEqual(['unknown', 'unknown']);
   });
 
   test('a tag of which nothing but its ages went on is the very same', () => {

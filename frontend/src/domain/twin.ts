@@ -3,7 +3,7 @@ import { mapPoint, type MapPoint } from '../geometry/coordinates';
 import type { Shared } from './memo';
 import type { When } from './time';
 
-export interface FailedTry {
+export interface FailedAttempt {
   readonly at: When;
   /** As in lupin_msgs/Observation; never 0, which is a success. */
   readonly status: number;
@@ -53,7 +53,7 @@ export function tagOf(wire: TwinTagState, state: TakenState) {
   const readAt = new Map(
     wire.readings.map((reading): [string, When] => [reading.name, readAtOf(wire, reading, state)]),
   );
-  const { looked_at: looked, last_try: tried, last_try_status: status } = wire;
+  const { looked_at: inspected, last_try: attempted, last_try_status: status } = wire;
   return {
     id: wire.tag_id,
     /** Metres; null: the tag has no pose, or one that is far off, and gets no pin. */
@@ -69,12 +69,12 @@ export function tagOf(wire: TwinTagState, state: TakenState) {
     /** When the newest reading was made. */
     scannedAt: newest(readAt.values()),
     /** When the flowers were last looked at; "never" also where the twin does not tell. */
-    lookedAt: looked === null ? 'never' : whenOf(looked, state),
+    inspectedAt: inspected === null ? 'never' : whenOf(inspected, state),
     /** The last scan or look, if it brought nothing. */
-    failedTry:
-      tried === null || status === null || status === 0
+    failedAttempt:
+      attempted === null || status === null || status === 0
         ? null
-        : ({ at: whenOf(tried, state), status, detail: wire.last_try_detail } as FailedTry),
+        : ({ at: whenOf(attempted, state), status, detail: wire.last_try_detail } as FailedAttempt),
     /** Whether it was ever observed in any way, and how long ago is known. */
     isObserved: wire.stale_seconds !== null,
     species: wire.species,

@@ -41,7 +41,7 @@ const Report = lazy(() => import('./Report'));
 const VIEWS = ['sites', 'alarms', 'compare', 'report'] as const;
 type View = (typeof VIEWS)[number];
 
-const asked = new URLSearchParams(window.location.search);
+const query = new URLSearchParams(window.location.search);
 
 interface Props {
   readonly seen: Seen;
@@ -52,13 +52,13 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
   const [view, setView] = useState<View>('sites');
   const [filter, setFilter] = useState<Filter>('all');
   const [search, setSearch] = useState('');
-  const [group, setGroup] = useState(asked.get('group') ?? '');
+  const [group, setGroup] = useState(query.get('group') ?? '');
   const field = useRef<HTMLInputElement>(null);
   const sites = useDeferredValue(seen.sites);
   const counts = useMemo(() => countsOf(sites.values()), [sites]);
   const alarms = useMemo(() => alarmCount(sites.values()), [sites]);
   // Before, there is nothing to count.
-  const isHere = seen.archive !== null;
+  const hasArchive = seen.archive !== null;
   const groups = useMemo(() => groupNames(sites.values()), [sites]);
   const shown = useMemo(() => chosen(sites, filter, search, group), [sites, filter, search, group]);
 
@@ -84,7 +84,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
         <h1>{words.sites}</h1>
         {isKiosk && (
           <span className="fleet-alarms" data-any={alarms > 0}>
-            {!isHere ? '' : alarms === 0 ? words.noAlarms : S.alarmCount(alarms)}
+            {!hasArchive ? '' : alarms === 0 ? words.noAlarms : S.alarmCount(alarms)}
           </span>
         )}
         {!isKiosk && (
@@ -94,7 +94,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
               value={view}
               onChange={setView}
               text={(each) => (each === 'alarms' || each === 'report' ? S[each] : words[each])}
-              count={(each) => (each === 'alarms' && isHere ? alarms : null)}
+              count={(each) => (each === 'alarms' && hasArchive ? alarms : null)}
             />
             <input
               ref={field}
@@ -124,7 +124,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
               value={filter}
               onChange={setFilter}
               text={filterText}
-              count={(each) => (isHere ? counts[each] : null)}
+              count={(each) => (hasArchive ? counts[each] : null)}
             />
           </>
         )}

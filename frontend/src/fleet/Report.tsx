@@ -80,7 +80,7 @@ export default function Report({ shown }: { shown: readonly Site[] }): JSX.Eleme
           </table>
           {notes.length > 0 && (
             <table className="fleet-table">
-              <caption className="fleet-note">{W.newestNotes}</caption>
+              <caption className="fleet-note">{W.latestNotes}</caption>
               <tbody>
                 {notes.map((note) => (
                   <NoteRow key={`${note.site} ${note.id}`} note={note} />

@@ -1,7 +1,7 @@
 /** The overview as the server sends it: one socket, tried again whenever it ends. */
 import { epochOf, now, onLapse } from '../clock';
 import { backoffMs } from '../connection/machine';
-import { signInIfAsked } from '../connection/socket';
+import { signInIfRequired } from '../connection/socket';
 import { parseSites, withFrame, type Archive, type Sites } from './sites';
 
 export interface Seen {
@@ -20,10 +20,10 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
   let seen: Seen = { sites: new Map(), archive: null, lostAt: null };
   let socket: WebSocket | null = null;
   let failures = 0;
-  let heardAt = now();
+  let receivedAt = now();
   let timer: ReturnType<typeof setTimeout> | undefined;
 
-  const tell = (news: Partial<Seen>): void => {
+  const update = (news: Partial<Seen>): void => {
     seen = { ...seen, ...news };
     onSeen(seen);
   };
@@ -37,7 +37,7 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
   const lost = (code: number | null): void => {
     drop();
     failures += 1;
-    if (seen.lostAt === null) tell({ lostAt: epochOf(heardAt) });
+    if (seen.lostAt === null) update({ lostAt: epochOf(receivedAt) });
     timer = setTimeout(open, backoffMs(failures, Math.random(), code));
   };
   const wait = (): void => {
@@ -56,18 +56,18 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
     socket.onclose = ({ code }) => {
       lost(code);
       // The server is away, or the session has ended.
-      if (!isOpened) void signInIfAsked();
+      if (!isOpened) void signInIfRequired();
     };
     socket.onmessage = ({ data }) => {
       const frame = parseSites(data);
       if (!frame) return;
-      heardAt = now();
+      receivedAt = now();
       failures = 0;
       wait();
       const isEmpty = !frame.is_whole && frame.sites.length === 0 && frame.gone.length === 0;
       const isSame = isEmpty && frame.archive.is_reachable === seen.archive?.is_reachable;
       if (isSame && seen.lostAt === null) return;
-      tell({ sites: withFrame(seen.sites, frame), archive: frame.archive, lostAt: null });
+      update({ sites: withFrame(seen.sites, frame), archive: frame.archive, lostAt: null });
     };
     wait();
   };

@@ -136,7 +136,7 @@ export function viewOf(camera: Camera, size: Size, leastScale = MIN_SCALE): View
 }
 
 /** What of the bounds stays in sight, pixels along each side. */
-const KEPT_PX = 40;
+const VISIBLE_PX = 40;
 
 /** The view, moved back so far that some of the bounds is to be seen. */
 export function inSight({ x, y, scale }: View, size: Size, bounds: Bounds): View {
@@ -144,8 +144,8 @@ export function inSight({ x, y, scale }: View, size: Size, bounds: Bounds): View
     Math.max(low, Math.min(high, value));
   return {
     scale,
-    x: clamp(x, KEPT_PX - bounds.maxX * scale, size.width - KEPT_PX - bounds.minX * scale),
-    y: clamp(y, KEPT_PX + bounds.minY * scale, size.height - KEPT_PX + bounds.maxY * scale),
+    x: clamp(x, VISIBLE_PX - bounds.maxX * scale, size.width - VISIBLE_PX - bounds.minX * scale),
+    y: clamp(y, VISIBLE_PX + bounds.minY * scale, size.height - VISIBLE_PX + bounds.maxY * scale),
   };
 }
 

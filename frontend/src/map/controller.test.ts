@@ -74,12 +74,12 @@ beforeEach(() => {
   vi.stubGlobal(
     'ResizeObserver',
     class {
-      readonly #tell: ResizeObserverCallback;
-      constructor(tell: ResizeObserverCallback) {
-        this.#tell = tell;
+      readonly #callback: ResizeObserverCallback;
+      constructor(callback: ResizeObserverCallback) {
+        this.#callback = callback;
       }
       observe(): void {
-        this.#tell([{ contentRect: SIZE }] as never, this as never);
+        this.#callback([{ contentRect: SIZE }] as never, this as never);
       }
       disconnect(): void {
         // Told once, and never again.

@@ -21,7 +21,7 @@ import {
   selectRange,
   selectSensor,
 } from '../store/derived';
-import { selectNewest, selectShown, selectTag, type Shown } from '../store/moment';
+import { selectLatest, selectShown, selectTag, type Shown } from '../store/moment';
 import { isPrinting, onThemeChange } from '../store/theme';
 import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
 import { keyAction, type MapActions, pinUnderMouse, pointedAt, theMap } from './commands';
@@ -175,7 +175,7 @@ export function runMap(
     const shown = contentOf(selectShown(state), lastField);
     return selectShown(state).moment === null
       ? shown
-      : together(contentOf(selectNewest(state), null), shown);
+      : together(contentOf(selectLatest(state), null), shown);
   };
 
   const goToContent = (): void => {

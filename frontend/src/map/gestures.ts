@@ -31,9 +31,9 @@ function takeHold(element: HTMLElement, held: Held): Hand {
     behaviour.transform(selection, transformOf(view));
     isFollowing = false;
   };
-  const byHand = (tell: (event: D3ZoomEvent<HTMLElement, unknown>) => void) => {
+  const byHand = (listener: (event: D3ZoomEvent<HTMLElement, unknown>) => void) => {
     return (event: D3ZoomEvent<HTMLElement, unknown>): void => {
-      if (!isFollowing) tell(event);
+      if (!isFollowing) listener(event);
     };
   };
   selection.call(behaviour);

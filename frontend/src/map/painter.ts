@@ -56,7 +56,7 @@ import {
   selectSensor,
   type Heat,
 } from '../store/derived';
-import { keeping, memoLast, memoOne } from '../domain/memo';
+import { retainEqual, memoLast, memoOne } from '../domain/memo';
 import { selectShown, selectTag, selectTags } from '../store/moment';
 import type { MapPicture } from '../geometry/image';
 
@@ -95,7 +95,7 @@ export class Painter {
   #ruler = contextOf(newCanvas(1, 1));
   /** Where labels found their places when the map last came to rest, and at which scale. */
   #room: RoomAt | null = null;
-  readonly #keptRoom = keeping<RoomAt>(equal);
+  readonly #retainedRoom = retainEqual<RoomAt>(equal);
   #paintedScene: Scene | null = null;
   readonly #hatching = new Hatching();
   readonly #stillBuffer = new PanBuffer();
@@ -166,22 +166,22 @@ export class Painter {
       const { placement } = picture;
       drawPicture(pen, { picture: this.#mapPicture(picture, this.#colour), placement });
     }
-    const isTold = layers.has('field') && layers.has('unknown');
-    const mapped = isTold ? selectMapped(state) : null;
+    const isUnknownMarked = layers.has('field') && layers.has('unknown');
+    const mapped = isUnknownMarked ? selectMapped(state) : null;
     if (mapped) this.#drawUnknown(pen, mapped, picture);
     if (layers.has('grid')) drawGridLines(pen);
     if (layers.has('boxes')) drawBoxes(pen, this.scene(state, now).boxes);
     const heat = selectHeat(state);
     if (heat && layers.has('field')) {
       const detail = layers.has('smooth') ? smoothDetail(heat.field) : 1;
-      const coloured = this.#heatPicture(heat, selectSensor(state), detail, isTold);
+      const coloured = this.#heatPicture(heat, selectSensor(state), detail, isUnknownMarked);
       drawPicture(pen, placedField(heat.field, coloured));
-      if (isTold && !heat.isError) {
+      if (isUnknownMarked && !heat.isError) {
         for (const { cells, gap } of hatched(heat.field, heat.old)) {
           this.#hatching.draw(pen, placedField(heat.field, cells), null, gap);
         }
       }
-      if (isTold) drawEdges(pen, edges(holding(heat.field, heat.old)));
+      if (isUnknownMarked) drawEdges(pen, edges(holding(heat.field, heat.old)));
     }
     drawAreas(pen, selectAreas(state));
   }
@@ -210,7 +210,7 @@ export class Painter {
         ...{ left: left - view.x, right: right - view.x },
         ...{ top: top - view.y, bottom: bottom - view.y },
       });
-      this.#room = this.#keptRoom({
+      this.#room = this.#retainedRoom({
         scale: view.scale,
         within: moved({ left: 0, top: 0, right: width, bottom: height }),
         covered: covered.map(moved),
@@ -272,10 +272,10 @@ export class Painter {
     );
   }
 
-  readonly #sceneInput = keeping<SceneInput>();
+  readonly #sceneInput = retainEqual<SceneInput>();
   /** The very same where nothing looks otherwise: labels stay in their places then. */
-  readonly #keptScene = keeping<Scene>(equal);
-  readonly #scene = memoOne((input: SceneInput) => this.#keptScene(buildScene(input)));
+  readonly #retainedScene = retainEqual<Scene>(equal);
+  readonly #scene = memoOne((input: SceneInput) => this.#retainedScene(buildScene(input)));
 
   readonly #labels = memoLast(
     (
@@ -311,7 +311,7 @@ export class Painter {
       { field, range, zones, difference, isError, old }: Heat,
       sensor: Sensor,
       detail: number,
-      isTold: boolean,
+      isUnknownMarked: boolean,
     ) => {
       const shade = difference
         ? divergingShade(range)
@@ -320,7 +320,9 @@ export class Painter {
           : zones
             ? idealShade(zones)
             : fieldShade(sensor, range);
-      return canvasOfPixels(fieldPixels(field, old ? withOld(shade, old, isTold) : shade, detail));
+      return canvasOfPixels(
+        fieldPixels(field, old ? withOld(shade, old, isUnknownMarked) : shade, detail),
+      );
     },
   );
 }

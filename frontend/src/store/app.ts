@@ -1,6 +1,6 @@
 import type { Size, View } from '../geometry/coordinates';
 import { type Change, changed, createStore, useSelected } from './create';
-import { createFetcher, type FetcherOptions, type Wish } from './fetcher';
+import { createFetcher, type FetcherOptions, type FetchTask } from './fetcher';
 import { DEFAULT_SETTINGS, type Settings } from './settings';
 import { NO_TWIN, type TwinState } from './twin';
 import { DEFAULT_VIEW, type ViewState, viewAfter } from './view';
@@ -67,12 +67,12 @@ interface KeepOptions<T> extends FetcherOptions<T> {
 /** Fetches what the state wishes for; undefined: as before. Returns the way to stop. */
 export function keepFetched<T>(
   { everyMs, parts = (state) => [state], ...options }: KeepOptions<T>,
-  wishFor: (state: AppState) => Wish<T> | null | undefined,
+  taskFor: (state: AppState) => FetchTask<T> | null | undefined,
 ): () => void {
   const fetcher = createFetcher(options);
   const update = (): void => {
-    const wish = wishFor(store.get());
-    if (wish !== undefined) fetcher.want(wish);
+    const task = taskFor(store.get());
+    if (task !== undefined) fetcher.want(task);
   };
   update();
   const stop = onChange(parts, update);

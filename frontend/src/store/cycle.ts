@@ -10,10 +10,10 @@ import { selectTags } from './moment';
 
 export const CYCLE_LIMITS = { least: 5, most: 3_600 } as const;
 
-export type CycleWish = ReturnType<typeof cycleWish>;
+export type CycleSetting = ReturnType<typeof cycleSetting>;
 
 /** The wish in an address: `?kiosk=1&cycle=30`. `seconds` a sensor; null: it stays. A bad one is `refused`, as written. */
-export function cycleWish(search: string) {
+export function cycleSetting(search: string) {
   const text = new URLSearchParams(search).get('cycle');
   const seconds = text !== null && /^\d{1,4}$/.test(text) ? Number(text) : NaN;
   const isAllowed = seconds >= CYCLE_LIMITS.least && seconds <= CYCLE_LIMITS.most;
@@ -46,7 +46,7 @@ export const nextSensor = createStore<{ readonly sensor: Sensor; readonly at: nu
 
 const round = memoLast(sensorsOf);
 
-export function startCycle({ seconds }: CycleWish): () => void {
+export function startCycle({ seconds }: CycleSetting): () => void {
   if (seconds === null) return () => undefined;
   let timer: ReturnType<typeof setTimeout> | undefined;
   let shown: string | null = null;

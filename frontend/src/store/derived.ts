@@ -3,7 +3,7 @@ import { houseHealth, type HouseHealth } from '../domain/health';
 import type { Field } from '../contract/types';
 import { symmetricRange } from '../domain/difference';
 import { errorField, onExplored } from '../domain/field';
-import { type Range, rangeOf, rounded, toldApart, withIdeal } from '../domain/ramp';
+import { type Range, rangeOf, rounded, withDistinctEnds, withIdeal } from '../domain/ramp';
 import {
   type CellGrid,
   oldCells,
@@ -32,8 +32,8 @@ import {
 } from '../domain/table';
 import { equal, type Tag } from '../domain/twin';
 import type { AppState } from './app';
-import { keeping, memoLast, memoOne } from '../domain/memo';
-import { isHeardNow, selectIsHeard, selectNewest, selectShown, selectTags } from './moment';
+import { retainEqual, memoLast, memoOne } from '../domain/memo';
+import { isReceivingNow, selectIsReceiving, selectLatest, selectShown, selectTags } from './moment';
 import type { MapPicture } from '../geometry/image';
 import type { Difference } from './twin';
 import { isColumnShown } from './settings';
@@ -43,12 +43,12 @@ const healthShown = memoLast(houseHealth);
 const healthNow = memoLast(houseHealth);
 
 export const selectHealth = (state: AppState): HouseHealth =>
-  healthShown(selectTags(state), selectShown(state).health, selectIsHeard(state));
+  healthShown(selectTags(state), selectShown(state).health, selectIsReceiving(state));
 
 /** As it is now, whatever moment is shown; null before anything has come. */
-export function selectNewestHealth(state: AppState): HouseHealth | null {
-  const { snapshot, health } = selectNewest(state);
-  return snapshot && healthNow(snapshot.tags, health, isHeardNow(state));
+export function selectLatestHealth(state: AppState): HouseHealth | null {
+  const { snapshot, health } = selectLatest(state);
+  return snapshot && healthNow(snapshot.tags, health, isReceivingNow(state));
 }
 
 export const selectCatalogues = (state: AppState): Catalogues =>
@@ -71,11 +71,11 @@ export const sourceOf = (state: AppState): Source =>
   state.view.heat !== 'nearest' && isMeasured(selectSensor(state)) ? 'estimate' : 'nearest';
 
 /** A new snapshot with the same sensors keeps the same list. */
-const keptNames = keeping<readonly string[]>(equal);
+const retainedNames = retainEqual<readonly string[]>(equal);
 const namesIn = memoLast((tags: readonly Tag[], chosen: string): readonly string[] => {
   const names = new Set(tags.flatMap((tag) => [...tag.readings.keys()]));
   if (chosen) names.add(chosen);
-  return keptNames([...names].sort());
+  return retainedNames([...names].sort());
 });
 const offered = memoLast((catalogue: Catalogue, names: readonly string[]) => catalogue.with(names));
 
@@ -94,7 +94,7 @@ const notHidden = memoLast((columns: readonly Sensor[], hidden: readonly string[
 export const selectShownColumns = (state: AppState): readonly Sensor[] =>
   notHidden(selectColumns(state), state.settings.hidden);
 
-const keptRange = keeping<Range>();
+const retainedRange = retainEqual<Range>();
 
 const rangeOfReadings = memoLast((tags: readonly Tag[], sensor: string): Range | null =>
   rangeOf(tags.map((tag) => tag.readings.get(sensor))),
@@ -111,18 +111,18 @@ export function selectRange(state: AppState): Range | null {
   const needed =
     isMapped && held?.sensor === view.sensor ? held.range : readings && rounded(readings);
   if (!needed) return null;
-  return keptRange(toldApart(withIdeal(needed, selectSensor(state).ideal)));
+  return retainedRange(withDistinctEnds(withIdeal(needed, selectSensor(state).ideal)));
 }
 
 const siteOf = ({ at, sureSpecies: species }: Tag): Site[] => (at ? [{ at, species }] : []);
 /** New tags whose places and plants are those of before keep the list. */
-const keptSites = keeping<readonly Site[]>(equal);
-const sitesIn = memoOne((tags: readonly Tag[]) => keptSites(tags.flatMap(siteOf)));
+const retainedSites = retainEqual<readonly Site[]>(equal);
+const sitesIn = memoOne((tags: readonly Tag[]) => retainedSites(tags.flatMap(siteOf)));
 
 /** The same for all fields that lie alike. */
-const keptGrid = keeping<CellGrid>();
+const retainedGrid = retainEqual<CellGrid>();
 const gridOf = memoOne(({ width, height, originX, originY, resolution }: Field) =>
-  keptGrid({ width, height, originX, originY, resolution }),
+  retainedGrid({ width, height, originX, originY, resolution }),
 );
 
 const zonesBy = memoLast(zonesOf);
@@ -155,11 +155,13 @@ export interface Heat {
   readonly old: Uint8Array | null;
 }
 
-const keptHeat = keeping<Heat>();
+const retainedHeat = retainEqual<Heat>();
 const PLAIN = { zones: null, difference: null, isError: false, old: null } as const;
 
-const keptRead = keeping<readonly ReadSite[]>(equal);
-const readBy = memoLast((...given: Parameters<typeof readSites>) => keptRead(readSites(...given)));
+const retainedRead = retainEqual<readonly ReadSite[]>(equal);
+const readBy = memoLast((...given: Parameters<typeof readSites>) =>
+  retainedRead(readSites(...given)),
+);
 const oldBy = memoLast(oldCells);
 
 /**
@@ -192,7 +194,7 @@ const errorOf = memoOne((field: Field): Field | null =>
 );
 const errorRange = memoOne(({ valueMax }: Field): Range => ({ low: 0, high: valueMax }));
 
-const keptDifference = keeping<Range>();
+const retainedDifference = retainEqual<Range>();
 
 /** Null: there is none, or the one that is wanted is not here, or nobody knows its colours yet. */
 export function selectHeat(state: AppState): Heat | null {
@@ -203,17 +205,18 @@ export function selectHeat(state: AppState): Heat | null {
     const field = value?.field;
     if (field?.sensor !== state.view.sensor || field.sampleCount === 0) return null;
     const old = sourceOf(state) === 'nearest' ? selectOld(state, field) : null;
-    const range = keptDifference(symmetricRange(field, selectSensor(state)));
-    return keptHeat({ ...PLAIN, field, range, difference: value, old });
+    const range = retainedDifference(symmetricRange(field, selectSensor(state)));
+    return retainedHeat({ ...PLAIN, field, range, difference: value, old });
   }
   const field = selectField(state);
   const error = field && state.view.heat === 'error' ? errorOf(field) : null;
-  if (error) return keptHeat({ ...PLAIN, field: error, range: errorRange(error), isError: true });
+  if (error)
+    return retainedHeat({ ...PLAIN, field: error, range: errorRange(error), isError: true });
   const range = selectRange(state);
   if (!field || !range || field.sampleCount === 0) return null;
   const isIdeal = selectColouring(state) === 'ideal';
   const old = field.sureness ? null : selectOld(state, field);
-  return keptHeat({
+  return retainedHeat({
     ...PLAIN,
     field,
     range,

@@ -9,8 +9,8 @@ import type { Bounds } from '../geometry/coordinates';
 import { keepFetched, receive, type AppState } from './app';
 import { sourceOf } from './derived';
 import { boxOfPins, fetchHeat, fieldResolution } from './heat';
-import { rosNow, selectNewest, selectShown } from './moment';
-import { DRAG_PACE_MS, failed, NOTHING, ready, type Wish } from './fetcher';
+import { rosNow, selectLatest, selectShown } from './moment';
+import { DRAG_PACE_MS, failed, NOTHING, ready, type FetchTask } from './fetcher';
 import { type Difference } from './twin';
 
 /** Live, the other moment moves on with now; this far at once, seconds. */
@@ -41,16 +41,16 @@ export function startDifference(): () => void {
         sourceOf(before) !== sourceOf(state);
       before = state;
       if (isOther && state.twin.difference !== NOTHING) receive({ difference: NOTHING });
-      return compare && wishFor(state, compare);
+      return compare && taskFor(state, compare);
     },
   );
 }
 
-function wishFor(state: AppState, compare: Compare): Wish<Difference> | undefined {
+function taskFor(state: AppState, compare: Compare): FetchTask<Difference> | undefined {
   const { moment, snapshot } = selectShown(state);
   const { epoch, socket } = state.twin.connection;
   const nowS = rosNow(state, now());
-  const resolution = fieldResolution(selectNewest(state).snapshot);
+  const resolution = fieldResolution(selectLatest(state).snapshot);
   const box = boxOf(snapshot, resolution);
   if (!snapshot || !box || nowS === null || socket.kind !== 'open') return undefined;
   const { sensor } = state.view;

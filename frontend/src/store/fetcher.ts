@@ -16,8 +16,8 @@ const MOST_DRAGGED = 2;
 const SETTLED_MS = 250;
 const TIMEOUT_MS = 30_000;
 /** While somebody drags, an answer serves again for so long: late readings may still change the past. */
-const KEEP_MS = 30_000;
-const MOST_KEPT = 60;
+const CACHE_MS = 30_000;
+const MOST_CACHED = 60;
 /** After a failure nothing is fetched for so long at least. */
 const CALM_MS = 500;
 const RETRY_FIRST_MS = 2_000;
@@ -40,7 +40,7 @@ export const failed = <T>(message: string, value: T | null = null): Fetched<T> =
   ...{ value, state: 'failed', message },
 });
 
-export interface Wish<T> {
+export interface FetchTask<T> {
   /** What it depends on; a wish with the key of the one before brings nothing new. */
   readonly key: string;
   /** A wish of another group takes over at once; those of one group keep the pace. */
@@ -76,7 +76,7 @@ export function createFetcher<T>({
     readonly order: number;
     readonly abort: AbortController;
   }
-  let wanted: Wish<T> | null = null;
+  let wanted: FetchTask<T> | null = null;
   let wantedSince = 0;
   /** The key whose value was handed on last, and the order of the wish that it was. */
   let done: string | null = null;
@@ -89,7 +89,7 @@ export function createFetcher<T>({
   let retryAt = -Infinity;
   let failures = 0;
   let timer: ReturnType<typeof setTimeout> | undefined;
-  const kept = new Map<string, { readonly value: T; readonly since: number }>();
+  const cached = new Map<string, { readonly value: T; readonly since: number }>();
 
   const end = (which: (each: Running) => boolean = () => true): void => {
     for (const each of running.filter(which)) each.abort.abort();
@@ -106,12 +106,12 @@ export function createFetcher<T>({
     onValue(value);
   };
 
-  const keep = (key: string, value: T): void => {
-    kept.delete(key);
-    kept.set(key, { value, since: now() });
-    for (const oldest of kept.keys()) {
-      if (kept.size <= MOST_KEPT) break;
-      kept.delete(oldest);
+  const cache = (key: string, value: T): void => {
+    cached.delete(key);
+    cached.set(key, { value, since: now() });
+    for (const oldest of cached.keys()) {
+      if (cached.size <= MOST_CACHED) break;
+      cached.delete(oldest);
     }
   };
 
@@ -137,9 +137,9 @@ export function createFetcher<T>({
     else start(wanted);
   };
 
-  const start = (wish: Wish<T>): void => {
+  const start = (task: FetchTask<T>): void => {
     const abort = new AbortController();
-    const mine = { key: wish.key, order: ++order, abort };
+    const mine = { key: task.key, order: ++order, abort };
     running = [...running, mine];
     startedAt = now();
     const late = setTimeout(() => {
@@ -151,11 +151,11 @@ export function createFetcher<T>({
       running = running.filter((each) => each !== mine);
       return !wasRunning;
     };
-    wish.run(abort.signal).then(
+    task.run(abort.signal).then(
       (value) => {
         if (isOver()) return;
-        if (isDragged) keep(wish.key, value);
-        handOn(wish.key, mine.order, value);
+        if (isDragged) cache(task.key, value);
+        handOn(task.key, mine.order, value);
         pump();
       },
       (error: unknown) => {
@@ -164,8 +164,8 @@ export function createFetcher<T>({
         const waitMs = error instanceof Refusal ? (error.retryAfterS ?? 0) * 1_000 : 0;
         calmUntil = now() + Math.min(CALM_LONGEST_MS, Math.max(CALM_MS, waitMs));
         // What nobody wants any more needs no second try.
-        if (wanted?.key === wish.key || !isDragged) {
-          if (isLasting) done = wish.key;
+        if (wanted?.key === task.key || !isDragged) {
+          if (isLasting) done = task.key;
           retryAt = now() + Math.min(RETRY_LONGEST_MS, RETRY_FIRST_MS * 2 ** failures);
           failures += 1;
           onError?.(failureText(error), isLasting);
@@ -177,10 +177,10 @@ export function createFetcher<T>({
 
   return {
     /** Null: nothing any more; all that is under way ends. */
-    want: (wish: Wish<T> | null): void => {
-      if (wish?.key === wanted?.key && wish?.group === wanted?.group) return;
-      const isOther = !wish || wish.group !== wanted?.group;
-      wanted = wish;
+    want: (task: FetchTask<T> | null): void => {
+      if (task?.key === wanted?.key && task?.group === wanted?.group) return;
+      const isOther = !task || task.group !== wanted?.group;
+      wanted = task;
       wantedSince = now();
       if (isOther || isDragged) {
         failures = 0;
@@ -189,13 +189,13 @@ export function createFetcher<T>({
       if (isOther) {
         clearTimeout(timer);
         end();
-        kept.clear();
+        cached.clear();
         done = null;
         startedAt = -Infinity;
       }
-      if (!wish) return;
-      const known = kept.get(wish.key);
-      if (known && now() - known.since < KEEP_MS) handOn(wish.key, ++order, known.value);
+      if (!task) return;
+      const known = cached.get(task.key);
+      if (known && now() - known.since < CACHE_MS) handOn(task.key, ++order, known.value);
       else pump();
     },
   };
@@ -205,9 +205,9 @@ export function createFetcher<T>({
  * What a component wishes for just now; null: nothing more. The value before stays until the next
  * has come, also that of another group: "waiting" then.
  */
-export function useFetched<T>(wish: Wish<T> | null, paceMs: number): Fetched<T> {
+export function useFetched<T>(task: FetchTask<T> | null, paceMs: number): Fetched<T> {
   const [fetched, setFetched] = useState<Fetched<T>>(NOTHING);
-  const [group, setGroup] = useState(wish?.group);
+  const [group, setGroup] = useState(task?.group);
   const [fetcher] = useState(() =>
     createFetcher<T>({
       paceMs,
@@ -219,13 +219,13 @@ export function useFetched<T>(wish: Wish<T> | null, paceMs: number): Fetched<T> 
       },
     }),
   );
-  if (wish && wish.group !== group) {
-    setGroup(wish.group);
+  if (task && task.group !== group) {
+    setGroup(task.group);
     setFetched(({ value }) => ({ value, state: 'waiting', message: '' }));
   }
   // The same wish as before changes nothing.
   useEffect(() => {
-    fetcher.want(wish);
+    fetcher.want(task);
   });
   useEffect(
     () => () => {

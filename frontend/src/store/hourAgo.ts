@@ -7,7 +7,7 @@ import { sameReading, type TagThen } from '../domain/difference';
 import { snapshotOf, type Tag } from '../domain/twin';
 import { keepFetched, store, type AppState } from './app';
 import { createStore } from './create';
-import { rosNow, selectDayS, selectNewest, selectShown } from './moment';
+import { rosNow, selectDayS, selectLatest, selectShown } from './moment';
 import { isColumnShown } from './settings';
 import { NOT_JUDGED } from '../domain/health';
 
@@ -43,7 +43,7 @@ export function selectHourAgo(state: AppState, last: HourAgo | null): HourAgo | 
 
 /** What was known an hour before now, whatever moment is shown; null: not known. */
 export function selectHourAgoNow(state: AppState, last: HourAgo | null): HourAgo | null {
-  const { snapshot } = selectNewest(state);
+  const { snapshot } = selectLatest(state);
   if (!last || !snapshot) return null;
   // It may be twice as old as it serves: the next answer is on its way.
   const isNear = Math.abs(secondsOf(snapshot.at) - last.of) <= 2 * SERVES * selectHourS(state);

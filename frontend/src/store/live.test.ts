@@ -60,12 +60,12 @@ test('the first state is taken at once, as old as the bridge says', () => {
 test('of many frames the newest is taken, a few times a second', () => {
   FakeSocket.last.speak(status());
   let changes = 0;
-  const unhear = store.subscribe(() => (changes += 1));
+  const unsubscribe = store.subscribe(() => (changes += 1));
   for (let i = 0; i < 20; i++) {
     FakeSocket.last.speak(stateFrame([wireTag()], { seq: i, sec: 10 + i, revision: `r${i}` }));
     vi.advanceTimersByTime(100);
   }
-  unhear();
+  unsubscribe();
   vi.advanceTimersByTime(300);
   expect(revision()).toBe('r19');
   expect(changes).toBeLessThanOrEqual(10);

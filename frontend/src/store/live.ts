@@ -1,7 +1,7 @@
 /** The page's one connection, and what its frames do to the store. */
 import { now, onLapse } from '../clock';
 import { latestAfter } from '../contract/frames';
-import { connect, type Link, signInIfAsked } from '../connection/socket';
+import { connect, type Link, signInIfRequired } from '../connection/socket';
 import { stateSocketUrl } from '../contract/api';
 import type { Latest } from '../contract/types';
 import { receive } from './app';
@@ -18,13 +18,13 @@ export function pauseMs(tags: number): number {
 }
 
 /** A message that could not be read is told of for so long after the last one. */
-const TOLD_MS = 60_000;
+const REPORT_MS = 60_000;
 
 let current: Link | null = null;
 
 /** Does not wait for the back-off any longer. */
 export function retryConnection(): void {
-  current?.tell('wake');
+  current?.dispatch('wake');
 }
 
 export function startLive(): () => void {
@@ -35,7 +35,7 @@ export function startLive(): () => void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let forget: ReturnType<typeof setTimeout> | undefined;
   /** The connection that `latest` came on, and the last one whose first state was taken. */
-  let heardOn = -1;
+  let receivedOn = -1;
   let greeted = -1;
 
   const take = (stateAgeSeconds: number | null): void => {
@@ -50,25 +50,25 @@ export function startLive(): () => void {
       receive(withState(latest, arrivedAt, stateAgeSeconds));
     } catch (error) {
       // The check of frames let something through: the page goes on with what it has.
-      tellBad(String(error));
-      link.tell('broken');
+      reportBad(String(error));
+      link.dispatch('broken');
     }
   };
 
-  const tellBad = (why: string): void => {
+  const reportBad = (why: string): void => {
     receive(withUnread(why));
     clearTimeout(forget);
     forget = setTimeout(() => {
       receive({ unread: null });
-    }, TOLD_MS);
+    }, REPORT_MS);
   };
 
   const link = connect(stateSocketUrl(), {
     onConnection: (connection) => {
       receive(withConnection(connection, now()));
     },
-    onRefused: () => void signInIfAsked(),
-    onBad: tellBad,
+    onRefused: () => void signInIfRequired(),
+    onBad: reportBad,
     onFrame: (frame, connection) => {
       const { epoch, status } = connection;
       if (frame.type === 'alarms') {
@@ -82,17 +82,17 @@ export function startLive(): () => void {
       }
       if (frame.type !== 'status') {
         const at = now();
-        const next = latestAfter(heardOn === epoch ? latest : null, frame);
+        const next = latestAfter(receivedOn === epoch ? latest : null, frame);
         if (!next) {
-          link.tell('broken');
+          link.dispatch('broken');
           return;
         }
         latest = next;
-        heardOn = epoch;
+        receivedOn = epoch;
         isNew = true;
         arrivedAt = at;
       }
-      if (!latest || heardOn !== epoch || !status) return;
+      if (!latest || receivedOn !== epoch || !status) return;
       if (greeted !== epoch) {
         // The first state may be an old one that the bridge kept; its status says how old.
         greeted = epoch;
@@ -106,14 +106,14 @@ export function startLive(): () => void {
     },
   });
   current = link;
-  const unhear = onLapse(() => {
+  const unsubscribe = onLapse(() => {
     latest = null;
     isNew = false;
     receive({ isTimeLost: true });
-    link.tell('start');
+    link.dispatch('start');
   });
   return () => {
-    unhear();
+    unsubscribe();
     clearTimeout(timer);
     clearTimeout(forget);
     link.stop();

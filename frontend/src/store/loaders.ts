@@ -7,9 +7,9 @@ import { type MapPicture, mapPlacement, opaqueBox, pixelBoxCorners } from '../ge
 import { act, type AppState, keepFetched, onChange, receive, store } from './app';
 import { withField, withLatest } from './twin';
 import { sourceOf } from './derived';
-import { failed, NOTHING, ready, type Wish } from './fetcher';
+import { failed, NOTHING, ready, type FetchTask } from './fetcher';
 import { boxOfPins, fetchHeat, fieldResolution } from './heat';
-import { selectNewest } from './moment';
+import { selectLatest } from './moment';
 import { DEFAULT_VIEW } from './view';
 
 const FIELD_INTERVAL_MS = 500;
@@ -31,10 +31,10 @@ export function startLoaders(): () => void {
           receive(withField(ready(value)));
         },
         onError: (message) => {
-          receive(withField(failed(message, selectNewest(store.get()).field.value)));
+          receive(withField(failed(message, selectLatest(store.get()).field.value)));
         },
       },
-      fieldWish,
+      fieldTask,
     ),
     keepFetched<MapPicture>(
       {
@@ -43,7 +43,7 @@ export function startLoaders(): () => void {
           receive(withLatest({ map: ready(value) }));
         },
         onError: (message) => {
-          receive(withLatest({ map: failed(message, selectNewest(store.get()).map.value) }));
+          receive(withLatest({ map: failed(message, selectLatest(store.get()).map.value) }));
         },
       },
       (state) => {
@@ -77,9 +77,9 @@ export function startLoaders(): () => void {
   };
 }
 
-function fieldWish(state: AppState): Wish<Field> | null {
+function fieldTask(state: AppState): FetchTask<Field> | null {
   const { sensor } = state.view;
-  const { snapshot } = selectNewest(state);
+  const { snapshot } = selectLatest(state);
   const base = baseKey(state);
   if (base === null || !boxOfPins(snapshot)) return null;
   const source = sourceOf(state);
@@ -97,7 +97,7 @@ function fieldWish(state: AppState): Wish<Field> | null {
 /** What the page does not show any more goes at once: a restarted twin begins empty. */
 function forgetOld(): void {
   const state = store.get();
-  const { field, map, snapshot } = selectNewest(state);
+  const { field, map, snapshot } = selectLatest(state);
   if (baseKey(state) === null) return;
   if (field.value && !boxOfPins(snapshot)) receive(withField(NOTHING));
   if (map.value && !state.twin.lastStatus?.has_map) receive(withLatest({ map: NOTHING }));
@@ -108,7 +108,7 @@ function forgetOld(): void {
  * while there is none, and until the bridge has said on it what there is to ask for.
  */
 function baseKey(state: AppState): string | null {
-  const { snapshot } = selectNewest(state);
+  const { snapshot } = selectLatest(state);
   const { epoch, socket, status } = state.twin.connection;
   return snapshot && status && socket.kind === 'open' ? `${epoch}|${snapshot.revision}` : null;
 }

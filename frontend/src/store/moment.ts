@@ -67,7 +67,7 @@ export const selectShown = ({ twin, view }: AppState): Shown => shownAt(twin, vi
 export const selectHasTime = ({ twin }: AppState): boolean => clockOf(twin) !== 'unknown';
 
 /** The newest there is, whatever is shown: for the connection's word, and for what to fetch. */
-export const selectNewest = ({ twin }: AppState): House => twin.latest;
+export const selectLatest = ({ twin }: AppState): House => twin.latest;
 
 export const selectPast = ({ twin }: AppState): Past | null => twin.past;
 
@@ -94,19 +94,19 @@ export function rosNow({ twin }: AppState, at: number): number | null {
  * Whether what is shown is heard of: the present of a twin that is silent, or cut off, is not. What
  * a past moment was like does not depend on it.
  */
-export const selectIsHeard = (state: AppState): boolean =>
-  selectShown(state).moment !== null || isHeardNow(state);
+export const selectIsReceiving = (state: AppState): boolean =>
+  selectShown(state).moment !== null || isReceivingNow(state);
 
 /** Whether the bridge does not answer: nothing comes, and nothing that is done here gets there. */
-export const selectIsCut = ({ twin: { phase } }: AppState): boolean =>
+export const selectIsDisconnected = ({ twin: { phase } }: AppState): boolean =>
   phase === 'stale' || phase === 'reconnecting';
 
-export const isHeardNow = ({ twin }: AppState): boolean =>
+export const isReceivingNow = ({ twin }: AppState): boolean =>
   twin.phase === 'live' && !twin.isTimeLost;
 
 export const selectSnapshot = (state: AppState): Snapshot | null => selectShown(state).snapshot;
 
-export const selectIsHere = (state: AppState): boolean => selectSnapshot(state) !== null;
+export const selectHasSnapshot = (state: AppState): boolean => selectSnapshot(state) !== null;
 
 const NO_TAGS: readonly Tag[] = [];
 
@@ -120,7 +120,7 @@ const byId = memoOne(
 export const selectTag = (state: AppState, tagId: string): Tag | undefined =>
   byId(selectTags(state)).get(tagId);
 
-export const selectNewestTag = ({ twin }: AppState, tagId: string): Tag | undefined =>
+export const selectLatestTag = ({ twin }: AppState, tagId: string): Tag | undefined =>
   byId(twin.latest.snapshot?.tags ?? NO_TAGS).get(tagId);
 
 /**
@@ -147,7 +147,7 @@ export const selectHasOwnTime = (state: AppState): boolean =>
 export function ownTime(state: AppState, at: number): number | null {
   if (!selectHasOwnTime(state)) return null;
   // Of one that is silent, that which was heard last.
-  return rosNow(state, isHeardNow(state) ? at : -Infinity);
+  return rosNow(state, isReceivingNow(state) ? at : -Infinity);
 }
 
 /** What is drawn is what was fetched; until then it is what was asked for. */
@@ -162,7 +162,7 @@ export function barSpan(state: AppState, nowS: number): Span {
 export const twinNow = (): number | null => rosNow(store.get(), now());
 
 /** What the end of the bar is called: of a recording it is no present, nor while nothing comes. */
-export const newestWord = (): string => {
+export const latestWord = (): string => {
   const { phase } = store.get().twin;
   if (phase !== 'live') return S.phase[phase];
   return selectIsRecorded(store.get()) ? S.origin.recorded : S.timebarLive;

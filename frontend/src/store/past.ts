@@ -7,8 +7,8 @@ import { snapshotOf } from '../domain/twin';
 import { type AppState, keepFetched, receive, store } from './app';
 import { sourceOf } from './derived';
 import { fetchHeat, fieldResolution } from './heat';
-import { selectNewest, selectPast } from './moment';
-import { DRAG_PACE_MS, failed, type Fetched, NOTHING, ready, type Wish } from './fetcher';
+import { selectLatest, selectPast } from './moment';
+import { DRAG_PACE_MS, failed, type Fetched, NOTHING, ready, type FetchTask } from './fetcher';
 import { NO_HOUSE, type Past, withPast } from './twin';
 
 /**
@@ -21,7 +21,7 @@ const QUALITY_AFTER_MS = 400;
 
 export function startPast(): () => void {
   let patience: ReturnType<typeof setTimeout> | undefined;
-  let heardOn = 0;
+  let receivedOn = 0;
 
   const show = (past: Past): void => {
     clearTimeout(patience);
@@ -41,7 +41,7 @@ export function startPast(): () => void {
     receive({ pastFault: { at: moment, message, isLasting } });
   };
 
-  const wish = (state: AppState): Wish<Past> | null => {
+  const task = (state: AppState): FetchTask<Past> | null => {
     const { moment } = state.view;
     const past = selectPast(state);
     if (moment === null) {
@@ -52,19 +52,19 @@ export function startPast(): () => void {
     }
     const fault = state.twin.pastFault;
     if (fault && fault.at !== moment) receive({ pastFault: null });
-    if (!past && !selectNewest(state).snapshot) showNothing(moment);
+    if (!past && !selectLatest(state).snapshot) showNothing(moment);
     else if (!past) patience ??= setTimeout(losePatience, PATIENCE_MS);
     else patience = undefined;
     const { epoch, socket } = state.twin.connection;
     // Each connection asks anew: another server may be behind it, or more was heard meanwhile.
-    if (socket.kind === 'open') heardOn = epoch;
-    return wishFor(state, moment, heardOn);
+    if (socket.kind === 'open') receivedOn = epoch;
+    return taskFor(state, moment, receivedOn);
   };
   const parts = ({ view, twin }: AppState): readonly unknown[] => [view, twin];
   const stops = [
     keepFetched<Past>(
       { paceMs: DRAG_PACE_MS, isDragged: true, parts, onValue: show, onError },
-      wish,
+      task,
     ),
     keepFetched<FieldQuality>(
       {
@@ -75,7 +75,7 @@ export function startPast(): () => void {
           if (past) receive(withPast({ ...past, house: { ...past.house, quality } }));
         },
       },
-      qualityWish,
+      qualityTask,
     ),
   ];
   return () => {
@@ -85,7 +85,7 @@ export function startPast(): () => void {
 }
 
 /** For a field that has come without it; an estimate tells its own error. */
-function qualityWish(state: AppState): Wish<FieldQuality> | null {
+function qualityTask(state: AppState): FetchTask<FieldQuality> | null {
   const past = selectPast(state);
   const field = past?.house.field.value;
   if (!past || !field || field.sureness || past.house.quality) return null;
@@ -102,10 +102,10 @@ function qualityWish(state: AppState): Wish<FieldQuality> | null {
   };
 }
 
-function wishFor(state: AppState, at: number, epoch: number): Wish<Past> {
+function taskFor(state: AppState, at: number, epoch: number): FetchTask<Past> {
   const { sensor } = state.view;
   const source = sourceOf(state);
-  const resolution = fieldResolution(selectNewest(state).snapshot);
+  const resolution = fieldResolution(selectLatest(state).snapshot);
   return {
     key: `${epoch}|${at}|${sensor}|${resolution}|${source}`,
     run: async (signal) => {

@@ -5,7 +5,7 @@ import { endsNow, type Period, type Span, spanOf } from '../domain/time';
 import { type Timeline, timelineOf } from '../domain/timeline';
 import { act, keepFetched, receive, store } from './app';
 import { failed, NOTHING, ready } from './fetcher';
-import { rosNow, selectNewest } from './moment';
+import { rosNow, selectLatest } from './moment';
 import { DEFAULT_VIEW, SHORT_PERIOD } from './view';
 
 /** Enough for the widest bar: a bucket is two or three pixels there. */
@@ -16,7 +16,7 @@ const SOONEST_S = 5;
 const LATEST_S = 30;
 
 /** The stretch to ask for: whole buckets, so that those that have passed stay as they are. */
-export function askedSpan(period: Period, nowS: number): Span | null {
+export function requestedSpan(period: Period, nowS: number): Span | null {
   if (period.kind === 'all') return null;
   const span = spanOf(period, nowS, null);
   if (!endsNow(period)) return span;
@@ -35,7 +35,7 @@ export function turnOf(period: Period, nowS: number): number {
 }
 
 export function startRemembered(): () => void {
-  let asked = '';
+  let requested = '';
   let changes = 0;
   return keepFetched<Timeline>(
     {
@@ -44,7 +44,7 @@ export function startRemembered(): () => void {
       parts: (state) => [
         state.view.period,
         state.twin.connection.epoch,
-        selectNewest(state).snapshot === null,
+        selectLatest(state).snapshot === null,
       ],
       onValue: (value) => {
         receive({ remembered: ready(value) });
@@ -61,8 +61,8 @@ export function startRemembered(): () => void {
       }
       const { period } = state.view;
       const next = JSON.stringify(period);
-      if (next !== asked) {
-        asked = next;
+      if (next !== requested) {
+        requested = next;
         changes += 1;
         // What is known of another period is of no use.
         if (state.twin.remembered.value) receive({ remembered: NOTHING });
@@ -73,7 +73,7 @@ export function startRemembered(): () => void {
         key: `${epoch}|${turnOf(period, nowS)}`,
         group: String(changes),
         run: (signal) =>
-          fetchTimeline(askedSpan(period, nowS), BUCKETS, signal).then((wire) =>
+          fetchTimeline(requestedSpan(period, nowS), BUCKETS, signal).then((wire) =>
             timelineOf(wire, nowS),
           ),
       };

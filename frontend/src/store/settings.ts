@@ -40,10 +40,10 @@ const KEY = 'lupin-twin.settings';
 /** Reads what was kept; what is not there or damaged is as by default. */
 export function readSettings(storage: Pick<Storage, 'getItem'>): Settings {
   try {
-    const kept = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<Settings>;
+    const stored = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<Settings>;
     // The first thing that looks for a column in no list would leave the page blank for good.
-    const hidden = Array.isArray(kept.hidden) ? kept.hidden : [];
-    return { ...DEFAULT_SETTINGS, ...kept, hidden };
+    const hidden = Array.isArray(stored.hidden) ? stored.hidden : [];
+    return { ...DEFAULT_SETTINGS, ...stored, hidden };
   } catch {
     return DEFAULT_SETTINGS;
   }

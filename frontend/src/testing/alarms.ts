@@ -30,6 +30,6 @@ export const alarms = (list: readonly Alarm[], over: Partial<Alarms> = {}): Alar
   ...over,
 });
 
-export const tellAlarms = (...list: readonly Alarm[]): void => {
+export const reportAlarms = (...list: readonly Alarm[]): void => {
   receive({ alarms: alarms(list) });
 };

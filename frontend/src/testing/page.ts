@@ -55,7 +55,7 @@ export function connection(now: number, ...events: readonly ConnectionEvent[]): 
   receive(withConnection(last, now));
 }
 
-const heard = (now: number, bridge: StatusFrame): ConnectionEvent[] => [
+const receivedEvents = (now: number, bridge: StatusFrame): ConnectionEvent[] => [
   { type: 'start', now },
   { type: 'opened', now },
   { type: 'frame', now, status: bridge },
@@ -65,10 +65,10 @@ const heard = (now: number, bridge: StatusFrame): ConnectionEvent[] => [
 /** Heard of, the last time so long ago. */
 export function goLive(bridge: StatusFrame = status(), silentMs = 0): void {
   const now = performance.now();
-  connection(now + silentMs, ...heard(now, bridge));
+  connection(now + silentMs, ...receivedEvents(now, bridge));
 }
 
 export function goLost(): void {
   const now = performance.now();
-  connection(now, ...heard(now, status()), { type: 'closed', now, code: 1006 });
+  connection(now, ...receivedEvents(now, status()), { type: 'closed', now, code: 1006 });
 }

@@ -3,7 +3,7 @@ import { afterEach, beforeEach, expect, test } from 'vitest';
 
 import { startAlarms } from '../../alarms/watch';
 import type { Alarm } from '../../contract/types';
-import { alarm, tellAlarms } from '../../testing/alarms';
+import { alarm, reportAlarms } from '../../testing/alarms';
 import { showTags } from '../../testing/page';
 import { wireTag } from '../../testing/tags';
 import { AlarmPanel } from './AlarmPanel';
@@ -18,9 +18,9 @@ afterEach(() => {
   stop();
 });
 
-const tell = (...list: readonly Alarm[]): void => {
+const report = (...list: readonly Alarm[]): void => {
   act(() => {
-    tellAlarms(...list);
+    reportAlarms(...list);
   });
 };
 const group = (name: string): Element[] => [
@@ -28,7 +28,7 @@ const group = (name: string): Element[] => [
 ];
 
 test('of many of one cause five, then a hundred more at a time', () => {
-  tell(...Array.from({ length: 150 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) })));
+  report(...Array.from({ length: 150 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) })));
   // By text: a role query over hundreds of buttons takes seconds.
   expect(screen.getByText('Active (150)')).toBeTruthy();
   expect(group('active')).toHaveLength(0);
@@ -44,7 +44,9 @@ test('of many of one cause five, then a hundred more at a time', () => {
 });
 
 test('many of one cause that are resolved have nothing to do, and no time in common', () => {
-  tell(...Array.from({ length: 5 }, (_, at) => alarm(`a${at}`, { tag_id: `${at}`, cleared: 950 })));
+  report(
+    ...Array.from({ length: 5 }, (_, at) => alarm(`a${at}`, { tag_id: `${at}`, cleared: 950 })),
+  );
   fireEvent.click(screen.getByText('Resolved in the last 24 h (5)'));
   const heading = screen.getByRole('button', { name: /Temperature too low · 5 alarms/ });
   expect(heading.querySelector('.alarm-do, [data-fact=since]')).toBeNull();

@@ -16,7 +16,7 @@ from lupin_bridge.cli import journal
 from lupin_bridge.cli.command import main, parser
 from lupin_bridge.feed.source import STUCK_AFTER_S
 from lupin_bridge.settings import settings_from, strange_variables, variable
-from lupin_twin.journal.beside import journal_path
+from lupin_twin.journal.paths import journal_path
 from lupin_twin.runtime.process import USAGE_ERROR, split_ros_args
 from tests.support.domains import ros_env
 from tests.support.processes import Process, lupin_twin, url_of

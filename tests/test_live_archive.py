@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.journal.beside import mark_of
+from lupin_twin.journal.paths import mark_of
 from tests.support.access import refused_start
 from tests.support.archive import Archive, forwarder, rows_of, wait_until_equal
 from tests.support.archive_killing import RATE, count, kill_and_compare, twin

@@ -19,7 +19,7 @@ from lupin_bridge.access.middleware import Access, AccessControl, ReadOnly
 from lupin_bridge.access.policy import BehindProxies, Proxies
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.metrics import Metered
-from lupin_bridge.routes import export, field, pages, sockets, state, status, written
+from lupin_bridge.routes import export, field, pages, sockets, state, status, writes
 from lupin_bridge.routes.answers import add_refusals, error_response
 from lupin_bridge.serving.http_protocol import PieceByPiece
 from lupin_bridge.stream import routes_schema, schema
@@ -34,7 +34,7 @@ ROUTED = (
     field,
     export,
     status,
-    written,
+    writes,
     pages,
 )
 

@@ -15,8 +15,8 @@ from typing import Final
 
 from lupin_bridge.alarms.board import AlarmBoard, Change, NoteBoard
 from lupin_bridge.alarms.feed import AlarmFeed, learn_recent
-from lupin_bridge.feed.shared_work import Periodic, Shared, end
 from lupin_bridge.feed.source import TwinSource, TwinUpdate
+from lupin_bridge.feed.tasks import Periodic, Shared, end
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Criteria, Judge, Judged, silenced, unjudged
 from lupin_bridge.metrics import Metrics, Sample, route_class
 from lupin_bridge.notify.channels import Channels
@@ -24,9 +24,9 @@ from lupin_bridge.notify.messages import GreenhouseState
 from lupin_bridge.past.plans import Answered
 from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits, RateLimit
 from lupin_bridge.settings import Settings
-from lupin_bridge.stream.followers import EstimateFollower, RobotFollower
 from lupin_bridge.stream.frames import FrameWriter, Liveness, Status, alarms_message
 from lupin_bridge.stream.hub import Client, Hub
+from lupin_bridge.stream.pollers import EstimateFollower, RobotFollower
 from lupin_bridge.viewers.foxglove import Offer
 from lupin_bridge.viewers.rosbridge_session import Writer
 from lupin_twin.core.diagnostics import Origin

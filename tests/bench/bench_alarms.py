@@ -17,7 +17,7 @@ from random import Random
 from lupin_bridge.alarms.board import AlarmBoard, board_of, change_between
 from lupin_bridge.alarms.feed import LOT, REACH_COUNT
 from lupin_bridge.feed.source import TwinUpdate
-from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.alarm_fold import AlarmFolder
 from lupin_bridge.judge.judging import Judge, own_sensors
 from lupin_bridge.notify.messages import GreenhouseState, Topics
 from lupin_bridge.notify.mqtt import Mirror
@@ -64,7 +64,7 @@ def ms_since(start: float) -> float:
 def alarms_of(tags: int) -> None:
     heard = list(past_of(tags))
     before_mb = resident_mb(os.getpid())
-    follower = Follower(BY_LIGHT, SPANS)
+    follower = AlarmFolder(BY_LIGHT, SPANS)
     lots = []
     for first in range(0, len(heard), LOT):
         start = time.thread_time()
@@ -153,7 +153,7 @@ def row(tags: int, name: str, took_ms: float, most_ms: float | None = None) -> N
 
 def ordinary() -> None:
     heard = ordinary_days()
-    follower = Follower(BY_LIGHT, SPANS)
+    follower = AlarmFolder(BY_LIGHT, SPANS)
     follower.take(heard)
     raised = follower.found(heard[-1].stamp_ns).alarms
     spells = (heard[-1].stamp_ns - heard[0].stamp_ns) / (600 * S)

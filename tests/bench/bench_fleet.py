@@ -23,7 +23,7 @@ from pathlib import Path
 import psycopg
 
 from lupin_bridge.archive.forwarding import Forwarder, Sink
-from lupin_bridge.archive.source import Batch, Epoch
+from lupin_bridge.archive.journal_reader import Batch, Epoch
 from lupin_twin.core.past import SeriesRequest
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series

@@ -20,10 +20,10 @@ from lupin_twin.core.state import Scan, TwinStore, Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
-from lupin_twin.journal.received import rows as exported
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from lupin_twin.journal.writer import Journal
+from lupin_twin.journal.writes import rows as exported
 from lupin_twin.runtime.memory import Memory
 from tests.bench.journal_double import BEGUN_NS, LIMITS, Filled, House, filled
 

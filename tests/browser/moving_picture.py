@@ -1,6 +1,6 @@
 """The README's moving picture of the page, from a demo: live, a tag, the estimate, the past.
 
-`python -m tests.browser.screenshots FOLDER --docs` makes it with the others.
+`python -m tests.browser.screenshots` makes it with the others.
 """
 
 import io

@@ -40,6 +40,13 @@ _WORDS_BELOW = """([selector, above]) => [...document.querySelectorAll(selector)
   return found;
 })"""
 
+# How many lines its words take.
+LINES = """(e) => {
+  const range = document.createRange();
+  range.selectNodeContents(e);
+  return new Set([...range.getClientRects()].map((box) => box.top)).size;
+}"""
+
 
 def place(thing: Locator) -> Box:
     """Where it is in the window, pixels."""

@@ -1,11 +1,5 @@
-"""Pictures of the HMI from the real demo: `python -m tests.browser.screenshots FOLDER`.
+"""The docs' pictures of the page, from the real demo: `python -m tests.browser.screenshots`."""
 
-One for each size, light and dark, and the wide one as people with the common kinds of colour
-blindness see it. To be looked at; with `--docs` those of the docs are made anew, as far as a script
-makes them.
-"""
-
-import argparse
 import json
 import sys
 import time
@@ -21,24 +15,15 @@ from tests.support.processes import lupin_twin, url_of
 from tests.support.state_home import use_own
 from tests.support.waiting import wait_for
 
-SIZES = ((360, 740), (820, 1180), (1440, 900), (1920, 1080))
-BLINDNESS = ("protanopia", "deuteranopia", "tritanopia", "achromatopsia")
 IMAGES = Path(__file__).parents[2] / "docs/images"
 # The second pass of the patrol brings pests, failed scans and ages that differ.
 PATROL_SPEED = 3
 PATIENCE_MS = 120_000
-ALL_LAYERS = "map,field,smooth,grid,boxes,blooms,pins,labels"
-CARD = f"/#sensor=soil_moisture&tag=5&layers={ALL_LAYERS}"
 
 
 def main() -> int:
     """Take them all."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--docs", action="store_true", help="also write those of the docs")
-    options = parser.parse_args()
     use_own()
-    options.folder.mkdir(parents=True, exist_ok=True)
     expect.set_options(timeout=PATIENCE_MS)
     with (
         own_domain() as domain,
@@ -50,13 +35,8 @@ def main() -> int:
     ):
         url = url_of(server)
         wait_for_second_pass(browser, url)
-        for size in SIZES:
-            for scheme in ("light", "dark"):
-                views(browser, url, options.folder, size, scheme)
-        blindness(browser, url, options.folder)
-        if options.docs:
-            of_the_docs(browser, url)
-            estimate_pictures.taken(browser, IMAGES)
+        of_the_page(browser, url)
+        estimate_pictures.taken(browser, IMAGES)
     return 0
 
 
@@ -97,55 +77,6 @@ def opened(browser: Browser, url: str, size: tuple[int, int], scheme: str, path:
     return page
 
 
-def views(browser: Browser, url: str, folder: Path, size: tuple[int, int], scheme: str) -> None:
-    """The page as it opens, with a tag chosen, smooth, and what belongs to its size."""
-    width, height = size
-    name = f"{width}x{height}-{scheme}"
-    page = opened(browser, url, size, scheme)
-    page.screenshot(path=folder / f"{name}.png")
-    if width < 600:
-        page.get_by_role("navigation").get_by_role("button", name="Tags").click()
-        page.screenshot(path=folder / f"{name}-tags.png")
-        page.get_by_role("navigation").get_by_role("button", name="Map").click()
-    page.context.close()
-    page = opened(browser, url, size, scheme, CARD)
-    expect(page.get_by_test_id("tag-card")).to_be_visible()
-    page.screenshot(path=folder / f"{name}-card.png")
-    page.context.close()
-    if width == 1440:
-        page = opened(browser, url, size, scheme)
-        page.get_by_role("radio", name="Value").check()
-        page.get_by_role("radio", name="Fixed").check()
-        page.get_by_role("button", name="Layers").click()
-        page.screenshot(path=folder / f"{name}-layers.png")
-        page.get_by_role("button", name="Menu").click()
-        page.screenshot(path=folder / f"{name}-menu.png")
-        page.keyboard.press("Escape")
-        page.get_by_test_id("map").focus()
-        page.keyboard.press("?")
-        page.screenshot(path=folder / f"{name}-help.png")
-        page.keyboard.press("Escape")
-        page.context.set_offline(True)
-        expect(page.get_by_test_id("frozen")).to_be_visible()
-        page.screenshot(path=folder / f"{name}-frozen.png")
-        page.context.close()
-    if width == 1920:
-        page = opened(browser, url, size, scheme, "/?kiosk=1#sensor=humidity")
-        page.screenshot(path=folder / f"{name}-kiosk.png")
-        page.context.close()
-
-
-def blindness(browser: Browser, url: str, folder: Path) -> None:
-    """The wide page, and the phone's, as Chromium emulates each kind."""
-    for scheme in ("light", "dark"):
-        page = opened(browser, url, (1440, 900), scheme, "/#tag=5")
-        session = page.context.new_cdp_session(page)
-        for kind in BLINDNESS:
-            session.send("Emulation.setEmulatedVisionDeficiency", {"type": kind})
-            page.screenshot(path=folder / f"1440x900-{scheme}-{kind}.png")
-        page.context.close()
-
-
 def past(url: str) -> str:
     """A link to the first day that the demo remembers, with a tag's chart."""
     with urlopen(f"{url}/api/timeline") as answer:
@@ -155,8 +86,8 @@ def past(url: str) -> str:
     return f"/#at={at_s}&period=all&chart.tag=5&tag=5"
 
 
-def of_the_docs(browser: Browser, url: str) -> None:
-    """The docs' pictures of the page, and the README's moving one."""
+def of_the_page(browser: Browser, url: str) -> None:
+    """Those of the page of the demo, and the README's moving one."""
     for name, size, scheme, path, part in (
         ("page", (1440, 900), "light", "/", "body"),
         ("past", (1280, 800), "dark", past(url), "body"),

@@ -11,7 +11,7 @@ from typing import Any
 from playwright.sync_api import Locator, expect
 
 from tests.browser.hmi import PHONE, WIDE, Hmi, OpenPage
-from tests.browser.places import out_of_reach, place, places
+from tests.browser.places import LINES, out_of_reach, place, places
 from tests.support.messages import scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -242,11 +242,16 @@ def test_nothing_moves_while_a_finger_rests_on_the_list(domain: int, open_page: 
         expect(rows(hmi, "resolved")).to_have_attribute("data-where", order[0])
         # Many of one cause: their heading has the columns of its rows.
         leave(hmi)
-        robot.observe(*[warm(f"d{at}", 27.0) for at in range(3)] * 2)
+        robot.observe(*[warm(f"{at}", at + 3.0) for at in (40, 41, 42)] * 2)
         hmi.page.locator("[data-group=active] .alarm-cause .alarm-go").click()
         values = fact(hmi.page.locator("[data-group=active]"), "now")
         expect(values).to_have_count(6)
         assert len({place(each).left for each in values.all()}) == 1
+        # No line breaks in the name of a tag: half a number is another tag.
+        hmi.go("list=alarms", "?lang=de")
+        worst = fact(hmi.page.locator("[data-group=active] .alarm-cause"), "now")
+        expect(worst).to_have_text("jetzt 45,0\u00a0°C (Messpunkt\u00a042)")
+        assert worst.evaluate(LINES) == 2
 
 
 def where(hmi: Hmi) -> list[str]:

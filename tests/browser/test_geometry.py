@@ -1,4 +1,4 @@
-"""Where things lie, by pixel: the field upright, pins on their cells, the map turned by its yaw."""
+"""Where things lie, by pixel: the field upright, pins on their cells."""
 
 import colorsys
 import json
@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from geometry_msgs.msg import Point, Pose, Quaternion
+from geometry_msgs.msg import Point, Pose
 from playwright.sync_api import expect
 
 import lupin_bridge
@@ -19,8 +19,8 @@ SENSORS: Any = json.loads((Path(lupin_bridge.__file__).parent / "sensors.json").
 
 # The bodies of pins in the light theme.
 HEALTHY, CRITICAL = (31, 122, 69), (196, 33, 26)
-# What it makes of occupied, free and unknown cells.
-WALL, FLOOR, GROUND = (84, 94, 88), (253, 253, 252), (232, 235, 231)
+# What it makes of occupied cells.
+WALL = (84, 94, 88)
 
 
 def colour_of(sensor: str) -> Pixel:
@@ -43,11 +43,6 @@ def over(base: Pixel, sensor: str, share: float) -> Pixel:
 
 def close(a: Pixel, b: Pixel, most: int = 3) -> bool:
     return max(abs(x - y) for x, y in zip(a, b, strict=True)) <= most
-
-
-def floor(width: int, height: int, origin: Any = None, resolution: float = 1.0) -> Any:
-    """A map of free floor."""
-    return occupancy_grid([[0] * width] * height, resolution=resolution, origin=origin)
 
 
 HOT = (4.0, 3.0)
@@ -107,7 +102,7 @@ def rgb(picture: Any, at: tuple[int, int]) -> Pixel:
 
 def test_a_pin_sits_on_its_pose_and_in_its_cell(domain: int, open_page: OpenPage) -> None:
     with bridge(domain=domain) as running:
-        running.peer.publish_map(floor(6, 6))
+        running.peer.publish_map(occupancy_grid([[0] * 6] * 6))
         at = (3.125, 2.375)
         running.peer.observe(scan("a", {"co2": 600.0}, at=at))
         running.tag("a")
@@ -134,34 +129,6 @@ def test_a_pin_sits_on_its_pose_and_in_its_cell(domain: int, open_page: OpenPage
         metre = hmi.view().scale
         above, corner = (at[0], at[1] + 7 / metre), (at[0] + 9 / metre, at[1] + 9 / metre)
         hmi.expect_pixels(lambda pixel: close(pixel, CRITICAL), above, corner, what="a red square")
-
-
-def test_a_map_with_a_yaw_lies_turned_about_its_origin(domain: int, open_page: OpenPage) -> None:
-    yaw = math.radians(30)
-    origin = Pose(
-        position=Point(x=1.0, y=-1.0),
-        orientation=Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2)),
-    )
-    # No two turns or mirrorings of this look the same.
-    rows = [[100, 0, 0, 100], [0, 0, 100, -1], [-1, 0, 0, 0]]
-    with bridge(domain=domain) as running:
-        running.peer.publish_map(occupancy_grid(rows, resolution=0.5, origin=origin))
-        running.peer.observe(scan("a", {"co2": 900.0}, at=(1, 0)))
-        running.tag("a")
-        hmi = open_page(running.url, "view=1.5,0,4&layers=map")
-        expect(hmi.row("a")).to_be_visible()
-
-        def centre(column: int, row: int) -> tuple[float, float]:
-            u, v = (column + 0.5) * 0.5, (row + 0.5) * 0.5
-            return (
-                1.0 + u * math.cos(yaw) - v * math.sin(yaw),
-                -1.0 + u * math.sin(yaw) + v * math.cos(yaw),
-            )
-
-        looks = {100: WALL, 0: FLOOR, -1: GROUND}
-        at = {centre(i, j): cell for j, row in enumerate(rows) for i, cell in enumerate(row)}
-        hmi.expect_pixels(lambda pixel: pixel == WALL, centre(0, 0), what="the map's first cell")
-        assert hmi.pixels(list(at)) == [looks[cell] for cell in at.values()]
 
 
 # Tells of each label what its picture's width is, and how wide its text came out in it.

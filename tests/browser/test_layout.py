@@ -10,7 +10,7 @@ from PIL import Image
 from playwright.sync_api import Locator, expect
 
 from tests.browser.hmi import PHONE, Box, Hmi, OpenPage, Pixel
-from tests.browser.places import expect_in_reach, place, places, words_below
+from tests.browser.places import LINES, expect_in_reach, place, places, words_below
 from tests.support.messages import scan
 from tests.support.web import Bridge, bridge
 
@@ -120,6 +120,28 @@ def test_the_word_for_now_has_one_line_of_the_time_bar(house: Bridge, open_page:
     now = hmi.test_id("timebar-when")
     expect(now).to_have_text("En directo")
     assert place(now).bottom - place(now).top < 24
+
+
+# By how much a choice is narrower than its words, px.
+_CUT_CHOICE = """(e) => {
+  const width = e.offsetWidth;
+  e.style.maxWidth = 'none';
+  const whole = e.offsetWidth;
+  e.style.maxWidth = '';
+  return whole - width;
+}"""
+
+
+def test_a_laptop_has_room_for_what_the_heat_map_shows(house: Bridge, open_page: OpenPage) -> None:
+    for language, width in (("en", 1100), ("nl", 1100), ("de", 1280)):
+        size = {"width": width, "height": 720}
+        hmi = open_page(house.url, query=f"?lang={language}", viewport=size)
+        choice = hmi.test_id("heat-legend")
+        expect(choice).to_be_visible()
+        assert (language == "nl") == (choice.evaluate(_CUT_CHOICE) > 0), language
+        chosen, details = places(hmi, ".legend .heat-choice", ".legend summary")
+        assert chosen.top < details.bottom, "one line"
+        assert details.top < chosen.bottom, "one line"
 
 
 def test_an_upright_window_has_the_map_or_the_table_and_a_card_below_the_map(
@@ -348,10 +370,6 @@ _TOO_LONG = """() => [...document.querySelectorAll('body *')].filter((e) => {
   return getComputedStyle(e).overflowX === "hidden" && end > box.right;
 }).map((e) => `${e.tagName} ${e.className}: ${e.textContent}`)"""
 
-_RECTS = "const range = document.createRange(); range.selectNodeContents(e);"
-# How many lines its words take.
-_LINES = f"(e) => {{ {_RECTS} return new Set([...range.getClientRects()].map((r) => r.top)).size }}"
-
 
 # The table's reasons that are cut.
 _CUT_REASONS = """() => [...document.querySelectorAll('tbody .cell-health > div')]
@@ -394,9 +412,11 @@ def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) 
         assert row.bottom - row.top < 2.75 * 44, language
         hmi.page.locator(".pane-tabs button").nth(1).click()
         expect(hmi.cell("1", "temperature")).to_contain_text(reading)
+        line = place(hmi.test_id("house-line"))
+        assert line.bottom - line.top < 24, language
         assert hmi.page.evaluate(_TOO_LONG) == []
         # Three letters, and the arrow beside them: no word to be broken.
-        assert hmi.page.locator("thead th").first.locator("span").first.evaluate(_LINES) == 1
+        assert hmi.page.locator("thead th").first.locator("span").first.evaluate(LINES) == 1
         assert hmi.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
         # On a phone and on the smallest laptops this column is narrow, with the arrow at first.
         for width in (PHONE["width"], 1100, 1280, 1440):
@@ -404,9 +424,10 @@ def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) 
             assert hmi.page.evaluate(_CUT_REASONS) == [], (language, width)
             if width >= 1100:
                 assert hmi.page.evaluate(_CUT_TODO) == [], (language, width)
-            assert hmi.row("failed").locator(".row-button bdi").evaluate(_LINES) == 1, width
-            health = hmi.page.locator("thead [data-column=health] button > span").first
-            assert health.evaluate(_LINES) == 1, (language, width)
+            assert hmi.row("failed").locator(".row-button bdi").evaluate(LINES) == 1, width
+            for head in hmi.page.locator("thead button > span:first-child:visible").all():
+                words = place(head)
+                assert words.bottom - words.top < 24, (language, width, head.inner_text())
         # Where the name of the page has no room, none of it is shown.
         hmi.resize(230, 740)
         brand = place(hmi.page.locator(".brand"))

@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, ViewportSize, expect
 
 from tests.browser.hmi import FONTS, OpenPage
 from tests.browser.places import place
@@ -113,20 +113,23 @@ def test_nothing_is_cut_on_paper_and_names_are_text(
         assert page.locator("script").count() == 0
 
 
-def test_on_a_phone_a_wide_table_scrolls_and_the_page_does_not(
+def test_on_a_phone_in_the_dark_it_is_light_and_a_wide_table_scrolls_and_not_the_page(
     troubled: Bridge, browser: Browser
 ) -> None:
-    with browser.new_context(viewport={"width": 390, "height": 844}) as context:
+    phone: ViewportSize = {"width": 390, "height": 844}
+    with browser.new_context(viewport=phone, color_scheme="dark") as context:
         page = context.new_page()
         page.goto(f"{troubled.url}/api/report.html")
         assert page.evaluate("document.documentElement.scrollWidth") == 390
         left = [place(it).left for it in page.locator("dt").all()]
         assert left[0] == left[2] < left[1] == left[3], "two in a row"
-
-
-def test_in_the_dark_it_is_light(troubled: Bridge, browser: Browser) -> None:
-    with browser.new_context(color_scheme="dark") as context:
-        page = context.new_page()
-        page.goto(f"{troubled.url}/api/report.html")
         colour = page.locator("body").evaluate("it => getComputedStyle(it).backgroundColor")
         assert colour == "rgb(255, 255, 255)"
+
+
+def test_on_a_phone_an_alarm_has_room(house: Bridge, browser: Browser) -> None:
+    with browser.new_context(viewport={"width": 390, "height": 844}) as context:
+        page = context.new_page()
+        page.goto(f"{house.url}/api/report.html?lang=nl")
+        hidden = "table => table.scrollWidth - table.clientWidth"
+        assert [it.evaluate(hidden) for it in page.locator("table.alarms").all()] == [0]

@@ -1,4 +1,4 @@
-"""A phone in the hand: tap, drag, pinch, and the two halves of a narrow screen."""
+"""A phone in the hand: drag, pinch, and the two halves of a narrow screen."""
 
 from collections.abc import Sequence
 
@@ -47,22 +47,6 @@ def show(phone: Hmi, pane: str) -> None:
     expect(phone.row("1")).to_be_visible(visible=pane == "Tags")
 
 
-def test_a_tap_on_a_pin_opens_its_card_and_one_beside_closes_it(phone: Hmi) -> None:
-    x, y = phone.view().pixel(1, 3)
-    # A finger is broad: it need not hit the middle.
-    phone.map.tap(position={"x": x + 12, "y": y - 12})
-    expect(phone.card("10")).to_be_visible()
-    expect(phone.card("10")).to_contain_text("31.0\u00a0°C")
-    # The card in short is the mouse's.
-    expect(phone.test_id("hover-card")).to_have_count(0)
-    box = phone.card("10").bounding_box()
-    assert box is not None
-    assert box["x"] >= 0
-    assert box["x"] + box["width"] <= PHONE["width"]
-    phone.page.get_by_role("button", name="Close").first.tap()
-    expect(phone.card("10")).to_have_count(0)
-
-
 def test_most_of_the_height_is_for_what_is_looked_at(phone: Hmi) -> None:
     """Not for bars: of each tab, and of the card."""
     tall = 0.6 * PHONE["height"]
@@ -89,7 +73,11 @@ def test_most_of_the_height_is_for_what_is_looked_at(phone: Hmi) -> None:
     assert frame + card >= tall
 
 
-def test_charts_of_several_tags_have_one_line_of_tools_and_the_whole_width(phone: Hmi) -> None:
+def test_charts_have_one_line_of_tools_and_the_whole_width(phone: Hmi) -> None:
+    phone.go("chart.tag=10&tag=10", "?lang=nl")
+    expect(phone.page.get_by_role("radio", name="Meetpunt 10")).to_be_checked()
+    [head] = places(phone, ".chart-view > header")
+    assert head.bottom - head.top < 60
     phone.turn("chart.sensor=1&chart.sensor=10&sensor=dew_point")
     expect(phone.page.locator(".chart-tags li")).to_have_count(2)
     expect(phone.page.locator(".u-over")).to_be_visible()

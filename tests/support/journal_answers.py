@@ -16,7 +16,7 @@ from typing import Any, Final
 from lupin_twin.core.past import SeriesRequest
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
-from lupin_twin.journal.received import rows
+from lupin_twin.journal.writes import rows
 
 JOURNALS: Final = Path(__file__).parents[1] / "fixtures" / "journals"
 NAMES: Final = sorted(path.stem for path in JOURNALS.glob("*.sqlite"))

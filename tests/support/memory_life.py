@@ -50,7 +50,7 @@ class Twin:
         self.wall_ns = NOW + int(at_s * S)
         now = Clock(self.now_ns, self.wall_ns, self.is_simulated)
         self.memory.follow(now)
-        self.memory.hold_to(now)
+        self.memory.clamp_to(now)
 
     def receive(
         self,

@@ -25,7 +25,7 @@ from lupin_bridge.access.credentials import (
     digest,
 )
 from lupin_bridge.settings import Settings
-from lupin_twin.journal.beside import state_folder
+from lupin_twin.journal.paths import state_folder
 
 # A shift: whoever takes over a control room's screen signs in under their own name.
 SESSION_S: Final = 12 * 3600

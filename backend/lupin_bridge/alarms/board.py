@@ -16,8 +16,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
-from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
+from lupin_bridge.feed.tasks import Periodic
 from lupin_bridge.judge.episodes import MAX_EPISODES, Alarm
 from lupin_bridge.judge.verdict import ORDER, Verdict
 from lupin_bridge.serving.admission import RateLimit

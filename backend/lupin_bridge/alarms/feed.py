@@ -22,9 +22,9 @@ from lupin_bridge.alarms.board import (
     change_between,
 )
 from lupin_bridge.feed.query import as_found
-from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
-from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, Follower, Found
+from lupin_bridge.feed.tasks import end
+from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, AlarmFolder, Found
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge
 from lupin_twin.core.diagnostics import JournalState
@@ -149,7 +149,7 @@ class AlarmFeed:
         self._note_days = note_days
         self._reach_ns = int(days * DAY_NS)
         self._wake = asyncio.Event()
-        self._follower: Follower | None = None
+        self._follower: AlarmFolder | None = None
         self._journal = ""
         self._last = 0
         self._written = 0
@@ -277,7 +277,7 @@ class AlarmFeed:
     async def _take_received(self) -> None:
         lot, self._received = self._received, []
         if self._follower is None:
-            self._follower = Follower(self._criteria, _ALL_TIME)
+            self._follower = AlarmFolder(self._criteria, _ALL_TIME)
         for first in range(0, len(lot), LOT):
             await self._take(lot[first : first + LOT])
         await self._publish()
@@ -294,7 +294,7 @@ class AlarmFeed:
                 self._begin("journal")
                 continue
             if self._follower is None:
-                self._follower = Follower(self._criteria, past.spans)
+                self._follower = AlarmFolder(self._criteria, past.spans)
             self._journal, self._last = past.journal, past.last
             await self._take(past.writes)
             if generation != self._generation:

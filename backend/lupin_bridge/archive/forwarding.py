@@ -35,9 +35,9 @@ from lupin_bridge.archive.database import (
     explaining,
     place_of,
 )
-from lupin_bridge.archive.source import Batch, Epoch, Row, Source, arrival_of
+from lupin_bridge.archive.journal_reader import Batch, Epoch, Row, Source, arrival_of
 from lupin_bridge.console import CommandError
-from lupin_bridge.feed.shared_work import end
+from lupin_bridge.feed.tasks import end
 from lupin_bridge.settings import Settings, option, variable
 from lupin_twin.core.past import DAY_NS
 from lupin_twin.journal.retention import RECORD
@@ -113,7 +113,7 @@ class Sink:
         execute(_HERE, (self._site, socket.gethostname(), os.getpid()))
         execute("INSERT INTO site VALUES (%s, '') ON CONFLICT DO NOTHING", (self._site,))
 
-    def heard(self) -> None:
+    def beat(self) -> None:
         """Note in the archive that this forwarder is alive."""
         self._connection.execute(
             "UPDATE forwarder SET heard_at = now() WHERE site = %s", (self._site,)
@@ -242,20 +242,20 @@ class Forwarder:
         self._site = site
         self._path = path
         self._say = say
-        self._told = ""
+        self._last_problem = ""
         self._wait_s = FIRST_WAIT_S
 
     def run(self, *, once: bool = False) -> bool:
         """Forward for ever, or `once` what is there; returns whether that succeeded."""
         while True:
-            wrong = self._try(once=once)
+            wrong = self._attempt(once=once)
             if once:
                 return not wrong
             if wrong:
                 time.sleep(self._wait_s)
                 self._wait_s = min(2 * self._wait_s, MAX_WAIT_S)
 
-    def _try(self, *, once: bool) -> bool:
+    def _attempt(self, *, once: bool) -> bool:
         """Forward until the journal is replaced; True: there was a problem, which is reported."""
         try:
             path = self._path()
@@ -267,8 +267,8 @@ class Forwarder:
         except UsageError:
             raise
         except CommandError as error:
-            if str(error) != self._told:
-                self._told = str(error)
+            if str(error) != self._last_problem:
+                self._last_problem = str(error)
                 again = "" if once else "; it will be retried"
                 self._say(f"site {self._site} is not forwarded: {error}{again}")
             return True
@@ -288,13 +288,13 @@ class Forwarder:
                     source.was_sent(batch, epoch)
                     is_full = batch.is_full
                 if not is_said:  # not earlier: a reachable archive may still refuse every batch
-                    self._told, self._wait_s, is_said = "", FIRST_WAIT_S, True
+                    self._last_problem, self._wait_s, is_said = "", FIRST_WAIT_S, True
                     self._say(f"site {self._site} is forwarded to {place_of(self._url)}")
                 if once and not is_full:
                     return
                 if time.monotonic() - received_s >= _HEARTBEAT_S:
                     received_s = time.monotonic()
-                    sink.heard()
+                    sink.beat()
                 if not is_full:
                     time.sleep(_POLL_S)
 

@@ -36,8 +36,8 @@ from lupin_twin.adapt.table import (
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH, check_length
 from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pin, Pose, Reading, Scan, Write
-from lupin_twin.journal.beside import Lock
 from lupin_twin.journal.file import JournalFile
+from lupin_twin.journal.paths import Lock
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.runs import Clock, Run, runs, span_at
 from lupin_twin.journal.schema import FILE_ERRORS, open_named

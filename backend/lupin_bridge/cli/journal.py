@@ -31,7 +31,6 @@ from lupin_bridge.past import bodies
 from lupin_bridge.query_string import MAX_SECONDS, moment
 from lupin_bridge.settings import SettingError, settings_from, variable
 from lupin_twin.core.past import NotRemembered, PastRefused, seconds
-from lupin_twin.journal.beside import InUse, demo_journal_path, holder_of, journal_path
 from lupin_twin.journal.checking import (
     RunExtent,
     extents,
@@ -41,8 +40,8 @@ from lupin_twin.journal.checking import (
     sensors_of,
     size_of,
 )
+from lupin_twin.journal.paths import InUse, demo_journal_path, holder_of, journal_path
 from lupin_twin.journal.rebuild import handle_interrupts, vacuum
-from lupin_twin.journal.received import rows
 from lupin_twin.journal.retention import (
     RETENTION_BYTES,
     RETENTION_NS,
@@ -59,6 +58,7 @@ from lupin_twin.journal.schema import (
     is_damage_error,
     open_named,
 )
+from lupin_twin.journal.writes import rows
 from lupin_twin.runtime.process import INTERRUPTED
 
 ACTIONS: Final[Mapping[str, str]] = {

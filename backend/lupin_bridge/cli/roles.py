@@ -48,7 +48,7 @@ from lupin_bridge.settings import Secrets, SettingError, Settings, option, unix_
 from lupin_bridge.stream.frames import STALE_AFTER_S
 from lupin_twin.core.parameters import ParameterError, World
 from lupin_twin.journal.appending import is_empty, simulated
-from lupin_twin.journal.beside import demo_journal_path
+from lupin_twin.journal.paths import demo_journal_path
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, open_reader
 
 log = logging.getLogger(__name__)

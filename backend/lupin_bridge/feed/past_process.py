@@ -18,7 +18,7 @@ import sys
 from typing import Any, Final, TypeVar
 
 from lupin_bridge.feed.query import HEAD, Now, PastQuery
-from lupin_bridge.feed.shared_work import end
+from lupin_bridge.feed.tasks import end
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.field.explored import OccupancyMap
 
@@ -45,7 +45,7 @@ class PastProcess:
         self._child = child
         self.starts = 0
         self.pid: int | None = None
-        self.asked: dict[int, asyncio.Future[Any]] = {}
+        self.pending: dict[int, asyncio.Future[Any]] = {}
         self.why_down = ""
         self._numbers = itertools.count(1)
         # The process's standard input; until it runs, queries wait in `_unsent`.
@@ -60,7 +60,7 @@ class PastProcess:
         await end(self._life)
         self._refuse_all()
 
-    async def ask(self, question: PastQuery[AnswerT], now: Now, cost_s: float) -> AnswerT:
+    async def ask(self, query: PastQuery[AnswerT], now: Now, cost_s: float) -> AnswerT:
         """Answer a query; `cost_s` is its estimated cost, s of one core.
 
         Raises:
@@ -70,12 +70,12 @@ class PastProcess:
         """
         if self.why_down:
             raise NotRemembered(self.why_down)
-        if len(self.asked) >= MAX_PENDING:
+        if len(self.pending) >= MAX_PENDING:
             raise NotRemembered(f"{MAX_PENDING} requests about the past are under way, the limit")
         packer = _Packer()
-        packer.dump((question, now, cost_s))
+        packer.dump((query, now, cost_s))
         number = next(self._numbers)
-        answer = self.asked[number] = asyncio.get_running_loop().create_future()
+        answer = self.pending[number] = asyncio.get_running_loop().create_future()
         try:
             self._unsent[number] = packer.file.getvalue(), packer.map
             if self._life is None:
@@ -87,21 +87,21 @@ class PastProcess:
                 self._queries.write(pickle.dumps((number, None)))
             raise
         finally:
-            del self.asked[number]
+            del self.pending[number]
             self._unsent.pop(number, None)
 
     def _send(self) -> None:
         if self._queries is None:
             return
-        for number, (question, occupancy_map) in self._unsent.items():
+        for number, (query, occupancy_map) in self._unsent.items():
             if occupancy_map is not None and occupancy_map is not self._sent_map:
                 self._sent_map = occupancy_map
                 self._queries.write(pickle.dumps((0, occupancy_map), 5))
-            self._queries.write(pickle.dumps((number, question), 5))
+            self._queries.write(pickle.dumps((number, query), 5))
         self._unsent.clear()
 
     def _refuse_all(self) -> None:
-        for answer in self.asked.values():
+        for answer in self.pending.values():
             if not answer.done():
                 answer.set_exception(NotRemembered(self.why_down))
 
@@ -150,7 +150,7 @@ class PastProcess:
             await process.wait()
 
     def _take(self, number: int, text: bytes) -> None:
-        answer = self.asked.get(number)
+        answer = self.pending.get(number)
         if answer is None or answer.done():
             return  # nobody waits any more
         is_error, value = pickle.loads(text)  # noqa: S301  # our own

@@ -37,8 +37,8 @@ from lupin_twin.core.past import (
 )
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
-from lupin_twin.journal.received import Export, lots, notes, observed, recent, scans, writes
 from lupin_twin.journal.rows import latest
+from lupin_twin.journal.writes import Export, lots, notes, observed, recent, scans, writes
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -117,12 +117,12 @@ class Child:
         self._sending = threading.Lock()
         self._out: IO[bytes]
 
-    def run(self, questions: IO[bytes], answers: IO[bytes]) -> None:
+    def run(self, queries: IO[bytes], answers: IO[bytes]) -> None:
         """Take queries until the parent is gone."""
         self._out = answers
         while True:
             try:
-                number, message = pickle.load(questions)  # noqa: S301  # the parent's own
+                number, message = pickle.load(queries)  # noqa: S301  # the parent's own
             except EOFError:
                 return
             if isinstance(message, bytes):
@@ -134,8 +134,8 @@ class Child:
 
     def _ask(self, number: int, message: bytes) -> None:
         try:
-            question, now, cost_s = _Unpickler(message, self._map).load()
-            search = self._search(question, now)
+            query, now, cost_s = _Unpickler(message, self._map).load()
+            search = self._search(query, now)
         except Exception as error:  # noqa: BLE001  # goes to the caller
             self._send(number, True, error)
             return
@@ -144,14 +144,14 @@ class Child:
         self._running[number] = running
         running.add_done_callback(partial(self._reply, number))
 
-    def _search(self, question: PastQuery[Any], now: Now) -> Search:
+    def _search(self, query: PastQuery[Any], now: Now) -> Search:
         def search(log: sqlite3.Connection, should_stop: ShouldStop) -> Any:
             def find(need: Any) -> Any:
                 if should_stop():  # as SQLite ends an interrupted statement
                     raise sqlite3.OperationalError("interrupted")
                 return _found(need, now, log)
 
-            return question(find, should_stop)
+            return query(find, should_stop)
 
         return search
 

@@ -26,7 +26,7 @@ from lupin_twin.core.past import FOREVER_NS, NotRemembered, PastRow, PastWrites,
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Scan, Snapshot
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.journal.received import NOTES_S, STRETCH_S, WRITES_S, Export
+from lupin_twin.journal.writes import NOTES_S, STRETCH_S, WRITES_S, Export
 from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 
@@ -90,7 +90,7 @@ class RobotLog:
         # Whether the robot has been away from its plan's end: a round ends where it begins.
         self._was_away = False
 
-    def take(self, heard: Robot, now_ns: int | None) -> bool:
+    def take(self, reported: Robot, now_ns: int | None) -> bool:
         """Take what was received since the last call; returns whether anything has changed.
 
         `now_ns` is the twin's time; None: not known. Values stamped in the future become unknown:
@@ -101,14 +101,14 @@ class RobotLog:
         if now_ns is not None:
             past_ns = now_ns - TRAIL_NS
             self.trail = [it for it in self.trail if past_ns <= it.at_ns <= future_ns]
-        position = _newest(before.position, heard.position, future_ns)
-        if position is not None and position is heard.position:
+        position = _newest(before.position, reported.position, future_ns)
+        if position is not None and position is reported.position:
             self._extend(position)
         known = _newest(before.plan, None, future_ns)
-        plan = _newest(known, heard.plan, future_ns)
-        if plan is not None and plan is heard.plan and not (known and _same_end(known, plan)):
+        plan = _newest(known, reported.plan, future_ns)
+        if plan is not None and plan is reported.plan and not (known and _same_end(known, plan)):
             self._was_away = False
-        battery = _newest(before.battery, heard.battery, future_ns)
+        battery = _newest(before.battery, reported.battery, future_ns)
         self.now = Robot(position, self._pending(plan, position, now_ns), battery)
         return self.now != before
 
@@ -141,12 +141,12 @@ def _same_end(a: Plan, b: Plan) -> bool:
     return bool(a.points and b.points) and math.dist(a.points[-1], b.points[-1]) <= ARRIVED_M
 
 
-def _newest(known: ValueT | None, heard: ValueT | None, future_ns: int) -> ValueT | None:
+def _newest(known: ValueT | None, reported: ValueT | None, future_ns: int) -> ValueT | None:
     """The newer of the two; a known value stamped in the future is dropped."""
     if known is not None and known.at_ns > future_ns:
         known = None
-    if known is None or (heard is not None and heard.at_ns >= known.at_ns):
-        return heard
+    if known is None or (reported is not None and reported.at_ns >= known.at_ns):
+        return reported
     return known
 
 
@@ -303,11 +303,11 @@ class TwinSource(ABC):
         """The error that the caller gets; a source may also start a repair."""
         return error
 
-    async def ask(self, question: PastQuery[ResultT], cost_s: float) -> ResultT:
+    async def ask(self, query: PastQuery[ResultT], cost_s: float) -> ResultT:
         """Answer a query about the past; `cost_s` is its estimated cost, s of one core."""
         now = await self.now()
         try:
-            return await self._in_time(self.past.ask(question, now, cost_s))
+            return await self._in_time(self.past.ask(query, now, cost_s))
         except NotRemembered as error:
             raise await self._explain(error) from None
 

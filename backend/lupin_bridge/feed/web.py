@@ -25,15 +25,15 @@ from lupin_msgs.srv import GetEstimateReport, GetWrites
 
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
-from lupin_bridge.feed.shared_work import Periodic, end
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
+from lupin_bridge.feed.tasks import Periodic, end
 from lupin_bridge.feed.web_node import WebNode, check_ok
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.core.state import Snapshot
-from lupin_twin.journal.beside import journal_path
 from lupin_twin.journal.follow import Followed, Lot, NotALotError, followed, write
+from lupin_twin.journal.paths import journal_path
 from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, is_damage_error
 from lupin_twin.ros import convert_services
 from lupin_twin.runtime.estimates import Report, ReportRequest

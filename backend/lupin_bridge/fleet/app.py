@@ -24,8 +24,8 @@ from lupin_bridge.app import STATIC_FOLDER, create_app
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import Now, PastQuery
-from lupin_bridge.feed.shared_work import Periodic, Shared
 from lupin_bridge.feed.source import exported
+from lupin_bridge.feed.tasks import Periodic, Shared
 from lupin_bridge.fleet.compare import (
     COMPARE_S,
     Compare,
@@ -79,7 +79,7 @@ from lupin_bridge.stream.frames import Status
 from lupin_bridge.stream.hub import Client, Hub
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.past import seconds
-from lupin_twin.journal.received import STRETCH_S, Export
+from lupin_twin.journal.writes import STRETCH_S, Export
 from lupin_twin.runtime.workers import Workers
 
 _TIDY_S: Final = 5.0
@@ -235,7 +235,7 @@ async def respond_sites(fleet: Fleet, kind: Format, request: Request) -> Respons
     named = [known[name] for name in chosen(given.sites, known)]
     start_ns, end_ns = span_of(given, None)
     query = Export(start_ns, end_ns, given.tag_id, given.sensor_type)
-    heard_ns = min((site.heard_ns for site in named), default=0)
+    heartbeat_ns = min((site.heartbeat_ns for site in named), default=0)
     return await respond_export(
         request,
         fleet,
@@ -243,7 +243,7 @@ async def respond_sites(fleet: Fleet, kind: Format, request: Request) -> Respons
         kind,
         given,
         now_ns=fleet.watching.now_ns,
-        known={COMPLETE_TO: seconds(min(heard_ns, end_ns))},
+        known={COMPLETE_TO: seconds(min(heartbeat_ns, end_ns))},
         has_site=True,
     )
 
@@ -397,11 +397,11 @@ def _add_answers(app: FastAPI, fleet: Fleet) -> None:
 
     async def over_sites(request: Request, query: Compare | SitesReport) -> Response:
         about = Now(0, "", UNKNOWN_JOURNAL)
-        asked: Any = query  # see `reader`
+        untyped: Any = query  # see `reader`
 
         async def compute() -> Answer:
             with fleet.admission.computing(client_of(request), is_large=True):
-                return cast("Answer", await fleet.past.ask(asked, about, COMPARE_S))
+                return cast("Answer", await fleet.past.ask(untyped, about, COMPARE_S))
 
         return await respond(request, query, compute)
 

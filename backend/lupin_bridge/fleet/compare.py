@@ -262,17 +262,17 @@ class SitesReport:
         }
         counted = connection.execute(_COUNTS, query).fetchall()
         counts = Counter({(site, event): int(n) for site, event, n in counted})
-        asked = f"from={seconds(self.start_ns)}&to={seconds(self.end_ns)}"
+        period_query = f"from={seconds(self.start_ns)}&to={seconds(self.end_ns)}"
         rows = [
             {
                 "site": site,
                 "name": name,
                 **{key: counts[site, event] for event, key in _COUNTED.items()},
                 "active_alarms": active,
-                "complete_to": stamp(min(heard_ns, self.end_ns)),
-                "report": f"sites/{quote(site, safe='')}/api/report?{asked}",
+                "complete_to": stamp(min(heartbeat_ns, self.end_ns)),
+                "report": f"sites/{quote(site, safe='')}/api/report?{period_query}",
             }
-            for site, name, active, heard_ns in self.sites
+            for site, name, active, heartbeat_ns in self.sites
         ]
         names = {site: name for site, name, *_ in self.sites}
         notes = [
@@ -307,7 +307,7 @@ def sites_report(parameters: Parameters, known: Mapping[str, Any], now_ns: int) 
     start_ns, end_ns = query_string.report(given, now_ns)
     sites = [known[name] for name in chosen(given.sites, known)]
     return SitesReport(
-        tuple((it.site, it.name or it.site, it.active_alarms, it.heard_ns) for it in sites),
+        tuple((it.site, it.name or it.site, it.active_alarms, it.heartbeat_ns) for it in sites),
         start_ns // HOUR_NS * HOUR_NS,
         -(-end_ns // HOUR_NS) * HOUR_NS,
     )

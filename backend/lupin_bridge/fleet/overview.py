@@ -89,8 +89,8 @@ class Site:
     """A site as its log and its forwarder show it. Times are ns of the archive's clock.
 
     `origin` is where its observations come from, as far as its log reports that. `last_seq` grows
-    with every row; `heard_ns` is the forwarder's last heartbeat; 0: never. `last_received_ns` is
-    when the twin received its newest row, by the clock of its machine. `verdict` and
+    with every row; `heartbeat_ns` is the forwarder's last heartbeat; 0: never. `last_received_ns`
+    is when the twin received its newest row, by the clock of its machine. `verdict` and
     `active_alarms` are None until they are computed; `alarms` are the worst active ones, as in
     `/api/alarms`. `dots` draw its map; `notes` is the number of notes.
     """
@@ -98,7 +98,7 @@ class Site:
     site: str
     name: str = ""
     last_seq: int = 0
-    heard_ns: int = 0
+    heartbeat_ns: int = 0
     is_live: bool = False
     last_received_ns: int | None = None
     verdict: Verdict | None = None
@@ -128,7 +128,9 @@ def site_json(site: Site, archive: Archive, now_ns: int) -> dict[str, Any]:
         "last_verdict": site.verdict,
         "active_alarms": site.active_alarms,
         "last_received": moment(site.last_received_ns),
-        "lag_s": None if not site.heard_ns else round(max(0, now_ns - site.heard_ns) / 1e9, 1),
+        "lag_s": None
+        if not site.heartbeat_ns
+        else round(max(0, now_ns - site.heartbeat_ns) / 1e9, 1),
         "is_live": is_live,
         "origin": site.origin,
         "map": map_version(site.dots),

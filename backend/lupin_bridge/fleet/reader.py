@@ -22,8 +22,8 @@ from lupin_bridge.archive.database import (
     explaining,
     open_archive,
 )
-from lupin_bridge.feed import query
 from lupin_bridge.feed.query import Child, Now, PastQuery, Search
+from lupin_bridge.feed.query import main as serve
 from lupin_bridge.fleet.compare import Compare, SitesReport
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
@@ -32,10 +32,10 @@ from lupin_twin.core.state import Snapshot
 from lupin_twin.field.explored import OccupancyMap, map_of
 from lupin_twin.journal.appending import simulated
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.received import last_number, put_note
 from lupin_twin.journal.retention import Stretches, kept
 from lupin_twin.journal.runs import runs, span_at, world_of
 from lupin_twin.journal.schema import MAP, DamagedFile, SiteLog
+from lupin_twin.journal.writes import last_number, put_note
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -70,12 +70,12 @@ class Latest:
 class Reported:
     """All tags as of the site's time now; what is kept of the past, and what of it is simulated.
 
-    `is_walls`: that time is wall-clock time, which goes on even while nothing comes. `world` is
-    what the twin observes.
+    `is_wall_clock`: that time is wall-clock time, which goes on even while nothing comes. `world`
+    is what the twin observes.
     """
 
     snapshot: Snapshot
-    is_walls: bool
+    is_wall_clock: bool
     world: World
     kept_ns: Stretches
     simulated_ns: tuple[int, int] | None
@@ -91,16 +91,16 @@ class ArchiveChild(Child):
         super().__init__(ArchiveRecall)
 
     def _search(
-        self, question: PastQuery[Any] | Latest | Note | Compare | SitesReport, now: Now
+        self, query: PastQuery[Any] | Latest | Note | Compare | SitesReport, now: Now
     ) -> Search:
         site = now.condition.path
-        if isinstance(question, Latest):
-            return lambda connection, _: _latest(SiteLog(connection, site), question, now.frame_id)
-        if isinstance(question, Note):
-            return lambda _, stop: _write_note(site, question, stop)
-        if isinstance(question, Compare | SitesReport):
-            return lambda connection, _: question.answer(connection)
-        found = super()._search(question, now)
+        if isinstance(query, Latest):
+            return lambda connection, _: _latest(SiteLog(connection, site), query, now.frame_id)
+        if isinstance(query, Note):
+            return lambda _, stop: _write_note(site, query, stop)
+        if isinstance(query, Compare | SitesReport):
+            return lambda connection, _: query.answer(connection)
+        found = super()._search(query, now)
         return lambda connection, stop: found(SiteLog(connection, site), stop)
 
 
@@ -128,26 +128,26 @@ def _write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
         return written
 
 
-def _latest(log: SiteLog, asked: Latest, frame_id: str) -> Reported:
+def _latest(log: SiteLog, request: Latest, frame_id: str) -> Reported:
     journal: Any = log
     every = runs(log.execute)
     span = span_at(every, FOREVER_NS)
-    is_walls = span is None or not span.run.begun.is_simulated
+    is_wall_clock = span is None or not span.run.begun.is_simulated
     (now_ns,) = log.execute(
         "SELECT CAST(extract(epoch FROM now()) * 1000000000 AS BIGINT)"
     ).fetchone()
     stamp_ns, arrival_ns = log.execute(_ARRIVED).fetchone()
-    if not is_walls:
+    if not is_wall_clock:
         now_ns = (stamp_ns or 0) + max(0, now_ns - (arrival_ns or now_ns))
     # Includes stamps of a robot's clock that is a little ahead of this one: they were received.
     known = state_at(journal, FOREVER_NS, frame_id)
     return Reported(
         Snapshot(max(now_ns, stamp_ns or 0), frame_id, known.tags),
-        is_walls,
+        is_wall_clock,
         world_of(log),
         kept(journal),
         simulated(journal),
-        *_newer_map(log, asked.map_hash),
+        *_newer_map(log, request.map_hash),
     )
 
 
@@ -165,13 +165,13 @@ class ArchiveRecall(Recall):
     """Queries the archive, each query in a transaction, over pooled connections."""
 
     def _answer(
-        self, question: Callable[[Any, ShouldStop], AnswerT], is_abandoned: ShouldStop
+        self, query: Callable[[Any, ShouldStop], AnswerT], is_abandoned: ShouldStop
     ) -> AnswerT:
         try:
             connection = self._connection()
             try:
                 with explaining(), connection.transaction():
-                    return question(connection, is_abandoned)
+                    return query(connection, is_abandoned)
             except ArchiveError:
                 connection.close()
                 raise
@@ -200,4 +200,4 @@ class ArchiveRecall(Recall):
 
 def main() -> None:
     """Answer the parent until it ends."""
-    query.main(ArchiveChild)
+    serve(ArchiveChild)

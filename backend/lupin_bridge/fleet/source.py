@@ -17,8 +17,8 @@ from typing import Any, Final
 from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.relay import Relay, TwinNames
-from lupin_bridge.feed.shared_work import end
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
+from lupin_bridge.feed.tasks import end
 from lupin_bridge.fleet.overview import Archive, Site
 from lupin_bridge.fleet.reader import Latest, Reported
 from lupin_bridge.fleet.watcher import News
@@ -247,11 +247,15 @@ class SiteTwin(TwinSource):
         if reported is None or not (is_live or said != self._said):
             return
         self._said = said
-        ago_s = max(0.0, (self._watching.now_ns - site.heard_ns) / 1e9) if site.heard_ns else 0.0
+        ago_s = (
+            max(0.0, (self._watching.now_ns - site.heartbeat_ns) / 1e9)
+            if site.heartbeat_ns
+            else 0.0
+        )
         stamp_ns = self._now_ns(reported)
         if not is_live:
             # As of the forwarder's last heartbeat: readers add `silent_s`.
-            stamp_ns = site.heard_ns if reported.is_walls else _newest_ns(reported)
+            stamp_ns = site.heartbeat_ns if reported.is_wall_clock else _newest_ns(reported)
         before = None if self.update is None else self.update.snapshot
         self.update = TwinUpdate(
             replace(
@@ -271,7 +275,7 @@ class SiteTwin(TwinSource):
     def _now_ns(self, reported: Reported) -> int:
         """The site's ROS time now; that of a simulation goes on only while it is live."""
         passed_ns = time.monotonic_ns() - self._read_ns
-        goes_on = reported.is_walls or self._is_live
+        goes_on = reported.is_wall_clock or self._is_live
         return reported.snapshot.stamp_ns + (passed_ns if goes_on else 0)
 
     # --- see `TwinSource` ---------------------------------------------------------------------
@@ -281,7 +285,9 @@ class SiteTwin(TwinSource):
         site, reported = self._site, self._reported
         complete_ns = None
         if reported is not None:
-            complete_ns = site.heard_ns if reported.is_walls else reported.snapshot.stamp_ns
+            complete_ns = (
+                site.heartbeat_ns if reported.is_wall_clock else reported.snapshot.stamp_ns
+            )
         return Condition(
             JournalState.RECORDING,
             path=self.site,
@@ -314,9 +320,9 @@ class SiteTwin(TwinSource):
         now_ns = self._now_ns(reported)
         return Now(now_ns, self._parameters.frame_id, self.journal())
 
-    async def _reading(self, question: Any) -> Any:
+    async def _reading(self, query: Any) -> Any:
         about = Now(0, self._parameters.frame_id, self.journal())
-        return await self.past.ask(question, about, 0.0)
+        return await self.past.ask(query, about, 0.0)
 
 
 def _newest_ns(reported: Reported) -> int:

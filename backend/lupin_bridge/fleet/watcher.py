@@ -22,10 +22,10 @@ from lupin_bridge.archive.database import (
     explaining,
     open_archive,
 )
-from lupin_bridge.feed import query
 from lupin_bridge.feed.query import Child, Now, Search
+from lupin_bridge.feed.query import main as serve
 from lupin_bridge.fleet.overview import LIVE_S, Site, dots
-from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.alarm_fold import AlarmFolder
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge
 from lupin_bridge.serving.admission import Limits
@@ -36,9 +36,9 @@ from lupin_twin.core.notes import Note, NotesRequest
 from lupin_twin.core.past import FOREVER_NS, NotRemembered, RecentRequest, WritesRequest
 from lupin_twin.core.state import Snapshot, same_tags
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.received import notes, recent, writes
 from lupin_twin.journal.runs import runs, span_at
 from lupin_twin.journal.schema import ORIGIN, DamagedFile, SiteLog
+from lupin_twin.journal.writes import notes, recent, writes
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -95,7 +95,7 @@ class _Judged:
     note_count: int = 0
     snapshot: Snapshot | None = None
     is_simulated: bool = False
-    follower: Follower | None = None
+    follower: AlarmFolder | None = None
     after: int = 0
     seq: int = -1
     is_caught_up: bool = False
@@ -159,12 +159,12 @@ class Watcher:
         before, self.sites = self.sites, {}
         judged, self._judged = self._judged, {}
         for site, *facts in execute(_FACTS, (LIVE_S, ORIGIN)).fetchall():
-            name, heard_ns, is_live, seqs, origin, note_count = facts
+            name, heartbeat_ns, is_live, seqs, origin, note_count = facts
             self._judged[site] = judged.get(site) or _Judged(Judge(self._criteria))
             self.sites[site] = replace(
                 before.get(site, Site(site)),
                 name=name,
-                heard_ns=heard_ns,
+                heartbeat_ns=heartbeat_ns,
                 is_live=is_live,
                 last_seq=sum(seqs or ()),
                 origin=_origin(origin or "", self._judged[site]),
@@ -239,7 +239,7 @@ class Watcher:
         # A simulation's time does not advance between two looks.
         now_ns = newest_ns if judged.is_simulated else now_ns
         # The last known state of a silent site does not grow old.
-        moment_ns = now_ns if site.is_live else min(now_ns, max(site.heard_ns, newest_ns))
+        moment_ns = now_ns if site.is_live else min(now_ns, max(site.heartbeat_ns, newest_ns))
         if judged.is_caught_up:
             alarms = _alarms(site, judged, moment_ns)
             active = [alarm for alarm in alarms if alarm.is_active]
@@ -278,7 +278,7 @@ class Watcher:
             if judged.follower is not None:
                 judged.follower, judged.after, judged.is_caught_up = None, 0, False
                 past = writes(log, replace(request, after=0))
-            judged.follower = Follower(self._criteria, past.spans)
+            judged.follower = AlarmFolder(self._criteria, past.spans)
         judged.follower.take(past.writes)
         judged.after, judged.is_caught_up = past.last, past.is_all
 
@@ -294,8 +294,8 @@ def _alarms(site: Site, judged: _Judged, moment_ns: int) -> list[Alarm]:
         of_log = judged.follower.found(moment_ns, max(0, moment_ns - reach_ns))
         judged.judge.note_days(of_log.days)
         found += of_log.alarms
-    if site.heard_ns and not site.is_live:
-        found.append(silence(moment_ns if judged.is_simulated else site.heard_ns))
+    if site.heartbeat_ns and not site.is_live:
+        found.append(silence(moment_ns if judged.is_simulated else site.heartbeat_ns))
     return found
 
 
@@ -318,8 +318,8 @@ class WatchChild(Child):
         super().__init__(_WithoutJournal)
         self._watcher: Watcher | None = None
 
-    def _search(self, question: Any, now: Now) -> Search:  # noqa: ARG002  # it is of now
-        return lambda *_: self._look(question)
+    def _search(self, query: Any, now: Now) -> Search:  # noqa: ARG002  # it is of now
+        return lambda *_: self._look(query)
 
     def _look(self, settings: Settings) -> News:
         try:
@@ -337,12 +337,12 @@ class WatchChild(Child):
 
 class _WithoutJournal(Recall):
     def _answer(
-        self, question: Callable[[Any, ShouldStop], AnswerT], is_abandoned: ShouldStop
+        self, query: Callable[[Any, ShouldStop], AnswerT], is_abandoned: ShouldStop
     ) -> AnswerT:
-        return question(None, is_abandoned)
+        return query(None, is_abandoned)
 
 
 def main() -> None:
     """Answer the parent until it ends."""
     logging.getLogger("psycopg").setLevel(logging.CRITICAL)
-    query.main(WatchChild)
+    serve(WatchChild)

@@ -16,7 +16,7 @@ from lupin_bridge.judge.day import DayLine, TagDays
 from lupin_bridge.judge.episodes import MAX_EPISODES, SITE, Alarm, TagEpisodes, alarm_id
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.scans import LONGEST_NS, SHORTEST_NS, Stretches
-from lupin_bridge.judge.tag_log import Gap, TagPast, is_long
+from lupin_bridge.judge.tag_log import Gap, TagStates, is_long
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_twin.core.past import FOREVER_NS, HOUR_NS, PastWrite, RunSpan
 from lupin_twin.core.state import Reading
@@ -45,7 +45,7 @@ class _Run:
     """One run of the clock."""
 
     begun_ns: int
-    tags: dict[str, TagPast] = field(default_factory=dict)
+    tags: dict[str, TagStates] = field(default_factory=dict)
     stretches: Stretches = field(default_factory=Stretches)
     days: DayLine = field(default_factory=DayLine)
     alarms: dict[str, tuple[Alarm, ...]] = field(default_factory=dict)
@@ -59,7 +59,7 @@ class _Run:
     due: dict[str, int] = field(default_factory=dict)
 
 
-class Follower:
+class AlarmFolder:
     """Derives the alarms from the writes that it takes. Belongs to one thread at a time.
 
     `spans` are the runs of the clock; when they change, a new follower is needed. It keeps about
@@ -138,7 +138,7 @@ class Follower:
             by = self._criteria
             days = TagDays(by.sensors, by.is_day, by.day_number)
             episodes = TagEpisodes(write.tag_id, run.begun_ns, by, days, self._max_episodes)
-            tag = TagPast(episodes, by.holds_ns, _matters(run), self._is_day(run))
+            tag = TagStates(episodes, by.holds_ns, _matters(run), self._is_day(run))
             run.tags[write.tag_id] = tag
         newest_ns = run.stretches.newest_ns
         if newest_ns is not None and write.stamp_ns <= newest_ns:
@@ -293,7 +293,7 @@ def _all_of(run: _Run) -> Iterator[Alarm]:
     yield from run.house
 
 
-def _gap_at(tag: TagPast, at_ns: int) -> Gap | None:
+def _gap_at(tag: TagStates, at_ns: int) -> Gap | None:
     """The gap between scans that a moment lies in, its start included."""
     return next(
         (

@@ -248,7 +248,7 @@ class Judge:
             self._scans.forget()
             self._recent = RecentScans(self._criteria.day)
             _, stamps_ns = self._recent.see(snapshot.tags)
-            self._scans.heard(stamps_ns, now_ns)
+            self._scans.add_stamps(stamps_ns, now_ns)
         news, gone = self._news(snapshot)
         day = self._recent.day(snapshot.stamp_ns)
         if now_ns is None or self._now_ns is None or is_back:
@@ -272,7 +272,9 @@ class Judge:
         self._recent = RecentScans.of(tags, writes, self._criteria.day)
         # Begin anew with all scans: the last scan of each tag alone gives no interval.
         self._scans.forget()
-        self._scans.heard(self._recent.stamps_ns(), self._now_ns if first is None else first.now_ns)
+        self._scans.add_stamps(
+            self._recent.stamps_ns(), self._now_ns if first is None else first.now_ns
+        )
         self._waiting |= dict.fromkeys(self._tags)
 
     def note_changed(self, changed: Mapping[str, Mapping[str, int]]) -> None:
@@ -307,7 +309,7 @@ class Judge:
             states.append(tag)
         others, stamps_ns = self._recent.see(states)
         news |= dict.fromkeys(others)
-        self._scans.heard(stamps_ns, snapshot.now_ns)
+        self._scans.add_stamps(stamps_ns, snapshot.now_ns)
         gone: list[str] = []
         if len(self._tags) != len(snapshot.tags):
             there = {tag.tag_id for tag in snapshot.tags}

@@ -71,7 +71,7 @@ class Scans:
     def __init__(self) -> None:
         self._scans_ns: deque[int] = deque(maxlen=LAP_INTERVALS + 1)
 
-    def heard(self, stamps_ns: Iterable[int], now_ns: int | None) -> None:
+    def add_stamps(self, stamps_ns: Iterable[int], now_ns: int | None) -> None:
         """Add the stamps later than the last known one; stamps in the future are ignored."""
         for stamp_ns in sorted(set(stamps_ns)):
             is_later = not self._scans_ns or stamp_ns > self._scans_ns[-1]

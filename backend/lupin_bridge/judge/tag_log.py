@@ -194,7 +194,7 @@ class Replay(Generic[StateT]):
             self.back_to(self._at_ns)
 
 
-class TagPast:
+class TagStates:
     """One tag in one run of the clock: its log, and the trail and episodes derived from it."""
 
     def __init__(

@@ -22,8 +22,8 @@ from typing import Final
 import orjson
 
 from lupin_bridge.alarms.board import Change
-from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.feed.tasks import Periodic
 from lupin_bridge.judge.judging import unix_s
 from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.notify.destinations import Targets
@@ -67,13 +67,13 @@ class DailyReport(Periodic):
     """Sends reports by one channel; what was not taken before `stop` is sent after a restart."""
 
     def __init__(self, target: DailyTarget, channel: Mqtt | Webhook, of: Source) -> None:
-        super().__init__(self._try, POLL_S, "the report of the day", first_s=0.0)
+        super().__init__(self._attempt, POLL_S, "the report of the day", first_s=0.0)
         self._target, self._channel, self._of = target, channel, of
         self._why = ""
         # The last one sent, which is not sent again and again if that cannot be noted.
         self._sent: tuple[Path, int] | None = None
 
-    async def _try(self) -> None:
+    async def _attempt(self) -> None:
         try:
             why = await self._look()
         except (NotRemembered, PastRefused, TwinUnavailableError, OSError) as error:

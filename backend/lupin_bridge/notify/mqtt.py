@@ -411,7 +411,7 @@ class Mqtt:
         client._disconnected.add_done_callback(  # noqa: SLF001
             lambda end: end.cancelled() or end.exception()
         )
-        _take_no_more_than(client, MAX_PACKET_BYTES)
+        _limit_packet_size(client, MAX_PACKET_BYTES)
         return client
 
     def _see(self) -> None:
@@ -430,7 +430,7 @@ class Mqtt:
             log.warning("MQTT: %s; it will be retried", problem)
 
 
-def _take_no_more_than(client: Client, most: int) -> None:
+def _limit_packet_size(client: Client, most: int) -> None:
     """End the connection at a larger packet: paho has no limit, and some brokers heed none."""
     paho = client._client  # noqa: SLF001
     receive = paho._sock_recv  # noqa: SLF001

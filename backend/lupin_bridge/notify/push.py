@@ -27,7 +27,7 @@ from lupin_bridge.access.accounts import Device
 from lupin_bridge.access.credentials import AccountError
 from lupin_bridge.access.people import People
 from lupin_bridge.alarms.board import NOTHING_SAID, Change, notes_of_alarms
-from lupin_bridge.feed.shared_work import end
+from lupin_bridge.feed.tasks import end
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify.destinations import Endpoint, PushTarget
@@ -48,7 +48,7 @@ TOGETHER_S: Final = 2.0
 # How long a push service keeps a message for a phone that is off, s; older ones are on the page.
 TTL_S: Final = 3_600
 # Attempts to send a message: they take most of that hour, as a greenhouse may be offline for long.
-TRIES: Final = 66
+MAX_ATTEMPTS: Final = 66
 # Between the first two attempts, and between later ones, s.
 FIRST_WAIT_S: Final = 2.0
 MOST_WAIT_S: Final = 60.0
@@ -223,7 +223,7 @@ class Push:
                 backoff,
                 "a push notification",
                 host,
-                most_tries=TRIES,
+                max_attempts=MAX_ATTEMPTS,
             )
         except DeviceGone:
             await self._people.write(lambda it, _: it.remove_device(device.endpoint))

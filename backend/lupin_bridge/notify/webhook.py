@@ -26,7 +26,7 @@ import h11
 import orjson
 
 from lupin_bridge.alarms.board import Change, happened_ns
-from lupin_bridge.feed.shared_work import end
+from lupin_bridge.feed.tasks import end
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.notify.destinations import Endpoint, WebhookTarget
 from lupin_bridge.notify.messages import Backoff, Condition, Source
@@ -365,22 +365,22 @@ async def until_taken(
     what: str,
     where: str,
     *,
-    most_tries: float = math.inf,
+    max_attempts: float = math.inf,
 ) -> bool:
     """Retry `post` until the message is taken; False: it was given up, and counted and logged so.
 
     `what` and `where` name the message and its receiver in the log.
     """
-    tries = refusals = 0
+    attempts = refusals = 0
     while True:
         try:
             await post()
         except PostError as error:
             before = condition.detail
             condition.failing(f"{error} ({where})")
-            tries += 1
+            attempts += 1
             refusals += error.status in REFUSALS
-            if tries >= most_tries or refusals >= MAX_REFUSALS:
+            if attempts >= max_attempts or refusals >= MAX_REFUSALS:
                 condition.dropped += 1
                 why = condition.detail
                 log.error("%s was not taken and is given up: %s", what, why)  # noqa: TRY400

@@ -20,7 +20,7 @@ import orjson
 
 from lupin_bridge.alarms.board import active_first, notes_of_alarms
 from lupin_bridge.feed.query import Find
-from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.alarm_fold import AlarmFolder
 from lupin_bridge.judge.episodes import SITE, Alarm, readings_of
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.scans import SHORTEST_NS, TIMES_MEDIAN
@@ -171,7 +171,7 @@ class _Fold:
     def __init__(self, of: Report, alarms_ns: int) -> None:
         self._of = of
         self._alarms_ns = alarms_ns
-        self._follower: Follower | None = None
+        self._follower: AlarmFolder | None = None
         self._sensors: dict[str, _Extremes] = {}
         self._counts = Counter({"scans": 0, "failed": 0, "inspections": 0})
         self._scanned: set[str] = set()
@@ -195,11 +195,11 @@ class _Fold:
             # The result is not used, but so the work is done lot by lot.
             self._follower.found(found.writes[-1].stamp_ns)
 
-    def _new(self, spans: Sequence[RunSpan]) -> Follower:
+    def _new(self, spans: Sequence[RunSpan]) -> AlarmFolder:
         by, end_ns = self._of.criteria, self._of.end_ns
         # Without what came later: it was not known then.
         cut = [replace(it, end_ns=min(it.end_ns, end_ns)) for it in spans if it.start_ns < end_ns]
-        return Follower(by, cut, kept=2 * MAX_WRITES, max_episodes=MAX_EPISODES)
+        return AlarmFolder(by, cut, kept=2 * MAX_WRITES, max_episodes=MAX_EPISODES)
 
     def _count(self, write: PastWrite) -> None:
         if write.status != STATUS_OK:

@@ -36,8 +36,8 @@ from lupin_bridge.routes.answers import (
     respond_past,
 )
 from lupin_bridge.serving.admission import Answer, ClientLimitError, content_answer
-from lupin_bridge.stream import followers, schema
-from lupin_bridge.stream.followers import sensors_of
+from lupin_bridge.stream import pollers, schema
+from lupin_bridge.stream.pollers import sensors_of
 from lupin_twin.core.past import PastRefused
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, ReportRequest
@@ -189,7 +189,7 @@ ESTIMATE: Final = InFormats(
 Made of what the log has up to a moment, the model too. That of now is made for the newest reading
 or the last whole minute of the day, whichever is later: until then its ETag holds.""",
     parameters=parameters_of(EstimateQuery),
-    model=followers.GetEstimateResponse,
+    model=pollers.GetEstimateResponse,
 )
 
 
@@ -253,7 +253,7 @@ _WRITE_TAG_S: Final = 10e-6
     router,
     "/api/estimate/quality",
     summary="How often the estimates of each sensor were right",
-    responses={**_REPORTED, 200: {"model": followers.EstimateQualities}},
+    responses={**_REPORTED, 200: {"model": pollers.EstimateQualities}},
     openapi_extra={"parameters": parameters_of(QualityQuery)},
 )
 async def quality(request: Request) -> Response:
@@ -266,7 +266,7 @@ async def quality(request: Request) -> Response:
     async def body(bridge: Bridge, query: QualityQuery) -> bytes:
         names = [query.sensor_type] if query.sensor_type else sensors_of(newest_of(bridge))
         reports = {name: await bridge.source.estimate_report(ReportRequest(name)) for name in names}
-        return followers.qualities(reports)
+        return pollers.qualities(reports)
 
     return await _report(request, QualityQuery, body)
 
@@ -275,7 +275,7 @@ async def quality(request: Request) -> Response:
     router,
     "/api/estimate/tags",
     summary="What was expected of each tag's newest reading, and which tags have changed",
-    responses={**_REPORTED, 200: {"model": followers.ExpectedTags}},
+    responses={**_REPORTED, 200: {"model": pollers.ExpectedTags}},
     openapi_extra={"parameters": parameters_of(TagsQuery)},
 )
 async def tags(request: Request) -> Response:
@@ -285,7 +285,7 @@ async def tags(request: Request) -> Response:
         sensor = query.sensor_type
         report = await bridge.source.estimate_report(ReportRequest(sensor))
         cost_s = len(report.tags) * _WRITE_TAG_S
-        return await on_worker(bridge, lambda _: followers.tags(sensor, report), cost_s)
+        return await on_worker(bridge, lambda _: pollers.tags(sensor, report), cost_s)
 
     return await _report(request, TagsQuery, body)
 
@@ -294,7 +294,7 @@ async def tags(request: Request) -> Response:
     router,
     "/api/estimate/advice",
     summary="Where another tag helps the estimate most",
-    responses={**_REPORTED, 200: {"model": followers.Advice}},
+    responses={**_REPORTED, 200: {"model": pollers.Advice}},
     openapi_extra={"parameters": parameters_of(AdviceQuery)},
 )
 async def advice(request: Request) -> Response:
@@ -302,7 +302,7 @@ async def advice(request: Request) -> Response:
 
     async def body(bridge: Bridge, query: AdviceQuery) -> bytes:
         wanted = ReportRequest(query.sensor_type, query.places)
-        return followers.advice(query.sensor_type, await bridge.source.estimate_report(wanted))
+        return pollers.advice(query.sensor_type, await bridge.source.estimate_report(wanted))
 
     return await _report(request, AdviceQuery, body)
 

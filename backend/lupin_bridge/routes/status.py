@@ -37,7 +37,7 @@ from lupin_bridge.routes.answers import (
 )
 from lupin_bridge.serving.admission import REVALIDATE, Answer, content_answer
 from lupin_bridge.stream import routes_schema, schema
-from lupin_bridge.stream.followers import robot_body
+from lupin_bridge.stream.pollers import robot_body
 from lupin_bridge.stream.state_json import alarms_body, header, judgement, pose, stamp
 from lupin_twin.core.state import Pose
 from lupin_twin.field.explored import OccupancyMap

@@ -221,7 +221,7 @@ class BridgeServer(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:  # noqa: ARG002
         """Begin the shutdown; the process then ends soon, even if the event loop is stuck."""
-        process.must_end()
+        process.set_exit_deadline()
         # At a second SIGINT uvicorn would cancel all requests, each with a trace in the log.
         super().handle_exit(signal.SIGTERM, frame)
 

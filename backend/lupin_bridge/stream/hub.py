@@ -179,12 +179,12 @@ class Hub:
         if size < self._parties[address] + 2:
             return False
         newest = next(client for client in reversed(self._clients) if client.address == largest)
-        self.turn_out(
+        self.evict(
             newest, f"{self.max_clients} clients are connected, the limit, {size} of them from here"
         )
         return True
 
-    def turn_out(self, client: Client, reason: str) -> None:
+    def evict(self, client: Client, reason: str) -> None:
         """Close a client to make room for others; it may try again."""
         self.leave(client)
         self.clients_dismissed += 1
@@ -193,7 +193,7 @@ class Hub:
     def turn_out_all(self, reason: str) -> None:
         """Close every client; each may try again."""
         for client in list(self._clients):
-            self.turn_out(client, reason)
+            self.evict(client, reason)
 
     @property
     def blocked(self) -> int:
@@ -222,7 +222,7 @@ class Hub:
         """
         if len(message) >= LARGE_BYTES and client in self._clients:
             for slowest in self.unsent.hold(client, message):
-                self.turn_out(slowest, "slow to take what it requested, and others need the memory")
+                self.evict(slowest, "slow to take what it requested, and others need the memory")
 
     def is_free(self, client: Client) -> None:
         """Note that a client's socket has taken everything."""

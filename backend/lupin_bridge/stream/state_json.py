@@ -175,12 +175,12 @@ def history(tag_id: str, past: TagHistory) -> dict[str, Any]:
         "sensors": [{"name": name, "values": values} for name, values in sensors.items()],
         "tries": [
             {
-                "stamp": stamp(tried.stamp_ns),
-                "status": tried.what.status,
-                "status_detail": tried.what.detail,
-                "kind": tried.kind,
+                "stamp": stamp(attempt.stamp_ns),
+                "status": attempt.what.status,
+                "status_detail": attempt.what.detail,
+                "kind": attempt.kind,
             }
-            for tried in past.attempts
+            for attempt in past.attempts
         ],
     }
 

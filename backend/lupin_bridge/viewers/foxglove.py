@@ -27,8 +27,8 @@ from typing import Any, Final
 import orjson
 
 from lupin_bridge.feed.relay import Sample, TwinNames, schema_text, topics_of
-from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
+from lupin_bridge.feed.tasks import Periodic
 from lupin_bridge.serving.ws_protocol import members_of, shown
 from lupin_twin.core import interfaces
 from lupin_twin.core.interfaces import Topic

@@ -22,8 +22,8 @@ from lupin_bridge.feed.relay import (
     absolute,
     topics_of,
 )
-from lupin_bridge.feed.shared_work import Shared
 from lupin_bridge.feed.source import TwinUnavailableError
+from lupin_bridge.feed.tasks import Shared
 from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.stream.frames import StateFrame, text_frame
 from lupin_bridge.viewers.rosbridge_protocol import (

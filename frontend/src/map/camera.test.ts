@@ -102,6 +102,14 @@ describe('camera', () => {
     expect(shown.y).toBeCloseTo(200);
   });
 
+  test('a pin near the edge stays where it is while everything is shown', () => {
+    camera.goTo(null, content);
+    const { view } = viewport();
+    for (const pin of content.pins) camera.show(pin);
+    expect(viewport().view).toBe(view);
+    expect(onCamera).not.toHaveBeenCalled();
+  });
+
   test('a point below the buttons is not in sight', () => {
     camera.goTo({ x: 2, y: 4, span: 8 }, null);
     const { view } = viewport();

@@ -155,7 +155,8 @@ export class MapCamera {
     const { view, size } = viewport();
     const { x, y } = toCanvas(view, point);
     const { width, height } = size;
-    const margin = Math.min(40, height / 4);
+    // Where everything is shown, a pin at the edge is as far inside as can be.
+    const margin = store.get().view.camera === null ? 0 : Math.min(40, height / 4);
     const isInside = x > margin && y > margin && x < width - margin && y < height - margin;
     if (width === 0 || (isInside && isClear(view, point, covered))) return;
     this.#step({ ...view, x: view.x + width / 2 - x, y: view.y + height / 2 - y });

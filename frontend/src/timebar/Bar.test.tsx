@@ -99,7 +99,7 @@ test('a clock that began anew is a line of its own', () => {
 test('times stand beside their dates, and never upon each other, however large the text is', () => {
   document.documentElement.style.fontSize = '32px';
   const axis = { from: 1.8e9, to: 1.8e9 + 3_600, width: 400 };
-  const { container } = render(<Bar axis={axis} timeline={null} columns={[]} />);
+  const { container, rerender } = render(<Bar axis={axis} timeline={null} columns={[]} />);
   document.documentElement.style.fontSize = '';
   const texts = [...container.querySelectorAll('text')];
   expect(texts[0]?.textContent).toMatch(/^\d+ \w+ \d\d:\d\d$/);
@@ -108,4 +108,6 @@ test('times stand beside their dates, and never upon each other, however large t
   texts.slice(1).forEach((each, index) => {
     expect(Number(each.getAttribute('x'))).toBeGreaterThan(ends[index] ?? Infinity);
   });
+  rerender(<Bar axis={{ ...axis, to: axis.from + 604_800 }} timeline={null} columns={[]} />);
+  expect(container.querySelector('text')?.textContent).toMatch(/^\d+ \w+ \d{4}$/);
 });

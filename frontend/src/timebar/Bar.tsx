@@ -120,8 +120,9 @@ function timesOf(axis: Axis) {
   let free = 0;
   return timeTicks(axis, axis.width / TICK_ROOM_PX, !hasDate(axis.to)).map((tick) => {
     const x = Math.round(xOf(axis, tick.at)) + 0.5;
-    // The date goes beside a day's first time.
-    const text = tick.text.split('\n').reverse().join(' ');
+    // The date goes before a day's first time, the year behind its first date.
+    const parts = tick.text.split('\n');
+    const text = (tick.text.includes(':') ? parts.reverse() : parts).join(' ');
     const width = text.length * letterPx;
     const left = Math.min(axis.width - width, Math.max(0, x - width / 2));
     if (left < free) return { at: tick.at, x, text, left: null };

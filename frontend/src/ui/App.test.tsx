@@ -57,16 +57,15 @@ describe('page', () => {
     const style = document.head.appendChild(document.createElement('style'));
     style.textContent = readFileSync(join(import.meta.dirname, '../styles/frozen.css'), 'utf8');
     render(<App kiosk={false} />);
-    const list = app().appendChild(document.createElement('ul'));
-    list.className = 'alarms';
-    const row = list.appendChild(document.createElement('li'));
+    const row = app().appendChild(document.createElement('button'));
+    row.className = 'alarm-go';
     const looks: string[] = [];
     for (const change of [goLost, goBack, goLive]) {
       flush(change);
       looks.push(getComputedStyle(row).filter);
     }
     expect(looks).toEqual(['grayscale(1)', 'grayscale(1)', '']);
-    list.remove();
+    row.remove();
     style.remove();
   });
 

@@ -106,7 +106,7 @@ def fill_past(journal: Path, options: argparse.Namespace) -> int:
 
     from lupin_patrol.mission import past  # noqa: PLC0415
     from lupin_twin.journal.appending import prefill  # noqa: PLC0415
-    from lupin_twin.journal.beside import InUse  # noqa: PLC0415
+    from lupin_twin.journal.paths import InUse  # noqa: PLC0415
     from lupin_twin.journal.schema import FILE_ERRORS, Foreign  # noqa: PLC0415
 
     now_ns, of_patrol = time.time_ns(), (options.seed, options.day_speed, options.speed)

@@ -3,6 +3,7 @@
 import random
 from dataclasses import replace
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -131,10 +132,11 @@ NOW = 10**18
 HOUR = 3_600 * 10**9
 COLD = Alarm("a", Reason(Kind.RANGE, Verdict.STRESSED, "temperature", 9.0, 12.0), "7", NOW - 1)
 SHELF = Note("1", NOW, "anna", SHELVE, "alarm:a", "heater", NOW + HOUR)
+SEEN = Note("0", NOW, "bert", ACKNOWLEDGE, "alarm:a")
 
 
 def test_who_acknowledged_and_who_shelved_until_when_is_told_and_nothing_else() -> None:
-    said = [Note("0", NOW, "bert", ACKNOWLEDGE, "alarm:a"), SHELF]
+    said = [SEEN, SHELF]
     found = alarm_json(COLD, notes_of_alarms([COLD], said, NOW).get("a"))
     assert {name: value for name, value in found.items() if "_by" in name} == {
         "acknowledged_by": "bert",
@@ -155,22 +157,16 @@ def test_a_shelf_ends_in_its_time_by_a_later_word_and_by_withdrawal() -> None:
     assert notes_of_alarms([COLD], [SHELF, Note("2", NOW, "anna", WITHDRAW, "note:1")], NOW) == {}
 
 
-def test_a_shelf_ends_when_its_alarm_gets_worse_and_one_of_later_holds() -> None:
+@pytest.mark.parametrize("said", [SHELF, SEEN], ids=["shelved", "acknowledged"])
+def test_what_was_said_ends_when_its_alarm_gets_worse_and_what_is_said_from_then_on_holds(
+    said: Note,
+) -> None:
     bad = replace(COLD.reason, verdict=Verdict.CRITICAL)
     worse = replace(COLD, reason=bad, raised_as=Verdict.STRESSED, worse_at_ns=NOW + 1)
-    assert notes_of_alarms([worse], [SHELF], NOW + 1) == {}
-    again = replace(SHELF, id="2", made_at_ns=NOW + 2)
-    assert "a" in notes_of_alarms([worse], [SHELF, again], NOW + 2)
-
-
-def test_nobody_has_acknowledged_what_an_alarm_became_later() -> None:
-    bad = replace(COLD.reason, verdict=Verdict.CRITICAL)
-    worse = replace(COLD, reason=bad, raised_as=Verdict.STRESSED, worse_at_ns=NOW + 1)
-    seen = Note("0", NOW, "bert", ACKNOWLEDGE, "alarm:a")
-    assert "a" in notes_of_alarms([COLD], [seen], NOW + 1)
-    assert notes_of_alarms([worse], [seen], NOW + 1) == {}
-    again = replace(seen, id="2", made_at_ns=NOW + 1)
-    assert "a" in notes_of_alarms([worse], [seen, again], NOW + 2)
+    assert "a" in notes_of_alarms([COLD], [said], NOW + 1)
+    assert notes_of_alarms([worse], [said], NOW + 1) == {}
+    again = replace(said, id="2", made_at_ns=NOW + 1)
+    assert "a" in notes_of_alarms([worse], [said, again], NOW + 2)
 
 
 def test_what_comes_back_is_shelved_too_unless_it_is_worse_or_another_thing() -> None:

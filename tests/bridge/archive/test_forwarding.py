@@ -12,12 +12,12 @@ import pytest
 
 from lupin_twin.core.notes import NotesRequest
 from lupin_twin.core.state import Write
-from lupin_twin.journal.beside import mark_of
+from lupin_twin.journal.paths import mark_of
 from lupin_twin.journal.rebuild import vacuum
-from lupin_twin.journal.received import notes
 from lupin_twin.journal.retention import Limits, forget
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import SiteLog, open_reader
+from lupin_twin.journal.writes import notes
 from tests.support.archive import (
     TABLES,
     Archive,

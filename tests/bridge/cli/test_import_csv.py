@@ -12,7 +12,7 @@ import httpx
 import pytest
 import yaml
 
-from lupin_twin.journal.beside import Lock
+from lupin_twin.journal.paths import Lock
 from lupin_twin.journal.runs import Clock
 from tests.support.docs import block_named
 from tests.support.journal import NOW, SECOND, kept, scan, select

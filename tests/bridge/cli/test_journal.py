@@ -12,7 +12,7 @@ from subprocess import CompletedProcess
 import pytest
 
 from lupin_bridge.past import bodies
-from lupin_twin.journal.beside import demo_journal_path, journal_path
+from lupin_twin.journal.paths import demo_journal_path, journal_path
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_writer
 from tests.support.journal import NOW, SECOND, is_whole, kept, look, pin, recording, scan

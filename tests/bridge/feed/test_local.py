@@ -95,7 +95,7 @@ async def test_an_answer_that_takes_too_long_ends_and_delays_no_observation(doma
         await until(lambda: twin.journal().state == "recording", "the journal")
         await twin.past.ask(partial(as_found, 0), await twin.now(), 0.0)
         waiting = asyncio.create_task(twin.ask(Endless(), 0.0))
-        await until(lambda: len(twin.past.asked) == 1, "the question")
+        await until(lambda: len(twin.past.pending) == 1, "the question")
         # Meanwhile the ROS thread answers as ever.
         await twin.thread.call(lambda node: node.notify_listener())
         assert not waiting.done()
@@ -103,4 +103,4 @@ async def test_an_answer_that_takes_too_long_ends_and_delays_no_observation(doma
         with pytest.raises(TwinTimeoutError, match=r"within 0\.1 s"):
             await twin.ask(Endless(), 0.0)
         waiting.cancel()
-        await until(lambda: twin.past.asked == {}, "the end of both")
+        await until(lambda: twin.past.pending == {}, "the end of both")

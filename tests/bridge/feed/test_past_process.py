@@ -1,4 +1,4 @@
-"""The process that looks back: asked, cancelled, killed, started again."""
+"""The process that looks back: pending, cancelled, killed, started again."""
 
 import asyncio
 import logging
@@ -21,7 +21,7 @@ from lupin_bridge.past.plans import Answered
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.journal.received import Export
+from lupin_twin.journal.writes import Export
 from tests.support.journal import NOW, SECOND, kept, scan
 from tests.support.looking import Body, Count, Endless, Failing, MapCells, Running
 from tests.support.maps import map_of
@@ -102,18 +102,18 @@ def test_what_nobody_waits_for_any_more_ends_there(path: Path, run: Run) -> None
         asking = [
             asyncio.create_task(past.ask(Endless(), now(path), 1.0)) for _ in range(MAX_PENDING)
         ]
-        await until(lambda: len(past.asked) == MAX_PENDING, "all of them")
+        await until(lambda: len(past.pending) == MAX_PENDING, "all of them")
         with pytest.raises(NotRemembered, match=f"{MAX_PENDING} requests .* the limit"):
             await past.ask(Running(), now(path), 0.0)
         asking.pop().cancel()
-        await until(lambda: len(past.asked) < MAX_PENDING, "one to go")
+        await until(lambda: len(past.pending) < MAX_PENDING, "one to go")
         running, _ = await past.ask(Running(), now(path), 0.0)
         assert running <= 3, "those that no thread has taken wait"
-        for asked in asking:
-            asked.cancel()
+        for pending in asking:
+            pending.cancel()
         while (await past.ask(Running(), now(path), 0.0))[0]:
             pass
-        assert past.asked == {}
+        assert past.pending == {}
 
     run(test)
 

@@ -2,7 +2,7 @@
 
 import asyncio
 
-from lupin_bridge.feed.shared_work import Shared
+from lupin_bridge.feed.tasks import Shared
 from tests.support.waiting import until
 
 

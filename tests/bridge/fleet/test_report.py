@@ -134,7 +134,7 @@ def test_sites_are_exported_together_or_by_name(archive: Archive, tmp_path: Path
         assert "site" not in alone.column_names
         assert alone["value"] == table.slice(6, 6)["value"]
         for query, status, said in (
-            ("sites=gh1,gh9", 404, "there is no site 'gh9' in the archive (3 others are)"),
+            ("sites=gh1,gh9", 404, "there is no site 'gh9' in the archive, which has 3"),
             ("sites=", 404, "there is no site ''"),
             ("site=gh1", 400, "parameter 'site' is unknown, expected from, to, tag_id,"),
             ("from=5&to=4", 400, "to is 4.000000000 s, before from,"),

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lupin_bridge.alarms.board import board_of
 from lupin_bridge.judge import alarm_fold, tag_log
-from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.alarm_fold import AlarmFolder
 from lupin_bridge.judge.day import ClockDay, Day
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria, own_sensors
@@ -97,7 +97,7 @@ def follow(
     lots: Iterable[Sequence[PastWrite]], spans: Sequence[RunSpan], now_ns: int
 ) -> tuple[Alarm, ...]:
     """What a bridge does that is asked now and then."""
-    follower = Follower(BY, spans)
+    follower = AlarmFolder(BY, spans)
     for lot in lots:
         follower.take(lot)
         follower.found(now_ns)
@@ -143,7 +143,7 @@ def test_what_is_old_is_forgotten_and_changes_nothing_of_what_is_told(seed: int)
     spans, now_ns = chance.choice(SPANS), heard[-1].stamp_ns + chance.randint(0, 300) * MINUTE
     expected = alarms(heard, spans, now_ns, SENSORS, day_of)
     # What there is no room for is kept as what it led to.
-    follower = Follower(BY, spans, kept=chance.choice([3, 24, 300]))
+    follower = AlarmFolder(BY, spans, kept=chance.choice([3, 24, 300]))
     since_ns = 0
     while heard:
         # Late, but not as late as that.
@@ -163,7 +163,7 @@ def test_what_is_old_is_forgotten_and_changes_nothing_of_what_is_told(seed: int)
 
 
 def test_what_is_older_than_what_is_kept_is_not_taken_in_and_counted() -> None:
-    follower, heard = Follower(BY, SPANS[0], kept=4), scans([22] * 9)
+    follower, heard = AlarmFolder(BY, SPANS[0], kept=4), scans([22] * 9)
     follower.take(heard[:5])
     follower.take(heard[5:])
     late = [replace(one, number=90 + one.number, stamp_ns=one.stamp_ns + S) for one in heard]
@@ -181,7 +181,7 @@ def test_what_is_older_than_what_is_kept_is_not_taken_in_and_counted() -> None:
 
 def test_nothing_grows_with_the_days() -> None:
     """A round a day, and a lamp that goes on and off: gaps, pauses and turns without end."""
-    follower = Follower(BY, SPANS[0])
+    follower = AlarmFolder(BY, SPANS[0])
     for day in range(60):
         for at in (0, 1):
             light, number = (900.0, 0.0)[at], 2 * day + at
@@ -263,7 +263,7 @@ def test_whatever_a_verdict_can_be_of_becomes_an_alarm_but_what_the_estimate_say
 
 
 def test_it_says_when_it_will_be_another_by_itself() -> None:
-    follower = Follower(BY, SPANS[0])
+    follower = AlarmFolder(BY, SPANS[0])
     heard = scans([22, 22])
     follower.take(heard)
     last_ns = heard[-1].stamp_ns
@@ -274,7 +274,7 @@ def test_it_says_when_it_will_be_another_by_itself() -> None:
 
 
 def test_what_stays_as_it_is_is_the_very_same() -> None:
-    follower = Follower(BY, SPANS[0])
+    follower = AlarmFolder(BY, SPANS[0])
     heard = scans([17, 17, 16, 22, 22])
     follower.take(heard[:2])
     now_ns = heard[-1].stamp_ns

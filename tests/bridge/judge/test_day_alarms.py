@@ -8,7 +8,7 @@ from itertools import count
 
 import pytest
 
-from lupin_bridge.judge.alarm_fold import Follower
+from lupin_bridge.judge.alarm_fold import AlarmFolder
 from lupin_bridge.judge.day import COUNTS_NS, SINCE_NS, ClockDay, Day, days_of
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria, own_sensors
@@ -53,8 +53,8 @@ def day_number(at_ns: int) -> int:
     return (at_ns - DAWN * HOUR) // DAY_NS
 
 
-def new_follower() -> Follower:
-    return Follower(DawnToDusk(own_sensors(), None, ClockDay(None)), SPANS)
+def new_follower() -> AlarmFolder:
+    return AlarmFolder(DawnToDusk(own_sensors(), None, ClockDay(None)), SPANS)
 
 
 def found(heard: Iterable[PastWrite]) -> list[Alarm]:
@@ -142,7 +142,7 @@ def test_a_sensor_that_reads_the_quantity_goes_first() -> None:
 
 
 def test_without_a_clock_a_day_is_24_hours_of_ros_time() -> None:
-    follower = Follower(Criteria(own_sensors(), None, ClockDay(None)), SPANS)
+    follower = AlarmFolder(Criteria(own_sensors(), None, ClockDay(None)), SPANS)
     follower.take(scans({"temperature": [14.0] * 3}, first_h=DAWN + 5))
     [cold] = [one for one in follower.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]
     assert (cold.reason.sensor, cold.raised_at_ns) == (MEAN, 2 * DAY_NS)

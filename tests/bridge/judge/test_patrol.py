@@ -3,27 +3,27 @@ from lupin_bridge.judge.scans import LAP_INTERVALS, Patrol, Scans
 S = 1_000_000_000
 
 
-def heard(*stamps_s: float) -> Patrol:
+def add_stamps(*stamps_s: float) -> Patrol:
     scans = Scans()
-    scans.heard([int(stamp * S) for stamp in stamps_s], None)
+    scans.add_stamps([int(stamp * S) for stamp in stamps_s], None)
     return scans.patrol(0)
 
 
 def test_a_way_back_or_a_pause_does_not_change_the_rhythm() -> None:
-    assert heard(0, 40, 80, 120, 700, 740).interval_ns == 40 * S
+    assert add_stamps(0, 40, 80, 120, 700, 740).interval_ns == 40 * S
 
 
 def test_only_the_last_intervals_count() -> None:
     slow = [i * 600 for i in range(2 * LAP_INTERVALS)]
     fast = [slow[-1] + 5 * (i + 1) for i in range(LAP_INTERVALS)]
-    assert heard(*slow, *fast).interval_ns == 5 * S
+    assert add_stamps(*slow, *fast).interval_ns == 5 * S
 
 
 def test_what_is_known_already_or_is_still_to_come_is_no_scan() -> None:
     scans = Scans()
-    scans.heard([100 * S, 140 * S], 150 * S)
-    scans.heard([151 * S, 140 * S, 100 * S, 120 * S], 150 * S)
-    scans.heard([149 * S, 145 * S], 150 * S)
+    scans.add_stamps([100 * S, 140 * S], 150 * S)
+    scans.add_stamps([151 * S, 140 * S, 100 * S, 120 * S], 150 * S)
+    scans.add_stamps([149 * S, 145 * S], 150 * S)
     assert scans.patrol(0) == Patrol(5 * S, 149 * S, 0)
-    scans.heard([151 * S], 151 * S)
+    scans.add_stamps([151 * S], 151 * S)
     assert scans.patrol(0).last_scan_ns == 151 * S

@@ -2,16 +2,16 @@ from lupin_bridge.judge.day import ClockDay, TagDays
 from lupin_bridge.judge.episodes import TagEpisodes
 from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_bridge.judge.quantities import IsDay
-from lupin_bridge.judge.tag_log import MARK, TagPast, is_long
+from lupin_bridge.judge.tag_log import MARK, TagStates, is_long
 from lupin_twin.core.past import PastWrite
 
 S = 10**9
 
 
-def tag(recent_s: float | None = None, is_day: IsDay = lambda _: True) -> TagPast:
+def tag(recent_s: float | None = None, is_day: IsDay = lambda _: True) -> TagStates:
     by = Criteria(own_sensors(), recent_s, ClockDay(None))
     episodes = TagEpisodes("a", 0, by, TagDays(by.sensors, lambda _: True, by.day_number))
-    return TagPast(episodes, by.holds_ns, lambda start, end, _: is_long(start, end), is_day)
+    return TagStates(episodes, by.holds_ns, lambda start, end, _: is_long(start, end), is_day)
 
 
 def write(number: int, at_s: int, light: float = 900.0) -> PastWrite:

@@ -28,7 +28,7 @@ from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify import push as push_module
 from lupin_bridge.notify.destinations import PushTarget
 from lupin_bridge.notify.messages import Backoff, Condition
-from lupin_bridge.notify.push import FIRST_WAIT_S, MOST_WAIT_S, TRIES, Push, encoded
+from lupin_bridge.notify.push import FIRST_WAIT_S, MAX_ATTEMPTS, MOST_WAIT_S, Push, encoded
 from lupin_bridge.notify.webhook import PostError, until_taken
 from lupin_bridge.settings import Settings
 from tests.support.access import refused_start
@@ -240,7 +240,7 @@ async def test_without_internet_for_half_an_hour_nothing_is_lost(
     monkeypatch.setattr("lupin_bridge.notify.webhook.asyncio.sleep", sleep)
     backoff, condition = Backoff(FIRST_WAIT_S, MOST_WAIT_S), Condition()
     assert await until_taken(
-        attempt, condition, backoff, "an alarm", "push.example", most_tries=TRIES
+        attempt, condition, backoff, "an alarm", "push.example", max_attempts=MAX_ATTEMPTS
     )
 
 

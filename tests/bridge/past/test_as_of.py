@@ -1,8 +1,7 @@
 """Answers as of a moment: what they say, and ETags that stand for exactly that."""
 
 import json
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC
 from typing import Any
@@ -211,37 +210,6 @@ def test_the_same_content_has_the_same_etags_whoever_made_it() -> None:
     for one, other in ((asked(), asked()), (asked(RULES, a_map(1)), asked(RULES, a_map(7)))):
         assert plans(again, other) == plans(SITE, one)
         assert len(set(plans(SITE, one))) == 7
-
-
-def later(house: Snapshot) -> Snapshot:
-    return replace(house, stamp_ns=6 * NS)
-
-
-def changed(**changes: Any) -> Callable[[Snapshot], Snapshot]:
-    return lambda house: replace(house, tags=(replace(house.tags[0], **changes), house.tags[1]))
-
-
-@pytest.mark.parametrize(
-    ("change", "field_changes"),
-    [
-        (later, False),  # the same field, whenever it is looked at
-        (changed(readings=(Reading("co2", 401.0, NS),)), True),
-        (changed(readings=(Reading("co2", math.nan, NS),)), True),
-        (changed(readings=(Reading("co2", 400.0, 2 * NS),)), False),
-        (changed(pose=None), True),
-        (changed(looked_at_ns=1), False),
-    ],
-)
-def test_what_changes_an_answer_changes_its_etag(
-    change: Callable[[Snapshot], Snapshot], field_changes: bool
-) -> None:
-    house = change(SITE)
-    assert WholeState(None).plan(house).etag != WholeState(None).plan(SITE).etag
-    for field_format in FORMATS:
-        one, other = (field_of(h, asked(), field_format) for h in (SITE, house))
-        assert (one.etag != other.etag) is field_changes
-        is_same = one.write(lambda: False) == other.write(lambda: False)
-        assert is_same is not field_changes
 
 
 @pytest.mark.parametrize(

@@ -152,33 +152,6 @@ def test_what_is_asked_over_the_period_comes_in_its_buckets(
 STAMPS = st.lists(st.integers(0, 999), max_size=30)
 
 
-@given(STAMPS, STAMPS, st.integers(0, 10**12), st.integers(1, 50))
-def test_each_event_is_in_the_one_bucket_that_holds_it(
-    scans: list[int], looks: list[int], start_ns: int, points: int
-) -> None:
-    end_ns = start_ns + 1_000
-    given_ = parts(
-        start_ns,
-        end_ns,
-        points=points,
-        scans=one_by_one([start_ns + stamp for stamp in scans], start_ns, end_ns),
-        looks=one_by_one([start_ns + stamp for stamp in looks], start_ns, end_ns),
-    )
-    found = timeline_body(*given_)
-    width_ns = -(-1_000 // points)
-    assert found["bucket_s"] == width_ns / NS
-    for name, stamps in (("scans", scans), ("looks", looks)):
-        plain = [0] * points
-        for stamp in stamps:
-            plain[stamp // width_ns] += 1
-        told = {
-            (b["start"]["sec"] * NS + b["start"]["nanosec"] - start_ns) // width_ns: b[name]
-            for b in found["buckets"]
-        }
-        assert [told.get(number, 0) for number in range(points)] == plain
-    assert all(bucket["scans"] or bucket["looks"] for bucket in found["buckets"])
-
-
 @given(STAMPS, STAMPS, st.integers(1, 50))
 def test_bucketed_or_not_the_counts_are_the_same(
     scans: list[int], looks: list[int], points: int

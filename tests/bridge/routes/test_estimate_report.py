@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from lupin_bridge.stream.followers import Advice, EstimateQualities, ExpectedTags
+from lupin_bridge.stream.pollers import Advice, EstimateQualities, ExpectedTags
 from lupin_twin.core.state import Pin, Pose, Write
 from lupin_twin.journal.runs import Clock
 from tests.support.journal import SECOND, kept, scan

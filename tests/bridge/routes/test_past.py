@@ -35,9 +35,9 @@ async def remembering(past: MadeUp, limits: Limits | None = None) -> AsyncIterat
         twin = it.twin
         twin.rows = past.rows  # type: ignore[method-assign]
 
-        async def ask(question: PastQuery[Any], cost_s: float) -> Any:
+        async def ask(query: PastQuery[Any], cost_s: float) -> Any:
             past.costs.append(cost_s)
-            return await look_up(question, past, twin.workers)
+            return await look_up(query, past, twin.workers)
 
         twin.ask = ask  # type: ignore[method-assign]
         await until(lambda: it.bridge.latest is not None, "the first state")
@@ -191,6 +191,6 @@ async def test_questions_say_what_they_cost_and_are_timed_by_their_kind(domain: 
             assert (await it.http.get(path)).status_code == 200
         assert min(past.costs) > 0, "by which a dear one gives way to a cheap one"
         text = (await it.http.get("/metrics")).text
-        assert 'lupin_past_seconds_count{question="history"} 1.0' in text
-        assert 'lupin_past_seconds_count{question="timeline"} 2.0' in text
+        assert 'lupin_past_seconds_count{query="history"} 1.0' in text
+        assert 'lupin_past_seconds_count{query="timeline"} 2.0' in text
         assert "lupin_exports_running 0.0" in text

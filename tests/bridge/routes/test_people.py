@@ -19,10 +19,8 @@ from tests.support.people import (
     PASSWORD,
     TOKEN,
     add,
-    end_of,
     in_s,
     notes,
-    remove,
     sign_in,
     signed_in,
     signed_in_once,
@@ -143,18 +141,6 @@ def test_trying_is_slowed_down_for_the_address_that_tries(live: Bridge) -> None:
 
         wait_for(is_slowed, "an end to guessing")
         assert sign_in(other, "anna").status_code == 204
-
-
-def test_what_a_removed_account_has_open_ends(live: Bridge, accounts: Path) -> None:
-    add(accounts, gone="operator")
-    with signed_in(live.url, "gone") as browser:
-        cookie = "; ".join(f"{name}={value}" for name, value in browser.cookies.items())
-        ws = f"{live.url.replace('http', 'ws', 1)}/ws/state"
-        with open_websocket(ws, additional_headers={"Cookie": cookie}) as socket_of_theirs:
-            assert socket_of_theirs.recv(timeout=PATIENCE_S)
-            remove(accounts, "gone")
-            assert browser.get("/api/state").status_code == 401
-            assert "the session has ended" in end_of(socket_of_theirs)
 
 
 def test_the_audit_trail_is_the_admins(live: Bridge) -> None:

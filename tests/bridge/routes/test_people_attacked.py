@@ -14,7 +14,7 @@ import httpx
 import pytest
 
 from lupin_bridge.access.credentials import digest
-from lupin_bridge.routes.written import MAX_LISTED
+from lupin_bridge.routes.writes import MAX_LISTED
 from lupin_twin.core.notes import COMMENT
 from tests.support import raw_http
 from tests.support.access import served

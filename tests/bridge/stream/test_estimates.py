@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.stream import followers
-from lupin_bridge.stream.followers import (
+from lupin_bridge.stream import pollers
+from lupin_bridge.stream.pollers import (
     MAX_SENSORS,
     Changed,
     EstimateFollower,
@@ -107,7 +107,7 @@ def test_of_many_sensors_so_many_are_asked_after() -> None:
 
 
 async def test_what_cannot_be_answered_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(followers, "PERIOD_S", 0.0)
+    monkeypatch.setattr(pollers, "PERIOD_S", 0.0)
     stage = Stage()
     stage.snapshot = snapshot(co2=1)
     stage.follower.start()

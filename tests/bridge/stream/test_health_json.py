@@ -1,18 +1,13 @@
 import json
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
-from hypothesis import given
-from hypothesis import strategies as st
-
-from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, own_sensors, silenced
+from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.state_json import judgement, judgement_since
 from lupin_twin.core.state import Reading, Snapshot, TagState
 from tests.support.seen import BY_LIGHT
 
-SENSORS = own_sensors()
 START = 1_000_000_000_000
 
 
@@ -68,34 +63,6 @@ def test_of_a_silent_house_it_says_so() -> None:
 def test_nothing_judged_yet_is_said_too() -> None:
     body = schema.Judgement.model_validate_json(judgement(NOTHING_JUDGED), strict=True)
     assert (body.house.verdict, body.tags) == ("unknown", {})
-
-
-STEPS = st.lists(st.dictionaries(st.sampled_from("abc"), st.sampled_from([6.0, 16.0, 22.0])))
-
-
-@given(STEPS, st.sets(st.integers(0, 20)))
-def test_whole_and_deltas_together_are_always_what_was_judged(
-    steps: list[dict[str, float]], skipped: set[int]
-) -> None:
-    judge = Judge(BY_LIGHT)
-    told, shown = NOTHING_JUDGED, json.loads(judgement(NOTHING_JUDGED))["tags"]
-    kept: dict[str, TagState] = {}
-    for number, values in enumerate(steps):
-        kept = {
-            tag_id: kept[tag_id]
-            if tag_id in kept and kept[tag_id].readings[0].value == value
-            else tag(tag_id, value, START + number)
-            for tag_id, value in values.items()
-        }
-        now = see(judge, START + number, list(kept.values()))
-        if number in skipped:
-            continue
-        delta: dict[str, Any] = json.loads(judgement_since(told, now))
-        shown = {**{key: one for key, one in shown.items() if key in kept}, **delta["tags"]}
-        assert {"house": delta["house"], "tags": shown} == json.loads(judgement(now))
-        if now is told:
-            assert delta["tags"] == {}
-        told = now
 
 
 def test_a_delta_holds_only_what_is_another() -> None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 
-from lupin_bridge.stream import followers
-from lupin_bridge.stream.followers import Advice, EstimateQualities, ExpectedTags
-from lupin_twin.estimate.cholesky import Place
+from lupin_bridge.stream import pollers
+from lupin_bridge.stream.pollers import Advice, EstimateQualities, ExpectedTags
 from lupin_twin.estimate.engine import Record, Tally
+from lupin_twin.estimate.solution import Place
 from lupin_twin.runtime.estimates import Report, TagCheck
 
 S = 1_000_000_000
@@ -26,7 +26,7 @@ BARE = Report(S, None, "", Record(None, Tally(), Tally()))
 
 
 def test_how_often_they_were_right() -> None:
-    body = json.loads(followers.qualities({"co2": REPORT, "ph": BARE}))
+    body = json.loads(pollers.qualities({"co2": REPORT, "ph": BARE}))
     EstimateQualities.model_validate(body)
     assert body["sensors"]["co2"] == {
         "fitted_at": {"sec": 4, "nanosec": 0},
@@ -44,7 +44,7 @@ def test_how_often_they_were_right() -> None:
 
 
 def test_what_was_expected_of_each_tag() -> None:
-    body = json.loads(followers.tags("co2", REPORT))
+    body = json.loads(pollers.tags("co2", REPORT))
     ExpectedTags.model_validate(body)
     assert (body["sensor_type"], body["at"]) == ("co2", {"sec": 5, "nanosec": 0})
     assert body["tags"]["b"] == {
@@ -60,6 +60,6 @@ def test_what_was_expected_of_each_tag() -> None:
 
 
 def test_where_another_tag_helps() -> None:
-    body = json.loads(followers.advice("co2", REPORT))
+    body = json.loads(pollers.advice("co2", REPORT))
     Advice.model_validate(body)
     assert body == {"sensor_type": "co2", "places": [{"x": 1.0, "y": 2.0, "error_ratio": 0.75}]}

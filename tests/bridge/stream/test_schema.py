@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from std_msgs.msg import Header
 
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.followers import GetEstimateResponse
+from lupin_bridge.stream.pollers import GetEstimateResponse
 
 
 def names(message_type: Any) -> list[str]:

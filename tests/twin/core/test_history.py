@@ -40,7 +40,7 @@ def test_after_a_clock_that_went_back_what_was_later_is_news_in_a_simulation(
     repeats = Repeats()
     for at_s in (40.0, 3600.0):
         repeats.add(scan("1", at_s=at_s, co2=at_s))
-    repeats.hold_to(50 * S, retains_keys=retains_keys)
+    repeats.clamp_to(50 * S, retains_keys=retains_keys)
     assert repeats.news(scan("1", at_s=40.0, co2=1.0)) is None
     assert (repeats.news(scan("1", at_s=3600.0, co2=1.0)) is None) is retains_keys
 

@@ -76,7 +76,7 @@ def test_a_clock_that_is_wrong_in_every_way_is_found_too(robot: Robot) -> None:
 
 def test_a_clock_that_goes_back_for_all_makes_nobody_late(robot: Robot) -> None:
     robot.says(1000.0)
-    robot.lateness.hold_to(50 * S)
+    robot.lateness.clamp_to(50 * S)
     assert robot.says(*(51.0 + i for i in range(20))) == []
 
 

@@ -1,4 +1,4 @@
-"""Which tags are far off. The page is held to the same cases by `domain/farOff.test.ts`."""
+"""Which tags are far off. The page is held to the same cases by `domain/twin.test.ts`."""
 
 import json
 import math

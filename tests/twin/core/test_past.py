@@ -8,11 +8,13 @@ from lupin_twin.core.drops import MAX_TEXT_LENGTH
 from lupin_twin.core.past import (
     HOUR_NS,
     MAX_READINGS,
+    MAX_WRITES,
     SLOT_NS,
     Grid,
     NotRemembered,
     PastRefused,
     SeriesRequest,
+    WritesRequest,
     check_moment,
     error_of,
     grid,
@@ -20,6 +22,13 @@ from lupin_twin.core.past import (
 )
 
 ASKED: dict[str, Any] = {"tag_id": "tag_7", "sensor_type": "temperature"}
+
+
+def request(given: dict[str, Any]) -> SeriesRequest | WritesRequest:
+    """Of a series, or of what was written where it has a name of those."""
+    if given.keys() & {"reach_s", "after", "max_count"}:
+        return WritesRequest(**given)
+    return SeriesRequest(**(ASKED | given))
 
 
 @pytest.mark.parametrize(
@@ -43,11 +52,17 @@ ASKED: dict[str, Any] = {"tag_id": "tag_7", "sensor_type": "temperature"}
         ({"start_ns": 5, "end_ns": 4}, "end 4 ns is before start 5 ns"),
         ({"max_points": 0}, "max_points is 0, the limits are 1 and 40000"),
         ({"max_points": MAX_READINGS + 1}, "max_points is 40001"),
+        ({"reach_s": -0.1}, "reach_s is -0.1"),
+        ({"reach_s": 1.1e9}, "reach_s is 1100000000"),
+        ({"reach_s": float("nan")}, "reach_s is nan"),
+        ({"after": 2**63}, "after is 9223372036854775808, the limit is 9223372036854775807"),
+        ({"max_count": 0}, "max_count is 0"),
+        ({"max_count": MAX_WRITES + 1}, f"max_count is {MAX_WRITES + 1}"),
     ],
 )
 def test_a_question_that_cannot_be_answered_is_refused(wrong: dict[str, Any], says: str) -> None:
     with pytest.raises(PastRefused, match=re.escape(says)):
-        SeriesRequest(**(ASKED | wrong))
+        request(wrong)
 
 
 @pytest.mark.parametrize(
@@ -59,10 +74,12 @@ def test_a_question_that_cannot_be_answered_is_refused(wrong: dict[str, Any], sa
         {"max_points": 1},
         {"max_points": MAX_READINGS},
         {"tag_id": "7" * MAX_TEXT_LENGTH, "sensor_type": "t" * MAX_TEXT_LENGTH},
+        {"after": 0, "reach_s": 1e9, "max_count": MAX_WRITES},
+        {"after": 2**63 - 1, "max_count": 1},
     ],
 )
 def test_the_limits_themselves_are_allowed(right: dict[str, Any]) -> None:
-    assert SeriesRequest(**(ASKED | right)).event is None
+    request(right)
 
 
 @pytest.mark.parametrize(

@@ -34,10 +34,12 @@ def test_after_a_clock_that_went_back_all_ages_from_there_and_news_is_news() -> 
     store.record(scan("tried", at_s=3600.0, succeeded=False))
     store.pin("never", at(1.0))
     count = store.observation_count
-    assert not store.hold_to(3600 * S)
-    assert not store.hold_to(0), "a simulated clock that has not started is no clock that went back"
-    assert store.hold_to(50 * S)
-    assert not store.hold_to(50 * S)
+    assert not store.clamp_to(3600 * S)
+    assert not store.clamp_to(0), (
+        "a simulated clock that has not started is no clock that went back"
+    )
+    assert store.clamp_to(50 * S)
+    assert not store.clamp_to(50 * S)
     ages = {t.tag_id: t.stale_seconds(60 * S) for t in store.snapshot(60 * S, "map").tags}
     assert ages == {"1": 10.0, "before": 20.0, "tried": 10.0, "never": math.inf}
     tags = {t.tag_id: t for t in store.snapshot(60 * S, "map").tags}
@@ -130,7 +132,7 @@ def test_against_the_plainest_store(steps: list[Write | int]) -> None:
     written: list[Write] = []
     for number, step in enumerate(steps):
         if isinstance(step, int):
-            store.hold_to(step * S)
+            store.clamp_to(step * S)
             # By time first: of what is equal from now on, the last in the list is the latest.
             written = [
                 replace(it, stamp_ns=min(it.stamp_ns, step * S))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from lupin_twin.estimate.cholesky import MAX_EXACT, gap_of
 from lupin_twin.estimate.kernel import Hyper, Readings, Scale
 from lupin_twin.estimate.model import Model, fit
 from lupin_twin.estimate.posterior import INFLATION
+from lupin_twin.estimate.solution import MAX_EXACT, gap_of
 from lupin_twin.field.grid import FloatArray
 from tests.support import textbook_gp
 from tests.support.estimates import DAY_S, a_day, hypers, some_readings, spots_of

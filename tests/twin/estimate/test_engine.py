@@ -3,9 +3,9 @@
 import pytest
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
-from lupin_twin.estimate.cholesky import MAX_EXACT, PER_TAG
 from lupin_twin.estimate.engine import MAX_TAGS, TagPast, moment_of, readings_of
 from lupin_twin.estimate.kernel import MAX_PER_TAG
+from lupin_twin.estimate.solution import MAX_EXACT, PER_TAG
 from lupin_twin.field.engine import FieldRefused
 from tests.support.estimates import DAY_S
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 from lupin_twin.estimate.kernel import PRIOR_LOG_SD, PRIOR_MEDIAN, Hyper, Pairs, Readings, scale_of
-from lupin_twin.estimate.model import FitFailed, hyper_of, minimise, surprise
+from lupin_twin.estimate.model import FitFailed, hyper_of, minimise, negative_log_posterior
 from tests.support import textbook_gp
 from tests.support.estimates import DAY_S, hypers, some_readings, spots_of
 
@@ -16,7 +16,7 @@ START = np.zeros(len(PRIOR_MEDIAN))
 
 def objective_of(readings: Readings) -> Any:
     y = scale_of(readings.value).standardised(readings.value)
-    return surprise(Pairs(readings, DAY_S), y)
+    return negative_log_posterior(Pairs(readings, DAY_S), y)
 
 
 @given(some_readings())

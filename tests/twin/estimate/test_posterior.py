@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lupin_twin.estimate.cholesky import MAX_EXACT
 from lupin_twin.estimate.kernel import Pairs, Readings
 from lupin_twin.estimate.model import fit
 from lupin_twin.estimate.posterior import INFLATION, Cells, EstimateGrid, Posterior
+from lupin_twin.estimate.solution import MAX_EXACT
 from lupin_twin.field.grid import FloatArray
 from lupin_twin.field.idw import Abandoned
 from tests.support import textbook_gp

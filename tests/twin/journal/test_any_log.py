@@ -23,12 +23,12 @@ from lupin_twin.core.past import (
     recent_of,
 )
 from lupin_twin.journal.appending import Appender
+from lupin_twin.journal.counts import count_rows
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.hours import count_rows
 from lupin_twin.journal.queries import newest, series
-from lupin_twin.journal.received import Export, lots, observed, recent, scans, writes
 from lupin_twin.journal.runs import runs, span_at
 from lupin_twin.journal.schema import SiteLog
+from lupin_twin.journal.writes import Export, lots, observed, recent, scans, writes
 from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, check, one_run, periods, steps
 from tests.twin.journal.conftest import Engines, Living
 
@@ -120,8 +120,8 @@ def check_export(life: Life, connection: Any, period: Period, tag: str | None) -
         for row in life.export(start_ns, end_ns, tag)
     ]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("lupin_twin.journal.received._STRETCH", 64)
-        patch.setattr("lupin_twin.journal.received.LOT", 3)
+        patch.setattr("lupin_twin.journal.writes._STRETCH", 64)
+        patch.setattr("lupin_twin.journal.writes.LOT", 3)
         export = Export(start_ns, end_ns, tag, None)
         found = [lot for step in iter(partial(export.step, connection), None) for lot in lots(step)]
     assert repr([row for lot in found for row in lot]) == repr(expected)

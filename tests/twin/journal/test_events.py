@@ -2,7 +2,7 @@ from pathlib import Path
 from sqlite3 import Connection
 
 from lupin_twin.core.past import EVERY_TAG, Event, SeriesPast, SeriesRequest
-from lupin_twin.journal.hours import SILENCE_NS
+from lupin_twin.journal.counts import SILENCE_NS
 from lupin_twin.journal.queries import series
 from tests.support.journal import SECOND, look, scan
 from tests.support.log_life import BEGUN, HOUR, LATEST, MINUTE, lived

@@ -4,8 +4,8 @@ from pathlib import Path
 import pytest
 
 from lupin_twin.core.past import NotRemembered
-from lupin_twin.journal.received import LOT, Export, rows
 from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.writes import LOT, Export, rows
 from tests.support.journal import SECOND, scan
 from tests.support.log_life import BEGUN, LATEST, MINUTE, lived
 
@@ -30,7 +30,7 @@ def test_lots_come_as_they_are_taken_and_nothing_is_held_open_between(tmp_path: 
 def test_what_is_deleted_meanwhile_breaks_it_off_and_only_if_it_was_to_come(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lupin_twin.journal.received._STRETCH", 400)
+    monkeypatch.setattr("lupin_twin.journal.writes._STRETCH", 400)
     total = 3_000
     with lived(tmp_path / "j.sqlite") as life:
         life.write(scan(at_ns=BEGUN + n * SECOND) for n in range(total))

@@ -115,55 +115,9 @@ def test_a_copy_that_says_nonsense_of_itself_is_damaged(
         follow.followed(target)
 
 
-def test_what_the_journal_deletes_is_deleted_in_the_copy_and_its_hours_stay(
-    source: Path, tmp_path: Path
-) -> None:
-    target = tmp_path / "web.sqlite"
-    copy(source, target)
-    with closing(open_writer(source)) as connection, transaction(connection):
-        purge_step(connection, Limits(1.0, 10**12), NOW + 3_600 * SECOND)
-    copy(source, target)
-    assert contents(target) == contents(source)
-    assert follow.followed(target).kept_ns == follow.followed(source).kept_ns != ((NOW, 2**63 - 1),)
-
-
 def purge(path: Path, upto_ns: int) -> None:
     with closing(open_writer(path)) as connection, transaction(connection):
         assert purge_step(connection, Limits(1.0, 10**12), upto_ns)
-
-
-def test_a_copy_begun_after_rows_were_deleted_has_what_was_counted_of_them(
-    source: Path, tmp_path: Path
-) -> None:
-    target = tmp_path / "web.sqlite"
-    # Behind a pause of 20 minutes, which a late scan halves: it is none any more.
-    kept(source, [scan(at_ns=NOW + 31 * 600 * SECOND)])
-    purge(source, NOW + 6 * 3_600 * SECOND)
-    copy(source, target, 2)
-    assert contents(target) == contents(source)
-    kept(source, [scan(at_ns=NOW + 30 * 600 * SECOND)])
-    copy(source, target, 2)
-    assert contents(target) == contents(source)
-    # Late ones, of hours that have lost rows and of others; the pests of one were never there.
-    late = NOW + 2 * 3_600 * SECOND
-    kept(source, [scan(at_ns=late, co2=9e3), look("8", at_ns=late), scan("9", NOW + 1, co2=1.0)])
-    kept(source, [scan(at_ns=NOW + 60 * 3_600 * SECOND)])
-    copy(source, target, 2)
-    assert contents(target) == contents(source)
-
-
-def test_a_copy_that_lacks_what_was_deleted_meanwhile_is_made_anew(
-    source: Path, tmp_path: Path
-) -> None:
-    target = tmp_path / "web.sqlite"
-    copy(source, target)
-    kept(source, [scan(at_ns=NOW + (n + 60) * 600 * SECOND) for n in range(30)])
-    purge(source, NOW + 85 * 600 * SECOND)
-    with pytest.raises(DamagedFile, match="were deleted in the journal"):
-        copy(source, target)
-    target.unlink()
-    copy(source, target)
-    assert contents(target) == contents(source)
 
 
 def test_a_copy_is_whole_in_the_end_though_the_journal_deletes_all_the_time(tmp_path: Path) -> None:
@@ -191,22 +145,6 @@ def test_a_day_of_no_length_is_the_usual_one(said: str, source: Path) -> None:
     assert follow.followed(source).world.day_length_s == 86_400.0
 
 
-def test_a_copy_that_was_behind_when_a_tag_was_forgotten_is_made_anew(
-    source: Path, tmp_path: Path
-) -> None:
-    target = tmp_path / "web.sqlite"
-    copy(source, target)
-    # Scans that stay in the site's counts, and of which the copy never hears.
-    kept(source, [scan(at_ns=NOW + 600 * 600 * SECOND)])
-    forget(source, "7", pose_only=False, by="who", at_ns=NOW)
-    kept(source, [scan("8", NOW + 601 * 600 * SECOND)])
-    with pytest.raises(DamagedFile, match="were deleted in the journal"):
-        copy(source, target)
-    target.unlink()
-    copy(source, target)
-    assert contents(target) == contents(source)
-
-
 def test_a_copy_of_a_journal_that_was_put_back_from_a_backup_is_made_anew(
     source: Path, tmp_path: Path
 ) -> None:
@@ -223,29 +161,6 @@ def test_a_copy_of_a_journal_that_was_put_back_from_a_backup_is_made_anew(
     target.unlink()
     copy(source, target)
     assert contents(target) == contents(source)
-
-
-@pytest.mark.parametrize("pose_only", [True, False])
-def test_a_tag_that_is_forgotten_is_gone_from_the_copy(
-    source: Path, tmp_path: Path, *, pose_only: bool
-) -> None:
-    target = tmp_path / "web.sqlite"
-    copy(source, target)
-    forget(source, "7", pose_only=pose_only, by="who", at_ns=NOW)
-    kept(source, [scan(at_ns=NOW + 500 * 600 * SECOND)])
-    copy(source, target)
-    assert contents(target) == contents(source)
-    copy(source, tmp_path / "new.sqlite")
-    assert contents(tmp_path / "new.sqlite") == contents(source)
-
-
-def test_a_lot_is_never_cut_between_a_series_and_its_first_row(source: Path) -> None:
-    with reading(source) as connection:
-        for most in range(1, 6):
-            after = 0
-            while not (lot := follow.read(connection, after, most)).is_all:
-                assert lot.last > after
-                after = lot.last
 
 
 @pytest.mark.parametrize(

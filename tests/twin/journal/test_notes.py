@@ -20,9 +20,9 @@ from lupin_twin.core.notes import (
     withdrawals,
 )
 from lupin_twin.journal import follow
-from lupin_twin.journal.received import NoteQueue, notes, number_of
 from lupin_twin.journal.schema import open_reader, open_writer
 from lupin_twin.journal.writer import Journal
+from lupin_twin.journal.writes import NoteQueue, notes, number_of
 from tests.support.journal import LIMITS, NOW, opened, recording, scan, select, wait_state
 from tests.support.waiting import PATIENCE_S, wait_for
 

@@ -6,7 +6,7 @@ import pytest
 
 from lupin_twin.core.past import FOREVER_NS, HOUR_NS
 from lupin_twin.journal import retention
-from lupin_twin.journal.hours import deleted_ns
+from lupin_twin.journal.counts import deleted_ns
 from lupin_twin.journal.retention import Limits, horizon_ns, note_lost, purge_step, used_bytes
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import SiteLog, open_writer, transaction

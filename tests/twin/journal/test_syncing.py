@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.journal.beside import Syncing
+from lupin_twin.journal.paths import Syncing
 from lupin_twin.journal.schema import open_writer
 from tests.support.waiting import wait_for
 

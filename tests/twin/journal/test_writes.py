@@ -5,7 +5,7 @@ from typing import Any
 
 from lupin_twin.core.past import PastWrite, PastWrites, RecentRequest, WritesRequest, recent_of
 from lupin_twin.core.state import NO_FLOWER
-from lupin_twin.journal.received import recent, writes
+from lupin_twin.journal.writes import recent, writes
 from tests.support.journal import SECOND, look, pin, scan
 from tests.support.log_life import BEGUN, Life, failure, lived
 from tests.twin.journal.conftest import Copied

@@ -5,8 +5,8 @@ from array import array
 import pytest
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND as S
-from lupin_twin.estimate.cholesky import Place
 from lupin_twin.estimate.engine import Record, Tally
+from lupin_twin.estimate.solution import Place
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.ros import convert_services
 from lupin_twin.runtime.estimates import DEFAULT_PLACES, Report, ReportRequest, TagCheck

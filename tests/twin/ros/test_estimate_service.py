@@ -1,25 +1,23 @@
-"""GetEstimate over DDS: of a twin that has heard a day, of a moment before, and what is refused."""
+"""GetEstimate over DDS: what is refused, and a flood; `routes/test_estimate` has the answers."""
 
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import cache
 from threading import Event
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from lupin_msgs.srv import GetEstimate, GetEstimateReport
 
 from lupin_twin.core.diagnostics import WARN
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, TwinStore
-from lupin_twin.estimate.engine import Grades, Record, TagPast, Tally, readings_of
+from lupin_twin.core.state import TwinStore
+from lupin_twin.estimate.engine import Grades, Record, TagPast, Tally
 from lupin_twin.ros import estimate_service
 from lupin_twin.ros.estimate_service import EstimateService
-from lupin_twin.runtime.estimates import Known, Report, ReportRequest
+from lupin_twin.runtime.estimates import LastResult, Report, ReportRequest
 from lupin_twin.runtime.workers import MAX_QUERIES, JobQueue, Workers
 from tests.support import messages
 from tests.support.domains import own_domain
@@ -38,20 +36,7 @@ BOX: dict[str, Any] = {
     "bbox_max_x": 2.0,
     "bbox_max_y": 3.0,
 }
-PLACES = {"a": (0.25, 0.25), "b": (1.75, 2.75)}
-
-
-@cache
-def now_s() -> int:
-    """When the first test here asks: all files are read long before the last one is run."""
-    return int(time.time())
-
-
-@cache
-def times() -> dict[str, list[int]]:
-    """Seven each, an hour apart; the last half an hour ago."""
-    seconds = [now_s() - 1800 - 3600 * n for n in range(7)]
-    return {"a": seconds, "b": [second - 600 for second in seconds]}
+NOW_S = int(time.time())
 
 
 @pytest.fixture(scope="module")
@@ -60,87 +45,17 @@ def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
     arguments = (*OFTEN, "-p", f"journal:={journal}")
     with own_domain() as domain, twin_node(domain, *arguments), Peer(domain) as peer:
         peer.wait_for_twin()
-        for tag_id, stamps in times().items():
-            for stamp_s in sorted(stamps):
-                readings = {"temperature": 20.0 + 3.0 * PLACES[tag_id][0]}
-                peer.observe(messages.scan(tag_id, readings, stamp_s=stamp_s, at=PLACES[tag_id]))
-        peer.observe(messages.scan("last", {"co2": 1.0}))
-        peer.tag("last")
+        peer.observe(
+            messages.scan("a", {"temperature": 21.0}, at=(0.25, 0.25)),
+            messages.scan("b", {"temperature": 25.0}, at=(1.75, 2.75)),
+        )
         rows = "SELECT count(*) FROM scan"
-        wait_for(lambda: select(journal, rows) == [(15,)], "all of it in the journal")
+        wait_for(lambda: select(journal, rows) == [(2,)], "both in the journal")
         yield peer
 
 
 def ask(peer: Peer, **changes: Any) -> Any:
     return peer.ask(GetEstimate, SERVICE, **{**BOX, **changes})
-
-
-def test_the_estimate_is_near_the_readings_at_the_tags_and_less_sure_between(peer: Peer) -> None:
-    answer = ask(peer)
-    assert answer.ok, answer.error_message
-    assert (answer.width, answer.height, answer.resolution_used) == (4, 6, 0.5)
-    assert (answer.sample_count, answer.reading_count) == (2, 14)
-    mean, sd = (np.array(one).reshape(6, 4) for one in (answer.mean, answer.sd))
-    assert mean[0, 0] == pytest.approx(20.75, abs=0.5)
-    assert mean[5, 3] == pytest.approx(25.25, abs=0.5)
-    assert sd[0, 0] < sd[3, 1]
-    assert (sd > 0.0).all()
-    assert answer.sd_known > 0.0
-
-
-def test_what_is_expected_of_each_tag_and_where_another_helps_is_reported(peer: Peer) -> None:
-    def ask_report(sensor_type: str, **more: int) -> Any:
-        return peer.ask(GetEstimateReport, REPORT_SERVICE, sensor_type=sensor_type, **more)
-
-    def report(newest: list[int]) -> Any:
-        def look() -> Any:
-            answer = ask_report("humidity")
-            assert answer.ok, answer.error_message
-            return answer if [one.sec for one in answer.observed_at] == newest else None
-
-        return wait_for(look, f"a report up to {newest}")
-
-    def scan(tag_id: str, stamp_s: int) -> None:
-        readings = {"humidity": 60.0 + PLACES[tag_id][0]}
-        peer.observe(messages.scan(tag_id, readings, stamp_s=stamp_s, at=PLACES[tag_id]))
-
-    # As many as a first model takes.
-    first = [(tag_id, stamp_s) for tag_id in PLACES for stamp_s in times()[tag_id][:5]]
-    for tag_id, stamp_s in sorted(first, key=lambda one: one[1]):
-        scan(tag_id, stamp_s)
-    loaded = report([times()["a"][0], times()["b"][0]])
-    assert list(loaded.tag_ids) == ["a", "b"]
-    assert loaded.fitted_at.sec >= now_s()
-    assert loaded.fit_problem == ""
-    assert list(loaded.measured) == [60.25, 61.75]
-    assert list(loaded.left_out) == [False, False]
-    assert 1 <= len(loaded.place_x) <= 5
-    assert all(0.0 < ratio <= 1.0 for ratio in loaded.error_ratio)
-    assert (loaded.week_scans, loaded.graded_since) == (0, Time())
-    assert ask_report("humidity", max_places=1).at == loaded.at, "it serves for a while"
-    refused = ask_report("co2", max_places=21)
-    assert refused == GetEstimateReport.Response(
-        error_message="max_places is 21, the limits are 1 and 20"
-    )
-    unknown = ask_report("ph")
-    assert (unknown.ok, unknown.fitted_at, list(unknown.tag_ids)) == (True, Time(), [])
-
-
-def test_as_of_a_moment_only_what_was_observed_until_then_counts(peer: Peer) -> None:
-    at_s = times()["a"][3]
-    answer = ask(peer, at=Time(sec=at_s))
-    assert answer.ok, answer.error_message
-    tags = [
-        TagPast(
-            tag_id,
-            *PLACES[tag_id],
-            tuple((stamp_s * NANOSECONDS_PER_SECOND, 0.0) for stamp_s in stamps),
-        )
-        for tag_id, stamps in times().items()
-    ]
-    expected = readings_of(tags, at_s * NANOSECONDS_PER_SECOND, 86_400.0)
-    assert answer.reading_count == len(expected) == 8
-    assert answer.sample_count == 2
 
 
 @pytest.mark.parametrize(
@@ -229,7 +144,7 @@ def test_a_report_serves_for_a_while_and_what_is_wrong_is_said_once(
         occupancy=lambda: None,
         day_length_s=86_400.0,
         max_grid_cells=100,
-        now_ns=lambda: int(now_s() * 1e9),
+        now_ns=lambda: int(NOW_S * 1e9),
     )
 
     def report() -> Report:
@@ -245,7 +160,7 @@ def test_a_report_serves_for_a_while_and_what_is_wrong_is_said_once(
     assert report().fitted_at_ns is None
     assert report().tags == ()
     assert len(searches) == 2, "nothing was found that could serve"
-    at_ns = int(now_s() * 1e9)
+    at_ns = int(NOW_S * 1e9)
     pasts[:] = [TagPast(str(n), n / 10.0, 0.0, ((at_ns, 20.0),)) for n in range(10_001)]
     assert report().fit_problem.startswith("10001 tags have this sensor")
     assert report().places == (), "who asks for no places has none worked out"
@@ -254,7 +169,7 @@ def test_a_report_serves_for_a_while_and_what_is_wrong_is_said_once(
     assert (said.level, said.message) == (WARN, f"co2: {report().fit_problem}")
     assert said.values == {"fits failed": "1"}
     graded = Record(1, Tally(40, 10), Tally(40, 10))
-    narrow = Known(Report(at_ns, at_ns, "", graded), Grades(86_400.0))
+    narrow = LastResult(Report(at_ns, at_ns, "", graded), Grades(86_400.0))
     said = replace(service, _known={"light": narrow}).finding()
     assert (said.level, said.message[:26]) == (WARN, "light: too sure of itself,")
     assert replace(service, _known={}).finding().message == "nothing is wrong"

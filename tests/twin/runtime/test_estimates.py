@@ -17,7 +17,7 @@ from lupin_twin.journal.schema import open_reader
 from lupin_twin.runtime.estimates import (
     FIRST_FIT,
     MAX_PLACES,
-    Known,
+    LastResult,
     ReportRequest,
     advice,
     estimate_at,
@@ -51,7 +51,7 @@ def house(until_s: int, *, tags: int = 12, every_s: int = 150) -> list[TagPast]:
     ]
 
 
-def found(pasts: list[TagPast], hours: float, before: Known | None = None) -> Known:
+def found(pasts: list[TagPast], hours: float, before: LastResult | None = None) -> LastResult:
     return find(before, pasts, int(hours * HOUR_NS), DAY_S)
 
 

@@ -12,8 +12,8 @@ import pytest
 from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Flower, Inspection, Pin, Pose, Reading, Scan, TwinStore, Write
-from lupin_twin.journal.beside import journal_path, state_folder
 from lupin_twin.journal.fold import state_at
+from lupin_twin.journal.paths import journal_path, state_folder
 from lupin_twin.journal.runs import Clock
 from lupin_twin.runtime.memory import MAX_NEW_RUNS, Memory, open_journal
 from lupin_twin.runtime.workers import ShouldStop

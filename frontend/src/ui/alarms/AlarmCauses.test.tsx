@@ -1,6 +1,7 @@
 import { act, fireEvent, render, screen } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test } from 'vitest';
 
+import { acknowledge, NO_LOCAL_ALARMS, own } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
 import type { Alarm } from '../../contract/types';
 import { alarm, reportAlarms } from '../../testing/alarms';
@@ -10,6 +11,7 @@ import { AlarmPanel } from './AlarmPanel';
 
 let stop: () => void;
 beforeEach(() => {
+  own.set(NO_LOCAL_ALARMS);
   showTags([wireTag()]);
   stop = startAlarms();
   render(<AlarmPanel />);
@@ -43,13 +45,36 @@ test('of many of one cause five, then a hundred more at a time', () => {
   expect(group('active')).toHaveLength(150);
 });
 
-test('many of one cause that are resolved have nothing to do, and no time in common', () => {
+test('many of one cause that one person has acknowledged say who, and when the last was', () => {
+  const saidBy = (...names: readonly string[]): void => {
+    const list = names.map((acknowledged_by, at) => {
+      const acknowledged_at = { sec: 1_000 + at, nanosec: 0 };
+      return alarm(`a${at}`, { tag_id: `${at}`, acknowledged_by, acknowledged_at });
+    });
+    report(...list);
+    act(() => {
+      const items = list.map((each) => ({ alarm: each, verdict: each.reason.verdict }));
+      own.set(acknowledge(NO_LOCAL_ALARMS, items, 0));
+    });
+  };
+  const status = (): string | null | undefined =>
+    document.querySelector('.alarm-status')?.textContent;
+  saidBy('anna', 'anna', 'anna', 'anna', 'anna');
+  expect(status()).toBe('acknowledged by anna, sim 00:16:44');
+  saidBy('anna', 'anna', 'anna', 'anna', 'ben');
+  expect(status()).toBe('acknowledged');
+});
+
+test('many of one cause that are resolved have nothing to do, and say when the last was', () => {
   report(
-    ...Array.from({ length: 5 }, (_, at) => alarm(`a${at}`, { tag_id: `${at}`, cleared: 950 })),
+    ...Array.from({ length: 5 }, (_, at) =>
+      alarm(`a${at}`, { tag_id: `${at}`, cleared: 950 + at }),
+    ),
   );
   fireEvent.click(screen.getByText('Resolved in the last 24 h (5)'));
-  const heading = screen.getByRole('button', { name: /Temperature too low · 5 alarms/ });
+  const heading = screen.getByRole('button', { name: /Temperature too low 5 alarms/ });
   expect(heading.querySelector('.alarm-do, [data-fact=since]')).toBeNull();
+  expect(heading.querySelector('small')?.textContent).toBe('resolved sim 00:15:54');
   // The empty tools cell stays, to align the columns.
   expect(heading.parentElement?.querySelector('.alarm-tools')?.children).toHaveLength(0);
 });

@@ -66,6 +66,11 @@ export function AlarmTimes({
   );
 }
 
+export function ResolvedNote({ alarm }: { alarm: Alarm }): JSX.Element {
+  const note = useTicking((at) => timesOf(alarm, rosNow(store.get(), at), true).note);
+  return <small className="faint">{note}</small>;
+}
+
 /** The value now and the worst value, in a column each. */
 export function AlarmFacts({
   item: { alarm, verdict },

@@ -25,6 +25,8 @@ import { acknowledgeAlarms } from '../../alarms/own';
 import { selectNow, selectSpeech, todoNow, worstNow, worstNowFirst } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { timeOfDay } from '../../clock';
+import type { Alarm } from '../../contract/types';
+import { secondsOf } from '../../domain/time';
 import { saveCsv } from '../../export/save';
 import { store, useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
@@ -34,11 +36,11 @@ import { S } from '../../strings';
 import { Disclosure, Icon, Select } from '../../widgets/controls';
 import { HealthMark } from '../HealthMark';
 import { useChosenInSight, usePaper } from '../visibleRows';
-import { AlarmTimes } from './AlarmFacts';
+import { AlarmTimes, ResolvedNote } from './AlarmFacts';
 import { AlarmNotes, AlarmsWait, LastActionLine, NotifySettings, SharingNote } from './AlarmNotes';
 import { Acknowledge, AlarmRow, ignoreDoubleClick } from './AlarmRow';
 import { ALARMS_ID, ListChoice } from './ListChoice';
-import { useIsRefused } from './people';
+import { useIsRefused, useWhoAcknowledged } from './people';
 
 /** Rows shown first for a shared cause; for others, and with each "more", `MOST_ROWS`. */
 const MOST_OF_CAUSE = 5;
@@ -287,6 +289,7 @@ function CauseHeading({
   const shown = own.length > 0 ? own : items;
   const verdict = useApp((state) => worstNow(state, shown));
   const todo = useApp((state) => todoNow(state, shown));
+  const who = useWhoAcknowledged(lastOfOne(own.map(({ alarm }) => alarm)));
   if (!verdict) return null;
   const waiting = unacknowledged(own);
   const oldest = group === 'resolved' ? undefined : oldestOf(shown);
@@ -297,11 +300,15 @@ function CauseHeading({
         {oldest ? (
           <AlarmTimes alarm={oldest} first={null} verdict={verdict} />
         ) : (
-          <HealthMark verdict={verdict} />
+          <span className="alarm-times">
+            <HealthMark verdict={verdict} />
+            {/* What was resolved last stands first. */}
+            {shown[0] && <ResolvedNote alarm={shown[0].alarm} />}
+          </span>
         )}
         <span className="alarm-text">
           <span>
-            <strong>{cause}</strong> ·{' '}
+            <strong>{cause}</strong>{' '}
             <span className="alarm-many">
               {S.alarmCount(own.length)} <Icon name="chevron" />
             </span>
@@ -320,7 +327,11 @@ function CauseHeading({
             label={S.alarmAcknowledgeOf(cause)}
             text={S.alarmAcknowledgeAll(waiting.length)}
             status={
-              waiting.length > 0 ? null : own.length > 0 ? S.healthAcknowledged : S.alarmCount(0)
+              waiting.length > 0
+                ? null
+                : own.length > 0
+                  ? (who ?? S.healthAcknowledged)
+                  : S.alarmCount(0)
             }
             onAcknowledge={() => {
               acknowledgeAlarms(waiting);
@@ -330,6 +341,13 @@ function CauseHeading({
       </div>
     </div>
   );
+}
+
+/** Of alarms that one person has acknowledged, the last; null: they are not. */
+function lastOfOne(alarms: readonly Alarm[]): Alarm | null {
+  const at = ({ acknowledged_at: time }: Alarm): number => (time ? secondsOf(time) : Infinity);
+  const [last = null] = [...alarms].sort((a, b) => at(b) - at(a));
+  return alarms.every((alarm) => alarm.acknowledged_by === last?.acknowledged_by) ? last : null;
 }
 
 interface HeldOrder extends HeldList {

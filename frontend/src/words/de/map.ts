@@ -209,7 +209,7 @@ export const TAGS: In<typeof EN.TAGS> = {
 export const CHARTS: In<typeof EN.CHARTS> = {
   charts: 'Verläufe',
   chartOf: (sensor) => `Verlauf: ${sensor}`,
-  chartsBy: { tag: 'Ein Messpunkt', sensor: 'Mehrere' },
+  chartsSeveral: 'Mehrere',
   chartsByLegend: 'Was gezeigt wird',
   chartSpan: (from, to) => `${from} bis ${to}`,
   chartSummary: (count, latest, at, low, high, gaps) =>

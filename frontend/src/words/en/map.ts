@@ -3,6 +3,7 @@ import { counted, whole } from './counted';
 
 const SHORT = new Map([
   ['Temperature', 'Temp.'],
+  ['Humidity', 'RH'],
   ['Soil moisture', 'Soil'],
   ['Vapour pressure deficit', 'VPD'],
 ]);
@@ -207,7 +208,7 @@ export const TAGS = {
 export const CHARTS = {
   charts: 'Charts',
   chartOf: (sensor: string): string => `Chart of ${sensor}`,
-  chartsBy: { tag: 'One tag', sensor: 'Several tags' },
+  chartsSeveral: 'Several tags',
   chartsByLegend: 'What is charted',
   chartSpan: (from: string, to: string): string => `${from} to ${to}`,
   chartSummary: (

@@ -207,7 +207,7 @@ export const TAGS: In<typeof EN.TAGS> = {
 export const CHARTS: In<typeof EN.CHARTS> = {
   charts: 'Gráficas',
   chartOf: (sensor) => `Gráfica: ${sensor}`,
-  chartsBy: { tag: 'Un punto', sensor: 'Varios puntos' },
+  chartsSeveral: 'Varios puntos',
   chartsByLegend: 'Qué se muestra',
   chartSpan: (from, to) => `${from} a ${to}`,
   chartSummary: (count, latest, at, low, high, gaps) =>

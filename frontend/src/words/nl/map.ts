@@ -207,7 +207,7 @@ export const TAGS: In<typeof EN.TAGS> = {
 export const CHARTS: In<typeof EN.CHARTS> = {
   charts: 'Grafieken',
   chartOf: (sensor) => `Grafiek: ${sensor}`,
-  chartsBy: { tag: 'Eén meetpunt', sensor: 'Meerdere' },
+  chartsSeveral: 'Meerdere',
   chartsByLegend: 'Wat er getoond wordt',
   chartSpan: (from, to) => `${from} tot ${to}`,
   chartSummary: (count, latest, at, low, high, gaps) =>

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from lupin_twin.adapt.table import ConfigError
 from lupin_twin.core.diagnostics import OK, WARN, Finding
-from lupin_twin.core.drops import Tally
+from lupin_twin.core.drops import DropCounts
 
 MAX_FRAMES: Final = 1_000
 # A chain goes from a tag over camera, arm, base and odometry to the map; a longer one is a loop.
@@ -208,7 +208,7 @@ class Source:
     received_s: float = 0.0
     problem: str = ""
     shown: dict[str, str] = field(default_factory=dict)
-    dropped: Tally = field(default_factory=Tally)
+    dropped: DropCounts = field(default_factory=DropCounts)
 
     def finding(self, topic: str) -> Finding:
         """Return the statistics as an entry of `/diagnostics`."""

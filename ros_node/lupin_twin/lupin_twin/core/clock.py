@@ -179,7 +179,7 @@ class Lateness:
         name = self._count(source, news)
         return Late(source, stream.run, (stream.newest_ns - stamp_ns) / 1e9, name, news)
 
-    def hold_to(self, now_ns: int) -> None:
+    def clamp_to(self, now_ns: int) -> None:
         """Follow ROS time that went back for everybody: no source is late because of it."""
         for stream in self._streams.values():
             stream.newest_ns, stream.run = min(stream.newest_ns, now_ns), 0

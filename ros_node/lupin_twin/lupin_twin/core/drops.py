@@ -72,7 +72,7 @@ class Counts:
     recent: tuple[Recent, ...] = ()
 
 
-class Tally:
+class DropCounts:
     """Counts drops and errors; belongs to one thread."""
 
     def __init__(self) -> None:

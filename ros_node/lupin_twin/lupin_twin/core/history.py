@@ -76,8 +76,8 @@ class Repeats:
         while len(tag) > max(1, min(KNOWN_PER_TAG, MAX_KNOWN // len(self._tags))):
             del tag[next(iter(tag))]
 
-    def hold_to(self, now_ns: int, *, retains_keys: bool) -> None:
-        """Follow a clock that went back, see `TwinStore.hold_to`.
+    def clamp_to(self, now_ns: int, *, retains_keys: bool) -> None:
+        """Follow a clock that went back, see `TwinStore.clamp_to`.
 
         `retains_keys`: later observations, received again, still count as repeats; else as new.
         """
@@ -159,9 +159,9 @@ def tag_history(
             if at_ns is not None and (at_ns, r.name, repr(r.value)) not in known:
                 key = KIND_TAG_READING, at_ns, ""
                 scans[key] = _with(scans.get(key, PastScan(at_ns, ())), (r,))
-        tried = {past.what for past in attempts.values()}
+        attempted = {past.what for past in attempts.values()}
         for past in _attempts_of(newest):
-            if past.what not in tried:
+            if past.what not in attempted:
                 attempts[past.kind, past.stamp_ns, ""] = past
     return TagHistory(
         tuple(sorted(scans.values(), key=lambda past: past.stamp_ns)[-count:]),

@@ -207,7 +207,7 @@ class TagState:
             and all(map(_is_same, self.readings, other.readings))
         )
 
-    def held_to(self, now_ns: int) -> TagState:
+    def clamped_to(self, now_ns: int) -> TagState:
         """The tag with no stamp later than `now_ns`."""
 
         def held(stamp_ns: int | None) -> int | None:
@@ -320,7 +320,7 @@ class TwinStore:
         if tag.pose is None:
             self._store(replace(tag, pose=pose))
 
-    def hold_to(self, now_ns: int) -> bool:
+    def clamp_to(self, now_ns: int) -> bool:
         """Follow a clock that went back: observations after `now_ns` count as made at `now_ns`.
 
         They age from then on, and new observations count as new. Returns whether there were any.
@@ -331,7 +331,7 @@ class TwinStore:
         self._newest_ns = now_ns
         for tag_id, tag in self._tags.items():
             if _is_later(_newest_of(tag), now_ns):
-                self._tags[tag_id] = tag.held_to(now_ns)
+                self._tags[tag_id] = tag.clamped_to(now_ns)
         self._observed = {tag_id: min(at_ns, now_ns) for tag_id, at_ns in self._observed.items()}
         return True
 
@@ -376,9 +376,9 @@ class TwinStore:
         check_length("tags", len(self._tags) + 1, MAX_TAGS)
         return TagState(tag_id=tag_id)
 
-    def _store_attempt(self, tag: TagState, tried: Scan | Inspection, brought: bool) -> None:
+    def _store_attempt(self, tag: TagState, attempt: Scan | Inspection, brought: bool) -> None:
         """Store a tag with the times of an attempt; `brought`: something was observed."""
-        at_ns, observed_ns = tried.stamp_ns, self._observed.get(tag.tag_id)
+        at_ns, observed_ns = attempt.stamp_ns, self._observed.get(tag.tag_id)
         if brought:
             observed_ns = max(observed_ns or 0, at_ns)
         last_observed_ns = observed_ns
@@ -386,7 +386,7 @@ class TwinStore:
             last_observed_ns = min(tag.last_observed_ns or at_ns, at_ns)
         last_try = tag.last_try
         if last_try is None or at_ns >= last_try.stamp_ns:
-            last_try = Attempt(at_ns, tried.status, tried.status_detail)
+            last_try = Attempt(at_ns, attempt.status, attempt.status_detail)
         self._store(replace(tag, last_observed_ns=last_observed_ns, last_try=last_try))
         if observed_ns is not None:
             self._observed[tag.tag_id] = observed_ns

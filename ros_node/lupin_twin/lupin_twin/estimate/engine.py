@@ -15,9 +15,9 @@ from typing import Final
 import numpy as np
 
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
-from lupin_twin.estimate.cholesky import MAX_EXACT, PER_TAG
 from lupin_twin.estimate.kernel import MAX_PER_TAG, Readings
 from lupin_twin.estimate.posterior import EstimateGrid
+from lupin_twin.estimate.solution import MAX_EXACT, PER_TAG
 from lupin_twin.field.engine import FieldRefused, FieldRequest, check_request
 
 MAX_TAGS: Final = 10_000

@@ -193,7 +193,7 @@ def _by_log_length(distance: FloatArray, length: float) -> FloatArray:
     return result
 
 
-def nearness(a: FloatArray, b: FloatArray, length: float) -> FloatArray:
+def correlation(a: FloatArray, b: FloatArray, length: float) -> FloatArray:
     """Along one axis, M(|a - b|; length): (len(a), len(b))."""
     return matern(_apart(a, b), length)
 

@@ -48,7 +48,9 @@ def hyper_of(coordinates: FloatArray) -> Hyper:
     return Hyper(*np.exp(_LOG_MEDIAN + _LOG_SD * coordinates).tolist())
 
 
-def surprise(pairs: Pairs, y: FloatArray, should_stop: Callable[[], bool] = never) -> Objective:
+def negative_log_posterior(
+    pairs: Pairs, y: FloatArray, should_stop: Callable[[], bool] = never
+) -> Objective:
     """Return the objective: minus the log posterior density, up to a constant, and its gradient.
 
     If the covariance cannot be factorised or overflows, the density counts as 0. The objective
@@ -169,7 +171,7 @@ def fit(
     scale = scale_of(readings.value)
     some = _some(readings, day_length_s)
     pairs = Pairs(some, day_length_s)
-    objective = surprise(pairs, scale.standardised(some.value), should_stop)
+    objective = negative_log_posterior(pairs, scale.standardised(some.value), should_stop)
     best = minimise(objective, np.zeros(len(Hyper._fields)))
     return Model(scale, day_length_s, hyper_of(best))
 

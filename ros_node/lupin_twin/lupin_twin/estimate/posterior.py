@@ -15,7 +15,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from lupin_twin.estimate.cholesky import (
+from lupin_twin.estimate.kernel import Hyper, IntArray, Readings, Scale
+from lupin_twin.estimate.solution import (
     MAX_EXACT,
     Change,
     Factor,
@@ -29,7 +30,6 @@ from lupin_twin.estimate.cholesky import (
     gap_of,
     shared_out,
 )
-from lupin_twin.estimate.kernel import Hyper, IntArray, Readings, Scale
 from lupin_twin.field.grid import BoolArray, CellGrid, FloatArray, cell_centres, grid_dimensions
 from lupin_twin.field.idw import Abandoned, never
 

@@ -17,9 +17,8 @@ from typing import Final
 
 from lupin_twin.core.history import KIND_FLOWER, KNOWN_BY_NOTHING, kind_of
 from lupin_twin.core.state import Flower, Inspection, Pin, Scan, Write
-from lupin_twin.journal.beside import Lock
-from lupin_twin.journal.hours import count_rows
-from lupin_twin.journal.received import last_number
+from lupin_twin.journal.counts import count_rows
+from lupin_twin.journal.paths import Lock
 from lupin_twin.journal.rows import sensor_names, weight
 from lupin_twin.journal.runs import Clock, Run, put_run
 from lupin_twin.journal.schema import (
@@ -31,6 +30,7 @@ from lupin_twin.journal.schema import (
     set_meta,
     transaction,
 )
+from lupin_twin.journal.writes import last_number
 
 PURGED_SEQ: Final = "purged_seq"
 # New numbers are above this one, because rows with numbers up to it may have been deleted.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from lupin_twin.core.past import HOUR_NS, Grid, SeriesPast, grid
-from lupin_twin.journal.hours import deleted_ns, is_counted
+from lupin_twin.journal.counts import deleted_ns, is_counted
 from lupin_twin.journal.runs import Span
 from lupin_twin.journal.schema import SiteLog
 

@@ -16,10 +16,9 @@ from lupin_twin.core.parameters import World
 from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import Write
 from lupin_twin.journal.appending import Appender, copy_known, simulated
-from lupin_twin.journal.beside import Syncing, forwarded_seq
 from lupin_twin.journal.checking import find_damage, size_of
 from lupin_twin.journal.fold import Restored, copies, fold
-from lupin_twin.journal.received import put_note
+from lupin_twin.journal.paths import Syncing, forwarded_seq
 from lupin_twin.journal.retention import (
     Limits,
     Stretches,
@@ -45,6 +44,7 @@ from lupin_twin.journal.schema import (
     set_meta,
     transaction,
 )
+from lupin_twin.journal.writes import put_note
 
 # A file up to this size is checked for damage when it is opened: a quarter of a second.
 _CHECKED_BYTES: Final = 64_000_000

@@ -75,14 +75,14 @@ class Restored:
     """
 
     run: Run
-    known: Known
+    known: FoldedState
     rows: tuple[Scan | Inspection, ...]
     last_seq: int
     doubted_ns: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class FoldedState:
     """Tags in the order in which they were first received, and the numbers of the rows used.
 
     `observed` are the tags with an observation: others have only failed attempts, or a pose.
@@ -111,7 +111,7 @@ def state_at(connection: sqlite3.Connection, at_ns: int, frame_id: str) -> Snaps
     return Snapshot(at_ns, frame_id, known.tags[:MAX_TAGS])
 
 
-def fold(connection: sqlite3.Connection, run: int, at_ns: int, since: int) -> Known:
+def fold(connection: sqlite3.Connection, run: int, at_ns: int, since: int) -> FoldedState:
     """What is known in a run as of a moment, from rows numbered `since` or later."""
     with _no_collection():
         return _known(connection, {"site": LOCAL_SITE, "run": run, "at": at_ns, "since": since})
@@ -127,11 +127,11 @@ def _no_collection() -> Iterator[None]:
         gc.enable()  # a second thread that is inside only becomes slower
 
 
-def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> Known:
+def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> FoldedState:
     execute = connection.execute
     # By tag: the number of its first write, its last attempt, when it was observed, its readings.
     first: dict[str, int] = {}
-    tried: dict[str, tuple[int, int, int, str]] = {}
+    last_attempts: dict[str, tuple[int, int, int, str]] = {}
     observed: dict[str, int] = {}
     found: dict[str, list[tuple[int, int, tuple[Reading, ...]]]] = {}
     scans = execute(_SCANS.format(newest=_NEWEST.format(but=""), which=""), query).fetchall()
@@ -143,9 +143,9 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> Known:
     for row, readings in zip(scans, _readings(scans), strict=True):
         series, tag, kind, _, seq, stamp_ns, status, detail, _ = row
         first.setdefault(tag, series)
-        last = tried.get(tag)
+        last = last_attempts.get(tag)
         if last is None or (stamp_ns, seq) >= last[:2]:
-            tried[tag] = (stamp_ns, seq, status, detail)
+            last_attempts[tag] = (stamp_ns, seq, status, detail)
         if readings or (kind == KIND_TAG_READING and status == STATUS_OK):
             if stamp_ns > observed.get(tag, -1):
                 observed[tag] = stamp_ns
@@ -154,16 +154,18 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> Known:
     inspections = execute(_INSPECTIONS, query).fetchall()
     for series, tag, seq, stamp_ns, *flower in inspections:
         first[tag] = min(series, first.get(tag, series))
-        tried[tag] = max((stamp_ns, seq, STATUS_OK, ""), tried.get(tag, (-1, 0, 0, "")))
+        last_attempts[tag] = max(
+            (stamp_ns, seq, STATUS_OK, ""), last_attempts.get(tag, (-1, 0, 0, ""))
+        )
         observed[tag] = max(stamp_ns, observed.get(tag, -1))
         flowers[tag] = (stamp_ns, flower_of(flower))
     poses, placed_ns = _places(execute, query, first)
     failed = {
         tag: execute(_FIRST_FAILURE, query | {"tag": tag}).fetchone()[0]
-        for tag in tried.keys() - observed.keys()
+        for tag in last_attempts.keys() - observed.keys()
     }
     tags = sorted(first, key=first.__getitem__)
-    attempts = {tag: Attempt(entry[0], *entry[2:]) for tag, entry in tried.items()}
+    attempts = {tag: Attempt(entry[0], *entry[2:]) for tag, entry in last_attempts.items()}
     states = tuple(
         TagState(
             tag,
@@ -176,7 +178,7 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> Known:
         )
         for tag in tags
     )
-    return Known(
+    return FoldedState(
         states,
         frozenset(observed),
         placed_ns,

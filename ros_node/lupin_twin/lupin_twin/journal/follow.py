@@ -20,8 +20,7 @@ from typing import Any, Final, NamedTuple
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import FOREVER_NS, HOUR_NS, Event
 from lupin_twin.journal.appending import PURGED_SEQ, simulated
-from lupin_twin.journal.hours import DELETED, FORGOTTEN, TALLIED, count_rows
-from lupin_twin.journal.received import id_behind, number_of
+from lupin_twin.journal.counts import DELETED, FORGOTTEN, TALLIED, count_rows
 from lupin_twin.journal.retention import (
     RECORD,
     Stretches,
@@ -45,6 +44,7 @@ from lupin_twin.journal.schema import (
     set_meta,
     transaction,
 )
+from lupin_twin.journal.writes import id_behind, number_of
 
 MAX_ROWS: Final = 2_000
 _MAX_BYTES: Final = 1_000_000

@@ -27,7 +27,7 @@ from lupin_twin.core.past import (
     grid,
 )
 from lupin_twin.journal.buckets import Buckets, Entry, Part, Table, answer, bounds, individually
-from lupin_twin.journal.hours import (
+from lupin_twin.journal.counts import (
     SILENCE_NS,
     TALLIED,
     deleted_ns,

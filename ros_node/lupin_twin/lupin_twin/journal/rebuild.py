@@ -18,10 +18,10 @@ from typing import Final
 
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import Appender, copy_known
-from lupin_twin.journal.beside import writing_alone
 from lupin_twin.journal.checking import Progress, find_all_damage
+from lupin_twin.journal.counts import DELETED
 from lupin_twin.journal.fold import copies
-from lupin_twin.journal.hours import DELETED
+from lupin_twin.journal.paths import writing_alone
 from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS
 from lupin_twin.journal.runs import Run, put_run
 from lupin_twin.journal.salvage import numbered

@@ -15,8 +15,8 @@ from typing import Final
 
 from lupin_twin.core.past import DAY_NS, FOREVER_NS, HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ, Appender
-from lupin_twin.journal.beside import writing_alone
-from lupin_twin.journal.hours import DELETED, FORGOTTEN, deleted_ns, extent
+from lupin_twin.journal.counts import DELETED, FORGOTTEN, deleted_ns, extent
+from lupin_twin.journal.paths import writing_alone
 from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,

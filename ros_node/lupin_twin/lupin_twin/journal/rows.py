@@ -52,18 +52,20 @@ def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan 
     span = span_at(runs(connection.execute), FOREVER_NS)
     if span is None:
         return []
-    asked: dict[str, Any] = {"site": LOCAL_SITE, "run": span.run.id}
-    asked |= {"tag": request.tag_id, "depth": request.count}
+    parameters: dict[str, Any] = {"site": LOCAL_SITE, "run": span.run.id}
+    parameters |= {"tag": request.tag_id, "depth": request.count}
     of_tag = "s.site = :site AND s.run = :run AND s.tag = :tag"
     newest = " ORDER BY r.stamp_ns DESC, r.seq DESC LIMIT :depth"
-    found = _inspections(connection, f"look AS r WHERE {_OF_RUN} AND r.tag = :tag{newest}", asked)
+    found = _inspections(
+        connection, f"look AS r WHERE {_OF_RUN} AND r.tag = :tag{newest}", parameters
+    )
     of_tag = f"SELECT series FROM series AS s WHERE {of_tag}"  # noqa: S608
-    for (number,) in connection.execute(of_tag, asked).fetchall():
+    for (number,) in connection.execute(of_tag, parameters).fetchall():
         found += _scans(
             connection,
             "series AS s CROSS JOIN scan AS r WHERE s.site = :site AND s.series = :series"
             f" AND r.site = s.site AND r.series = s.series{newest}",
-            asked | {"series": number},
+            parameters | {"series": number},
         )
     return [row for _, row in sorted(found, key=lambda entry: entry[0])]
 

@@ -21,7 +21,7 @@ from urllib.parse import quote
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ
 from lupin_twin.journal.checking import delete_wrong
-from lupin_twin.journal.hours import DELETED, count_rows
+from lupin_twin.journal.counts import DELETED, count_rows
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     LOCAL_SITE,
@@ -87,14 +87,14 @@ def numbered(path: Path, end: str) -> Iterator[Path]:
 
 def quarantine(path: Path, when: str) -> Path:
     """Rename a file and its WAL; returns the new path. No data is deleted or overwritten."""
-    aside = next(name for name in numbered(path, f".damaged-{when}") if not name.exists())
+    quarantined = next(name for name in numbered(path, f".damaged-{when}") if not name.exists())
     log = path.with_name(path.name + "-wal")
     if log.exists():
-        log.rename(aside.with_name(aside.name + "-wal"))
+        log.rename(quarantined.with_name(quarantined.name + "-wal"))
     # SQLite rebuilds the WAL's index from the WAL; one left behind would be of another file.
     path.with_name(path.name + "-shm").unlink(missing_ok=True)
-    path.rename(aside)
-    return aside
+    path.rename(quarantined)
+    return quarantined
 
 
 def readable(connection: sqlite3.Connection, select: str, number: str) -> Iterator[list[Record]]:
@@ -152,7 +152,7 @@ def _behind_damage(lot: Callable[[int, int], object], bad: int) -> int:
     return good
 
 
-def salvage(aside: Path, connection: sqlite3.Connection) -> None:
+def salvage(quarantined: Path, connection: sqlite3.Connection) -> None:
     """Copy what can be read of a quarantined journal into a new one; rows keep their numbers.
 
     After a salvage that was killed, everything is copied again. If the quarantined file is gone,
@@ -162,20 +162,20 @@ def salvage(aside: Path, connection: sqlite3.Connection) -> None:
         sqlite3.Error, OSError: the new one cannot be written, or the old one cannot be opened.
 
     """
-    if not aside.exists():
+    if not quarantined.exists():
         return
-    mended = aside.with_name(aside.name + ".mended")
+    mended = quarantined.with_name(quarantined.name + ".mended")
     try:
-        with closing(_opened(aside)) as old:
+        with closing(_opened(quarantined)) as old:
             is_known = _has_tables(old)
             if is_known:
-                _copy(old, connection, aside.stat().st_size)
+                _copy(old, connection, quarantined.stat().st_size)
         if not is_known:
-            _mend(aside, mended)
+            _mend(quarantined, mended)
             with closing(_opened(mended)) as old:
-                _copy(old, connection, aside.stat().st_size)
+                _copy(old, connection, quarantined.stat().st_size)
     finally:
-        for file, ends in ((aside, ("-shm",)), (mended, ("", "-wal", "-shm"))):
+        for file, ends in ((quarantined, ("-shm",)), (mended, ("", "-wal", "-shm"))):
             for end in ends:
                 file.with_name(file.name + end).unlink(missing_ok=True)
 
@@ -194,11 +194,13 @@ def _has_tables(old: sqlite3.Connection) -> bool:
     return True
 
 
-def _mend(aside: Path, mended: Path) -> None:
+def _mend(quarantined: Path, mended: Path) -> None:
     """Copy a file with a new one's header and schema, which lie at the same place in each."""
     for end in ("", "-wal"):
-        if aside.with_name(aside.name + end).exists():
-            shutil.copyfile(aside.with_name(aside.name + end), mended.with_name(mended.name + end))
+        if quarantined.with_name(quarantined.name + end).exists():
+            shutil.copyfile(
+                quarantined.with_name(quarantined.name + end), mended.with_name(mended.name + end)
+            )
     content, roots = empty_file()
     with mended.open("rb+") as file:
         for number in range(len(content) // PAGE_SIZE):

@@ -29,7 +29,7 @@ from lupin_twin.core.state import (
     Scan,
     Write,
 )
-from lupin_twin.journal.hours import SILENCE_NS
+from lupin_twin.journal.counts import SILENCE_NS
 from lupin_twin.journal.rows import sensor_names
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.salvage import readable

@@ -23,15 +23,15 @@ from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Write
 from lupin_twin.field.explored import OccupancyMap, text_of
-from lupin_twin.journal.beside import InUse, Lock
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
+from lupin_twin.journal.paths import InUse, Lock
 from lupin_twin.journal.rebuild import is_version3, upgrade
-from lupin_twin.journal.received import NoteQueue
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import weight
 from lupin_twin.journal.runs import Clock, Run, Turn
 from lupin_twin.journal.schema import DamagedFile, Foreign, is_damage_error
+from lupin_twin.journal.writes import NoteQueue
 
 # Readings, flowers and rows that may wait: about 60 MB, twenty minutes of the largest greenhouse.
 MAX_WEIGHT: Final = 200_000

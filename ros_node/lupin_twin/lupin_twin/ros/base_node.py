@@ -29,7 +29,7 @@ from rclpy.signals import SignalHandlerOptions
 from lupin_twin.core import ingest
 from lupin_twin.core.clock import Late
 from lupin_twin.core.diagnostics import MAX_PROBLEMS
-from lupin_twin.core.drops import LATE, LOST, Counts, Drop, Reason, Tally, Throttle
+from lupin_twin.core.drops import LATE, LOST, Counts, Drop, DropCounts, Reason, Throttle
 from lupin_twin.core.interfaces import SERVICE_DEPTH, Topic
 from lupin_twin.core.parameters import ParameterError
 from lupin_twin.field.explored import OccupancyMap
@@ -105,7 +105,7 @@ class NodeUtilities:
     """Subscriptions, warnings and counts of one node; belongs to its thread."""
 
     def __init__(self, node: Node) -> None:
-        self.tally = Tally()
+        self.tally = DropCounts()
         # When the current message was published, by its publisher's clock, and how long before its
         # arrival that was, s, by the two clocks.
         self.published_ns = 0

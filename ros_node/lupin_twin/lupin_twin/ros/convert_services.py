@@ -33,8 +33,8 @@ from lupin_twin.core.past import (
     error_of,
 )
 from lupin_twin.core.state import Snapshot
-from lupin_twin.estimate.cholesky import Place
 from lupin_twin.estimate.engine import Estimate, EstimateRequest, Record, Tally
+from lupin_twin.estimate.solution import Place
 from lupin_twin.field.engine import NUMBERS, FieldRequest
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.journal.follow import Lot, NotALotError

@@ -31,7 +31,7 @@ from lupin_twin.ros.base_node import NodeUtilities
 from lupin_twin.ros.services import offer
 from lupin_twin.runtime.estimates import (
     AS_OF,
-    Known,
+    LastResult,
     Report,
     ReportRequest,
     advice,
@@ -80,7 +80,7 @@ class EstimateService:
     day_length_s: float
     max_grid_cells: int
     now_ns: Callable[[], int]
-    _known: dict[str, Known] = field(default_factory=dict)
+    _known: dict[str, LastResult] = field(default_factory=dict)
     _rests_until_s: dict[str, float] = field(default_factory=dict)
     # Sensors whose estimates were reported as overconfident, and have not recovered since.
     _warned: set[str] = field(default_factory=set)
@@ -152,7 +152,7 @@ class EstimateService:
                 self._search_s,
             )
 
-        def make(looked_up: Any) -> tuple[Known, float, Any]:
+        def make(looked_up: Any) -> tuple[LastResult, float, Any]:
             before, at_ns, begun_s, pasts = looked_up
             known = before if pasts is None else find(before, pasts, at_ns, day_s)
             took_s = 0.0 if pasts is None else time.monotonic() - begun_s
@@ -170,7 +170,7 @@ class EstimateService:
 
         return Query(look_up, end, make, _REPORT_S)
 
-    def _learn(self, sensor: str, known: Known, took_s: float) -> None:
+    def _learn(self, sensor: str, known: LastResult, took_s: float) -> None:
         """Cache a sensor's new result, if there is one, and warn of problems."""
         if known is self._known.get(sensor) or not (known.loaded or known.failed):
             return

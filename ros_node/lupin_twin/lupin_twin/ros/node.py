@@ -25,7 +25,7 @@ from lupin_twin.core.parameters import ParameterError, TwinParameters, World
 from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore, Write
 from lupin_twin.field.engine import FieldCache, FieldRules
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.journal.beside import journal_path
+from lupin_twin.journal.paths import journal_path
 from lupin_twin.journal.runs import Clock as RunClock
 from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import NodeUtilities, qos_of, waker
@@ -383,8 +383,8 @@ class TwinNode(AdjustableNode):
     def _follow(self, now: RunClock) -> None:
         if restored := self.memory.follow(now):
             self.get_logger().info(restored)
-        if self.memory.hold_to(now):
-            self.lateness.hold_to(now.stamp_ns)
+        if self.memory.clamp_to(now):
+            self.lateness.clamp_to(now.stamp_ns)
             self.utilities.warn(
                 ("clock", 0),
                 "ROS time has gone back: all observations from later than now age from here on",

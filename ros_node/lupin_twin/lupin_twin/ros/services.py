@@ -39,7 +39,7 @@ from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal import follow
 from lupin_twin.journal.fold import STATE_S_PER_TAG, state_at
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG, series
-from lupin_twin.journal.received import WRITES_S, writes
+from lupin_twin.journal.writes import WRITES_S, writes
 from lupin_twin.ros import convert, convert_services
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
 from lupin_twin.ros.parameters import naming

@@ -17,7 +17,6 @@ from typing import Final
 import numpy as np
 
 from lupin_twin.core.state import FLOAT32_MAX, NANOSECONDS_PER_SECOND
-from lupin_twin.estimate.cholesky import Change, Place
 from lupin_twin.estimate.engine import (
     HALF_WIDTH_SDS,
     Estimate,
@@ -32,6 +31,7 @@ from lupin_twin.estimate.engine import (
 from lupin_twin.estimate.kernel import MAX_PER_TAG, Readings
 from lupin_twin.estimate.model import FitFailed, Model, fit
 from lupin_twin.estimate.posterior import Posterior
+from lupin_twin.estimate.solution import Change, Place
 from lupin_twin.field.engine import FieldRefused, check_sensor_type
 from lupin_twin.field.explored import OccupancyMap, floor, free_of
 from lupin_twin.field.idw import never
@@ -81,7 +81,7 @@ def are_enough(pasts: Sequence[TagPast]) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class TagCheck:
-    """A tag's latest reading, and what was expected of it; see `cholesky.Change`."""
+    """A tag's latest reading, and what was expected of it; see `solution.Change`."""
 
     tag_id: str
     measured: float
@@ -229,7 +229,7 @@ class Report:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Known:
+class LastResult:
     """The last result for a sensor; `failed` counts the models that could not be fitted.
 
     `loaded` is None if there are too few readings.
@@ -241,13 +241,15 @@ class Known:
     failed: int = 0
 
 
-def find(before: Known | None, pasts: Sequence[TagPast], at_ns: int, day_length_s: float) -> Known:
+def find(
+    before: LastResult | None, pasts: Sequence[TagPast], at_ns: int, day_length_s: float
+) -> LastResult:
     """Judge a sensor's estimates as of now; scans since `before` are compared with predictions.
 
     If the readings cannot be computed with, the earlier result stays, with the reason.
     """
     grades = Grades(day_length_s) if before is None else copy(before.grades)
-    nothing = Known(
+    nothing = LastResult(
         Report(at_ns, None, "", grades.record(at_ns)), grades, failed=before.failed if before else 0
     )
     if not are_enough(pasts):
@@ -261,7 +263,7 @@ def find(before: Known | None, pasts: Sequence[TagPast], at_ns: int, day_length_
     if before is not None and before.loaded is not None:
         grades.add(_graded(loaded, posterior, pasts, before.loaded.at_ns), at_ns)
     report = Report(at_ns, at_ns, "", grades.record(at_ns), loaded.checks)
-    return Known(report, grades, loaded, nothing.failed)
+    return LastResult(report, grades, loaded, nothing.failed)
 
 
 def _graded(loaded: Loaded, posterior: Posterior, pasts: Sequence[TagPast], since_ns: int) -> Tally:

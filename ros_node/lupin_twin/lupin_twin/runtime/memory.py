@@ -195,7 +195,7 @@ class Memory:
             ingest.apply(entry.write, self._store, self.repeats)
             if doubt is not None and self._doubt is None:
                 self._hand_over(entry.write)
-        self.hold_to(now)
+        self.clamp_to(now)
         return f"journal {self.condition.path}: {_summary(restored, now)}"
 
     def _restore(self, restored: Restored) -> None:
@@ -214,14 +214,14 @@ class Memory:
             self._store.observation_count, count + 1, restored.last_seq
         )
 
-    def hold_to(self, now: Clock) -> bool:
+    def clamp_to(self, now: Clock) -> bool:
         """Follow a clock that has gone back; returns whether anything was later than now.
 
         A simulation that starts over repeats its stamps for new writes; wall time does not.
         """
-        if not self._store.hold_to(now.stamp_ns):
+        if not self._store.clamp_to(now.stamp_ns):
             return False
-        self.repeats.hold_to(now.stamp_ns, retains_keys=not now.is_simulated)
+        self.repeats.clamp_to(now.stamp_ns, retains_keys=not now.is_simulated)
         return True
 
     def _check_doubt(self, doubt: _Doubt, now: Clock) -> str | None:

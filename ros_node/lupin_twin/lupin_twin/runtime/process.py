@@ -180,12 +180,12 @@ def block() -> None:
 
 
 def wait(end_within_s: int = END_S) -> None:
-    """Return when a stop signal has come; from then on the process has to end (`must_end`).
+    """Return when a stop signal has come; then the process has to end (`set_exit_deadline`).
 
     Not by sigtimedwait: after a SIGSTOP and a SIGCONT, CPython returns from it without a signal.
     """
     signal.sigwait(STOP_SIGNALS)
-    must_end(end_within_s)
+    set_exit_deadline(end_within_s)
 
 
 def stop_flag() -> threading.Event:
@@ -200,7 +200,7 @@ def stop_flag() -> threading.Event:
     return flag
 
 
-def must_end(within_s: int = END_S) -> None:
+def set_exit_deadline(within_s: int = END_S) -> None:
     """End the process within `within_s` from now, even if the middleware hangs.
 
     In that case the traceback of every thread is printed. Neither of the two timers needs the

@@ -166,9 +166,11 @@ async def test_followers_are_told_of_news_alone_and_an_id_never_comes_back(
         looks = source.looks
         await until(lambda: source.looks > looks + 2, "some looks")
         assert news[2:] == [7], "time that stands is told once"
+        source.now = RosTime(8, is_simulated=True)
+        await until(lambda: news[2:] == [7, 8], "and the next")
         late: list[int | None] = []
         async with offer.followed(late.append):
-            assert late == [7], "and once to whoever comes meanwhile"
+            assert late == [8], "and once to whoever comes meanwhile"
 
     def following() -> list[str]:
         names = (task.get_name() for task in asyncio.all_tasks())
@@ -177,26 +179,7 @@ async def test_followers_are_told_of_news_alone_and_an_id_never_comes_back(
     await until(lambda: not following(), "an end of looking: nobody follows")
     next_one: list[int | None] = []
     async with offer.followed(next_one.append):
-        await until(lambda: next_one == [7], "the time that still stands")
-
-
-async def test_a_layer_and_each_moment_are_told_as_they_come(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(module, "POLL_S", 0.0)
-    monkeypatch.setattr(module, "TICK_S", 0.0)
-
-    source = Source()
-    offer = offer_of(source)
-    await offer.look()
-    news: list[int | None] = []
-    async with offer.followed(news.append):
-        source.now_published["/n/twin/field/a"] = POINTS
-        await until(lambda: news == [None], "the layer")
-        source.now = RosTime(7, is_simulated=True)
-        await until(lambda: news == [None, 7], "its first moment")
-        source.now = RosTime(8, is_simulated=True)
-        await until(lambda: news == [None, 7, 8], "and the next")
+        await until(lambda: next_one == [8], "the time that still stands")
 
 
 def test_the_layout_shows_what_is_offered_and_each_of_its_panels_has_a_place() -> None:

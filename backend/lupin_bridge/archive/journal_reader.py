@@ -19,7 +19,7 @@ from typing import Any, Final
 from lupin_bridge.archive.database import ArchiveError
 from lupin_twin.core.past import HOUR_NS, Event
 from lupin_twin.journal.appending import PURGED_SEQ, Appender
-from lupin_twin.journal.beside import forwarded_seq, note_forwarded
+from lupin_twin.journal.paths import forwarded_seq, note_forwarded
 from lupin_twin.journal.retention import RECORD
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
@@ -216,7 +216,7 @@ class Source:
         with one_view(self._connection):
             self._refuse_salvaged()
             upto, is_full = self._upto(epoch.forwarded_seq)
-            asked = {
+            parameters = {
                 "site": epoch.site,
                 "seqs": epoch.seq_offset,
                 "runs": epoch.run_offset,
@@ -227,13 +227,13 @@ class Source:
             found = Batch(upto, is_full)
             if upto > epoch.forwarded_seq:
                 for table, sql in _ROWS.items():
-                    found.rows[table] = self._connection.execute(sql, asked).fetchall()
-            small = {table: self._rows(sql, asked) for table, sql in _SMALL.items()}
-            for table, rows in {**small, "meta": self._facts(asked)}.items():
+                    found.rows[table] = self._connection.execute(sql, parameters).fetchall()
+            small = {table: self._rows(sql, parameters) for table, sql in _SMALL.items()}
+            for table, rows in {**small, "meta": self._facts(parameters)}.items():
                 found.small[table] = frozenset(rows)
                 sent = self._sent.get(table, frozenset())
                 found.rows[table] = [row for row in rows if row not in sent]
-            self._see_events(found, asked)
+            self._see_events(found, parameters)
         self._sync()
         return found
 
@@ -274,8 +274,8 @@ class Source:
 
     # --- one batch --------------------------------------------------------------------------------
 
-    def _rows(self, sql: str, asked: Mapping[str, object]) -> list[Row]:
-        return self._connection.execute(sql, asked).fetchall()
+    def _rows(self, sql: str, parameters: Mapping[str, object]) -> list[Row]:
+        return self._connection.execute(sql, parameters).fetchall()
 
     def _upto(self, after: int) -> tuple[int, bool]:
         """The last number of the next batch, and whether there is more after it."""
@@ -291,34 +291,34 @@ class Source:
                 ends.append(end)
         return (min(ends), True) if ends else (last, False)
 
-    def _facts(self, asked: Mapping[str, Any]) -> list[Row]:
+    def _facts(self, parameters: Mapping[str, Any]) -> list[Row]:
         """The rows of the file's `meta` that are true of the archive too.
 
         Rows that were deleted here stay there, except those that were never forwarded.
         """
         purged = int(get_meta(self._connection, PURGED_SEQ) or 0)
-        of_runs = ("lost_ns:", "purged_ns:") if purged > asked["after"] else ("lost_ns:",)
+        of_runs = ("lost_ns:", "purged_ns:") if purged > parameters["after"] else ("lost_ns:",)
         found = []
         for key, value in self._connection.execute(
             "SELECT key, value FROM meta WHERE site = ? ORDER BY key", (LOCAL_SITE,)
         ):
             name, _, run = key.partition(":")
             if f"{name}:" in of_runs:
-                found.append((asked["site"], f"{name}:{int(run) + asked['runs']}", value))
+                found.append((parameters["site"], f"{name}:{int(run) + parameters['runs']}", value))
             elif f"{name}:" == RECORD:
                 record = json.loads(value)
-                record["seq"] = record.get("seq", 0) + asked["seqs"]
-                moved = f"{key}:{asked['epoch']}"
-                found.append((asked["site"], moved, json.dumps(record)))
+                record["seq"] = record.get("seq", 0) + parameters["seqs"]
+                moved = f"{key}:{parameters['epoch']}"
+                found.append((parameters["site"], moved, json.dumps(record)))
             elif key in {ORIGIN, DAY_LENGTH, MAP} or key.startswith("simulated_"):
-                found.append((asked["site"], key, value))
+                found.append((parameters["site"], key, value))
         return found
 
-    def _see_events(self, found: Batch, asked: Mapping[str, Any]) -> None:
+    def _see_events(self, found: Batch, parameters: Mapping[str, Any]) -> None:
         """Add the events to a batch that is not full: late rows change them, so rows go first."""
         since = self._events_since
-        if since is not None and found.upto > asked["after"]:
-            for run, stamp_ns in self._rows(_TOUCHED_SINCE, asked):
+        if since is not None and found.upto > parameters["after"]:
+            for run, stamp_ns in self._rows(_TOUCHED_SINCE, parameters):
                 since[run] = min(stamp_ns, since.get(run, stamp_ns))
         if found.is_full:
             return
@@ -326,10 +326,10 @@ class Source:
             runs = self._connection.execute("SELECT run FROM run WHERE site = ?", (LOCAL_SITE,))
             since = dict.fromkeys((run for (run,) in runs), 0)
         for run, stamp_ns in since.items():
-            within = {**asked, "run": run, "since": stamp_ns, "event": Event.SILENCES}
+            within = {**parameters, "run": run, "since": stamp_ns, "event": Event.SILENCES}
             (over_ns,) = self._rows(_EVENT_OVER, within)[0]
             within["since"] = stamp_ns if over_ns is None else over_ns
-            key = (run + asked["runs"], within["since"])
+            key = (run + parameters["runs"], within["since"])
             found.events[key] = self._rows(_EVENTS, within)
 
     def _sync(self) -> None:

@@ -15,8 +15,8 @@ from typing import Any, Final
 import orjson
 from pydantic import Field
 
-from lupin_bridge.feed.shared_work import Periodic
 from lupin_bridge.feed.source import Position, Robot, RobotLog, TwinSource, TwinUnavailableError
+from lupin_bridge.feed.tasks import Periodic
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.hub import Hub
 from lupin_bridge.stream.schema import Contract, Time
@@ -287,9 +287,9 @@ class RobotFollower(Periodic):
     async def _look(self) -> None:
         now_ns = self._now_ns()
         try:
-            heard = await self._source.robot(now_ns)
+            reported = await self._source.robot(now_ns)
         except TwinUnavailableError:  # the ROS thread has ended, which the status reports
             return
-        if heard is not None and self.log.take(heard, now_ns):
+        if reported is not None and self.log.take(reported, now_ns):
             frame = orjson.dumps({"type": "robot", **_now(self.log.now)})
             self._hub.publish_robot(text_frame(frame), self._clock())

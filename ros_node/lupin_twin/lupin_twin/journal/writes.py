@@ -35,7 +35,7 @@ from lupin_twin.core.past import (
     recent_of,
 )
 from lupin_twin.core.state import STATUS_OK, sure_species
-from lupin_twin.journal.hours import deleted_ns
+from lupin_twin.journal.counts import deleted_ns
 from lupin_twin.journal.queries import FROM_SCAN
 from lupin_twin.journal.rows import named_numbers, sensor_names
 from lupin_twin.journal.runs import Run, Span, cut, runs, span_at, spans

@@ -25,7 +25,7 @@ from typing import Final
 
 import numpy as np
 
-from lupin_twin.estimate.kernel import HOURS, Hyper, IntArray, Pairs, Readings, in_time, nearness
+from lupin_twin.estimate.kernel import HOURS, Hyper, IntArray, Pairs, Readings, correlation, in_time
 from lupin_twin.field.grid import FloatArray
 
 
@@ -44,21 +44,21 @@ class Solved:
     def near(self, places: FloatArray) -> FloatArray:
         """The phi (k, 1 + T) of places (k, 2), m."""
         result = np.ones((len(places), 1 + len(self.xy)))
-        result[:, 1:] = self.nearness(places, self.xy)
+        result[:, 1:] = self.correlation(places, self.xy)
         return result
 
     def near_grid(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """The phi of a grid's places, row by row: a product of R along x and R along y."""
-        along_x = nearness(x, self.xy[:, 0], self.hyper.l)
-        along_y = nearness(y, self.xy[:, 1], self.hyper.l)
+        along_x = correlation(x, self.xy[:, 0], self.hyper.l)
+        along_y = correlation(y, self.xy[:, 1], self.hyper.l)
         result = np.ones((len(y), len(x), 1 + len(self.xy)))
         np.multiply(along_y[:, None, :], along_x[None, :, :], out=result[:, :, 1:])
         return result.reshape(len(y) * len(x), -1)
 
-    def nearness(self, places: FloatArray, others: FloatArray) -> FloatArray:
+    def correlation(self, places: FloatArray, others: FloatArray) -> FloatArray:
         """R (k, m) of places (k, 2) and others (m, 2), m."""
         (x, y), (other_x, other_y), length = places.T, others.T, self.hyper.l
-        return nearness(x, other_x, length) * nearness(y, other_y, length)
+        return correlation(x, other_x, length) * correlation(y, other_y, length)
 
     def moments(self, phi: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean and variance (k,) of the true values now, at places given by `phi`."""
@@ -317,8 +317,8 @@ class Gain:
         near, near_targets = solved.near(candidates), solved.near(targets)
         self.candidates = candidates
         self._noise = solved.hyper.noise
-        self._own = solved.shared(near, near, solved.nearness(candidates, candidates))
-        self._reach = solved.shared(near, near_targets, solved.nearness(candidates, targets))
+        self._own = solved.shared(near, near, solved.correlation(candidates, candidates))
+        self._reach = solved.shared(near, near_targets, solved.correlation(candidates, targets))
         # The sum of the variances at the targets.
         self.error = float(solved.moments(near_targets)[1].sum())
 

@@ -10,7 +10,7 @@ import { chosenSensor, pointsFor, useCharts, useChosenSensor, useSensorsOf } fro
 
 const HEIGHT = 172;
 
-/** The sensor that was chosen here, the one in view, or the tag's first, over the period of the time bar. */
+/** The sensor chosen here, the one in view, or the tag's first, over the time bar's period. */
 export default function CardChart({ tagId }: { tagId: string }): JSX.Element | null {
   const inView = useApp((state) => state.view.sensor);
   const sensors = useSensorsOf(tagId);

@@ -1,19 +1,19 @@
-/** The routes of the past: how it was at a moment, and what happened when. Times are ROS seconds. */
+/** The routes of the past: the state at a moment, and what happened when. Times are ROS seconds. */
 import { answer, get, momentParameter, read, route, withQuery } from './api';
 import { filledHealth, filledTag } from './frames';
 import type { History, Latest, Timeline } from './types';
 
-/** Stamps are exact to the nanosecond, and a moment that is asked for to the millisecond. */
+/** Stamps are exact to the nanosecond, requested moments to the millisecond. */
 const SAME_MOMENT_S = 0.0005;
 
 /**
- * Every tag as of a moment, and what is to be said of it. An answer about any other moment is an error: a server that does not
- * know `at` would give the present.
+ * Every tag at a moment, with the verdicts. An answer about another moment is an error: a server that
+ * does not know `at` would return the present.
  */
 export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Latest> {
   const query = { at: momentParameter(at) };
   let isWhole = true;
-  // Both or none: no moment has the verdicts of another one.
+  // Both or neither: no moment shows the verdicts of another one.
   const [state, health] = await Promise.all([
     get(withQuery('api/state', query), signal).then((it) => {
       isWhole = holdsAll(it, at);
@@ -37,7 +37,7 @@ export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Lat
   };
 }
 
-/** Whether all is in the journal that leads up to a moment; a server that does not say has it. */
+/** Whether the journal is complete up to a moment; assumed if the server does not report it. */
 function holdsAll({ headers }: Response, at: number): boolean {
   const complete = headers.get('X-Complete-To');
   const keptFrom = headers.get('X-Kept-From');
@@ -48,8 +48,8 @@ function holdsAll({ headers }: Response, at: number): boolean {
 }
 
 /**
- * What happened over a period, in so many buckets; without a period, over all that is kept. With
- * a tag only what happened there.
+ * What happened over a period, in the given number of buckets; without a period, over the whole
+ * history. With a tag, only what happened there.
  */
 export const fetchTimeline = (
   span: { readonly from: number; readonly to: number } | null,
@@ -64,7 +64,7 @@ export const fetchTimeline = (
     tag_id: tagId,
   });
 
-/** What the server gives at most of each. */
+/** The server's limits. */
 const MAX_POINTS = 5_000;
 
 /** Times are ROS seconds. */
@@ -92,6 +92,6 @@ export const fetchSeries = (
     points: Math.min(MAX_POINTS, points),
   });
 
-/** Where every reading and try of a period is to be had, of one tag and of one sensor if named. */
+/** Address of every reading and attempt of a period, of one tag and sensor if given. */
 export const exportAddress = (query: SeriesQuery): string =>
   route(withQuery('api/export.csv', parameters(query))).href;

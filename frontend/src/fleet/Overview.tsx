@@ -1,4 +1,4 @@
-/** All greenhouses, the worst first; their alarms; and one sensor of several beside each other. */
+/** All greenhouses, the worst first; their alarms; and one sensor of several compared. */
 import {
   type JSX,
   lazy,
@@ -33,7 +33,7 @@ import {
   words,
 } from './sites';
 
-// Loaded when somebody asks for them.
+// Loaded when first shown.
 const Alarms = lazy(() => import('./Alarms'));
 const Compare = lazy(() => import('./Compare'));
 const Report = lazy(() => import('./Report'));
@@ -57,7 +57,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
   const sites = useDeferredValue(seen.sites);
   const counts = useMemo(() => countsOf(sites.values()), [sites]);
   const alarms = useMemo(() => alarmCount(sites.values()), [sites]);
-  // Before, there is nothing to count.
+  // Until then there is nothing to count.
   const hasArchive = seen.archive !== null;
   const groups = useMemo(() => groupNames(sites.values()), [sites]);
   const shown = useMemo(() => chosen(sites, filter, search, group), [sites, filter, search, group]);
@@ -181,7 +181,7 @@ function Trouble({ seen }: { seen: Seen }): JSX.Element {
 }
 
 const STAYS_MS = 200;
-/** So long after its last word a greenhouse counts as silent, and the archive as down. */
+/** After this long without data, a greenhouse counts as silent, or the archive as down. */
 const LIVE_MS = 20_000;
 
 function Cards({
@@ -279,7 +279,7 @@ const SiteCard = memo(function SiteCard({ site, asOf }: Listed & { site: Site })
   );
 });
 
-/** Fetched once its card stays in sight: whoever scrolls past waits for none of them. */
+/** Fetched once its card stays in sight, not while scrolling past. */
 function SmallMap({ src }: { src: string }): JSX.Element {
   const place = useRef<HTMLSpanElement>(null);
   const [isShown, setShown] = useState(false);
@@ -306,7 +306,7 @@ function SmallMap({ src }: { src: string }): JSX.Element {
   );
 }
 
-/** What no robot observed, or not now; null: that is not known, or need not be said. */
+/** Says that data are simulated or recorded; null: not known, or from a robot. */
 function originText({ origin }: Site): string | null {
   return origin in S.origin ? S.origin[origin as keyof typeof S.origin] : null;
 }

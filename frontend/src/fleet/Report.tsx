@@ -1,4 +1,4 @@
-/** What happened at the greenhouses that are shown: a row for each, and what people said of them. */
+/** What happened at the shown greenhouses: a row for each, and people's notes. */
 import { useState, type JSX } from 'react';
 
 import { timeOfDay, timeZone } from '../clock';
@@ -111,7 +111,7 @@ function NoteRow({ note }: { note: SiteNote }): JSX.Element {
   );
 }
 
-/** Its report to read, in the reader's language and time zone. */
+/** Address of its readable report, in the reader's language and time zone. */
 const pageOf = ({ report }: SiteReport): string => {
   const query = new URLSearchParams({ lang: LANGUAGE, time_zone: timeZone() });
   return `${report.replace('/api/report?', '/api/report.html?')}&${query.toString()}`;

@@ -1,4 +1,4 @@
-/** The overview as the server sends it: one socket, tried again whenever it ends. */
+/** The overview as the server sends it, over one socket that reconnects. */
 import { epochOf, now, onLapse } from '../clock';
 import { backoffMs } from '../connection/machine';
 import { signInIfRequired } from '../connection/socket';
@@ -6,16 +6,16 @@ import { parseSites, withFrame, type Archive, type Sites } from './sites';
 
 export interface Seen {
   readonly sites: Sites;
-  /** null: nothing has come yet. */
+  /** null: nothing received yet. */
   readonly archive: Archive | null;
-  /** Since when nothing comes any more, ms since the epoch; null: it does. */
+  /** When data stopped arriving, ms since the epoch; null: they arrive. */
   readonly lostAt: number | null;
 }
 
-/** The server sends something every five seconds at least. */
+/** The server sends something at least every five seconds. */
 const SILENT_MS = 12_000;
 
-/** Calls back with everything that is known, at each change; returns the way to stop. */
+/** Calls back with the full state on each change; returns a stop function. */
 export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
   let seen: Seen = { sites: new Map(), archive: null, lostAt: null };
   let socket: WebSocket | null = null;
@@ -55,7 +55,7 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
     };
     socket.onclose = ({ code }) => {
       lost(code);
-      // The server is away, or the session has ended.
+      // The server is unreachable, or the session has ended.
       if (!isOpened) void signInIfRequired();
     };
     socket.onmessage = ({ data }) => {
@@ -74,7 +74,7 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
   const again = (): void => {
     if (document.visibilityState === 'visible' && (seen.lostAt !== null || !socket)) open();
   };
-  // Whoever slept may have a socket that nobody answers.
+  // After sleep, the socket may be dead.
   const stopLapse = onLapse(() => {
     setTimeout(open);
   });

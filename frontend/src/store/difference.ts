@@ -1,6 +1,6 @@
 /**
- * Fetches what the heat map is when it is compared: the field of the moment that is shown, and that
- * of the other one, on one grid.
+ * Fetches what a compared heat map needs: the fields of the shown and of the other moment, on one
+ * grid.
  */
 import { now } from '../clock';
 import { differenceOf, otherMoment, type Compare } from '../domain/difference';
@@ -13,7 +13,7 @@ import { rosNow, selectLatest, selectShown } from './moment';
 import { DRAG_PACE_MS, failed, NOTHING, ready, type FetchTask } from './fetcher';
 import { type Difference } from './twin';
 
-/** Live, the other moment moves on with now; this far at once, seconds. */
+/** When live, the other moment follows now in steps of this length, seconds. */
 const STEP_S = 10;
 const TICK_MS = 2_000;
 
@@ -33,7 +33,7 @@ export function startDifference(): () => void {
     },
     (state) => {
       const { compare, sensor } = state.view;
-      // Of another sensor or source, or to another moment, it is none of what is wanted.
+      // A difference of another sensor, source or moment must not stay.
       const isOther =
         compare === null ||
         before?.view.compare !== compare ||
@@ -74,7 +74,7 @@ function taskFor(state: AppState, compare: Compare): FetchTask<Difference> | und
   };
 }
 
-/** Around all pins, in whole cells: both fields lie on the same ones. */
+/** A box around all pins, in whole cells, so that both fields share them. */
 function boxOf(snapshot: Snapshot | null, resolution: number): Bounds | null {
   const bounds = boxOfPins(snapshot);
   if (!bounds) return null;

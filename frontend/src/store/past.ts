@@ -1,4 +1,4 @@
-/** Fetches the greenhouse as of the moment that is wanted, and the field of that moment with it. */
+/** Fetches the greenhouse's state and field as of the requested moment. */
 import { pause } from '../clock';
 import { fetchQuality, Refusal } from '../contract/api';
 import { fetchStateAt } from '../contract/past';
@@ -12,11 +12,11 @@ import { DRAG_PACE_MS, failed, type Fetched, NOTHING, ready, type FetchTask } fr
 import { NO_HOUSE, type Past, withPast } from './twin';
 
 /**
- * What was shown stays for so long while the first moment is on its way, with its own label: most
- * answers are there before anybody would see an empty page.
+ * How long the previous state stays, under its own label, while the first moment is fetched: most
+ * answers arrive before an empty page would show.
  */
 const PATIENCE_MS = 300;
-/** How far off a field is, is asked for once the moment stays. */
+/** The field's error is fetched once the moment has stayed this long. */
 const QUALITY_AFTER_MS = 400;
 
 export function startPast(): () => void {
@@ -56,7 +56,7 @@ export function startPast(): () => void {
     else if (!past) patience ??= setTimeout(losePatience, PATIENCE_MS);
     else patience = undefined;
     const { epoch, socket } = state.twin.connection;
-    // Each connection asks anew: another server may be behind it, or more was heard meanwhile.
+    // Each connection refetches: it may lead to another server, or more data has arrived.
     if (socket.kind === 'open') receivedOn = epoch;
     return taskFor(state, moment, receivedOn);
   };
@@ -84,7 +84,7 @@ export function startPast(): () => void {
   };
 }
 
-/** For a field that has come without it; an estimate tells its own error. */
+/** For a field without its error; an estimate has its own. */
 function qualityTask(state: AppState): FetchTask<FieldQuality> | null {
   const past = selectPast(state);
   const field = past?.house.field.value;
@@ -109,20 +109,20 @@ function taskFor(state: AppState, at: number, epoch: number): FetchTask<Past> {
   return {
     key: `${epoch}|${at}|${sensor}|${resolution}|${source}`,
     run: async (signal) => {
-      // Both or none: no moment has the field of another one.
+      // Both or neither: no moment shows the field of another one.
       const [latest, field] = await Promise.all([
         fetchStateAt(at, signal),
         fetchHeat(source, { sensor, resolution, at }, signal).then(
           ready,
           (error: unknown): Fetched<Field> => {
-            // What may pass is tried again with the rest.
+            // A temporary failure is retried together with the state.
             if (!(error instanceof Refusal) || error.status !== 400) throw error;
             return failed(error.message);
           },
         ),
       ]);
       const before = selectPast(store.get())?.house.snapshot ?? null;
-      // In milliseconds of ROS time, where nothing but differences counts.
+      // In milliseconds of ROS time: only differences count.
       const snapshot = snapshotOf(latest, at * 1000, before);
       const hasPins = snapshot.tags.some((tag) => tag.at);
       const { health } = latest;

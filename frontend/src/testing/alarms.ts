@@ -1,4 +1,4 @@
-/** Alarms as the bridge might tell of them. */
+/** Alarms as the bridge might send them. */
 import type { Alarm, Alarms, HealthReason } from '../contract/types';
 import { receive } from '../store/app';
 import { reason } from './health';

@@ -72,9 +72,9 @@ def settings() -> str:
         "Each setting is an option of `lupin-twin serve`, `web` and `demo`, an environment "
         "variable, and a key of the TOML file that `--config` or "
         f"`{CONFIG_VARIABLE}` names. The key is the option's name with `_` in place of `-`.\n\n"
-        "The command line wins over the environment, the environment over the file, and the file "
-        "over the default. An option that may be given more than once is a list in the file; its "
-        "variable holds the values with commas between them.",
+        "The command line overrides the environment, the environment the file, and the file the "
+        "default. An option that may be given more than once is a list in the file; its variable "
+        "holds the values, separated by commas.",
         *(
             part
             for group, rows in groups.items()
@@ -103,7 +103,7 @@ def parameters() -> str:
         )
     return page(
         "Parameters of the twin",
-        "Set them as any ROS parameter: `lupin-twin serve --ros-args -p idw_power:=3.0`, or in a "
+        "Set them like any ROS parameter: `lupin-twin serve --ros-args -p idw_power:=3.0`, or in a "
         "file of parameters. A value out of its range stops the twin at its start. While the twin "
         "runs, `ros2 param set` changes those that may change.\n\n"
         "Every node also has ROS's own `use_sim_time`: with `true` it follows `/clock`.",
@@ -125,7 +125,7 @@ def launch() -> str:
     return page(
         "Launch arguments",
         "`ros2 launch lupin_twin twin.launch.py namespace:=gh1` starts the twin alone. An argument "
-        "that is given wins over the file of parameters.",
+        "that is given overrides the file of parameters.",
         grid(("argument", "default", "values", "meaning"), rows),
     )
 
@@ -140,8 +140,8 @@ def commands() -> str:
         ]
     return page(
         "Commands",
-        "`twin_node` runs the twin alone. It has no options of its own: everything from "
-        "`--ros-args` on goes to ROS, as for every other command here.",
+        "`twin_node` runs the twin alone. It has no options of its own: everything after "
+        "`--ros-args` goes to ROS, as with every other command here.",
         *sections,
     )
 
@@ -172,7 +172,7 @@ def http() -> str:
     return page(
         "HTTP routes",
         prose(document["info"]["description"]),
-        "A running bridge has the same as `/openapi.json`, and as a page at `/docs`.",
+        "A running bridge serves the same as `/openapi.json`, and as a page at `/docs`.",
         *sections,
         "## Other routes",
         "Pages, documents and WebSockets, which OpenAPI does not describe.",
@@ -218,7 +218,7 @@ def frames() -> str:
     schemas = create_app(None).openapi()["components"]["schemas"]
     return page(
         "WebSocket frames",
-        "`/ws/state` sends JSON texts. The member `type` of each names its kind.",
+        "`/ws/state` sends JSON text. The field `type` of each frame names its kind.",
         *(part for model in FRAMES for part in _schema(model.__name__, schemas[model.__name__])),
     )
 
@@ -276,21 +276,21 @@ def topics() -> str:
     """Topics and services with their QoS."""
     return page(
         "Topics and services",
-        "Names are relative to the node's namespace, but for those that begin with `/`. So a "
+        "Names are relative to the node's namespace, except those that begin with `/`. So a "
         "namespace moves the whole twin. *Latched* is RELIABLE and TRANSIENT_LOCAL: a late "
         "subscriber still gets the last messages, as many as the depth.",
         "## The twin subscribes to",
         _topics(interfaces.SUBSCRIBED),
         "## The bridge subscribes to",
-        "In `serve` and `web`, for [the robot on the map](../page/map.md#the-robot). It subscribes "
-        "as they are published, latched or not, and reads once a second. ROS remapping works.",
+        "In `serve` and `web`, for [the robot on the map](../page/map.md#the-robot). It adopts the "
+        "publisher's QoS, latched or not, and reads once a second. ROS remapping works.",
         _topics(interfaces.ROBOT),
         "## The twin publishes",
         _topics(interfaces.PUBLISHED),
         "## The twin serves",
         "Services are reliable and volatile. A service and each of its clients hold "
-        f"{interfaces.SERVICE_DEPTH} messages; create a client with the same depth, or DDS loses "
-        "answers without a word.",
+        f"{interfaces.SERVICE_DEPTH} messages; create a client with the same depth, or DDS "
+        "silently loses answers.",
         grid(
             ("service", "type", "parameter", "what"),
             [
@@ -299,8 +299,8 @@ def topics() -> str:
             ],
         ),
         "## SROS 2 policy",
-        "What `lupin_twin` and `lupin_web` may do, and nothing else. A bridge reads for its "
-        "viewers what the twin publishes. The file is `sros2-policy.xml` beside the systemd unit.",
+        "The only rights of `lupin_twin` and `lupin_web`. A bridge reads what the twin publishes, "
+        "for its viewers. The file is `sros2-policy.xml` beside the systemd unit.",
         block(policy(), "xml"),
     )
 
@@ -406,7 +406,7 @@ def measures() -> str:
     ]
     return page(
         "Metrics",
-        "`/metrics` has them in Prometheus' text format, beside those of the process itself.",
+        "`/metrics` serves them in Prometheus' text format, with those of the process itself.",
         grid(("metric", "type", "label", "meaning"), rows),
     )
 
@@ -416,9 +416,8 @@ def sensors() -> str:
     document = json.loads(SENSORS.read_text(encoding="utf-8"))
     return page(
         "Sensors and their ranges",
-        "The file of sensors that the bridge has by itself. A file of one's own, named with "
-        "`--sensors`, takes its place. Outside of `ideal` a tag is stressed, outside of `critical` "
-        "it is critical.",
+        "The sensors file that is built into the bridge. Your own file, given with `--sensors`, "
+        "replaces it. Outside `ideal` a tag is stressed, outside `critical` it is critical.",
         block(json.dumps(document, indent=2, ensure_ascii=False), "json"),
     )
 

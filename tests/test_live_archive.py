@@ -96,7 +96,7 @@ def test_serve_forwards_and_lives_through_the_end_of_archive_and_forwarder(
         (("--site", "gh1"), "--site is given without --archive-url"),
         (("--archive-url", "postgresql:///x"), "--archive-url is given without --site"),
         (("--site", "GH", "--archive-url", "postgresql:///x"), "--site is 'GH', expected a-z"),
-        (("--site", "gh1", "--archive-url", "x"), "--archive-url is no address"),
+        (("--site", "gh1", "--archive-url", "x"), "--archive-url is not a PostgreSQL"),
     ],
 )
 def test_serve_refuses_what_can_never_be_forwarded(args: tuple[str, ...], said: str) -> None:

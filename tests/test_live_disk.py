@@ -110,7 +110,10 @@ def test_a_journal_in_a_read_only_folder_can_be_read(disk: Disk) -> None:
     kept(path, [scan()])
     disk.be("readonly")
     command = (sys.executable, "-m", "lupin_bridge.cli.command", "journal")
-    for action, said in (("info", "scans      1, of them 0 failed"), ("check", f"{path} is whole")):
+    for action, said in (
+        ("info", "scans        1, 0 of them failed"),
+        ("check", f"{path} is whole"),
+    ):
         done = subprocess.run(
             [*command, action, "--journal", path],
             env={**os.environ, **disk.env},

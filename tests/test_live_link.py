@@ -101,7 +101,7 @@ def test_of_a_publisher_that_had_said_nothing_each_loss_is_counted(domain: int) 
             return lost > 0 and lost + int(values["journal"]["written"]) == count
 
         assert diagnosed(peer, is_all)
-        assert f"on {TOPIC}: they came too fast" in twin.output
+        assert f"on {TOPIC}: they arrived too fast" in twin.output
 
 
 # --- other users ----------------------------------------------------------------------------------

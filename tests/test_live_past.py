@@ -197,7 +197,7 @@ def test_a_flood_of_the_dearest_question_loses_no_observation(domain: int, tmp_p
         last = f"SELECT 1 FROM scan WHERE stamp_ns = {stamp_ns(T + 2.0 + (OBSERVED - 1) / RATE)}"
         wait_for(lambda: select(journal, last), "the last of them in the journal", meanwhile=ask)
         assert select(journal, "SELECT count(*) FROM scan") == [(SITE + OBSERVED,)]
-        assert "they came too fast" not in twin.output
+        assert "they arrived too fast" not in twin.output
         assert len(answers) > before + 2, "asked all the while"
         assert {len(answer.state.tags) for answer in answers if answer.ok} <= {SITE, SITE + 1}
         assert all(answer.ok for answer in answers)

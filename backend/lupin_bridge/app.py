@@ -89,13 +89,12 @@ def create_app(
 
 
 _DESCRIPTION = """
-Every route answers GET and HEAD alone, but sign-in, notes, devices for notifications and
-observations. Nothing here writes to ROS but `POST /api/observations`, which is off by default.
-Positions are metres in the map frame, values are in the sensor's unit, what is not known is null.
-`/ws/state` is a WebSocket that sends `StateFrame`, `StatusFrame`, `AlarmsFrame` and `RobotFrame` as
-JSON text: the current ones at once, then every change. A bridge with a token (`LUPIN_TOKEN`) needs
-it as `Authorization: Bearer` with every request, `/healthz` excepted; a browser signs in at
-`/signin`.
+All routes are read-only (GET and HEAD), except those for sign-in, notes, push devices and
+observations. Only `POST /api/observations` writes to ROS, and it is off by default. Positions are
+metres in the map frame, values are in the sensor's unit, and unknown values are null. `/ws/state`
+is a WebSocket that sends `StateFrame`, `StatusFrame`, `AlarmsFrame` and `RobotFrame` as JSON text:
+the current ones on connection, then every change. A bridge with a token (`LUPIN_TOKEN`) requires it
+as `Authorization: Bearer` with every request except `/healthz`; a browser signs in at `/signin`.
 """
 
 

@@ -400,4 +400,4 @@ class Bridge:
             self.hub.remind(now_s)
         self.hub.serve_all(now_s)  # clients with a low rate may be due by now
         if stuck := self.hub.dismiss_stuck(now_s):
-            log.warning("closed %d clients that took no frame", stuck)
+            log.warning("disconnected %d clients that accepted no frame", stuck)

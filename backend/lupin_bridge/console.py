@@ -136,7 +136,7 @@ def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], 
     try:
         target.open("xb").close()
     except FileExistsError as error:
-        raise CommandError(f"{target} is there already, and nothing is overwritten") from error
+        raise CommandError(f"{target} already exists, and nothing is overwritten") from error
     except OSError as error:
         raise CommandError(f"cannot write {target}: {error.strerror}") from error
     # An incomplete copy looks complete: whatever ends this, Ctrl-C too, removes it.

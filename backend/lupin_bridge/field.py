@@ -47,7 +47,7 @@ FORMATS: Final = (JSON, PNG, NPY)
 
 
 BOX_NAMES: Final = ("bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y")
-_BOX: Final = "m, map frame; without a box: all pinned tags but those far off, and their reach"
+_BOX: Final = "m, map frame; default box: all pinned tags except those far off, and their reach"
 
 Box = tuple[float, float, float, float]
 
@@ -58,15 +58,15 @@ class FieldQuery:
 
     sensor_type: Name = needed("name of a sensor, as in a reading")
     resolution: Annotated[float, Gt(0)] | None = parameter(
-        "m, side of a square cell; without a box either: doubled until the field is small enough; "
-        f"default: {DEFAULT_RESOLUTION_M}"
+        f"side of a square cell, m; default: {DEFAULT_RESOLUTION_M}, which without a box is "
+        "doubled until the field is small enough"
     )
     bbox_min_x: float | None = parameter(_BOX)
     bbox_min_y: float | None = parameter(_BOX)
     bbox_max_x: float | None = parameter(_BOX)
     bbox_max_y: float | None = parameter(_BOX)
     scale: Annotated[int, Interval(ge=1, le=1000)] = parameter(
-        "PNG only: pixels a cell along each side", 1
+        "PNG only: pixels per cell, along each side", 1
     )
     at: str | None = parameter(AT)
 
@@ -103,7 +103,7 @@ class EstimateQuery(FieldQuery):
     """Query parameters of an estimate: it has two numbers per cell, and a PNG shows one of them."""
 
     layer: Literal["mean", "sd"] = parameter(
-        "PNG only: which of the two numbers; transparent where the estimate is not known", "mean"
+        "PNG only: the number to draw; transparent where the estimate is not known", "mean"
     )
 
 

@@ -33,75 +33,73 @@ counter = partial(Described, "counter")
 # By name; the output adds `_total` to a counter's, as Prometheus requires.
 METRICS: Final = {
     "lupin_clients": gauge("WebSocket clients that follow the state"),
-    "lupin_clients_blocked": gauge("clients whose socket takes nothing just now"),
-    "lupin_topics_relayed": gauge("ROS topics that are subscribed for viewers"),
+    "lupin_clients_blocked": gauge("clients whose socket accepts no data at the moment"),
+    "lupin_topics_relayed": gauge("ROS topics that the bridge relays to viewers"),
     "lupin_ros_thread_alive": gauge("1 while the ROS thread runs"),
-    "lupin_ros_calls_waiting": gauge("calls that wait for the ROS thread"),
+    "lupin_ros_calls_waiting": gauge("calls waiting for the ROS thread"),
     "lupin_twin_live": gauge("1 while the twin is live"),
-    "lupin_twins": gauge("twins that publish the state; more than 1 is a mistake"),
-    "lupin_state_age_seconds": gauge("seconds since the last state came; infinite: none has"),
+    "lupin_twins": gauge("twins that publish the state; more than 1 is a fault"),
+    "lupin_state_age_seconds": gauge("seconds since the last state arrived; infinite: none has"),
     "lupin_tags": gauge("tags that the twin knows"),
     "lupin_tags_pinned": gauge("tags that have a pose"),
-    "lupin_alarms_known": gauge("1 once alarms of the past are known"),
-    "lupin_alarms_active": gauge("alarms that are active"),
+    "lupin_alarms_known": gauge("1 once past alarms are known"),
+    "lupin_alarms_active": gauge("active alarms"),
     "lupin_fields_computing": gauge("field requests being computed now"),
     "lupin_exports_running": gauge("exports being sent now"),
-    "lupin_journal_recording": gauge("1 while the journal records what is observed"),
-    "lupin_journal_rows_waiting": gauge("observations that are not in the journal yet"),
-    "lupin_journal_behind_seconds": gauge("for how long the oldest of those has been waiting"),
-    "lupin_journal_file_bytes": gauge("size of the journal on the disk"),
-    "lupin_outward_connected": gauge("1 while the other side takes messages", "channel"),
+    "lupin_journal_recording": gauge("1 while the journal records observations"),
+    "lupin_journal_rows_waiting": gauge("observations not yet written to the journal"),
+    "lupin_journal_behind_seconds": gauge("seconds that the oldest of those has waited"),
+    "lupin_journal_file_bytes": gauge("size of the journal file on disk"),
+    "lupin_outward_connected": gauge("1 while the receiving side accepts messages", "channel"),
     "lupin_estimate_trusted": gauge(
-        "1 while about as many scans lie in the predicted range as should; absent: too few scans",
+        "1 while about as many scans as expected lie in the predicted range; absent: too few scans",
         "sensor",
     ),
-    "lupin_estimate_fit_failing": gauge("1 while its last model could not be fitted", "sensor"),
+    "lupin_estimate_fit_failing": gauge("1 while the last fit of its model has failed", "sensor"),
     "lupin_outward_waiting": gauge(
-        "tags, the greenhouse or changes of alarms, not sent yet", "channel"
+        "items not yet sent: tags, the greenhouse or changes of alarms", "channel"
     ),
-    "lupin_clients_dismissed": counter("clients closed because they took no frame for too long"),
+    "lupin_clients_dismissed": counter(
+        "clients disconnected because they accepted no frame for too long"
+    ),
     "lupin_frames_sent": counter("state frames written to clients"),
     "lupin_frames_skipped": counter(
-        "state frames that a client did not get, being slow or wanting fewer"
+        "state frames not sent because a client was slow or asked for fewer"
     ),
     "lupin_bytes_sent": counter("bytes of frames written to clients"),
-    "lupin_messages_sent": counter("ROS messages written to viewers as they are"),
+    "lupin_messages_sent": counter("ROS messages relayed to viewers unchanged"),
     "lupin_messages_skipped": counter(
-        "ROS messages that a viewer did not get, being slow, or too large"
+        "ROS messages not relayed because a viewer was slow or the message too large"
     ),
-    "lupin_alarms_missed": counter(
-        "observations that were received too late for the alarms they belong to"
-    ),
-    "lupin_alarms_raised": counter(
-        "alarms raised since the start; those of the past are not counted"
-    ),
-    "lupin_ros_callback_errors": counter("errors met by ROS callbacks"),
+    "lupin_alarms_missed": counter("observations received too late for the alarms they belong to"),
+    "lupin_alarms_raised": counter("alarms raised since the start; past alarms are not counted"),
+    "lupin_ros_callback_errors": counter("errors raised in ROS callbacks"),
     "lupin_judge_errors": counter(
-        "states that could not be judged, so that every status is unknown"
+        "states that could not be judged, which leaves every status unknown"
     ),
-    "lupin_work_abandoned": counter("computations that were ended because nobody waited any more"),
+    "lupin_work_abandoned": counter("computations stopped because nobody waited for them any more"),
     "lupin_journal_rows": counter("observations written to the journal"),
     "lupin_journal_rows_lost": counter(
-        "observations given up because the journal could not be written"
+        "observations lost because the journal could not be written"
     ),
-    "lupin_admission_refused": counter("computed answers refused, by the limit they met", "reason"),
+    "lupin_admission_refused": counter("requests refused, by the limit they exceeded", "reason"),
     "lupin_dropped": counter("messages and entries that the twin dropped or lost", "reason"),
     "lupin_web_dropped": counter("messages that `web` itself dropped or lost", "reason"),
     "lupin_http_answers": counter("HTTP answers of the routes, by status", "status"),
-    "lupin_outward_sent": counter("messages that a broker or a receiver has taken", "channel"),
+    "lupin_outward_sent": counter("messages that a broker or a receiver accepted", "channel"),
     "lupin_outward_failed": counter("connections and posts that failed", "channel"),
     "lupin_outward_dropped": counter(
-        "of MQTT, states of tags that gave way to newer ones; of the webhook, changes given up",
+        "MQTT: states of tags replaced by newer ones; webhook: changes of alarms given up",
         "channel",
     ),
 }
 HISTOGRAMS: Final = {
     "lupin_push_seconds": (
-        "from a change in the ROS thread until every ready client has been written its frame"
+        "time from a change in the ROS thread until the frame is written to every ready client"
     ),
-    "lupin_field_seconds": "until a field is computed and written",
-    "lupin_http_seconds": "from a request until its answer began",
-    "lupin_past_seconds": "until a request about the past is answered, by its kind",
+    "lupin_field_seconds": "time until a field is computed and written",
+    "lupin_http_seconds": "time from a request until its answer begins",
+    "lupin_past_seconds": "time until a request about the past is answered, by its kind",
 }
 
 # From a millisecond to the time-out of a field.

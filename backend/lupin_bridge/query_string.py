@@ -171,10 +171,10 @@ def compact(stamp_ns: int) -> str:
 
 # --- parameters of queries about the past ---------------------------------------------------------
 
-_FROM: Final = f"{MOMENT}; default: the oldest in the journal"
-_TO: Final = "as `from`; this moment itself is not in the period; default: now"
-_POINTS: Final = "at most so many readings or buckets"
-_ONE_TAG: Final = "one tag alone; default: all"
+_FROM: Final = f"start of the period: {MOMENT}; default: the oldest in the journal"
+_TO: Final = "end of the period, exclusive, in the form of `from`; default: now"
+_POINTS: Final = "maximum number of readings or buckets"
+_ONE_TAG: Final = "this tag only; default: all"
 Points = Annotated[int, Interval(ge=1, le=MAX_POINTS)]
 
 
@@ -216,7 +216,7 @@ class OfPeriod:
 class OfHistory(OfPeriod):
     """The parameters of `/api/history`."""
 
-    tag_id: Name = needed("one tag; for events, `*` is the whole greenhouse")
+    tag_id: Name = needed("id of a tag; for events, `*` is the whole greenhouse")
     sensor_type: Name = needed(
         f"name of a sensor, as in a reading; or an event: {', '.join(Event)}"
     )
@@ -236,7 +236,7 @@ class OfAlarms(OfPeriod):
     """The parameters of `/api/alarms`."""
 
     active: Literal["0", "1"] | None = parameter(
-        "1: only those that have not been cleared, 0: only the others; default: all"
+        "1: only active alarms; 0: only cleared ones; default: all"
     )
 
 
@@ -244,9 +244,9 @@ class OfAlarms(OfPeriod):
 class OfNotes(OfPeriod):
     """The parameters of `/api/notes`."""
 
-    subject: str | None = parameter("of this alone: `alarm:ID`, `tag:ID` or `site`; default: all")
+    subject: str | None = parameter("only about this: `alarm:ID`, `tag:ID` or `site`; default: all")
     kind: Literal["acknowledge", "shelve", "comment"] | None = parameter(
-        "this kind alone; default: all"
+        "only this kind; default: all"
     )
 
 
@@ -259,7 +259,7 @@ MAX_REPORT_DAYS: Final = 31
 class OfReport:
     """The parameters of `/api/report`."""
 
-    from_: str | None = parameter(f"{MOMENT}; default: eight hours before `to`")
+    from_: str | None = parameter(f"start of the period: {MOMENT}; default: 8 h before `to`")
     to: str | None = parameter(_TO)
 
 
@@ -267,10 +267,10 @@ class OfReport:
 class OfReportPage(OfReport):
     """The parameters of `/api/report.html`."""
 
-    lang: Literal["en", "de", "nl", "es"] = parameter("language", "en")
+    lang: Literal["en", "de", "nl", "es"] = parameter("language of the page", "en")
     time_zone: str | None = parameter(
-        "of its times, such as Europe/Amsterdam; default: that of the setting `time_zone`; UTC in "
-        "place of one that this machine does not know"
+        "time zone of the page's times, such as Europe/Amsterdam; default: the setting "
+        "`time_zone`; UTC if this machine does not know it"
     )
 
 
@@ -279,7 +279,7 @@ class OfExport(OfPeriod):
     """The parameters of an export."""
 
     tag_id: Name | None = parameter(_ONE_TAG)
-    sensor_type: Name | None = parameter("one sensor alone; default: all")
+    sensor_type: Name | None = parameter("this sensor only; default: all")
 
 
 def at(parameters: Parameters, now_ns: int | None) -> int | None:

@@ -54,119 +54,125 @@ class Settings:
 
     host: Annotated[str, MinLen(1)] = _setting(
         "127.0.0.1",
-        "address to listen on; other machines need 0.0.0.0 or ::, and a reverse proxy of this "
-        "machine a Unix socket, such as unix:/run/lupin-twin/http.sock",
+        "address to listen on; to accept other machines: 0.0.0.0 or ::; behind a reverse proxy on "
+        "this machine: a Unix socket, such as unix:/run/lupin-twin/http.sock",
         group="listening",
     )
     port: Annotated[int, Interval(ge=0, le=65_535)] = _setting(
-        8000, "port to listen on; 0: any free one"
+        8000, "port to listen on; 0: any free port"
     )
-    tls_cert: str = _setting("", "PEM file with the certificate chain: serve https and wss")
-    tls_key: str = _setting("", "PEM file with the certificate's private key, not encrypted")
+    tls_cert: str = _setting("", "PEM file with the certificate chain; turns on https and wss")
+    tls_key: str = _setting("", "PEM file with the certificate's private key, unencrypted")
     max_clients: Annotated[int, Interval(ge=1, le=100_000)] = _setting(
-        5_000, "WebSocket clients at most"
+        5_000, "maximum number of WebSocket clients"
     )
     token_file: str = _setting(
-        "", "file with the token that readers have to know, a line of text", group="access"
+        "", "file with the token that readers must present, as one line of text", group="access"
     )
     accounts: str = _setting(
         "",
-        "file of accounts and API tokens, which `lupin-twin user` and `token` make; empty: "
+        "file of accounts and API tokens, which `lupin-twin user` and `token` create; empty: "
         "accounts.sqlite in the folder of this user's journals",
     )
     http_observations: Literal["off", "on"] = _setting(
         "off",
-        "on: programs with a token of the role writer post readings to /api/observations, and the "
+        "on: programs whose token has the role writer may post readings to /api/observations; the "
         "bridge publishes them over ROS",
     )
     allow_host: tuple[str, ...] = _setting(
-        (), "another name of the bridge, such as twin.example; may be given more than once"
+        (), "additional host name of the bridge, such as twin.example; may be given more than once"
     )
     allow_origin: tuple[str, ...] = _setting(
         (),
-        "origin whose pages may read the bridge too, and whose host is a name of the bridge, such "
-        "as https://panel.example; may be given more than once",
+        "additional origin whose pages may read the bridge, such as https://panel.example; its "
+        "host is then a host name of the bridge too; may be given more than once",
     )
     trusted_proxy: tuple[str, ...] = _setting(
         (),
         "address or network of a reverse proxy whose X-Forwarded-For and X-Forwarded-Proto are "
-        "believed, such as 127.0.0.1 or 10.0.0.0/24; may be given more than once",
+        "trusted, such as 127.0.0.1 or 10.0.0.0/24; may be given more than once",
         group="behind a proxy",
     )
     proxy_user_header: str = _setting(
-        "", "header in which such a proxy names who has signed in there, such as Remote-User"
+        "", "header in which a trusted proxy names the user it signed in, such as Remote-User"
     )
-    path_prefix: str = _setting("", "path that a proxy serves the bridge below, such as /gh1")
+    path_prefix: str = _setting("", "path under which a proxy serves the bridge, such as /gh1")
     sensors: str = _setting(
         "",
-        "JSON file with every sensor's label, unit, colour and ranges, instead of our own",
+        "JSON file with every sensor's label, unit, colour and ranges; empty: the built-in one",
         group="judgement",
     )
     reading_validity_s: Annotated[float, Interval(ge=0.0, le=604_800.0)] = _setting(
-        0.0, "how long a reading is valid, s; 0: three times the tag's own usual interval"
+        0.0, "how long a reading is valid, s; 0: three times the tag's usual scan interval"
     )
     day_hours: str = _setting(
-        "06:00-20:00", "from when to when it is day where no light is measured; 00:00-00:00: always"
+        "06:00-20:00", "hours that count as day where no light is measured; 00:00-00:00: always"
     )
     time_zone: str = _setting(
-        "", "such as Europe/Amsterdam: for the hours of the day; empty: this machine's"
+        "", "time zone for times of day, such as Europe/Amsterdam; empty: this machine's"
     )
     mqtt_url: str = _setting(
         "",
-        "MQTT broker, such as mqtt://broker.lan or mqtts://broker.lan:8883: readings, verdicts and "
-        "alarms go there",
+        "MQTT broker that receives readings, verdicts and alarms, such as mqtt://broker.lan or "
+        "mqtts://broker.lan:8883",
         group="MQTT",
         is_private=True,
     )
-    mqtt_user: str = _setting("", "who the bridge is to the broker")
-    mqtt_password_file: str = _setting("", "file with that user's password, a line of text")
-    mqtt_ca: str = _setting("", "PEM file with who signs the broker's certificate")
-    mqtt_prefix: str = _setting("lupin-twin", "what the topics begin with, such as farm/gh1")
+    mqtt_user: str = _setting("", "user name at the MQTT broker")
+    mqtt_password_file: str = _setting("", "file with that user's password, as one line of text")
+    mqtt_ca: str = _setting("", "PEM file with the CA certificate for the broker")
+    mqtt_prefix: str = _setting("lupin-twin", "prefix of every topic, such as farm/gh1")
     mqtt_discovery_prefix: str = _setting(
-        "homeassistant", "where Home Assistant looks for devices; empty: they are not announced"
+        "homeassistant", "Home Assistant's discovery prefix; empty: devices are not announced"
     )
     webhook_url: str = _setting(
         "",
-        "http or https address that changes of alarms are posted to",
+        "http or https address to which changes of alarms are posted",
         group="webhook",
         is_private=True,
     )
-    webhook_secret_file: str = _setting("", "file with the secret that signs them, a line of text")
-    webhook_ca: str = _setting("", "PEM file with who signs the receiver's certificate")
+    webhook_secret_file: str = _setting(
+        "", "file with the secret that signs the posts, as one line of text"
+    )
+    webhook_ca: str = _setting("", "PEM file with the CA certificate for the receiver")
     push_contact: str = _setting(
         "",
-        "turns on Web Push, and is whom push services write to if it goes wrong, such as "
+        "turns on Web Push; the address that push services contact about problems, such as "
         "mailto:grower@example.org",
         group="push",
     )
     push_private_host: tuple[str, ...] = _setting(
-        (), "a push service of your own, which may be in a private network, may be repeated"
+        (),
+        "host of a push service of your own, which may be in a private network; may be given more "
+        "than once",
     )
     report_at: str = _setting(
         "",
-        "when the report of the last day is sent, by MQTT and webhook, such as 06:00 in the time "
-        "zone of the hours of the day; empty: never",
+        "time of day at which the report of the last day is sent by MQTT and webhook, such as "
+        "06:00; empty: never",
         group="report",
     )
     journal: str = _setting(
         "",
-        "for web: the file of its twin's journal, where this machine knows it by another path",
+        "for web: its twin's journal, if this machine sees the file under a different path",
         group="past",
     )
     site: str = _setting(
-        "", "the greenhouse's name in the archive, and its user's, such as gh1", group="archive"
+        "",
+        "name of the greenhouse in the archive, and of its database user, such as gh1",
+        group="archive",
     )
     archive_url: str = _setting(
         "",
-        "PostgreSQL that the journal is forwarded to, or that fleet shows, such as "
-        "postgresql://gh1@db.example/lupin; its password: PGPASSWORD or PGPASSFILE",
+        "PostgreSQL database that the journal is forwarded to, or that fleet shows, such as "
+        "postgresql://gh1@db.example/lupin; the password comes from PGPASSWORD or PGPASSFILE",
         is_private=True,
     )
     log_format: Literal["text", "json"] = _setting(
-        "text", "lines for people, or JSON for a collector", group="log"
+        "text", "lines for people, or JSON for a log collector", group="log"
     )
     log_level: Literal["debug", "info", "warning", "error"] = _setting(
-        "info", "the least that is logged"
+        "info", "lowest level that is logged"
     )
     # How the operator gave each setting: an option, a variable, or a file's line and key.
     given_as: Mapping[str, str] = field(
@@ -300,7 +306,7 @@ def _checked(name: str, called: str, value: Any, *, is_text: bool) -> Any:
         raise SettingError(f"{called} is {_shown(name, value)}: {why}") from None
     texts = found if isinstance(found, tuple) else (found,)
     if any(isinstance(text, str) and _CONTROL.search(text) for text in texts):
-        raise SettingError(f"{called} is {_shown(name, value)}: there is a control character in it")
+        raise SettingError(f"{called} is {_shown(name, value)}: it contains a control character")
     return found
 
 
@@ -365,7 +371,7 @@ def strange_variables(environment: Iterable[str]) -> list[str]:
     """
     known = {*_NOT_IN_THE_TABLE, *(variable(spec.name) for spec in table())}
     return [
-        f"the environment's {name} is no setting of the bridge{_meant(name, known)}"
+        f"environment variable {name} is not a setting of the bridge{_meant(name, known)}"
         for name in sorted(environment)
         if name.startswith(ENV_PREFIX) and name not in known
     ]
@@ -382,11 +388,11 @@ def _of_file(path: str, called: str) -> Iterator[_Given]:
         place = f"{path}{_line_of(key, text)}: {key if _BARE.fullmatch(key) else repr(key[:64])}"
         if key in SECRETS:
             raise SettingError(
-                f"{place} is no setting: put the {key.rpartition('_')[2]} into a file of its own, "
-                f"and name that with {key}_file"
+                f"{place} is not a setting: put the {key.rpartition('_')[2]} into a file of its "
+                f"own, and name that file with {key}_file"
             )
         if key not in names:
-            raise SettingError(f"{place} is no setting of the bridge{_meant(key, names)}")
+            raise SettingError(f"{place} is not a setting of the bridge{_meant(key, names)}")
         yield key, place, value
 
 
@@ -407,7 +413,7 @@ def read_text(path: str, called: str, max_bytes: int = MAX_FILE_BYTES) -> str:
     try:
         return content.decode()
     except UnicodeDecodeError:
-        raise SettingError(f"{called} {path} is no text (UTF-8)") from None
+        raise SettingError(f"{called} {path} is not UTF-8 text") from None
 
 
 def _line_of(key: str, text: str) -> str:

@@ -86,8 +86,8 @@ def test_nothing_is_overwritten_and_what_cannot_be_made_is_named(
     taken = tmp_path / "taken"
     taken.write_text("mine", encoding="ascii")
     for target, why in (
-        (taken, "is there already, and nothing is overwritten"),
-        (source, "is there already, and nothing is overwritten"),
+        (taken, "already exists, and nothing is overwritten"),
+        (source, "already exists, and nothing is overwritten"),
         (tmp_path / "none" / "copy", "No such file or directory"),
     ):
         assert main(["journal", "backup", str(target), "--journal", str(source)]) == 1

@@ -196,7 +196,7 @@ def test_a_signal_ends_it_cleanly_while_nobody_listens(domain: int) -> None:
     ("arguments", "named"),
     [
         (["--ros-args", "-p", "frame_id:=''"], "parameter frame_id is empty"),
-        (["--ros-args", "-p", "use_sim_time:=5"], "parameter use_sim_time is no bool"),
+        (["--ros-args", "-p", "use_sim_time:=5"], "parameter use_sim_time is not a bool"),
         (["--ros-args", "-p", "map_topic:=a//b"], "parameter map_topic is 'a//b'"),
         (["--ros-args", "--bogus"], "--bogus"),
     ],

@@ -86,7 +86,7 @@ def test_it_ends_with_1_when_its_thread_dies(domain: int) -> None:
         (["-r", "__node:=bad name"], "__node:=bad name"),
         (["-r", "two\nlines"], "-r two lines"),
         (["--params-file", "/nonexistent.yaml"], "/nonexistent.yaml"),
-        (["-p", "use_sim_time:=5"], "parameter use_sim_time is no bool"),
+        (["-p", "use_sim_time:=5"], "parameter use_sim_time is not a bool"),
         (["-p", "idw_power:=-1.0"], "parameter idw_power is -1.0"),
     ],
 )

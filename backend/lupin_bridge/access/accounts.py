@@ -123,7 +123,7 @@ def make_file(path: Path) -> None:
                     f" PRAGMA application_id = {_APPLICATION_ID}; COMMIT;"
                 )
     except (OSError, sqlite3.Error) as error:
-        raise AccountError(f"the file of accounts {path} cannot be made: {error}") from error
+        raise AccountError(f"the file of accounts {path} cannot be created: {error}") from error
 
 
 class Accounts:
@@ -145,7 +145,7 @@ class Accounts:
                 if_unusable.callback(self._connection.close)
                 execute = self._connection.execute
                 if execute("PRAGMA application_id").fetchone() != (_APPLICATION_ID,):
-                    raise AccountError(f"{path} is no file of accounts")
+                    raise AccountError(f"{path} is not a file of accounts")
                 (version,) = execute("PRAGMA user_version").fetchone()
                 if version != _VERSION:
                     raise AccountError(f"{path} is of version {version}, this is {_VERSION}")

@@ -235,12 +235,12 @@ class AccessControl:
         elif decision.foreign is not None and _is_preflight(request):
             refusal = _refusal(204, "", _PREFLIGHT_HEADERS)
         elif decision.foreign is not None and scope.get("method", "GET") not in _READS:
-            refusal = _refusal(403, "pages of another origin may read here, and no more")
+            refusal = _refusal(403, "pages of another origin may only read here")
         else:
             try:
                 checked = self._check_credentials(request)
             except AccountError as error:
-                log.warning("%s: nobody is let in", error)
+                log.warning("%s: every request is refused", error)
                 checked = _refusal(503, "the accounts cannot be read", {"retry-after": "5"})
             if not isinstance(checked, Response):
                 checked = self._check_reach(checked, path_of(scope))
@@ -255,7 +255,7 @@ class AccessControl:
         if person is None:
             return None
         if person.role == WRITER and path != OBSERVATIONS:
-            detail = f"{person.name} is a writer: it posts to {OBSERVATIONS}, and no more"
+            detail = f"{person.name} is a writer: it may only post to {OBSERVATIONS}"
             return _refusal(403, detail)
         site = self._access.site_of(path)
         if site is not None and not person.reads(site):
@@ -270,26 +270,16 @@ class AccessControl:
         scope = {**scope, "headers": [line for line in scope["headers"] if line[0] != b"cookie"]}
         if person is not None:
             scope["state"] = {**scope.get("state", {}), PERSON_KEY: person}
-        if person == SHARED or scope["type"] == "http":
+        people = self._access.people
+        if people is None or person == SHARED or scope["type"] == "http":
             await self._app(scope, receive, send)
             return
-        looking = asyncio.create_task(self._end_with(person, scope["state"][CONNECTION_KEY]))
+        connection: Connection = scope["state"][CONNECTION_KEY]
+        looking = asyncio.create_task(_end_with(people, person, connection))
         try:
             await self._app(scope, receive, send)
         finally:
             looking.cancel()
-
-    async def _end_with(self, person: Person | None, connection: Connection) -> None:
-        """Close the connection when the session ends; without a person, at the first account."""
-        people = self._access.people
-        if people is None:
-            return
-        try:
-            while not people.is_on if person is None else people.still(person):
-                await asyncio.sleep(_POLL_S)
-        except AccountError as error:
-            log.warning("%s: what %s had open is closed", error, person and person.name)
-        connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")
 
     def _check_credentials(self, request: HTTPConnection) -> Response | Person | None:
         """Who makes the request; None: no credentials are needed here; or a refusal."""
@@ -299,7 +289,7 @@ class AccessControl:
         named = request.scope.get("state", {}).get(PROXY_USER_KEY)
         header = request.headers.get("authorization")
         if named is not None:
-            return people.by_proxy(named) or _unauthorized("the proxy names nobody who can be")
+            return people.by_proxy(named) or _unauthorized("the proxy sent no valid user name")
         if header is not None:
             return self._check_header(people, header, client_of(request))
         if path == SIGN_IN:
@@ -407,3 +397,13 @@ def _with_cors(send: Send, foreign: str | None) -> Send:
         await send(message)
 
     return send_with_cors
+
+
+async def _end_with(people: People, person: Person | None, connection: Connection) -> None:
+    """Close the connection when the session ends; without a person, at the first account."""
+    try:
+        while not people.is_on if person is None else people.still(person):
+            await asyncio.sleep(_POLL_S)
+    except AccountError as error:
+        log.warning("%s: the open connections of %s are closed", error, person and person.name)
+    connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")

@@ -84,7 +84,7 @@ class Proxies:
         if header and not (settings.trusted_proxy or has_unix_socket):
             raise settings.wrong(
                 "proxy_user_header",
-                "is given without --host unix:PATH or --trusted-proxy: nobody is believed",
+                "is given without --host unix:PATH or --trusted-proxy: no proxy is trusted",
             )
         called = settings.called("trusted_proxy")
         proxies = tuple(_network(text, called) for text in settings.trusted_proxy)

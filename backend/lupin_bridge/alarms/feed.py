@@ -255,10 +255,10 @@ class AlarmFeed:
                 await (self._take_received() if self._origin == "heard" else self._follow())
             except Exception as error:  # nobody awaits this task: it goes on after any error
                 if not isinstance(error, (NotRemembered, PastRefused, TwinUnavailableError)):
-                    log.exception("alarms are as they were, and are worked out anew")
+                    log.exception("the alarms stay unchanged, and are computed again")
                     self._begin(self._origin)
                 elif str(error) != why:
-                    log.info("alarms are as they were: %s", error)
+                    log.info("the alarms stay unchanged: %s", error)
                 why = str(error)
                 self._ask_again(RETRY_S)
                 try:
@@ -322,7 +322,7 @@ class AlarmFeed:
         await self._on_worker(lambda _: follower.take(lot))
         if follower.missed and not self.missed:
             log.warning(
-                "an observation came too late for its alarms: lupin_alarms_missed counts them"
+                "an observation arrived too late for its alarms; lupin_alarms_missed counts these"
             )
         self.missed = missed + follower.missed
 
@@ -397,8 +397,8 @@ async def learn_recent(source: TwinSource, judge: Judge, first: Snapshot) -> Non
             await asyncio.sleep(LEARN_AGAIN_S)
             continue
         except PastRefused as error:
-            log.info("what was recent before is not known: %s", error)
+            log.info("alarms start without the recent past: %s", error)
         except Exception:  # nobody awaits this, and nothing else needs it
-            log.exception("what was recent before is not known")
+            log.exception("alarms start without the recent past")
         judge.knows_recent = True
         return

@@ -99,7 +99,7 @@ def check_url(url: str) -> dict[str, Any]:
     # counts as the host, which messages name; the host of an abstract socket begins with @.
     if not found or "@" in str(found.get("host", ""))[1:]:
         raise UsageError(
-            "--archive-url is no address of a PostgreSQL, expected one such as"
+            "--archive-url is not a PostgreSQL address, expected one such as"
             " postgresql://gh1@db.example/lupin"
         )
     return found
@@ -181,12 +181,12 @@ def _explained(error: psycopg.Error) -> str:
         text = noise.sub("", text)
     match error:
         case psycopg.errors.UndefinedTable():
-            text = "the database has no archive: lupin-twin archive init makes it"
+            text = "the database has no archive: lupin-twin archive init creates it"
         case psycopg.errors.InsufficientPrivilege():
             text = (
-                f"the archive does not allow it: {text}; a forwarder needs a user in"
-                " lupin_forwarder that is named as the site is, a page one in lupin_page, and"
-                " whoever looks after it its owner"
+                f"the archive does not permit it: {text}; a forwarder needs a user in the role"
+                " lupin_forwarder with the name of the site, a page one in lupin_page, and its"
+                " administrator the owner"
             )
         case psycopg.errors.DiskFull():
             text = f"the archive is full: {text}"
@@ -236,7 +236,7 @@ def init(connection: psycopg.Connection[Any]) -> None:
         raise ArchiveError(f"the database's encoding is {encoding}, expected UTF8")
     there = connection.execute("SELECT to_regclass('archive'), to_regclass('scan')").fetchone()
     if there != (None, None):
-        raise ArchiveError("the database has an archive already: see lupin-twin archive info")
+        raise ArchiveError("the database already has an archive: see lupin-twin archive info")
     with connection.transaction():
         connection.execute(POSTGRESQL_TABLES)
         connection.execute(_text("tables.sql"))

@@ -109,7 +109,7 @@ class Sink:
                 (self._site,),
             ).fetchone()
             told = "{} (process {}) since {}".format(*other) if other else "another machine"
-            raise ArchiveError(f"site {self._site} is forwarded by {told}: one alone may")
+            raise ArchiveError(f"site {self._site} is already forwarded by {told}: only one may")
         execute(_HERE, (self._site, socket.gethostname(), os.getpid()))
         execute("INSERT INTO site VALUES (%s, '') ON CONFLICT DO NOTHING", (self._site,))
 
@@ -137,7 +137,7 @@ class Sink:
         last = Epoch(self._site, *numbers)
         if journal_id == source.journal_id and self._goes_on(source, last):
             return last
-        say(f"site {self._site} has another journal than before: all of it is forwarded")
+        say(f"site {self._site} has a different journal than before: all of it is forwarded")
         (runs,) = self._connection.execute(
             "SELECT coalesce(max(run), 0) FROM run WHERE site = %s", (self._site,)
         ).fetchone()
@@ -365,5 +365,5 @@ class Forwarding:
                 ended = f"has ended with code {await self._process.wait()}"
             except OSError as error:
                 ended = f"cannot be started: {error}"
-            log.error("the forwarder %s; it is started again", ended)
+            log.error("the forwarder %s; it is restarted", ended)
             await asyncio.sleep(_RESTART_S)

@@ -136,7 +136,7 @@ class PlayerNode(Node):  # type: ignore[misc]  # rclpy is not typed
         if len(twins) > 1:
             raise RecordingError(
                 f"several twins run in ROS domain {self.context.get_domain_id()} "
-                f"({', '.join(sorted(twins))}), and a journal would keep what is played: choose "
+                f"({', '.join(sorted(twins))}), and a journal would record the playback: choose "
                 "another ROS_DOMAIN_ID for this demo"
             )
 
@@ -241,7 +241,7 @@ class Player:
         except RuntimeError as error:  # rclpy's own: the bytes are no such message
             name, kind = self._recording.name, CLOCK.type_name
             raise RecordingError(
-                f"cannot read {name}: a message of {message.topic} is no {kind}"
+                f"cannot read {name}: a message on {message.topic} is not a {kind}"
             ) from error
 
     def _publish(self, message: Recorded) -> None:

@@ -162,7 +162,7 @@ class Recording:
             reader = SeekingReader(file, validate_crcs=True)
             summary = reader.get_summary()
         except (OSError, *_DAMAGE) as error:  # OSError: the footer lies before the file's begin
-            why = "it was not finished, or is cut off"
+            why = "it is incomplete or truncated"
             raise _broken(path, f"{why}: {str(error) or type(error).__name__}") from error
         if summary is None or summary.statistics is None:
             raise _broken(path, "it has no index")
@@ -177,7 +177,7 @@ class Recording:
             if self.topics.setdefault(channel.topic, kind) != kind:
                 raise RecordingError(
                     f"{path} has {channel.topic} as {kind}, a file before it as "
-                    f"{self.topics[channel.topic]}: they are not of one recording"
+                    f"{self.topics[channel.topic]}: they are not parts of one recording"
                 )
         return reader, summary.statistics
 
@@ -190,7 +190,7 @@ def _files(named: Sequence[Path]) -> list[Path]:
         except OSError as error:
             raise RecordingError(f"cannot read {path}: {error.strerror}") from error
         if not inside:
-            raise RecordingError(f"{path} is a folder in which no file ends in {SUFFIX}")
+            raise RecordingError(f"{path} is a folder without a {SUFFIX} file")
         files += inside
     return files
 
@@ -198,7 +198,7 @@ def _files(named: Sequence[Path]) -> list[Path]:
 def _opened(path: Path) -> IO[bytes]:
     try:
         if not path.is_file() and path.exists():  # a pipe would be waited for
-            raise RecordingError(f"{path} is no file")
+            raise RecordingError(f"{path} is not a file")
         return path.open("rb")
     except OSError as error:
         raise RecordingError(f"cannot read {path}: {error.strerror}") from error

@@ -70,11 +70,11 @@ from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
 from lupin_twin.runtime.process import USAGE_ERROR
 
 ARCHIVE_ACTIONS: Final[Mapping[str, str]] = {
-    "init": "make its tables and roles, in a database that has none of them",
+    "init": "create its tables and roles, in a database that has none of them",
     "migrate": "bring its tables and roles up to date",
-    "info": "its sites: how much of each, received until when, and who forwards it",
-    "check": "read all of it for rows that fit no other; exit code 1 if there are any",
-    "retain": "delete scans and inspections that are older than some days",
+    "info": "list its sites: how much of each, received until when, and who forwards it",
+    "check": "read all of it and report inconsistent rows; exit code 1 if there are any",
+    "retain": "delete scans and inspections older than a number of days",
 }
 # Beside a busy twin it gets a tenth of the core that they share.
 _NICENESS: Final = 10
@@ -83,22 +83,22 @@ _URL: Final = "archive_url"
 
 def add_archive(roles: Roles) -> None:
     """Add `archive` and `forward`, with their options."""
-    text = "the archive of many greenhouses, in PostgreSQL: init, migrate, info, check, retain"
+    text = "work on the archive of many greenhouses: init, migrate, info, check, retain"
     for action, own in add_actions(roles, "archive", text, ARCHIVE_ACTIONS):
         _add_url(own)
         if action == "retain":
             own.add_argument(
-                "--days", type=float, required=True, help="what is younger stays, more than 0"
+                "--days", type=float, required=True, help="age up to which they stay; more than 0"
             )
-            own.add_argument("--site", metavar="NAME", help="of this one alone (default: of all)")
-    text = "send what a twin's journal receives to the archive, as serve --archive-url does"
+            own.add_argument("--site", metavar="NAME", help="this site only (default: all)")
+    text = "forward a twin's journal to the archive, as serve --archive-url does"
     forward = add_role(roles, "forward", text)
     forward.add_argument(
-        "--site", metavar="NAME", help=f"the greenhouse's name (default: {variable('site')})"
+        "--site", metavar="NAME", help=f"name of the greenhouse (default: {variable('site')})"
     )
     _add_url(forward)
     journal.add_which(forward)
-    forward.add_argument("--once", action="store_true", help="send what is there, and end")
+    forward.add_argument("--once", action="store_true", help="forward what is there, and exit")
     # For `serve`, which starts it: it ends with `serve`, for whatever reason that ends.
     forward.add_argument("--end-with-input", action="store_true", help=argparse.SUPPRESS)
 
@@ -107,8 +107,8 @@ def _add_url(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         option(_URL),
         metavar="URL",
-        help="such as postgresql://gh1@db.example/lupin; its password: PGPASSWORD or PGPASSFILE"
-        f" (default: {variable(_URL)})",
+        help="database, such as postgresql://gh1@db.example/lupin; the password comes from "
+        f"PGPASSWORD or PGPASSFILE (default: {variable(_URL)})",
     )
 
 
@@ -146,7 +146,7 @@ def _archive(options: argparse.Namespace, url: str) -> int:
     with closing(connect(url, f"lupin-twin archive {action}")) as connection, explaining():
         if action == "init":
             init(connection)
-            tell(f"{place}: the archive is made")
+            tell(f"{place}: the archive is created")
             return 0
         if action == "migrate":
             migrate(connection)
@@ -186,21 +186,21 @@ def _end_with_input() -> None:
 
 USER_ACTIONS: Final[Mapping[str, str]] = {
     "add": "add an account; the command prompts for the password, or reads it from a file",
-    "list": "all accounts, with their roles",
+    "list": "list all accounts, with their roles",
     "remove": "remove an account; its sessions end",
 }
 TOKEN_ACTIONS: Final[Mapping[str, str]] = {
-    "add": "make an API token and print it, this once",
-    "list": "all tokens, with their roles",
-    "revoke": "revoke a token; what it has open ends",
+    "add": "create an API token and print it, once only",
+    "list": "list all tokens, with their roles",
+    "revoke": "revoke a token; its open connections end",
 }
 _WHAT: Final[Mapping[str, Kind]] = {"user": "account", "token": "token"}
 
 
 def add_people(roles: Roles) -> None:
     """Add `user`, `token` and `audit`, with their options."""
-    users = "accounts of people: add, list, remove"
-    tokens = "tokens of programs: add, list, revoke"
+    users = "manage accounts of people: add, list, remove"
+    tokens = "manage API tokens of programs: add, list, revoke"
     for role, text, actions in (("user", users, USER_ACTIONS), ("token", tokens, TOKEN_ACTIONS)):
         for action, own in add_actions(roles, role, text, actions):
             _add_file(own)
@@ -212,33 +212,36 @@ def add_people(roles: Roles) -> None:
                     action="append",
                     default=[],
                     metavar="SITE",
-                    help="a site whose data they may read, may be repeated (default: all)",
+                    help="site whose data may be read; may be given more than once (default: all)",
                 )
                 own.add_argument(
                     "--role",
                     dest="given_role",  # `role` is the command's
                     required=True,
                     choices=TOKEN_ROLES if role == "token" else ROLES,
-                    help="viewer reads, operator writes notes too, admin reads the audit trail too"
-                    + (", writer posts observations and does nothing else" * (role == "token")),
+                    help="viewer reads, operator also writes notes, admin also reads the audit "
+                    "trail" + (", writer only posts observations" * (role == "token")),
                 )
             if action == "add" and role == "user":
                 which = own.add_mutually_exclusive_group()
-                which.add_argument("--password-file", metavar="FILE", help="a line of text")
+                which.add_argument("--password-file", metavar="FILE", help="one line of text")
                 which.add_argument(
                     "--no-password",
                     action="store_true",
-                    help="a trusted proxy signs them in (--proxy-user-header)",
+                    help="a trusted proxy signs the person in (--proxy-user-header)",
                 )
-    _add_file(add_role(roles, "audit", "who signed in and who changed what, as CSV, newest first"))
+    text = "print who signed in and who changed what, as CSV, newest first"
+    _add_file(add_role(roles, "audit", text))
 
 
 def _add_file(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--config", metavar="FILE", help=f"as for serve: {CONFIG_VARIABLE}")
+    parser.add_argument(
+        "--config", metavar="FILE", help=f"settings file (default: {CONFIG_VARIABLE})"
+    )
     parser.add_argument(
         option("accounts"),
         metavar="FILE",
-        help=f"the file of accounts (default: {variable('accounts')}, or as for serve)",
+        help=f"file of accounts (default: {variable('accounts')}, or as for serve)",
     )
 
 
@@ -281,7 +284,7 @@ def _add(path: Path, options: argparse.Namespace) -> int:
             sites=options.for_site,
         )
     if is_first:
-        say(f"{path} is made: from now on, bridges with this file want everybody to sign in")
+        say(f"{path} is created: from now on, bridges that use it require everybody to sign in")
     tell(token or f"{kind} {options.name} is added, with the role {options.given_role}")
     return 0
 
@@ -291,10 +294,10 @@ def _password(options: argparse.Namespace) -> str:
         password = read_text(options.password_file, "--password-file").rstrip("\r\n")
     elif sys.stdin.isatty():
         password = getpass.getpass(f"Password of {options.name}: ")
-        if getpass.getpass("The same again: ") != password:
+        if getpass.getpass("Repeat the password: ") != password:
             raise AccountError("the two passwords are not the same")
     else:
-        raise AccountError("there is no terminal to enter the password: use --password-file")
+        raise AccountError("there is no terminal to enter the password in: use --password-file")
     check_password(password)
     return password
 
@@ -307,7 +310,7 @@ def _remove(path: Path, options: argparse.Namespace) -> int:
     tell(f"{kind} {options.name} is removed")
     if is_last:
         say(
-            f"nobody is left who could sign in; to have bridges open to all again, stop them and "
+            f"nobody can sign in any more; to open the bridges to everybody again, stop them and "
             f"delete {path}"
         )
     return 0

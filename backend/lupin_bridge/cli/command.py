@@ -155,9 +155,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return adapt.run(options, ros_args)
     if options.role in _WITHOUT_ROS:
         if ros_args:
-            which = ": name its file with --journal or --namespace"
+            which = ": choose its file with --journal or --namespace"
             of_a_file = which if options.role in {"journal", "import"} else ""
-            _fail(f"{options.role} takes no arguments of ROS{of_a_file}")
+            _fail(f"{options.role} takes no ROS arguments{of_a_file}")
         return _WITHOUT_ROS[options.role](options, os.environ)
     play_args = _play_args(options)
     try:
@@ -195,10 +195,10 @@ def command() -> NoReturn:
 
 
 ROLES = {
-    "serve": "the twin and the bridge in one process",
-    "demo": "serve, plus a simulated patrol in a second process",
-    "web": "the bridge alone, for a twin elsewhere; as many of these as needed",
-    "fleet": "every greenhouse of an archive on one page; as many of these as needed",
+    "serve": "run the twin and the bridge in one process",
+    "demo": "run serve, plus a simulated patrol in a second process",
+    "web": "run the bridge alone, for a twin elsewhere; run as many as needed",
+    "fleet": "show every greenhouse of an archive on one page; run as many as needed",
 }
 
 
@@ -206,9 +206,9 @@ ROLES = {
 PATROL_OPTIONS: dict[str, tuple[type[int | float], str]] = {
     "speed": (
         float,
-        "how fast the patrol goes, or the recording, its seconds a second (default: 1)",
+        "patrol seconds, or seconds of the recording, per second (default: 1)",
     ),
-    "seed": (int, "another seed, another patrol (default: 0)"),
+    "seed": (int, "seed of the patrol: a different seed gives a different patrol (default: 0)"),
 }
 
 
@@ -233,7 +233,7 @@ def _play_args(options: argparse.Namespace) -> list[str]:
             _fail(f"{given[0].partition('=')[0]} is for --from FILE.mcap")
         return []
     if options.seed is not None:
-        _fail("--seed is the patrol's, which --from FILE.mcap does without")
+        _fail("--seed is for the patrol, which --from FILE.mcap replaces")
     if options.speed is not None:
         low, high = PLAYER_SPEEDS
         if not low <= options.speed <= high:
@@ -252,8 +252,8 @@ def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="lupin-twin",
         description="Digital twin of a greenhouse: ROS 2 node, web bridge and browser HMI.",
-        epilog="Everything from --ros-args on goes to ROS: --ros-args -p idw_power:=3.0. A setting "
-        "may also stand in the environment (LUPIN_PORT for --port) or in the file of --config.",
+        epilog="Everything after --ros-args goes to ROS: --ros-args -p idw_power:=3.0. A setting "
+        "may also be in the environment (LUPIN_PORT for --port) or in the file of --config.",
     )
     made.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     roles = made.add_subparsers(dest="role", required=True, metavar="ROLE")
@@ -261,7 +261,7 @@ def parser() -> argparse.ArgumentParser:
     common.add_argument(
         "--config",
         metavar="FILE",
-        help=f"TOML file with any of these settings, by their names with _ "
+        help=f"TOML file with any of these settings, named with underscores "
         f"(default: {CONFIG_VARIABLE}, or none)",
     )
     for group in dict.fromkeys(spec.metadata["group"] for spec in table()):
@@ -275,7 +275,7 @@ def parser() -> argparse.ArgumentParser:
                     # None: not given here, so the environment or the file decides.
                     default=None,
                     metavar=spec.name.rpartition("_")[2].upper(),
-                    help=f"{spec.metadata['help']}{limits and f', {limits}'} "
+                    help=f"{spec.metadata['help']}{limits and f'; {limits}'} "
                     f"(default: {spec.default or 'none'})",
                 )
     for role, text in ROLES.items():
@@ -288,24 +288,24 @@ def parser() -> argparse.ArgumentParser:
                 dest="recording",
                 metavar="FILE.mcap",
                 nargs="+",
-                help="show this recording and not the patrol: a file, or all of its files, or the "
-                "folder that they are in. It goes to a twin of its own, with the time of the "
-                "recording and a journal that ends with it",
+                help="play this recording instead of the patrol: one file, all of its files, or "
+                "their folder. It feeds a twin of its own, with the time of the recording and a "
+                "temporary journal",
             )
             own.add_argument(
                 "--start",
                 type=_seconds,
                 metavar="SECONDS",
-                help="begin the recording so long after its first message; what came before is "
-                "published at once (default: 0)",
+                help="start this long after the first message of the recording; earlier messages "
+                "are published at once (default: 0)",
             )
-            own.add_argument("--loop", action="store_true", help="begin it again at its end")
+            own.add_argument("--loop", action="store_true", help="play it again from its end")
             own.add_argument(
                 "--skip-gaps",
                 type=_seconds,
                 default=math.inf,
                 metavar="SECONDS",
-                help="jump over its silences of more than so many seconds (default: wait)",
+                help="skip silences of the recording longer than this (default: wait)",
             )
     journal.add_parser(roles)
     administration.add_archive(roles)

@@ -128,8 +128,8 @@ class Summary:
             yield f"refused: {count}: {reason} (line {', '.join(map(str, examples))})"
         if self.repeated:
             yield (
-                f"refused: {self.repeated}: the sensor has another reading of that moment; "
-                "where clocks are set back in autumn, times need an offset"
+                f"refused: {self.repeated}: the sensor has another reading at that moment; "
+                "where clocks go back in autumn, times need an offset"
             )
 
 
@@ -162,9 +162,9 @@ def columns_of(content: Any) -> Columns:
     )
     table.end()
     if bool(columns.tag) == bool(columns.tag_id):
-        raise ConfigError("expected tag, a column, or tag_id, every row's tag; one of them")
+        raise ConfigError("expected either tag, a column, or tag_id, the tag of every row")
     if bool(columns.sensors) == bool(columns.sensor and columns.value):
-        raise ConfigError("expected sensors, or sensor and value; one of them")
+        raise ConfigError("expected either sensors, or sensor and value")
     return columns
 
 
@@ -267,7 +267,7 @@ def _number(name: str, text: str, column: Value) -> float:
     except ValueError:
         if text in ("unknown", "unavailable"):  # a sensor of Home Assistant that is offline
             raise ValueError(f"{name} is {text}") from None
-        raise ValueError(f"{name} is no number") from None
+        raise ValueError(f"{name} is not a number") from None
     if not column.low <= value <= column.high or math.isinf(value):
         raise ValueError(f"{name} is not from {column.low:g} to {column.high:g}")
     return value
@@ -278,7 +278,7 @@ def _number(name: str, text: str, column: Value) -> float:
 def _moment_ns(text: str, zone: ZoneInfo | None) -> int:
     seconds = seconds_of(text, zone)
     if seconds > time.time():
-        raise ValueError("the time is ahead of now")
+        raise ValueError("the time is in the future")
     return int(seconds * 1e6) * 1000
 
 
@@ -294,7 +294,7 @@ _NO_LIMITS: Final = Limits(days=MAX_JOURNAL_DAYS, max_bytes=2**62)
 
 def add_parser(roles: Roles) -> None:
     """Add `import` to the command's options."""
-    text = "readings of before, from CSV, into a journal; without --write, what would be imported"
+    text = "import past readings from CSV into a journal; without --write, only report on them"
     parser = add_role(roles, "import", text)
     parser.add_argument("file", metavar="FILE.csv", type=Path)
     parser.add_argument(
@@ -303,10 +303,10 @@ def add_parser(roles: Roles) -> None:
         metavar="FILE.yaml",
         type=Path,
         required=True,
-        help="which column is what",
+        help="what each column of the CSV is",
     )
     parser.add_argument(
-        "--write", action="store_true", help="write it into the journal, whose twin is stopped"
+        "--write", action="store_true", help="write into the journal; stop its twin first"
     )
     add_which(parser)
 
@@ -318,7 +318,7 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
     except ConfigError as error:
         return fail(f"{options.columns}: {error}")
     except (UnicodeDecodeError, csv.Error) as error:
-        return fail(f"{options.file} is no CSV in UTF-8: {error}")
+        return fail(f"{options.file} is not CSV in UTF-8: {error}")
     except (*SHOWN, *FILE_ERRORS, OSError) as error:
         return fail(str(error))
 
@@ -394,7 +394,7 @@ def _write(path: Path, columns: Columns, found: Iterator[Merged]) -> tuple[int, 
             known = runs(connection.execute)
             placed = {tag for (tag,) in connection.execute("SELECT DISTINCT tag FROM place")}
         if any(run.begun.is_simulated for run in known):
-            raise CommandError(f"the journal {path} is of a simulation: import into another")
+            raise CommandError(f"the journal {path} is a simulation's: import into another one")
         while batch := list(islice(found, _BATCH)):
             count += len(batch)
             if not known:

@@ -62,12 +62,12 @@ from lupin_twin.journal.writes import rows
 from lupin_twin.runtime.process import INTERRUPTED
 
 ACTIONS: Final[Mapping[str, str]] = {
-    "info": "what is in it: size, rows, tags, sensors, how far back, runs of the clock",
-    "check": "read all of it for damage; exit code 1 if there is any",
-    "export": "its readings and failed attempts as CSV, or its observations as a recording",
-    "backup": "copy it to a new file, also while its twin writes",
-    "forget": "forget a tag, or its place alone, so that it is pinned anew; stop its twin first",
-    "vacuum": "make a whole file as small as what is in it; its twin has to be stopped",
+    "info": "show what is in it: size, rows, tags, sensors, period, runs of the clock",
+    "check": "read all of it and report damage; exit code 1 if there is any",
+    "export": "write its readings and failed attempts as CSV, or its observations as a recording",
+    "backup": "copy it to a new file, even while its twin writes",
+    "forget": "forget a tag, or only its pose, so that it is pinned again; stop its twin first",
+    "vacuum": "shrink an undamaged file to the size of its contents; stop its twin first",
 }
 _MAX_SHOWN: Final = 20
 _RUNS_SHOWN: Final = 10
@@ -92,50 +92,52 @@ SHOWN: Final = (
 
 def add_parser(roles: Roles) -> None:
     """Add `journal` and its actions to the command's options."""
-    text = "what a twin remembers: info, check, export, backup, forget, vacuum"
+    text = "work on a twin's journal: info, check, export, backup, forget, vacuum"
     for action, own in add_actions(roles, "journal", text, ACTIONS):
         add_which(own)
         if action == "backup":
-            own.add_argument("target", metavar="FILE", type=Path, help="must not be there yet")
+            own.add_argument("target", metavar="FILE", type=Path, help="must not exist yet")
         if action == "forget":
-            own.add_argument("tag", metavar="TAG", help="its id")
-            own.add_argument("--pose", action="store_true", help="its place alone")
+            own.add_argument("tag", metavar="TAG", help="id of the tag")
+            own.add_argument("--pose", action="store_true", help="forget only its pose")
         if action == "export":
             own.add_argument(
                 "recording",
                 metavar="FILE.mcap",
                 nargs="?",
                 type=Path,
-                help="not CSV: the observations themselves, for ROS's own tools",
+                help="write a recording of the observations, for ROS tools, instead of CSV",
             )
             when = "seconds of ROS time, or ISO 8601 with an offset"
-            own.add_argument("--from", dest="start", metavar="TIME", help=f"from then on: {when}")
-            own.add_argument("--to", dest="end", metavar="TIME", help=f"until before then: {when}")
-            own.add_argument("--tag", metavar="ID", help="one tag alone")
-            own.add_argument("--sensor", metavar="NAME", help="one sensor alone")
             own.add_argument(
-                "--sensors", metavar="FILE", help=f"units of CSV (default: {variable('sensors')})"
+                "--from", dest="start", metavar="TIME", help=f"start of the period: {when}"
+            )
+            own.add_argument("--to", dest="end", metavar="TIME", help=f"end, exclusive: {when}")
+            own.add_argument("--tag", metavar="ID", help="this tag only")
+            own.add_argument("--sensor", metavar="NAME", help="this sensor only")
+            own.add_argument(
+                "--sensors", metavar="FILE", help=f"sensors file (default: {variable('sensors')})"
             )
             own.add_argument(
-                "--config", metavar="FILE", help=f"settings (default: {variable('config')})"
+                "--config", metavar="FILE", help=f"settings file (default: {variable('config')})"
             )
 
 
 def add_which(parser: argparse.ArgumentParser) -> None:
     """Add the options that say which journal, for `path_of`."""
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--journal", metavar="PATH", help="the file")
+    which.add_argument("--journal", metavar="PATH", help="file of the journal")
     which.add_argument(
-        "--demo", metavar="SEED", type=int, help="that of the demo with this seed (make run: 0)"
+        "--demo", metavar="SEED", type=int, help="journal of the demo with this seed (make run: 0)"
     )
     which.add_argument(
-        "--namespace", default="", help="that of the twin in this namespace (default: none)"
+        "--namespace", default="", help="journal of the twin in this namespace (default: none)"
     )
     parser.add_argument(
         "--domain",
         type=int,
         metavar="ID",
-        help=f"that of the twin in this ROS domain, 0 to {_MAX_DOMAIN}"
+        help=f"journal of the twin in this ROS domain, 0 to {_MAX_DOMAIN}"
         " (default: ROS_DOMAIN_ID, or 0)",
     )
 
@@ -187,9 +189,9 @@ def path_of(
             domain = 0 if named else _domain(options, environ)
             path = journal_path(options.journal or "", environ, domain, options.namespace)
     except RuntimeError as error:
-        raise CommandError(f"there is no home to look for a journal in: {error}") from error
+        raise CommandError(f"there is no home folder to look for a journal in: {error}") from error
     if path is None:
-        raise CommandError("--journal is 'off', must be a file")
+        raise CommandError("--journal is 'off', expected a file")
     for file in (path,) if named else (path, SERVICE_FOLDER / path.name):
         try:
             if file.is_file():
@@ -246,8 +248,8 @@ def _lines(connection: sqlite3.Connection, path: Path) -> Iterator[tuple[str, st
     yield "log", _mb(size_of(path.with_name(path.name + "-wal")))
     yield "recording", holder_of(path) or "nobody"
     rows = row_counts(connection)
-    yield "scans", f"{rows['scan']:,}, of them {rows['failure']:,} failed"
-    yield "looks", f"{rows['look']:,}"
+    yield "scans", f"{rows['scan']:,}, {rows['failure']:,} of them failed"
+    yield "inspections", f"{rows['look']:,}"
     yield "places", f"{rows['place']:,}"
     yield "tags", f"{rows['tag']:,}"
     yield "sensors", ", ".join(sensors_of(connection)) or "none"
@@ -342,9 +344,9 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
     target: Path = options.recording
     for name in ("tag", "sensor"):
         if getattr(options, name) is not None:
-            raise CommandError(f"--{name} is for CSV: {target} has whole observations")
+            raise CommandError(f"--{name} is for CSV: {target} holds whole observations")
     if target.suffix != SUFFIX:
-        raise CommandError(f"{target} does not end in {SUFFIX}: that is how its form is known")
+        raise CommandError(f"{target} does not end in {SUFFIX}, as a recording must")
     try:
         # Imported only where it is needed: it needs ROS.
         from lupin_bridge.bags.journal_export import export  # noqa: PLC0415
@@ -352,12 +354,12 @@ def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int)
         with closing(_reader(path)) as connection:
             observations, tags = export(connection, target, start_ns, end_ns, options.namespace)
     except FileExistsError as error:
-        raise CommandError(f"{target} is there already, and nothing is overwritten") from error
+        raise CommandError(f"{target} already exists, and nothing is overwritten") from error
     except (OSError, LookupError) as error:
         why = getattr(error, "strerror", None) or str(error)
         raise CommandError(f"cannot make {target}: {why}") from error
     if not observations + tags:
-        raise CommandError(f"the journal {path} holds nothing of that period")
+        raise CommandError(f"the journal {path} has nothing in that period")
     _say(f"{observations:,} observations and {tags:,} messages of discovered tags are in {target}")
     return 0
 

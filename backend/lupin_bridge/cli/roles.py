@@ -156,9 +156,9 @@ def with_past(feed: Feed) -> Feed:
             )
     except subprocess.CalledProcessError as error:
         why = (error.stderr.splitlines() or [str(error)])[-1]
-        log.warning("the demo starts without a past: %s", why.removeprefix("patrol_node: error: "))
+        log.warning("the demo starts without history: %s", why.removeprefix("patrol_node: error: "))
     except (Foreign, subprocess.TimeoutExpired, OSError, *FILE_ERRORS) as error:
-        log.warning("the demo starts without a past: %s", error)
+        log.warning("the demo starts without history: %s", error)
     if past is None:
         return feed
     _, past_ns = past
@@ -264,7 +264,7 @@ async def _run(
     targets = Targets.of(settings, secrets)
     archive.check(settings, role)
     if settings.journal and role != "web":
-        raise settings.wrong("journal", "is for web; a twin's own file is its parameter journal")
+        raise settings.wrong("journal", "is for web; the parameter journal names a twin's own file")
     if "://" in settings.journal:
         raise settings.wrong(
             "journal",
@@ -272,12 +272,12 @@ async def _run(
         )
     if settings.journal and not Path(settings.journal).exists():
         log.warning(
-            "%s: there is no file %s; until there is, the twin's log is copied over ROS",
+            "%s: %s does not exist; until it does, the twin's log is copied over ROS",
             *(settings.called("journal"), settings.journal),
         )
     listener = _open_listener(settings, access)
     if not has_page():
-        log.warning("the page was not built, / says so: %s", HOW_TO_BUILD)
+        log.warning("the page is not built, so / shows only a notice: %s", HOW_TO_BUILD)
     settings = replace(settings, max_clients=allow_connections(settings.max_clients))
     # Before a process is started that would inherit its variables.
     supervisor = Supervisor(os.environ)
@@ -354,7 +354,7 @@ class Feeder:
         # At Ctrl-C a terminal signals both processes: by now, the loop knows of our signal.
         if not self._is_stopping():
             log.error(
-                "the %s has ended with code %d; the twin goes on without it", self._what, code
+                "the %s ended with exit code %d; the twin continues without it", self._what, code
             )
 
 
@@ -374,7 +374,7 @@ def run_fleet(settings: Settings, secrets: Secrets, ros_args: Sequence[str]) -> 
     # Errors are reported once, here.
     logging.getLogger("psycopg").setLevel(logging.CRITICAL)
     if ros_args:
-        raise SettingError("fleet takes no arguments of ROS")
+        raise SettingError("fleet takes no ROS arguments")
     if not settings.archive_url:
         raise SettingError(f"{option('archive_url')} is missing, or {variable('archive_url')}")
     for name in _NOT_HERE:

@@ -114,10 +114,10 @@ class PastProcess:
         except OSError as error:
             ended = f"cannot be started: {error}"
         except Exception as error:  # or no query would ever be answered again
-            log.exception("the process that reads the past met an error here")
-            ended = f"met an error: {error}"
+            log.exception("the process that reads the past caused an error here")
+            ended = f"had an error: {error}"
         log.error("the process that reads the past %s", ended)
-        self.why_down = f"the process that reads the past {ended}; it is about to be started again"
+        self.why_down = f"the process that reads the past {ended}; it is being restarted"
         self._refuse_all()
         await asyncio.sleep(REST_S)
         self._life, self.why_down = None, ""

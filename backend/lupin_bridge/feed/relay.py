@@ -329,7 +329,7 @@ def _schema_text(type_name: str, prefixes: tuple[str, ...]) -> str:
 def _definition(type_name: str, needed_by: str, prefixes: tuple[str, ...]) -> str:
     parts = _NAME.fullmatch(type_name)
     if parts is None:
-        raise LookupError(f"{type_name!r} is no message type, must be package/msg/Name")
+        raise LookupError(f"{type_name!r} is not a message type, expected package/msg/Name")
     package, name = parts.groups()
     for prefix in prefixes:
         try:

@@ -133,7 +133,7 @@ class RosThread(Generic[NodeT, EventT]):
         finally:
             self._is_joining = False
         if self._thread.is_alive():
-            log.warning("the ROS thread did not end within %s s: left behind", STOP_TIMEOUT_S)
+            log.warning("the ROS thread did not end within %s s: left running", STOP_TIMEOUT_S)
         for result in self._unanswered:
             _settle(result, None, TwinUnavailableError(_NOT_RUNNING))
 

@@ -158,7 +158,7 @@ ResultT = TypeVar("ResultT")
 STUCK_AFTER_S: Final = 10.0
 
 ELSEWHERE: Final = (
-    "this bridge only reads the log; notes are written at the bridge of the process that keeps the "
+    "this bridge cannot write notes: write them at the bridge of the process that keeps the "
     "journal, `lupin-twin serve`"
 )
 
@@ -341,7 +341,7 @@ class TwinSource(ABC):
             TwinUnavailableError: there is no node.
 
         """
-        raise TwinUnavailableError(f"readings of {scan.source} at {scan.tag_id} have no way to ROS")
+        raise TwinUnavailableError(f"{scan.source}, {scan.tag_id}: no way to publish over ROS")
 
     async def rows(
         self,

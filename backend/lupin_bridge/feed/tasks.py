@@ -52,7 +52,7 @@ class Periodic:
             try:
                 await self._work()
             except Exception:
-                log.exception("%s met an error and goes on", self._what)
+                log.exception("%s had an error and continues", self._what)
             await asyncio.sleep(self._every_s)
 
 

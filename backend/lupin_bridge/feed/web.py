@@ -118,7 +118,7 @@ class FollowedLog:
             return error
         if error.damage:
             await self._on_worker(lambda: _delete(path))
-        why = f"{path}, the copy of the twin's journal, cannot be read; it is made anew"
+        why = f"{path}, the copy of the twin's journal, cannot be read; it is copied again"
         return NotRemembered(f"{why} as soon as the twin answers")
 
     async def wait(self) -> None:
@@ -195,7 +195,7 @@ class FollowedLog:
             if isinstance(error, Foreign) or is_damage_error(error) or here.is_dir():
                 self._followed = None
                 await self._on_worker(lambda: _delete(here))
-                log.warning("%s cannot be used (%s): the log is copied anew", here, error)
+                log.warning("%s cannot be used (%s): the log is copied again", here, error)
             raise
         return POLL_S if lot.is_all else 0.0
 

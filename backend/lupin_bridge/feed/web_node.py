@@ -180,7 +180,7 @@ class WebNode(AdjustableNode):
         if self.clients_of_twin[service].service_is_ready():
             return ""
         if self.count_publishers(self._topics["state_topic"]):
-            guess = "its state is received, so try again; or does it have another name there?"
+            guess = "the twin's state is received, so try again; is the service renamed there?"
         else:
             guess = "is it running?"
         return f"no twin offers {self.clients_of_twin[service].service_name}: {guess}"

@@ -208,24 +208,24 @@ class Fleet:
         yield "lupin_fleet_sites", "sites in the archive", len(watching.sites)
         live = sum(site.is_live for site in watching.sites.values())
         is_reachable = watching.archive.is_reachable
-        yield "lupin_fleet_sites_live", "sites that are live", live if is_reachable else 0
+        yield "lupin_fleet_sites_live", "live sites", live if is_reachable else 0
         yield "lupin_fleet_archive_reachable", "1 while the archive answers", is_reachable
         yield "lupin_fleet_looks", "queries of the archive for changes", watching.looks
         starts = watching.process.starts
-        yield "lupin_fleet_watcher_starts", "starts of the process that makes these queries", starts
+        yield "lupin_fleet_watcher_starts", "starts of the process that queries the archive", starts
         starts = self.past.starts
         yield "lupin_fleet_reader_starts", "starts of the process that reads sites", starts
         yield "lupin_fleet_sites_open", "sites whose page is open here", len(self.pages)
         yield "lupin_clients", "WebSocket clients that follow the overview", len(self.hub)
         dismissed = self.hub.clients_dismissed
-        yield "lupin_clients_dismissed", "of them, those that took no frame", dismissed
+        yield "lupin_clients_dismissed", "clients disconnected: they accepted no frame", dismissed
 
 
 @dataclass(frozen=True, slots=True)
 class OfSitesExport(OfExport):
     """The parameters of an export of many sites."""
 
-    sites: str | None = parameter("names of sites, with a comma between; default: all")
+    sites: str | None = parameter("names of sites, separated by commas; default: all")
 
 
 async def respond_sites(fleet: Fleet, kind: Format, request: Request) -> Response:

@@ -60,7 +60,7 @@ WHERE place IS NOT NULL AND hour >= %(origin)s AND hour < %(last)s GROUP BY site
 class OfSites:
     """The parameters of `/api/alarms`."""
 
-    sites: str | None = parameter("names with commas between them; default: all")
+    sites: str | None = parameter("names of sites, separated by commas; default: all")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,9 +68,9 @@ class OfCompare(OfPeriod):
     """The parameters of `/api/compare`."""
 
     sensor_type: Name = needed("name of a sensor, as in a reading")
-    sites: str | None = parameter(f"names with commas between them, {MAX_SITES} at most")
+    sites: str | None = parameter(f"names of sites, separated by commas, at most {MAX_SITES}")
     points: Annotated[int, Interval(ge=1, le=MAX_POINTS)] = parameter(
-        "at most so many buckets, each of whole hours", _POINTS
+        "maximum number of buckets, each of whole hours", _POINTS
     )
 
 
@@ -145,7 +145,7 @@ def compare(
     start_ns, end_ns = given.span(now_ns)
     if given.sensor_type in DERIVED or given.sensor_type in DAILY:
         raise PastRefused(
-            f"sensor_type is {given.sensor_type!r}, which is derived: measured ones are compared"
+            f"sensor_type is {given.sensor_type!r}, which is derived: expected a measured one"
         )
     names = chosen(given.sites, known)
     if len(names) > MAX_SITES:
@@ -237,7 +237,7 @@ ORDER BY made_at_ns DESC, site, id
 class OfSitesReport(OfReport):
     """The parameters of `/api/report` of the fleet."""
 
-    sites: str | None = parameter("names with commas between them; default: all")
+    sites: str | None = parameter("names of sites, separated by commas; default: all")
 
 
 @dataclass(frozen=True, slots=True)

@@ -124,7 +124,7 @@ class Watching:
 # --- the source of one site's page ----------------------------------------------------------------
 
 HEARTBEAT_S: Final = 1.0
-_NO_REPORT: Final = "how right estimates were is known to the twin of the greenhouse, not here"
+_NO_REPORT: Final = "only the greenhouse's own twin knows how right estimates were"
 
 
 class SiteTwin(TwinSource):
@@ -222,7 +222,7 @@ class SiteTwin(TwinSource):
                 why = str(error) if is_known else f"the archive cannot be read: {error}"
                 before, self._problem = self._problem, _sentence(why)
                 if self._problem != before:
-                    log.warning("site %s is as it was: %s", self.site, why, exc_info=not is_known)
+                    log.warning("site %s is unchanged: %s", self.site, why, exc_info=not is_known)
                 await asyncio.sleep(_RETRY_S)
                 continue
             await self._wake.wait()
@@ -335,4 +335,4 @@ def _sentence(message: str) -> str:
 
 
 def _no_ros() -> Any:
-    raise TwinUnavailableError("the archive has no topics of ROS")
+    raise TwinUnavailableError("the archive has no ROS topics")

@@ -115,7 +115,7 @@ def _sensors(settings: Settings) -> Sensors:
 def _clock(settings: Settings) -> ClockDay:
     hours = _HOURS.fullmatch(settings.day_hours)
     if hours is None:
-        raise settings.wrong("day_hours", f"is {settings.day_hours!r}, not such as 06:00-20:00")
+        raise settings.wrong("day_hours", f"is {settings.day_hours!r}, expected HH:MM-HH:MM")
     begins, ends = (time.fromisoformat(hour) for hour in hours.groups())
     # None: this machine's zone, daylight saving time included.
     zone = zone_of(settings.time_zone) if settings.time_zone else None

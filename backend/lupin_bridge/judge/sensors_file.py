@@ -83,7 +83,7 @@ class _Sensor(_DayAndNight):
     @model_validator(mode="after")
     def _names_each_species_once(self) -> Self:
         if len({kind.lower() for kind in self.species}) < len(self.species):
-            raise ValueError("a species is given more than once: case does not count")
+            raise ValueError("a species is given more than once: case is ignored")
         return self
 
     def named(self, name: str) -> Sensor:

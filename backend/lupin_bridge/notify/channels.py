@@ -89,7 +89,7 @@ class DailyReport(Periodic):
         if now_ns is None or not journal.journal_id:
             return ""
         if unix_s(now_ns) is None:
-            return "the time is simulated, and has no hours of the day"
+            return "the time is simulated, and has no time of day"
         file = self._file(journal.journal_id)
         newest_ns = target.ended_ns(now_ns)
         last_ns = _read(file)
@@ -114,7 +114,7 @@ class DailyReport(Periodic):
             if now_ns < due_ns + LATE_NS:
                 raise
             # It would be refused for ever, and hold up the days after it.
-            log.error("the report up to %s is left out: %s", compact(due_ns), error)  # noqa: TRY400
+            log.error("the report up to %s is skipped: %s", compact(due_ns), error)  # noqa: TRY400
         self._sent = file, due_ns
         _write(file, due_ns)
         return ""
@@ -137,7 +137,7 @@ def _read(file: Path) -> int | None:
     except FileNotFoundError:
         return None
     except ValueError:
-        log.error("%s is damaged: the next report is that of tomorrow", file)  # noqa: TRY400  # one line
+        log.error("%s is damaged: the next report is tomorrow's", file)  # noqa: TRY400  # one line
         return None
 
 
@@ -215,7 +215,7 @@ class Channels:
             try:
                 channel.on_alarms(change)
             except Exception:  # whatever it is: the page and the other channels get them
-                log.exception("%s met an error in alarms that have changed", channel.name)
+                log.exception("%s had an error with changed alarms", channel.name)
 
     async def stop(self) -> None:
         """Stop all of them concurrently."""

@@ -145,7 +145,7 @@ def _mqtt(settings: Settings, password: str | None) -> MqttTarget | None:
     tls = _tls(settings, "mqtt_ca", is_wanted=url.scheme == "mqtts", url="mqtt_url")
     if password is not None and tls is None:
         log.warning(
-            "%s is without TLS: whoever sees the packets can read the password, use mqtts://",
+            "%s is without TLS: anyone who sees the packets can read the password, use mqtts://",
             settings.called("mqtt_url"),
         )
     return MqttTarget(
@@ -206,16 +206,16 @@ def _address(settings: Settings, name: str, ports: dict[str, int]) -> tuple[Spli
     schemes = one_of([f"{scheme}://" for scheme in ports])
     if len(text) > MAX_URL or not _ADDRESS.fullmatch(text):
         raise SettingError(
-            f"{called} is longer than {MAX_URL} characters, or has one that no address may: write "
-            "it in ASCII, without spaces"
+            f"{called} is longer than {MAX_URL} characters, or has one that is invalid in an "
+            "address: write it in ASCII, without spaces"
         )
     try:
         url = urlsplit(text)
         port, host = url.port, url.hostname
     except ValueError as error:
-        raise SettingError(f"{called} is no address: {error}") from None
+        raise SettingError(f"{called} is not an address: {error}") from None
     if url.scheme not in ports:
-        raise SettingError(f"{called} has to begin with {schemes}")
+        raise SettingError(f"{called} must begin with {schemes}")
     if "@" in url.netloc:
         raise SettingError(
             f"{called} has a user or a password in it: others can read a command line, they have "

@@ -297,7 +297,7 @@ class Mqtt:
             except MqttError as error:
                 self._failed(str(error))
             except Exception as error:
-                log.exception("MQTT met an error and goes on")
+                log.exception("MQTT had an error and continues")
                 self._failed(type(error).__name__)
             self._is_connecting = False
             if self._is_stopping:
@@ -385,7 +385,7 @@ class Mqtt:
             async with asyncio.timeout(LAST_MESSAGE_S):
                 await client.publish(self._topics.status, OFFLINE, qos=AT_LEAST_ONCE, retain=True)
         except (MqttError, TimeoutError):
-            log.info("MQTT: %s did not take the shutdown, its will applies", self._target.called)
+            log.info("MQTT: %s did not accept the shutdown: last will", self._target.called)
 
     def _client(self) -> Client:
         target = self._target

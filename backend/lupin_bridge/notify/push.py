@@ -165,7 +165,7 @@ class Push:
                 self._is_news.set()
                 await asyncio.sleep(backoff.wait_s())
             except Exception:  # nobody waits for this task
-                log.exception("push met an error and goes on")
+                log.exception("push had an error and continues")
 
     async def _notify(self, alarms: Sequence[Alarm], source: Source) -> None:
         for device in await self._devices():
@@ -189,7 +189,7 @@ class Push:
         except (AccountError, AdmissionError) as error:
             self._failed(str(error))
         except Exception:  # nobody waits for this task
-            log.exception("push met an error and goes on")
+            log.exception("push had an error and continues")
         finally:
             self._owed.pop(device.endpoint, None)
             del self._sending[device.endpoint]
@@ -233,7 +233,7 @@ class Push:
 
     def _failed(self, why: str) -> None:
         self.condition.failing(why)
-        log.warning("a push notification was not taken: %s", self.condition.detail)
+        log.warning("a push notification was not accepted: %s", self.condition.detail)
 
     async def _headers(self, endpoint: Endpoint) -> dict[str, str]:
         claims = {
@@ -264,7 +264,7 @@ class Push:
         for address in addresses:
             is_public = ip_address(address.partition("%")[0]).is_global
             if not is_public and endpoint.host not in self.target.private_hosts:
-                raise DeviceRefused(f"{address} is no public address, see --push-private-host")
+                raise DeviceRefused(f"{address} is not a public address, see --push-private-host")
         return replace(endpoint, address=addresses[0])
 
 

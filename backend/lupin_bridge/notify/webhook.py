@@ -213,7 +213,7 @@ class Webhook:
             try:
                 is_taken = await self._send(delivery, lost)
             except Exception as error:
-                log.exception("the webhook met an error and goes on")
+                log.exception("the webhook had an error and continues")
                 self.condition.failing(f"{type(error).__name__} ({self._target.called})")
                 self.condition.dropped += 1
                 is_taken = False
@@ -284,7 +284,7 @@ async def post(target: Endpoint, headers: Mapping[str, str], body: bytes) -> Non
     except OSError as error:
         raise PostError(_words_of(error)) from None
     except UnicodeError:  # of a label that is empty or too long
-        raise PostError("its host is no name that can be looked up") from None
+        raise PostError("its host name cannot be looked up") from None
     try:
         async with asyncio.timeout(ANSWER_S):
             all_headers = {"Content-Type": "application/json", **headers}
@@ -294,7 +294,7 @@ async def post(target: Endpoint, headers: Mapping[str, str], body: bytes) -> Non
     except OSError as error:
         raise PostError(_words_of(error)) from None
     except h11.RemoteProtocolError as error:
-        raise PostError(f"no answer of HTTP: {error}") from None
+        raise PostError(f"no HTTP answer: {error}") from None
     finally:
         # At once: the rest of the answer is not wanted.
         writer.transport.abort()
@@ -383,14 +383,14 @@ async def until_taken(
             if attempts >= max_attempts or refusals >= MAX_REFUSALS:
                 condition.dropped += 1
                 why = condition.detail
-                log.error("%s was not taken and is given up: %s", what, why)  # noqa: TRY400
+                log.error("%s was not accepted and is given up: %s", what, why)  # noqa: TRY400
                 return False
             if condition.detail != before:
-                log.warning("%s was not taken, and will be retried: %s", what, condition.detail)
+                log.warning("%s was not accepted, and will be retried: %s", what, condition.detail)
             await asyncio.sleep(max(backoff.wait_s(), min(error.retry_after_s, backoff.most_s)))
         else:
             if condition.detail:
-                log.info("%s was taken after all", what)
+                log.info("%s was accepted in the end", what)
             backoff.succeeded()
             condition.taken()
             return True

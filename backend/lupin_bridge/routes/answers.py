@@ -60,13 +60,13 @@ def taking(body: type[BaseModel]) -> dict[str, Any]:
 
 # The responses that `add_refusals` makes of refusals, for the OpenAPI document.
 NOT_REMEMBERED: Final[Documented] = {
-    304: {"description": "the ETag still holds"},
+    304: {"description": "not modified: the ETag is still current"},
     **refusing(
         {
             400: "refused; detail has the reason",
             429: "too many requests from this client",
-            503: "it cannot be read now, or too much is",
-            504: "it took too long",
+            503: "not readable at the moment, or the server is overloaded",
+            504: "the answer took too long",
         }
     ),
 }
@@ -129,13 +129,13 @@ async def read_body(request: Request, model: type[ModelT]) -> ModelT:
         async with asyncio.timeout(BODY_S):
             body = await request.body()
     except TimeoutError:
-        raise Refused(f"the body was not there within {BODY_S:g} s", 408) from None
+        raise Refused(f"the body did not arrive within {BODY_S:g} s", 408) from None
     except ClientDisconnect:
-        raise Refused("the client left before its body was there", CLIENT_DISCONNECTED) from None
+        raise Refused("the client left before its body arrived", CLIENT_DISCONNECTED) from None
     try:
         return model.model_validate(orjson.loads(body))
     except orjson.JSONDecodeError as error:
-        raise Refused(f"the body is no JSON: {error}") from None
+        raise Refused(f"the body is not JSON: {error}") from None
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False, include_context=False)[0]
         name, why = ".".join(map(str, first["loc"])) or "the body", first["msg"]
@@ -288,7 +288,7 @@ async def within_time(limits: Limits, work: Awaitable[ResultT]) -> ResultT:
         async with asyncio.timeout(limit_s):
             return await work
     except TimeoutError:
-        raise TwinTimeoutError(f"the answer was not there within {limit_s:g} s") from None
+        raise TwinTimeoutError(f"the answer was not ready within {limit_s:g} s") from None
 
 
 async def while_client_waits(

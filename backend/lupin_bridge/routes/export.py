@@ -75,9 +75,9 @@ def _content(media_type: str) -> dict[str, Any]:
     openapi_extra={"parameters": parameters_of(OfExport)},
 )
 async def csv_route(request: Request) -> Response:
-    """A row for each reading, and one without a sensor for each attempt that brought no reading.
+    """One row for each reading, and one without a sensor for each attempt that got no reading.
 
-    The answer is streamed: without HTTP's last chunk, it is incomplete.
+    The answer is streamed: without the final HTTP chunk, it is incomplete.
     """
     return await _of_site(request, Csv)
 
@@ -85,7 +85,7 @@ async def csv_route(request: Request) -> Response:
 @read_route(
     router,
     "/api/export.parquet",
-    summary="The same as Parquet, with units and coordinates",
+    summary="The same rows as Parquet, with units and coordinates",
     responses={
         200: _content(Parquet.media_type),
         **_ANSWERS,
@@ -94,7 +94,7 @@ async def csv_route(request: Request) -> Response:
     openapi_extra={"parameters": parameters_of(OfExport)},
 )
 async def parquet_route(request: Request) -> Response:
-    """The columns of the CSV; `time` is a timestamp. Fields and file have attributes."""
+    """The columns of the CSV; `time` is a timestamp. Columns and file carry metadata."""
     return await _of_site(request, Parquet)
 
 
@@ -145,7 +145,7 @@ async def respond_export(
     client, connection = client_of(request), request.scope["state"][CONNECTION_KEY]
 
     def evict() -> None:
-        log.warning("the export of %s is slow and makes place for another one", client)
+        log.warning("the export of %s is slow and is ended for another one", client)
         connection.break_off()
 
     facts = {"title": "lupin-twin: readings and failed attempts", **_facts(known, given, now_ns)}
@@ -221,7 +221,7 @@ class ExportResponse(StreamingResponse):
             await while_client_waits(request, self.stream_response(send))
         except Exception as error:
             is_known = isinstance(error, (NotRemembered, PastRefused, TwinUnavailableError))
-            log.warning("an export ended before its end: %s", error, exc_info=not is_known)
+            log.warning("an export ended early: %s", error, exc_info=not is_known)
             connection: HttpConnection = scope["state"][CONNECTION_KEY]
             connection.break_off()
             await client_left(request)  # or the server would log an answer without an end

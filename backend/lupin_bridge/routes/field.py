@@ -65,11 +65,11 @@ class InFormats:
     def refusals(self) -> dict[int | str, dict[str, Any]]:
         """The responses other than 200, for the OpenAPI document."""
         return {
-            304: {"description": "the ETag still holds"},
+            304: {"description": "not modified: the ETag is still current"},
             400: {"model": self.model, "description": "refused; error_message has the reason"},
             429: {"model": self.model, "description": "too many requests from this client"},
             **refusing(
-                {503: "the twin is not there, or busy", 504: "the twin did not answer in time"}
+                {503: "the twin is missing or busy", 504: "the twin did not answer in time"}
             ),
         }
 
@@ -94,7 +94,7 @@ class InFormats:
         @read_route(
             router,
             f"/api/{self.name}",
-            summary=f"{self.summary}, in the format of the header Accept",
+            summary=f"{self.summary}, in the format that the Accept header names",
             description=self.description,
             responses={
                 200: {
@@ -102,7 +102,7 @@ class InFormats:
                     "content": {each.media_type: binary for each in FORMATS if each is not JSON},
                 },
                 **self.refusals(),
-                **refusing({406: "no format that Accept allows"}),
+                **refusing({406: "the Accept header allows no available format"}),
             },
             name=self.name,
             **documented,
@@ -140,10 +140,9 @@ class InFormats:
 FIELDS: Final = InFormats(
     name="field",
     summary="The field of one sensor",
-    description="""Inverse-distance-weighted from the pinned tags; not known where no tag is near.
+    description="""Inverse-distance-weighted from the pinned tags; unknown where no tag is near.
 
-As of a moment that has passed: of the tags as they were then, by the rules and on the map of
-now.""",
+With `at`, it uses the tags as they were at that moment, with the current parameters and map.""",
     parameters=parameters_of(FieldQuery),
     model=schema.GetFieldResponse,
 )
@@ -170,12 +169,12 @@ FIELDS.register(router, _answer)
 @read_route(
     router,
     "/api/field/quality",
-    summary="How far off the field is, and how much of it is known",
+    summary="The error of the field, and the share of it that is known",
     responses={200: {"model": schema.FieldQuality}, **FIELDS.refusals()},
     openapi_extra={"parameters": [p for p in FIELDS.parameters if p["name"] != "scale"]},
 )
 async def field_quality(request: Request) -> Response:
-    """The leave-one-out error of the current readings, and the share of cells painted."""
+    """The leave-one-out error of the current readings, and the share of known cells."""
     return await FIELDS.or_refusal(_answer(request, None))
 
 
@@ -184,10 +183,10 @@ async def field_quality(request: Request) -> Response:
 ESTIMATE: Final = InFormats(
     name="estimate",
     summary="The estimate of one sensor",
-    description="""From all readings of a day, in space and time, with its error.
+    description="""From all readings of one day, in space and time, with its error.
 
-Made of what the log has up to a moment, the model too. That of now is made for the newest reading
-or the last whole minute of the day, whichever is later: until then its ETag holds.""",
+It uses the journal up to a moment, for the model too. Without `at`, that moment is the newest
+reading or the last whole minute, whichever is later; the ETag changes with it.""",
     parameters=parameters_of(EstimateQuery),
     model=pollers.GetEstimateResponse,
 )
@@ -222,7 +221,7 @@ ESTIMATE.register(router, _estimate)
 class QualityQuery:
     """The parameters of `/api/estimate/quality`."""
 
-    sensor_type: Name | None = parameter("of this sensor alone; default: of every one")
+    sensor_type: Name | None = parameter("this sensor only; default: all")
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,13 +236,13 @@ class AdviceQuery(TagsQuery):
     """The parameters of `/api/estimate/advice`."""
 
     places: Annotated[int, Interval(ge=1, le=MAX_PLACES)] = parameter(
-        "at most so many places", DEFAULT_PLACES
+        "maximum number of places", DEFAULT_PLACES
     )
 
 
 QueryT = TypeVar("QueryT", QualityQuery, TagsQuery, AdviceQuery)
 
-_REPORTED: Final = {**NOT_REMEMBERED, **refusing({404: "only the site's own twin counts it"})}
+_REPORTED: Final = {**NOT_REMEMBERED, **refusing({404: "only the site's own twin has it"})}
 
 # Rough time to write a tag, s.
 _WRITE_TAG_S: Final = 10e-6
@@ -257,10 +256,10 @@ _WRITE_TAG_S: Final = 10e-6
     openapi_extra={"parameters": parameters_of(QualityQuery)},
 )
 async def quality(request: Request) -> Response:
-    """Each new scan is compared with the prediction from all tags but its own and those beside it.
+    """Each new scan is compared with a prediction that leaves out its own tag and those beside it.
 
-    So it shows how right the estimate is between tags: 9 of 10 scans should lie in the predicted
-    interval. Counts are by the hour, over the last day and week, since the twin was started.
+    This shows how accurate the estimate is between tags: 9 of 10 scans should lie in the predicted
+    interval. Counts are hourly, over the last day and week, since the twin started.
     """
 
     async def body(bridge: Bridge, query: QualityQuery) -> bytes:
@@ -274,12 +273,12 @@ async def quality(request: Request) -> Response:
 @read_route(
     router,
     "/api/estimate/tags",
-    summary="What was expected of each tag's newest reading, and which tags have changed",
+    summary="The expected value of each tag's newest reading, and which tags have changed",
     responses={**_REPORTED, 200: {"model": pollers.ExpectedTags}},
     openapi_extra={"parameters": parameters_of(TagsQuery)},
 )
 async def tags(request: Request) -> Response:
-    """Predicted from all other tags, and from the tag's own readings except its last ones."""
+    """Predicted from all other tags, and from the tag's own readings except the latest ones."""
 
     async def body(bridge: Bridge, query: TagsQuery) -> bytes:
         sensor = query.sensor_type
@@ -293,12 +292,12 @@ async def tags(request: Request) -> Response:
 @read_route(
     router,
     "/api/estimate/advice",
-    summary="Where another tag helps the estimate most",
+    summary="Where an additional tag would help the estimate most",
     responses={**_REPORTED, 200: {"model": pollers.Advice}},
     openapi_extra={"parameters": parameters_of(AdviceQuery)},
 )
 async def advice(request: Request) -> Response:
-    """Places on the free floor of the map or, without a map, around the tags; the best first."""
+    """Places on the map's free floor or, without a map, around the tags; the best first."""
 
     async def body(bridge: Bridge, query: AdviceQuery) -> bytes:
         wanted = ReportRequest(query.sensor_type, query.places)

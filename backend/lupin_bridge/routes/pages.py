@@ -264,7 +264,7 @@ async def sign_in(request: Request) -> Response:
         )
         ends_others = given.ends_others
     if person is None:
-        return error_response("there is no such account, or the password is another", 401)
+        return error_response("there is no such account, or the password is wrong", 401)
     begun = await while_client_waits(
         request, people.sign_in(person, address, ends_others=ends_others)
     )
@@ -292,11 +292,11 @@ async def sign_out(request: Request) -> Response:
 @read_route(
     router,
     "/api/session",
-    summary="Who makes the request, and is this a session that can be signed out of?",
+    summary="Who makes the request, and can the session be signed out of?",
     responses={200: {"model": routes_schema.Session}},
 )
 async def session_route(request: Request) -> Response:
-    """Who makes the request, and how much longer its session lasts, if it has one."""
+    """Who makes the request, and how long its session still lasts, if there is one."""
     person = person_of(request) or SHARED
     # A fleet has no log of its own.
     source: TwinSource | None = getattr(request.app.state.bridge, "source", None)

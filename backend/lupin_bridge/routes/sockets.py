@@ -380,8 +380,8 @@ class _RosbridgeConversation(_Conversation):
         except (AdmissionError, TwinUnavailableError) as error:
             response = service_failure(call.id, call.service, str(error))
         except Exception:  # nobody awaits this task: the client gets the error, as over HTTP
-            log.exception("a call of %s met an error", call.service)
-            text = "the bridge met an error of its own, see its log"
+            log.exception("a call of %s failed", call.service)
+            text = "the bridge had an internal error, see its log"
             response = service_failure(call.id, call.service, text)
         return text_frame(response)
 

@@ -64,8 +64,8 @@ MAX_REASON_BYTES: Final = 123
 class ListenQuery:
     """How a client wants its frames."""
 
-    delta: bool = parameter("1: only what has changed, to who has the frame before", False)
-    max_rate_hz: Annotated[float, Ge(0.01)] = parameter("frames a second at most", math.inf)
+    delta: bool = parameter("1: only what has changed since the client's previous frame", False)
+    max_rate_hz: Annotated[float, Ge(0.01)] = parameter("maximum rate of frames, Hz", math.inf)
 
     @property
     def min_interval_s(self) -> float:
@@ -103,7 +103,7 @@ async def ws_state(websocket: WebSocket) -> None:
     openapi_extra={"parameters": parameters_of(query_string.OfMoment)},
 )
 async def state(request: Request) -> Response:
-    """The newest TwinState, with the message's own field names, and ages as of this answer.
+    """The newest TwinState, with the message's own field names, and ages at the time of the answer.
 
     With `at`, `header.stamp` is that moment, and ages are as of then.
     """
@@ -131,11 +131,11 @@ async def state(request: Request) -> Response:
 @read_route(
     router,
     "/api/tags/{tag_id:path}/history",
-    summary="The last scans and attempts of one tag",
+    summary="The latest scans and attempts of one tag",
     responses={200: {"model": schema.TagHistory}, **NOT_REMEMBERED, **_NO_TAG},
 )
 async def history(request: Request, tag_id: str) -> Response:
-    """The tag's last scans that brought readings, sensor by sensor, and its last attempts."""
+    """The tag's latest scans with readings, sensor by sensor, and its latest attempts."""
     bridge = bridge_of(request)
     newest = None if bridge.latest is None else tag_of(bridge.latest.snapshot, tag_id)
     query = LatestOfTag(tag_id, newest, bridge.source.buffer_len)
@@ -150,7 +150,7 @@ async def history(request: Request, tag_id: str) -> Response:
     openapi_extra={"parameters": parameters_of(query_string.OfMoment)},
 )
 async def tag(request: Request, tag_id: str) -> Response:
-    """Everything that the twin knows about one tag, or knew at a moment."""
+    """Everything that the twin knows about one tag or, with `at`, knew at that moment."""
     bridge = bridge_of(request)
     at_ns = query_string.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
@@ -180,7 +180,7 @@ async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
     openapi_extra={"parameters": parameters_of(query_string.OfHistory)},
 )
 async def history_route(request: Request) -> Response:
-    """Readings, or equal buckets if there are more than `points`; `gaps`: where nothing came."""
+    """Readings, or equal buckets if there are more than `points`; `gaps`: without readings."""
     bridge = bridge_of(request)
     now_ns = bridge.ros_time_ns
     given = read(query_string.OfHistory, request.query_params.multi_items())
@@ -193,12 +193,12 @@ async def history_route(request: Request) -> Response:
 @read_route(
     router,
     "/api/timeline",
-    summary="What happened when: scans, failures, inspections, pests, silences, runs of the clock",
+    summary="Events over time: scans, failures, inspections, pests, silences, runs of the clock",
     responses={200: {"model": routes_schema.Timeline}, **NOT_REMEMBERED},
     openapi_extra={"parameters": parameters_of(query_string.OfTimeline)},
 )
 async def timeline_route(request: Request) -> Response:
-    """Events counted in buckets of equal length, and how far back the log reaches."""
+    """Events counted in buckets of equal length, and how far back the journal reaches."""
     bridge = bridge_of(request)
     given = read(query_string.OfTimeline, request.query_params.multi_items())
     start_ns, end_ns = given.span(bridge.ros_time_ns)
@@ -210,12 +210,12 @@ async def timeline_route(request: Request) -> Response:
 @read_route(
     router,
     "/api/report",
-    summary="What happened between two moments: alarms, notes, silences, extremes, scans",
+    summary="Report of a period: alarms, notes, silences, extremes, scans",
     responses={200: {"model": routes_schema.ShiftReport}, **NOT_REMEMBERED},
     openapi_extra={"parameters": parameters_of(query_string.OfReport)},
 )
 async def report_route(request: Request) -> Response:
-    """At most 31 days and 100,000 scans and inspections; 500 entries of each list."""
+    """At most 31 days, 100,000 scans and inspections, and 500 entries in each list."""
     given = read(query_string.OfReport, request.query_params.multi_items())
     return await respond_past(request, _report(request, given), "report")
 
@@ -223,12 +223,12 @@ async def report_route(request: Request) -> Response:
 @read_route(
     router,
     "/api/report.html",
-    summary="The same as a page for paper, A4",
+    summary="The same report as an A4 page for printing",
     responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}}, **NOT_REMEMBERED},
     openapi_extra={"parameters": parameters_of(query_string.OfReportPage)},
 )
 async def report_page_route(request: Request) -> Response:
-    """The page has no scripts. A browser gets a refusal as a page too."""
+    """The page has no scripts. A browser gets refusals as a page too."""
     try:
         return await _report_page(request)
     except REFUSALS as error:

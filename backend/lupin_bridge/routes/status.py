@@ -94,12 +94,12 @@ router = APIRouter()
 _DRAW_CELL_S: Final = 50e-9
 
 _NO_MAP = {
-    304: {"description": "the ETag still holds"},
+    304: {"description": "not modified: the ETag is still current"},
     **refusing(
         {
-            404: "no map has come yet",
+            404: "no map has been received yet",
             429: "too many requests from this client",
-            503: "the twin is not there, or busy",
+            503: "the twin is missing or busy",
         }
     ),
 }
@@ -108,7 +108,7 @@ _NO_MAP = {
 @read_route(
     router,
     "/api/map",
-    summary="Frame, place and size of the occupancy grid",
+    summary="Frame, origin and size of the occupancy grid",
     responses={200: {"model": schema.OccupancyGrid}, **_NO_MAP},
 )
 async def occupancy_map(request: Request) -> Response:
@@ -134,7 +134,7 @@ async def _map(request: Request, kind: str) -> Response:
     bridge = bridge_of(request)
     occupancy = bridge.source.occupancy_map()
     if occupancy is None:
-        return error_response("no map has come yet on the twin's map_topic", 404)
+        return error_response("no map has been received yet on the twin's map_topic", 404)
     # A replica that started later has the same map with a later stamp, which is in the JSON.
     which = occupancy.stamp_ns if kind == "json" else kind
     etag = f'"{bridge.source.identity}-{occupancy.revision}-{which}"'
@@ -157,11 +157,11 @@ async def _map(request: Request, kind: str) -> Response:
 @read_route(
     router,
     "/api/robot",
-    summary="Where the robot is and has been, its plan, its battery",
+    summary="The robot's position, trail, planned path and battery",
     responses={200: {"model": routes_schema.Robot}},
 )
 async def robot(request: Request) -> Response:
-    """From the robot's own topics. Only current data: the journal does not have it."""
+    """From the robot's own topics. Only current data: the journal does not record it."""
     known = bridge_of(request).robot.log
 
     async def compute() -> Answer:
@@ -178,19 +178,19 @@ _WRITE_ALARM_S: Final = 10e-6
 @read_route(
     router,
     "/api/health",
-    summary="The status of the greenhouse and of each tag, and why",
+    summary="The status of the greenhouse and of each tag, with reasons",
     responses={
         **NOT_REMEMBERED,
         200: {"model": schema.Judgement},
-        **refusing({503: "no twin was found yet, or it is busy"}),
+        **refusing({503: "no twin has been found yet, or it is busy"}),
     },
     openapi_extra={"parameters": parameters_of(query_string.OfMoment)},
 )
 async def health(request: Request) -> Response:
     """The verdicts, as in the frames of `/ws/state`, with the reasons for each.
 
-    With `at`, what was known then is judged by the current ranges, and by the scans of each tag up
-    to then. A reason's `since` is the last observation that shows it, not the first.
+    With `at`, the state of that moment is judged with the current ranges, and with each tag's scans
+    up to it. A reason's `since` is then the last observation that shows it, not the first.
     """
     bridge = bridge_of(request)
     at_ns = query_string.at(request.query_params.multi_items(), bridge.ros_time_ns)
@@ -209,11 +209,11 @@ async def health(request: Request) -> Response:
 @read_route(
     router,
     "/api/sensors",
-    summary="The file of sensors that is in force: labels, units, colours, ranges",
+    summary="The sensors file in use: labels, units, colours, ranges",
     responses={200: {"content": {"application/json": {"schema": {"type": "object"}}}}},
 )
 async def sensors(request: Request) -> Response:
-    """`sensors.json`, or the file that the operator gave instead, unchanged."""
+    """The built-in `sensors.json`, or the file of the setting `sensors`, unchanged."""
     answer = content_answer(bridge_of(request).criteria.sensors.text.encode())
     if has_etag(request, etag := answer.headers["ETag"]):
         return not_modified(etag)
@@ -223,14 +223,14 @@ async def sensors(request: Request) -> Response:
 @read_route(
     router,
     "/api/alarms",
-    summary="What was wrong, where, from when to when, and how bad at worst",
+    summary="Alarms: what was wrong, where, from when to when, and the worst value",
     responses={200: {"model": schema.Alarms}, **NOT_REMEMBERED},
     openapi_extra={"parameters": parameters_of(query_string.OfAlarms)},
 )
 async def alarms_route(request: Request) -> Response:
-    """Alarms that were active at any time of the period, the newest first and 2,000 at most.
+    """Alarms that were active at any time in the period, newest first, at most 2,000.
 
-    They are derived from the observations and the current ranges, the same in every replica.
+    They are derived from the observations and the current ranges, so every replica has the same.
     """
     bridge = bridge_of(request)
     given = read(query_string.OfAlarms, request.query_params.multi_items())
@@ -270,12 +270,12 @@ def _is_in(alarm: Alarm, start_ns: int, end_ns: int, active: str | None) -> bool
         200: {"model": schema.Health},
         503: {
             "model": schema.Health,
-            "description": "the ROS thread has ended, or is stuck: restart",
+            "description": "the ROS thread has ended or is stuck: restart the bridge",
         },
     },
 )
 async def healthz(request: Request) -> Response:
-    """503 when the ROS thread has ended or hangs in a callback: a supervisor should restart it."""
+    """503 if the ROS thread has ended or hangs in a callback: a supervisor should restart it."""
     source = bridge_of(request).source
     wrong = ailment(source.thread)
     body = {
@@ -314,7 +314,7 @@ async def metrics(request: Request) -> Response:
 async def readyz(request: Request) -> Response:
     """The status as WebSocket clients receive it; 503 while the twin is offline.
 
-    A journal that cannot be written is reported, but is no reason for 503: the twin goes on.
+    A journal that cannot be written is reported, but does not cause a 503: the twin continues.
     """
     status = bridge_of(request).status
     return json_response(orjson.dumps(status.frame()), 200 if status.is_live else 503)

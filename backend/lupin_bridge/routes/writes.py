@@ -63,11 +63,11 @@ _SLACK_S: Final = 10
 _WRITE_ANSWERS: Final = refusing(
     {
         400: "refused; detail has the reason",
-        403: "it takes an account with the role operator",
+        403: "requires an account with the role operator",
         404: "there is no such alarm, tag or note",
-        405: "this bridge only reads the log",
+        405: "this bridge cannot write notes",
         429: "too many requests from this client",
-        503: "it was not written",
+        503: "the note was not written",
     }
 )
 
@@ -80,7 +80,7 @@ _WRITE_ANSWERS: Final = refusing(
     openapi_extra={"parameters": parameters_of(OfNotes)},
 )
 async def notes_route(request: Request) -> Response:
-    """The newest first and 2,000 at most, withdrawn ones too; the same in every replica."""
+    """Newest first, at most 2,000, including withdrawn ones; the same in every replica."""
     bridge = bridge_of(request)
     given = read(OfNotes, request.query_params.multi_items())
     start_ns, end_ns = given.span(bridge.ros_time_ns)
@@ -111,7 +111,7 @@ async def notes_route(request: Request) -> Response:
     openapi_extra=taking(routes_schema.NoteDraft),
 )
 async def write_note(request: Request) -> Response:
-    """It takes the role operator. Of two notes of one kind on an alarm, the later one counts."""
+    """Requires the role operator. Of two notes of one kind on an alarm, the later one counts."""
     bridge = bridge_of(request)
     person = _writer(request, bridge)
     draft = await read_body(request, routes_schema.NoteDraft)
@@ -125,11 +125,11 @@ async def write_note(request: Request) -> Response:
 
 @router.delete(
     "/api/notes/{note_id}",
-    summary="Withdraw a note: it is kept, with who withdrew it and when",
+    summary="Withdraw a note; it is kept, with who withdrew it and when",
     responses={200: {"model": routes_schema.Note}, **_WRITE_ANSWERS},
 )
 async def withdraw_note(request: Request, note_id: str) -> Response:
-    """Its author, or an admin, may withdraw it."""
+    """The author or an admin may withdraw a note."""
     bridge = bridge_of(request)
     person = _writer(request, bridge)
     notes = _known(bridge)
@@ -137,7 +137,7 @@ async def withdraw_note(request: Request, note_id: str) -> Response:
     if note is None or note.kind == WITHDRAW:
         raise Refused(f"there is no note {note_id[:64]!r}", 404)
     if note.by != person.name and not person.may("admin"):
-        raise Refused(f"the note is by {note.by}: they withdraw it, or an admin", 403)
+        raise Refused(f"the note is by {note.by}: only they or an admin may withdraw it", 403)
     gone = withdrawals(notes)
     if note.id not in gone:
         draft = Note("", _now_ns(bridge), person.name, WITHDRAW, f"{WITHDRAWN}{note.id}")
@@ -158,7 +158,7 @@ def _writer(request: Request, bridge: Bridge) -> Person:
             403,
         )
     if not person.may("operator"):
-        raise Refused(f"{person.name} is a {person.role}, notes take an operator", 403)
+        raise Refused(f"{person.name} is a {person.role}, notes require an operator", 403)
     if not bridge.source.writes_notes:
         raise Refused(ELSEWHERE, 405, {"Allow": "GET, HEAD", **NEVER_STORE})
     return person
@@ -197,7 +197,7 @@ def _checked(draft: routes_schema.NoteDraft, person: Person, bridge: Bridge) -> 
     if draft.kind != COMMENT and kind != "alarm":
         raise Refused(f"kind is {draft.kind!r}, which is for alarms: expected comment")
     if draft.kind == COMMENT and not draft.text:
-        raise Refused("text is empty, a comment has one")
+        raise Refused("text is empty, a comment must have one")
     until_ns = _until(draft, now_ns, is_critical=is_critical)
     return Note("", now_ns, person.name, draft.kind, draft.subject, draft.text, until_ns)
 
@@ -205,19 +205,19 @@ def _checked(draft: routes_schema.NoteDraft, person: Person, bridge: Bridge) -> 
 def _until(draft: routes_schema.NoteDraft, now_ns: int, *, is_critical: bool) -> int | None:
     """When shelving ends, or the moment of a comment, ns; None: it ends now, or is about now."""
     if draft.kind == SHELVE and "until" not in draft.model_fields_set:
-        raise Refused("until is missing: a moment, or null where it is not shelved any more")
+        raise Refused("until is missing, expected a moment, or null to unshelve")
     if draft.until is None:
         return None
     until_ns = moment("until", draft.until)
     left_s = (until_ns - now_ns) / NANOSECONDS_PER_SECOND
     if draft.kind == COMMENT:
         if left_s > _SLACK_S:
-            raise Refused(f"until is in {left_s:.0f} s, a comment is about a moment until now")
+            raise Refused(f"until is in {left_s:.0f} s, a comment cannot be about a later moment")
         return until_ns
     if draft.kind != SHELVE:
         raise Refused("until is for the kinds shelve and comment")
     if is_critical and not draft.text:
-        raise Refused("text is empty: to shelve a critical alarm takes a reason")
+        raise Refused("text is empty: shelving a critical alarm requires a reason")
     longest_s = CRITICAL_SHELF_S if is_critical else SHELF_S
     if not 0.0 < left_s <= longest_s + _SLACK_S:
         what = "a critical alarm" if is_critical else "an alarm"
@@ -262,11 +262,11 @@ async def _write(request: Request, bridge: Bridge, note: Note) -> Note:
     summary="Who signed in, and who changed what",
     responses={
         200: {"model": routes_schema.Audit},
-        **refusing({403: "it takes the role admin", 503: "the accounts cannot be read"}),
+        **refusing({403: "requires the role admin", 503: "the accounts cannot be read"}),
     },
 )
 async def audit_route(request: Request) -> Response:
-    """The newest first and 2,000 at most; all of it: `lupin-twin audit`."""
+    """Newest first, at most 2,000 entries; `lupin-twin audit` prints all of them."""
     access, person = request.app.state.access, person_of(request)
     if person is None or not person.may("admin") or access.people is None:
         raise Refused("the audit trail is for the role admin", 403)
@@ -282,14 +282,14 @@ MAX_AHEAD_S: Final = 10
 
 @router.post(
     OBSERVATIONS,
-    summary="Post the readings of one tag: they reach the twin over ROS, as a robot's do",
+    summary="Post the readings of one tag, which reach the twin over ROS, as a robot's do",
     status_code=202,
     responses={
         202: {"model": routes_schema.PublishedObservation, "description": "published over ROS"},
         **refusing(
             {
                 400: "refused; detail has the reason",
-                403: "it takes a token of the role writer, and a bridge with "
+                403: "requires a token with the role writer, and a bridge with "
                 "--http-observations on",
                 429: "too many requests from this client",
                 503: "the twin is silent",
@@ -299,14 +299,14 @@ MAX_AHEAD_S: Final = 10
     openapi_extra=taking(routes_schema.ObservationDraft),
 )
 async def post_observation(request: Request) -> Response:
-    """It takes a token of the role writer. The same tag at the same `observed_at` counts once.
+    """Requires a token with the role writer. The same tag at the same `observed_at` counts once.
 
-    The twin applies its own rules: it reports what it drops on `/diagnostics`.
+    The twin applies its own rules, and reports on `/diagnostics` what it drops.
     """
     bridge, person = bridge_of(request), person_of(request)
     if person is None or person.role != WRITER:
         raise Refused(
-            f"observations take a token of the role {WRITER} "
+            f"observations require a token of the role {WRITER} "
             f"(`lupin-twin token add NAME --role {WRITER}`), as Authorization: Bearer",
             403,
         )
@@ -344,7 +344,7 @@ def _stamp_ns(observed_at: str | float | None, now_ns: int) -> int:
             f"{MAX_AHEAD_S} s: is a clock wrong?"
         )
     if not stamp_ns:
-        raise Refused("observed_at is 0, which is no moment: leave it out for now")
+        raise Refused("observed_at is 0, which is not a moment: omit it for the current time")
     return min(stamp_ns, now_ns)
 
 
@@ -354,11 +354,11 @@ def _stamp_ns(observed_at: str | float | None, now_ns: int) -> int:
 @read_route(
     router,
     PUSH,
-    summary="The key that a browser subscribes to notifications with",
+    summary="The key with which a browser subscribes to notifications",
     responses={200: {"model": routes_schema.PushKey}},
 )
 async def key_route(request: Request) -> Response:
-    """There is a key for people with an account, if the bridge has `--push-contact`."""
+    """Only people with an account get a key, and only if the bridge has `--push-contact`."""
     push, person = bridge_of(request).outward.push, person_of(request)
     key = None
     if push is not None and person is not None and _has_account(request, person):
@@ -368,15 +368,15 @@ async def key_route(request: Request) -> Response:
 
 @router.post(
     PUSH,
-    summary="Have a browser notified of critical alarms, or not any more",
+    summary="Turn notifications of critical alarms on or off for a browser",
     status_code=204,
     responses={
         204: {"description": "done"},
         **refusing(
             {
                 400: "refused; detail has the reason",
-                403: "it takes an account",
-                404: "this bridge has no Web Push",
+                403: "requires an account",
+                404: "Web Push is not set up on this bridge",
                 429: "too many requests from this client",
             }
         ),
@@ -384,13 +384,13 @@ async def key_route(request: Request) -> Response:
     openapi_extra=taking(routes_schema.PushSubscription),
 )
 async def subscribe(request: Request) -> Response:
-    """An account may have ten browsers: one more replaces the oldest."""
+    """An account may have ten browsers; an eleventh replaces the oldest."""
     push, person = bridge_of(request).outward.push, person_of(request)
     access: Access = request.app.state.access
     if push is None or access.people is None:
         raise Refused("this bridge has no Web Push: start it with --push-contact", 404)
     if person is None or not _has_account(request, person):
-        raise Refused("notifications take an account: sign in by name", 403)
+        raise Refused("notifications require an account: sign in by name", 403)
     _paced(bridge_of(request).notes.pace, person.name, _TOO_MANY_NOTES)
     given = await read_body(request, routes_schema.PushSubscription)
     if given.keys is None:

@@ -278,7 +278,7 @@ class HttpConnection(H11Protocol):
 
     def _give_up(self) -> None:
         self._reader_deadline = None
-        log.warning("cut off a reader that took nothing for %g s", self.timeout_keep_alive)
+        log.warning("disconnected a reader that accepted nothing for %g s", self.timeout_keep_alive)
         self.abort()
 
 

@@ -64,7 +64,7 @@ def check_pair(cert_file: str, key_file: str) -> None:
         if error.reason == "KEY_VALUES_MISMATCH":
             raise SettingError(f"--tls-key {key_file} is not the key of {cert_file}") from None
         reason = error.reason or "not PEM"
-        raise SettingError(f"--tls-key {key_file} is no usable private key ({reason})") from None
+        raise SettingError(f"--tls-key {key_file} is not a usable private key ({reason})") from None
 
 
 class Certificates:
@@ -97,11 +97,11 @@ class Certificates:
             self._context.load_cert_chain(*self._files)
         except (SettingError, OSError) as error:  # ssl.SSLError is an OSError
             if str(error) != self._warned:
-                log.warning("the new TLS certificate is refused, the old one goes on: %s", error)
+                log.warning("the new TLS certificate is refused, the old one stays: %s", error)
             self._warned = str(error)
             return
         self._served, self._warned = version, ""
-        log.info("new connections get the TLS certificate of %s as it is now", self._files[0])
+        log.info("new connections use the renewed TLS certificate of %s", self._files[0])
 
     def _version(self) -> list[tuple[int, ...] | None]:
         return [_stamp(path) for path in self._files]

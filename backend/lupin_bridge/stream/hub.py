@@ -319,7 +319,7 @@ class Hub:
         for client in stuck:
             self.leave(client)
             client.connection.dismiss(
-                CLOSE_POLICY, f"took no frame for {self.client_timeout_s:g} s"
+                CLOSE_POLICY, f"accepted no frame for {self.client_timeout_s:g} s"
             )
         self.clients_dismissed += len(stuck)
         return len(stuck)

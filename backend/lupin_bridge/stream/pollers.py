@@ -35,20 +35,20 @@ class GetEstimateResponse(Contract):
     error_message: str
     mean: list[float | None] = Field(description="sensor's unit, row-major, row 0 at bbox_min_y")
     sd: list[float | None] = Field(
-        description="sensor's unit, as mean: 9 of 10 times the truth is within 1.645 sd"
+        description="sensor's unit, as mean; the true value is within 1.645 sd 9 times in 10"
     )
     width: int
     height: int
     origin_x: float
     origin_y: float
     resolution_used: float
-    sd_known: float = Field(description="a cell whose sd is not below this is not known")
+    sd_known: float = Field(description="a cell is known only if its sd is below this")
     sample_count: int = Field(description="tags that contribute")
     reading_count: int = Field(description="readings that contribute")
 
 
 class Graded(Contract):
-    """New scans that were predicted from other tags, and those inside the 90 % interval."""
+    """New scans predicted from other tags, and how many were inside the 90 % interval."""
 
     scans: int
     inside: int
@@ -57,21 +57,21 @@ class Graded(Contract):
 class EstimateQuality(Contract):
     """How often a sensor's estimates were right; a day lasts the twin's `day_length_s`."""
 
-    fitted_at: Time | None = Field(description="null: no model was fitted yet")
-    fit_problem: str = Field(description="why the last fit came to nothing; empty: it did not")
-    graded_since: Time | None = Field(description="the counts are since then; null: none yet")
+    fitted_at: Time | None = Field(description="null: no model has been fitted yet")
+    fit_problem: str = Field(description="why the last fit failed; empty: it did not")
+    graded_since: Time | None = Field(description="start of the counts; null: none yet")
     day: Graded
     week: Graded
-    share_day: float | None = Field(description="inside of scans; null: there are none")
+    share_day: float | None = Field(description="inside divided by scans; null: no scans")
     share_week: float | None
     is_trusted: bool | None = Field(
-        description="false: a share is under 0.8, the intervals are too narrow; null: fewer than "
-        "40 scans could be compared with other tags, so there is no claim"
+        description="false: a share is below 0.8, so the intervals are too narrow; null: fewer "
+        "than 40 scans could be compared with other tags, so nothing is claimed"
     )
 
 
 class EstimateQualities(Contract):
-    """`/api/estimate/quality`: by sensor."""
+    """`/api/estimate/quality`: the quality of each sensor's estimates."""
 
     sensors: dict[str, EstimateQuality]
 
@@ -82,11 +82,11 @@ class ExpectedReading(Contract):
     measured: float
     observed_at: Time
     expected: float
-    expected_sd: float = Field(description="a reading's noise included")
-    z: float = Field(description="how far its last readings are off together, in sds")
-    offset: float = Field(description="by how much they are off")
+    expected_sd: float = Field(description="includes the noise of a reading")
+    z: float = Field(description="joint deviation of its latest readings, in sds")
+    offset: float = Field(description="deviation of those readings")
     left_out: bool = Field(
-        description="the sensor has changed: the estimate does without what it read since then"
+        description="the sensor has changed: the estimate leaves out its readings since then"
     )
 
 
@@ -99,17 +99,17 @@ class ExpectedTags(Contract):
 
 
 class AdvisedPlace(Contract):
-    """Where another tag helps; m, map frame."""
+    """A place where an additional tag would help; m, map frame."""
 
     x: float
     y: float
     error_ratio: float = Field(
-        description="the error with a tag there, and at the places before it, without: 1"
+        description="error with a tag there and at the places before it, divided by that without"
     )
 
 
 class Advice(Contract):
-    """`/api/estimate/advice`: where another tag helps most, the best place first."""
+    """`/api/estimate/advice`: where an additional tag would help most, the best place first."""
 
     sensor_type: str
     places: list[AdvisedPlace]

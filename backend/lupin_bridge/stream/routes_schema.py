@@ -41,22 +41,22 @@ class SignIn(_Given):
 
 
 class _Keys(_Given):
-    p256dh: str = Field(max_length=100, description="of the browser, base64url (RFC 8291)")
-    auth: str = Field(max_length=30, description="of the browser, base64url (RFC 8291)")
+    p256dh: str = Field(max_length=100, description="browser's public key, base64url (RFC 8291)")
+    auth: str = Field(max_length=30, description="browser's secret, base64url (RFC 8291)")
 
 
 class PushSubscription(_Given):
     """The body of `POST /api/push`: a browser's subscription, as its `toJSON()` returns it."""
 
-    endpoint: str = Field(max_length=1_000, description="the push service's address")
-    keys: _Keys | None = Field(default=None, description="null: notify it no more")
+    endpoint: str = Field(max_length=1_000, description="address at the push service")
+    keys: _Keys | None = Field(default=None, description="null: stop the notifications")
     expirationTime: float | None = None  # noqa: N815  # as browsers write it
 
 
 class PushKey(Contract):
     """`/api/push`: whether push notifications are available, and the key to subscribe with."""
 
-    public_key: str | None = Field(description="base64url; null: not here, or not for them")
+    public_key: str | None = Field(description="base64url; null: not available")
 
 
 class NoteDraft(_Given):
@@ -70,8 +70,8 @@ class NoteDraft(_Given):
     until: str | None = Field(
         default=None,
         max_length=64,
-        description="as `at`. Of shelve, its end; null: not any more. Of comment, the moment that "
-        "it is about; null: now",
+        description="a moment, in the form of `at`. For shelve: its end; null: unshelve. For "
+        "comment: the moment that it is about; null: now",
     )
 
 
@@ -83,38 +83,38 @@ class ObservationDraft(_Given):
         min_length=1, max_length=MAX_SENSORS_PER_TAG, description="by sensor, in its own unit"
     )
     observed_at: str | float | None = Field(
-        default=None, description="ISO 8601 or ROS seconds, as `at`; null: now"
+        default=None, description="ISO 8601 or ROS seconds, as for `at`; null: now"
     )
     place: list[Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]] | None = Field(
         default=None,
         min_length=2,
         max_length=3,
-        description="x, y and z of the tag, m; the first place stays",
+        description="x, y and z of the tag, m; only the tag's first place counts",
     )
 
 
 class PublishedObservation(Contract):
-    """The answer to `POST /api/observations`: what was published."""
+    """The response to `POST /api/observations`: what was published."""
 
     tag_id: str
     observed_at: Time
-    source: str = Field(description="`http/` and the name of the token")
+    source: str = Field(description="`http/` followed by the name of the token")
 
 
 class Note(Contract):
-    """A note of a person or a program; it is never changed. Times are ROS time."""
+    """A note by a person or a program; it never changes. Times are ROS time."""
 
     id: str = Field(description="opaque")
     kind: Literal["acknowledge", "shelve", "comment"]
     subject: str
     text: str
     until: Time | None = Field(
-        description="of shelve, its end; null: not any more. Of comment, the moment that it is "
+        description="for shelve: its end; null: unshelved. For comment: the moment that it is "
         "about; null: `made_at`"
     )
     made_at: Time
-    by: str = Field(description="name of an account or of a token")
-    withdrawn_by: str | None = Field(description="null: it stands")
+    by: str = Field(description="name of an account or a token")
+    withdrawn_by: str | None = Field(description="null: not withdrawn")
     withdrawn_at: Time | None
 
 
@@ -128,16 +128,16 @@ class Session(Contract):
     """`/api/session`: who makes the request, and whether `/api/signout` would end a session."""
 
     can_sign_out: bool
-    seconds_left: float | None = Field(description="of the session; null: there is none")
-    name: str | None = Field(description="null: nobody that is known by name")
+    seconds_left: float | None = Field(description="until the session ends; null: there is none")
+    name: str | None = Field(description="null: no name is known")
     role: Role
-    can_write_notes: bool = Field(description="whether `POST /api/notes` is for them, and is here")
+    can_write_notes: bool = Field(description="whether they may write notes, and this bridge can")
 
 
 class AuditRow(Contract):
     """Who did what to what, from where, and when."""
 
-    at_s: int = Field(description="s since the epoch, by the wall's clock")
+    at_s: int = Field(description="s since the epoch, by the wall clock")
     who: str
     what: str
     subject: str
@@ -165,7 +165,7 @@ class RobotPosition(RobotPoint):
     """The robot's last known position."""
 
     heading: float | None = Field(
-        description="where it faces, rad from x towards y; null: not reported"
+        description="direction it faces, rad from x towards y; null: not reported"
     )
 
 
@@ -173,7 +173,7 @@ class RobotPlan(Contract):
     """The path that the robot plans to take."""
 
     points: list[list[float]] = Field(
-        description="of each x and y, m in the map frame; at most 60, the last is where it ends"
+        description="x and y of each, m in the map frame; at most 60, the last is the goal"
     )
     observed_at: Time
 
@@ -194,7 +194,7 @@ class RobotNow(Contract):
 
 
 class RobotFrame(RobotNow):
-    """WebSocket frame: once the robot has published something; on change, at most once a second."""
+    """WebSocket frame: from the robot's first message on, at each change, at most once a second."""
 
     type: Literal["robot"]
 
@@ -203,7 +203,7 @@ class Robot(RobotNow):
     """`/api/robot`: what the robot reports of itself, and where it has been."""
 
     trail: list[RobotPoint] = Field(
-        description="the last hour as this process received it, oldest first; at most 720 points"
+        description="the last hour, as this process received it; oldest first, at most 720 points"
     )
 
 
@@ -218,13 +218,13 @@ class Period(Contract):
 
 
 class PastPeriod(Period):
-    """A period, and how much of it the log covers."""
+    """A period, and how much of it the journal covers."""
 
     complete_to: Time | None = Field(
-        description="all that was received before this is in the journal; null: not known"
+        description="everything received before this is in the journal; null: not known"
     )
     kept_from: Time | None = Field(
-        description="from here on every single reading and event is in the journal; null: not known"
+        description="every single reading and event since then is in the journal; null: not known"
     )
 
 
@@ -239,20 +239,20 @@ class Bucket(Contract):
 
 
 class History(PastPeriod):
-    """One sensor of one tag over a period: `readings`, or `buckets` where they are too many."""
+    """One sensor of one tag over a period: `readings`, or `buckets` if there are too many."""
 
     tag_id: str
     sensor_type: str
     unit: str
     is_bucketed: bool
-    bucket_s: float | None = Field(description="s, length of a bucket; null: these are readings")
+    bucket_s: float | None = Field(description="length of a bucket, s; null: these are readings")
     readings: list[HistoryReading] = Field(description="oldest first")
     buckets: list[Bucket] = Field(description="oldest first; one without a reading is absent")
     gaps: list[Period] = Field(
-        description="no reading for longer than three times what is usual here: draw no line"
+        description="no reading for longer than three times the usual interval: draw no line"
     )
     nights: list[Period] | None = Field(
-        description="nights by the clock that meet it; null: simulated, or over 400 days"
+        description="nights by the clock that overlap it; null: simulated, or over 400 days"
     )
 
 
@@ -274,36 +274,36 @@ class ClockRun(Period):
 
 
 class Timeline(PastPeriod):
-    """What happened in a period, and how far back the log reaches."""
+    """What happened in a period, and how far back the journal reaches."""
 
-    bucket_s: float = Field(description="s, length of a bucket")
+    bucket_s: float = Field(description="length of a bucket, s")
     reach: Period | None = Field(
-        description="what is remembered at all, up to the end of the period; null: nothing is"
+        description="extent of the journal, up to the end of the period; null: it is empty"
     )
     buckets: list[TimelineBucket] = Field(
         description="oldest first; one in which nothing happened is absent"
     )
-    silences: list[Period] = Field(description="stretches without any attempt")
-    runs: list[ClockRun] = Field(description="the runs of the clock that meet this period")
+    silences: list[Period] = Field(description="times without any attempt")
+    runs: list[ClockRun] = Field(description="the runs of the clock that overlap this period")
 
 
 class ReportCounts(Contract):
     """How much happened in a period."""
 
-    raised: int = Field(description="alarms that were raised in it")
-    cleared: int = Field(description="alarms that were cleared in it")
-    active: int = Field(description="alarms that were active at its end")
-    critical: int = Field(description="of those, the critical ones")
+    raised: int = Field(description="alarms raised in it")
+    cleared: int = Field(description="alarms cleared in it")
+    active: int = Field(description="alarms active at its end")
+    critical: int = Field(description="the critical ones of those")
     notes: int
-    scans: int = Field(description="attempts at sensors that succeeded")
-    failed: int = Field(description="attempts that failed, inspections too")
+    scans: int = Field(description="scans that succeeded")
+    failed: int = Field(description="scans and inspections that failed")
     inspections: int = Field(description="inspections that saw the flowers")
-    tags: int = Field(description="tags that were known at its end")
-    tags_scanned: int = Field(description="of those, with a scan in it")
+    tags: int = Field(description="tags known at its end")
+    tags_scanned: int = Field(description="those of them with a scan in it")
 
 
 class ReportSilence(Period):
-    """A period without an attempt; a tag's does not count while the whole greenhouse paused."""
+    """A period without an attempt; a tag's silence excludes those of the whole greenhouse."""
 
     tag_id: str = Field(description="empty: the whole greenhouse")
 
@@ -317,19 +317,19 @@ class ReportExtreme(Contract):
 
 
 class ReportSensor(Contract):
-    """The readings of a sensor, or of a quantity that is derived from each scan."""
+    """The readings of a sensor, or of a quantity derived from each scan."""
 
     sensor_type: str
     unit: str
-    n: int = Field(description="plausible readings, of which the rest is")
-    failed: int = Field(description="readings that no working sensor gives")
+    n: int = Field(description="number of plausible readings, to which the other values refer")
+    failed: int = Field(description="readings that no working sensor would give")
     mean: float | None
     low: ReportExtreme | None
     high: ReportExtreme | None
 
 
 class ReportLeftOut(Contract):
-    """How many entries of each list are left out."""
+    """How many entries each list leaves out."""
 
     alarms: int
     notes: int
@@ -339,17 +339,17 @@ class ReportLeftOut(Contract):
 
 
 class ShiftReport(PastPeriod):
-    """What happened between two moments, as it was known at the second one."""
+    """What happened between two moments, as known at the second one."""
 
     counts: ReportCounts
     alarms_from: Time = Field(
-        description="from here on alarms are worked out: `from`, unless too much was scanned"
+        description="moment from which alarms are included: `from`, unless there are too many scans"
     )
     alarms: list[Alarm] = Field(
-        description="active at any time of the period: first those at its end; the worst first"
+        description="active at any time in the period: first those active at its end; worst first"
     )
     notes: list[Note] = Field(description="newest first")
-    silences: list[ReportSilence] = Field(description="of the greenhouse, then of tags")
+    silences: list[ReportSilence] = Field(description="those of the greenhouse, then those of tags")
     sensors: list[ReportSensor]
     never_scanned: list[str] = Field(description="tags without a scan in the period")
     left_out: ReportLeftOut

@@ -67,9 +67,9 @@ class SensorReading(Contract):
     value: float | None
     observed_at: Time | None = Field(
         default_factory=lambda: None,
-        description="ROS time; null: the twin does not report it; absent: as of the reading before "
-        "it, of the first the tag's last_observed. Its age is stale_seconds of the tag, and what "
-        "last_observed is later",
+        description="ROS time; null: the twin does not report it; absent: the same as for the "
+        "reading before it or, for the first, the tag's last_observed. The reading's age is the "
+        "tag's stale_seconds plus last_observed minus observed_at",
     )
 
 
@@ -97,8 +97,8 @@ class TwinTagState(Contract):
     readings: list[SensorReading]
     last_observed: Time = Field(description="ROS time; 0: discovered and never observed")
     stale_seconds: float | None = Field(
-        description="s since last_observed, at header.stamp in a frame and now in an HTTP answer; "
-        "never negative; null: never observed"
+        description="s since last_observed: at header.stamp in a frame, at the time of the answer "
+        "over HTTP; never negative; null: never observed"
     )
     species: str
     species_confidence: float | None
@@ -114,12 +114,12 @@ class TwinTagState(Contract):
     last_try: Time | None = Field(
         default_factory=lambda: None,
         description="ROS time of the latest scan or inspection, successful or not; null: none, or "
-        "not known; absent, and so are the next two: it was OK, at last_observed",
+        "not known; absent, as are the next two fields: it was OK, at last_observed",
     )
     last_try_status: int | None = Field(
         default_factory=lambda: None,
         description="of the last attempt, as in lupin_msgs/Observation: 0 OK, 1 unreachable, 2 "
-        "scan failed, 3 skipped; null: as last_try",
+        "scan failed, 3 skipped; null: as for last_try",
     )
     last_try_detail: str = Field(default_factory=str, description="why it was not OK")
 
@@ -134,26 +134,26 @@ class TwinState(Contract):
 class HealthReason(Contract):
     """Why a tag, or the greenhouse, has its verdict.
 
-    The last two are the greenhouse's. `silent`: nothing comes from the twin, or its clock does
-    not run. `stopped`: no tag was scanned for longer than the patrol's own scan interval allows.
+    Only the greenhouse has the last two kinds. `silent`: nothing arrives from the twin, or its
+    clock does not run. `stopped`: the last scan is longer ago than the scan interval allows.
     """
 
     kind: Literal[
         "range", "reading_failed", "scan_failed", "pest", "old", "changed", "silent", "stopped"
     ]
     verdict: Literal["critical", "stressed", "unknown", "healthy"]
-    sensor: str = Field(description="empty: all of the tag's, or none")
+    sensor: str = Field(description="empty: all sensors of the tag, or none")
     value: float | None = Field(
-        description="sensor's unit; of a pest how many were counted, of scan_failed the status"
+        description="sensor's unit; for pest: the number counted; for scan_failed: the status"
     )
     limit: float | None = Field(
-        description="the bound that was passed, sensor's unit; of old how long readings hold, s"
+        description="the limit exceeded, sensor's unit; for old: how long a reading is valid, s"
     )
     since: Time | None = Field(
-        description="ROS time of the observation that began it, of old the last one; null: none"
+        description="ROS time of the observation that began it; for old: the last one; null: none"
     )
     release: float | None = Field(
-        default_factory=lambda: None, description="where it ends; only while the deadband holds it"
+        default_factory=lambda: None, description="end value; only while the deadband holds it"
     )
 
 
@@ -167,21 +167,21 @@ class TagHealth(Contract):
 
 
 class Day(Contract):
-    """Whether the ranges of the day or of the night apply, and by what that was decided."""
+    """Whether the ranges for day or for night apply, and what decided it."""
 
     is_day: bool
     source: Literal["light", "clock", "assumed"]
 
 
 class Patrol(Contract):
-    """How the scanning of the greenhouse goes; none of this is a verdict."""
+    """The progress of scanning the greenhouse; none of this is a verdict."""
 
     interval_s: float | None = Field(
-        description="median of the last intervals between scans, whatever tag they were of; "
+        description="s, median of the latest intervals between scans of any tags; "
         "null: fewer than two are known"
     )
     last_scan: Time | None = Field(description="ROS time; null: none is known")
-    overdue: int = Field(description="tags none of whose readings holds any more, or without any")
+    overdue: int = Field(description="tags without a reading that is still valid")
 
 
 class HouseHealth(TagHealth):
@@ -192,7 +192,7 @@ class HouseHealth(TagHealth):
 
 
 class Judgement(Contract):
-    """`/api/health`, and `health` in frames: in a delta only the tags whose health has changed."""
+    """`/api/health`, and `health` in frames; a delta has only the tags whose health changed."""
 
     house: HouseHealth
     tags: dict[str, TagHealth]
@@ -201,53 +201,53 @@ class Judgement(Contract):
 class Alarm(Contract):
     """One episode: what was wrong, where, from when to when, and how bad at worst.
 
-    It is derived from the observations and the ranges alone, so it is the same in every replica and
+    It is derived only from the observations and the ranges, so it is the same in every replica and
     after every restart.
     """
 
-    id: str = Field(description="opaque; made of what, where and since when")
+    id: str = Field(description="opaque; derived from what is wrong, where and since when")
     reason: HealthReason = Field(description="as it was when the alarm was raised")
     tag_id: str = Field(description="empty: the greenhouse")
     raised_at: Time = Field(description="ROS time")
     cleared_at: Time | None = Field(description="ROS time; null: it is active")
     worst: float | None = Field(
-        description="the value farthest beyond its limit, sensor's unit; of a pest the most that "
-        "were counted; null: there is no such value"
+        description="the value farthest beyond its limit, sensor's unit; for pest: the highest "
+        "number counted; null: there is no such value"
     )
     acknowledged_by: str | None = Field(
-        default_factory=lambda: None, description="who; absent: nobody has"
+        default_factory=lambda: None, description="who did; absent: nobody has"
     )
     acknowledged_at: Time | None = Field(default_factory=lambda: None, description="ROS time")
     shelved_by: str | None = Field(
-        default_factory=lambda: None, description="who; absent: it is not shelved"
+        default_factory=lambda: None, description="who did; absent: it is not shelved"
     )
     shelved_until: Time | None = Field(default_factory=lambda: None, description="ROS time")
     shelved_reason: str | None = Field(
-        default_factory=lambda: None, description="in the words of who shelved it; may be empty"
+        default_factory=lambda: None, description="as written by that person; may be empty"
     )
 
 
 class Alarms(Contract):
-    """`/api/alarms`: the alarms of the past and of now.
+    """`/api/alarms`: past and active alarms.
 
-    `starting`: the past is still being read. `heard`: there is no journal, and the alarms are only
-    from what this process has received since its start.
+    `starting`: the past is still being read. `heard`: there is no journal, so the alarms cover only
+    what this process has received since its start.
     """
 
     alarms: list[Alarm] = Field(description="newest first")
     source: Literal["starting", "journal", "heard"]
-    since: Time | None = Field(description="ROS time from which on alarms are known; null: not yet")
+    since: Time | None = Field(description="ROS time from which alarms are known; null: not yet")
 
 
 class AlarmsFrame(Alarms):
     """WebSocket frame: the active alarms and those raised or cleared within 24 h, on any change."""
 
     type: Literal["alarms"]
-    notes: int = Field(description="grows with every note: `/api/notes` has more")
+    notes: int = Field(description="grows with every note: fetch `/api/notes` again")
 
 
 class StateFrame(Contract):
-    """WebSocket frame: the state. `seq` grows by one per frame; a gap shows what was skipped."""
+    """WebSocket frame: the state. `seq` grows by one per frame; a gap means skipped frames."""
 
     type: Literal["state"]
     seq: int
@@ -259,8 +259,8 @@ class StateFrame(Contract):
 class DeltaFrame(Contract):
     """WebSocket frame (`?delta=1`): what differs from the frame numbered `base`.
 
-    A client that has `base` replaces the `changed` tags, appends those it did not know, in this
-    order, and drops the `removed` ones. The age of an unchanged tag is `header.stamp` minus its
+    A client that has `base` replaces the `changed` tags, appends the unknown ones in this order,
+    and drops the `removed` ones. The age of an unchanged tag is `header.stamp` minus its
     `last_observed`. A client that skipped a frame gets a full `StateFrame` instead.
     """
 
@@ -275,7 +275,7 @@ class DeltaFrame(Contract):
 
 
 class RecentDrop(Contract):
-    """Messages of the last minutes that the twin dropped or lost, for one reason."""
+    """Messages that the twin dropped or lost in the last minutes, for one reason."""
 
     reason: str
     message: str = Field(description="the last of them, for a person to read")
@@ -290,16 +290,16 @@ class Stretch(Contract):
 
 
 class Journal(Contract):
-    """The condition of the twin's journal. Everything is kept only while it is `recording`."""
+    """The condition of the twin's journal. It keeps everything only while it is `recording`."""
 
     state: Literal[
         "unknown", "off", "starting", "upgrading", "recording", "slow", "failing", "doubting",
         "in_use", "foreign",
     ] = Field(description="unknown: the twin does not report it")  # fmt: skip
     detail: str = Field(description="for a person to read")
-    set_aside: str = Field(description="the last damaged file, by its new name; empty: none")
+    set_aside: str = Field(description="the last quarantined file, by its new name; empty: none")
     simulated: Stretch | None = Field(
-        description="what no robot observed: the past that a demo's journal begins with"
+        description="a past that no robot observed, with which a demo's journal begins"
     )
 
 
@@ -317,25 +317,25 @@ class StatusFrame(Contract):
     type: Literal["status"]
     twin: Literal["live", "offline"]
     reason: Reason = Field(
-        description="paused: simulated time stands on purpose, the twin is live; no_clock, "
-        "clock_stopped: the twin's time does not run; clock_doubted: it contradicts the journal; "
-        "no age is known then, and the twin counts as offline"
+        description="paused: simulated time is paused, and the twin is live; no_clock, "
+        "clock_stopped: the twin's time does not run; clock_doubted: it contradicts the journal. "
+        "In the last three, no age is known, and the twin counts as offline"
     )
     message: str = Field(description="for a person to read")
     state_age_seconds: float | None = Field(
-        description="s since the bridge got its last state, by its own clock; null: never"
+        description="s since the bridge received its last state, by its own clock; null: never"
     )
-    has_map: bool = Field(description="false: /api/map answers 404, no map has come yet")
+    has_map: bool = Field(description="false: no map received yet, and /api/map answers 404")
     origin: Origin = Field(
-        description="where what was observed comes from, as the twin reports; sim_time: it goes by "
-        "/clock, so from a simulation, or a recording that is played"
+        description="the origin of the observations, as the twin reports it; sim_time: the twin "
+        "follows /clock, so they come from a simulation or a recording"
     )
-    twin_count: int = Field(description="how many publish the state; of more than one, a mixture")
+    twin_count: int = Field(description="twins that publish the state; of several, a mixture")
     input_problems: list[str] = Field(description="why the twin misses messages, with the remedy")
-    day_length_s: float = Field(description="s of ROS time that a day takes; fewer in a demo")
-    drops: list[RecentDrop] = Field(description="what the twin dropped recently, by reason")
+    day_length_s: float = Field(description="length of a day in s of ROS time; shorter in a demo")
+    drops: list[RecentDrop] = Field(description="what the twin has recently dropped, by reason")
     journal: Journal
-    outward: list[Outward] = Field(description="those that the operator has set up")
+    outward: list[Outward] = Field(description="the channels that the operator has set up")
 
 
 class GetFieldResponse(Contract):
@@ -362,7 +362,7 @@ class TagError(Contract):
     tag_id: str
     measured: float
     predicted: float
-    error: float = Field(description="predicted less measured, sensor's unit")
+    error: float = Field(description="predicted minus measured, sensor's unit")
 
 
 class FieldQuality(Contract):
@@ -371,17 +371,17 @@ class FieldQuality(Contract):
     sensor_type: str
     unit: str
     sample_count: int = Field(description="tags that contribute: pinned, with a finite reading")
-    judged_count: int = Field(description="of those, the ones with another in reach")
+    judged_count: int = Field(description="those of them with another tag in reach")
     rmse: float | None = Field(description="sensor's unit; null: no tag could be judged")
     worst: TagError | None
-    painted_share: float = Field(description="cells that are known, 0 to 1")
+    painted_share: float = Field(description="share of cells that are known, 0 to 1")
     far_off_tags: list[str] = Field(
-        description="tags too far from the others for a map: no default box goes as far"
+        description="tags too far from the others for a map: the default box leaves them out"
     )
 
 
 class MapMetaData(Contract):
-    """Size and place of the occupancy grid; resolution in m a cell."""
+    """Size and origin of the occupancy grid; resolution in m per cell."""
 
     map_load_time: Time
     resolution: float
@@ -418,18 +418,18 @@ class PastAttempt(Contract):
     status: int = Field(description="as in lupin_msgs/Observation: 0 is OK")
     status_detail: str = Field(description="why the status is not OK, for a person to read")
     kind: int | None = Field(
-        description="as in lupin_msgs/Observation: 0 scan, 1 inspection; null: of an attempt that "
-        "failed, and is not in the journal yet"
+        description="as in lupin_msgs/Observation: 0 scan, 1 inspection; null: the attempt failed, "
+        "and is not in the journal yet"
     )
 
 
 class TagHistory(Contract):
-    """The last scans and attempts of one tag (as many of each as the twin's `buffer_len`)."""
+    """The latest scans and attempts of one tag, up to the twin's `buffer_len` of each."""
 
     tag_id: str
     source: str | None = Field(
-        description="of the newest observation that names one, as in lupin_msgs/Observation: "
-        "adapt/fixed is a fixed sensor, adapt a robot's visit, http/NAME a program; null: none does"
+        description="as in lupin_msgs/Observation, from the newest one with a source: adapt/fixed "
+        "is a fixed sensor, adapt a robot's visit, http/NAME a program; null: none has one"
     )
     sensors: list[SensorHistory]
     tries: list[PastAttempt] = Field(description="oldest first")
@@ -444,6 +444,6 @@ class Health(Contract):
 
 
 class ErrorMessage(Contract):
-    """Body of a refusal outside the field routes."""
+    """Body of a refusal, except by the field routes."""
 
     detail: str

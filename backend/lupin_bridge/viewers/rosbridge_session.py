@@ -274,9 +274,9 @@ class Feeds:
         try:
             frame = await self._writer.frame(feed, sample)
         except ValueError as error:
-            await self._report(feed, f"a message of topic {shown(feed.name)} is none: {error}")
+            await self._report(feed, f"a message of topic {shown(feed.name)} is invalid: {error}")
         except Exception as error:  # noqa: BLE001  # nobody awaits this task: the next one comes
-            await self._report(feed, "the bridge met an error of its own, see its log", error)
+            await self._report(feed, "the bridge had an internal error, see its log", error)
         else:
             await self._send(frame)
 

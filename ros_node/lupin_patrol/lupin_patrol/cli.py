@@ -22,7 +22,7 @@ def parser() -> argparse.ArgumentParser:
     """Return the parser of the options, ROS arguments excluded; it exits with 2 on a bad one."""
     made = _Parser(
         prog="patrol_node",
-        description="A robot on patrol in the simulated greenhouse, as the twin sees it.",
+        description="Simulate a robot on patrol in a greenhouse, and publish what it observes.",
         epilog="ROS arguments follow --ros-args.",
         allow_abbrev=False,
     )
@@ -48,15 +48,13 @@ def parser() -> argparse.ArgumentParser:
         "--since-morning",
         type=_number(float, "a number", 0.0, 86_400.0),
         default=0.0,
-        help="patrol seconds since nine o'clock, when it begins (default 0)",
+        help="where the patrol starts, in patrol seconds after nine o'clock (default 0)",
     )
-    made.add_argument(
-        "--once", action="store_true", help="end after one pass, its retries included"
-    )
+    made.add_argument("--once", action="store_true", help="exit after one pass and its retries")
     made.add_argument(
         "--end-with-parent",
         action="store_true",
-        help="end when the process that started this one does, even by kill -9 (Linux)",
+        help="exit when the parent process ends, even by kill -9 (Linux)",
     )
     # For `lupin-twin demo`: fills a new journal before the twin starts.
     made.add_argument("--fill-past", metavar="JOURNAL", type=Path, help=argparse.SUPPRESS)
@@ -128,7 +126,7 @@ def _number(
         try:
             value = convert(text)
         except ValueError:
-            raise argparse.ArgumentTypeError(f"{text!r} is no number, {limits}") from None
+            raise argparse.ArgumentTypeError(f"{text!r} is not a number, {limits}") from None
         if not lowest <= value <= highest:
             raise argparse.ArgumentTypeError(f"{text!r} is out of range, {limits}")
         return value

@@ -124,7 +124,7 @@ def test_an_allowed_page_cannot_write_either(open_bridge: Served) -> None:
     for path in ("/api/state", "/api/notes", "/api/signin"):
         answer = open_bridge.post(path, {"Origin": PANEL})
         assert answer.status_code == 403
-        assert "may read here, and no more" in refusal_of(answer)
+        assert "may only read here" in refusal_of(answer)
 
 
 def test_a_picture_in_a_foreign_page_is_not_even_computed(open_bridge: Served) -> None:

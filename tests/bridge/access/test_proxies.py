@@ -228,6 +228,6 @@ def test_what_a_client_adds_to_the_proxys_word_names_nobody(behind: Served) -> N
 
 
 def test_the_settings_of_a_proxy_go_together() -> None:
-    assert "nobody is believed" in refused_start("--proxy-user-header", "Remote-User")
+    assert "no proxy is trusted" in refused_start("--proxy-user-header", "Remote-User")
     wrong = refused_start("--proxy-user-header", "a b", "--trusted-proxy", PROXY)
     assert "must be a header's name" in wrong

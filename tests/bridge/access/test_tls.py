@@ -58,7 +58,7 @@ def test_a_pair_that_cannot_be_served_is_named(ours: Certificate, tmp_path: Path
         odd.write_bytes(content)
         assert refusal(odd, ours.key) == f"--tls-cert {odd} holds no PEM certificate"
     odd.write_bytes(ours.cert.read_bytes())
-    assert f"--tls-key {odd} is no usable private key" in refusal(ours.cert, odd)
+    assert f"--tls-key {odd} is not a usable private key" in refusal(ours.cert, odd)
     other = certificate(tmp_path)
     assert refusal(ours.cert, other.key) == f"--tls-key {other.key} is not the key of {ours.cert}"
     # Without asking the terminal.
@@ -180,7 +180,7 @@ def test_a_new_pair_is_served_to_whoever_connects_from_now_on(
             live.process.send(signal.SIGHUP)
         wait_for(lambda: is_trusted(live, new.trust), "the new certificate")
         assert not is_trusted(live, old.trust)
-        assert live.process.output.count("new connections get the TLS certificate") == 1
+        assert live.process.output.count("new connections use the renewed TLS certificate") == 1
         # Who was there before goes on.
         now_s = kept.get("/api/state").json()["header"]["stamp"]["sec"]
         wait_for(
@@ -196,7 +196,7 @@ def test_a_broken_new_pair_is_told_once_and_the_old_one_goes_on(tmp_path: Path) 
     with served(*ours.options, trust=ours.trust) as live:
         other = certificate(tmp_path, "other")
         for content, said in (
-            (b"nonsense", "is no usable private key"),
+            (b"nonsense", "is not a usable private key"),
             (other.key.read_bytes(), "is not the key of"),
             (None, "No such file or directory"),
         ):
@@ -209,7 +209,7 @@ def test_a_broken_new_pair_is_told_once_and_the_old_one_goes_on(tmp_path: Path) 
                 assert is_trusted(live, ours.trust)
             live.process.wait_for_output(said)
             assert live.process.output.count(said) == 1
-        assert live.process.output.count("is refused, the old one goes on: --tls-key") == 3
+        assert live.process.output.count("is refused, the old one stays: --tls-key") == 3
         put(ours.key, key)
-        live.process.wait_for_output("new connections get the TLS certificate")
+        live.process.wait_for_output("new connections use the renewed TLS certificate")
         assert is_trusted(live, ours.trust)

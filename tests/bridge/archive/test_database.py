@@ -105,7 +105,7 @@ def test_check_tells_rows_that_fit_no_other(two_sites: Archive) -> None:
 def test_an_archive_is_made_once(archive: Archive) -> None:
     again = command("init", archive.owner)
     assert (again.returncode, len(again.stderr.splitlines())) == (1, 1)
-    assert "has an archive already" in again.stderr
+    assert "already has an archive" in again.stderr
 
 
 def test_migrating_gives_the_roles_back_what_they_may(two_sites: Archive) -> None:
@@ -126,7 +126,7 @@ def test_an_archive_of_another_version_is_left_alone(archive: Archive) -> None:
 def test_a_database_without_an_archive_is_named_so(postgresql: Postgres) -> None:
     done = command("info", postgresql.url_of("postgres"))
     assert done.returncode == 1
-    assert "the database has no archive: lupin-twin archive init makes it" in done.stderr
+    assert "the database has no archive: lupin-twin archive init creates it" in done.stderr
 
 
 def test_a_wrong_password_is_said_and_not_repeated(archive: Archive) -> None:
@@ -150,7 +150,7 @@ def test_a_wrong_password_is_said_and_not_repeated(archive: Archive) -> None:
 def test_part_of_a_password_is_never_taken_for_a_host() -> None:
     done = command("info", "postgresql://gh1:one@two@127.0.0.1:1/lupin")
     assert done.returncode == 2
-    assert "--archive-url is no address of a PostgreSQL" in done.stderr
+    assert "--archive-url is not a PostgreSQL address" in done.stderr
     assert "two@" not in done.stderr
 
 

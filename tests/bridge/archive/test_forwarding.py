@@ -273,7 +273,7 @@ def test_an_archive_that_is_reached_and_takes_nothing_is_said_once(
     kept(journal, scans(0, 50))
     archive.do("REVOKE INSERT ON scan FROM lupin_forwarder")
     with forwarder(archive, journal) as process:
-        process.wait_for_output("is not forwarded: the archive does not allow it")
+        process.wait_for_output("is not forwarded: the archive does not permit it")
         for _ in range(2):
             here = archive.select("SELECT since FROM forwarder")
             wait_for(
@@ -302,11 +302,11 @@ def test_what_is_wrong_is_said_in_one_line(archive: Archive, journal: Path) -> N
     kept(journal, scans(0, 5))
     for given, code, said in (
         ({"site": "GH 1"}, 2, "--site is 'GH 1', expected a-z"),
-        ({"archive_url": "nonsense"}, 2, "--archive-url is no address of a PostgreSQL"),
+        ({"archive_url": "nonsense"}, 2, "--archive-url is not a PostgreSQL address"),
         ({"archive_url": "postgresql://gh1@127.0.0.1:1/x"}, 1, "failed: Connection refused\n"),
-        ({"site": "gh2"}, 1, "a forwarder needs a user in lupin_forwarder that is named as"),
+        ({"site": "gh2"}, 1, "a forwarder needs a user in the role lupin_forwarder with"),
         ({"journal": "/nowhere/journal.sqlite"}, 1, "there is no journal /nowhere"),
-        ({"journal": __file__}, 1, "is no journal"),
+        ({"journal": __file__}, 1, "is not a journal"),
     ):
         done = run(*words(archive, journal, **given))
         assert (done.returncode, len(done.stderr.splitlines())) == (code, 1), done.stderr

@@ -235,7 +235,7 @@ def test_export_writes_a_recording_of_a_period(path: Path, tmp_path: Path) -> No
         "/floranova/observations",
     ]
     done = said("journal", *words)
-    assert (done.returncode, f"{target} is there already" in done.stderr) == (1, True)
+    assert (done.returncode, f"{target} already exists" in done.stderr) == (1, True)
 
 
 @pytest.mark.parametrize(
@@ -245,7 +245,7 @@ def test_export_writes_a_recording_of_a_period(path: Path, tmp_path: Path) -> No
         (("a.mcap", "--tag", "7"), "--tag is for CSV"),
         (("a.mcap", "--sensor", "a"), "--sensor is for CSV"),
         (("nowhere/a.mcap",), "nowhere/a.mcap: No such file or directory"),
-        (("a.mcap", "--to", "5"), "holds nothing of that period"),
+        (("a.mcap", "--to", "5"), "has nothing in that period"),
     ],
 )
 def test_a_recording_that_cannot_be_made_is_one_clear_line(

@@ -96,7 +96,7 @@ def test_a_clock_that_tells_no_time_is_named_with_its_file(tmp_path: Path) -> No
     path.write_bytes(path.read_bytes().replace(told, b"\xff\xff" + told[2:]))
     with (
         Recording([path]) as recording,
-        pytest.raises(RecordingError, match=f"^cannot read {path}: a message of /clock is no "),
+        pytest.raises(RecordingError, match=f"^cannot read {path}: a message on /clock is not a "),
     ):
         Player(recording, None, parser().parse_args([str(path), "--start", "1"]))  # type: ignore[arg-type]  # it comes to no node
 
@@ -118,4 +118,4 @@ def test_a_second_twin_ends_the_player_for_its_journal_would_keep_what_is_played
     path = write_bag(tmp_path / "run.mcap", [seen("a", 5_000.0)])
     with twin_node(domain), demo_of(domain, path) as (demo, _):
         demo.wait_for_output("several twins run in ROS domain")
-        demo.wait_for_output("the player has ended with code 1")
+        demo.wait_for_output("the player ended with exit code 1")

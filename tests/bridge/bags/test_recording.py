@@ -109,10 +109,10 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     os.mkfifo(fifo)
     for paths, why in (
         ([json], "encoded as 'json', must be 'cdr'"),
-        ([one, tags], "they are not of one recording"),
+        ([one, tags], "they are not parts of one recording"),
         ([tmp_path / "none.mcap"], "No such file"),
-        ([folder], "no file ends in"),
-        ([fifo], "is no file"),
+        ([folder], "is a folder without a .mcap file"),
+        ([fifo], "is not a file"),
     ):
         with pytest.raises(RecordingError, match=why):
             Recording(paths)

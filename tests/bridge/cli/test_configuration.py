@@ -94,13 +94,19 @@ def test_a_mistake_in_a_variable_is_named(name: str, value: str, named: str) -> 
             " line 3: port is 'True': input should be a valid integer",
         ),
         ("allow_host = 'x'", " line 1: allow_host is 'x': input should be a valid tuple"),
-        ("port = 1\nmax-clients = 5", " line 2: max-clients is no setting of the bridge (did you"),
-        ('"a\\nb" = 1', ": 'a\\nb' is no setting of the bridge"),
-        ("token = 'x'", " line 1: token is no setting: put the token into a file of its own"),
-        ("mqtt_password = 'x'", " line 1: mqtt_password is no setting: put the password into a f"),
+        (
+            "port = 1\nmax-clients = 5",
+            " line 2: max-clients is not a setting of the bridge (did you",
+        ),
+        ('"a\\nb" = 1', ": 'a\\nb' is not a setting of the bridge"),
+        ("token = 'x'", " line 1: token is not a setting: put the token into a file of its own"),
+        (
+            "mqtt_password = 'x'",
+            " line 1: mqtt_password is not a setting: put the password into a f",
+        ),
         ("port = ", " is not TOML: Invalid value (at end of document)"),
         (f"port = {'9' * 5_000}", " is not TOML: Exceeds the limit (4300 digits) for integer"),
-        (r'sensors = "a\u0000b"', " line 1: sensors is 'a\\x00b': there is a co"),
+        (r'sensors = "a\u0000b"', " line 1: sensors is 'a\\x00b': it contains a co"),
     ],
 )
 def test_a_mistake_in_a_file_is_named_with_its_line(config: Any, text: str, named: str) -> None:
@@ -129,7 +135,7 @@ def test_what_is_no_file_of_settings_is_named(tmp_path: Path) -> None:
     assert refusal({}, {}, str(tmp_path)) == f"--config {tmp_path}: Is a directory"
     odd = tmp_path / "odd"
     odd.write_bytes(b"\xff")
-    assert refusal({}, {}, str(odd)) == f"--config {odd} is no text (UTF-8)"
+    assert refusal({}, {}, str(odd)) == f"--config {odd} is not UTF-8 text"
     odd.write_bytes(b"#" * MAX_FILE_BYTES)
     assert settings_from({}, {}, str(odd)) == Settings()
     odd.write_bytes(b"#" * (MAX_FILE_BYTES + 1))
@@ -141,7 +147,7 @@ def test_a_strange_variable_is_warned_of_and_others_are_nobodys_business() -> No
     environment = {"LUPIN_PROT": "1", "LUPIN_PORT": "1", "LUPIN_TOKEN": "", "PORT": "1"}
     (warning,) = strange_variables(environment)
     assert warning == (
-        "the environment's LUPIN_PROT is no setting of the bridge (did you mean LUPIN_PORT?)"
+        "environment variable LUPIN_PROT is not a setting of the bridge (did you mean LUPIN_PORT?)"
     )
 
 
@@ -195,14 +201,16 @@ def test_the_process_takes_all_three(config: Any, tmp_path: Path) -> None:
         assert answer.status_code == 401
         bearer = {"Authorization": f"Bearer {TOKEN}", "Host": "twin.example"}
         assert live.get("/api/state", bearer).status_code == 200
-        assert '"level": "warning"' in live.process.wait_for_output("LUPIN_NONSENSE is no setting")
+        assert '"level": "warning"' in live.process.wait_for_output(
+            "LUPIN_NONSENSE is not a setting"
+        )
         assert "LUPIN_TOKEN_FILE" in live.process.wait_for_output("can read the token")
 
 
 def test_a_mistake_anywhere_ends_the_start_with_one_line(config: Any, tmp_path: Path) -> None:
     path = config("port = 1\nprot = 2\n")
     assert refused_start("--config", path) == (
-        f"lupin-twin: {path} line 2: prot is no setting of the bridge (did you mean port?)"
+        f"lupin-twin: {path} line 2: prot is not a setting of the bridge (did you mean port?)"
     )
     short = tmp_path / "token"
     short.write_text("short\n", encoding="ascii")

@@ -182,15 +182,15 @@ def test_what_came_before_a_twin_is_in_its_past(importing: Import) -> None:
 @pytest.mark.parametrize(
     ("row", "reason"),
     [
-        ("yesterday,A,1,", "the time is no ISO 8601, and no seconds since 1970"),
+        ("yesterday,A,1,", "the time is neither ISO 8601 nor seconds since 1970"),
         ("2024-05-01T10:00:00,A,1,", "the time has no offset, and time_zone is not given"),
         ("1900-05-01T10:00:00Z,A,1,", "the time is before 1970"),
-        ("9999-12-31T23:59:59Z,A,1,", "the time is ahead of now"),
-        ("9e10,A,1,", "the time is ahead of now"),
-        ("-5,A,1,", "the time is no moment since 1970"),
+        ("9999-12-31T23:59:59Z,A,1,", "the time is in the future"),
+        ("9e10,A,1,", "the time is in the future"),
+        ("-5,A,1,", "the time is not a moment since 1970"),
         ("1714558200,,1,", "no tag, or one of more than 256 characters"),
         ("1714558200,A,,", "no reading"),
-        ("1714558200,A,warm,", "temperature is no number"),
+        ("1714558200,A,warm,", "temperature is not a number"),
         ("1714558200,A,nan,", "temperature is not from -inf to inf"),
         ("1714558200,A,1,1.01", "humidity is not from -inf to 100"),
         ("1714558200,A", "too few columns"),
@@ -220,7 +220,7 @@ def test_a_time_without_offset_is_in_the_zone_that_is_given_and_an_hour_may_come
     )
     out = importing.given(WIDE | {"time_zone": "Europe/Amsterdam"}, rows).written()
     assert importing.rows()[0][1] == 1_714_557_600 * SECOND
-    assert "refused: 1: the sensor has another reading of that moment" in out
+    assert "refused: 1: the sensor has another reading at that moment" in out
 
 
 @pytest.mark.parametrize(
@@ -229,12 +229,16 @@ def test_a_time_without_offset_is_in_the_zone_that_is_given_and_an_hour_may_come
         (WIDE | {"time": "when"}, ROWS, "there is no column 'when', but at, bench, t, rh, note"),
         (WIDE | {"zone": "x"}, ROWS, "'zone' is not known, expected one of time_zone, time, tag"),
         (WIDE | {"time_zone": "Mars"}, ROWS, "time_zone is 'Mars', expected such as Europe/"),
-        (WIDE | {"tag_id": "A"}, ROWS, "expected tag, a column, or tag_id, every row's tag"),
-        (WIDE | {"sensor": "a", "value": "b"}, ROWS, "expected sensors, or sensor and value"),
+        (WIDE | {"tag_id": "A"}, ROWS, "expected either tag, a column, or tag_id"),
+        (
+            WIDE | {"sensor": "a", "value": "b"},
+            ROWS,
+            "expected either sensors, or sensor and value",
+        ),
         (WIDE | {"sensors": {"t": 5}}, ROWS, "sensors.t is 5, expected keys and values"),
         (WIDE | {"places": {"A": [1, "x"]}}, ROWS, "places.A is [1, 'x'], expected [x, y] or"),
-        (WIDE, b"\xff\xfe\x00", "is no CSV in UTF-8"),
-        (WIDE, 'at,bench,t,rh\n"' + "x" * 200_000, "is no CSV in UTF-8: field larger than"),
+        (WIDE, b"\xff\xfe\x00", "is not CSV in UTF-8"),
+        (WIDE, 'at,bench,t,rh\n"' + "x" * 200_000, "is not CSV in UTF-8: field larger than"),
         (WIDE, "at,bench,t,rh\n" + "," * 1_000_001, "line 2 has 1,000,000 characters or more"),
     ],
 )
@@ -259,7 +263,7 @@ def test_a_journal_of_a_simulation_is_left_alone(importing: Import) -> None:
     kept(importing.journal, [scan("A", 5 * SECOND)], Clock(5 * SECOND, NOW, is_simulated=True))
     done = importing.given(WIDE, ROWS).run("--write")
     assert done.returncode == 1
-    assert "is of a simulation: import into another" in done.stderr
+    assert "is a simulation's: import into another one" in done.stderr
 
 
 def test_the_page_has_what_was_imported(domain: int, importing: Import) -> None:

@@ -90,7 +90,7 @@ def test_a_file_that_is_not_there_is_named_and_not_made(tmp_path: Path, path: Pa
 @pytest.mark.parametrize(
     ("words", "named"),
     [
-        (["info", "--ros-args", "-p", "journal:=x"], "journal takes no arguments of ROS: name its"),
+        (["info", "--ros-args", "-p", "journal:=x"], "journal takes no ROS arguments: choose its"),
         (["info", "--domain", "x"], "argument --domain: invalid int value: 'x'"),
         (["info", "--journal", "x", "--demo", "0"], "--demo: not allowed with argument --journal"),
         ([], "the following arguments are required: ACTION"),
@@ -106,7 +106,7 @@ def test_a_mistake_is_one_clear_line(words: list[str], named: str) -> None:
 @pytest.mark.parametrize(
     ("words", "domain", "named"),
     [
-        ("--journal off", "0", "--journal is 'off', must be a file"),
+        ("--journal off", "0", "--journal is 'off', expected a file"),
         ("--domain -1", "0", "--domain is -1, must be from 0 to 232"),
         ("--domain 233", "0", "--domain is 233, must be from 0 to 232"),
         ("--domain 232", "x", "domain-232.sqlite"),
@@ -144,8 +144,8 @@ def test_somebody_else_s_file_is_left_and_named(tmp_path: Path) -> None:
     empty.touch()
     for path, named in (
         (foreign, "is a database, but not a journal of lupin-twin"),
-        (recorded, f"{recorded} is no journal: it does not begin as SQLite's files do\n"),
-        (empty, "is empty: a journal that is just being made, or none"),
+        (recorded, f"{recorded} is not a journal: it does not begin as an SQLite file\n"),
+        (empty, "is empty: a journal that is just being created, or none"),
     ):
         before = path.read_bytes()
         for action in ACTIONS:
@@ -166,8 +166,8 @@ def test_info_tells_what_is_in_it(path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert (done.returncode, done.stderr) == (0, "")
     found = told("--journal", path)
     assert found["recording"] == "nobody"
-    assert found["scans"] == "2,002, of them 1 failed"
-    assert (found["looks"], found["places"], found["tags"]) == ("1", "1", "3")
+    assert found["scans"] == "2,002, 1 of them failed"
+    assert (found["inspections"], found["places"], found["tags"]) == ("1", "1", "3")
     assert found["sensors"] == "a, temperature"
     assert found["reach"] == "2025-11-21T04:40:00Z to 2025-11-21T05:13:19Z"
     assert found["quarantined"] == "j.sqlite.damaged-20261121T141500Z, 2.0 MB"
@@ -180,7 +180,7 @@ def test_while_a_twin_records_all_can_be_read_and_nothing_shrunk(path: Path) -> 
             twin.write(scan("new", NOW + number, a=1.0))
         wait_for(lambda: twin.condition.written == 300, "all of it written")
         info = told("--journal", path)
-        assert info["scans"] == "2,301, of them 1 failed"
+        assert info["scans"] == "2,301, 1 of them failed"
         assert info["recording"].startswith("/test/lupin_twin (process ")
         assert journal("check", "--journal", path).returncode == 0
         refused = journal("vacuum", "--journal", path)
@@ -197,7 +197,7 @@ def test_the_log_of_a_killed_twin_is_read_too(path: Path) -> None:
     for name in ("j.sqlite", "j.sqlite-wal"):
         path.with_name(name.replace("j", "k", 1)).write_bytes(path.with_name(name).read_bytes())
     connection.close()
-    assert told("--journal", path.with_name("k.sqlite"))["looks"] == "0"
+    assert told("--journal", path.with_name("k.sqlite"))["inspections"] == "0"
 
 
 def test_check_says_what_is_damaged_and_ends_with_1(path: Path) -> None:

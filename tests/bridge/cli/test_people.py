@@ -48,7 +48,7 @@ def test_a_user_is_added_listed_and_removed(file: Path) -> None:
         0,
         "account anna is added, with the role operator\n",
     )
-    assert f"{file} is made: from now on, bridges" in added.stderr
+    assert f"{file} is created: from now on, bridges" in added.stderr
     assert printed(file, "user add bert --role viewer --no-password") == (
         "account bert is added, with the role viewer\n"
     )
@@ -69,7 +69,7 @@ def test_a_user_is_added_listed_and_removed(file: Path) -> None:
         assert accounts.of_session(session, int(time.time())) is None
     last = ended(file, "user remove bert")
     assert (last.returncode, printed(file, "user list")) == (0, "")
-    assert "nobody is left who could sign in" in last.stderr
+    assert "nobody can sign in any more" in last.stderr
 
 
 def test_a_token_is_printed_once_listed_and_revoked(file: Path) -> None:
@@ -113,7 +113,7 @@ def test_the_audit_trail_is_csv_with_the_newest_first(file: Path) -> None:
     [
         ("user add no/name --role viewer --no-password", "the name is 'no/name'"),
         ("user add anna --role viewer --no-password", "there is account 'anna' already"),
-        ("user add bert --role viewer", "there is no terminal to enter the password"),
+        ("user add bert --role viewer", "there is no terminal to enter the password in"),
         ("user add bert --role viewer --password-file /nowhere", "--password-file /nowhere: No "),
         ("user remove bert", "there is no account 'bert'"),
         ("token revoke anna", "there is no token 'anna'"),

@@ -234,4 +234,4 @@ def test_what_hinders_it_is_told_and_is_no_end(
     told = [record.message for record in caplog.records]
     expected = ("argument --speed: ", r"\[Errno 17\] File exists", ".*not a database")
     for text, why in zip(told, expected, strict=True):
-        assert re.match(f"the demo starts without a past: {why}", text)
+        assert re.match(f"the demo starts without history: {why}", text)

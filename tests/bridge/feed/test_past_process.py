@@ -158,7 +158,7 @@ async def test_one_that_dies_or_cannot_be_started_is_told_of_and_another_is_star
             nowhere.setattr(sys, "executable", "/nowhere/python")
             with pytest.raises(NotRemembered, match="cannot be started"):
                 await past.ask(Count(NOW_NS), now(path), 0.0)
-        with pytest.raises(NotRemembered, match="is about to be started again"):
+        with pytest.raises(NotRemembered, match="is being restarted"):
             await past.ask(Count(NOW_NS), now(path), 0.0)
         await until(lambda: not past.why_down, "the rest")
         waiting = asyncio.create_task(past.ask(Endless(), now(path), 0.0))

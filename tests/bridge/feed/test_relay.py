@@ -233,9 +233,9 @@ def test_the_prefixes_of_a_sourced_ros_come_first(tmp_path: Path) -> None:
     [
         ("nobody_msgs/msg/Thing", "nobody_msgs/msg/Thing is not installed"),
         ("lupin_msgs/msg/Nothing", "lupin_msgs/msg/Nothing is not installed"),
-        ("lupin_msgs/Observation", "'lupin_msgs/Observation' is no message type"),
-        ("../msg/Observation", "'../msg/Observation' is no message type"),
-        ("", "'' is no message type"),
+        ("lupin_msgs/Observation", "'lupin_msgs/Observation' is not a message type"),
+        ("../msg/Observation", "'../msg/Observation' is not a message type"),
+        ("", "'' is not a message type"),
     ],
 )
 def test_what_is_not_installed_is_named(type_name: str, said: str) -> None:

@@ -262,7 +262,7 @@ def test_rows_that_cannot_be_read_are_said_on_their_sites_page(
         wait_for(lambda: "cannot be read" in problem(), "the site's page to say so")
         looks = running.metric("lupin_fleet_looks")
         wait_for(lambda: running.metric("lupin_fleet_looks") > looks + 1, "it to be tried again")
-        assert running.process.output.count("site gh1 is as it was: rows of the site") == 1
+        assert running.process.output.count("site gh1 is unchanged: rows of the site") == 1
         # What was last known stays.
         assert len(running.http.get("/sites/gh1/api/state").json()["tags"]) == 5
         assert running.http.get("/readyz").status_code == 200
@@ -351,7 +351,7 @@ def test_a_sites_clock_that_is_wrong_by_a_year(archive: Archive, tmp_path: Path)
     [
         ((), "--archive-url is missing, or LUPIN_ARCHIVE_URL"),
         (("--archive-url", "postgresql://a@b/c", "--site", "gh1"), "--site is for a twin, not for"),
-        (("--ros-args", "-p", "a:=1"), "fleet takes no arguments of ROS"),
+        (("--ros-args", "-p", "a:=1"), "fleet takes no ROS arguments"),
     ],
 )
 def test_what_can_never_work_ends_it(args: tuple[str, ...], said: str) -> None:

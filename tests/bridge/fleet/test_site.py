@@ -73,7 +73,7 @@ def test_a_sites_page_is_below_its_path_and_follows_its_log(
         assert past["header"]["stamp"]["sec"] == int(float(at))
         # The twin has sent no map; and how right estimates were, it has counted itself.
         assert get("api/map").status_code == 404
-        assert "is known to the twin" in get("api/estimate/quality").json()["detail"]
+        assert "the greenhouse's own twin knows" in get("api/estimate/quality").json()["detail"]
         write(journal, [scan("new", time.time_ns(), temperature=22.0)])
         wait_for(lambda: len(get("api/state").json()["tags"]) == 6, "the tag that is new")
 

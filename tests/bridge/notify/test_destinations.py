@@ -59,15 +59,15 @@ def test_a_receiver_is_named_without_its_path(url: str, port: int, path: str, ca
 @pytest.mark.parametrize(
     ("url", "named"),
     [
-        ("tcp://broker", "--mqtt-url has to begin with mqtt:// or mqtts://"),
+        ("tcp://broker", "--mqtt-url must begin with mqtt:// or mqtts://"),
         ("mqtt://", "--mqtt-url names no host"),
         ("mqtt://a:0", "--mqtt-url has the port 0, must be from 1 to 65535"),
-        ("mqtt://a:65536", "--mqtt-url is no address: Port out of range 0-65535"),
+        ("mqtt://a:65536", "--mqtt-url is not an address: Port out of range 0-65535"),
         ("mqtt://a/b", "--mqtt-url has a path: topics go below --mqtt-prefix"),
         ("mqtt://me:hunter2@a", "--mqtt-url has a user or a password in it"),
         ("mqtt://a b", "--mqtt-url is longer than 2000 characters, or has one that"),
         ("mqtt://" + "a" * (MAX_URL - 6), "--mqtt-url is longer than 2000 characters"),
-        ("ftp://a", "--webhook-url has to begin with http:// or https://"),
+        ("ftp://a", "--webhook-url must begin with http:// or https://"),
         ("http://a/#b", "--webhook-url has a fragment (#)"),
         ("http://a/\r\nX: y", "--webhook-url is longer than 2000 characters, or has one that"),
         ("https://me:hunter2@a", "--webhook-url has a user or a password in it"),
@@ -137,7 +137,7 @@ def test_a_setting_that_is_of_no_use_is_told(name: str, url: str) -> None:
 
 def test_a_mistake_is_called_what_its_operator_called_it() -> None:
     said = refusal(mqtt_url="x", given_as={"mqtt_url": "LUPIN_MQTT_URL"})
-    assert said.startswith("LUPIN_MQTT_URL has to begin with")
+    assert said.startswith("LUPIN_MQTT_URL must begin with")
 
 
 def test_an_authority_of_ones_own_is_trusted_and_a_file_that_is_none_is_named(

@@ -66,7 +66,7 @@ def test_any_other_status_is_none_and_a_redirect_is_not_followed(code: int) -> N
 
 def test_nobody_there_is_told_in_the_systems_words() -> None:
     assert refusal(f"http://127.0.0.1:{free_port()}/") == "Connection refused"
-    assert refusal("http://a..b/") == "its host is no name that can be looked up"
+    assert refusal("http://a..b/") == "its host name cannot be looked up"
 
 
 @pytest.mark.parametrize("begin", [b"", b"HTTP/1.1 200 OK\r\nX: "])
@@ -107,7 +107,7 @@ def test_a_head_is_read_up_to_a_limit(begin: bytes, more: bytes) -> None:
 @pytest.mark.parametrize(
     ("said", "why"),
     [
-        (b"SSH-2.0-OpenSSH\r\n\r\n", "no answer of HTTP: "),
+        (b"SSH-2.0-OpenSSH\r\n\r\n", "no HTTP answer: "),
         (b"", "the connection was closed before an answer"),
         (b"HTTP/1.1 200", "the connection was closed before an answer"),
     ],

@@ -183,7 +183,7 @@ async def test_while_the_accounts_cannot_be_read_a_message_waits(
         on.subscribe(on.phone("one"))
         accounts.rename(aside)
         on.board.show([alarm("7")])
-        await until(lambda: "was not taken: the file of accounts" in caplog.text, "why")
+        await until(lambda: "was not accepted: the file of accounts" in caplog.text, "why")
         aside.rename(accounts)
         await until(lambda: on.service.posted, "the first attempt")
         await until(lambda: "will be retried: the file of accounts" in caplog.text, "why")
@@ -386,7 +386,7 @@ def test_a_name_that_leads_into_a_private_network_is_posted_nothing(
         subscribe(anna, phone)
         open_to.live.peer.observe(look(f"at {host}", anomaly=True, bug_count=2))
         wait_for(lambda: count(anna, "dropped") == before + 1, "that it is given up")
-        assert "is no public address" in anna.get("/readyz").text + open_to.live.process.output
+        assert "is not a public address" in anna.get("/readyz").text + open_to.live.process.output
         anna.post("/api/push", json={"endpoint": phone.endpoint})
     assert len(open_to.service.posted) == posted
 
@@ -407,7 +407,7 @@ def test_who_has_no_account_is_notified_of_nothing(open_to: Live) -> None:
         headers = {**OWN, "Authorization": f"Bearer {token}"}
         assert open_to.live.http.get("/api/push", headers=headers).json() == {"public_key": None}
         answer = open_to.live.http.post("/api/push", json=given, headers=headers)
-        assert (answer.status_code, "take an account" in answer.text) == (403, True)
+        assert (answer.status_code, "require an account" in answer.text) == (403, True)
     assert open_to.live.http.post("/api/push", json=given, headers=OWN).status_code == 401
 
 

@@ -187,7 +187,7 @@ async def test_slow_readers_keep_nobody_waiting_for_long(
             with pytest.raises(ConnectionResetError):
                 deque(iter(lambda: slow[0].recv(65_536), b""))
         await until(lambda: it.bridge.admission.exporting == 0, "their places")
-    assert "the export of 127.0.9.1 is slow and makes place for another one" in caplog.text
+    assert "the export of 127.0.9.1 is slow and is ended for another one" in caplog.text
     assert [record for record in caplog.records if record.levelname == "ERROR"] == []
 
 
@@ -227,7 +227,7 @@ async def test_a_lot_that_does_not_come_in_time_breaks_it_off_and_is_one_line_of
         with pytest.raises(httpx.TransportError):
             await it.http.get(PATH)
         await until(lambda: it.bridge.admission.exporting == 0, "its place")
-    assert "an export ended before its end: the answer was not there within 1 s" in caplog.text
+    assert "an export ended early: the answer was not ready within 1 s" in caplog.text
     assert "Traceback" not in caplog.text
 
 

@@ -70,7 +70,7 @@ def test_a_restarted_bridge_has_no_map_at_first_and_matches_no_etag_of_its_prede
                 answer = running.get(path)
                 message = schema.ErrorMessage.model_validate_json(answer.content)
                 assert answer.status_code == 404
-                assert message.detail == "no map has come yet on the twin's map_topic"
+                assert message.detail == "no map has been received yet on the twin's map_topic"
             put_map(running, ROWS, Pose())
             running.peer.observe(scan("1", {"temperature": 20.0}, at=(0.1, 0.1)))
             running.tag("1")

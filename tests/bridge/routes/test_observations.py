@@ -128,8 +128,8 @@ GOOD = {"tag_id": "bad", "readings": {"t": 1.0}}
 @pytest.mark.parametrize(
     ("body", "complaint"),
     [
-        (b"", "the body is no JSON"),
-        (b'{"tag_id": "bad", "readings": {"t": NaN}}', "the body is no JSON"),
+        (b"", "the body is not JSON"),
+        (b'{"tag_id": "bad", "readings": {"t": NaN}}', "the body is not JSON"),
         (b'{"tag_id": "bad", "readings": {"t": 1e999}}', ""),
         ([], "the body: input should be"),
         ({**GOOD, "readings": {}}, "readings: dictionary should have at least 1"),
@@ -143,7 +143,7 @@ GOOD = {"tag_id": "bad", "readings": {"t": 1.0}}
         ({**GOOD, "observed_at": time.time() + 3600}, "s ahead of ROS time, the limit is 10 s"),
         ({**GOOD, "observed_at": "yesterday"}, "observed_at is 'yesterday', expected"),
         ({**GOOD, "observed_at": -5}, "observed_at is '-5.000000000'"),
-        ({**GOOD, "observed_at": 0}, "observed_at is 0, which is no moment"),
+        ({**GOOD, "observed_at": 0}, "observed_at is 0, which is not a moment"),
     ],
 )
 def test_what_cannot_be_is_refused_by_name_and_reaches_nobody(
@@ -180,7 +180,7 @@ def test_a_writer_posts_and_does_nothing_else(live: Bridge) -> None:
     for path in ("/", "/api/state", "/api/session", "/api/audit", "/metrics", "/docs"):
         answer = live.get(path, writer)
         assert answer.status_code == 403, path
-        assert "esp is a writer: it posts to /api/observations, and no more" in answer.text
+        assert "esp is a writer: it may only post to /api/observations" in answer.text
     note = {"kind": "comment", "subject": "site", "text": "x"}
     assert live.http.post("/api/notes", json=note, headers={**writer, **OWN}).status_code == 403
     assert live.http.post("/api/signin", headers={**writer, **OWN}).status_code == 403

@@ -92,7 +92,7 @@ async def test_open_calls_are_bounded_and_the_rest_is_answered(
             TwinUnavailableError("nothing has been received from a twin yet"),
             "nothing has been received from a twin yet",
         ),
-        (RuntimeError("a bug"), "the bridge met an error of its own, see its log"),
+        (RuntimeError("a bug"), "the bridge had an internal error, see its log"),
         (None, f"{FIELD} did not answer within 0.1 s"),
     ],
 )

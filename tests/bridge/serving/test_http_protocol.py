@@ -49,7 +49,7 @@ def test_deaf_readers_keep_their_own_places_and_are_cut_off(live: Served) -> Non
         wait_for(lambda: refused in live.get(SMALL_FIELD).text, "the deaf readers' places")
         with live.client("127.0.4.1") as other:
             assert other.get(SMALL_FIELD).status_code == 200, "it is another client"
-        line = f"cut off a reader that took nothing for {TIMEOUT_S} s"
+        line = f"disconnected a reader that accepted nothing for {TIMEOUT_S} s"
         wait_for(lambda: live.process.output.count(line) == CONCURRENCY, "their end")
         assert all(len(raw_http.heard(client)) < 4_000_000 for client in deaf)
     wait_for(lambda: live.get(SMALL_FIELD).status_code == 200, "their places to be free")

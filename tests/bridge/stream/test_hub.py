@@ -227,7 +227,7 @@ def test_a_client_that_takes_nothing_for_too_long_is_closed_and_forgotten(stage:
     stage.publish(20.0)
     assert stage.hub.dismiss_stuck(10.0 + TIMEOUT_S - 0.1) == 0
     assert stage.hub.dismiss_stuck(10.0 + TIMEOUT_S) == 1
-    assert stuck.dismissed == (CLOSE_POLICY, "took no frame for 30 s")
+    assert stuck.dismissed == (CLOSE_POLICY, "accepted no frame for 30 s")
     assert (quick.dismissed, len(stage.hub)) == (None, 1)
     assert stage.hub.dismiss_stuck(1_000.0) == 0
     assert stage.hub.clients_dismissed == 1

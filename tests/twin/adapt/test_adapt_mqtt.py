@@ -135,7 +135,7 @@ def test_what_is_retained_counts_by_its_own_time_or_not_at_all(domain: int, tmp_
             peer.listen()
             tag = peer.tag("bench", lambda tag: tag.readings)
             assert abs(tag.last_observed.sec - then_s) < 2.0
-            peer.until(lambda: robot.said("it is retained and says no time"), "the complaint")
+            peer.until(lambda: robot.said("it is retained and has no time"), "the complaint")
             peer.until(lambda: robot.said("must be from -inf to 2000"), "the other")
             assert readings(peer, "undated") == readings(peer, "hot") == {}
 
@@ -163,8 +163,8 @@ def test_a_flood_a_megabyte_and_a_topic_for_each_message_harm_nothing(
             return bool(readings(peer, "bench"))
 
         peer.until(is_known, "a good reading behind all that")
-        peer.until(lambda: robot.said("it is no JSON"), "the complaint")
-        assert process.output.count("it is no JSON") < 10
+        peer.until(lambda: robot.said("it is not JSON"), "the complaint")
+        assert process.output.count("it is not JSON") < 10
         assert process.exit_code is None
 
 
@@ -190,7 +190,7 @@ def test_a_topic_that_is_no_utf8_is_told_and_costs_no_other(domain: int, tmp_pat
             Peer(domain) as peer,
         ):
             robot = Robot(peer)
-            peer.until(lambda: robot.said("its topic is no UTF-8"), "the complaint")
+            peer.until(lambda: robot.said("topic is not UTF-8"), "the complaint")
             peer.until(lambda: robot.observations, "the good one behind it")
             assert "Traceback" not in process.output
         serving.result()
@@ -222,7 +222,7 @@ def test_a_broker_that_comes_late_or_goes_is_told_and_found_again(
     broker = Broker(tmp_path)
     with adapted(domain, broker) as process, Peer(domain) as peer:
         robot = Robot(peer)
-        peer.until(lambda: robot.said("nobody answers at 127.0.0.1"), "the broker to be missed")
+        peer.until(lambda: robot.said("nothing answers at 127.0.0.1"), "the broker to be missed")
         with broker.running():
             peer.until(lambda: robot.said("connected"), "the broker")
         robot.reports.clear()

@@ -147,7 +147,7 @@ def test_a_tag_that_is_seen_is_on_the_map_and_what_is_read_there_is_its_own(
 
 
 WRONG: list[tuple[Callable[[Robot], object], str]] = [
-    (lambda robot: None, "TF has no way from 'base_link' to 'map' (frame_id)"),
+    (lambda robot: None, "TF has no path from 'base_link' to 'map' (frame_id)"),
     (
         lambda robot: robot.be_at(0.0, robot.see(7, 0.3, frame="bench")),
         "a tag was detected, but TF has no 'tag36h11:7': is tag.frames set in apriltag_ros?",
@@ -191,7 +191,7 @@ def test_a_fixed_sensor_is_where_its_frame_is(domain: int, config: Path) -> None
 
         at = peer.until(is_there, "the sensor where its frame is").pose.position
         assert (at.x, at.y, at.z) == pytest.approx((4.0, 1.5, 0.8))
-        peer.until(lambda: robot.said("TF has no way from 'nowhere' to 'map'"), "the other one")
+        peer.until(lambda: robot.said("TF has no path from 'nowhere' to 'map'"), "the other one")
         robot.stand(*frames, robot.step("map", "nowhere", (1.0, 0.0, 0.0)))
         robot.reports.clear()
 

@@ -105,7 +105,7 @@ def changed(path: str, value: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("path", "value", "complaint"),
     [
-        ("sensors", ..., "sensors: none is given, and no mqtt"),
+        ("sensors", ..., "sensors and mqtt are both missing"),
         ("sensors.temperature.topic", ..., "sensors.temperature.topic is missing"),
         ("sensors.temperature.factr", 2, "sensors.temperature.'factr' is not known, expected one"),
         ("sensors.temperature.factor", "2", "sensors.temperature.factor is '2', expected a number"),
@@ -159,10 +159,10 @@ def test_what_cannot_be_is_named(path: str, value: Any, complaint: str | None) -
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("a: [", "is no YAML"),
-        ("[" * 5000, "is no YAML"),
-        ("a: " + "9" * 5000, "is no YAML"),
-        ("\x00", "is no YAML"),
+        ("a: [", "is not YAML"),
+        ("[" * 5000, "is not YAML"),
+        ("a: " + "9" * 5000, "is not YAML"),
+        ("\x00", "is not YAML"),
         ("- 1", "the file is [1], expected keys"),
         ("reach_m: 0x" + "f" * 5000, "reach_m is a very large int, expected a number"),
         # A thousand million entries, in ten lines.

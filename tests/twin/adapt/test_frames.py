@@ -63,14 +63,14 @@ def test_any_chain_is_the_product_of_its_matrices() -> None:
 @pytest.mark.parametrize(
     ("steps", "complaint"),
     [
-        ({}, "TF has no way from 'tag' to 'map' (frame_id): it ends at 'tag'"),
+        ({}, "TF has no path from 'tag' to 'map' (frame_id): it ends at 'tag'"),
         ({"tag": step("camera", 0, 0, 0)}, "it ends at 'camera'"),
         (
             {"tag": step("map", 0, 0, 0, stamp_ns=NOW - 3 * S)},
             "the transform from 'map' to 'tag' is 3.0 s old, the limit is 2 s",
         ),
         ({"tag": step("map", 0, 0, 0, stamp_ns=NOW + 11 * S)}, "is -11.0 s old"),
-        ({"tag": step("a", 0, 0, 0), "a": step("tag", 0, 0, 0)}, "TF has a circle"),
+        ({"tag": step("a", 0, 0, 0), "a": step("tag", 0, 0, 0)}, "TF has a loop"),
     ],
 )
 def test_where_no_chain_leads_is_named(steps: dict[str, Transform], complaint: str) -> None:

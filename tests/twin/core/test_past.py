@@ -37,10 +37,10 @@ def request(given: dict[str, Any]) -> SeriesRequest | WritesRequest:
         ({"tag_id": ""}, "tag_id is empty"),
         ({"sensor_type": ""}, "sensor_type is empty"),
         ({"sensor_type": "~hopes"}, "sensor_type '~hopes' is none of ~scans"),
-        ({"sensor_type": "~runs"}, "tag_id is 'tag_7', and ~runs are those of '*'"),
+        ({"sensor_type": "~runs"}, "tag_id is 'tag_7', but ~runs are only those of '*'"),
         (
             {"tag_id": "*"},
-            "tag_id is '*', which has events alone, and sensor_type is 'temperature': expected one",
+            "tag_id is '*', which has only events, but sensor_type is 'temperature': expected one",
         ),
         (
             {"tag_id": "7" * (MAX_TEXT_LENGTH + 1)},

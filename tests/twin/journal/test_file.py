@@ -69,7 +69,9 @@ def test_it_is_said_where_hours_leave_no_room_for_scans(
     monkeypatch.setattr("lupin_twin.journal.file._PURGE_EVERY_S", 0.0)
     kept(path, [scan(at_ns=NOW + n) for n in range(500)])
     with recording(path, limits=Limits(days=36_500, max_bytes=10_000)) as journal:
-        wait_state(journal, JournalState.RECORDING, "no scans are kept: hours, which stay")
+        wait_state(
+            journal, JournalState.RECORDING, "no scans are kept: the hours, which are never deleted"
+        )
     assert select(path, "SELECT count(*) FROM scan") == [(0,)]
 
 

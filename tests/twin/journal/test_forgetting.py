@@ -104,11 +104,11 @@ def test_it_is_on_record_what_was_forgotten_by_whom_and_when(path: Path, journal
     assert journal("forget", LOST, "--pose").returncode == 0
     again = journal("forget", LOST, "--pose")
     assert (again.returncode, again.stdout) == (1, "")
-    assert "knows no place of tag 'lost'" in again.stderr
+    assert "has no place of tag 'lost'" in again.stderr
     assert journal("forget", LOST).returncode == 0
-    assert "knows no tag 'lost'" in journal("forget", LOST).stderr
+    assert "has no tag 'lost'" in journal("forget", LOST).stderr
     told = journal("info").stdout
     by = getpass.getuser()
-    assert f"forgotten  the pose of tag 'lost', by {by}, 20" in told
-    assert f"forgotten  all of tag 'lost', by {by}, 20" in told
+    assert f"forgotten    the pose of tag 'lost', by {by}, 20" in told
+    assert f"forgotten    all of tag 'lost', by {by}, 20" in told
     assert told.count("forgotten") == 2

@@ -88,7 +88,7 @@ def test_a_file_that_is_being_made_is_called_empty_and_is_not_damaged(tmp_path: 
     with closing(sqlite3.connect(path, isolation_level=None)) as maker:
         maker.execute("BEGIN IMMEDIATE")
         maker.execute("CREATE TABLE meta (x)")
-        with pytest.raises(Empty, match="is empty: a journal that is just being made"):
+        with pytest.raises(Empty, match="is empty: a journal that is just being created"):
             open_reader(path)
         assert find_damage(path) is None
 
@@ -116,14 +116,14 @@ def test_a_file_that_is_no_database_is_damaged(tmp_path: Path) -> None:
 @pytest.mark.parametrize("content", [b"x", b"\x89MCAP0\r\n" * 1000])
 def test_a_named_file_that_is_no_database_is_somebody_elses(content: bytes, path: Path) -> None:
     path.write_bytes(content)
-    with pytest.raises(Foreign, match="is no journal: it does not begin as SQLite's files do"):
+    with pytest.raises(Foreign, match="is not a journal: it does not begin as an SQLite file"):
         open_named(path)
 
 
 def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "fifo")
     for path in (tmp_path / "fifo", tmp_path, Path("/dev/zero")):
-        with pytest.raises(Foreign, match="is no journal: it is no regular file"):
+        with pytest.raises(Foreign, match="is not a journal: it is not a regular file"):
             open_reader(path)
 
 

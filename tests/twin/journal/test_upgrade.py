@@ -187,7 +187,7 @@ def test_while_somebody_reads_it_waits(tmp_path: Path) -> None:
         reader.execute("BEGIN")
         reader.execute("SELECT count(*) FROM scan").fetchone()
         writer.execute("UPDATE run SET begun_arrival_ns = begun_arrival_ns + 1")
-        with pytest.raises(sqlite3.OperationalError, match="somebody reads"):
+        with pytest.raises(sqlite3.OperationalError, match="another process reads"):
             upgrade(path, lambda share: None)
         reader.execute("ROLLBACK")
         # To have it open is no hindrance, and it goes on with what it has, whatever is written.

@@ -153,7 +153,7 @@ def test_what_is_too_much_is_lost_oldest_first_and_told(
         wait_state(journal, JournalState.FAILING)
         for n in range(15):
             journal.write(scan(str(n)))
-        condition = wait_state(journal, JournalState.FAILING, "5 observations were lost to it")
+        condition = wait_state(journal, JournalState.FAILING, "5 observations were lost")
         assert (condition.lost, condition.waiting) == (5, 10)
         path.rmdir()
         wait_for(lambda: journal.condition.written == 10, "healing")

@@ -171,7 +171,7 @@ def test_a_report_serves_for_a_while_and_what_is_wrong_is_said_once(
     graded = Record(1, Tally(40, 10), Tally(40, 10))
     narrow = LastResult(Report(at_ns, at_ns, "", graded), Grades(86_400.0))
     said = replace(service, _known={"light": narrow}).finding()
-    assert (said.level, said.message[:26]) == (WARN, "light: too sure of itself,")
+    assert (said.level, said.message) == (WARN, "light: the predicted range is too narrow")
     assert replace(service, _known={}).finding().message == "nothing is wrong"
     assert reported == [f"no new model of co2: {report().fit_problem}"]
     searches.clear()

@@ -31,7 +31,7 @@ def test_what_is_given_overrides_the_file_with_its_type() -> None:
 
 def test_a_file_that_is_not_there_is_refused_by_name() -> None:
     given = NOT_GIVEN | {"params_file": "/no.yaml"}
-    with pytest.raises(LaunchError, match=r"params_file is '/no\.yaml', expected a file"):
+    with pytest.raises(LaunchError, match=r"params_file is '/no\.yaml', expected an existing file"):
         params_file(given, "twin.yaml", lambda path: path == "twin.yaml")
     assert params_file(given, "twin.yaml", lambda path: path == "/no.yaml") == "/no.yaml"
 

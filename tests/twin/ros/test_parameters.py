@@ -43,7 +43,7 @@ def test_descriptors_tell_meaning_range_and_why_it_is_read_only(domain: int) -> 
     assert (power.read_only, power.additional_constraints) == (False, "")
     [whole] = length.integer_range
     assert (whole.from_value, whole.to_value, length.read_only) == (1, 10_000, True)
-    assert journal.additional_constraints.startswith("read only: room was made by it")
+    assert journal.additional_constraints.startswith("read only: memory and files were set up")
 
 
 def test_a_change_is_told_once_with_all_parameters(domain: int) -> None:
@@ -70,7 +70,7 @@ def test_a_change_is_told_once_with_all_parameters(domain: int) -> None:
         (
             "buffer_len",
             5,
-            "parameter buffer_len is 32 and cannot become 5 while the twin runs: room",
+            "parameter buffer_len is 32 and cannot become 5 while the twin runs: memory",
         ),
     ],
 )
@@ -105,13 +105,15 @@ def test_complaints_name_the_parameter(domain: int) -> None:
     ):
         node.create_subscription(Time, "a b", lambda _: None, 1)
     with (
-        pytest.raises(ParameterError, match=r"parameter use_sim_time is no bool: .*'5'"),
+        pytest.raises(ParameterError, match=r"parameter use_sim_time is not a bool: .*'5'"),
         naming_own_parameters(),
         node_with(domain, "use_sim_time:=5"),
     ):
         pass
     with (
-        pytest.raises(ParameterError, match="parameter start_type_description_service is no bool"),
+        pytest.raises(
+            ParameterError, match="parameter start_type_description_service is not a bool"
+        ),
         naming_own_parameters(),
         node_with(domain, "start_type_description_service:=5"),
     ):

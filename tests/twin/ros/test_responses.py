@@ -111,8 +111,8 @@ def test_it_is_given_up_aloud_where_nobody_reads(stage: Stage) -> None:
     assert stage.go_on() == []
     [said] = stage.warned
     assert said == (
-        "gave up a response of /ask: for 30 s DDS has found no reader for it; is the QoS of a "
-        "client another than the default of services?"
+        "gave up a response of /ask: for 30 s DDS has found no reader for it; does a "
+        "client use a QoS other than the default of services?"
     )
 
 

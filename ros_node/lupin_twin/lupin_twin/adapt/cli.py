@@ -19,17 +19,19 @@ if TYPE_CHECKING:
 WRONG = 1
 
 
-HELP = "make observations of a robot's own topics, or of sensors at an MQTT broker"
+HELP = "turn a robot's own topics, or sensors on an MQTT broker, into observations"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's own options; those of ROS follow `--ros-args`."""
-    parser.add_argument("--config", type=Path, metavar="FILE", help="YAML: topics, tags, sensors")
+    parser.add_argument(
+        "--config", type=Path, metavar="FILE", help="YAML file: topics, tags, sensors"
+    )
     parser.add_argument(
         "--check",
         action="store_true",
-        help="listen, say what comes and what is missing, and end; without --config, print a "
-        "configuration to start from",
+        help="listen, report what arrives and what is missing, and exit; without --config, print "
+        "a configuration to start from",
     )
     parser.add_argument(
         "--seconds", type=float, default=10.0, metavar="S", help="how long to listen (default: 10)"
@@ -81,7 +83,7 @@ def _run(config: Config) -> int:
     node = AdaptNode(config)
     node.get_logger().info(
         f"adapting sensors for {len(config.tags)} tags; "
-        "what comes and what is dropped is on /diagnostics"
+        "/diagnostics shows what arrives and what is dropped"
     )
     return run_until_signal(node)
 
@@ -108,10 +110,8 @@ def _suggest(seconds: float) -> int:
         sys.stderr.write(f"{why}\n")
     if not any(source.received for source in listener.sources.values()):
         topics = ", ".join(sorted(name for name, _ in listener.get_topic_names_and_types()))
-        return refuse(
-            "adapt", f"nothing was received that is a reading or a pose; topics: {topics or 'none'}"
-        )
-    sys.stdout.write("# Where each tag is, [x, y] in m, is for you to fill in.\n")
+        return refuse("adapt", f"no reading and no pose was received; topics: {topics or 'none'}")
+    sys.stdout.write("# Fill in where each tag is: [x, y] in m.\n")
     sys.stdout.write(suggestion(listener))
     return 0
 

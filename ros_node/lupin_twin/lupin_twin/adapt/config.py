@@ -142,7 +142,7 @@ def config_of(content: Any, folder: Path = Path()) -> Config:
     )
     table.end()
     if not sensors and config.broker is None:
-        raise ConfigError("sensors: none is given, and no mqtt: expected one of them at least")
+        raise ConfigError("sensors and mqtt are both missing, expected at least one")
     for sensor in sensors:
         if sensor.tag and sensor.tag not in tags:
             raise ConfigError(
@@ -288,4 +288,4 @@ def read_yaml(path: Path) -> Any:
         return yaml.load(content, Loader)  # noqa: S506  # it is a SafeLoader
     # PyYAML passes on Python's errors about encoding, numbers of thousands of digits, and [[[[[...
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ConfigError(f"{path} is no YAML: {' '.join(str(error).split())[:200]}") from None
+        raise ConfigError(f"{path} is not YAML: {' '.join(str(error).split())[:200]}") from None

@@ -75,7 +75,7 @@ class Frames:
         numbers = (*transform.move, *transform.turn)
         length = math.hypot(*transform.turn)
         if not all(abs(number) < 1e6 for number in numbers) or length < 1e-3:  # NaN is neither
-            raise FrameError(f"the transform to {frame[:64]!r} has {numbers}, which is none")
+            raise FrameError(f"the transform to {frame[:64]!r} has {numbers}, which is invalid")
         if not 0 < len(frame) <= MAX_NAME or not 0 < len(transform.parent) <= MAX_NAME:
             raise FrameError(f"a frame's name has {len(frame)} characters, the limit: {MAX_NAME}")
         if frame not in self._of and len(self._of) >= MAX_FRAMES:
@@ -103,7 +103,7 @@ class Frames:
             step = self._of.get(name)
             if step is None:
                 raise FrameError(
-                    f"TF has no way from {frame!r} to {inside!r} (frame_id): it ends at {name!r}"
+                    f"TF has no path from {frame!r} to {inside!r} (frame_id): it ends at {name!r}"
                 )
             age_ns = 0 if step.stamp_ns is None else now_ns - step.stamp_ns
             if not -_AHEAD_NS <= age_ns <= max_age_ns:
@@ -112,7 +112,7 @@ class Frames:
                     f"the limit is {max_age_ns / 1e9:g} s"
                 )
             at, name = step.apply(*at), step.parent
-        raise FrameError(f"more than {MAX_STEPS} transforms from {frame!r}: TF has a circle")
+        raise FrameError(f"more than {MAX_STEPS} transforms from {frame!r}: TF has a loop")
 
 
 class Sightings:

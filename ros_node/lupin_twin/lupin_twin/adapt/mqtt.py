@@ -141,7 +141,7 @@ def measured(pattern: Pattern, tag: str, sensor: str, payload: bytes) -> Measure
     try:
         content = json.loads(payload)
     except (ValueError, RecursionError):
-        raise Rejected(f"it is no JSON: {shown(payload[:40])}") from None
+        raise Rejected(f"it is not JSON: {shown(payload[:40])}") from None
     readings = []
     for name, value in pattern.values.items():
         found = _at(content, value.path)
@@ -198,7 +198,7 @@ def _password(table: Table, folder: Path) -> str:
         with (folder / str(file)).open(encoding="utf-8") as opened:
             return opened.read(MAX_PAYLOAD_BYTES).strip()
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is no text"
+        reason = getattr(error, "strerror", None) or "it is not text"
         raise ConfigError(f"mqtt.password_file {file}: {reason}") from None
 
 
@@ -337,13 +337,13 @@ class MqttClient:
         self, client: Any, _data: Any, _flags: Any, code: Any, _properties: Any
     ) -> None:
         if code.is_failure:
-            self.problem = f"{self._broker.host}:{self._broker.port} refuses us: {code}"
+            self.problem = f"{self._broker.host}:{self._broker.port} refuses the connection: {code}"
             return
         self.problem = ""
         client.subscribe([(pattern.filter, 1) for pattern in self._broker.patterns])
 
     def _on_connect_fail(self, _client: Any, _data: Any) -> None:
-        self.problem = f"nobody answers at {self._broker.host}:{self._broker.port}"
+        self.problem = f"nothing answers at {self._broker.host}:{self._broker.port}"
 
     def _on_disconnect(
         self, _client: Any, _data: Any, _flags: Any, code: Any, _properties: Any

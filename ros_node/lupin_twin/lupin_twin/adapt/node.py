@@ -315,7 +315,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             try:
                 topic = message.topic
             except UnicodeDecodeError as error:  # some brokers let it pass
-                self._drop(Reason.UNREADABLE, MQTT, f"its topic is no UTF-8: {error}", case="topic")
+                self._drop(Reason.UNREADABLE, MQTT, f"topic is not UTF-8: {error}", case="topic")
                 continue
             if len(topic) > MAX_TOPIC_LENGTH:
                 why = f"its topic has {len(topic)} characters, the limit: {MAX_TOPIC_LENGTH}"
@@ -340,7 +340,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             self._drop(
                 Reason.REJECTED,
                 topic,
-                "it is retained and says no time (time): nobody knows how old it is",
+                "it is retained and has no time (time): its age is not known",
                 case="retained",
             )
             return
@@ -357,7 +357,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
                 self._sources[MQTT].used += 1
                 self._sources[MQTT].shown[pattern.topic] = f"{said.tag} {name} {value:g}"
             else:
-                self._drop(Reason.SIZE, topic, "it is of one tag or sensor too many", case="many")
+                self._drop(Reason.SIZE, topic, "it is one tag or sensor too many", case="many")
 
     def _each_second(self) -> None:
         self._publish(self._scans.due(self._now_ns()))
@@ -365,7 +365,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         for frame in self._sightings.missed(self._now_ns()):
             why = f"TF has no {frame!r}: is tag.frames set in apriltag_ros?"
             if frame in self._frames:
-                why = self._why_no_place(frame) or f"{frame!r} is of an earlier picture in TF"
+                why = self._why_no_place(frame) or f"{frame!r} is from an earlier picture in TF"
             self._drop(Reason.FRAME, TF, f"a tag was detected, but {why}", case="tag")
         self._send(
             self._diagnostics,

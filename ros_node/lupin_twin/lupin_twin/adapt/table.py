@@ -172,12 +172,12 @@ def seconds_of(stamp: Any, zone: tzinfo | None) -> float:
         unit = next((size for size in (1e9, 1e6, 1e3) if number > _MILLISECONDS * size / 1e3), 1.0)
         seconds = number / unit
         if not 0 < seconds < _MILLISECONDS:
-            raise Rejected("the time is no moment since 1970")
+            raise Rejected("the time is not a moment since 1970")
         return seconds
     try:
         moment = datetime.fromisoformat(stamp.strip())
     except (AttributeError, ValueError):
-        raise Rejected("the time is no ISO 8601, and no seconds since 1970") from None
+        raise Rejected("the time is neither ISO 8601 nor seconds since 1970") from None
     if moment.tzinfo is None:
         if zone is None:
             raise Rejected("the time has no offset, and time_zone is not given")

@@ -38,9 +38,9 @@ STALE: Final = 3
 
 CLOCK: Final[Mapping[ClockState, tuple[int, str]]] = {
     "running": (OK, "ROS time runs"),
-    "paused": (WARN, "ROS time is paused: /clock is published and stands"),
-    "stopped": (ERROR, "ROS time has stopped, nothing comes on /clock: ages are not known"),
-    "none": (ERROR, "there is no ROS time, nothing comes on /clock: ages are not known"),
+    "paused": (WARN, "ROS time is paused: /clock is published, but does not advance"),
+    "stopped": (ERROR, "ROS time has stopped, nothing arrives on /clock: ages are not known"),
+    "none": (ERROR, "there is no ROS time, nothing arrives on /clock: ages are not known"),
     "doubted": (ERROR, "ROS time contradicts the journal: ages are not known; set the clock"),
 }
 
@@ -49,11 +49,11 @@ CLOCK: Final[Mapping[ClockState, tuple[int, str]]] = {
 # come from a simulation or from a recording that is played.
 Origin = Literal["unknown", "robot", "simulated", "recorded", "sim_time"]
 _ORIGIN: Final[Mapping[Origin, str]] = {
-    "unknown": "nobody says where observations come from",
-    "robot": "observations are a robot's",
+    "unknown": "the origin of observations is not known",
+    "robot": "observations come from a robot",
     "simulated": "observations are simulated",
     "recorded": "observations are played from a recording",
-    "sim_time": "time is that of /clock: a simulation's, or that of a recording that is played",
+    "sim_time": "time comes from /clock: from a simulation, or a recording",
 }
 
 
@@ -121,7 +121,7 @@ _WELL = frozenset(
     {JournalState.UNKNOWN, JournalState.OFF, JournalState.STARTING, JournalState.RECORDING}
 )
 UNKNOWN_JOURNAL = Condition(
-    JournalState.UNKNOWN, "the twin does not say whether it keeps a journal"
+    JournalState.UNKNOWN, "the twin does not report whether it keeps a journal"
 )
 
 
@@ -193,7 +193,7 @@ def findings(health: Health) -> Iterator[Finding]:
         WARN if late else OK,
         f"stamps behind their own earlier ones from {shown(', '.join(late))}"
         if late
-        else "no stamps too late",
+        else "no late stamps",
         late,
     )
     yield Finding(
@@ -243,10 +243,10 @@ def _inputs(health: Health) -> Finding:
     if problems:
         return Finding("inputs", WARN, "; ".join(problems), values)
     if observed_ago_s is None:
-        return Finding("inputs", STALE, "no observation has been taken in yet", values)
+        return Finding("inputs", STALE, "no observation has been accepted yet", values)
     if silent:
-        return Finding("inputs", WARN, f"nobody publishes {', '.join(silent)}", values)
-    return Finding("inputs", OK, "all inputs are there", values)
+        return Finding("inputs", WARN, f"nothing publishes {', '.join(silent)}", values)
+    return Finding("inputs", OK, "all inputs have publishers", values)
 
 
 def _recent_readings(recent: Iterable[Recent]) -> dict[str, str]:

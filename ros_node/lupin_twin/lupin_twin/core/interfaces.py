@@ -70,7 +70,7 @@ DISCOVERED_TAGS: Final = Topic(
     max_bytes=16_000_000,
 )
 MAP: Final = Topic(
-    "nav_msgs/msg/OccupancyGrid", "the floor as SLAM knows it", parameter="map_topic"
+    "nav_msgs/msg/OccupancyGrid", "occupancy grid of the floor, from SLAM", parameter="map_topic"
 )
 CLOCK: Final = Topic(
     "rosgraph_msgs/msg/Clock",
@@ -98,7 +98,7 @@ STATE: Final = Topic(
 )
 TIMES: Final = Topic(
     "lupin_msgs/msg/TwinTimes",
-    "when each value of the state was observed; published right behind it, with the same stamp",
+    "when each value of the state was observed; published right after it, with the same stamp",
     "twin/times",
 )
 LAYERS: Final = Topic(

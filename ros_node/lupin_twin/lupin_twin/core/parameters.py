@@ -60,9 +60,9 @@ def _parameter(default: Any, description: str, *limits: float, **more: Any) -> A
 
 
 # Reasons why a parameter is read only at the start.
-_NAMED: Final = "what others have found under this name cannot follow: start the twin anew"
-_MEANING: Final = "what is known already was taken in by it: start the twin anew"
-_MADE: Final = "room was made by it as the twin started: start the twin anew"
+_NAMED: Final = "other nodes already use this name: restart the twin"
+_MEANING: Final = "existing data was accepted under it: restart the twin"
+_MADE: Final = "memory and files were set up for it at the start: restart the twin"
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,22 +96,22 @@ class TwinParameters:
         "twin/get_field", "name of the GetField service", fixed=_NAMED
     )
     state_publish_rate_hz: float = _parameter(
-        1.0, "how often the state is published, by the steady clock", 0.01, 100.0
+        1.0, "rate at which the state is published, Hz, by the steady clock", 0.01, 100.0
     )
-    frame_id: str = _parameter("map", "the frame that every pose has to be in", fixed=_MEANING)
+    frame_id: str = _parameter("map", "frame that every pose must be in", fixed=_MEANING)
     max_pose_m: float = _parameter(
         1000.0,
         "a pose with a coordinate farther than this from the frame's origin is dropped, m",
         0.001,
         FARTHEST_M,
     )
-    buffer_len: int = _parameter(32, "scans in the history of a tag", 1, 10_000, fixed=_MADE)
+    buffer_len: int = _parameter(32, "scans kept in the history of a tag", 1, 10_000, fixed=_MADE)
     idw_power: float = _parameter(2.0, "exponent of the distance in the weights", 0.01, 100.0)
     idw_falloff_radius_m: float = _parameter(
         1.5, "tags up to this distance are averaged, m", 0.001, 10_000.0
     )
     idw_max_distance_m: float = _parameter(
-        1.5, "a cell whose nearest tag is farther is NaN, m", 0.001, 10_000.0
+        1.5, "a cell farther than this from its nearest tag is NaN, m", 0.001, 10_000.0
     )
     max_grid_cells: int = _parameter(
         1_000_000, "largest field served, cells", 1, 100_000_000, fixed=_MADE
@@ -123,8 +123,8 @@ class TwinParameters:
 
     journal: str = _parameter(
         "",
-        "file that keeps what was observed; off: a temporary one; empty: the user's, by domain and "
-        "namespace",
+        "file that records all observations; off: a temporary file; empty: this user's file for "
+        "the ROS domain and namespace",
         may_be_empty=True,
         fixed=_MADE,
     )
@@ -136,7 +136,7 @@ class TwinParameters:
         fixed=_MADE,
     )
     journal_max_mb: float = _parameter(
-        4000.0, "size past which the journal deletes its oldest scans, MB", 10.0, 1e7, fixed=_MADE
+        4000.0, "size beyond which the journal deletes its oldest scans, MB", 10.0, 1e7, fixed=_MADE
     )
 
     def __post_init__(self) -> None:
@@ -225,25 +225,26 @@ class Argument:
 
 
 ARGUMENTS: Final = (
-    Argument("namespace", "moves the node, its topics and its services, such as gh1"),
-    Argument("params_file", "file of parameters, YAML; not given: the package's config/twin.yaml"),
+    Argument("namespace", "namespace of the node, its topics and its services, such as gh1"),
+    Argument("params_file", "YAML file of parameters; not given: the package's config/twin.yaml"),
     Argument(
         "use_sim_time",
-        "true follows /clock; not given: what the file says",
+        "true: follow /clock; not given: as in the file of parameters",
         choices=("", "true", "false"),
     ),
     Argument(
         "journal",
-        "file that keeps what was observed, or off for none; not given: what the file says",
+        "file that records all observations; off: a temporary file; not given: as in the file of "
+        "parameters",
     ),
     Argument(
         "layers",
         "sensors whose fields are published for RViz, separated by commas, such as "
-        "temperature,humidity; not given: what the file says",
+        "temperature,humidity; not given: as in the file of parameters",
     ),
     Argument(
         "log_level",
-        "debug, info, warn, error or fatal; or of one logger, such as rcl:=debug",
+        "debug, info, warn, error or fatal; or the level of one logger, such as rcl:=debug",
         default="info",
     ),
 )
@@ -270,5 +271,5 @@ def params_file(given: Mapping[str, str], default: str, is_file: Callable[[str],
     """
     path = given["params_file"] or default
     if not is_file(path):
-        raise LaunchError(f"params_file is {path!r}, expected a file that is there")
+        raise LaunchError(f"params_file is {path!r}, expected an existing file")
     return path

@@ -141,11 +141,11 @@ class SeriesRequest:
             )
         if self.event is Event.RUNS and self.tag_id != EVERY_TAG:
             raise PastRefused(
-                f"tag_id is {self.tag_id[:64]!r}, and ~runs are those of {EVERY_TAG!r}"
+                f"tag_id is {self.tag_id[:64]!r}, but ~runs are only those of {EVERY_TAG!r}"
             )
         if self.event is None and self.tag_id == EVERY_TAG:
             raise PastRefused(
-                f"tag_id is {EVERY_TAG!r}, which has events alone, and sensor_type is "
+                f"tag_id is {EVERY_TAG!r}, which has only events, but sensor_type is "
                 f"{self.sensor_type[:64]!r}: expected one tag, or one of {', '.join(Event)}"
             )
 

@@ -257,4 +257,4 @@ def map_of(text: str, revision: int) -> OccupancyMap:
         cells = zlib.decompressobj().decompress(packed, size + 1)
         return OccupancyMap(**about, cells=np.frombuffer(cells, np.int8), revision=revision)
     except (AttributeError, KeyError, TypeError, zlib.error) as error:
-        raise ValueError(f"it is no map: {error}") from None
+        raise ValueError(f"it is not a map: {error}") from None

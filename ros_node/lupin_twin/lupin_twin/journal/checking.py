@@ -92,7 +92,7 @@ def find_all_damage(connection: sqlite3.Connection, report: Progress) -> Generat
         except FILE_ERRORS as error:
             if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT:
                 raise
-            yield f"{what}: cannot be read on: {error}"
+            yield f"{what}: cannot be read further: {error}"
 
 
 def _structure(connection: sqlite3.Connection) -> Iterator[str]:

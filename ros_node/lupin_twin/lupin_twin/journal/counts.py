@@ -176,7 +176,7 @@ def _hours_of(log: SiteLog, keys: Iterable[tuple[int, int]]) -> dict[tuple[int, 
     try:
         lists = json.loads("[" + ",".join([f"[{','.join(row[2:])}]" for row in rows]) + "]")
     except ValueError:
-        raise DamagedFile("an hour in the journal is no list of numbers") from None
+        raise DamagedFile("an hour in the journal is not a list of numbers") from None
     return {row[:2]: of_row for row, of_row in zip(rows, lists, strict=True)}
 
 

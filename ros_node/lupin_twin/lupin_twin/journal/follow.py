@@ -203,7 +203,7 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
                 _followed(connection)
                 gone, begun = _gone_seq(connection), int(get_meta(connection, _BEGUN) or 0)
             except _UNUSABLE as error:
-                raise NotALotError(f"rows that are none of a log: {error}") from error
+                raise NotALotError(f"rows that are not those of a log: {error}") from error
             # A journal that was restored from a backup gives the same numbers to other rows.
             there, here = get_meta(connection, _UP_TO) or "", _up_to(connection, behind)
             if there.startswith(f"{behind} ") and there != here:
@@ -234,7 +234,7 @@ def followed(path: Path) -> Followed:
             _gone_seq(connection)  # `write` relies on it
             return _followed(connection)
         except _UNUSABLE as error:
-            raise DamagedFile(f"{path} says nonsense of itself: {error}") from error
+            raise DamagedFile(f"{path} contradicts itself: {error}") from error
 
 
 def _followed(connection: sqlite3.Connection) -> Followed:

@@ -72,7 +72,7 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
         with closing(sqlite3.connect(path, isolation_level=None, timeout=5.0)) as connection:
             # First move the WAL into the file: otherwise it would be taken for the new file's WAL.
             if _is_read(connection):
-                somebody = f"somebody reads {path}, which is to be upgraded"
+                somebody = f"another process reads {path}, which must be upgraded"
                 raise sqlite3.OperationalError(somebody)  # noqa: TRY301
             connection.execute("PRAGMA query_only = 1")
             _remove(new)
@@ -256,7 +256,7 @@ def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:
             )
         connection.execute("VACUUM")
         if _is_read(connection):
-            raise NotPossible(f"somebody reads {path}: try again when nobody does")
+            raise NotPossible(f"another process reads {path}: try again when none does")
         return before, path.stat().st_size
 
 

@@ -149,7 +149,7 @@ def delete_up_to(connection: sqlite3.Connection, last: int) -> None:
 def unmet_limit(connection: sqlite3.Connection, limits: Limits, before_ns: int) -> str:
     """Which limit is exceeded although nothing more can be deleted, in words; empty if none."""
     if used_bytes(connection) > limits.max_bytes:
-        return "no scans are kept: hours, which stay, are larger than journal_max_mb"
+        return "no scans are kept: the hours, which are never deleted, exceed journal_max_mb"
     if any(row[2] < before_ns for row in outermost(connection, "ASC")):
         return "what is older than journal_days is kept until it is forwarded"
     return ""
@@ -235,7 +235,7 @@ def forget(path: Path, tag_id: str, *, pose_only: bool, by: str, at_ns: int) -> 
         set_meta(connection, LAST_SEQ, last_seq)
         forgotten = delete_tag(connection, tag_id, last_seq, pose_only=pose_only)
         if pose_only and not forgotten[-1]:
-            raise NotPossible(f"the journal {path} knows no place of tag {tag_id!r}")
+            raise NotPossible(f"the journal {path} has no place of tag {tag_id!r}")
         what = _POSE if pose_only else "all"
         log = SiteLog(connection)
         for run in runs(connection.execute):
@@ -266,7 +266,7 @@ def _check_known(connection: sqlite3.Connection, path: Path, tag_id: str) -> Non
         found = connection.execute(f"SELECT 1 FROM {table} WHERE {_OF_TAG} LIMIT 1", query)  # noqa: S608
         if found.fetchone() is not None:
             return
-    raise NotPossible(f"the journal {path} knows no tag {tag_id!r}")
+    raise NotPossible(f"the journal {path} has no tag {tag_id!r}")
 
 
 def delete_recorded(connection: sqlite3.Connection, record: str) -> None:

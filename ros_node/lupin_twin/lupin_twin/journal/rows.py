@@ -154,7 +154,7 @@ def numbers_of(texts: Sequence[str]) -> list[list[float]]:
     except (ValueError, TypeError, RecursionError):
         every = []
     if len(every) != len(texts):
-        raise DamagedFile("readings in the journal are no lists of numbers")
+        raise DamagedFile("readings in the journal are not lists of numbers")
     return every
 
 
@@ -186,7 +186,7 @@ def sensor_names(text: str) -> tuple[str, ...]:
     except (ValueError, RecursionError):
         names = None
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise DamagedFile(f"{text[:64]!r} is no list of sensors")
+        raise DamagedFile(f"{text[:64]!r} is not a list of sensors")
     return tuple(names)
 
 
@@ -209,7 +209,7 @@ def flower_of(row: Sequence[Any]) -> Flower:
             () if box == "[]" else tuple(_point(*point) for point in json.loads(box)),
         )
     except (ValueError, TypeError, RecursionError):
-        raise DamagedFile("blooms or a box in the journal are none") from None
+        raise DamagedFile("flowers or a box in the journal are invalid") from None
 
 
 def _bloom(*of: Any) -> Bloom:

@@ -255,7 +255,7 @@ def open_reader(path: Path, *, is_still: bool = False) -> sqlite3.Connection:
     """
     # Opening a FIFO would wait forever.
     if path.exists() and not path.is_file():
-        raise Foreign(f"{path} is no journal: it is no regular file")
+        raise Foreign(f"{path} is not a journal: it is not a regular file")
     connection = sqlite3.connect(
         f"file:{quote(os.fsencode(path))}?mode=ro{'&immutable=1' if is_still else ''}",
         uri=True,
@@ -288,7 +288,7 @@ def open_named(path: Path, *, is_still: bool = False) -> sqlite3.Connection:
         code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_NOTADB)
         if code == sqlite3.SQLITE_NOTADB and _starts_as_something_else(path):
             raise Foreign(
-                f"{path} is no journal: it does not begin as SQLite's files do"
+                f"{path} is not a journal: it does not begin as an SQLite file"
             ) from error
         raise
 
@@ -302,7 +302,7 @@ def _check_identity(connection: sqlite3.Connection, path: Path) -> frozenset[byt
     """Check that a file is a journal; returns the SQL of indexes that an earlier release lacks."""
     # Checked first: a new file gets all of its content at once.
     if connection.execute("PRAGMA page_count").fetchone() == (0,):
-        raise Empty(f"{path} is empty: a journal that is just being made, or none")
+        raise Empty(f"{path} is empty: a journal that is just being created, or none")
     (application_id,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if application_id != APPLICATION_ID:

@@ -238,7 +238,7 @@ class Journal:
             state = JournalState.SLOW
             detail = f"the disk is slow: the journal is {behind_s:.0f} s behind"
         if lost and state not in _WELL:
-            detail += f"; {lost} observations were lost to it"
+            detail += f"; {lost} observations were lost"
         return replace(
             last,
             state=state,
@@ -391,7 +391,7 @@ class Journal:
 
     def _summary(self, unmet_limit: str) -> str:
         if self._is_temporary:
-            return "what is observed is kept in a temporary file, which goes at the end"
+            return "observations are kept in a temporary file, which is deleted at the end"
         if self._quarantined:
             return f"recording; a damaged journal was quarantined as {self._quarantined}"
         if unmet_limit:
@@ -410,7 +410,7 @@ class Journal:
             until = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self._doubted_ns // 10**9))
             detail = (
                 f"the clock contradicts the journal {self._path}, which was written until {until}:"
-                " nothing is written before they agree, or ten minutes have passed"
+                " nothing is written until they agree or ten minutes have passed"
             )
         self._report(
             state,

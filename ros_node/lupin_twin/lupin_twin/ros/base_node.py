@@ -285,7 +285,7 @@ class NodeUtilities:
         try:
             new = convert.map_of(msg, 0)
         except ValueError as error:
-            self.drop(Drop(Reason.MAP, f"{error}; the last one stays", "a map"), topic)
+            self.drop(Drop(Reason.MAP, f"{error}; the previous one stays", "a map"), topic)
             return None
         return None if before is not None and new.shows_the_same_as(before) else new
 
@@ -314,7 +314,7 @@ class NodeUtilities:
 
     def lose(self, count: int, topic: str) -> None:
         """Count and report messages that came faster than they were read."""
-        text = f"messages on {topic}: they came too fast"
+        text = f"messages on {topic}: they arrived too fast"
         self.tally.add(LOST, f"lost {text}", time.monotonic(), count)
         self.warn((LOST, topic), f"lost {count} {text} to be read")
 

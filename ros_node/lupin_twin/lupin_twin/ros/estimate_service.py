@@ -188,8 +188,8 @@ class EstimateService:
             self._warned.add(sensor)
             self.utilities.warn(
                 ("trust", sensor),
-                f"the estimate of {sensor} is too sure of itself: of {report.record.week.scans} "
-                f"scans, {report.record.week.inside} came to lie where 9 of 10 were predicted",
+                f"the predicted range of {sensor} is too narrow: {report.record.week.inside} of "
+                f"{report.record.week.scans} scans lay in it, expected 9 of 10",
             )
 
     def finding(self) -> Finding:
@@ -199,7 +199,7 @@ class EstimateService:
             if known.report.fit_problem:
                 wrong.append(f"{sensor}: {known.report.fit_problem}")
             if known.report.record.is_trusted is False:
-                wrong.append(f"{sensor}: too sure of itself, by what it predicted")
+                wrong.append(f"{sensor}: the predicted range is too narrow")
         failed = sum(known.failed for known in self._known.values())
         return Finding(
             "estimates",

@@ -342,7 +342,7 @@ class TwinNode(AdjustableNode):
         if not condition.is_well:
             self.utilities.warn(("journal", condition.state), f"journal: {condition.detail}")
         elif not self._was_journal_well:
-            self.get_logger().info(f"journal: well again: {condition.detail}")
+            self.get_logger().info(f"journal: recovered: {condition.detail}")
         self._was_journal_well = condition.is_well
 
     def _watch_clock(self, now_ns: int, *, is_simulated: bool) -> None:
@@ -387,5 +387,5 @@ class TwinNode(AdjustableNode):
             self.lateness.clamp_to(now.stamp_ns)
             self.utilities.warn(
                 ("clock", 0),
-                "ROS time has gone back: all observations from later than now age from here on",
+                "ROS time has gone back: observations stamped later than now age from here on",
             )

@@ -142,4 +142,4 @@ def naming_own_parameters() -> Iterator[None]:
         yield
     except InvalidParameterTypeException as error:
         name = str(error).rpartition(": ")[2]
-        raise ParameterError(f"parameter {name} is no bool: {error}") from error
+        raise ParameterError(f"parameter {name} is not a bool: {error}") from error

@@ -282,7 +282,7 @@ class Responses:
     def _give_up(self, unsent: _Unsent, why: str) -> None:
         self._utilities.warn(
             ("unsent", unsent.name),
-            f"gave up a response of {unsent.name}: {why}; is the QoS of a client another than the "
+            f"gave up a response of {unsent.name}: {why}; does a client use a QoS other than the "
             "default of services?",
         )
 

@@ -114,7 +114,7 @@ async def test_looking_goes_on_after_an_error(
     source.fault = RuntimeError("a fault")
     offer = offer_of(source)
     async with offer.followed(lambda _: None):
-        await until(lambda: "met an error and goes on" in caplog.text, "the error")
+        await until(lambda: "had an error and continues" in caplog.text, "the error")
         source.fault = None
         await until(lambda: offer.channels, "the topics")
 

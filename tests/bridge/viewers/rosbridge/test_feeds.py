@@ -175,9 +175,9 @@ async def test_what_cannot_be_told_is_an_error_for_the_client_and_the_log_has_ea
         relay.publish("good")
         await until(lambda: len(client.frames) == frames, "the next one")  # noqa: B023
         odd, bad, half, good = client.frames[-4:]
-        assert b"the bridge met an error of its own" in odd
-        assert b"a message of topic 'in' is none: not a message" in bad
-        assert b"a message of topic 'in' is none: " in half
+        assert b"the bridge had an internal error" in odd
+        assert b"a message of topic 'in' is invalid: not a message" in bad
+        assert b"a message of topic 'in' is invalid: " in half
         assert good == json_frame("good")
     assert caplog.text.count("Traceback") == 1
     assert caplog.text.count("not a message") == 1

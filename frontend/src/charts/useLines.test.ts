@@ -10,13 +10,13 @@ import { pairKey } from './model';
 import { useLines, type RequestedLines } from './useLines';
 
 const pair = { tagId: '1', sensor: 'co2' };
-/** The last hour is looked at anew each 15 s from here on. */
+/** From here on, the last hour is refetched every 15 s. */
 const NOW_S = 99_990;
 
 let requested: URL[] = [];
 let refuse: Response | null = null;
 
-/** A bridge that has one reading, and one failed try at the beginning. */
+/** A bridge that has one reading, and one failed attempt at the beginning. */
 function answer(url: URL): Response {
   if (refuse) return refuse.clone();
   const query = url.searchParams;
@@ -47,7 +47,7 @@ function answer(url: URL): Response {
   });
 }
 
-/** A state with the tag as it was visited at a moment. */
+/** A state with the tag as visited at a moment. */
 function visit(sec: number, over: Parameters<typeof wireTag>[0] = {}): void {
   flush(() => {
     const latest = stateFrame([wireTag({ last_observed: wireTime(sec), ...over })], { sec });
@@ -134,7 +134,7 @@ describe('the server is asked anew', () => {
     expect(histories()).toHaveLength(1);
     await passed(1_500);
     expect(histories()).toHaveLength(2);
-    // Up to when it is asked, and not up to when the visit was.
+    // Up to the time of the request, not of the visit.
     expect(histories()[1]).toBeGreaterThan(NOW_S + 2 - 3_600);
     await passed(5_000);
     expect(histories()).toHaveLength(2);
@@ -168,7 +168,7 @@ describe('the server is asked anew', () => {
     expect(shown.current).toMatchObject({ state: 'waiting', lines: { series: { size: 1 } } });
     await passed(10);
     expect(histories()[1]).toBe(2_000);
-    // It is over: nothing that comes later belongs to it.
+    // The period has ended: later data do not belong to it.
     visit(NOW_S + 1);
     await passed(60_000);
     expect(histories()).toHaveLength(2);

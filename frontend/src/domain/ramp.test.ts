@@ -96,7 +96,7 @@ test('values that come and go at its edge do not make it flicker', () => {
     [20.2, 29.8],
     ...Array.from({ length: 50 }, (_, n) => [20.2, 29.8 + 0.4 * (n % 2)] as const),
   ]);
-  // Once wider for what came, and never back and forth after it.
+  // It widens once, then stays.
   expect(new Set(ranges).size).toBe(2);
   expect(ranges.at(-1)).toEqual({ low: 20, high: 31 });
 });

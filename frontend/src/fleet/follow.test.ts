@@ -13,7 +13,7 @@ class FakeSocket {
   }
 
   close(): void {
-    // It says nothing more.
+    // It sends nothing more.
   }
 }
 
@@ -33,7 +33,7 @@ test('a connection that is refused may be one of a session that has ended', () =
   FakeSocket.last?.onopen?.();
   FakeSocket.last?.onclose?.({ code: 1006 });
   expect(requests).toEqual([]);
-  // Tried again after a time that is random, and closed before it counts as silent.
+  // Reconnects after a random pause, and is closed before it counts as silent.
   const first = FakeSocket.last;
   while (FakeSocket.last === first) vi.advanceTimersByTime(100);
   FakeSocket.last?.onclose?.({ code: 1006 });

@@ -8,7 +8,7 @@ import { selectHeat } from './derived';
 import { startDifference } from './difference';
 
 let requests: URLSearchParams[] = [];
-/** What the bridge knows of the moment that is shown, and of the one before. */
+/** The bridge's data of the shown moment, and of the one before. */
 let known = { now: 22, then: 20.5, samplesThen: 1 };
 let stop: () => void;
 
@@ -53,7 +53,7 @@ test('nothing is fetched while nothing is compared', async () => {
 
 test('both fields are asked for on one box, and their difference is the heat map', async () => {
   act({ compare: { by: 'moment', at: 500 } });
-  // What is shown meanwhile is no difference, and not shown as one.
+  // Until then nothing is shown as a difference.
   expect(selectHeat(store.get())).toBeNull();
   await settled();
   expect(requests.map((query) => query.get('at'))).toEqual([null, '500.000']);

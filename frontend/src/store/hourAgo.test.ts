@@ -73,7 +73,7 @@ test('what a reading of now is compared with stays until there is a newer one', 
   expect(second).not.toBe(first);
   expect(thenOf(hourAgo.get(), at(22), 'temperature')).toBe(first);
   expect(thenOf(hourAgo.get(), at(23), 'temperature')).toBe(second);
-  // Of a moment in the past it is what was an hour before, however somebody came there.
+  // At a past moment it is the state an hour before, however the moment was reached.
   act({ moment: 50_000 });
   receive(withPast({ at: 50_000, house: NO_HOUSE }));
   await pass(1_000);

@@ -137,7 +137,7 @@ test('a bad message is told of for a minute after the last one', () => {
 
 describe('a machine that slept for an hour', () => {
   const HOUR = 3_600_000;
-  // Of each test's own: a state that is sent again is as old as it was.
+  // A new stamp per test: a repeated state keeps its age.
   let sec = 100_000;
   const ageing = (): string => selectShown(store.get()).ageing.kind;
   const age = (): number | null => {
@@ -193,7 +193,7 @@ describe('a machine that slept for an hour', () => {
     );
     expect(revision()).not.toBe('waits');
     vi.setSystemTime(Date.now() + HOUR);
-    // The timer that was to show it is the first to look at the clock.
+    // Its own timer is the first to read the clock.
     vi.advanceTimersByTime(300);
     expect(revision()).not.toBe('waits');
     expect(ageing()).toBe('unknown');

@@ -66,13 +66,13 @@ beforeEach(() => {
 afterEach(async () => {
   act({ moment: null });
   stop();
-  // What was asked for only once a moment stays was not yet.
+  // What is fetched once a moment stays has not been requested yet.
   await pass(500);
   expect(vi.getTimerCount()).toBe(0);
   vi.useRealTimers();
 });
 
-/** What the page says that it shows, and what it shows. */
+/** The moment that the page states, and the data that it shows. */
 const shown = (): unknown[] => {
   const { moment, snapshot, field } = selectShown(store.get());
   return [
@@ -230,7 +230,7 @@ test('how far off the field is, is asked for once the moment stays', async () =>
   await requests.at(-1)?.answer();
   expect(selectShown(store.get()).quality).toMatchObject({ rmse: 40 });
   expect(shown()).toEqual([40, 40, 40]);
-  // What comes anew, on another connection, has none yet.
+  // A refetched field, on another connection, has none yet.
   const { connection } = store.get().twin;
   receive(withConnection({ ...connection, epoch: 9 }, performance.now()));
   await pass(100);
@@ -256,6 +256,6 @@ test('an estimate that is chosen goes the same way: with its state, the newest f
   expect(shown()).toEqual([at, at, at]);
   expect(selectShown(store.get()).field.value?.sureness?.sdKnown).toBe(1);
   await pass(2_000);
-  // How far off the nearest readings are is of no interest.
+  // The error of the nearest readings is not needed.
   expect(requests.some(({ path }) => path.endsWith('field/quality'))).toBe(false);
 });

@@ -81,7 +81,7 @@ test('a link that names no period brings back what the page opens on, at once', 
   answer = () => Response.json(wireTimeline({ from: 0, to: 240, reach: wireStretch(0, 240) }));
   await pass(1_100);
   expect(store.get().view.period).toEqual({ kind: 'hour' });
-  // Also twice, sooner than anything is fetched again.
+  // Also twice, before any refetch.
   for (const layers of ['map', 'map,pins']) {
     act(fromFragment(`layers=${layers}`));
     await pass(100);

@@ -11,7 +11,7 @@ interface Modules {
   getModuleInfo: (id: string) => { isEntry: boolean; importers: readonly string[] } | null;
 }
 
-/** Whether the page needs a module before it shows anything: the entry imports it, however far off. */
+/** Whether the first view needs a module: the entry imports it, directly or not. */
 function isFirst(id: string, modules: Modules, seen = new Set<string>()): boolean {
   if (seen.has(id)) return false;
   seen.add(id);
@@ -28,16 +28,16 @@ const RULES = [
   'src/draw/colours.test.ts',
   'src/store/{create,fetcher,twin,view}.test.ts',
   'src/timebar/axis.test.ts',
-  'src/ui/{fitting,later}.test.ts',
+  'src/ui/{fitting,loadDeferred}.test.ts',
   'src/words/languages.test.ts',
 ];
 
 export default defineConfig({
   root: here('.'),
-  // Relative, so that the bridge may stand behind any path prefix.
+  // Relative, so that any path prefix works.
   base: './',
   plugins: [react()],
-  // Nothing in the map is animated by d3-zoom: it gets what it needs, and nothing more.
+  // The map has no animations, so d3-zoom gets stubs.
   resolve: {
     alias: {
       'd3-transition': here('src/map/instantly.ts'),
@@ -49,12 +49,12 @@ export default defineConfig({
     emptyOutDir: true,
     // A data: URL for a script, style or font would need a wider Content-Security-Policy.
     assetsInlineLimit: 0,
-    // The polyfill is an inline script in some outputs; every browser of the last years preloads.
+    // The polyfill may be an inline script, and all current browsers can preload.
     modulePreload: { polyfill: false },
     target: 'es2022',
     rolldownOptions: {
       output: {
-        // In one piece: what later parts share with it would else be a file each, and more in all.
+        // One chunk: otherwise each module shared with later parts is its own file, larger in total.
         codeSplitting: {
           groups: [
             { debugName: 'first', name: (id, modules) => (isFirst(id, modules) ? 'first' : null) },
@@ -76,13 +76,13 @@ export default defineConfig({
     restoreMocks: true,
     // See src/testing/asFound.ts.
     isolate: false,
-    // Else it is loaded as it is, and not with what stands in for its parts.
+    // Otherwise the aliases above would not apply to it.
     server: { deps: { inline: ['d3-zoom'] } },
-    // A machine that builds and tests at once is slow; a test that hangs still fails.
+    // A busy machine is slow; a hanging test still fails.
     testTimeout: 30_000,
     unstubGlobals: true,
     projects: [
-      // Rules that need no page run without one: a jsdom takes longer than all their tests.
+      // Tests without a page run without jsdom, which takes longer than all of them.
       {
         extends: true,
         test: {

@@ -1,4 +1,4 @@
-/** The page over all greenhouses: a bundle of its own, beside that of one greenhouse. */
+/** The page over all greenhouses: a separate bundle. */
 import { fileURLToPath } from 'node:url';
 
 import react from '@vitejs/plugin-react';

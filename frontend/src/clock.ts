@@ -1,28 +1,28 @@
 /**
- * The page's one clock: when something came, and how long ago that is.
+ * The page's one clock: when something arrived, and how long ago.
  *
  * The monotonic clock is right for differences, but on Linux it stands still while the machine
- * sleeps; the wall clock goes on, but may be set. Where the wall clock runs ahead of the other
- * from one look to the next, the machine has slept or its clock was set: nobody can tell which,
- * so all that came before is then of an age that is not known.
+ * sleeps; the wall clock goes on, but may be set. If the wall clock gains on it between two readings,
+ * the machine has slept or its clock was set. These cannot be distinguished, so the age of everything
+ * before is then unknown.
  */
 
-/** The clocks may come apart by so much between two looks, ms; slewing stays far below. */
+/** Tolerated drift between two readings, ms; slewing stays far below. */
 const LAPSE_MS = 2_000;
-/** Lapses that are remembered for the time of day of what came before them. */
+/** Lapses remembered, for the time of day of earlier moments. */
 const MOST_ERAS = 100;
 
 const listeners = new Set<() => void>();
-/** Never goes back, may stand still while the machine sleeps. */
+/** The last monotonic reading. */
 let last = performance.now();
-/** Stretches without a lapse: from when on, and wall less monotonic clock in it. */
+/** Periods without a lapse: their beginning, and the wall clock minus the monotonic one. */
 let eras: readonly { readonly from: number; readonly offset: number }[] = [
   { from: -Infinity, offset: Date.now() - last },
 ];
 
 /**
- * ms on the monotonic clock: for differences, never for a time of day. Each call looks whether
- * time has lapsed, and tells of it before it returns: not to be called while React renders.
+ * ms on the monotonic clock: for differences, never for a time of day. Each call checks for a lapse and
+ * notifies listeners before it returns: do not call it while React renders.
  */
 export function now(): number {
   const at = performance.now();
@@ -35,23 +35,23 @@ export function now(): number {
     for (const listener of [...listeners]) listener();
     return at;
   }
-  // Slewed, or set back: the newer word of the wall clock is the better one.
+  // Slewed or set back: the newer offset is the better one.
   const before = hasGoneBack ? [] : eras.slice(0, -1);
   eras = [...before, { from: before.length > 0 ? (era?.from ?? at) : -Infinity, offset }];
   return at;
 }
 
-/** Time of day, ms since the epoch, of a moment on the monotonic clock: as it was then. */
+/** Time of day, ms since the epoch, of a moment on the monotonic clock, as it was then. */
 export function epochOf(moment: number): number {
   const era = eras.findLast(({ from }) => from <= moment) ?? eras[0];
   const offset = Date.now() - performance.now();
   if (!era) return moment + offset;
-  // Of the present stretch the present word, unless time has lapsed and nobody has looked yet.
+  // In the present period, the present offset, unless there is an undetected lapse.
   const isPresent = era === eras.at(-1) && offset - era.offset <= LAPSE_MS;
   return moment + (isPresent ? offset : era.offset);
 }
 
-/** Calls back when time has lapsed; returns the way to stop. */
+/** Calls back when time has lapsed; returns a stop function. */
 export function onLapse(listener: () => void): () => void {
   listeners.add(listener);
   return () => listeners.delete(listener);

@@ -26,7 +26,7 @@ test.each([
 ])('with “%s” the key T leaves it %s', async (query, theme, buttons) => {
   history.replaceState(null, '', `/${query}`);
   await flush(() => import('./main'));
-  const { loadParts } = await import('./ui/later');
+  const { loadParts } = await import('./ui/loadDeferred');
   await flush(() => loadParts());
   const { store } = await import('./store/app');
   fireEvent.keyDown(document.body, { key: 't' });

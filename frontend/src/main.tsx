@@ -15,10 +15,10 @@ import './styles/frozen.css';
 import './styles/troubles.css';
 import './styles/past.css';
 import './styles/forced.css';
-import { startAlarmsAndTelling } from './alarms/watch';
+import { startAlarmsAndAnnouncements } from './alarms/watch';
 import { startAddress } from './store/address';
 import { onChange, prefer, store } from './store/app';
-import { cycleWish, startCycle } from './store/cycle';
+import { cycleSetting, startCycle } from './store/cycle';
 import { startHourAgo } from './store/hourAgo';
 import { startLive } from './store/live';
 import { startLoaders, startSensors } from './store/loaders';
@@ -29,7 +29,7 @@ import { LANGUAGE, S } from './strings';
 import { App } from './ui/App';
 import { ErrorBoundary } from './ui/ErrorBoundary';
 import { startKeys } from './ui/keys';
-import { loadParts } from './ui/later';
+import { loadParts } from './ui/loadDeferred';
 
 const storage = openStorage();
 prefer(readSettings(storage));
@@ -41,7 +41,7 @@ onChange(
 );
 
 const kiosk = new URLSearchParams(window.location.search).has('kiosk');
-const cycle = cycleWish(window.location.search);
+const cycle = cycleSetting(window.location.search);
 
 document.documentElement.lang = LANGUAGE;
 document.title = S.product;
@@ -49,7 +49,7 @@ startTheme();
 startAddress(kiosk, cycle.seconds !== null);
 startSensors();
 startLoaders();
-startAlarmsAndTelling(storage);
+startAlarmsAndAnnouncements(storage);
 startLive();
 if (kiosk) {
   startCycle(cycle);
@@ -68,7 +68,7 @@ void loadParts().then((parts) => {
   parts.startPeople();
   parts.startShell();
   if (kiosk) {
-    parts.startLeaving();
+    parts.startKioskClose();
   } else {
     parts.startNotes();
     parts.startRemembered();

@@ -5,7 +5,7 @@ import { alarm } from '../testing/alarms';
 import { cataloguesOf } from '../domain/sensors';
 import { CATALOGUE, FILE } from '../testing/sensors';
 import { alarmsCsv, arranged, causeFacts, filtered, tagsText } from './arrange';
-import { acknowledge, NOTHING_KEPT, shelve, type Kept } from './own';
+import { acknowledge, NO_LOCAL_ALARMS, shelve, type LocalAlarms } from './own';
 import { causesFirst, listOf } from './list';
 import type { Now } from './words';
 
@@ -23,7 +23,7 @@ const hot = (tag: number) =>
 const many = (one: typeof cold, count: number) =>
   Array.from({ length: count }, (_, index) => one(index + 1));
 const active = (...alarms: ReturnType<typeof alarm>[]) =>
-  listOf(alarms, NOTHING_KEPT, null, AT).active;
+  listOf(alarms, NO_LOCAL_ALARMS, null, AT).active;
 
 test('many of one cause stand together, the worst cause first; a few stand by themselves', () => {
   const blocks = arranged(active(...many(hot, 6), ...many(cold, 5)), 'cause', speech);
@@ -67,7 +67,7 @@ test('of one cause, each area stands by itself, and is found by its name', () =>
     ['North · Temperature too low', 5],
     ['South · Temperature too low', 6],
   ]);
-  const list = listOf(many(cold, 11), NOTHING_KEPT, null, AT);
+  const list = listOf(many(cold, 11), NO_LOCAL_ALARMS, null, AT);
   expect(filtered(list, 'south', { sensors, unit: 'C' }, isTag).active).toHaveLength(6);
 });
 
@@ -80,7 +80,7 @@ test('of a cause how many are how bad, and the value farthest beyond', () => {
       // The lowest value, whatever its plants' limit.
       alarm('4', { tag_id: '4', reason: { limit: 4, value: 3 }, worst: 2.9, cleared: 130 }),
     ],
-    NOTHING_KEPT,
+    NO_LOCAL_ALARMS,
     null,
     AT,
   );
@@ -124,23 +124,23 @@ test('the worst cause first, then what nobody has seen to, then what most have',
   const further = { value: 99, limit: 35, verdict: 'stressed' } as const;
   const hots = many(hot, 5).map((each) => ({ ...each, reason: { ...each.reason, ...further } }));
   const all = [...hots, ...many(dry, 7), worst];
-  const order = (kept: Kept, alarms = all) => {
-    const items = listOf(alarms, kept, null, AT).active;
+  const order = (local: LocalAlarms, alarms = all) => {
+    const items = listOf(alarms, local, null, AT).active;
     return arranged(
       causesFirst(items, (item) => item.alarm.reason, speech),
       'cause',
       speech,
     ).map(({ items: own }) => `${own[0]?.alarm.id.replace(/\d/, '')} ${own.length}`);
   };
-  expect(order(NOTHING_KEPT)).toEqual(['worst 1', 'dry 7', 'hot 5']);
+  expect(order(NO_LOCAL_ALARMS)).toEqual(['worst 1', 'dry 7', 'hot 5']);
   const seen = many(dry, 7).map((each) => ({ alarm: each, verdict: 'stressed' }) as const);
-  expect(order(acknowledge(NOTHING_KEPT, seen, AT))).toEqual(['worst 1', 'hot 5', 'dry 7']);
+  expect(order(acknowledge(NO_LOCAL_ALARMS, seen, AT))).toEqual(['worst 1', 'hot 5', 'dry 7']);
   // Too few for a block: the worst alarm is first.
-  expect(order(NOTHING_KEPT, [...many(dry, 2), ...hots.slice(0, 1)])).toEqual(['hot 3']);
+  expect(order(NO_LOCAL_ALARMS, [...many(dry, 2), ...hots.slice(0, 1)])).toEqual(['hot 3']);
 });
 
 test('a word that is exactly the id of a tag finds that tag, and no other', () => {
-  const list = listOf([cold(7), cold(27), hot(71)], NOTHING_KEPT, null, AT);
+  const list = listOf([cold(7), cold(27), hot(71)], NO_LOCAL_ALARMS, null, AT);
   const find = (text: string, ids: readonly string[]) =>
     filtered(list, text, speech, (id) => ids.includes(id)).active.map((it) => it.alarm.id);
   expect(find('Tag 7', ['7', '27', '71'])).toEqual(['cold7']);
@@ -154,15 +154,15 @@ test.each([
   ['  ', ['cold3', 'hot2']],
   ['humidity', []],
 ])('%j finds %j', (text, ids) => {
-  const list = listOf([cold(3), hot(2)], NOTHING_KEPT, null, AT);
+  const list = listOf([cold(3), hot(2)], NO_LOCAL_ALARMS, null, AT);
   expect(filtered(list, text, speech, isTag).active.map(({ alarm: it }) => it.id)).toEqual(ids);
 });
 
 test('as a file: each state, values in the unit of the page, and no formula', () => {
   const evil = alarm('a', { tag_id: '=1+1', raised: 0, worst: 4.2 });
   const rated = { alarm: evil, verdict: 'critical' } as const;
-  const kept = shelve(NOTHING_KEPT, rated, AT + 60_000, 'fan, off');
-  const list = listOf([evil, alarm('b', { cleared: 960 })], kept, 1_000, AT);
+  const local = shelve(NO_LOCAL_ALARMS, rated, AT + 60_000, 'fan, off');
+  const list = listOf([evil, alarm('b', { cleared: 960 })], local, 1_000, AT);
   const [head, shelved, resolved] = alarmsCsv(list, { ...speech, unit: 'F' }, () => null)
     .slice(1)
     .split('\r\n');

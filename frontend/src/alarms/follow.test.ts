@@ -4,11 +4,11 @@ import { theMap, type MapActions } from '../map/commands';
 import { act, receive, store } from '../store/app';
 import { withState } from '../store/twin';
 import { withList, withTag } from '../store/view';
-import { alarm, tellAlarms } from '../testing/alarms';
+import { alarm, reportAlarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { goToStart, periodWith, showAlarm } from './follow';
-import { NOTHING_KEPT, own } from './own';
+import { NO_LOCAL_ALARMS, own } from './own';
 import { calling } from './list';
 import { alarmList, startAlarms } from './watch';
 
@@ -45,7 +45,7 @@ describe('follow', () => {
   beforeEach(() => {
     vi.spyOn(performance, 'now').mockReturnValue(performance.now());
     seen.length = 0;
-    own.set(NOTHING_KEPT);
+    own.set(NO_LOCAL_ALARMS);
     showTags([]);
     const latest = stateFrame([wireTag()], { sec: 10_000 });
     receive(withState(latest, performance.now()));
@@ -59,7 +59,7 @@ describe('follow', () => {
 
   test('an alarm leads to its tag and sensor as they are now, and is not acknowledged by that', () => {
     const co2 = alarm('a', { tag_id: '5', raised: 9_000, reason: { sensor: 'co2' } });
-    tellAlarms(co2);
+    reportAlarms(co2);
     act({ compare: { by: 'ago', seconds: 60 } });
     act({ moment: 9_100 });
     act(withList('alarms'));

@@ -3,7 +3,7 @@ import { describe, expect, test } from 'vitest';
 import type { Alarm } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { reason } from '../testing/health';
-import { acknowledge, NOTHING_KEPT, shelve, type Kept } from './own';
+import { acknowledge, NO_LOCAL_ALARMS, shelve, type LocalAlarms } from './own';
 import {
   calling,
   EMPTY_LIST,
@@ -19,8 +19,8 @@ import {
 
 const AT = 1_800_000_000_000;
 const NOW_S = 1_000;
-const list = (alarms: readonly Alarm[], kept: Kept = NOTHING_KEPT): AlarmList =>
-  listOf(alarms, kept, NOW_S, AT);
+const list = (alarms: readonly Alarm[], local: LocalAlarms = NO_LOCAL_ALARMS): AlarmList =>
+  listOf(alarms, local, NOW_S, AT);
 const ids = (items: readonly Item[]): string[] => items.map(({ alarm: { id } }) => id);
 const stressed = { verdict: 'stressed' } as const;
 
@@ -42,10 +42,10 @@ describe('order', () => {
       alarm('late', { raised: 100, cleared: NOW_S + 1 }),
     ];
     expect(ids(list(over).resolved)).toEqual(['late', 'early']);
-    expect(ids(listOf(over, NOTHING_KEPT, far - 1, AT).resolved)).toEqual(['late', 'early']);
-    expect(ids(listOf(over, NOTHING_KEPT, far, AT).resolved)).toEqual(['late']);
+    expect(ids(listOf(over, NO_LOCAL_ALARMS, far - 1, AT).resolved)).toEqual(['late', 'early']);
+    expect(ids(listOf(over, NO_LOCAL_ALARMS, far, AT).resolved)).toEqual(['late']);
     // Without the twin's time, the age of resolved alarms is unknown.
-    expect(listOf(over, NOTHING_KEPT, null, AT).resolved).toHaveLength(2);
+    expect(listOf(over, NO_LOCAL_ALARMS, null, AT).resolved).toHaveLength(2);
   });
 
   test('of what came at once the order is the same, however it came', () => {
@@ -59,56 +59,59 @@ describe('acknowledged and shelved', () => {
   const mild = { alarm: alarm('a', { reason: stressed }), verdict: 'stressed' } as const;
 
   test('what was acknowledged calls for nobody, until it gets worse', () => {
-    const kept = acknowledge(NOTHING_KEPT, [mild], AT);
+    const local = acknowledge(NO_LOCAL_ALARMS, [mild], AT);
     expect(calling(list([mild.alarm]))).toHaveLength(1);
-    expect(calling(list([mild.alarm], kept))).toEqual([]);
-    expect(list([mild.alarm], kept).active[0]?.isAcknowledged).toBe(true);
+    expect(calling(list([mild.alarm], local))).toEqual([]);
+    expect(list([mild.alarm], local).active[0]?.isAcknowledged).toBe(true);
     // At equal verdicts, it comes after unacknowledged ones.
     const older = alarm('older', { raised: 1, reason: stressed });
-    expect(ids(list([mild.alarm, older], kept).active)).toEqual(['older', 'a']);
+    expect(ids(list([mild.alarm, older], local).active)).toEqual(['older', 'a']);
     const worse = { ...mild.alarm, reason: reason() };
-    expect(calling(list([worse], kept))).toHaveLength(1);
+    expect(calling(list([worse], local))).toHaveLength(1);
   });
 
   test('what is shelved stands apart with its end, comes back then, or when it gets worse', () => {
-    const kept = shelve(NOTHING_KEPT, mild, AT + 1_000, 'fan off');
-    const shown = list([mild.alarm], kept);
+    const local = shelve(NO_LOCAL_ALARMS, mild, AT + 1_000, 'fan off');
+    const shown = list([mild.alarm], local);
     expect(shown.active).toEqual([]);
     expect(shown.shelved[0]?.shelf).toMatchObject({ until: AT + 1_000, reason: 'fan off' });
     expect(calling(shown)).toEqual([]);
-    expect(listOf([mild.alarm], kept, NOW_S, AT + 1_000).shelved).toEqual([]);
-    const worse = list([{ ...mild.alarm, reason: reason() }], kept);
+    expect(listOf([mild.alarm], local, NOW_S, AT + 1_000).shelved).toEqual([]);
+    const worse = list([{ ...mild.alarm, reason: reason() }], local);
     expect(calling(worse)).toHaveLength(1);
     // The same fault, raised again, is still shelved.
-    expect(list([alarm('later', { raised: 990, reason: stressed })], kept).active).toEqual([]);
+    expect(list([alarm('later', { raised: 990, reason: stressed })], local).active).toEqual([]);
   });
 });
 
 describe('news', () => {
   const a = alarm('a', { reason: stressed });
   const b = alarm('b', { tag_id: '2' });
-  const told = (before: AlarmList, now: AlarmList): string[][] => {
+  const newsIds = (before: AlarmList, now: AlarmList): string[][] => {
     const { raised, cleared } = newsOf(before, now);
     return [ids(raised), ids(cleared)];
   };
 
   test('is what has come, got worse or is resolved; what stays is none', () => {
-    expect(told(EMPTY_LIST, list([a]))).toEqual([['a'], []]);
-    expect(told(list([a]), list([b, a]))).toEqual([['b'], []]);
-    expect(told(list([a]), list([{ ...a, reason: reason() }]))).toEqual([['a'], []]);
-    expect(told(list([{ ...a, reason: reason() }]), list([a]))).toEqual([[], []]);
+    expect(newsIds(EMPTY_LIST, list([a]))).toEqual([['a'], []]);
+    expect(newsIds(list([a]), list([b, a]))).toEqual([['b'], []]);
+    expect(newsIds(list([a]), list([{ ...a, reason: reason() }]))).toEqual([['a'], []]);
+    expect(newsIds(list([{ ...a, reason: reason() }]), list([a]))).toEqual([[], []]);
     const over = { ...a, cleared_at: { sec: 999, nanosec: 0 } };
-    expect(told(list([a, b]), list([over, b]))).toEqual([[], ['a']]);
-    expect(told(EMPTY_LIST, list([over]))).toEqual([[], []]);
-    expect(told(list([a]), list([]))).toEqual([[], []]);
+    expect(newsIds(list([a, b]), list([over, b]))).toEqual([[], ['a']]);
+    expect(newsIds(EMPTY_LIST, list([over]))).toEqual([[], []]);
+    expect(newsIds(list([a]), list([]))).toEqual([[], []]);
   });
 
   test('not what is acknowledged or shelved; what comes back from there is', () => {
     const mild = { alarm: a, verdict: 'stressed' } as const;
-    const kept = shelve(NOTHING_KEPT, mild, AT + 1_000, 'fan off');
-    expect(told(EMPTY_LIST, list([a], kept))).toEqual([[], []]);
-    expect(told(EMPTY_LIST, list([a], acknowledge(NOTHING_KEPT, [mild], AT)))).toEqual([[], []]);
-    expect(told(list([a], kept), list([a]))).toEqual([['a'], []]);
+    const local = shelve(NO_LOCAL_ALARMS, mild, AT + 1_000, 'fan off');
+    expect(newsIds(EMPTY_LIST, list([a], local))).toEqual([[], []]);
+    expect(newsIds(EMPTY_LIST, list([a], acknowledge(NO_LOCAL_ALARMS, [mild], AT)))).toEqual([
+      [],
+      [],
+    ]);
+    expect(newsIds(list([a], local), list([a]))).toEqual([['a'], []]);
   });
 });
 

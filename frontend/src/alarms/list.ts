@@ -4,7 +4,7 @@ import { isOfRange, severity, sideOf } from '../domain/health';
 import { groupedBy, withParts } from '../domain/memo';
 import { secondsOf } from '../domain/time';
 import { compareIds, equal } from '../domain/twin';
-import { isShelfHeld, isWorse, whatOf, type Kept, type Shelf } from './own';
+import { isShelfHeld, isWorse, faultKey, type LocalAlarms, type Shelf } from './own';
 import type { Speech } from './words';
 
 /** How long a resolved alarm stays listed, seconds. */
@@ -47,14 +47,14 @@ export const EMPTY_LIST: AlarmList = { active: [], shelved: [], resolved: [] };
  */
 export function listOf(
   alarms: readonly Alarm[],
-  kept: Kept,
+  local: LocalAlarms,
   nowS: number | null,
   at: number,
 ): AlarmList {
   const items = alarms.map((alarm): Item => {
     const { verdict } = alarm.reason;
-    const known = kept.acknowledged.get(alarm.id);
-    const shelf = kept.shelved.get(whatOf(alarm));
+    const known = local.acknowledged.get(alarm.id);
+    const shelf = local.shelved.get(faultKey(alarm));
     return {
       alarm,
       verdict,
@@ -147,7 +147,8 @@ export const alarmOf = (
 ): Item | undefined =>
   reason &&
   items.find(
-    ({ alarm }) => alarm.tag_id === tagId && whatOf(alarm) === whatOf({ tag_id: tagId, reason }),
+    ({ alarm }) =>
+      alarm.tag_id === tagId && faultKey(alarm) === faultKey({ tag_id: tagId, reason }),
   );
 
 /** Whether a reason's alarm waits for a second scan to confirm it. */

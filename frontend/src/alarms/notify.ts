@@ -1,6 +1,6 @@
 /** Alarms while nobody looks at the page: opt-in notifications and sounds, and the page's icon. */
 import { now } from '../clock';
-import { ask } from '../contract/api';
+import { request } from '../contract/api';
 import { postPush } from '../contract/people';
 import type { Verdict } from '../contract/types';
 import { store } from '../store/app';
@@ -9,37 +9,37 @@ import { selectOrigin } from '../store/moment';
 import { S } from '../strings';
 import { showAlarm } from './follow';
 import type { Item } from './list';
-import { own, preferTold } from './own';
+import { own, updateNotifySettings } from './own';
 import { textNow } from './speech';
 import { alarmList, onNews } from './watch';
 import { severalText } from './words';
 
 /**
- * The browser's permission. "asks": it will ask the operator. "insecure": it allows notifications only
+ * The browser's permission. "prompt": it will ask the operator. "insecure": it allows notifications only
  * on https or localhost. "none": it has none, or does not let a page show them.
  */
-export type NotifyState = 'granted' | 'asks' | 'refused' | 'insecure' | 'none';
+export type NotifyState = 'granted' | 'prompt' | 'refused' | 'insecure' | 'none';
 
 function stateNow(): NotifyState {
   if (!window.isSecureContext) return 'insecure';
   if (!('Notification' in window)) return 'none';
   const { permission } = Notification;
-  return permission === 'granted' ? 'granted' : permission === 'denied' ? 'refused' : 'asks';
+  return permission === 'granted' ? 'granted' : permission === 'denied' ? 'refused' : 'prompt';
 }
 
 export const notifyState = createStore<NotifyState>('none');
 
 /** Turns notifications on or off, on a click: only then may the page ask for permission. */
-export async function wishNotify(isWished: boolean): Promise<void> {
+export async function setNotify(isRequested: boolean): Promise<void> {
   notifyState.set(stateNow());
-  if (isWished && notifyState.get() === 'asks') {
+  if (isRequested && notifyState.get() === 'prompt') {
     await Notification.requestPermission();
     notifyState.set(stateNow());
   }
-  const isOn = isWished && notifyState.get() === 'granted';
-  preferTold({ notify: isOn });
+  const isOn = isRequested && notifyState.get() === 'granted';
+  updateNotifySettings({ notify: isOn });
   // In addition: an open page notifies without Web Push.
-  await wishPush(isOn).catch(() => {
+  await setPush(isOn).catch(() => {
     // No push service, or the bridge is unreachable: the page still notifies.
   });
 }
@@ -73,7 +73,7 @@ function show(raised: readonly Item[]): void {
   } catch {
     // Some browsers refuse the constructor to pages, and throw only here.
     notifyState.set('none');
-    preferTold({ notify: false });
+    updateNotifySettings({ notify: false });
   }
 }
 
@@ -92,19 +92,19 @@ interface Key {
 }
 
 /** Subscribes this browser to the bridge's Web Push, or unsubscribes it; without Web Push, does nothing. */
-export async function wishPush(isWished: boolean): Promise<void> {
+export async function setPush(isRequested: boolean): Promise<void> {
   if (!('serviceWorker' in navigator)) return;
   const registration = await navigator.serviceWorker.getRegistration();
   if (!registration || !('pushManager' in registration)) return;
   const { pushManager } = registration;
   const known = await pushManager.getSubscription();
-  if (!isWished) {
+  if (!isRequested) {
     if (!known) return;
     await postPush({ endpoint: known.endpoint });
     await known.unsubscribe();
     return;
   }
-  const { public_key: key } = (await (await ask('api/push', {})).json()) as Key;
+  const { public_key: key } = (await (await request('api/push', {})).json()) as Key;
   if (key === null) return;
   const options = { userVisibleOnly: true, applicationServerKey: key };
   let subscription;
@@ -210,12 +210,12 @@ function sound(notes: readonly number[]): void {
 }
 
 /** Turns sound on or off, on a click; plays a sample at once when turned on. */
-export async function wishSound(
-  isWished: boolean,
+export async function setSound(
+  isRequested: boolean,
   make: () => AudioContext = () => new AudioContext(),
 ): Promise<void> {
-  preferTold({ sound: isWished });
-  if (!isWished) return;
+  updateNotifySettings({ sound: isRequested });
+  if (!isRequested) return;
   await wake(make);
   playedAt = -Infinity;
   sound(NOTES.other);

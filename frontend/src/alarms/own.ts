@@ -38,16 +38,16 @@ export interface Shelf {
   readonly reason: string;
 }
 
-export interface Kept {
+export interface LocalAlarms {
   /** By alarm id. */
   readonly acknowledged: ReadonlyMap<string, Acknowledgement>;
-  /** By `whatOf`, so that the shelf still holds if the alarm is raised again. */
+  /** By `faultKey`, so that the shelf still holds if the alarm is raised again. */
   readonly shelved: ReadonlyMap<string, Shelf>;
   readonly sound: boolean;
   readonly notify: boolean;
 }
 
-export const NOTHING_KEPT: Kept = {
+export const NO_LOCAL_ALARMS: LocalAlarms = {
   acknowledged: new Map(),
   shelved: new Map(),
   sound: false,
@@ -59,7 +59,7 @@ export const isWorse = (a: Verdict, b: Verdict): boolean =>
   VERDICTS.indexOf(a) < VERDICTS.indexOf(b);
 
 /** Key of what is wrong and where, independent of time; "too cold" and "too warm" differ. */
-export const whatOf = ({ tag_id, reason }: Pick<Alarm, 'tag_id' | 'reason'>): string =>
+export const faultKey = ({ tag_id, reason }: Pick<Alarm, 'tag_id' | 'reason'>): string =>
   JSON.stringify([tag_id, reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : '']);
 
 /** An alarm and its current verdict. */
@@ -68,38 +68,46 @@ export interface Rated {
   readonly verdict: Verdict;
 }
 
-export const acknowledge = (kept: Kept, alarms: readonly Rated[], at: number): Kept => ({
-  ...kept,
+export const acknowledge = (
+  local: LocalAlarms,
+  alarms: readonly Rated[],
+  at: number,
+): LocalAlarms => ({
+  ...local,
   acknowledged: new Map([
-    ...kept.acknowledged,
+    ...local.acknowledged,
     ...alarms.map(({ alarm, verdict }) => [alarm.id, { verdict, at }] as const),
   ]),
 });
 
 export const shelve = (
-  kept: Kept,
+  local: LocalAlarms,
   { alarm, verdict }: Rated,
   until: number,
   reason: string,
-): Kept => ({
-  ...kept,
-  shelved: new Map([...kept.shelved, [whatOf(alarm), { verdict, until, reason }]]),
+): LocalAlarms => ({
+  ...local,
+  shelved: new Map([...local.shelved, [faultKey(alarm), { verdict, until, reason }]]),
 });
 
 const without = <Value>(map: ReadonlyMap<string, Value>, key: string): ReadonlyMap<string, Value> =>
   new Map([...map].filter(([each]) => each !== key));
 
-/** `kept` without ended shelves and old acknowledgements of unlisted alarms; null: not known what is listed. */
-export function pruned(kept: Kept, listed: ReadonlySet<string> | null, at: number): Kept {
-  const acknowledged = [...kept.acknowledged].filter(
+/** `local` without ended shelves and old acknowledgements of unlisted alarms; null: not known what is listed. */
+export function pruned(
+  local: LocalAlarms,
+  listed: ReadonlySet<string> | null,
+  at: number,
+): LocalAlarms {
+  const acknowledged = [...local.acknowledged].filter(
     ([id, each]) => !listed || listed.has(id) || Math.abs(at - each.at) < FORGET_MS,
   );
-  const shelved = [...kept.shelved].filter(([, shelf]) => isAhead(shelf, at));
+  const shelved = [...local.shelved].filter(([, shelf]) => isAhead(shelf, at));
   const isSame =
-    acknowledged.length === kept.acknowledged.size && shelved.length === kept.shelved.size;
+    acknowledged.length === local.acknowledged.size && shelved.length === local.shelved.size;
   return isSame
-    ? kept
-    : { ...kept, acknowledged: new Map(acknowledged), shelved: new Map(shelved) };
+    ? local
+    : { ...local, acknowledged: new Map(acknowledged), shelved: new Map(shelved) };
 }
 
 /** Whether a shelf is still running; the upper limit ends it if the clock is set back. */
@@ -110,19 +118,19 @@ export const isShelfHeld = (shelf: Shelf, verdict: Verdict, at: number): boolean
   isAhead(shelf, at) && !isWorse(verdict, shelf.verdict);
 
 /** When the next shelf ends; Infinity: there is none. */
-export const nextEnd = (kept: Kept, at: number): number =>
-  Math.min(...[...kept.shelved.values()].map(({ until }) => until).filter((until) => until > at));
+export const nextEnd = (local: LocalAlarms, at: number): number =>
+  Math.min(...[...local.shelved.values()].map(({ until }) => until).filter((until) => until > at));
 
 const KEY = 'lupin-twin.alarms';
 /** Reads the stored state; a damaged one counts as empty. */
-export function readKept(storage: Pick<Storage, 'getItem'>): Kept {
+export function readStored(storage: Pick<Storage, 'getItem'>): LocalAlarms {
   try {
     const {
       acknowledged = [],
       shelved = [],
       sound = false,
       notify = false,
-    } = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<KeptRows>;
+    } = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<StoredRows>;
     return {
       acknowledged: new Map(acknowledged.map(([id, verdict, at]) => [id, { verdict, at }])),
       shelved: new Map(
@@ -131,23 +139,23 @@ export function readKept(storage: Pick<Storage, 'getItem'>): Kept {
       ...{ sound, notify },
     };
   } catch {
-    return NOTHING_KEPT;
+    return NO_LOCAL_ALARMS;
   }
 }
 
-/** Stored form of `Kept`. */
-interface KeptRows {
+/** Stored form of `LocalAlarms`. */
+interface StoredRows {
   readonly acknowledged: readonly (readonly [id: string, Verdict, at: number])[];
   readonly shelved: readonly (readonly [what: string, Verdict, until: number, reason?: string])[];
   readonly sound: boolean;
   readonly notify: boolean;
 }
 
-export function writeKept(storage: Pick<Storage, 'setItem'>, kept: Kept): void {
-  const { sound, notify } = kept;
-  const rows: KeptRows = {
-    acknowledged: [...kept.acknowledged].map(([id, { verdict, at }]) => [id, verdict, at]),
-    shelved: [...kept.shelved].map(([what, { verdict, until, reason }]) => [
+export function writeStored(storage: Pick<Storage, 'setItem'>, local: LocalAlarms): void {
+  const { sound, notify } = local;
+  const rows: StoredRows = {
+    acknowledged: [...local.acknowledged].map(([id, { verdict, at }]) => [id, verdict, at]),
+    shelved: [...local.shelved].map(([what, { verdict, until, reason }]) => [
       what,
       verdict,
       until,
@@ -162,39 +170,41 @@ export function writeKept(storage: Pick<Storage, 'setItem'>, kept: Kept): void {
   }
 }
 
-export const own = createStore<Kept>(NOTHING_KEPT);
+export const own = createStore<LocalAlarms>(NO_LOCAL_ALARMS);
 
 /** How long the last action can be undone in place, ms; later, through the alarm's menu. */
 export const UNDO_MS = 10_000;
 
 /** The operator's last action. */
-export interface Done {
+export interface LastAction {
   readonly what: 'acknowledge' | 'unacknowledge' | 'shelve' | 'unshelve';
   /** Number of alarms affected. */
   readonly count: number;
   /** State before the action. */
-  readonly before: Kept;
+  readonly before: LocalAlarms;
 }
 
 /** The last action while it can be undone; null: none. */
-export const done = createStore<Done | null>(null);
+export const lastAction = createStore<LastAction | null>(null);
 
 /** Called with the state before and after each action, to share it; null: it stays in this browser. */
-export const acting: { tell: ((before: Kept, next: Kept) => void) | null } = { tell: null };
+export const acting: { share: ((before: LocalAlarms, next: LocalAlarms) => void) | null } = {
+  share: null,
+};
 
 let timer: ReturnType<typeof setTimeout> | undefined;
 
-function setDone(action: Done | null): void {
+function setLastAction(action: LastAction | null): void {
   clearTimeout(timer);
-  done.set(action);
-  if (action) timer = setTimeout(setDone, UNDO_MS, null);
+  lastAction.set(action);
+  if (action) timer = setTimeout(setLastAction, UNDO_MS, null);
 }
 
-function change(what: Done['what'], count: number, next: Kept): void {
+function change(what: LastAction['what'], count: number, next: LocalAlarms): void {
   const before = own.get();
   own.set(next);
-  setDone({ what, count, before });
-  acting.tell?.(before, next);
+  setLastAction({ what, count, before });
+  acting.share?.(before, next);
 }
 
 export const acknowledgeAlarms = (items: readonly Rated[]): void => {
@@ -202,8 +212,8 @@ export const acknowledgeAlarms = (items: readonly Rated[]): void => {
 };
 
 export const unacknowledgeAlarm = (alarm: Alarm): void => {
-  const kept = own.get();
-  change('unacknowledge', 1, { ...kept, acknowledged: without(kept.acknowledged, alarm.id) });
+  const local = own.get();
+  change('unacknowledge', 1, { ...local, acknowledged: without(local.acknowledged, alarm.id) });
 };
 
 export const shelveAlarm = (item: Rated, minutes: number, reason: string): void => {
@@ -211,41 +221,41 @@ export const shelveAlarm = (item: Rated, minutes: number, reason: string): void 
 };
 
 export const unshelveAlarm = (alarm: Alarm): void => {
-  const kept = own.get();
-  change('unshelve', 1, { ...kept, shelved: without(kept.shelved, whatOf(alarm)) });
+  const local = own.get();
+  change('unshelve', 1, { ...local, shelved: without(local.shelved, faultKey(alarm)) });
 };
 
 /** Undoes the last action. */
 export function undo(): void {
-  const last = done.get();
+  const last = lastAction.get();
   if (!last) return;
   const { acknowledged, shelved } = last.before;
   const now = own.get();
   own.set({ ...now, acknowledged, shelved });
-  setDone(null);
-  acting.tell?.(now, own.get());
+  setLastAction(null);
+  acting.share?.(now, own.get());
 }
 
-export const preferTold = (way: Partial<Pick<Kept, 'sound' | 'notify'>>): void => {
+export const updateNotifySettings = (way: Partial<Pick<LocalAlarms, 'sound' | 'notify'>>): void => {
   own.set({ ...own.get(), ...way });
 };
 
 /** Loads the stored state, and stores every change; returns a stop function. */
 export function startOwn(storage: Pick<Storage, 'getItem' | 'setItem'>): () => void {
-  own.set(readKept(storage));
+  own.set(readStored(storage));
   const stop = own.subscribe(() => {
-    writeKept(storage, own.get());
+    writeStored(storage, own.get());
   });
   // Another tab changed the state: undoing here would undo its change too.
   const onStorage = ({ key }: StorageEvent): void => {
     if (key !== KEY && key !== null) return;
-    own.set(readKept(storage));
-    setDone(null);
+    own.set(readStored(storage));
+    setLastAction(null);
   };
   window.addEventListener('storage', onStorage);
   return () => {
     stop();
-    setDone(null);
+    setLastAction(null);
     window.removeEventListener('storage', onStorage);
   };
 }

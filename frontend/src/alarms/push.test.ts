@@ -1,6 +1,6 @@
 import { afterEach, expect, test, vi } from 'vitest';
 
-import { wishPush } from './notify';
+import { setPush } from './notify';
 
 afterEach(() => vi.unstubAllGlobals());
 
@@ -36,27 +36,27 @@ const subscribed = { endpoint: 'https://push.example/1', keys: { p256dh: 'p', au
 
 test('a browser subscribes with the key of its bridge, which gets the subscription', async () => {
   const log = stage('KEY');
-  await wishPush(true);
+  await setPush(true);
   expect(log).toEqual([options, subscribed]);
 });
 
 test('one of another key gives way', async () => {
   const log = stage('KEY', { known: true, fails: true });
-  await wishPush(true);
+  await setPush(true);
   expect(log).toEqual([options, 'unsubscribe', options, subscribed]);
 });
 
 test('who wants it no more is taken off the list, at both', async () => {
   const log = stage('KEY', { known: true });
-  await wishPush(false);
+  await setPush(false);
   expect(log).toEqual([{ endpoint: 'https://push.example/1' }, 'unsubscribe']);
 });
 
 test('nothing is asked of the browser where the bridge offers none', async () => {
   const log = stage(null);
-  await wishPush(true);
+  await setPush(true);
   expect(log).toEqual([]);
   vi.stubGlobal('navigator', {});
-  await wishPush(true);
+  await setPush(true);
   expect(log).toEqual([]);
 });

@@ -5,14 +5,14 @@ import { alarm } from '../testing/alarms';
 import { held, judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
-import { NOTHING_KEPT } from './own';
+import { NO_LOCAL_ALARMS } from './own';
 import { listOf } from './list';
 import { todoNow } from './speech';
 
 const IDS = ['1', '2'];
 const { active } = listOf(
   IDS.map((tag_id) => alarm(tag_id, { tag_id, reason: { value: 17, limit: 18 } })),
-  NOTHING_KEPT,
+  NO_LOCAL_ALARMS,
   null,
   0,
 );

@@ -1,11 +1,11 @@
 /** Connects the alarms' words to the app state: sensor catalogue, unit, and the latest values. */
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import type { AppState } from '../store/app';
-import { selectCatalogue, selectNewestHealth } from '../store/derived';
+import { selectCatalogue, selectLatestHealth } from '../store/derived';
 import { hourAgo, selectHourAgoNow, thenOf, type HourAgo } from '../store/hourAgo';
 import { todoText, VERDICTS } from '../domain/health';
 import { memoLast } from '../domain/memo';
-import { isHeardNow, selectNewestTag } from '../store/moment';
+import { isReceivingNow, selectLatestTag } from '../store/moment';
 import { causesFirst, type Item } from './list';
 import { alarmText, nowOf, reasonNow, type Now, type Speech } from './words';
 
@@ -23,10 +23,10 @@ export function selectNow(
   alarm: Alarm,
   last: HourAgo | null = hourAgo.get(),
 ): Now | null {
-  const tag = selectNewestTag(state, alarm.tag_id);
-  const health = selectNewestHealth(state)?.byTag.get(alarm.tag_id);
+  const tag = selectLatestTag(state, alarm.tag_id);
+  const health = selectLatestHealth(state)?.byTag.get(alarm.tag_id);
   const before = tag ? thenOf(selectHourAgoNow(state, last), tag, alarm.reason.sensor) : null;
-  return nowOf(alarm, tag && health ? { tag, health } : null, before, isHeardNow(state));
+  return nowOf(alarm, tag && health ? { tag, health } : null, before, isReceivingNow(state));
 }
 
 const reasonIn = (state: AppState, alarm: Alarm): HealthReason =>

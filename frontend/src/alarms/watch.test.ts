@@ -1,14 +1,14 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { act, receive } from '../store/app';
-import { alarm, alarms, tellAlarms } from '../testing/alarms';
+import { alarm, alarms, reportAlarms } from '../testing/alarms';
 import { showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import {
   acknowledgeAlarms,
-  done,
+  lastAction,
   FORGET_MS,
-  NOTHING_KEPT,
+  NO_LOCAL_ALARMS,
   own,
   shelveAlarm,
   startOwn,
@@ -22,11 +22,11 @@ import { alarmList, meanwhile, onNews, startAlarms, startMeanwhile } from './wat
 
 const STRESSED = { verdict: 'stressed' } as const;
 let stops: (() => void)[];
-let told: string[];
-const kept = new Map<string, string>();
+let announced: string[];
+const stored = new Map<string, string>();
 const storage = {
-  getItem: (key: string) => kept.get(key) ?? null,
-  setItem: (key: string, text: string) => void kept.set(key, text),
+  getItem: (key: string) => stored.get(key) ?? null,
+  setItem: (key: string, text: string) => void stored.set(key, text),
 };
 
 const start = (): void => {
@@ -35,8 +35,8 @@ const start = (): void => {
     startAlarms(),
     startMeanwhile(),
     onNews(({ raised, cleared }) => {
-      told.push(...raised.map(({ alarm: { id } }) => id));
-      told.push(...cleared.map(({ alarm: { id } }) => `-${id}`));
+      announced.push(...raised.map(({ alarm: { id } }) => id));
+      announced.push(...cleared.map(({ alarm: { id } }) => `-${id}`));
     }),
   ];
 };
@@ -46,9 +46,9 @@ const stop = (): void => {
 
 beforeEach(() => {
   vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'Date'] });
-  told = [];
-  kept.clear();
-  own.set(NOTHING_KEPT);
+  announced = [];
+  stored.clear();
+  own.set(NO_LOCAL_ALARMS);
   showTags([wireTag()]);
   start();
 });
@@ -66,80 +66,80 @@ const item = (id: string): ReturnType<typeof calling>[number] => {
 };
 
 test('what the page opens with is no news; what comes later is, once', () => {
-  tellAlarms(alarm('a'));
-  expect(told).toEqual([]);
+  reportAlarms(alarm('a'));
+  expect(announced).toEqual([]);
   expect(ids()).toEqual(['a']);
-  tellAlarms(alarm('b', { tag_id: '2' }), alarm('a'));
-  tellAlarms(alarm('b', { tag_id: '2' }), alarm('a'));
-  expect(told).toEqual(['b']);
-  tellAlarms(alarm('b', { tag_id: '2', cleared: 950 }), alarm('a'));
-  expect(told).toEqual(['b', '-b']);
+  reportAlarms(alarm('b', { tag_id: '2' }), alarm('a'));
+  reportAlarms(alarm('b', { tag_id: '2' }), alarm('a'));
+  expect(announced).toEqual(['b']);
+  reportAlarms(alarm('b', { tag_id: '2', cleared: 950 }), alarm('a'));
+  expect(announced).toEqual(['b', '-b']);
 });
 
 test('a bridge that starts anew and goes through the past tells nothing twice', () => {
-  tellAlarms(alarm('a'));
+  reportAlarms(alarm('a'));
   receive({ alarms: alarms([], { source: 'starting', since: null }) });
   expect(ids()).toEqual([]);
-  tellAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
-  expect(told).toEqual(['b']);
+  reportAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
+  expect(announced).toEqual(['b']);
 });
 
 test('what gets worse is told again, acknowledged or not', () => {
-  tellAlarms(alarm('a', { reason: STRESSED }));
+  reportAlarms(alarm('a', { reason: STRESSED }));
   acknowledgeAlarms([item('a')]);
   expect(ids()).toEqual([]);
-  tellAlarms(alarm('a'));
+  reportAlarms(alarm('a'));
   expect(ids()).toEqual(['a']);
-  expect(told).toEqual(['a']);
+  expect(announced).toEqual(['a']);
 });
 
 test('acknowledged holds after a reload, and what is done here is no news', () => {
-  tellAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
+  reportAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
   acknowledgeAlarms([item('a')]);
   shelveAlarm(item('b'), 15, 'x');
   expect(ids()).toEqual([]);
   unshelveAlarm(item('b').alarm);
   expect(ids()).toEqual(['b']);
   stop();
-  own.set(NOTHING_KEPT);
+  own.set(NO_LOCAL_ALARMS);
   start();
-  tellAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
+  reportAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
   expect(ids()).toEqual(['b']);
-  expect(told).toEqual([]);
+  expect(announced).toEqual([]);
 });
 
 test('acknowledged long ago, a lasting alarm stays so while the list is not there yet', () => {
-  tellAlarms(alarm('a'));
+  reportAlarms(alarm('a'));
   acknowledgeAlarms([item('a')]);
   stop();
   vi.setSystemTime(Date.now() + FORGET_MS);
-  own.set(NOTHING_KEPT);
+  own.set(NO_LOCAL_ALARMS);
   receive({ alarms: null });
   start();
   receive({ alarms: alarms([], { source: 'starting', since: null }) });
-  tellAlarms(alarm('a'));
+  reportAlarms(alarm('a'));
   expect(ids()).toEqual([]);
 });
 
 test('what was shelved comes back by itself when its time is over, and is told', () => {
-  tellAlarms(alarm('a'));
+  reportAlarms(alarm('a'));
   shelveAlarm(item('a'), 15, 'x');
   expect(alarmList.get().shelved).toHaveLength(1);
   vi.advanceTimersByTime(15 * 60_000 - 1);
   expect(ids()).toEqual([]);
   vi.advanceTimersByTime(1);
   expect(ids()).toEqual(['a']);
-  expect(told).toEqual(['a']);
+  expect(announced).toEqual(['a']);
   expect(own.get().shelved.size).toBe(0);
 });
 
 test('each action can be undone for a while; another tab’s word ends that', () => {
-  const last = (): unknown[] => [done.get()?.what, done.get()?.count];
-  tellAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
+  const last = (): unknown[] => [lastAction.get()?.what, lastAction.get()?.count];
+  reportAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
   acknowledgeAlarms([item('a'), item('b')]);
   expect(last()).toEqual(['acknowledge', 2]);
   undo();
-  expect([ids(), done.get()]).toEqual([['a', 'b'], null]);
+  expect([ids(), lastAction.get()]).toEqual([['a', 'b'], null]);
   acknowledgeAlarms([item('a')]);
   shelveAlarm(item('b'), 15, 'x');
   expect(last()).toEqual(['shelve', 1]);
@@ -156,34 +156,37 @@ test('each action can be undone for a while; another tab’s word ends that', ()
   expect(ids()).toEqual([]);
   unshelveAlarm(item('b').alarm);
   vi.advanceTimersByTime(UNDO_MS);
-  expect(done.get()).toBeNull();
+  expect(lastAction.get()).toBeNull();
   shelveAlarm(item('b'), 15, 'x');
   window.dispatchEvent(new StorageEvent('storage', { key: 'lupin-twin.alarms' }));
-  expect(done.get()).toBeNull();
+  expect(lastAction.get()).toBeNull();
 });
 
 test('what another tab of the browser has acknowledged is so here', () => {
-  tellAlarms(alarm('a'));
-  kept.set('lupin-twin.alarms', JSON.stringify({ acknowledged: [['a', 'critical', Date.now()]] }));
+  reportAlarms(alarm('a'));
+  stored.set(
+    'lupin-twin.alarms',
+    JSON.stringify({ acknowledged: [['a', 'critical', Date.now()]] }),
+  );
   window.dispatchEvent(new StorageEvent('storage', { key: 'lupin-twin.alarms' }));
   expect(ids()).toEqual([]);
 });
 
 test('while another moment is shown, what comes is told apart until it is acknowledged or resolved', () => {
   const now = (): string[] => meanwhile.get().map(({ alarm: { id } }) => id);
-  tellAlarms(alarm('a'));
+  reportAlarms(alarm('a'));
   act({ moment: 50 });
   expect(now()).toEqual([]);
   const b = alarm('b', { tag_id: '2', reason: STRESSED });
   const c = alarm('c', { tag_id: '3' });
-  tellAlarms(b, alarm('a'));
-  tellAlarms(c, b, alarm('a'));
+  reportAlarms(b, alarm('a'));
+  reportAlarms(c, b, alarm('a'));
   expect(now()).toEqual(['c', 'b']);
   acknowledgeAlarms([item('b')]);
   expect(now()).toEqual(['c']);
-  tellAlarms({ ...c, cleared_at: { sec: 990, nanosec: 0 } }, b, alarm('a'));
+  reportAlarms({ ...c, cleared_at: { sec: 990, nanosec: 0 } }, b, alarm('a'));
   expect(now()).toEqual([]);
-  tellAlarms(alarm('d', { tag_id: '4' }), alarm('a'));
+  reportAlarms(alarm('d', { tag_id: '4' }), alarm('a'));
   expect(now()).toEqual(['d']);
   act({ moment: null });
   expect(now()).toEqual([]);

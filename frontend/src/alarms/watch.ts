@@ -7,7 +7,7 @@ import type { Alarms } from '../contract/types';
 import { rosText } from '../domain/time';
 import { type AppState, onChange, store } from '../store/app';
 import { announce, createStore, createVoice } from '../store/create';
-import { rosNow, selectIsCut, selectIsRecorded, selectShown } from '../store/moment';
+import { rosNow, selectIsDisconnected, selectIsRecorded, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { nextEnd, own, pruned, startOwn } from './own';
 import {
@@ -40,36 +40,36 @@ const SWEEP_MS = 60_000;
 
 export function startAlarms(): () => void {
   /** The list last announced; null: none received yet, and the first one is no news. */
-  let told: AlarmList | null = null;
-  let looked = own.get();
+  let announced: AlarmList | null = null;
+  let checked = own.get();
   let timer: ReturnType<typeof setTimeout> | undefined;
 
-  const look = (isOwnDoing: boolean): void => {
+  const update = (isOwnDoing: boolean): void => {
     clearTimeout(timer);
     const at = timeOfDay();
     const state = store.get();
     const { alarms } = state.twin;
-    const kept = pruned(own.get(), idsOf(alarms), at);
-    looked = kept;
-    timer = setTimeout(look, Math.min(SWEEP_MS, nextEnd(kept, at) - at), false);
-    if (kept !== own.get()) own.set(kept);
+    const local = pruned(own.get(), idsOf(alarms), at);
+    checked = local;
+    timer = setTimeout(update, Math.min(SWEEP_MS, nextEnd(local, at) - at), false);
+    if (local !== own.get()) own.set(local);
     if (!alarms) return;
-    const list = listOf(alarms.alarms, kept, rosNow(state, now()), at);
-    const news = told && !isOwnDoing ? newsOf(told, list) : null;
+    const list = listOf(alarms.alarms, local, rosNow(state, now()), at);
+    const news = announced && !isOwnDoing ? newsOf(announced, list) : null;
     // While the bridge replays the past, alarms missing from the list are not resolved.
-    if (alarms.source !== 'starting') told = list;
+    if (alarms.source !== 'starting') announced = list;
     alarmList.set(sharedList(alarmList.get(), list));
     if (news && news.raised.length + news.cleared.length > 0) {
       for (const listener of [...listeners]) listener(news);
     }
   };
   const onAlarms = (): void => {
-    look(false);
+    update(false);
   };
   const onOwn = (): void => {
-    if (looked !== own.get()) look(true);
+    if (checked !== own.get()) update(true);
   };
-  look(true);
+  update(true);
   const stops = [onChange(({ twin }) => [twin.alarms], onAlarms), own.subscribe(onOwn)];
   return () => {
     clearTimeout(timer);
@@ -118,7 +118,7 @@ export const titleOf = (count: number, moment: number | null, note = ''): string
 
 /** In the background, a disconnected tab would look as if it had no alarms. */
 const noteOf = (state: AppState): string | undefined =>
-  selectIsCut(state)
+  selectIsDisconnected(state)
     ? S.phase[state.twin.phase]
     : selectIsRecorded(state)
       ? S.origin.recorded
@@ -168,7 +168,9 @@ export const startVoices = (): (() => void) =>
     announce(isUrgent ? urgentVoice : politeVoice, newsText(news));
   });
 
-export function startAlarmsAndTelling(storage: Pick<Storage, 'getItem' | 'setItem'>): () => void {
+export function startAlarmsAndAnnouncements(
+  storage: Pick<Storage, 'getItem' | 'setItem'>,
+): () => void {
   // Stored state first, so that alarms acknowledged on an earlier visit are not announced.
   const stops = [startOwn(storage), startAlarms(), startTitle(), startVoices(), startMeanwhile()];
   return () => {

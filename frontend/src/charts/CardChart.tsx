@@ -10,7 +10,7 @@ import { chosenSensor, pointsFor, useCharts, useChosenSensor, useSensorsOf } fro
 
 const HEIGHT = 172;
 
-/** The sensor that was chosen here, the one in view, or the tag's first, over the period of the time bar. */
+/** The sensor chosen here, the one in view, or the tag's first, over the time bar's period. */
 export default function CardChart({ tagId }: { tagId: string }): JSX.Element | null {
   const inView = useApp((state) => state.view.sensor);
   const sensors = useSensorsOf(tagId);
@@ -22,8 +22,8 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
     () => (sensor === undefined ? [] : [{ sensor, tagIds: [tagId] }]),
     [sensor, tagId],
   );
-  const { asked, models } = useCharts(plans, pointsFor(width));
-  const { lines, state } = asked;
+  const { requested, models } = useCharts(plans, pointsFor(width));
+  const { lines, state } = requested;
   const [model] = models;
   if (sensor === undefined) return null;
   return (
@@ -41,7 +41,7 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
           <MarksKey marks={[...lines.marks.values()].flat()} />
         </>
       ) : (
-        <ChartState asked={asked} hasLines={false} lacks={null} />
+        <ChartState requested={requested} hasLines={false} lacks={null} />
       )}
       <button
         type="button"

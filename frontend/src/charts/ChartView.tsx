@@ -21,12 +21,12 @@ import { TIMES_HEIGHT } from './plot';
 import { pointsFor, useCharts, useSensorsOf } from './useLines';
 import { useZoomed, zoomBack, zoomBy } from './zoom';
 
-/** Of one chart of a tag's, and of several tags' only one, without the times; CSS pixels. */
+/** Least height of each chart of a tag, and of the one chart of a sensor, without the times; CSS pixels. */
 const LEAST_HEIGHT = { tag: 64, sensor: 152 } as const;
 /** Height of a chart's title and margins, CSS pixels. */
 const AROUND = 42;
 
-/** The charts of a tag, or of a sensor: over the map, above the time bar whose period they have. */
+/** The charts of a tag or a sensor, in place of the map; they have the time bar's period. */
 export default function ChartView({ charted }: { charted: Charted }): JSX.Element {
   const sensor = useApp((state) => state.view.sensor);
   const hasDayBefore = useApp((state) => state.settings.dayBefore);
@@ -34,7 +34,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const [isTable, setTable] = useState(false);
   const root = useRef<HTMLElement>(null);
   useFocusBack(root);
-  // The card has its own chart again, with the button that led here.
+  // On closing, the card shows its own chart again, with the button that led here.
   useEffect(
     () => () => {
       requestAnimationFrame(() => {
@@ -52,8 +52,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const sensors = useSensorsOf(tagId);
 
   const plans = useMemo(() => plansOf(charted, sensors, sensor), [charted, sensors, sensor]);
-  const { asked, models } = useCharts(plans, pointsFor(size.width), hasDayBefore);
-  const { lines, span } = asked;
+  const { requested, models } = useCharts(plans, pointsFor(size.width), hasDayBefore);
+  const { lines, span } = requested;
   const withLines = models.filter(({ lines }) => lines.length > 0);
   const room = (size.height - TIMES_HEIGHT) / Math.max(1, plans.length);
   const least = LEAST_HEIGHT[charted.by];
@@ -113,18 +113,18 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
       {charted.by === 'sensor' && <TagChoice tagIds={charted.tagIds} model={withLines[0]} />}
       <div className="chart-body" ref={body}>
         <ChartState
-          asked={asked}
+          requested={requested}
           hasLines={withLines.length > 0}
           lacks={plans.length === 0 ? S.chartNoSensors : null}
         />
         {isTable && <ChartTables models={withLines} />}
         {!isTable &&
           withLines.map((model, index) => {
-            // The times of them all, below the last, are out of sight where the charts scroll.
+            // The shared times, below the last chart, are out of sight if the charts scroll.
             const hasTimes = index === withLines.length - 1 || room - AROUND < least;
             return (
               <PlotView
-                // Alone, a line has other colours.
+                // A single line has other colours.
                 key={`${charted.by} ${model.sensor.name}`}
                 model={model}
                 height={height + (hasTimes ? TIMES_HEIGHT : 0)}
@@ -147,13 +147,13 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   );
 }
 
-/** The tags of one chart with what their lines say: each can go, and another be added. */
+/** The tags of one chart and their values: each can be removed, and others added. */
 function TagChoice({
   tagIds,
   model,
 }: {
   tagIds: readonly string[];
-  /** Undefined: nothing of it is here yet. */
+  /** Undefined: nothing received yet. */
   model: PlotModel | undefined;
 }): JSX.Element {
   const sensor = useApp(selectSensor);

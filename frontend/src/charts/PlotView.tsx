@@ -19,7 +19,7 @@ import { Select } from '../widgets/controls';
 import { isStroked, lookOf, markerPath } from './layers';
 import type { Line, PlotModel } from './model';
 import { type PlotHandlers, usePlot } from './plot';
-import { type Asked, useSensorsOf } from './useLines';
+import { type RequestedLines, useSensorsOf } from './useLines';
 import { zoomTo } from './zoom';
 import { DAY_S } from '../domain/difference';
 
@@ -33,7 +33,7 @@ const HANDLERS: PlotHandlers = {
   onZoom: zoomTo,
 };
 
-/** One chart. `isAlone`: its one line has the sensor's colour, and no list beside it that says its value. */
+/** One chart. `isAlone`: its one line has the sensor's colour, and no list beside it with its value. */
 export function PlotView({
   model,
   height,
@@ -47,7 +47,7 @@ export function PlotView({
 }): JSX.Element {
   const place = useRef<HTMLDivElement>(null);
   const ofBar = useSelected(pointedTime, pointedBy('bar'));
-  const { at } = useTold();
+  const { at } = useReadoutTime();
   const only = isAlone ? model.lines[0] : undefined;
 
   const plot = usePlot(place, model, height, hasTimes, HANDLERS, onThemeChange);
@@ -87,15 +87,15 @@ export function PlotView({
   );
 }
 
-/** The time that charts tell of: under the mouse, else the moment that the page shows; null: newest. */
-function useTold(): { at: number | null; isPointed: boolean } {
+/** The time of the values beside charts: under the mouse, else the page's moment; null: the latest. */
+function useReadoutTime(): { at: number | null; isPointed: boolean } {
   const pointed = useSelected(pointedTime, (it) => it?.at ?? null);
-  // Beside a house of the past, the newest value would pass for one of then.
+  // At a past moment, the latest value would be misleading.
   const moment = useApp((state) => state.view.moment);
   return { at: pointed ?? moment, isPointed: pointed !== null };
 }
 
-/** What a line says at that time, how far it ranges there, and what it was the day before. */
+/** A line's value at that time, its range there, and its value the day before. */
 export function LineValue({
   line,
   model: { sensor, unit, span },
@@ -103,7 +103,7 @@ export function LineValue({
   line: Line;
   model: PlotModel;
 }): JSX.Element {
-  const { at, isPointed } = useTold();
+  const { at, isPointed } = useReadoutTime();
   const point = (isPointed ? pointAt : lastUntil)(line.series, at ?? Infinity);
   const value = point?.value ?? null;
   const was = beforeAt(line, at)?.value ?? null;
@@ -130,7 +130,7 @@ export function LineValue({
   );
 }
 
-/** The day before, at a moment or when the line's newest was read. */
+/** The point of the day before, at a moment or at the line's latest reading. */
 function beforeAt({ series, before }: Line, at: number | null): Point | null {
   const newest = lastUntil(series, Infinity);
   return before && newest && pointAt(before, at ?? newest.at);
@@ -153,7 +153,7 @@ export function LineSign({ look: index }: { look: number }): JSX.Element {
   );
 }
 
-/** What the marks below the lines are, and how many of each; nothing where there are none. */
+/** Key to the marks below the lines, with their numbers; nothing if there are none. */
 export function MarksKey({ marks }: { marks: readonly Mark[] }): JSX.Element | null {
   const count = (kind: Mark['kind']): number =>
     marks.reduce((sum, mark) => sum + (mark.kind === kind ? mark.count : 0), 0);
@@ -163,7 +163,7 @@ export function MarksKey({ marks }: { marks: readonly Mark[] }): JSX.Element | n
     <p className="marks-key" data-testid="marks-key">
       {looks > 0 && (
         <span data-mark="look">
-          <span aria-hidden="true">○</span> {S.chartLooks(looks)}
+          <span aria-hidden="true">○</span> {S.chartInspections(looks)}
         </span>
       )}
       {failures > 0 && (
@@ -176,13 +176,13 @@ export function MarksKey({ marks }: { marks: readonly Mark[] }): JSX.Element | n
 }
 
 export function ChartState({
-  asked: { state, message, span },
+  requested: { state, message, span },
   hasLines,
   lacks,
 }: {
-  asked: Asked;
+  requested: RequestedLines;
   hasLines: boolean;
-  /** What there is nothing of to chart; null: there is something. */
+  /** What has no data to chart; null: there is some. */
   lacks: string | null;
 }): JSX.Element | null {
   const text =
@@ -202,7 +202,7 @@ export function ChartState({
   );
 }
 
-/** Which sensor of a tag is charted; what is computed of its sensors is among them. */
+/** Choice of the tag's charted sensor; computed ones included. */
 export function SensorChoice({
   tagId,
   value,
@@ -233,7 +233,7 @@ export function SensorChoice({
 
 export const spanText = ({ from, to }: Span): string => S.chartSpan(rosText(from), rosText(to));
 
-/** The latest, the least and the most, and how often nothing came. */
+/** The latest, least and largest value, and the number of gaps. */
 function seriesText({ points, gaps }: Series, sensor: Sensor, unit: TemperatureUnit): string {
   const latest = points.findLast(({ value }) => value !== null);
   const range = rangeOf(points.flatMap(({ min, max }) => [min, max]));

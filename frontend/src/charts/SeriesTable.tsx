@@ -40,7 +40,7 @@ export function ChartTables({ models }: { models: readonly PlotModel[] }): JSX.E
   );
 }
 
-/** The same as a line of a chart, for the keyboard and for screen readers; the newest row first. */
+/** A chart's line as a table, for keyboard and screen readers; the latest row first. */
 function SeriesTable({ line, model }: { line: Line; model: PlotModel }): JSX.Element {
   const { series } = line;
   const { sensor, unit } = model;
@@ -48,7 +48,7 @@ function SeriesTable({ line, model }: { line: Line; model: PlotModel }): JSX.Ele
   const { chartColumns: columns } = S;
   const rows = rowsOfSeries(series, line.marks).reverse();
   return (
-    // May scroll, so the keyboard must be able to reach it.
+    // It may scroll, so the keyboard must reach it.
     // eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex
     <div className="series-scroll" tabIndex={0}>
       <table className="series-table" data-testid="series-table">
@@ -121,7 +121,7 @@ function Values({
   );
 }
 
-/** What is no value; empty: it is one. */
+/** A row that is no value, in words; empty: it is one. */
 function eventText({ kind, at, to, n }: SeriesRow): string {
   switch (kind) {
     case 'reading':
@@ -135,6 +135,6 @@ function eventText({ kind, at, to, n }: SeriesRow): string {
     case 'failure':
       return S.chartFailures(n ?? 0);
     case 'look':
-      return S.chartLooks(n ?? 0);
+      return S.chartInspections(n ?? 0);
   }
 }

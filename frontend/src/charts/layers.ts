@@ -1,18 +1,18 @@
-/** What a chart has below and above its lines: drawn by functions that keep no state. */
+/** The layers below and above a chart's lines, drawn by functions without state. */
 import { valueText } from '../domain/format';
 import type { Span } from '../domain/time';
 import type { Colours } from '../draw/colours';
 import { S } from '../strings';
 import { limitsOf, type Line, type PlotModel, pointsOf } from './model';
 
-/** Where things lie on the canvas, in its own pixels. */
+/** Positions on the canvas, in its own pixels. */
 export interface Frame {
   readonly context: CanvasRenderingContext2D;
   readonly box: Readonly<Record<'left' | 'top' | 'width' | 'height', number>>;
-  /** Canvas pixels a CSS pixel. */
+  /** Canvas pixels per CSS pixel. */
   readonly ratio: number;
   readonly x: (at: number) => number;
-  /** Of a value in the sensor's own unit. */
+  /** Position of a value in the sensor's own unit. */
   readonly y: (value: number) => number;
   readonly model: PlotModel;
   readonly colour: Colours;
@@ -33,7 +33,7 @@ export function drawBelow(frame: Frame): void {
   const { context, model } = frame;
   clip(frame);
   drawIdeal(frame);
-  // With several, one's gap lies behind another's line.
+  // With several lines, a gap of one would lie behind another.
   const [only] = model.lines;
   if (only && model.lines.length === 1) drawGaps(frame, only);
   for (const line of model.lines) drawRanges(frame, line);
@@ -61,18 +61,18 @@ function drawIdeal({ context, ratio, x, y, model, colour }: Frame): void {
     context.setLineDash([2 * ratio, 4 * ratio]);
     lines(ideal);
     context.setLineDash([]);
-    // Where the values come near it: a line that nothing ever crosses has no room.
+    // Drawn only if the picture reaches it; it gets no room of its own.
     context.strokeStyle = colour('chart-failure');
     lines(critical ?? []);
   }
 }
 
-/** Hatched, so that an empty stretch is seen to be told and not forgotten. */
+/** Hatched, so that a gap does not look like a fault of the page. */
 function drawGaps(frame: Frame, { series }: Line): void {
   frame.context.strokeStyle = frame.colour('chart-gap');
   frame.context.lineWidth = frame.ratio;
   hatched(frame, series.gaps, 1);
-  // Leaning to the other side: of these nobody knows whether anything came.
+  // Leaning the other way: whether anything was received is not known.
   hatched(frame, series.missing, -1);
 }
 
@@ -99,7 +99,7 @@ function hatched({ context, box, ratio, x }: Frame, spans: readonly Span[], slan
   }
 }
 
-/** From the least to the most of each bucket, as wide as the bucket: none joins two of them. */
+/** From the least to the largest value of each bucket, as wide as the bucket; nothing joins buckets. */
 function drawRanges({ context, ratio, x, y, model, colour }: Frame, line: Line): void {
   const { series } = line;
   if (series.bucketS === null) return;
@@ -128,11 +128,11 @@ export function drawAbove(frame: Frame): void {
   drawNames(frame);
 }
 
-/** A limit's name right of the plot needs so much of it in height; CSS pixels. */
+/** Height of a limit's name right of the plot; CSS pixels. */
 const NAME_HEIGHT = 13;
 const NAME_GAP = 6;
 
-/** Each limit at its line, and with an arrow where its line lies above or below the picture. */
+/** Each limit's name at its line, with an arrow if the line lies above or below the picture. */
 function drawNames({ context, box, ratio, y, model, colour }: Frame): void {
   const height = NAME_HEIGHT * ratio;
   const names = limitsOf(model).sort((a, b) => b.value - a.value);
@@ -153,7 +153,7 @@ function drawNames({ context, box, ratio, y, model, colour }: Frame): void {
 
 const ARROWS = { below: '↓ ', inside: '', above: '↑ ' } as const;
 
-/** Each reading where there is room; a point between two breaks always, or it would not be seen. */
+/** A marker for each reading, if there is room; always for a point between two breaks, which has no line. */
 function drawMarkers({ context, ratio, x, y, box, model, colour }: Frame, line: Line): void {
   const { marker } = lookOf(line.look);
   const points = pointsOf(line.series);
@@ -176,10 +176,10 @@ function drawMarkers({ context, ratio, x, y, box, model, colour }: Frame, line: 
   });
 }
 
-/** Marks of one kind closer together than this are one mark; CSS pixels. */
+/** Marks of one kind closer together than this are merged; CSS pixels. */
 const MARK_ROOM = 7;
 const MARK_SIZE = 7;
-/** Between the values and their times, marks have a lane of their own; CSS pixels. */
+/** Height of the marks' own lane, between values and times; CSS pixels. */
 export const MARKS_LANE = 24;
 
 export function drawMarks({ context, ratio, x, box, colour }: Frame, { marks }: Line): void {
@@ -217,7 +217,7 @@ function drawMoment({ context, box, ratio, x, model: { moment }, colour }: Frame
 
 type Marker = 'circle' | 'square' | 'diamond' | 'up' | 'cross' | 'down' | 'plus' | 'ring';
 
-/** How the lines of one chart are told apart: by colour, dash and marker, so that none has to do. */
+/** Lines differ in colour, dash and marker, so that none of these is needed alone. */
 const LOOKS: readonly { readonly dash: readonly number[]; readonly marker: Marker }[] = [
   { dash: [], marker: 'circle' },
   { dash: [8, 4], marker: 'square' },
@@ -229,7 +229,7 @@ const LOOKS: readonly { readonly dash: readonly number[]; readonly marker: Marke
   { dash: [14, 5], marker: 'ring' },
 ];
 
-/** The look of the line with that place in the list; each keeps its own while others go. */
+/** The style of the line at that place in the list; it keeps it while others are removed. */
 export function lookOf(index: number) {
   const colour = index % LOOKS.length;
   const { dash, marker } = LOOKS[colour] ?? { dash: [], marker: 'circle' };
@@ -239,13 +239,13 @@ export function lookOf(index: number) {
 export const lineColour = (colour: Colours, look: number): string =>
   colour(`chart-${lookOf(look).colour + 1}`);
 
-/** Larger where the page's text is. */
+/** Grows with the page's text. */
 export const fontPx = (): number => {
   const { fontSize } = getComputedStyle(document.documentElement);
   return Math.round(11.5 * (parseFloat(fontSize) / 16 || 1));
 };
 
-/** Outline of a marker around a point; `size` is its width. Filled but for crosses and the ring. */
+/** Outline of a marker around a point; `size` is its width. Filled, except crosses and the ring. */
 export function markerPath(marker: Marker, x: number, y: number, size: number): string {
   const r = size / 2;
   const line = (...points: readonly (readonly [number, number])[]): string =>

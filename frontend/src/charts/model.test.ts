@@ -73,7 +73,7 @@ describe('the ranges of day and night', () => {
   test('are one where it was day, or night, all of the time', () => {
     expect(bands(0, 100, [])).toEqual([[0, 100, 'day']]);
     expect(bands(0, 100, [[-10, 120]])).toEqual([[0, 100, 'night']]);
-    // A span that has moved on since the nights were told.
+    // The span has moved on since the nights were received.
     expect(bands(50, 150, [[0, 40]])).toEqual([[50, 150, 'day']]);
   });
 
@@ -90,7 +90,7 @@ describe('the ranges of day and night', () => {
       [0, 60, 'now'],
       [60, 100, 'night'],
     ]);
-    // Of a period that has ended, nothing is judged now.
+    // In a period that has ended, no reading is judged now.
     expect(bands(0, 100, [], 150)).toEqual([[0, 100, 'day']]);
   });
 });
@@ -185,7 +185,7 @@ describe('the axis of the values', () => {
     const humidity = { sensor: sensorNamed('humidity') };
     expect(valueRange(model([reading(60, 74)], humidity))[1]).toBeCloseTo(85 + 35 * 0.08);
     expect(valueRange(model([reading(60, 73.9)], humidity))[1]).toBeLessThan(85);
-    // Below it, the critical limit of 10 is taken in, though 18 is too far off.
+    // Below it, the critical limit of 10 is included, though 18 is too far off.
     expect(valueRange(model([reading(5.6, 8.2)]))[1]).toBeCloseTo(10 + 4.4 * 0.08);
     expect(valueRange(model([reading(19, 25)]))[0]).toBeGreaterThan(10);
     // Far above it, the ideal range stays out.
@@ -196,7 +196,7 @@ describe('the axis of the values', () => {
     const light = { sensor: sensorNamed('light') };
     const [low, high] = valueRange(model([reading(750, 900)], light));
     expect([low, high]).toEqual([738, 912]);
-    // Nor has what is never negative a negative half.
+    // Nor do values that are never negative get a negative half.
     expect(valueRange(model([reading(0, 0)], light))).toEqual([-0.08, 1.08]);
   });
 

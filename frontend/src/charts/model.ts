@@ -1,4 +1,4 @@
-/** What one chart shows: one sensor, as one or several tags read it. Pure. */
+/** The content of one chart: one sensor of one or several tags. Pure. */
 import uPlot from 'uplot';
 
 import { fetchSeries, fetchTimeline } from '../contract/past';
@@ -19,8 +19,8 @@ interface Band extends Span {
 }
 
 /**
- * The ranges of day and night one after the other; `now`, those that readings are judged by at the
- * moment `at`, around it and where nothing tells.
+ * The successive ranges of day and night. `now`, the ranges in force at the moment `at`, hold around it,
+ * and where the clock does not decide.
  */
 export function bandsOf(
   { from, to }: Span,
@@ -34,7 +34,7 @@ export function bandsOf(
   const add = (until: number, ranges: Ranges): void => {
     const end = Math.min(until, to);
     if (end <= next) return;
-    // Light may say other than the clock, and the chart is read beside its verdict.
+    // Light may disagree with the clock, and the chart must match the verdict beside it.
     const isJudged = at !== null && next < at && at <= end;
     bands.push({ from: next, to: end, ranges: isJudged ? now : ranges });
     next = end;
@@ -49,10 +49,10 @@ export function bandsOf(
 
 export type PlotModel = Shared<ReturnType<typeof modelOf>>;
 
-/** A point of a line in the unit that is shown; null breaks the line. */
+/** A point of a line, in the shown unit; null breaks the line. */
 type Drawn = Pick<Point, 'at' | 'value'>;
 
-/** The points of a series in their order, with a break in each gap. */
+/** The points of a series in order, with a break in each gap. */
 export function pointsOf(series: Series, shown = (value: number): number => value): Drawn[] {
   const points: Drawn[] = [
     ...series.points.map((point) => ({
@@ -64,7 +64,7 @@ export function pointsOf(series: Series, shown = (value: number): number => valu
   return points.sort((a, b) => a.at - b.at);
 }
 
-/** What is drawn, from below: the days before, and then the lines. */
+/** What is drawn, from the bottom: the days before, then the lines. */
 export const drawnOf = ({
   lines,
 }: Pick<PlotModel, 'lines'>): { series: Series; look: number; isBefore: boolean }[] => [
@@ -77,7 +77,7 @@ export const drawnOf = ({
 export const hasMarks = ({ lines }: PlotModel): boolean =>
   lines.some(({ marks }) => marks.length > 0);
 
-/** Common times, and per `drawnOf` its values: null is a break, undefined not of this line. */
+/** Common times, and the values of each `drawnOf`: null is a break, undefined belongs to another line. */
 export const aligned = ({ lines, sensor, unit }: PlotModel): uPlot.AlignedData =>
   uPlot.join(
     drawnOf({ lines }).map(({ series }) => {
@@ -86,16 +86,16 @@ export const aligned = ({ lines, sensor, unit }: PlotModel): uPlot.AlignedData =
     }),
   );
 
-/** Room above and below the values, as a share of how far they spread. */
+/** Room above and below the values, as a share of their spread. */
 const ROOM = 0.08;
-/** The ideal range comes into the picture as long as the values keep this share of the height. */
+/** The picture includes the ideal range if the values keep this share of the height. */
 const LEAST_SHARE = 0.4;
-/** A spread that is less than this share of the ideal range would make mountains of noise. */
+/** Least height, as a share of the ideal range: less would magnify noise. */
 const LEAST_OF_IDEAL = 0.1;
-/** As is this share of the values, where the ideal range reaches far beyond them. */
+/** Least height, as a share of the values, if the ideal range reaches far beyond them. */
 const LEAST_OF_VALUE = 0.1;
 
-/** The values' axis, in the unit that is shown. */
+/** The values' axis, in the shown unit. */
 export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: number, high: number] {
   const values = drawnOf({ lines }).flatMap(({ series }) =>
     series.points.flatMap(({ min, max }) => [min, max]),
@@ -109,14 +109,14 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
   const least = Math.min(share || 1, ideal ? LEAST_OF_IDEAL * (ideal[1] - ideal[0]) : Infinity);
   if (high - low < least) {
     const middle = (low + high) / 2;
-    // What is never negative has no negative half of a picture.
+    // Values that are never negative get no negative half.
     low = Math.max(middle - least / 2, Math.min(low, 0));
     high = low + least;
   }
   if (ideal) {
     const spread = high - low;
-    // Each end on its own: one that is far off stays out, and the other still helps.
-    // Who is beyond what is ideal, wants to see how far it is to what is critical.
+    // Each end on its own: if one is too far off, the other can still be included.
+    // Beyond the ideal range, the distance to the critical limit matters.
     const critical = all.flatMap((ranges) => ranges.critical ?? []);
     const near = critical.filter((bound) => (bound < ideal[0] ? low < ideal[0] : high > ideal[1]));
     for (const bound of [...near, ...ideal]) {
@@ -129,8 +129,8 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
 }
 
 /**
- * The limits that are named at the picture's edge, and where their lines lie. Those of the end of the
- * span: the ideal range's, of one out of sight the nearer, and critical ones in sight.
+ * The limits named at the picture's edge, with the places of their lines, as at the end of the span:
+ * those of the ideal range (the nearer one if it is out of sight), and critical ones in sight.
  */
 export function limitsOf(model: PlotModel) {
   const { ideal, critical } = model.bands.at(-1)?.ranges ?? {};
@@ -157,27 +157,27 @@ export interface Pair {
 
 export const pairKey = ({ tagId, sensor }: Pair): string => `${sensor}\u0000${tagId}`;
 
-/** What charts show, fetched in one go: lines by `pairKey`, and marks by tag. */
+/** Chart data, fetched together: lines by `pairKey`, and marks by tag. */
 export type Lines = Awaited<ReturnType<typeof fetchLines>>;
 
 export const NO_LINES: Lines = { series: new Map(), before: new Map(), marks: new Map() };
 
-interface Question {
+interface LinesQuery {
   readonly pairs: readonly Pair[];
   readonly span: Span;
   /** The twin's time, ROS seconds: the span may end later. */
   readonly nowS: number;
-  /** At most so many readings or buckets a line. */
+  /** Most readings or buckets per line. */
   readonly points: number;
-  /** How long a day takes, seconds, where the day before is wanted too; null: it is not. */
+  /** Length of a day, seconds, if the day before is wanted; else null. */
   readonly dayS: number | null;
 }
 
-/** Looks and failures are marked to a few pixels. */
+/** Buckets of marks: exact to a few pixels. */
 const MARK_POINTS = 200;
 
 export async function fetchLines(
-  { pairs, span, nowS, points, dayS }: Question,
+  { pairs, span, nowS, points, dayS }: LinesQuery,
   signal: AbortSignal,
 ) {
   const tagIds = [...new Set(pairs.map(({ tagId }) => tagId))];
@@ -196,13 +196,13 @@ export async function fetchLines(
   ]);
   return {
     series: new Map(series),
-    /** A day later than it was; empty: nobody asked for it. */
+    /** Shifted by a day; empty: not requested. */
     before: new Map(earlier.map(([key, each]) => [key, laterBy(each, dayS ?? 0)])),
     marks: new Map(timelines.map((timeline, index) => [tagIds[index] ?? '', marksOf(timeline)])),
   };
 }
 
-/** Null: it was before the twin's time began, as in a simulation. */
+/** Null: before the twin's time began, as in a simulation. */
 function dayBefore({ from, to }: Span, dayS: number): Span | null {
   return to > dayS ? { from: Math.max(0, from - dayS), to: to - dayS } : null;
 }
@@ -213,7 +213,7 @@ export interface Plan {
   readonly tagIds: readonly string[];
 }
 
-/** `sensors`: those of the first tag; `sensor`: the one in view. */
+/** `sensors`: the first tag's sensors; `sensor`: the one in view. */
 export function plansOf(
   { by, tagIds }: Charted,
   sensors: readonly string[],
@@ -228,8 +228,8 @@ export function plansOf(
 export const tagLabel = (tagId: string): string => S.card(shown(tagId, 24));
 
 /**
- * What of a plan is here. A tag keeps its look while others come later, or have nothing. `species` are
- * those of the plan's tags: what is ideal is drawn where it is the same for all.
+ * The received part of a plan. A tag keeps its style, whether others arrive later or have no data.
+ * `species` are those of the plan's tags: the ideal range is drawn if all share it.
  */
 export function modelOf(
   catalogue: Catalogue,
@@ -249,9 +249,9 @@ export function modelOf(
     return [
       {
         series: own,
-        /** The day before, a day later than it was; null: it is not shown. */
+        /** The day before, shifted by a day; null: not shown. */
         before: before.get(key) ?? null,
-        /** Place among the looks. */
+        /** Index for `lookOf`. */
         look,
         label: tagLabel(tagId),
         marks: marks.get(tagId) ?? [],
@@ -262,7 +262,7 @@ export function modelOf(
   const isMixed = new Set(tagIds.map((_, index) => rangesFor(now, species[index] ?? ''))).size > 1;
   const own = (of: Catalogue): Ranges => rangesFor(of.named(sensor), species[0] ?? '');
   const ranges = { now: own(catalogue), day: own(day), night: own(night) };
-  // The nights are the greenhouse's: each line has the same.
+  // Nights are the same for every line.
   const bands = isMixed
     ? []
     : bandsOf(span, lines[0]?.series.nights ?? null, ranges, moment ?? nowS);
@@ -270,12 +270,12 @@ export function modelOf(
     sensor: now,
     unit,
     span,
-    /** That the page shows, ROS seconds; null: now. */
+    /** The page's moment, ROS seconds; null: now. */
     moment,
     lines,
-    /** By their time, over all of the span. */
+    /** Sorted by time, covering the span. */
     bands,
-    /** The lines' plants have ranges of their own, and no band is that of all. */
+    /** The lines' plants have different ranges, so no band holds for all. */
     isMixed,
   };
 }

@@ -1,4 +1,4 @@
-/** One chart on the page: uPlot with the layers of `layers.ts`, told what to show and how large. */
+/** One chart on the page: uPlot with the layers of `layers.ts`. */
 import { type RefObject, useEffect, useLayoutEffect, useRef } from 'react';
 import uPlot from 'uplot';
 
@@ -21,7 +21,7 @@ import {
 import { aligned, drawnOf, hasMarks, limitsOf, valueRange, type PlotModel } from './model';
 
 export interface PlotHandlers {
-  /** The time that the mouse is on, ROS seconds; null: on none. */
+  /** The time under the mouse, ROS seconds; null: none. */
   readonly onPoint: (at: number | null) => void;
   readonly onPick?: (at: number) => void;
   readonly onZoom?: (span: Span) => void;
@@ -30,22 +30,22 @@ export interface PlotHandlers {
 interface PlotSize {
   readonly width: number;
   readonly height: number;
-  /** Times and marks below it: of charts above each other, the last has them for all. */
+  /** Whether times and marks are below it: in a stack of charts, the last has them for all. */
   readonly hasTimes: boolean;
 }
 
 /** Height of the times and the lane of marks, CSS pixels. */
 export const TIMES_HEIGHT = 44 + MARKS_LANE;
 const NO_TIMES_HEIGHT = 8;
-/** The day before: strokes and pauses, CSS pixels. */
+/** Dashes of the day before: stroke and pause, CSS pixels. */
 const DASH_BEFORE = [3, 3];
-/** A drag that is shorter is a click, CSS pixels. */
+/** A shorter drag is a click, CSS pixels. */
 const SHORTEST_DRAG = 6;
-/** The names of limits, right of the plot; of the font's size. */
+/** Room for the names of limits right of the plot, in font sizes. */
 const LIMITS_ROOM = 8;
-/** Charts of one view have one cursor. */
+/** All charts share one cursor. */
 const SYNC_KEY = 'lupin-charts';
-/** In the page's language: uPlot goes by the browser's. */
+/** In the page's language: uPlot uses the browser's. */
 const AXIS_NUMBER = new Intl.NumberFormat(LOCALE);
 
 type Plot = ReturnType<typeof createPlot>;
@@ -90,7 +90,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
           sync: {
             key: SYNC_KEY,
             scales: ['x', null],
-            // Another's drag is not one's own.
+            // A drag must not act on the other charts.
             filters: { pub: (type) => type !== 'mousedown' && type !== 'mouseup' },
           },
         },
@@ -126,7 +126,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
           {
             ...axis(),
             size: 48,
-            // Steps come in ones, twos and fives: in six of these there are three ticks.
+            // Steps are 1, 2 or 5 times a power of ten: room for six gives at least three ticks.
             space: (_self, _axis, _min, _max, height) => Math.min(34, height / 6),
             values: (_self, splits) => splits.map((at) => AXIS_NUMBER.format(at)),
           },
@@ -179,12 +179,12 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
     return lineColour(colour, look);
   };
 
-  /** The point of the reading that held then, or of the bucket: the value beside the chart is that. */
+  /** The point of the reading valid then, or of the bucket, as in the value beside the chart. */
   const heldIndex = (u: uPlot, series: number, nearest: number, at: number): number => {
     const drawn = model && drawnOf(model)[series - 1];
     const [times, values] = [u.data[0], u.data[series]];
     if (!drawn || !values) return nearest;
-    // A bucket has its point in its middle.
+    // A bucket's point is at its middle.
     const last = at + (drawn.series.bucketS ?? 0) / 2;
     return times.findLastIndex((time, index) => time <= last && values[index] !== undefined);
   };
@@ -207,12 +207,12 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
       if (chart.width !== size.width || chart.height !== size.height) chart.setSize(size);
       if (before !== next) chart.setData(aligned(next));
     },
-    /** Marks a time, ROS seconds, as the mouse would, and tells nobody; null: none. */
+    /** Marks a time, ROS seconds, as the mouse would, but without an event; null: none. */
     point: (at: number | null): void => {
       const left = at === null ? -10 : (chart?.valToPos(at, 'x') ?? -10);
       chart?.setCursor({ left, top: at === null ? -10 : 0 }, false);
     },
-    /** Draws anew in the colours that are in force now, at once: a printer does not wait. */
+    /** Redraws at once in the current colours: a printer does not wait. */
     recolour: (): void => {
       chart?.batch(() => {
         chart?.redraw();
@@ -225,11 +225,11 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
   };
 }
 
-/** Of one line always: it may stand above others, with the same times below each other. */
+/** A single line always has room for names, so that stacked charts align in time. */
 const hasNames = (model: PlotModel): boolean =>
   model.lines.length === 1 || limitsOf(model).length > 0;
 
-/** `onLook` calls back when a chart's colours are others. */
+/** `onLook` calls back when a chart's colours change. */
 export function usePlot(
   place: RefObject<HTMLDivElement | null>,
   model: PlotModel,

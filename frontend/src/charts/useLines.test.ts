@@ -7,24 +7,24 @@ import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { wireTime } from '../testing/timeline';
 import { pairKey } from './model';
-import { useLines, type Asked } from './useLines';
+import { useLines, type RequestedLines } from './useLines';
 
 const pair = { tagId: '1', sensor: 'co2' };
-/** The last hour is looked at anew each 15 s from here on. */
+/** From here on, the last hour is refetched every 15 s. */
 const NOW_S = 99_990;
 
-let asked: URL[] = [];
+let requested: URL[] = [];
 let refuse: Response | null = null;
 
-/** A bridge that has one reading, and one failed try at the beginning. */
+/** A bridge that has one reading, and one failed attempt at the beginning. */
 function answer(url: URL): Response {
   if (refuse) return refuse.clone();
   const query = url.searchParams;
   const [from, to] = [Number(query.get('from')), Number(query.get('to'))];
-  const told = { from: wireTime(from), to: wireTime(to), complete_to: null, kept_from: null };
+  const bounds = { from: wireTime(from), to: wireTime(to), complete_to: null, kept_from: null };
   if (url.pathname.endsWith('/history')) {
     return Response.json({
-      ...told,
+      ...bounds,
       tag_id: query.get('tag_id'),
       sensor_type: query.get('sensor_type'),
       unit: 'ppm',
@@ -38,7 +38,7 @@ function answer(url: URL): Response {
   }
   const bucket = { start: wireTime(from), scans: 1, failures: 1, looks: 0 };
   return Response.json({
-    ...told,
+    ...bounds,
     bucket_s: 10,
     reach: null,
     buckets: [{ ...bucket, pests_seen: 0, pests_cleared: 0 }],
@@ -47,7 +47,7 @@ function answer(url: URL): Response {
   });
 }
 
-/** A state with the tag as it was visited at a moment. */
+/** A state with the tag as visited at a moment. */
 function visit(sec: number, over: Parameters<typeof wireTag>[0] = {}): void {
   flush(() => {
     const latest = stateFrame([wireTag({ last_observed: wireTime(sec), ...over })], { sec });
@@ -61,12 +61,12 @@ const passed = (ms: number): Promise<void> =>
   });
 
 const sinceOf = (path: string): number[] =>
-  asked
+  requested
     .filter(({ pathname }) => pathname === path)
     .map(({ searchParams }) => Number(searchParams.get('from')));
 const histories = (): number[] => sinceOf('/api/history');
 
-function show(hasDayBefore = false): { readonly current: Asked } {
+function show(hasDayBefore = false): { readonly current: RequestedLines } {
   const pairs = [pair];
   return renderHook(() => useLines(pairs, 300, hasDayBefore)).result;
 }
@@ -75,10 +75,10 @@ beforeAll(() => {
   vi.useFakeTimers();
 });
 beforeEach(() => {
-  asked = [];
+  requested = [];
   refuse = null;
   vi.stubGlobal('fetch', (url: URL) => {
-    asked.push(url);
+    requested.push(url);
     return Promise.resolve(answer(url));
   });
   showTags([]);
@@ -93,7 +93,7 @@ test('a line is asked for once, with its tag’s timeline', async () => {
   const shown = show();
   expect(shown.current.state).toBe('waiting');
   await passed(100);
-  expect(asked.map(({ pathname }) => pathname)).toEqual(['/api/history', '/api/timeline']);
+  expect(requested.map(({ pathname }) => pathname)).toEqual(['/api/history', '/api/timeline']);
   const { state, lines } = shown.current;
   const from = NOW_S - 3_600;
   expect(state).toBe('ready');
@@ -134,7 +134,7 @@ describe('the server is asked anew', () => {
     expect(histories()).toHaveLength(1);
     await passed(1_500);
     expect(histories()).toHaveLength(2);
-    // Up to when it is asked, and not up to when the visit was.
+    // Up to the time of the request, not of the visit.
     expect(histories()[1]).toBeGreaterThan(NOW_S + 2 - 3_600);
     await passed(5_000);
     expect(histories()).toHaveLength(2);
@@ -168,7 +168,7 @@ describe('the server is asked anew', () => {
     expect(shown.current).toMatchObject({ state: 'waiting', lines: { series: { size: 1 } } });
     await passed(10);
     expect(histories()[1]).toBe(2_000);
-    // It is over: nothing that comes later belongs to it.
+    // The period has ended: later data do not belong to it.
     visit(NOW_S + 1);
     await passed(60_000);
     expect(histories()).toHaveLength(2);

@@ -7,22 +7,22 @@ import { type AppState, store, useApp } from '../store/app';
 import { createStore, useSelected } from '../store/create';
 import { selectCatalogue, selectCatalogues } from '../store/derived';
 import { useFetched } from '../store/fetcher';
-import { rosNow, selectDayS, selectNewestTag, selectTag } from '../store/moment';
+import { rosNow, selectDayS, selectLatestTag, selectTag } from '../store/moment';
 import { turnOf } from '../store/remembered';
 import { useNow } from '../widgets/useNow';
 import { fetchLines, type Lines, modelOf, NO_LINES, type Pair, pairKey, type Plan } from './model';
 
-/** Between two questions about the same lines, ms; of many lines longer. */
+/** Interval between requests for the same lines, ms; longer for many lines. */
 const PACE_MS = 3_000;
 const PACE_A_LINE_MS = 1_000;
-/** What was heard is in the journal within 100 ms, and in another host's copy of it soon after. */
+/** Received data are in the journal within 100 ms, and in another host's copy soon after. */
 const WRITTEN_MS = 1_000;
 
-export type Asked = ReturnType<typeof useLines>;
+export type RequestedLines = ReturnType<typeof useLines>;
 
 /**
- * What these lines have over the period of the time bar: asked for again when one of the tags was
- * visited, on each connection, and now and then.
+ * These lines over the time bar's period: refetched after a visit to one of the tags, on each
+ * connection, and at intervals.
  */
 export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = false) {
   const period = useApp((state) => state.view.period);
@@ -45,10 +45,13 @@ export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = 
           paceMs: Math.max(PACE_MS, PACE_A_LINE_MS * pairs.length),
           run: async (signal) => {
             if (answered.current === group) await pause(WRITTEN_MS);
-            // The twin's time has gone on since this was wished for.
+            // The twin's time has advanced since the task was made.
             const atS = rosNow(store.get(), now()) ?? nowS;
-            const asked = spanOf(period, atS, oldest);
-            const lines = await fetchLines({ pairs, span: asked, nowS: atS, points, dayS }, signal);
+            const requested = spanOf(period, atS, oldest);
+            const lines = await fetchLines(
+              { pairs, span: requested, nowS: atS, points, dayS },
+              signal,
+            );
             answered.current = group;
             return lines;
           },
@@ -57,17 +60,17 @@ export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = 
   );
   return {
     lines: fetched.value ?? NO_LINES,
-    /** Null while nobody knows what time it is. */
+    /** Null while the time is not known. */
     span,
     /** The time of the twin, ROS seconds. */
     nowS,
-    /** While it is fetched again, what was there stays. */
+    /** During a refetch, the old lines stay. */
     state: fetched.state,
     message: fetched.message,
   };
 }
 
-/** The charts of plans of the same tags, as far as their lines are here. */
+/** The charts of plans of the same tags, as far as their lines have arrived. */
 export function useCharts(plans: readonly Plan[], points: number, hasDayBefore = false) {
   const unit = useApp((state) => state.settings.unit);
   const moment = useApp((state) => state.view.moment);
@@ -78,8 +81,8 @@ export function useCharts(plans: readonly Plan[], points: number, hasDayBefore =
     () => plans.flatMap(({ sensor, tagIds }) => tagIds.map((tagId) => ({ tagId, sensor }))),
     [plans],
   );
-  const asked = useLines(pairs, points, hasDayBefore);
-  const { lines, span, nowS } = asked;
+  const requested = useLines(pairs, points, hasDayBefore);
+  const { lines, span, nowS } = requested;
   const models = useMemo(
     () =>
       span
@@ -89,10 +92,10 @@ export function useCharts(plans: readonly Plan[], points: number, hasDayBefore =
         : [],
     [catalogue, both, plans, species, lines, span, unit, moment, nowS],
   );
-  return { asked, models };
+  return { requested, models };
 }
 
-/** Changes when one of the tags was visited: not in the past, nor for a period that has ended. */
+/** Changes when one of the tags is visited; not in the past, nor for a period that has ended. */
 function useVisits(pairs: readonly Pair[]): string {
   const newest = useApp((state) =>
     state.view.moment === null && endsNow(state.view.period) ? visitsOf(state, pairs) : null,
@@ -105,15 +108,15 @@ function useVisits(pairs: readonly Pair[]): string {
 const visitsOf = (state: AppState, pairs: readonly Pair[]): string =>
   JSON.stringify(
     pairs.map(({ tagId }) => {
-      const wire = selectNewestTag(state, tagId)?.wire;
+      const wire = selectLatestTag(state, tagId)?.wire;
       return [wire?.last_observed, wire?.last_try];
     }),
   );
 
-/** What was chosen for the card's chart, and what the map showed then: with another, the card follows it. */
+/** The sensor chosen for the card's chart, and the map's at that time: if the map changes, the card follows. */
 export const chosenSensor = createStore<{ name: string; inView: string } | null>(null);
 
-/** What the card's chart is to show: the sensor in view, unless another was chosen. */
+/** The sensor of the card's chart: the one in view, unless another was chosen. */
 export function useChosenSensor(): string {
   const inView = useApp((state) => state.view.sensor);
   const chosen = useSelected(chosenSensor);
@@ -121,8 +124,8 @@ export function useChosenSensor(): string {
 }
 
 /**
- * The sensors that a tag has at the moment that is shown, in their usual order; and what is in view
- * or chosen, where it is computed of them.
+ * The tag's sensors at the shown moment, in their usual order; and the one in view or chosen, if it
+ * is computed from them.
  */
 export function useSensorsOf(tagId: string): readonly string[] {
   const chosen = useChosenSensor();
@@ -154,14 +157,14 @@ function inOrder({ all }: Catalogue, names: readonly string[]): readonly string[
   return [...declared, ...names.filter((name) => !declared.includes(name)).sort()];
 }
 
-/** A bucket of fewer pixels is a line that nobody can tell from the next. */
+/** Narrower buckets would be indistinguishable. */
 const BUCKET_PX = 2;
 const STEP = 50;
 const MOST = 1_000;
 
 /**
- * So many points or buckets as can be told apart in a chart of that width, in steps: a window
- * that is resized does not ask anew with each pixel. 0 while there is no width.
+ * The number of distinguishable points or buckets in a chart of that width, in steps, so that resizing
+ * a window does not refetch at each pixel. 0 while there is no width.
  */
 export const pointsFor = (width: number): number =>
   width === 0 ? 0 : Math.min(MOST, Math.max(100, Math.ceil(width / BUCKET_PX / STEP) * STEP));

@@ -1,21 +1,21 @@
-/** A part of the period, chosen in a chart, becomes the period: time bar and link follow. */
+/** Zoom: the part chosen in a chart becomes the period; time bar and link follow. */
 import type { Period, Span } from '../domain/time';
 import { act, store, useApp } from '../store/app';
 import { createStore, useSelected } from '../store/create';
 import { roundedMoment } from '../store/view';
 
-/** Nothing is to be seen in less, seconds. */
+/** Shortest useful period, seconds. */
 export const SHORTEST_S = 10;
 
-/** The period before the first zoom; null: nobody has zoomed. */
+/** The period before the first zoom; null: not zoomed. */
 export const wholePeriod = createStore<Period | null>(null);
 
-/** Widened to what a chart can show, around its middle; never before the beginning of time. */
+/** Widened around its middle to the shortest period; never before ROS time 0. */
 export function zoomedSpan({ from, to }: Span): Span {
   const middle = (from + to) / 2;
   const half = Math.max(to - from, SHORTEST_S) / 2;
   const start = Math.max(0, middle - half);
-  // As the link holds it.
+  // The precision of a link.
   return {
     from: roundedMoment(start),
     to: roundedMoment(Math.max(start + SHORTEST_S, middle + half)),

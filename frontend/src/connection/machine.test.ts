@@ -49,14 +49,14 @@ const closed = (now: number, code: number | null = 1006): ConnectionEvent => ({
 
 describe('phases', () => {
   test('alarms are a sign of life, and no state', () => {
-    const waiting = run(...started.slice(0, 3), { type: 'heard', now: 30 }).connection;
+    const waiting = run(...started.slice(0, 3), { type: 'received', now: 30 }).connection;
     expect(phaseOf(waiting, 30)).toBe('connecting');
-    const heard = step(live, { type: 'heard', now: 25 + SILENCE_MS - 1 }).connection;
-    expect(phaseOf(heard, 25 + SILENCE_MS)).toBe('live');
+    const received = step(live, { type: 'received', now: 25 + SILENCE_MS - 1 }).connection;
+    expect(phaseOf(received, 25 + SILENCE_MS)).toBe('live');
     expect(phaseOf(live, 25 + SILENCE_MS)).toBe('stale');
     // The page was suspended: this frame may be old too.
-    expect(step(live, { type: 'heard', now: 25 + DEAD_MS }).command).toBe('reopen');
-    expect(step(INITIAL, { type: 'heard', now: 1 }).connection).toBe(INITIAL);
+    expect(step(live, { type: 'received', now: 25 + DEAD_MS }).command).toBe('reopen');
+    expect(step(INITIAL, { type: 'received', now: 1 }).connection).toBe(INITIAL);
   });
 
   test('connecting until the first frame, then live', () => {
@@ -119,8 +119,8 @@ describe('phases', () => {
       { type: 'frame', now: 10_001, status: null },
     );
     expect(phaseOf(connection, 10_002)).toBe('reconnecting');
-    const told: ConnectionEvent = { type: 'frame', now: 10_003, status: status('live') };
-    expect(phaseOf(step(connection, told).connection, 10_004)).toBe('live');
+    const statusEvent: ConnectionEvent = { type: 'frame', now: 10_003, status: status('live') };
+    expect(phaseOf(step(connection, statusEvent).connection, 10_004)).toBe('live');
   });
 
   test('a state alone is not live: how old it is its status says', () => {

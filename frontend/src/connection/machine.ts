@@ -44,13 +44,13 @@ export type ConnectionEvent =
 
 /**
  * - start: make a new connection in any state; after a lapse, the old one may deliver old frames
- * - heard: a frame other than status and state, which only shows that the bridge is alive
+ * - received: a frame other than status and state, which only shows that the bridge is alive
  * - broken: an unusable frame; later deltas would build on it
  * - wake: the tab became visible, or the operator wants to retry now
  * - online: the network is back; restart a running attempt, which began without it
  * - tick: a deadline of `nextDeadline` may have passed
  */
-export type Plain = 'start' | 'opened' | 'heard' | 'broken' | 'wake' | 'online' | 'tick';
+export type Plain = 'start' | 'opened' | 'received' | 'broken' | 'wake' | 'online' | 'tick';
 
 /** What `socket.ts` must do. "reopen": drop the socket, if any, and make a new one. */
 export type Command = 'reopen' | 'drop' | null;
@@ -81,17 +81,17 @@ export function step(
         socket: { kind: 'open', since: now, lastFrameAt: null, hasState: false },
       });
     case 'frame':
-    case 'heard': {
+    case 'received': {
       if (socket.kind !== 'open') return stay(connection);
       // The page was suspended: the frame may be old.
       if (silence(socket, now) >= DEAD_MS) return open(connection, now);
-      const heard = { ...socket, lastFrameAt: now };
-      if (event.type !== 'frame') return stay({ ...connection, socket: heard });
+      const received = { ...socket, lastFrameAt: now };
+      if (event.type !== 'frame') return stay({ ...connection, socket: received });
       const { status } = event;
       return stay({
         ...connection,
         status: status ?? connection.status,
-        socket: { ...heard, hasState: heard.hasState || status === null },
+        socket: { ...received, hasState: received.hasState || status === null },
       });
     }
     case 'closed':

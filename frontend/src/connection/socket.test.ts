@@ -5,7 +5,7 @@ import type { Frame } from '../contract/types';
 import { status } from '../testing/page';
 import { stateFrame } from '../testing/tags';
 import { type Connection, type Phase, phaseOf, SILENCE_MS } from './machine';
-import { connect, type Link, signInIfAsked } from './socket';
+import { connect, type Link, signInIfRequired } from './socket';
 
 class FakeSocket {
   static readonly made: FakeSocket[] = [];
@@ -153,8 +153,8 @@ describe('socket shell', () => {
 
   test('what waits in a socket as the machine wakes is not heard: a new connection is made', () => {
     vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'performance', 'Date'] });
-    const unhear = onLapse(() => {
-      link.tell('start');
+    const unsubscribe = onLapse(() => {
+      link.dispatch('start');
     });
     socket(0).onopen?.();
     socket(0).speak(status());
@@ -162,7 +162,7 @@ describe('socket shell', () => {
     vi.setSystemTime(Date.now() + 3_600_000);
     const { onmessage } = socket(0);
     onmessage?.({ data: JSON.stringify(stateFrame([], { seq: 2 })) });
-    unhear();
+    unsubscribe();
     expect(frames).toHaveLength(2);
     expect(phases).toEqual(['connecting', 'live', 'reconnecting']);
     expect(socket(0).closed).toBe(true);
@@ -189,20 +189,20 @@ const answering = (status: number): void => {
 test('a server that wants a token is one to sign in at', async () => {
   const leave = vi.fn<(url: URL) => void>();
   answering(401);
-  await signInIfAsked(leave);
+  await signInIfRequired(leave);
   expect(leave.mock.calls.map(([url]) => url.pathname)).toEqual(['/signin']);
 });
 
 test.each([200, 403, 503])('a server that answers %i keeps the page', async (status) => {
   const leave = vi.fn<(url: URL) => void>();
   answering(status);
-  await signInIfAsked(leave);
+  await signInIfRequired(leave);
   expect(leave).not.toHaveBeenCalled();
 });
 
 test('a server that is away keeps the page', async () => {
   const leave = vi.fn<(url: URL) => void>();
   vi.stubGlobal('fetch', () => Promise.reject(new TypeError('Failed to fetch')));
-  await signInIfAsked(leave);
+  await signInIfRequired(leave);
   expect(leave).not.toHaveBeenCalled();
 });

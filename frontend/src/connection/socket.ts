@@ -36,11 +36,11 @@ export function connect(url: string, handlers: ConnectionHandlers) {
     if (command === 'reopen') open();
     clearTimeout(timer);
     const wait = Math.max(0, nextDeadline(connection, event.now) - event.now);
-    timer = setTimeout(tell, wait, 'tick');
+    timer = setTimeout(dispatch, wait, 'tick');
     handlers.onConnection(connection);
   };
 
-  const tell = (type: Plain): void => {
+  const dispatch = (type: Plain): void => {
     send({ type, now: now() });
   };
 
@@ -82,11 +82,11 @@ export function connect(url: string, handlers: ConnectionHandlers) {
         handlers.onBad(parsed.why);
         // Its changes are lost, and later deltas build on them: reconnect, which starts with a
         // full state.
-        if (parsed.isDelta) tell('broken');
+        if (parsed.isDelta) dispatch('broken');
         return;
       }
       const { frame } = parsed;
-      if (frame.type === 'alarms' || frame.type === 'robot') send({ type: 'heard', now: at });
+      if (frame.type === 'alarms' || frame.type === 'robot') send({ type: 'received', now: at });
       else send({ type: 'frame', now: at, status: frame.type === 'status' ? frame : null });
       if (look() === null) return;
       handlers.onFrame(frame, connection);
@@ -94,16 +94,16 @@ export function connect(url: string, handlers: ConnectionHandlers) {
   };
 
   const wake = (): void => {
-    if (document.visibilityState === 'visible') tell('wake');
+    if (document.visibilityState === 'visible') dispatch('wake');
   };
   const online = (): void => {
-    tell('online');
+    dispatch('online');
   };
   document.addEventListener('visibilitychange', wake);
   window.addEventListener('online', online);
   window.addEventListener('pageshow', wake);
 
-  tell('start');
+  dispatch('start');
 
   const stop = (): void => {
     document.removeEventListener('visibilitychange', wake);
@@ -112,14 +112,14 @@ export function connect(url: string, handlers: ConnectionHandlers) {
     clearTimeout(timer);
     drop();
   };
-  return { tell, stop };
+  return { dispatch, stop };
 }
 
 /**
  * Goes to the sign-in page if the server requires a token. A refused WebSocket does not say why, so this
  * asks over HTTP; a server that is merely down changes nothing.
  */
-export async function signInIfAsked(leave: (url: URL) => void = goTo): Promise<void> {
+export async function signInIfRequired(leave: (url: URL) => void = goTo): Promise<void> {
   const answer = await fetch(route('readyz'), { cache: 'no-store' }).catch(() => null);
   if (answer?.status === 401) leave(route('signin'));
 }

@@ -18,15 +18,15 @@ describe('addresses', () => {
   });
 
   test('a tag’s id is written so that it stays one part of the path', async () => {
-    let asked = '';
+    let requests = '';
     vi.stubGlobal('fetch', (url: URL) => {
-      asked = url.href;
+      requests = url.href;
       return Promise.resolve(
         Response.json({ tag_id: 'a/b?c', source: null, sensors: [], tries: [] }),
       );
     });
     await fetchHistory('a/b?c', signal);
-    expect(asked).toMatch(/\/api\/tags\/a%2Fb%3Fc\/history$/);
+    expect(requests).toMatch(/\/api\/tags\/a%2Fb%3Fc\/history$/);
   });
 });
 
@@ -85,14 +85,14 @@ describe('npy', () => {
 
 describe('an estimate', () => {
   test('has means, errors and what counts as known', async () => {
-    let asked = '';
+    let requests = '';
     vi.stubGlobal('fetch', (url: URL) => {
-      asked = url.pathname + url.search;
+      requests = url.pathname + url.search;
       return Promise.resolve(npyEstimate([21, 22, 23], [0.5, 1, 2], 0.75));
     });
     const query = { sensor: 'co2', resolution: 0.1, at: 50 };
     const estimate = await fetchEstimate(query, signal);
-    expect(asked).toBe('/api/estimate.npy?sensor_type=co2&resolution=0.1&at=50.000');
+    expect(requests).toBe('/api/estimate.npy?sensor_type=co2&resolution=0.1&at=50.000');
     expect([...estimate.mean]).toEqual([21, 22, 23]);
     expect([...estimate.sd]).toEqual([0.5, 1, 2]);
     expect(estimate).toMatchObject({

@@ -19,12 +19,12 @@ export function stateSocketUrl(): string {
   const url = route('ws/state');
   url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
   url.hash = '';
-  // Only what changed, after a full state: a house of hundreds costs the Wi-Fi next to nothing.
+  // Deltas after a full state, so that hundreds of tags hardly load the Wi-Fi.
   url.search = 'delta=1';
   return url.href;
 }
 
-/** What stands behind the "?" of an address; what is undefined is left out. */
+/** Parameters of a query; undefined ones are left out. */
 type Query = Readonly<Record<string, string | number | undefined>>;
 
 export function withQuery(path: string, query: Query): string {
@@ -35,12 +35,12 @@ export function withQuery(path: string, query: Query): string {
   return `${path}?${parts.toString()}`;
 }
 
-/** A moment as the routes read it, never with an exponent; ROS seconds. */
+/** A moment in the routes' format, never with an exponent; ROS seconds. */
 export const momentParameter = (at: number): string => Math.max(0, at).toFixed(3);
 
-/** An answer of the bridge. The browser asks with its ETag each time, and a 304 costs no body. */
+/** An answer of the bridge. The browser always sends its ETag, and a 304 has no body. */
 export const get = (path: string, signal: AbortSignal): Promise<Response> =>
-  ask(path, { signal, cache: 'no-cache' });
+  request(path, { signal, cache: 'no-cache' });
 
 /** An answer, checked against the server's schema of that name. */
 export const answer = async <Name extends keyof Schemas>(
@@ -51,7 +51,7 @@ export const answer = async <Name extends keyof Schemas>(
 ): Promise<Schemas[Name]> => read(name, await get(query ? withQuery(path, query) : path, signal));
 
 /** A refusal is thrown with its reason. */
-export async function ask(path: string, init: RequestInit): Promise<Response> {
+export async function request(path: string, init: RequestInit): Promise<Response> {
   const response = await fetch(route(path), init);
   if (!response.ok) {
     const wait = Number(response.headers.get('Retry-After') ?? NaN);
@@ -103,7 +103,7 @@ export interface FieldQuery {
   readonly box?: Readonly<Record<'minX' | 'minY' | 'maxX' | 'maxY', number>>;
 }
 
-/** The grid of a field or an estimate, and its numbers by the end of their headers' names. */
+/** The grid of a field or estimate, and its numbers by the suffix of their headers. */
 async function fetchGrid(
   kind: 'Field' | 'Estimate',
   dimensions: number,
@@ -139,7 +139,7 @@ export async function fetchField(query: FieldQuery, signal: AbortSignal): Promis
 
 export type Estimate = Awaited<ReturnType<typeof fetchEstimate>>;
 
-/** Whatever a cell's error is, its mean is told; not-a-number where the house is not explored. */
+/** Each cell has a mean, whatever its error; not-a-number where the greenhouse is not explored. */
 export async function fetchEstimate(query: FieldQuery, signal: AbortSignal) {
   const { grid, shape, values, header } = await fetchGrid('Estimate', 3, query, signal);
   if (shape[0] !== 2) throw new Error(`estimate: ${shape[0]} grids, expected mean and sd`);
@@ -166,7 +166,7 @@ export const fetchHistory = (tagId: string, signal: AbortSignal): Promise<TagHis
 const MAGIC = '\x93NUMPY';
 
 /**
- * Numbers in so many dimensions, row-major, of the one NPY flavour that the bridge sends: version 1,
+ * Numbers in the given dimensions, row-major, in the one NPY format that the bridge sends: version 1,
  * little-endian float32, C order. Format: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html
  */
 export function npyOf(
@@ -177,7 +177,7 @@ export function npyOf(
   const magic = String.fromCharCode(...bytes.subarray(0, MAGIC.length));
   if (magic !== MAGIC) throw new Error(`npy: magic is ${JSON.stringify(magic)}`);
 
-  // Behind the version, 1.0, and the header's length.
+  // After the version, 1.0, and the header's length.
   const start = 10;
   if (buffer.byteLength < start) throw new Error(`npy: only ${buffer.byteLength} bytes`);
   const length = new DataView(buffer).getUint16(8, true);

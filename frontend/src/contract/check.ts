@@ -1,13 +1,13 @@
 /**
  * Checks a value against the server's own schema. A check says what is wrong, as
- * ".state.tags[3].pose: an object, not null"; null: nothing is. Nothing is put together unless
- * something is wrong, so that ten thousand tags cost milliseconds.
+ * ".state.tags[3].pose: an object, not null"; null: nothing is. Text is built only for a fault, so that
+ * ten thousand tags cost milliseconds.
  */
 import schemas from './schemas.gen.json';
 
 type Check = (value: unknown) => string | null;
 
-/** What the generated schemas use of JSON Schema. */
+/** The part of JSON Schema that the generated schemas use. */
 interface Schema {
   readonly $ref?: string;
   readonly anyOf?: readonly Schema[];
@@ -107,7 +107,7 @@ export const isObject = (value: unknown): value is Readonly<Record<string, unkno
 
 const SHOWN = 40;
 
-/** The fault, with what the wrong value is in short. */
+/** The fault, with the wrong value in short. */
 function wrong(wanted: string, value: unknown): string {
   if (value === undefined) return ': is missing';
   if (Array.isArray(value)) return `: ${wanted}, not a list of ${value.length}`;

@@ -79,11 +79,11 @@ test('fields and reasons of a later server do no harm', () => {
   const later = { ...status, reason: 'on_holiday', more: [[[[]]]] };
   expect(parse(later)).toEqual({ kind: 'frame', frame: later });
   expect(parse({ type: 'weather' })).toEqual({ kind: 'passed over' });
-  // No frame's name, though every object has it.
+  // Not a frame's name, though a property of every object.
   expect(parse({ type: 'constructor' })).toMatchObject({ kind: 'passed over' });
 });
 
-/** Every field of a frame that holds one, as a path, and the frame with it set to something. */
+/** The path of every field, and the frame with `wrong` in its place. */
 function mutations(frame: unknown, wrong: unknown): [string, unknown][] {
   if (typeof frame !== 'object' || frame === null) return [];
   return Object.entries(frame).flatMap(([key, value]: [string, unknown]) => {
@@ -99,7 +99,7 @@ function mutations(frame: unknown, wrong: unknown): [string, unknown][] {
   });
 }
 
-/** What the page works out itself, whatever is sent. */
+/** Fields that the page computes itself, whatever is sent. */
 const OF_THE_PAGE = /\.readings\.\d+\.stale_seconds$/;
 
 const paths = (frame: unknown): string[] => mutations(frame, undefined).map(([path]) => path);
@@ -205,7 +205,7 @@ test.each([
 describe('filled', () => {
   const sec = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });
 
-  /** As the server writes it: without what is as usual. */
+  /** As the server writes it: without defaults. */
   const tags = [
     {
       ...wireTag({ tag_id: 'a', last_observed: sec(100), stale_seconds: 5 }),
@@ -273,8 +273,8 @@ describe('filled', () => {
     vi.stubGlobal('fetch', (url: URL) =>
       Promise.resolve(Response.json(url.pathname === '/api/health' ? health : state)),
     );
-    const told = await fetchStateAt(12, new AbortController().signal);
-    expect(told).toMatchObject({ state: { tags: filled }, health: verdicts });
+    const received = await fetchStateAt(12, new AbortController().signal);
+    expect(received).toMatchObject({ state: { tags: filled }, health: verdicts });
   });
 });
 
@@ -283,9 +283,9 @@ describe('latest', () => {
     tag_id: 'a',
     last_observed: { sec: 995, nanosec: 0 },
     readings: [
-      // Flowers were looked at since.
+      // Flowers were inspected since.
       { name: 'co2', value: 600, observed_at: { sec: 100, nanosec: 0 } },
-      // A twin that does not tell.
+      // A twin that does not report it.
       { name: 'light', value: 9, observed_at: null },
     ],
   });

@@ -1,4 +1,4 @@
-/** What comes over the WebSocket, checked to the last field: nothing behind it checks again. */
+/** The frames of the WebSocket, checked completely: no later code checks again. */
 import { checkOf, isObject } from './check';
 import type {
   DeltaFrame,
@@ -10,7 +10,7 @@ import type {
   TwinTagState,
 } from './types';
 
-/** Most characters of a frame: the largest house that a twin keeps is a bit smaller. */
+/** Longest frame, characters: slightly more than the largest greenhouse needs. */
 export const MAX_FRAME_CHARS = 128_000_000;
 
 const FRAMES: Readonly<Record<Frame['type'], string>> = {
@@ -21,7 +21,7 @@ const FRAMES: Readonly<Record<Frame['type'], string>> = {
   robot: 'RobotFrame',
 };
 
-/** "passed over": a type of a later server. */
+/** "passed over": a type from a later server. */
 type Parsed =
   | { readonly kind: 'frame'; readonly frame: Frame }
   | { readonly kind: 'passed over' }
@@ -69,7 +69,7 @@ const isKnown = (type: string): type is Frame['type'] => Object.hasOwn(FRAMES, t
 
 type WireTag = Schemas['TwinTagState'];
 
-/** With what the server leaves out because it is as usual; `filledHealth` does so for verdicts. */
+/** Restores the defaults that the server leaves out; `filledHealth` does so for verdicts. */
 export function filledTag(tag: WireTag): TwinTagState {
   const { last_observed: last } = tag;
   let observedAt: WireTag['readings'][number]['observed_at'] = last;
@@ -93,9 +93,8 @@ export const filledHealth = ({ house, tags }: Schemas['Judgement']): Judgement =
 });
 
 /**
- * The state after a frame; null where a delta does not build on what is there. It names the frame that it
- * builds on: frames of one connection come in order, so another one than the last means that the two sides
- * have lost each other.
+ * The state after a frame; null if a delta does not fit. A delta names the frame that it builds on. Frames
+ * of one connection arrive in order, so any other than the last means that the two sides are out of step.
  */
 export function latestAfter(latest: Latest | null, frame: StateFrame | DeltaFrame): Latest | null {
   if (frame.type === 'state') return frame;
@@ -115,7 +114,7 @@ export function latestAfter(latest: Latest | null, frame: StateFrame | DeltaFram
   };
 }
 
-/** The very same where nobody's health is another. */
+/** The same object if no tag's health has changed. */
 function healthsAfter({ health }: Latest, frame: DeltaFrame): Latest['health']['tags'] {
   const isSame = frame.removed.length === 0 && Object.keys(frame.health.tags).length === 0;
   if (isSame) return health.tags;

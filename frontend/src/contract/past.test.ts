@@ -9,12 +9,12 @@ import { fetchStateAt, fetchTimeline } from './past';
 const { signal } = new AbortController();
 
 const answering = (body: unknown, health: unknown = NOBODY): string[] => {
-  const asked: string[] = [];
+  const requests: string[] = [];
   vi.stubGlobal('fetch', (url: URL) => {
-    asked.push(`${url.pathname}${url.search}`);
+    requests.push(`${url.pathname}${url.search}`);
     return Promise.resolve(Response.json(url.pathname === '/api/health' ? health : body));
   });
-  return asked;
+  return requests;
 };
 
 describe('the state of a moment', () => {
@@ -23,9 +23,9 @@ describe('the state of a moment', () => {
 
   test('is asked for to the millisecond, with the verdicts of that moment', async () => {
     const health = judgement({ 1: [reason()] });
-    const asked = answering(half, health);
+    const requests = answering(half, health);
     await expect(fetchStateAt(12.5, signal)).resolves.toMatchObject({ state: half, health });
-    expect(asked).toEqual(['/api/state?at=12.500', '/api/health?at=12.500']);
+    expect(requests).toEqual(['/api/state?at=12.500', '/api/health?at=12.500']);
     expect([momentParameter(1_794_000_000.125), momentParameter(1e-7)]).toEqual([
       '1794000000.125',
       '0.000',
@@ -35,7 +35,7 @@ describe('the state of a moment', () => {
   test('of any other moment is none: a server that knows no past gives the present', async () => {
     answering(state);
     await expect(fetchStateAt(12.5, signal)).rejects.toThrow(
-      'the answer is about 1794000000.000 s, asked was 12.500 s',
+      'the answer is about 1794000000.000 s, requested was 12.500 s',
     );
   });
 
@@ -54,10 +54,10 @@ describe('the state of a moment', () => {
 
 test('what happened is asked for over a period, or over all there is', async () => {
   const wire = wireTimeline({ from: 5, to: 9.5 });
-  const asked = answering(wire);
+  const requests = answering(wire);
   await expect(fetchTimeline({ from: 5, to: 9.5 }, 240, signal)).resolves.toEqual(wire);
   await fetchTimeline(null, 240, signal);
-  expect(asked).toEqual([
+  expect(requests).toEqual([
     '/api/timeline?points=240&from=5.000&to=9.500',
     '/api/timeline?points=240',
   ]);

@@ -1,19 +1,19 @@
-/** The routes of the past: how it was at a moment, and what happened when. Times are ROS seconds. */
+/** The routes of the past: the state at a moment, and what happened when. Times are ROS seconds. */
 import { answer, get, momentParameter, read, route, withQuery } from './api';
 import { filledHealth, filledTag } from './frames';
 import type { History, Latest, Timeline } from './types';
 
-/** Stamps are exact to the nanosecond, and a moment that is asked for to the millisecond. */
+/** Stamps are exact to the nanosecond, requested moments to the millisecond. */
 const SAME_MOMENT_S = 0.0005;
 
 /**
- * Every tag as of a moment, and what is to be said of it. An answer about any other moment is an error: a server that does not
- * know `at` would give the present.
+ * Every tag at a moment, with the verdicts. An answer about another moment is an error: a server that
+ * does not know `at` would return the present.
  */
 export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Latest> {
   const query = { at: momentParameter(at) };
   let isWhole = true;
-  // Both or none: no moment has the verdicts of another one.
+  // Both or neither: no moment shows the verdicts of another one.
   const [state, health] = await Promise.all([
     get(withQuery('api/state', query), signal).then((it) => {
       isWhole = holdsAll(it, at);
@@ -22,9 +22,11 @@ export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Lat
     answer('Judgement', signal, 'api/health', query),
   ]);
   const { sec, nanosec } = state.header.stamp;
-  const told = sec + nanosec / 1e9;
-  if (Math.abs(told - at) > SAME_MOMENT_S) {
-    throw new Error(`the answer is about ${told.toFixed(3)} s, asked was ${at.toFixed(3)} s`);
+  const answered = sec + nanosec / 1e9;
+  if (Math.abs(answered - at) > SAME_MOMENT_S) {
+    throw new Error(
+      `the answer is about ${answered.toFixed(3)} s, requested was ${at.toFixed(3)} s`,
+    );
   }
   return {
     seq: 0,
@@ -35,19 +37,19 @@ export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Lat
   };
 }
 
-/** Whether all is in the journal that leads up to a moment; a server that does not say has it. */
+/** Whether the journal is complete up to a moment; assumed if the server does not report it. */
 function holdsAll({ headers }: Response, at: number): boolean {
   const complete = headers.get('X-Complete-To');
-  const kept = headers.get('X-Kept-From');
+  const keptFrom = headers.get('X-Kept-From');
   return (
     (complete === null || Number(complete) >= at - SAME_MOMENT_S) &&
-    (kept === null || Number(kept) <= at + SAME_MOMENT_S)
+    (keptFrom === null || Number(keptFrom) <= at + SAME_MOMENT_S)
   );
 }
 
 /**
- * What happened over a period, in so many buckets; without a period, over all that is kept. With
- * a tag only what happened there.
+ * What happened over a period, in the given number of buckets; without a period, over the whole
+ * history. With a tag, only what happened there.
  */
 export const fetchTimeline = (
   span: { readonly from: number; readonly to: number } | null,
@@ -62,30 +64,34 @@ export const fetchTimeline = (
     tag_id: tagId,
   });
 
-/** What the server gives at most of each. */
+/** The server's limits. */
 const MAX_POINTS = 5_000;
 
 /** Times are ROS seconds. */
-interface Asked {
+interface SeriesQuery {
   readonly tagId: string | undefined;
   readonly sensor: string | undefined;
   readonly from: number;
   readonly to: number;
 }
 
-const parameters = ({ tagId, sensor, from, to }: Asked) => ({
+const parameters = ({ tagId, sensor, from, to }: SeriesQuery) => ({
   tag_id: tagId,
   sensor_type: sensor,
   from: momentParameter(from),
   to: momentParameter(to),
 });
 
-export const fetchSeries = (asked: Asked, points: number, signal: AbortSignal): Promise<History> =>
+export const fetchSeries = (
+  query: SeriesQuery,
+  points: number,
+  signal: AbortSignal,
+): Promise<History> =>
   answer('History', signal, 'api/history', {
-    ...parameters(asked),
+    ...parameters(query),
     points: Math.min(MAX_POINTS, points),
   });
 
-/** Where every reading and try of a period is to be had, of one tag and of one sensor if named. */
-export const exportAddress = (asked: Asked): string =>
-  route(withQuery('api/export.csv', parameters(asked))).href;
+/** Address of every reading and attempt of a period, of one tag and sensor if given. */
+export const exportAddress = (query: SeriesQuery): string =>
+  route(withQuery('api/export.csv', parameters(query))).href;

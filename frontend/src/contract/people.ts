@@ -1,37 +1,37 @@
-/** The bridge's routes for people: who is signed in, and what they say. */
-import { answer, ask } from './api';
+/** The bridge's routes for people: who is signed in, and their notes. */
+import { answer, request } from './api';
 import type { Note, Session } from './types';
 
-/** A header of our own: no form and no picture of another page can send one. */
+/** Our own header: no form or picture of another page can send it. */
 const OWN = { 'X-Lupin-Twin': '1' };
 
 export const fetchSession = (signal: AbortSignal): Promise<Session> =>
   answer('Session', signal, 'api/session');
 
-/** Ends the session, and with it the sockets that it has open. */
+/** Ends the session and its open sockets. */
 export async function signOut(): Promise<void> {
-  await ask('api/signout', { method: 'POST', headers: OWN });
+  await request('api/signout', { method: 'POST', headers: OWN });
 }
 
 interface Draft {
   readonly kind: 'acknowledge' | 'shelve' | 'comment';
   readonly subject: string;
   readonly text?: string;
-  /** ROS seconds. Of shelve its end, null: not any more; of comment the moment that it is about. */
+  /** ROS seconds. For shelve its end, null: ended; for comment the moment that it is about. */
   readonly until?: string | null;
 }
 
 const post = async (path: string, body: object): Promise<void> => {
   const headers = { ...OWN, 'Content-Type': 'application/json' };
-  await ask(path, { method: 'POST', headers, body: JSON.stringify(body) });
+  await request(path, { method: 'POST', headers, body: JSON.stringify(body) });
 };
 
 export const postNote = (note: Draft): Promise<void> => post('api/notes', note);
 
-/** Subscribes a browser to notifications; with its endpoint alone, not any more. */
+/** Subscribes a browser to notifications; with its endpoint alone, unsubscribes it. */
 export const postPush = (body: PushSubscriptionJSON): Promise<void> => post('api/push', body);
 
-/** Takes the word back that stands of a subject, if there is one. */
+/** Withdraws the current note on a subject, if there is one. */
 export async function withdrawNote(kind: Draft['kind'], subject: string): Promise<void> {
   const { signal } = new AbortController();
   const { notes } = await answer('Notes', signal, 'api/notes', { subject });
@@ -39,10 +39,10 @@ export async function withdrawNote(kind: Draft['kind'], subject: string): Promis
   if (note) await withdrawComment(note.id);
 }
 
-/** The newest first, withdrawn ones too. */
+/** The latest first, including withdrawn ones. */
 export const fetchNotes = async (signal: AbortSignal): Promise<readonly Note[]> =>
   (await answer('Notes', signal, 'api/notes')).notes;
 
 export async function withdrawComment(id: string): Promise<void> {
-  await ask(`api/notes/${encodeURIComponent(id)}`, { method: 'DELETE', headers: OWN });
+  await request(`api/notes/${encodeURIComponent(id)}`, { method: 'DELETE', headers: OWN });
 }

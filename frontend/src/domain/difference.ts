@@ -1,4 +1,4 @@
-/** A field less another of the same house at another moment: yesterday against today. Pure. */
+/** A field minus that of another moment: yesterday against today. Pure. */
 import type { Field, TagHealth } from '../contract/types';
 import { S } from '../strings';
 import { differenceNumber, type TemperatureUnit, withUnit } from './format';
@@ -6,7 +6,7 @@ import { fraction, mix, type Range, rangeOf, type Rgb, rgbText, type Shade } fro
 import type { Ranges, Sensor } from './sensors';
 import type { Tag } from './twin';
 
-/** What the moment that is shown is compared with: so many seconds before it, or one moment. */
+/** What the shown moment is compared with: a number of seconds before it, or a fixed moment. */
 export type Compare =
   { readonly by: 'ago'; readonly seconds: number } | { readonly by: 'moment'; readonly at: number };
 
@@ -18,8 +18,8 @@ export const otherMoment = (compare: Compare, shownAt: number): number =>
   compare.by === 'moment' ? compare.at : shownAt - compare.seconds;
 
 /**
- * What is shown less what was then, cell by cell, on their one grid; not known where either is
- * not. `valueMin` and `valueMax` range over what is known; both are 0 where nothing is.
+ * The shown field minus the other, cell by cell, on one grid; a cell is known only if both are.
+ * `valueMin` and `valueMax` cover the known cells; both are 0 without any.
  */
 export function differenceOf(shown: Field, then: Field): Field {
   for (const key of ['sensor', 'width', 'height', 'originX', 'originY', 'resolution'] as const) {
@@ -42,20 +42,20 @@ export function differenceOf(shown: Field, then: Field): Field {
   };
 }
 
-/** Less than this share of the ideal range is no change worth a full colour. */
+/** A change below this share of the ideal range gets no full colour. */
 const LEAST_OF_IDEAL = 0.05;
 
-/** As far below 0 as above it, or a small change would look like a large one of the other kind. */
+/** Symmetric around 0, or a small change one way would look like a large one the other way. */
 export function symmetricRange({ valueMin, valueMax }: Field, { ideal }: Ranges): Range {
   const least = ideal ? LEAST_OF_IDEAL * (ideal[1] - ideal[0]) : 0;
   const most = Math.max(Math.abs(valueMin), Math.abs(valueMax), least);
   return { low: -most, high: most };
 }
 
-/** Less is blue and more is orange, which no common colour blindness takes for each other. */
+/** Less is blue and more is orange: distinguishable with every common colour blindness. */
 const LESS: Rgb = [0, 92, 200];
 const MORE: Rgb = [222, 92, 0];
-/** No change is grey and to be seen: it is not the same as not known. */
+/** No change is a visible grey: it differs from "not known". */
 const SAME: Rgb = [128, 128, 128];
 const FAINTEST = 0.2;
 const STRONGEST = 0.8;
@@ -79,7 +79,7 @@ export const divergingColours = (): string[] =>
     return rgbText(rgb, alpha);
   });
 
-/** A difference with its sign, without its unit; no sign where nothing is left to show. */
+/** A difference with its sign, without its unit; no sign if it rounds to 0. */
 export function signedText(sensor: Sensor, value: number, unit: TemperatureUnit): string {
   const text = differenceNumber(sensor, value, unit);
   const isNothing = !/[1-9]/.test(text);
@@ -98,8 +98,8 @@ export interface TagThen {
 }
 
 /**
- * Null: there is no reading now that holds, and nothing to compare. `by`: what is now less what was then, in
- * the sensor's unit; none: there was no reading, or none that held then; same: it is the reading of then.
+ * Null: no valid reading now, so nothing to compare. `by`: now minus then, in the sensor's unit; none: no
+ * valid reading then; same: it is still that reading.
  */
 export function trendOf(sensor: string, now: TagThen, then: TagThen | null) {
   const value = held(sensor, now);
@@ -110,11 +110,11 @@ export function trendOf(sensor: string, now: TagThen, then: TagThen | null) {
   return { kind: 'by', by: value - before } as const;
 }
 
-/** The value of a reading that has not grown too old; null: there is none. */
+/** The value of a reading that is not too old; null: there is none. */
 const held = (sensor: string, then: TagThen): number | null =>
   isOldReading(sensor, then) ? null : (then.tag.readings.get(sensor) ?? null);
 
-/** Whether a reading has grown too old, as the bridge judges age; of what is derived, any other. */
+/** Whether the bridge judges a reading too old; for a derived sensor, any of the tag's readings. */
 export function isOldReading(sensor: string, { tag, health }: TagThen): boolean {
   const isDerived = !tag.readings.has(sensor);
   return health.reasons.some(
@@ -130,8 +130,8 @@ export function sameReading(sensor: string, a: Tag, b: Tag): boolean {
 }
 
 /**
- * The difference as precise as the sensor's values are: what rounds to nothing is level. `text` has its
- * sign and its unit, or says that there is none.
+ * The difference, as precise as the sensor's values: what rounds to 0 is level. `text` has sign and
+ * unit, or says that there is no difference.
  */
 export function differenceShown(
   sensor: Sensor,

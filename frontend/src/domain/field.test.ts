@@ -136,7 +136,7 @@ describe('how sure a cell is', () => {
       expect(stepOf(step * 2, 2)).toBe(index + 1);
     });
     expect(stepOf(NaN, 2)).toBe(NOT_KNOWN_STEP);
-    // A house of which nobody says what would be known.
+    // Without a limit for known cells.
     expect(stepOf(0, 0)).toBe(NOT_KNOWN_STEP);
   });
 
@@ -192,7 +192,7 @@ test('an estimate ends where the map does, and where nothing is explored', () =>
   const clipped = onExplored(estimated([20, 21, 22, 23], [1, 1, 1, 1]), map());
   expect(known(clipped.values)).toEqual([false, true, false, false]);
   expect(known(clipped.sureness?.sd)).toEqual([false, true, false, false]);
-  // A quarter turn about the corner: the explored pixel then lies before it.
+  // Rotated by 90° about the corner: the explored pixel is then on its other side.
   const turned = onExplored(estimated([20, 21, 22, 23], [1, 1, 1, 1]), map(Math.PI / 2));
   expect(known(turned.values)).toEqual([true, false, false, false]);
 });

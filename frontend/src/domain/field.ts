@@ -4,7 +4,7 @@ import { type Bounds, mapPoint, type MapPoint } from '../geometry/coordinates';
 import type { MapPicture } from '../geometry/image';
 import { fraction, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
 
-/** The cell that holds the point; null outside the grid. */
+/** The cell that contains the point; null outside the grid. */
 export function cellAt(field: Field, point: MapPoint): number | null {
   const column = Math.floor((point.x - field.originX) / field.resolution);
   const row = Math.floor((point.y - field.originY) / field.resolution);
@@ -12,7 +12,7 @@ export function cellAt(field: Field, point: MapPoint): number | null {
   return row * field.width + column;
 }
 
-/** The value of the cell that holds the point; null outside the grid and where it is not known. */
+/** The value of the cell that contains the point; null outside the grid or if not known. */
 export function valueAt(field: Field, point: MapPoint): number | null {
   const cell = cellAt(field, point);
   const value = cell === null ? undefined : field.values[cell];
@@ -32,8 +32,8 @@ export function resolutionFor(bounds: Bounds, maxCells: number): number {
 /**
  * Colours a field. Not-a-number is fully transparent. The picture's top row is the grid's last
  * row. With `detail` above 1 every cell becomes detail x detail pixels whose values are
- * interpolated between cell centres, in values and not in colours: a picture scaled by the
- * browser would let colour bleed into cells that are not known.
+ * interpolated between cell centres. Values are interpolated, not colours: a picture scaled by the
+ * browser would let colour bleed into unknown cells.
  */
 export function fieldPixels(field: Field, shade: Shade, detail: number) {
   const width = field.width * detail;
@@ -61,7 +61,7 @@ export function fieldPixels(field: Field, shade: Shade, detail: number) {
 
 /**
  * Value between cell centres, `u` and `v` in cells with the first centre at 0. Not-a-number
- * where the cell that holds the point is; unknown neighbours have no say.
+ * if the cell that contains the point is; unknown neighbours are ignored.
  */
 export function interpolate(field: Field, u: number, v: number): number {
   const { width, height, values } = field;
@@ -87,7 +87,7 @@ export function interpolate(field: Field, u: number, v: number): number {
   return weights > 0 ? sum / weights : own;
 }
 
-/** Pixels a cell edge for a smooth picture, so that it stays under two million pixels. */
+/** Pixels per cell edge of a smooth picture, which stays under two million pixels. */
 export function smoothDetail(field: Field): number {
   const cells = Math.max(1, field.width * field.height);
   return Math.max(1, Math.min(8, Math.floor(Math.sqrt(2_000_000 / cells))));
@@ -101,12 +101,12 @@ export function fieldCorners(field: Field): readonly [MapPoint, MapPoint] {
   ];
 }
 
-/** Where the known ends: straight lines as x0, y0, x1, y1, metres in the map frame, one after the other. */
+/** Outline of the known area: lines as successive x0, y0, x1, y1, metres in the map frame. */
 export function edgesOf({ width, height, originX, originY, resolution, values }: Field): number[] {
   const isKnown = (x: number, y: number): boolean =>
     x >= 0 && x < width && y >= 0 && y < height && !Number.isNaN(values[y * width + x]);
   const lines: number[] = [];
-  // Runs of cell sides on one straight line are one line.
+  // Adjacent cell sides on one straight line are merged.
   const runs = (
     count: number,
     isEdge: (index: number) => boolean,
@@ -140,17 +140,17 @@ export function edgesOf({ width, height, originX, originY, resolution, values }:
   return lines;
 }
 
-/** Nine of ten values of a normal distribution lie within so many standard deviations. */
+/** Nine of ten values of a normal distribution lie within this many standard deviations. */
 export const NINE_OF_TEN = 1.645;
 
 /**
- * Errors as ratios to that below which a cell is known, at which the hatching becomes denser. From the
- * last on a cell is not known: hardly surer than if no tag were anywhere near.
+ * Errors at which the hatching becomes denser, as ratios to the limit of a known cell. From the last
+ * on, a cell is not known: hardly surer than without any tag nearby.
  */
 export const STEPS = [1, 7 / 6, 8 / 6, 9 / 6] as const;
 export const NOT_KNOWN_STEP = STEPS.length;
 
-/** 0: known; then one for each step that the error reaches, the last: not known at all. */
+/** 0: known; then the number of steps that the error reaches. At the last step nothing is known. */
 export function stepOf(sd: number, sdKnown: number): number {
   if (Number.isNaN(sd)) return NOT_KNOWN_STEP;
   return STEPS.filter((step) => !(sd < step * sdKnown)).length;
@@ -162,19 +162,19 @@ export const stepsIn = ({ sd, sdKnown }: Sureness): Uint8Array =>
 /** Half the width of the range that nine of ten values fall into, from a standard deviation. */
 export const plusMinus = (sd: number): number => NINE_OF_TEN * sd;
 
-/** The error alone, as a field: plus or minus what, also where it is too large to be known. */
+/** The error alone, as a field of plus-or-minus values, also where the value is not known. */
 export function errorField(field: Field, { sd }: Sureness): Field {
   const values = sd.map(plusMinus);
-  const told = values.filter((value) => !Number.isNaN(value));
+  const finite = values.filter((value) => !Number.isNaN(value));
   return {
     ...field,
     values,
     valueMin: 0,
-    valueMax: told.reduce((most, value) => Math.max(most, value), 0),
+    valueMax: finite.reduce((most, value) => Math.max(most, value), 0),
   };
 }
 
-/** Of no sensor and of no verdict. */
+/** A colour that no sensor and no verdict has. */
 const ERROR: Rgb = [112, 58, 168];
 const FAINTEST = 0.08;
 const STRONGEST = 0.82;
@@ -188,7 +188,7 @@ export const errorShade =
   (range: Range): Shade =>
   (value) => ({ rgb: ERROR, alpha: errorAlpha(fraction(range, value)) });
 
-/** A field of an estimate as it came: what is too unsure is not known. Pure. */
+/** The field of a received estimate: cells that are too unsure are not known. Pure. */
 export function estimatedField(sensor: string, estimate: Estimate): Field {
   const { mean, sd, sdKnown, ...grid } = estimate;
   const values = mean.map((value, cell) =>
@@ -205,7 +205,7 @@ export function estimatedField(sensor: string, estimate: Estimate): Field {
   };
 }
 
-/** An estimate tells a number for every cell, outside the house too; there it is not asked. */
+/** An estimate has a number for every cell; outside the greenhouse it is dropped. */
 export function onExplored(
   field: Field,
   { placement, pixels }: Pick<MapPicture, 'placement' | 'pixels'>,

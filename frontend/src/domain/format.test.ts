@@ -125,7 +125,7 @@ test('all values of a sensor have as many digits, whatever their size', () => {
   expect(texts('vpd', 0.04, 1.1, 12)).toEqual(['0.04', '1.10', '12.00']);
   expect(texts('co2', 0, 99.6, 1_499.6)).toEqual(['0', '100', '1,500']);
   expect(texts('humidity', 0.4, 100)).toEqual(['0.4', '100.0']);
-  // Without ranges of their own, as what they are computed of.
+  // Without their own ranges, as precise as the sensors that they are computed from.
   expect(texts('dew_point', 0.4, 12)).toEqual(['0.4', '12.0']);
   expect(texts('co2_dose', 80.4, 800)).toEqual(['80', '800']);
 });

@@ -4,15 +4,15 @@ import { LOCALE, S } from '../strings';
 import type { Range } from './ramp';
 import type { Sensor } from './sensors';
 
-/** What stands between the whole and the tenths where the reader lives. */
+/** The reader's decimal separator. */
 const POINT =
   new Intl.NumberFormat(LOCALE).formatToParts(0.5).find(({ type }) => type === 'decimal')?.value ??
   '.';
 
-/** A number's text as the reader writes it: their decimal point, and a true minus sign. */
+/** A number's text in the reader's form: their decimal separator, and a true minus sign. */
 export const written = (text: string): string => text.replace('.', POINT).replace('-', '\u2212');
 
-/** A number at the precision that its size deserves, or with so many digits. */
+/** A number with the given digits, or as precise as its size needs. */
 function roundedText(value: number, digits: number | null): string {
   const size = Math.abs(value);
   if (size >= 1e6) return value.toExponential(2);
@@ -22,7 +22,7 @@ function roundedText(value: number, digits: number | null): string {
 
 const WHOLE = new Intl.NumberFormat(LOCALE, { maximumFractionDigits: 0 });
 
-/** As a reader writes it; thousands are set apart, as on a chart's axis. */
+/** In the reader's form, with thousands separators, as on a chart's axis. */
 export const numberText = (value: number, digits: number | null = null): string =>
   Math.abs(value) >= 1000 && Math.abs(value) < 1e6
     ? WHOLE.format(value).replace('-', '\u2212')
@@ -32,20 +32,20 @@ export const numberText = (value: number, digits: number | null = null): string 
 export const valueText = (sensor: Sensor, value: number, unit: TemperatureUnit): string =>
   sized(sensor, toShown(sensor, value, unit));
 
-/** What two readings differ by, or an error, without its unit. */
+/** The difference of two readings, or an error, without its unit. */
 export const differenceNumber = (sensor: Sensor, by: number, unit: TemperatureUnit): string =>
   sized(sensor, differenceToShown(sensor, by, unit));
 
 const sized = ({ digits }: Sensor, given: number): string =>
   numberText(given, digits ?? digitsOfSmall(given));
 
-/** A number's text and the sensor's unit, held together by a no-break space. */
+/** A number's text and the sensor's unit, joined by a no-break space. */
 export function withUnit(sensor: Sensor, text: string, unit: TemperatureUnit): string {
   const suffix = unitOf(sensor, unit);
   return suffix ? `${text}\u00a0${suffix}` : text;
 }
 
-/** Of a sensor without ranges two digits of a small value, which would read as nothing else. */
+/** Without ranges, a small value keeps two digits; otherwise it would read as 0. */
 function digitsOfSmall(value: number): number | null {
   const size = Math.abs(value);
   return size === 0 || size >= 0.1 ? null : Math.min(6, 1 + Math.ceil(-Math.log10(size)));
@@ -54,7 +54,7 @@ function digitsOfSmall(value: number): number | null {
 export const readingText = (sensor: Sensor, value: number, unit: TemperatureUnit): string =>
   withUnit(sensor, valueText(sensor, value, unit), unit);
 
-/** A reading with its unit; one that reads like the limit that it is beyond says on which side it is. */
+/** A reading with its unit; if it reads like the limit that it exceeds, the text says on which side it lies. */
 export function beyondLimitText(
   sensor: Sensor,
   value: number,
@@ -67,13 +67,13 @@ export function beyondLimitText(
     : text;
 }
 
-/** A range with its unit; an en dash where there is none. */
+/** A range with its unit; an en dash if there is none. */
 export function rangeText(sensor: Sensor, range: Range | null, unit: TemperatureUnit): string {
   if (!range) return '–';
   return `${valueText(sensor, range.low, unit)} – ${readingText(sensor, range.high, unit)}`;
 }
 
-/** An age in its two largest units at most. */
+/** An age in at most its two largest units. */
 export function ageText(seconds: number): string {
   const s = Math.floor(seconds);
   if (s < 60) return `${s}\u00a0s`;
@@ -84,7 +84,7 @@ export function ageText(seconds: number): string {
   return `${Math.floor(hours / 24)}\u00a0d ${hours % 24}\u00a0${S.hours}`;
 }
 
-/** A time between two things that come again and again: exact where it is short. */
+/** An interval between repeated events: exact if short. */
 export function intervalText(seconds: number): string {
   if (seconds < 10) return `${written(seconds.toFixed(1))}\u00a0s`;
   const s = Math.round(seconds);
@@ -92,7 +92,7 @@ export function intervalText(seconds: number): string {
   return durationText(s);
 }
 
-/** As an age, without a second unit of 0. */
+/** Like an age, but without a second unit of 0. */
 export const durationText = (seconds: number): string =>
   ageText(seconds).replace(/\u00a0([hud]) 0\u00a0\w+$/, '\u00a0$1');
 
@@ -115,7 +115,7 @@ export function clockText(epochMs: number): string {
 /** Without the seconds. */
 export const minuteText = (epochMs: number): string => clockText(epochMs).slice(0, -3);
 
-/** Date and time of day on the operator's own clock, for files' names: 2026-05-01 14:03:22. */
+/** Date and time on the operator's own clock, for file names: 2026-05-01 14:03:22. */
 export function momentText(epochMs: number): string {
   return new Date(epochMs).toLocaleString('sv-SE');
 }
@@ -133,9 +133,9 @@ export const farOffText = ({ x, y }: MapPoint): string =>
 
 const TIMEOUT = 504;
 
-/** Why something could not be had: what may pass soon in the reader's language, else as it was said. */
+/** Why a request failed: temporary failures in the reader's language, others as received. */
 export function failureText(error: unknown): string {
-  // A server that is busy says when to ask again. Where no answer comes at all, `fetch` throws a TypeError.
+  // A busy server says when to retry. Without any answer, `fetch` throws a TypeError.
   const isPassing =
     error instanceof Refusal
       ? error.retryAfterS !== null || error.status === TIMEOUT
@@ -144,7 +144,7 @@ export function failureText(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
-/** What the operator reads temperatures in. Everything inside the page stays in °C. */
+/** The operator's temperature unit. Inside the page everything stays in °C. */
 export type TemperatureUnit = 'C' | 'F';
 
 const inFahrenheit = (sensor: Sensor, unit: TemperatureUnit): boolean =>
@@ -158,12 +158,12 @@ export function toShown(sensor: Sensor, value: number, unit: TemperatureUnit): n
   return inFahrenheit(sensor, unit) ? value * 1.8 + 32 : value;
 }
 
-/** A difference of two values as shown: the offset of 32 falls out. */
+/** A difference of two values as shown: without the offset of 32. */
 export function differenceToShown(sensor: Sensor, value: number, unit: TemperatureUnit): number {
   return inFahrenheit(sensor, unit) ? value * 1.8 : value;
 }
 
-/** The reverse of `toShown`, for numbers that the operator types. */
+/** The inverse of `toShown`, for numbers that the operator types. */
 export function fromShown(sensor: Sensor, value: number, unit: TemperatureUnit): number {
   return inFahrenheit(sensor, unit) ? (value - 32) / 1.8 : value;
 }

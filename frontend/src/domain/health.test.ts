@@ -17,11 +17,11 @@ import {
   worstReason,
 } from './health';
 
-const house = (said: Parameters<typeof judgement>[0], isHeard = true): HouseHealth =>
+const house = (said: Parameters<typeof judgement>[0], isReceiving = true): HouseHealth =>
   houseHealth(
     Object.keys(said).map((tag_id) => tag({ tag_id })),
     judgement(said),
-    isHeard,
+    isReceiving,
   );
 
 describe('house', () => {
@@ -143,7 +143,7 @@ describe('a reason in words', () => {
       `Temperature just below 35.0${NBSP}°C (critical)`,
     ],
     [
-      // Within the ideal range of 18 to 26, and not by enough.
+      // Within the ideal range of 18 to 26, but not far enough.
       { verdict: 'stressed', value: 18.1, limit: 18, ...held(18.4) } as const,
       null,
       `Temperature 18.1${NBSP}°C, stressed until 18.4`,
@@ -154,7 +154,7 @@ describe('a reason in words', () => {
       `Temperature 26.0${NBSP}°C, stressed until 25.6`,
     ],
     [
-      // Within the critical range of 10, by less: of the ideal one it is far off.
+      // Only just within the critical limit of 10, and far from the ideal range.
       { value: 10.39, limit: 10, ...held(10.4) } as const,
       null,
       `Temperature just below 10.4${NBSP}°C, critical until 10.4`,
@@ -213,8 +213,8 @@ describe('a reason in words', () => {
       'No tag is being scanned: the robot has stopped, or its data is lost',
     ],
     [{ kind: 'door_open' as never, sensor: '', value: null, limit: null }, null, 'door open'],
-  ] as const)('%o', (over, age, told) => {
-    expect(text(over, age)).toBe(told);
+  ] as const)('%o', (over, age, expected) => {
+    expect(text(over, age)).toBe(expected);
   });
 
   test('follows the unit that is chosen', () => {

@@ -1,4 +1,4 @@
-/** What the bridge's verdicts come to for the page. Nothing is judged here: no rule, no range. */
+/** Presents the bridge's verdicts. Nothing is judged here: no rule, no range. */
 import type { HealthReason, Judgement, TagHealth, Verdict } from '../contract/types';
 import { S } from '../strings';
 import {
@@ -14,7 +14,7 @@ import type { Catalogue } from './sensors';
 import { shown } from './text';
 import type { Tag } from './twin';
 
-/** From the worst to the best; of who is unknown, nobody knows that he is well. */
+/** From the worst to the best; "unknown" is worse than "healthy". */
 export const VERDICTS = [
   'critical',
   'stressed',
@@ -36,10 +36,14 @@ const SILENT: HealthReason = {
 };
 
 /**
- * The house as it was judged. `isHeard`: false, and nothing is known of it as a whole, whatever
- * was said last; of its tags that stands, with the age of their readings beside it.
+ * The greenhouse as judged. If `isReceiving` is false, its own verdict is unknown, whatever came last;
+ * the tags' verdicts stay, beside the age of their readings.
  */
-export function houseHealth(tags: readonly Tag[], judgement: Judgement | null, isHeard: boolean) {
+export function houseHealth(
+  tags: readonly Tag[],
+  judgement: Judgement | null,
+  isReceiving: boolean,
+) {
   const counts = { critical: 0, stressed: 0, unknown: 0, healthy: 0 };
   const byTag = new Map<string, TagHealth>();
   for (const { id } of tags) {
@@ -47,13 +51,13 @@ export function houseHealth(tags: readonly Tag[], judgement: Judgement | null, i
     byTag.set(id, health);
     counts[health.verdict] += 1;
   }
-  const { verdict, reasons } = isHeard ? (judgement?.house ?? NOT_JUDGED) : UNHEARD;
+  const { verdict, reasons } = isReceiving ? (judgement?.house ?? NOT_JUDGED) : NOT_RECEIVED;
   return {
     verdict,
     reasons,
-    /** Whose ranges hold, and what says so; null: nobody was asked. */
+    /** Whether day or night ranges hold, and why; null: not judged. */
     day: judgement?.house.day ?? null,
-    /** What it is doing; null: nobody was asked. */
+    /** The robot's patrol; null: not judged. */
     patrol: judgement?.house.patrol ?? null,
     counts: counts as Readonly<Record<Verdict, number>>,
     byTag,
@@ -63,14 +67,14 @@ export function houseHealth(tags: readonly Tag[], judgement: Judgement | null, i
 export const isBad = (verdict: Verdict): boolean =>
   verdict === 'critical' || verdict === 'stressed';
 
-/** Whether nobody knows how it is now, of all its tags. */
+/** Whether the greenhouse as a whole is silent. */
 export const isSilent = ({ reasons }: TagHealth): boolean => reasons[0]?.kind === 'silent';
 
-const UNHEARD: TagHealth = { verdict: 'unknown', reasons: [SILENT] };
+const NOT_RECEIVED: TagHealth = { verdict: 'unknown', reasons: [SILENT] };
 
 /**
- * The one order of what is wrong, of tags and of alarms; more is worse. By verdict, then what nobody
- * has seen to, then by how far beyond its limit the worst value is; of equals, by the tag.
+ * The one order of problems, for tags and alarms; higher is worse. By verdict, then unacknowledged
+ * first, then by how far the worst value exceeds its limit; ties by tag.
  */
 export function severity(health: TagHealth, isSeen = false): number {
   const reason = worstReason(health);
@@ -78,11 +82,11 @@ export function severity(health: TagHealth, isSeen = false): number {
   return 2 * rank - Number(isSeen) + (reason ? weight(reason) : 0);
 }
 
-/** What is to be said of a tag before all else. */
+/** The most important reason of a tag. */
 export const worstReason = ({ verdict, reasons }: TagHealth): HealthReason | undefined =>
   reasons.filter((reason) => reason.verdict === verdict).sort((a, b) => weight(b) - weight(a))[0];
 
-/** Pests by their number; a value by how far it is beyond its limit, as a part of the larger of both. From 0 to 1. */
+/** From 0 to 1: pests by number; a value by its distance to the limit, relative to the larger of both. */
 function weight(reason: HealthReason): number {
   if (reason.kind === 'pest') return 1 - 1 / (2 + (reason.value ?? 0));
   if (!isOfRange(reason) || reason.release !== undefined || reason.value === reason.limit) return 0;
@@ -90,7 +94,7 @@ function weight(reason: HealthReason): number {
   return Math.min(0.99, Math.abs(value - limit) / Math.max(Math.abs(value), Math.abs(limit)));
 }
 
-/** Why a sensor's value counts as out of its range; null: it does not. */
+/** Why a sensor's value counts as out of range; null: it does not. */
 export const rangeReason = (health: TagHealth | undefined, sensor: string): OfRange | null =>
   health?.reasons.filter(isOfRange).find((reason) => reason.sensor === sensor) ?? null;
 
@@ -99,7 +103,7 @@ type OfRange = HealthReason & { readonly value: number; readonly limit: number }
 export const isOfRange = (reason: HealthReason): reason is OfRange =>
   reason.kind === 'range' && reason.value !== null && reason.limit !== null;
 
-/** On which side of its range a value is that lies outside, or has yet to pass `release`. */
+/** The side of its range on which a value lies that is outside, or has yet to pass `release`. */
 export const sideOf = ({
   value,
   limit,
@@ -107,20 +111,19 @@ export const sideOf = ({
 }: Pick<OfRange, 'value' | 'limit' | 'release'>): 'below' | 'above' =>
   value < (release ?? limit) ? 'below' : 'above';
 
-/** The very same as before where nothing else is said: what follows from it is kept then. */
+/** The previous object if the content is the same, so that derived values stay cached. */
 export function sharedJudgement(before: Judgement | null, now: Judgement): Judgement {
   const isSame =
     before?.tags === now.tags && JSON.stringify(before.house) === JSON.stringify(now.house);
   return isSame ? before : now;
 }
 
-/** Of a name that some twin made up. */
+/** Longest name of an undeclared sensor or kind, characters. */
 const LONGEST_NAME = 32;
 
 /**
- * A reason as a sentence without its full stop. `age` is how long ago the observation was that
- * says so, seconds; null: that is told elsewhere, or nobody knows. `isMarked`: a sign beside it says
- * how bad it is.
+ * A reason as a sentence without its full stop. `age` is that of the observation behind it, seconds;
+ * null: shown elsewhere, or not known. `isMarked`: a sign beside it shows the severity.
  */
 export function reasonText(
   sensors: Catalogue,
@@ -147,14 +150,17 @@ export function reasonText(
   }
   switch (kind) {
     case 'range':
-      // Without its numbers it says no more than that.
+      // Its numbers are missing.
       return R.other(S.reasons.outOfRange, label);
     case 'reading_failed':
       return value === null
         ? R.readingFailed(label)
         : R.implausible(`${label} ${readingText(sensor, value, unit)}`);
     case 'scan_failed':
-      return R.scanFailed(S.tried[tryKind(value ?? NaN)], age === null ? null : shortAgeText(age));
+      return R.scanFailed(
+        S.attemptOutcomes[attemptOutcome(value ?? NaN)],
+        age === null ? null : shortAgeText(age),
+      );
     case 'pest':
       return R.pest(value ?? 0);
     case 'old':
@@ -171,23 +177,23 @@ export function reasonText(
     case 'changed':
       return R.changed(value === null ? label : `${label} ${readingText(sensor, value, unit)}`);
     default:
-      // Of a later server.
+      // A kind from a later server.
       return R.other(shown((kind as string).replaceAll('_', ' '), LONGEST_NAME), label);
   }
 }
 
-/** Whether the value is back in its ideal range, and has yet to lie well within. */
+/** Whether the value is back in its ideal range, but not far enough inside yet. */
 export const isBack = ({ release, verdict }: HealthReason): boolean =>
   release !== undefined && verdict === 'stressed';
 
-/** Of a value that is back in its range, how far it has to go; null: it is beyond its limit. */
+/** For a value that is back in its range, what it must pass; null: it is beyond its limit. */
 const heldText = (
   { release = null, verdict }: OfRange,
   text: (value: number) => string,
 ): string | null =>
   release === null ? null : S.reasons.heldUntil(S.health[verdict].toLowerCase(), text(release));
 
-/** What lies on which side of which limit, without the value: that changes. */
+/** Names sensor, side and limit, without the value, which changes. */
 export function beyondText(sensors: Catalogue, reason: OfRange, unit: TemperatureUnit): string {
   const sensor = sensors.named(reason.sensor);
   const text = (value: number): string => readingText(sensor, value, unit);
@@ -199,8 +205,8 @@ export function beyondText(sensors: Catalogue, reason: OfRange, unit: Temperatur
 }
 
 /**
- * What somebody does about it; of what is well by now, what its alarm still waits for.
- * Empty: nothing, as it is back in its range, and the reason says when that ends it.
+ * What to do about it; for what is healthy again, what its alarm still waits for. Empty: nothing to
+ * do, as the value is back in range and the reason says what ends it.
  */
 export function todoText(reason: HealthReason): string {
   if (reason.verdict === 'healthy') return reason.kind === 'pest' ? S.todoPestAgain : S.todoWell;
@@ -209,7 +215,7 @@ export function todoText(reason: HealthReason): string {
   if (isOfRange(reason) && reason.sensor in sensors) {
     return sensors[reason.sensor as keyof typeof sensors][sideOf(reason)];
   }
-  // Of a later server, a kind may be another.
+  // A later server may send other kinds.
   return (kinds as Partial<Record<string, string>>)[reason.kind] ?? kinds.other;
 }
 
@@ -219,10 +225,10 @@ export const reasonsText = (
   unit: TemperatureUnit,
 ): string => reasons.map((reason) => reasonText(sensors, reason, unit, null)).join('; ');
 
-/** What became of a try, by the status of its observation (lupin_msgs/Observation). */
-type TryKind = 'ok' | 'unreachable' | 'undecoded' | 'skipped' | 'failed';
+/** The outcome of an attempt, by the status of its observation (lupin_msgs/Observation). */
+type AttemptOutcome = 'ok' | 'unreachable' | 'undecoded' | 'skipped' | 'failed';
 
-const KINDS: readonly TryKind[] = ['ok', 'unreachable', 'undecoded', 'skipped'];
+const KINDS: readonly AttemptOutcome[] = ['ok', 'unreachable', 'undecoded', 'skipped'];
 
-/** A status that is not known yet is a failure of some kind. */
-export const tryKind = (status: number): TryKind => KINDS[status] ?? 'failed';
+/** An unknown status counts as a failure. */
+export const attemptOutcome = (status: number): AttemptOutcome => KINDS[status] ?? 'failed';

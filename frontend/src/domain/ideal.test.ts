@@ -59,7 +59,7 @@ describe('excess', () => {
 });
 
 describe('words', () => {
-  const told = (name: string, value: number, unit: 'C' | 'F' = 'C'): string | null => {
+  const described = (name: string, value: number, unit: 'C' | 'F' = 'C'): string | null => {
     const sensor = sensorNamed(name);
     return idealText(sensor, sensor, value, unit);
   };
@@ -71,7 +71,7 @@ describe('words', () => {
     ['temperature', 26.000_01, 'C', 'too high'],
     ['dew_point', 5, 'C', null],
   ] as const)('%s %f %s: %s', (name, value, unit, text) => {
-    expect(told(name, value, unit)).toBe(text);
+    expect(described(name, value, unit)).toBe(text);
   });
 });
 
@@ -110,7 +110,7 @@ describe.each(Object.entries(SEEN))('colours as seen with %s', (_, seen) => {
     const apart = labs.flatMap((a, i) =>
       labs.slice(i + 1).map((b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2])),
     );
-    // 10 is what is told apart at a glance, side by side.
+    // A difference of 10 is visible at a glance, side by side.
     expect(Math.min(...apart)).toBeGreaterThan(12);
   });
 });
@@ -245,7 +245,7 @@ test('thousands of tags cost as little as a few', () => {
   });
   const many = { ...row, width: side, height: side, resolution: 0.1 };
   expect(oldCells(many, sites)).toHaveLength(side * side);
-  // Tag by cell it would be 400 million.
+  // Comparing each tag with each cell would take 400 million steps.
   expect(looks).toBeLessThan(12 * side * side);
 });
 

@@ -1,4 +1,4 @@
-/** How a value lies against its ideal range: too low, right, too high; in colour and in words. Pure. */
+/** A value against its ideal range: too low, right, too high; in colour and in words. Pure. */
 import type { Field, Judgement } from '../contract/types';
 import type { MapPoint } from '../geometry/coordinates';
 import { S } from '../strings';
@@ -8,7 +8,7 @@ import { mix, type Rgb, rgbText, type Shade } from './ramp';
 import { partsOf, type Ranges, rangesFor, type Sensor, type Span } from './sensors';
 import type { Tag } from './twin';
 
-/** How far beyond its ideal range a value is, in its unit: below 0 too low, 0 right; null: no ideal. */
+/** Distance beyond the ideal range, in the sensor's unit: below 0 too low, 0 right; null: no ideal. */
 export function beyond({ ideal }: Ranges, value: number): number | null {
   if (!ideal) return null;
   const [low, high] = ideal;
@@ -16,14 +16,14 @@ export function beyond({ ideal }: Ranges, value: number): number | null {
 }
 
 /**
- * The same from -1 to 1, where the critical limit is reached; without one, at half the ideal
- * range's width beyond it.
+ * The same from -1 to 1, reached at the critical limit; without one, at half the ideal range's width
+ * beyond it.
  */
 export function excess(ranges: Ranges, value: number): number | null {
   const by = beyond(ranges, value);
   if (by === null || by === 0 || !ranges.ideal) return by;
   const reach = reachOf(ranges.ideal, ranges.critical, by > 0);
-  // Critical where it is no more ideal: there is no way between.
+  // Critical as soon as it is not ideal: there is nothing in between.
   if (!(reach > 0)) return Math.sign(by);
   return Math.max(-1, Math.min(1, by / reach));
 }
@@ -33,7 +33,7 @@ function reachOf(ideal: Span, critical: Span | null, isAbove: boolean): number {
   return isAbove ? critical[1] - ideal[1] : ideal[0] - critical[0];
 }
 
-/** The ideal of each species that is there with one of its own, and of all others; empty: no species has. */
+/** The ideal of each present species with its own ranges, and that of all others; empty: none has its own. */
 export function idealsText(sensor: Sensor, tags: readonly Tag[], unit: TemperatureUnit): string {
   const text = ({ ideal }: Ranges): string =>
     rangeText(sensor, ideal && { low: ideal[0], high: ideal[1] }, unit);
@@ -44,19 +44,19 @@ export function idealsText(sensor: Sensor, tags: readonly Tag[], unit: Temperatu
   return own.length === 0 ? '' : [...own, `${S.legendOthers} ${text(sensor)}`].join('; ');
 }
 
-/** Blue, green, orange: apart in hue and lightness for every common colour blindness. */
+/** Blue, green, orange: distinct in hue and lightness for every common colour blindness. */
 const FAR_LOW: Rgb = [20, 66, 170];
 const LOW: Rgb = [96, 160, 238];
 const RIGHT: Rgb = [158, 204, 168];
 const HIGH: Rgb = [240, 158, 72];
 const FAR_HIGH: Rgb = [176, 46, 10];
-/** Of what nobody has an ideal of. */
+/** For a value without an ideal. */
 const UNJUDGED: Rgb = [140, 140, 140];
 
-/** Everywhere that is known is painted so: no value looks like one that is not known. */
+/** Alpha of every known cell, so that none looks unknown. */
 export const IDEAL_ALPHA = 0.72;
 
-/** The colour of an excess; just past a limit it is another one at once, as the verdict is. */
+/** The colour of an excess; it changes abruptly at a limit, as the verdict does. */
 export function idealColour(by: number | null): Rgb {
   if (by === null) return UNJUDGED;
   if (by === 0) return RIGHT;
@@ -80,7 +80,7 @@ export function idealText(
   if (by === null) return null;
   if (by === 0) return S.idealParts.any;
   const text = differenceNumber(sensor, Math.abs(by), unit);
-  // Of less than can be told there is nothing to tell.
+  // An excess that rounds to 0 has no number.
   const how = /[1-9]/.test(text) ? withUnit(sensor, text, unit) : null;
   return by < 0 ? S.tooLow(how) : S.tooHigh(how);
 }
@@ -92,7 +92,7 @@ export interface Site {
 
 export interface Zones {
   readonly kinds: readonly Ranges[];
-  /** Index into `kinds`, cell by cell, row 0 at the bottom; null: all have the first. */
+  /** Index into `kinds` for each cell, row 0 at the bottom; null: all have the first. */
   readonly byCell: Uint8Array | null;
 }
 
@@ -114,8 +114,8 @@ export const rangesAt = ({ kinds, byCell }: Zones, cell: number): Ranges | undef
   kinds[byCell?.[cell] ?? 0];
 
 /**
- * Index of the nearest site for each cell, by handing on from cell to cell (Danielsson 1980): what it
- * costs depends on the cells alone. A cell as good as halfway between two may get either.
+ * Index of the nearest site for each cell, passed on from cell to cell (Danielsson 1980): the cost
+ * depends only on the cells. A cell about halfway between two sites may get either.
  */
 function nearestSites(grid: CellGrid, sites: readonly { readonly at: MapPoint }[]): Int32Array {
   const { width, height, originX, originY, resolution } = grid;
@@ -144,7 +144,7 @@ function nearestSites(grid: CellGrid, sites: readonly { readonly at: MapPoint }[
     const site = nearest[fromY * width + fromX] ?? -1;
     if (site >= 0) offer(y * width + x, x, y, site);
   };
-  // Up and down, and in each row there and back.
+  // Up and down, and in each row forwards and backwards.
   for (const dy of [-1, 1]) {
     for (let row = 0; row < height; row++) {
       const y = dy < 0 ? row : height - 1 - row;
@@ -176,21 +176,21 @@ export function readSites(
     const parts = partsOf(sensor, (part) => readings.has(part));
     if (!at || parts.some((part) => (readings.get(part) ?? null) === null)) return [];
     const old = said[id]?.reasons.filter(({ kind }) => kind === 'old') ?? [];
-    // Without a sensor's name it is said of all that the tag has. Of what is derived no age is
-    // told, but where one part alone is old it is of another scan, and nothing is derived of it.
+    // Without a sensor's name the reason is about all of the tag. A derived value has no age of its
+    // own; if only one part is old, the parts are of different scans, and nothing is derived.
     const isOld = parts.every((part) => old.some(({ sensor }) => sensor === '' || sensor === part));
     return [{ at, isOld }];
   });
 }
 
-/** 1 where the nearest reading is too old, cell by cell, row 0 at the bottom; null: nowhere. */
+/** For each cell 1 if the nearest reading is too old, row 0 at the bottom; null: none is. */
 export function oldCells(grid: CellGrid, sites: readonly ReadSite[]): Uint8Array | null {
   if (!sites.some(({ isOld }) => isOld)) return null;
   const nearest = nearestSites(grid, sites);
   return Uint8Array.from(nearest, (site) => Number(sites[site]?.isOld ?? false));
 }
 
-/** The cells of a field for which `isIn` holds; all others are not known. */
+/** The field with only the cells for which `isIn` holds; all others are not known. */
 export const cellsWhere = (field: Field, isIn: (cell: number) => boolean): Field => ({
   ...field,
   values: field.values.map((value, cell) => (isIn(cell) ? value : NaN)),
@@ -198,7 +198,7 @@ export const cellsWhere = (field: Field, isIn: (cell: number) => boolean): Field
 
 const FAINT = 0.22;
 
-/** Colours what is too old faintly: it is hatched besides, and `isHatched` false leaves it bare. */
+/** Colours cells that are too old faintly if they are hatched as well; otherwise leaves them bare. */
 export const withOld =
   (shade: Shade, old: Uint8Array, isHatched: boolean): Shade =>
   (value, cell) => {

@@ -1,7 +1,7 @@
 /**
- * The look of a verdict without its colour: one outline and one sign each, the same on the map, in
- * the table and in the legend. Outlines differ as silhouettes, so that a pin of a few pixels is told
- * by whoever sees no colours. SVG paths about the origin, y down; most of an outline is at radius 1.
+ * The shape of a verdict: one outline and one sign each, the same on the map, in the table and in the
+ * legend. Outlines differ as silhouettes, so that even pins of a few pixels are distinguishable without
+ * colour. SVG paths about the origin, y down; most of an outline is at radius 1.
  */
 import type { Verdict } from '../contract/types';
 import { S } from '../strings';
@@ -10,7 +10,7 @@ import { shown } from './text';
 
 interface Mark {
   readonly outline: string;
-  /** What is drawn on it; a dot is a line of next to no length. Empty: nothing is known. */
+  /** The sign on it; a dot is a line of almost no length. Empty: nothing is known. */
   readonly sign: string;
 }
 
@@ -23,16 +23,16 @@ export const MARKS: Readonly<Record<Verdict, Mark>> = {
   healthy: { outline: CIRCLE, sign: 'M-.44.04L-.12.36L.46-.3' },
 };
 
-/** How a species' blooms are drawn: colour and shape, so that colour is never alone. */
+/** How a species' blooms are drawn: by colour and shape, never by colour alone. */
 export interface BloomLook {
   readonly colour: Rgb;
   readonly shape: 'circle' | 'square' | 'triangle';
 }
 
 /**
- * Colours: Okabe and Ito, "Color Universal Design" (2008), told apart with every common kind of
- * colour blindness; their black is left out, as it is none on a dark map. Neighbours in this list
- * have different shapes, and so have the two colours that come closest for red-green blindness.
+ * Colours: Okabe and Ito, "Color Universal Design" (2008), distinguishable with every common colour
+ * blindness; without their black, which would vanish on a dark map. Neighbours in this list have
+ * different shapes, and so do the two colours closest for red-green blindness.
  */
 const LOOKS: readonly BloomLook[] = [
   { colour: [0, 114, 178], shape: 'circle' },
@@ -47,9 +47,9 @@ const LOOKS: readonly BloomLook[] = [
 export const UNKNOWN_SPECIES: BloomLook = { colour: [140, 140, 140], shape: 'circle' };
 
 /**
- * A look for each species name. It starts from the name itself, so that a species keeps its look
- * from one day to the next; where two want the same, the later in the alphabet takes the next
- * free one. Beyond the list's size looks repeat.
+ * A style for each species name. It is derived from the name, so that a species keeps it from day to
+ * day. If two collide, the later in the alphabet takes the next free one. With more species than
+ * styles, styles repeat.
  */
 export function speciesLooks(names: Iterable<string>): ReadonlyMap<string, BloomLook> {
   const looks = new Map<string, BloomLook>();
@@ -73,7 +73,7 @@ function hash(text: string): number {
   return value >>> 0;
 }
 
-/** A species in the reader's language, fit to show; one that the page has no name for, as it came. */
+/** A species in the reader's language, safe to show; without a translation, as received. */
 export function speciesText(name: string, longest?: number): string {
   const names: Readonly<Record<string, string>> = S.speciesNames;
   const known = name.toLowerCase();

@@ -5,10 +5,10 @@ type Frozen<Part> =
       ? readonly Item[]
       : Part;
 
-/** Of what several places hold at once: nobody changes its fields, nor its lists and maps. */
+/** A shared object: its fields, lists and maps are read-only. */
 export type Shared<Whole> = { readonly [Key in keyof Whole]: Frozen<Whole[Key]> };
 
-/** The same function, but the same arguments as last time give the same object back. */
+/** Caches the last result: the same arguments as last time return the same object. */
 export function memoLast<Args extends readonly unknown[], Result>(
   compute: (...args: Args) => Result,
 ): (...args: Args) => Result {
@@ -22,7 +22,7 @@ export function memoLast<Args extends readonly unknown[], Result>(
   };
 }
 
-/** The same for one object, and for each one that is still about: two states can be compared. */
+/** Caches one result per argument while that object exists, so that two states can alternate. */
 export function memoOne<Arg extends object, Result>(
   compute: (arg: Arg) => Result,
 ): (arg: Arg) => Result {
@@ -34,21 +34,21 @@ export function memoOne<Arg extends object, Result>(
   };
 }
 
-/** With these parts; the very same object where none of them is another. */
+/** `whole` with these parts; the same object if none of them differs. */
 export function withParts<Whole extends object>(whole: Whole, parts: Partial<Whole>): Whole {
   const keys = Object.keys(parts) as (keyof Whole)[];
   return keys.every((key) => parts[key] === whole[key]) ? whole : { ...whole, ...parts };
 }
 
-/** What it was given last time, as long as that is the same: by its parts, or as `isSame` says. */
-export function keeping<Kept extends object>(
-  isSame = (last: Kept, next: Kept): boolean => withParts(last, next) === last,
-): (next: Kept) => Kept {
-  let last: Kept | null = null;
+/** Returns the previous object while the next one is equal: by its parts, or by `isSame`. */
+export function retainEqual<Value extends object>(
+  isSame = (last: Value, next: Value): boolean => withParts(last, next) === last,
+): (next: Value) => Value {
+  let last: Value | null = null;
   return (next) => (last = last && isSame(last, next) ? last : next);
 }
 
-/** Items by their groups, which stand in the order in which the first of each comes. */
+/** Items by group, in the order of each group's first item. */
 export function groupedBy<Item>(
   items: readonly Item[],
   groupOf: (item: Item) => string,

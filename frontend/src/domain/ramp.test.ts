@@ -13,7 +13,7 @@ import {
   rgbText,
   rounded,
   sensorColour,
-  toldApart,
+  withDistinctEnds,
   withIdeal,
 } from './ramp';
 
@@ -84,11 +84,11 @@ test('of values that nobody can tell apart its ends are told apart', () => {
     [0.3, 0.3],
     [1013, 1013],
   ] as const) {
-    const range = toldApart({ low, high });
+    const range = withDistinctEnds({ low, high });
     expect(numberText(range.high)).not.toBe(numberText(range.low));
     expect(Math.abs(fraction(range, low) - 0.5)).toBeLessThan(0.1);
   }
-  expect(toldApart({ low: 20, high: 22 })).toEqual({ low: 20, high: 22 });
+  expect(withDistinctEnds({ low: 20, high: 22 })).toEqual({ low: 20, high: 22 });
 });
 
 test('values that come and go at its edge do not make it flicker', () => {
@@ -96,7 +96,7 @@ test('values that come and go at its edge do not make it flicker', () => {
     [20.2, 29.8],
     ...Array.from({ length: 50 }, (_, n) => [20.2, 29.8 + 0.4 * (n % 2)] as const),
   ]);
-  // Once wider for what came, and never back and forth after it.
+  // It widens once, then stays.
   expect(new Set(ranges).size).toBe(2);
   expect(ranges.at(-1)).toEqual({ low: 20, high: 31 });
 });

@@ -20,14 +20,14 @@ export function hslToRgb(hue: number, saturation: number, lightness: number): Rg
   return [channel(0), channel(8), channel(4)];
 }
 
-/** The one colour of a sensor; values differ by how much of it there is. */
+/** The one colour of a sensor; values differ in its opacity. */
 export function sensorColour(sensor: Sensor): Rgb {
   return hslToRgb(sensor.hue, sensor.saturation, sensor.lightness);
 }
 
 /**
- * Where a value lies in a range, from 0 to 1 and clamped. A range of no width gives 1: a house
- * with one reading shows where that reading reaches, as the bridge's PNG does.
+ * Position of a value in a range, clamped to 0 to 1. A range of no width gives 1: a single reading
+ * shows how far it reaches, as in the bridge's PNG.
  */
 export function fraction(range: Range, value: number): number {
   const width = range.high - range.low;
@@ -35,7 +35,7 @@ export function fraction(range: Range, value: number): number {
   return Math.min(1, Math.max(0, (value - range.low) / width));
 }
 
-/** The colour of a pixel, by the value that it stands for and the cell it lies in. */
+/** The colour of a pixel, by its value and its cell. */
 export type Shade = (value: number, cell: number) => { readonly rgb: Rgb; readonly alpha: number };
 
 /** Transparent at the minimum. */
@@ -65,12 +65,12 @@ export function rangeOf(values: Iterable<number | null | undefined>): Range | nu
   return low <= high ? { low, high } : null;
 }
 
-/** A side gives way only when this share of the range lies idle behind it. */
+/** A side narrows only if more than this share of the range is unused there. */
 const IDLE = 0.3;
 
 /**
- * The range to go on with: what the data need, on round numbers. It widens at once and narrows only
- * when much of it lies idle, so that values that come and go at its edge do not make it flicker.
+ * The next range: what the data need, on round numbers. It widens at once and narrows only when much
+ * of it is unused, so that values at its edge do not make it flicker.
  */
 export function heldRange(before: Range | null, data: Range): Range {
   const wanted = rounded(data);
@@ -92,7 +92,7 @@ function sideOf(
   return Math.abs(held - needed) > IDLE * width ? wanted : held;
 }
 
-/** Outwards to about a tenth of its width; one without a width stays as it is. */
+/** Rounded outwards to about a tenth of its width; a range of no width stays. */
 export function rounded({ low, high }: Range): Range {
   const width = high - low;
   if (!(width > 0)) return { low, high };
@@ -101,14 +101,14 @@ export function rounded({ low, high }: Range): Range {
   return { low: round(Math.floor(low / step) * step), high: round(Math.ceil(high / step) * step) };
 }
 
-/** With all of the ideal range in it: a house that is ideal is nowhere near the top of its colours. */
+/** Extended to the ideal range, so that ideal values stay far from the strongest colour. */
 export function withIdeal({ low, high }: Range, ideal: Span | null): Range {
   if (!ideal) return { low, high };
   return { low: Math.min(low, ideal[0]), high: Math.max(high, ideal[1]) };
 }
 
-/** Where both ends would read the same it is wider, on both sides: they are rounded to a tenth, or more. */
-export function toldApart({ low, high }: Range): Range {
+/** Widened on both sides if both ends would read the same: they are rounded to a tenth, or coarser. */
+export function withDistinctEnds({ low, high }: Range): Range {
   const middle = (low + high) / 2;
   const size = Math.abs(middle);
   const least = Math.max(0.01 * size, 0.2 * Math.min(1, size)) || 0.2;

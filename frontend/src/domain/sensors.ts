@@ -1,4 +1,4 @@
-/** What the page knows about kinds of sensors: the file that is in force, as the bridge tells it. */
+/** The kinds of sensors: the bridge's file that is in force. */
 import type { SensorEntry, SensorRanges, SensorsFile } from '../contract/types';
 import { LANGUAGE } from '../strings';
 import type { Shared } from './memo';
@@ -7,41 +7,41 @@ import type { Shared } from './memo';
 export type Span = readonly [low: number, high: number];
 
 export interface Ranges {
-  /** Outside of it a reading is out of its range; null: it is never judged. */
+  /** A reading outside it is out of range; null: never judged. */
   readonly ideal: Span | null;
-  /** Outside of it, it is critical; null: nothing is. */
+  /** A reading outside it is critical; null: none is. */
   readonly critical: Span | null;
 }
 
-/** A kind of sensor, with the ranges of the day or of the night, whichever it is. */
+/** A kind of sensor, with the ranges of the day or of the night. */
 export type Sensor = Shared<ReturnType<typeof sensorOf>>;
 export type Catalogue = ReturnType<typeof catalogueOf>;
 /** By day and by night. */
 export type Catalogues = ReturnType<typeof cataloguesOf>;
 
-/** Whether tags can have readings of it: what is derived is told where it is a reason. */
+/** Whether tags can have readings of it; a derived sensor appears only in reasons. */
 export const isMeasured = ({ madeOf }: Sensor): boolean => madeOf.length === 0;
 
-/** What is computed of one sensor alone is made of its readings of a day: charts offer it. */
+/** Whether it is computed from one sensor's readings of a day: charts offer it. */
 export const isOfDay = ({ madeOf }: Sensor): boolean => madeOf.length === 1;
 
-/** Whether a tag that has these sensors has it, or what it takes to compute it. */
+/** Whether a tag with these sensors has it, or all that it is computed from. */
 export const isHad = (
   { name, madeOf }: Pick<Sensor, 'name' | 'madeOf'>,
   has: (sensor: string) => boolean,
 ): boolean => has(name) || (madeOf.length > 0 && madeOf.every(has));
 
-/** What a tag's value is of: its own reading, or the readings that it is computed of. */
+/** The sources of a tag's value: its own reading, or those that it is computed from. */
 export const partsOf = (
   { name, madeOf }: Pick<Sensor, 'name' | 'madeOf'>,
   has: (sensor: string) => boolean,
 ): readonly string[] => (madeOf.length > 0 && !has(name) ? madeOf : [name]);
 
-/** What holds for plants of a species; of one that is not known, what holds for all. */
+/** The ranges for plants of a species; for an unknown species, those for all. */
 export const rangesFor = (sensor: Sensor, species: string): Ranges =>
   sensor.species.get(species.toLowerCase()) ?? sensor;
 
-/** So many names that the file does not have are remembered; tags may make up any number. */
+/** Most cached sensors that the file lacks; tags may invent any number. */
 const MOST_OTHERS = 1_000;
 
 function catalogueOf(
@@ -65,11 +65,11 @@ function catalogueOf(
   };
   return {
     all: all as readonly Sensor[],
-    /** Of the tag with that id; empty: in none. */
+    /** The area of a tag, by its id; empty: none. */
     areaOf,
-    /** A sensor by its name on the wire; one that nobody declared gets the fallback's look. */
+    /** A sensor by its name on the wire; an undeclared one looks like the fallback. */
     named,
-    /** All to offer: of the declared ones what some tag reports or allows to compute; others by name. */
+    /** All sensors to offer: declared ones that a tag reports or that can be computed; others by name. */
     with: (reported: Iterable<string>): readonly Sensor[] => {
       const names = new Set(reported);
       const isOffered = (sensor: Sensor): boolean =>
@@ -80,7 +80,7 @@ function catalogueOf(
   };
 }
 
-/** Which area of a file a tag is in: the first that names it. */
+/** The area of a tag: the first one in the file that names it. */
 function areasOf({ areas = {} }: SensorsFile): (tagId: string) => string {
   const byId = new Map<string, string>();
   const begins: [prefix: string, area: string][] = [];
@@ -111,7 +111,7 @@ function sensorOf(
   return {
     /** On the wire. */
     name,
-    /** In the page's language; where the file has none, as in every language. */
+    /** In the page's language, if the file has it. */
     label: entry.labels?.[language] ?? (entry.label || name),
     /** The same in every language, for files that programs read. */
     dataLabel: entry.label || name,
@@ -123,14 +123,14 @@ function sensorOf(
     saturation: file.ramp.saturation,
     /** Of the heat map at the maximum. */
     maxAlpha: file.ramp.max_alpha,
-    /** After the point, wherever a value of it stands; null: as the value's size deserves. */
+    /** Digits after the point of every value; null: as many as the value's size needs. */
     digits: digitsOf([entry]) ?? digitsOf(madeOf.map((of) => file.sensors[of])),
-    /** The sensors that it is computed of: there are fields and a past of it, and no readings. */
+    /** The sensors that it is computed from: it has fields and a history, but no readings. */
     madeOf,
-    /** Whose its ranges are; null: by day and by night they are the same. */
+    /** Whether its ranges are those of day or night; null: both are the same. */
     part: entry.night ? (isDay ? ('day' as const) : ('night' as const)) : null,
     ...rangesOf(entry, isDay),
-    /** Species with ranges of their own, by their name in lower case. */
+    /** Species with their own ranges, by name in lower case. */
     species: new Map(
       Object.entries(entry.species ?? {}).map(([species, ranges]) => [
         species.toLowerCase(),
@@ -140,13 +140,13 @@ function sensorOf(
   };
 }
 
-/** Of a night that says nothing, what holds by day. */
+/** What the file leaves out for the night holds as by day. */
 function rangesOf(entry: SensorRanges, isDay: boolean): Ranges {
   const { ideal, critical } = isDay ? entry : (entry.night ?? entry);
   return { ideal: spanOf(ideal), critical: spanOf(critical) };
 }
 
-/** Those that tell the largest limit to about three figures: 1.30 kPa, 26.0 °C, 1500 ppm. */
+/** Digits that show the largest limit to about three figures: 1.30 kPa, 26.0 °C, 1500 ppm. */
 function digitsOf(entries: readonly (SensorEntry | undefined)[]): number | null {
   const limits = entries
     .flatMap((entry) => [entry, ...Object.values(entry?.species ?? {})])
@@ -160,7 +160,7 @@ function spanOf(bounds: readonly number[] | null | undefined): Span | null {
   return low !== undefined && high !== undefined ? [low, high] : null;
 }
 
-/** Before the bridge has told: no sensor has more than its name, and none is judged. */
+/** Until the file arrives: sensors have only their names, and none is judged. */
 export const NO_CATALOGUES: Catalogues = cataloguesOf({
   ramp: { saturation: 0, max_alpha: 0 },
   fallback: { label: '', unit: '', hue: 0, lightness: 50, ideal: null },

@@ -88,8 +88,8 @@ describe('the rows of a chart', () => {
 
   test('leave out marks of another period', () => {
     const marks = [989, 990, 1_099, 1_100].map(failure);
-    const kept = rowsOfSeries(bucketed(1_000), marks).filter(({ kind }) => kind === 'failure');
-    expect(kept.map(({ at }) => at)).toEqual([990, 1_099]);
+    const failures = rowsOfSeries(bucketed(1_000), marks).filter(({ kind }) => kind === 'failure');
+    expect(failures.map(({ at }) => at)).toEqual([990, 1_099]);
   });
 });
 

@@ -1,6 +1,6 @@
 /**
- * What one sensor of one tag read over a period: each reading, or buckets where there are too many
- * to show. All times are ROS seconds. Where the robot was away is a gap, and nothing bridges it.
+ * One sensor of one tag over a period: each reading, or buckets if there are too many to show. All
+ * times are ROS seconds. While the robot was away there is a gap, and nothing bridges it.
  */
 import type { History, Timeline } from '../contract/types';
 import { type Cell, csv } from './text';
@@ -12,17 +12,17 @@ import { type Missing, missingOf, spanOfWire } from './timeline';
 
 /** A reading, or all finite readings of a bucket. */
 export interface Point {
-  /** Of the reading, or the bucket's beginning. */
+  /** Time of the reading, or the bucket's beginning. */
   readonly at: number;
   /** The mean of a bucket; null: the sensor gave no number. */
   readonly value: number | null;
   readonly min: number | null;
   readonly max: number | null;
-  /** How many numbers it is of. */
+  /** The number of readings in it. */
   readonly n: number;
 }
 
-/** Tries that came to nothing, or looks at the flowers, somewhere in `widthS` seconds from `at` on. */
+/** Failed attempts, or flower inspections, within `widthS` seconds from `at` on. */
 export type Mark = Shared<ReturnType<typeof marksOf>[number]>;
 export type Series = Shared<ReturnType<typeof seriesOf>>;
 
@@ -31,7 +31,7 @@ export const readingAt = (at: number, value: number | null): Point => ({
   n: Number(value !== null),
 });
 
-/** The series that the bridge told, at `nowS` of the twin's time, ROS seconds. */
+/** The received series; `nowS` is the twin's time, ROS seconds. */
 export const seriesOf = (wire: History, nowS: number) => ({
   ...spanOfWire(wire),
   tagId: wire.tag_id,
@@ -48,12 +48,12 @@ export const seriesOf = (wire: History, nowS: number) => ({
     })),
   ] as readonly Point[],
   gaps: wire.gaps.map(spanOfWire),
-  /** When it was night by the clock; null: that does not tell. */
+  /** When it was night by the clock; null: the clock does not decide. */
   nights: wire.nights?.map(spanOfWire) ?? null,
   missing: missingOf(wire, nowS),
 });
 
-/** The same so many seconds later: to stand beside what was read then. */
+/** The same series, shifted later, to compare with the readings then. */
 export const laterBy = (series: Series, byS: number): Series => ({
   ...series,
   from: series.from + byS,
@@ -64,7 +64,7 @@ export const laterBy = (series: Series, byS: number): Series => ({
   missing: series.missing.map((each) => ({ ...each, from: each.from + byS, to: each.to + byS })),
 });
 
-/** What a tag's timeline tells of tries and looks; scans are told by the readings themselves. */
+/** The failed attempts and flower inspections of a tag's timeline; readings show the scans. */
 export const marksOf = ({ buckets, bucket_s: widthS }: Timeline) =>
   buckets.flatMap(({ start, failures, looks }) =>
     [
@@ -75,11 +75,11 @@ export const marksOf = ({ buckets, bucket_s: widthS }: Timeline) =>
     ),
   );
 
-/** Where a point stands in a picture: a bucket in its middle, but never later than the series goes. */
+/** Where a point is drawn: a bucket at its middle, but never after the series' end. */
 export const middleOf = ({ at }: Point, { bucketS, to }: Series): number =>
   bucketS === null ? at : Math.max(at, Math.min(at + bucketS / 2, to));
 
-/** What a series has at a moment: the reading that held then, or its bucket; null: a gap. */
+/** The series at a moment: the reading valid then, or its bucket; null: a gap. */
 export function pointAt(series: Series, moment: number): Point | null {
   const { bucketS, gaps, points } = series;
   if (bucketS !== null) {
@@ -97,11 +97,11 @@ export interface SeriesRow extends Omit<Point, 'n'> {
   readonly kind: 'reading' | 'bucket' | 'gap' | Missing['why'] | Mark['kind'];
   /** When it ended; a reading has no end. */
   readonly to: number | null;
-  /** How often; null: nobody knows. */
+  /** How often; null: not known. */
   readonly n: number | null;
 }
 
-/** By their time; what begins at one moment: what is missing, gap, values, marks. */
+/** Sorted by time; at equal times: missing data, gap, values, marks. */
 export function rowsOfSeries(series: Series, marks: readonly Mark[]): SeriesRow[] {
   const { bucketS } = series;
   const event = (kind: SeriesRow['kind'], { from, to }: Span, n: number | null): SeriesRow => ({
@@ -120,7 +120,7 @@ export function rowsOfSeries(series: Series, marks: readonly Mark[]): SeriesRow[
       .filter(({ at, widthS }) => at + widthS >= series.from && at < series.to)
       .map(({ kind, at, widthS, count }) => event(kind, { from: at, to: at + widthS }, count)),
   ];
-  // The sort is stable: what is first above stays first.
+  // The sort is stable and keeps the order above.
   return rows.sort((a, b) => a.at - b.at);
 }
 
@@ -129,7 +129,7 @@ const HEADER = [
   ...['kind', 'n', 'value', 'min', 'max'],
 ];
 
-/** The rows of all that is charted. A simulated clock has no dates: `time_iso` is empty then. */
+/** The rows of all charted series. A simulated clock has no dates, so `time_iso` is then empty. */
 export function chartCsv(
   sensors: Catalogue,
   charted: readonly { readonly series: Series; readonly marks: readonly Mark[] }[],

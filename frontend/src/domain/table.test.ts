@@ -17,7 +17,7 @@ const tags = [
   tag({ tag_id: '10', readings: readings({ temperature: 35 }), anomaly: true, bug_count: 3 }),
   tag({
     tag_id: '9',
-    // Its flowers were looked at since: that makes no reading younger.
+    // A later flower inspection makes no reading younger.
     stale_seconds: 1,
     readings: readings({ humidity: 60 }, 25),
   }),
@@ -90,7 +90,7 @@ describe('filter', () => {
     ['humid', ['9']],
     ['critical temp', ['10']],
     ['rose pest', []],
-    // Exactly a tag's id: not 10 as well.
+    // Equals a tag's id, so 10 does not match.
     ['1', ['1']],
   ])('%j', (text, expected) => {
     expect(ids(filterRows(rows, text, null, CATALOGUE))).toEqual(expected);

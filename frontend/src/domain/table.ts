@@ -1,9 +1,9 @@
-/** Rows of the table: what is in a column, how it sorts, what a filter finds. */
+/** Rows of the table: columns, sorting, filter. */
 import type { TagHealth, Verdict, WireTime } from '../contract/types';
 import { S } from '../strings';
 import { ageSeconds } from './time';
 import { type Cell, csv, finder } from './text';
-import { type HouseHealth, reasonsText, severity, tryKind } from './health';
+import { type HouseHealth, reasonsText, severity, attemptOutcome } from './health';
 import { groupedBy, memoLast, memoOne } from './memo';
 import { speciesText } from './marks';
 import type { Catalogue, Sensor } from './sensors';
@@ -23,7 +23,7 @@ export function rowsOf(tags: readonly Tag[], health: HouseHealth): Row[] {
 }
 
 export interface AreaHead {
-  /** Empty: of the tags that are in none. */
+  /** Empty: tags without an area. */
   readonly area: string;
   readonly count: number;
   readonly worst: Verdict;
@@ -33,7 +33,7 @@ export type Line = Row | AreaHead;
 
 type Area = ReturnType<typeof inAreas>[number];
 
-/** Rows by their area, in the order in which the first of each comes; last those that are in none. */
+/** Rows by area, in the order of each area's first row; rows without an area last. */
 export function inAreas(rows: readonly Row[], areaOf: (tagId: string) => string) {
   const areas = groupedBy(rows, ({ tag }) => areaOf(tag.id));
   const found = [...areas].map(([area, own]) => ({ area, rows: own }));
@@ -72,14 +72,14 @@ function sortKey({ tag, health }: Row, column: string): Key {
     case 'flowers':
       return tag.isObserved ? tag.flowerCount : null;
     case 'age':
-      // The age itself grows with the clock; its order does not.
+      // By time and not by age: ages grow, but their order stays.
       return typeof tag.scannedAt === 'number' ? -tag.scannedAt : null;
     default:
       return tag.readings.get(column) ?? null;
   }
 }
 
-/** `rows` are in the order of their ids, and equals stay in it. */
+/** `rows` must be in the order of their ids; equal rows keep it. */
 export function sortRows(
   rows: readonly Row[],
   { column, descending }: { readonly column: string; readonly descending: boolean },
@@ -100,13 +100,13 @@ export function sortRows(
     .map(({ row }) => row);
 }
 
-/** The place of each text among all: few texts have many rows, and a collator is slow. */
+/** The rank of each text: many rows share few texts, and a collator is slow. */
 function textRanks(keys: readonly Key[]): ReadonlyMap<string, number> {
   const texts = new Set(keys.filter((key) => typeof key === 'string'));
   return new Map([...texts].sort(compareIds).map((text, rank) => [text, rank]));
 }
 
-/** Rows of that health, or of any, in which every word of the text occurs (`finder`). */
+/** Rows of that health, or of any, that contain every word of the text (`finder`). */
 export function filterRows(
   rows: readonly Row[],
   text: string,
@@ -123,7 +123,7 @@ export function filterRows(
   );
 }
 
-/** A tag is searched with each letter that is typed. */
+/** Cached, as every typed letter searches all tags. */
 const haystack = memoOne((tag: Tag) =>
   memoLast((health: TagHealth, sensors: Catalogue) => haystackOf(tag, health, sensors)),
 );
@@ -137,29 +137,29 @@ function haystackOf(tag: Tag, health: TagHealth, sensors: Catalogue): string {
     tag.anomaly ? S.pest : '',
     tag.at ? '' : tag.farOff ? S.farOff : S.notOnMap,
     tag.scannedAt === 'never' ? S.neverObserved : '',
-    tag.failedTry ? S.tried[tryKind(tag.failedTry.status)] : '',
+    tag.failedAttempt ? S.attemptOutcomes[attemptOutcome(tag.failedAttempt.status)] : '',
     ...[...tag.readings.keys()].map((name) => `${name} ${sensors.named(name).label}`),
   ]
     .join(' ')
     .toLowerCase();
 }
 
-/** ISO 8601, of the twin's own clock: the ROS time that a bag has too; null: never. */
+/** ISO 8601, on the twin's clock: the same ROS time as in a bag; null: never. */
 function observedText({ sec, nanosec }: WireTime): string | null {
   if (sec === 0 && nanosec === 0) return null;
   return new Date(sec * 1000 + Math.floor(nanosec / 1e6)).toISOString();
 }
 
 /**
- * The table as a file: raw values at full precision, in the units that the page shows. Programs read
- * it, so its columns are named, and its numbers written, the same in every language.
+ * The table as a file: raw values at full precision, in the units that the page shows. For programs,
+ * column names and number formats are the same in every language.
  */
 export function tableCsv(
   rows: readonly Row[],
   catalogue: Catalogue,
   sensors: readonly Sensor[],
   unit: TemperatureUnit,
-  /** When the state was taken, ms on the monotonic clock: ages are those of that moment. */
+  /** When the state was taken, ms on the monotonic clock; ages are as of then. */
   now: number,
 ): string {
   const header: Cell[] = [

@@ -1,18 +1,18 @@
 /**
- * Strings from the wire are a stranger's. React and fillText never run them as markup; this
- * takes the rest: characters that move or hide other text, and lengths that break a layout.
+ * Strings from the wire are untrusted. React and fillText never run them as markup; this module
+ * handles the rest: characters that move or hide other text, and lengths that break a layout.
  */
 
 // C0 and C1 controls, soft hyphen, zero-width characters, line and paragraph separators, marks
 // and overrides of writing direction, invisible operators, byte-order mark, tag characters.
 const INVISIBLE =
   /[\p{Cc}\p{Cs}\u00ad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\u{e0000}-\u{e007f}]/gu;
-/** More than this many combining marks on one letter reach into other lines. */
+/** More combining marks on one letter would reach into other lines. */
 const STACKED_MARKS = /(\p{M}{3})\p{M}+/gu;
 
 /**
- * Whether every word of a filter is in what is said of a tag, in lower case; null: there is none. A
- * word that is exactly a tag's id finds that tag alone.
+ * Whether a tag's text, in lower case, contains every word of a filter; null: no filter. A word that
+ * equals a tag's id finds only that tag.
  */
 export function finder(
   text: string,
@@ -27,12 +27,12 @@ export function finder(
 
 const REPLACEMENT = '\ufffd';
 const LONGEST = 80;
-/** Stands for text of which nothing can be seen: a name must have something to click on. */
+/** Replaces invisible text: a name must have something to click on. */
 const BLANK = '\u2423';
 
 /** Text fit to show: never blank, nothing invisible, marks bounded, at most `longest` characters. */
 export function shown(text: string, longest = LONGEST): string {
-  // Cut first: a megabyte needs no cleaning to show eighty characters.
+  // Cut first, to avoid cleaning a megabyte for eighty characters.
   const clean = text
     .slice(0, longest * 8)
     .replace(INVISIBLE, REPLACEMENT)
@@ -46,7 +46,7 @@ export function shown(text: string, longest = LONGEST): string {
 export type Cell = string | number | null;
 
 /**
- * RFC 4180 with a byte-order mark, which spreadsheets want for "°". Text that a spreadsheet
+ * RFC 4180 with a byte-order mark, which spreadsheets need for "°". Text that a spreadsheet
  * would run as a formula gets an apostrophe in front (OWASP, "CSV Injection"); numbers stay
  * numbers, negative ones too.
  */

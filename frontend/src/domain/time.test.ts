@@ -37,14 +37,14 @@ describe('freshness', () => {
   });
 });
 
-// Half an hour off the full one, and set before any module looks at the clock.
+// An offset with half an hour, set before any module reads the clock.
 vi.hoisted(() => {
   vi.stubEnv('TZ', 'Asia/Kolkata');
 });
 
 test('a moment is a date on the operator’s own clock', () => {
   expect(rosText(Date.UTC(2026, 10, 13, 21, 42, 40) / 1000)).toBe('14 Nov 2026, 03:12:40');
-  // What is not over yet is not told.
+  // What has not ended yet is not shown.
   expect(rosText(Date.UTC(2026, 10, 13, 21, 42, 40) / 1000 + 0.999)).toBe('14 Nov 2026, 03:12:40');
   expect(shortRosText(Date.UTC(2026, 10, 13, 21, 42, 40) / 1000)).toBe('14 Nov, 03:12:40');
 });
@@ -75,7 +75,7 @@ test.each([
 test('everything begins with memory, and is a day as long as nobody knows', () => {
   expect(spanOf({ kind: 'all' }, NOW, NOW - 500)).toEqual({ from: NOW - 500, to: NOW });
   expect(spanOf({ kind: 'all' }, NOW, null)).toEqual({ from: NOW - 86_400, to: NOW });
-  // What memory has from later than now is a run of another clock; a stretch is never empty.
+  // History after now belongs to another clock; a span is never empty.
   expect(spanOf({ kind: 'all' }, NOW, NOW + 9)).toEqual({ from: NOW - 1, to: NOW });
 });
 

@@ -9,8 +9,8 @@ const FADE_TO_S = 1800;
 const FAINTEST = 0.35;
 
 /**
- * How ages go on in what is shown: with the browser's clock; or not, as of one moment (a past
- * one, ms on the monotonic clock); or nobody knows.
+ * How ages develop: with the browser's clock; not at all, as of one (past) moment, ms on the monotonic
+ * clock; or unknown.
  */
 export type Ageing =
   | { readonly kind: 'growing' }
@@ -20,10 +20,10 @@ export type Ageing =
 export const GROWING: Ageing = { kind: 'growing' };
 export const AGES_UNKNOWN: Ageing = { kind: 'unknown' };
 
-/** When something was, ms on the monotonic clock. */
+/** A time, ms on the monotonic clock. */
 export type When = number | 'never' | 'unknown';
 
-/** Seconds since then; null: it never was, or nobody knows. */
+/** Seconds since then; null: never, or not known. */
 export function ageSeconds(
   observedAt: When | null,
   now: number,
@@ -34,13 +34,13 @@ export function ageSeconds(
   return Math.max(0, asOf - observedAt) / 1000;
 }
 
-/** How old something looks in text, which does not fade as a picture does. */
+/** Age steps for text, which cannot fade as a picture does. */
 export function ageStep(age: number | null): 'fresh' | 'fading' | 'old' {
   if (age === null || age >= FADE_TO_S) return 'old';
   return age < FADE_FROM_S ? 'fresh' : 'fading';
 }
 
-/** How strongly to draw something of that age, 0.35 to 1, even in ratios of age; null: faintest. */
+/** Opacity for an age, 0.35 to 1, linear in its logarithm; null: faintest. */
 export function freshness(age: number | null): number {
   if (age === null) return FAINTEST;
   const share =
@@ -62,7 +62,7 @@ export function rosText(at: number): string {
   return hasDate(at) ? dateText(Math.floor(at) * 1000) : simText(at);
 }
 
-/** "14 Nov": for where the year stands beside it, or goes without saying. */
+/** "14 Nov": for use beside a year, or if the year is obvious. */
 export const dayFormat = new Intl.DateTimeFormat(LOCALE, { day: 'numeric', month: 'short' });
 
 /** "14 Nov, 03:12:40", as `rosText` without the year. */
@@ -88,10 +88,10 @@ const simText = (at: number): string => `sim ${countText(at).padStart(8, '0')}`;
 /** Lengths that end now, in seconds. */
 const LENGTHS = { hour: 3_600, day: 86_400, week: 604_800, month: 2_592_000 } as const;
 
-/** Those without a number of their own, in the order in which they are offered. */
+/** Periods without parameters, in the order in which they are offered. */
 export const PERIOD_KINDS = ['hour', 'day', 'week', 'month', 'all'] as const;
 
-/** "own" is between two moments, ROS seconds; the others end now, and "all" begins with memory. */
+/** "own" is between two moments, ROS seconds; the others end now, and "all" begins with the history. */
 export type Period =
   | { readonly kind: (typeof PERIOD_KINDS)[number] }
   | { readonly kind: 'own'; readonly from: number; readonly to: number };
@@ -102,7 +102,7 @@ export interface Span {
   readonly to: number;
 }
 
-/** A period's stretch. `now` is the twin's time, `oldest` what memory reaches back to; null: not known. */
+/** A period's span. `now` is the twin's time, `oldest` the beginning of the history; null: not known. */
 export function spanOf(period: Period, now: number, oldest: number | null): Span {
   switch (period.kind) {
     case 'own':

@@ -1,11 +1,11 @@
-/** What happened when, and how far back anything is remembered. Times are ROS seconds. */
+/** What happened when, and how far back the history reaches. Times are ROS seconds. */
 import type { Timeline as WireTimeline } from '../contract/types';
 import { LOCALE } from '../strings';
 import { clockText, minuteText } from './format';
 import type { Shared } from './memo';
 import { countText, dayFormat, secondsOf, type Span } from './time';
 
-/** What happened in one bucket, from when it begins, ROS seconds. */
+/** The events of one bucket, with its beginning, ROS seconds. */
 export type Happened = Timeline['buckets'][number];
 
 export type Timeline = Shared<ReturnType<typeof timelineOf>>;
@@ -15,39 +15,39 @@ export const spanOfWire = ({ from, to }: WireTimeline['silences'][number]): Span
   to: secondsOf(to),
 });
 
-/** `nowS`: the twin's time, ROS seconds, as it was told. */
+/** `nowS`: the twin's time of the answer, ROS seconds. */
 export function timelineOf(wire: WireTimeline, nowS: number) {
   return {
     ...spanOfWire(wire),
     bucketS: wire.bucket_s,
-    /** What memory holds at all; null: nothing yet. */
+    /** The span of the whole history; null: none yet. */
     reach: wire.reach && spanOfWire(wire.reach),
-    /** By their time; one in which nothing happened is left out. */
+    /** Sorted by time, without empty buckets. */
     buckets: wire.buckets.map((bucket) => ({ ...bucket, start: secondsOf(bucket.start) })),
     silences: wire.silences.map(spanOfWire),
-    /** Of the clock. */
+    /** Nights by the clock. */
     runs: wire.runs.map(spanOfWire),
     missing: missingOf(wire, nowS),
   };
 }
 
-/** A stretch of which something may have been received that the answer does not have; it is no silence. */
+/** A span in which data may have been received that the answer lacks; not a silence. */
 export interface Missing extends Span {
   readonly why: 'not_kept' | 'not_recorded';
 }
 
-/** The twin says once a second how far its journal is. */
+/** The twin reports its journal's progress once a second. */
 const SLACK_S = 5;
 
-/** `nowS` is the twin's time at which it was told: of what comes later nothing is missing. */
+/** `nowS` is the twin's time of the answer: nothing is missing after it. */
 export function missingOf(
-  told: Pick<WireTimeline, 'from' | 'to' | 'complete_to' | 'kept_from'>,
+  wire: Pick<WireTimeline, 'from' | 'to' | 'complete_to' | 'kept_from'>,
   nowS: number,
 ): readonly Missing[] {
-  const [from, to] = [secondsOf(told.from), Math.min(secondsOf(told.to), nowS)];
+  const [from, to] = [secondsOf(wire.from), Math.min(secondsOf(wire.to), nowS)];
   const missing: Missing[] = [];
-  if (told.kept_from) missing.push({ from, to: secondsOf(told.kept_from), why: 'not_kept' });
-  const complete = told.complete_to && secondsOf(told.complete_to);
+  if (wire.kept_from) missing.push({ from, to: secondsOf(wire.kept_from), why: 'not_kept' });
+  const complete = wire.complete_to && secondsOf(wire.complete_to);
   if (complete !== null && to - complete > SLACK_S) {
     missing.push({ from: Math.max(from, complete), to, why: 'not_recorded' });
   }
@@ -57,7 +57,7 @@ export function missingOf(
 export interface Tick {
   /** ROS seconds. */
   readonly at: number;
-  /** The time, and below it the date where it is the first or another than before. */
+  /** The time, and below it the date, if first or changed. */
   readonly text: string;
 }
 
@@ -105,19 +105,19 @@ function evenTimes({ from, to }: Span, step: number): number[] {
   return times;
 }
 
-/** Times of the operator's own clock, which may lie an hour more or less apart twice a year. */
+/** Times on the operator's own clock; twice a year they are an hour closer or further apart. */
 function clockTimes({ from, to }: Span, step: number): number[] {
   const times: number[] = [];
   const day = new Date(from * 1000);
   day.setHours(0, 0, 0, 0);
   if (step >= 30 * DAY) day.setMonth(0, 1);
-  // Weeks begin on Mondays, and other numbers of days always on the same.
+  // Weeks begin on Mondays; other multiples of days are counted from a fixed day.
   else if (step >= DAY) day.setDate(day.getDate() - (daysOf(day) % Math.round(step / DAY)));
   while (day.getTime() / 1000 <= to) {
     const begin = day.getTime() / 1000;
     if (step >= 30 * DAY) day.setMonth(day.getMonth() + Math.round(step / (30 * DAY)));
     else day.setDate(day.getDate() + Math.max(1, Math.round(step / DAY)));
-    // Where summer begins at midnight, that day begins at one, and the next does not.
+    // If daylight saving begins at midnight, that day begins at one, but the next does not.
     day.setHours(0, 0, 0, 0);
     if (step >= DAY) {
       if (begin >= from) times.push(begin);
@@ -130,7 +130,7 @@ function clockTimes({ from, to }: Span, step: number): number[] {
   return times;
 }
 
-/** Whole days since a Monday long ago, by the calendar. */
+/** Calendar days since a Monday in the past. */
 const daysOf = (day: Date): number =>
   Math.round(Date.UTC(day.getFullYear(), day.getMonth(), day.getDate()) / 1000 / DAY) + 3;
 

@@ -147,9 +147,9 @@ describe('times of their own', () => {
     expect(scanned([unknown])).toBe('unknown');
     expect(scanned([unknown, ...readings({ b: 1 }, 4_997)])).toBe(-3_000);
     expect(scanned([])).toBe('never');
-    // Of a clock that does not run no age is known.
+    // If the clock does not run, no age is known.
     expect(scanned(readings({ b: 1 }, 4_997), null)).toBe('unknown');
-    // One that went back makes no negative age.
+    // A clock that went back gives no negative age.
     expect(scanned(readings({ b: 1 }, 6_000))).toBe(0);
   });
 
@@ -161,12 +161,12 @@ describe('times of their own', () => {
       last_try_detail: 'dark',
     });
     const tag = tagOf(wire, { at, takenAt: 0 });
-    expect(tag.lookedAt).toBe(-9_500);
-    expect(tag.failedTry).toEqual({ at: -120_000, status: 2, detail: 'dark' });
-    expect(tagOf({ ...wire, last_try_status: 0 }, { at, takenAt: 0 }).failedTry).toBeNull();
+    expect(tag.inspectedAt).toBe(-9_500);
+    expect(tag.failedAttempt).toEqual({ at: -120_000, status: 2, detail: 'dark' });
+    expect(tagOf({ ...wire, last_try_status: 0 }, { at, takenAt: 0 }).failedAttempt).toBeNull();
     // Without a clock there is no age.
     const timeless = tagOf(wire, { at: { sec: 0, nanosec: 0 }, takenAt: 0 });
-    expect([timeless.lookedAt, timeless.failedTry?.at]).toEqual(['unknown', 'unknown']);
+    expect([timeless.inspectedAt, timeless.failedAttempt?.at]).toEqual(['unknown', 'unknown']);
   });
 
   test('a tag of which nothing but its ages went on is the very same', () => {
@@ -176,10 +176,10 @@ describe('times of their own', () => {
     const first = snapshotOf(house(own, 1_000), 0, null);
     const later = snapshotOf(house(structuredClone(own), 1_010), 10_000, first);
     expect(later.tags[0]).toBe(first.tags[0]);
-    // A light scan, of which the value is the same by chance.
+    // A light scan with the same value by chance.
     const again = snapshotOf(house(readings({ a: 1 }, 1_020), 1_020), 20_000, later);
     expect(again.tags[0]?.readAt.get('a')).toBe(20_000);
-    // A twin that ceases to tell.
+    // A twin that stops reporting it.
     const silent = snapshotOf(house([unknown], 1_030), 30_000, again);
     expect(silent.tags[0]?.scannedAt).toBe('unknown');
   });

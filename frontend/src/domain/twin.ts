@@ -3,20 +3,20 @@ import { mapPoint, type MapPoint } from '../geometry/coordinates';
 import type { Shared } from './memo';
 import type { When } from './time';
 
-export interface FailedTry {
+export interface FailedAttempt {
   readonly at: When;
   /** As in lupin_msgs/Observation; never 0, which is a success. */
   readonly status: number;
   readonly detail: string;
 }
 
-/** One tag as the page uses it. Strings are as they came: show them through `domain/text`. */
+/** One tag as the page uses it. Strings are as received: show them through `domain/text`. */
 export type Tag = Shared<ReturnType<typeof tagOf>>;
 
 export interface Snapshot {
-  /** By their ids; the same list as before if nothing but the time went on. */
+  /** Sorted by id; the same list as before if only time has passed. */
   readonly tags: readonly Tag[];
-  /** Changes exactly when a field or the map could have changed. */
+  /** Changes exactly when a field or the map may have changed. */
   readonly revision: string;
   /** ROS time of the state. */
   readonly at: WireTime;
@@ -24,11 +24,11 @@ export interface Snapshot {
   readonly takenAt: number;
   /** Tags observed since the snapshot before. */
   readonly fresh: readonly string[];
-  /** Whether what is not in it never was; else the journal does not have all of then. */
+  /** Whether it is complete; else the journal lacks data of that time. */
   readonly isWhole: boolean;
 }
 
-/** A point with a coordinate that is not finite (null on the wire) is no point. */
+/** Null for a point with a coordinate that is not finite (null on the wire). */
 function pointOf(point: WirePoint): MapPoint | null {
   return point.x === null || point.y === null ? null : mapPoint(point.x, point.y);
 }
@@ -36,8 +36,8 @@ function pointOf(point: WirePoint): MapPoint | null {
 type TakenState = Pick<Snapshot, 'at' | 'takenAt'>;
 
 /**
- * A ROS time on the monotonic clock: a difference to the wall clock would be wrong in simulation, and
- * on a tablet that is off. A state without a time of its own (0) dates nothing.
+ * A ROS time on the monotonic clock: the wall clock would be wrong in simulation, and on a tablet whose
+ * clock is off. Nothing can be dated by a state without its own time (0).
  */
 export function whenOf(time: WireTime, { at, takenAt }: TakenState): When {
   if (at.sec === 0 && at.nanosec === 0) return 'unknown';
@@ -45,7 +45,7 @@ export function whenOf(time: WireTime, { at, takenAt }: TakenState): When {
   return takenAt - Math.max(0, age) * 1000;
 }
 
-/** Below it the bridge judges by what holds for all: `sure_species` of the twin. */
+/** Below it the bridge judges by the ranges for all species: the twin's `sure_species`. */
 const SURE = 0.5;
 
 export function tagOf(wire: TwinTagState, state: TakenState) {
@@ -53,33 +53,33 @@ export function tagOf(wire: TwinTagState, state: TakenState) {
   const readAt = new Map(
     wire.readings.map((reading): [string, When] => [reading.name, readAtOf(wire, reading, state)]),
   );
-  const { looked_at: looked, last_try: tried, last_try_status: status } = wire;
+  const { looked_at: inspected, last_try: attempted, last_try_status: status } = wire;
   return {
     id: wire.tag_id,
-    /** Metres; null: the tag has no pose, or one that is far off, and gets no pin. */
+    /** Metres; null: no pin, as the tag has no pose or is far off. */
     // w is exactly 0 where the twin has no pose; every rotation about z by less than half a
     // turn has another w, and ROS itself defaults it to 1.
     at: orientation.w === 0 || orientation.w === null ? null : pointOf(position),
-    /** Where it was pinned, too far from the others for any map; null: it was not. */
+    /** Its place if too far from the others for the map; else null. */
     farOff: null as MapPoint | null,
     /** Latest reading by sensor, in its unit; null: the sensor gave not-a-number. */
     readings: new Map(wire.readings.map(({ name, value }) => [name, value])),
-    /** When each reading was made: a look at the flowers makes none younger. */
+    /** When each reading was taken: a flower inspection makes none younger. */
     readAt,
-    /** When the newest reading was made. */
+    /** When the newest reading was taken. */
     scannedAt: newest(readAt.values()),
-    /** When the flowers were last looked at; "never" also where the twin does not tell. */
-    lookedAt: looked === null ? 'never' : whenOf(looked, state),
-    /** The last scan or look, if it brought nothing. */
-    failedTry:
-      tried === null || status === null || status === 0
+    /** When the flowers were last inspected; "never" also if the twin does not report it. */
+    inspectedAt: inspected === null ? 'never' : whenOf(inspected, state),
+    /** The last scan or inspection, if it failed. */
+    failedAttempt:
+      attempted === null || status === null || status === 0
         ? null
-        : ({ at: whenOf(tried, state), status, detail: wire.last_try_detail } as FailedTry),
-    /** Whether it was ever observed in any way, and how long ago is known. */
+        : ({ at: whenOf(attempted, state), status, detail: wire.last_try_detail } as FailedAttempt),
+    /** Whether it was ever observed, with a known age. */
     isObserved: wire.stale_seconds !== null,
     species: wire.species,
     speciesConfidence: wire.species_confidence,
-    /** The species whose ranges hold; empty where the camera was not sure, as the bridge judges. */
+    /** The species whose ranges hold; empty if the camera was not sure, as in the bridge. */
     sureSpecies: (wire.species_confidence ?? 0) >= SURE ? wire.species : '',
     anomaly: wire.anomaly,
     flowerCount: wire.flower_count,
@@ -94,14 +94,14 @@ export function tagOf(wire: TwinTagState, state: TakenState) {
   };
 }
 
-/** A tag without an age has no reading of a known one. */
+/** Without the tag's age, the ages of its readings are unknown. */
 const readAtOf = (
   { stale_seconds: age }: TwinTagState,
   { observed_at: at }: TwinTagState['readings'][number],
   state: TakenState,
 ): When => (age === null || at == null ? 'unknown' : whenOf(at, state));
 
-/** The latest of some times; "unknown" where there are only such, "never" without any. */
+/** The latest of some times; "unknown" if all are, "never" without any. */
 function newest(times: Iterable<When>): When {
   let latest: When = 'never';
   for (const time of times) {
@@ -111,12 +111,12 @@ function newest(times: Iterable<When>): When {
   return latest;
 }
 
-/** Ages of one observation that differ by less come from the network, not from a new look. */
+/** Smaller differences in age come from network delay, not from a new observation. */
 const JITTER_MS = 1_500;
 
 /**
- * The tag as it was, if nothing but its age went on: the page renders only what changed. Where
- * the twin's clock runs at another speed (simulation), its ages still win.
+ * The previous tag if only its age has grown: the page renders only what changed. If the twin's clock
+ * runs at another speed (simulation), its ages still win.
  */
 function sharedTag(before: Tag | undefined, wire: TwinTagState, state: TakenState): Tag {
   const isSame = (name: string, now: When): boolean => {
@@ -132,7 +132,7 @@ function sharedTag(before: Tag | undefined, wire: TwinTagState, state: TakenStat
   return isShared ? before : tagOf(wire, state);
 }
 
-/** Deep equality of plain JSON values, but for ages. */
+/** Deep equality of plain JSON values, except ages. */
 export function equal(a: unknown, b: unknown): boolean {
   if (a === b) return true;
   if (typeof a !== 'object' || typeof b !== 'object' || a === null || b === null) return false;
@@ -148,11 +148,11 @@ export function equal(a: unknown, b: unknown): boolean {
 }
 
 /**
- * The snapshot that a state makes. `arrivedAt` is when its frame came, less the state's
- * age if it was old then, ms on the monotonic clock.
+ * The snapshot of a state. `arrivedAt` is when its frame arrived, minus the state's age if it was old,
+ * ms on the monotonic clock.
  *
- * A frame that repeats the state before (a heartbeat of a bridge whose twin is gone) is not new:
- * it keeps the older `takenAt`, or every heartbeat would make the readings look fresh again.
+ * A frame that repeats the previous state (a heartbeat of a bridge without a twin) is not new: it keeps
+ * the older `takenAt`, or every heartbeat would make the readings look fresh.
  */
 export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot | null): Snapshot {
   const at = latest.state.header.stamp;
@@ -183,8 +183,8 @@ function within(reach: Reach, tag: Tag): Tag {
 }
 
 /**
- * By their ids, as the map shows them. The very list of before if each tag is the very same: then
- * nothing is redrawn.
+ * Tags sorted by id, without the places that are far off. Returns the previous list if each tag is the
+ * same object, so that nothing is redrawn.
  */
 function inOrder(
   read: readonly Tag[],
@@ -219,11 +219,11 @@ export function compareIds(a: string, b: string): number {
 }
 
 /**
- * Which tags lie so far from the others that they are on no map: `lupin_twin/core/outlying.py`, which says
- * why, has the same rule. Both are held to the cases of `tests/twin/core/far_off.json`.
+ * Which tags are too far from the others for the map: the same rule as in `lupin_twin/field/grid.py`, which
+ * explains it. `tests/twin/core/far_off.json` tests both.
  */
 
-/** A circle about the middle of the tags, metres; what is outside is far off. */
+/** A circle around the centre of the tags, metres; a tag outside is far off. */
 interface Reach {
   readonly x: number;
   readonly y: number;
@@ -254,7 +254,7 @@ export function reachOf(places: readonly MapPoint[]): Reach {
   return { x, y, radius };
 }
 
-/** The middle value; of an even count the lower of the two, 0 of none. */
+/** The median; of an even count the lower of the two, 0 of none. */
 function medianLow(values: readonly number[]): number {
   const sorted = Float64Array.from(values).sort();
   return sorted[(sorted.length - 1) >> 1] ?? 0;

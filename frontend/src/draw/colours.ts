@@ -1,4 +1,4 @@
-/** The colours of a canvas, by their names in the style sheet: light or dark, forced, or for paper, as they are now. */
+/** The current colours of a canvas, by name in the style sheet: light, dark, forced, or for paper. */
 export type Colours = (name: string) => string;
 
 export function coloursOf(element: Element): Colours {

@@ -97,7 +97,7 @@ describe('pins', () => {
       draw([pin({ kind })]).sprites[0]?.named('setLineDash') ?? [];
     expect(dashes('lacking')).toHaveLength(2);
     expect(dashes('failed')).toHaveLength(1);
-    // A stroke through it in place of the sign: halo, outline, and that.
+    // Halo, outline, and a stroke through it instead of the sign.
     const sign = (kind: Pin['kind']): unknown => strokes({ kind })[2]?.args[0];
     expect(sign('failed')).not.toEqual(sign('value'));
     expect(sign('lacking')).toEqual(sign('value'));
@@ -112,7 +112,7 @@ describe('pins', () => {
   });
 
   test('where pins crowd only a critical one has room for its sign', () => {
-    // Halo and outline; its cross besides.
+    // Halo, outline and cross.
     const lines = (verdict: Verdict): number | undefined =>
       draw([pin({ verdict })], 0.02).sprites[0]?.named('stroke').length;
     expect(VERDICTS.map(lines)).toEqual(VERDICTS.map((each) => (each === 'critical' ? 3 : 2)));
@@ -152,7 +152,7 @@ test('labels are copied relative to the map’s origin', () => {
   const label = { id: '1', text: '1', x: 50, y: -100, width: 20 };
   drawLabels(penOn(copies, { view }), [label]);
   expect(copies.named('drawImage')[0]?.args.slice(1, 3)).toEqual([50, 300]);
-  // As high as their text asks for.
+  // As high as their text needs.
   drawLabels(penOn(copies, { textScale: 2 }), [label]);
   expect(copies.named('drawImage')[1]?.args[4]).toBe(36);
 });
@@ -160,7 +160,7 @@ test('labels are copied relative to the map’s origin', () => {
 test('pins and blooms shrink with the map, within limits', () => {
   expect(pinRadius(1)).toBe(6);
   expect(pinRadius(5000)).toBe(11);
-  // Where they crowd, the heat map is seen between them.
+  // If they are crowded, the heat map shows between them.
   expect(pinRadius(5, 2)).toBe(2);
   expect(pinRadius(20, 2)).toBe(6);
   expect(bloomRadius(1)).toBe(1.5);
@@ -195,7 +195,7 @@ describe('overlay', () => {
     drawMark(pen, mapPoint(1, 1), true);
     const [, left, y, radius] = /^M(\S+) (\S+)a(\S+) /.exec(path(context)) ?? [];
     expect([Number(left) + Number(radius), Number(y)]).toEqual([50, 50]);
-    // With the ring of a pest in it.
+    // With the pest ring inside.
     expect(Number(radius)).toBeGreaterThan(pinRadius(50) + 7);
   });
 

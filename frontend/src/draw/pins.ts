@@ -1,4 +1,4 @@
-/** Pins, blooms, pest rings and labels: what the data moves. All from cached sprites. */
+/** Pins, blooms, pest rings and labels: what changes with the data. All from cached sprites. */
 import { isBad, VERDICTS } from '../domain/health';
 import { type BloomLook, MARKS } from '../domain/marks';
 import { rgbText } from '../domain/ramp';
@@ -8,24 +8,24 @@ import type { Colours } from './colours';
 import type { Pin, Scene } from './scene';
 import type { Pen, Surface } from './surface';
 
-/** `text`: how large the page's text is, 1 as usual. */
+/** `text`: scale of the page's text, usually 1. */
 export const labelHeight = (text: number): number => Math.round(18 * text);
 export const labelFont = (text: number): string =>
   `600 ${11.5 * text}px "Inter Variable", system-ui, sans-serif`;
 const LABEL_PADDING = 5;
 
 /**
- * Half a pin's width in pixels: smaller when far away, and where pins crowd (`spacing`, m), so that the
- * heat map is seen between them.
+ * Half a pin's width in pixels: smaller when zoomed out, and for crowded pins (`spacing`, m), so that
+ * the heat map shows between them.
  */
 export function pinRadius(scale: number, spacing = Infinity): number {
   const usual = Math.round(Math.min(11, Math.max(6, scale * 0.11)));
   return Math.min(usual, Math.max(LEAST_PX.healthy, Math.round(scale * spacing * 0.22)));
 }
 
-/** Where pins crowd; the worse, the larger. */
+/** Least size of crowded pins: the worse, the larger. */
 const LEAST_PX = { healthy: 2, unknown: 2, stressed: 3, critical: 5 };
-/** Smaller ones have no room for a sign. */
+/** Smaller pins have no room for a sign. */
 const LEAST_SIGN_PX = 5;
 
 export function bloomRadius(scale: number): number {
@@ -58,7 +58,7 @@ const BLOOMS = {
   triangle: 'M0-1.3L1.2.85H-1.2Z',
 } as const;
 
-/** A dot about the origin. */
+/** A bloom about the origin. */
 function paintBloom(
   context: CanvasRenderingContext2D,
   radius: number,
@@ -67,7 +67,7 @@ function paintBloom(
 ): void {
   const outline = new Path2D(BLOOMS[look.shape]);
   context.scale(radius, radius);
-  // Its colour alone would not stand out from a heat map over a planter.
+  // The colour alone would not stand out from a heat map over a planter.
   context.strokeStyle = colour('map-halo');
   context.lineWidth = 2.5 / radius;
   context.stroke(outline);
@@ -102,7 +102,7 @@ export function drawPins(pen: Pen, pins: readonly Pin[], spacing: number): void 
       target.globalAlpha = 1;
     }
   }
-  // Last, so that no neighbour covers a warning; and never faded.
+  // Last and never faded, so that no neighbour covers a warning.
   for (const pin of pins) {
     if (!pin.pest) continue;
     const { x, y } = toCanvas(view, pin.at);
@@ -112,9 +112,9 @@ export function drawPins(pen: Pen, pins: readonly Pin[], spacing: number): void 
 }
 
 /**
- * The mark of a verdict about the origin. Whether the tag has the sensor in view is told by its
- * body: full with a reading, empty and its line broken without such a sensor, empty and struck through
- * where the sensor gives no number.
+ * The mark of a verdict about the origin. Its body shows the sensor in view: full with a reading,
+ * empty with a broken outline without such a sensor, empty and struck through if the sensor gives no
+ * number.
  */
 function paintPin(
   context: CanvasRenderingContext2D,
@@ -131,7 +131,7 @@ function paintPin(
   context.scale(radius, radius);
   context.lineJoin = 'round';
   context.lineCap = 'round';
-  // The halo tells it from whatever colour lies below.
+  // The halo separates it from any colour below.
   context.strokeStyle = colour('map-halo');
   context.lineWidth = (radius < LEAST_SIGN_PX ? 1.5 : isLine ? 5 : 4) / radius;
   context.stroke(outline);
@@ -149,7 +149,7 @@ function paintPin(
   context.stroke(new Path2D(kind === 'failed' ? STRUCK : mark.sign));
 }
 
-/** There is such a sensor, and it gives no number. */
+/** The sensor exists but gives no number. */
 const STRUCK = 'M-.45.45L.45-.45';
 
 function drawPest(pen: Pen, x: number, y: number, radius: number): void {
@@ -166,14 +166,14 @@ function drawPest(pen: Pen, x: number, y: number, radius: number): void {
     context.stroke();
     context.setLineDash([]);
     context.translate(ring * 0.74, -ring * 0.74);
-    // Small pins stand close together.
+    // Small pins are close together.
     context.scale(radius < 8 ? 0.8 : 1, radius < 8 ? 0.8 : 1);
     paintBug(context, colour);
   });
   sprites.draw(pen, sprite, x - box / 2, y - box / 2);
 }
 
-/** A bug on a disc about the origin: no shape of any verdict. */
+/** A bug on a disc about the origin: no verdict has this shape. */
 function paintBug(context: CanvasRenderingContext2D, colour: Colours): void {
   context.beginPath();
   context.arc(0, 0, 7, 0, 2 * Math.PI);
@@ -194,7 +194,7 @@ function paintBug(context: CanvasRenderingContext2D, colour: Colours): void {
   context.fill();
 }
 
-/** What `placeLabels` needs to know, relative to the map's origin. */
+/** Input of `placeLabels`, relative to the map's origin. */
 export function labelRequests(
   pins: readonly Pin[],
   scale: number,
@@ -202,7 +202,7 @@ export function labelRequests(
   widthOf: (text: string) => number,
 ): LabelRequest[] {
   const radius = pinRadius(scale);
-  // Beside the rings of what is selected and of pests.
+  // Clear of the rings of selection and pests.
   const around = (pin: Pin): number => (pin.id === first ? 10 : pin.pest ? 6 : 0);
   return pins.map((pin) => ({
     id: pin.id,
@@ -233,7 +233,7 @@ export function drawLabels(pen: Pen, labels: readonly PlacedLabel[]): void {
   }
 }
 
-/** How long the ring of a fresh observation grows, ms. */
+/** How long the ring of a new observation grows, ms. */
 export const PULSE_MS = 1_200;
 
 export interface Pulse {
@@ -261,7 +261,7 @@ export function drawPulses(
   context.globalAlpha = 1;
 }
 
-/** In the accent's colour, on a halo that tells it from whatever lies below. */
+/** In the accent colour, with a halo that separates it from any colour below. */
 function drawOutlined({ context, colour }: Pen, lines: Path2D, halo: number, width: number): void {
   context.strokeStyle = colour('map-halo');
   context.lineWidth = halo;
@@ -272,14 +272,14 @@ function drawOutlined({ context, colour }: Pen, lines: Path2D, halo: number, wid
 }
 
 export function drawMark(pen: Pen, at: MapPoint, strong: boolean): void {
-  // Outside of the ring that tells a pest.
+  // Outside the pest ring.
   const r = pinRadius(pen.view.scale) + 9;
   const { x, y } = toCanvas(pen.view, at);
   const ring = new Path2D(`M${x - r} ${y}a${r} ${r} 0 1 1 ${2 * r} 0a${r} ${r} 0 1 1 ${-2 * r} 0Z`);
   drawOutlined(pen, ring, strong ? 6 : 4, strong ? 3 : 2);
 }
 
-/** The point whose value the keyboard reads: the middle of the view. */
+/** The point of the keyboard's read-out: the middle of the view. */
 export function drawCrosshair(pen: Pen): void {
   const x = Math.round(pen.size.width / 2) + 0.5;
   const y = Math.round(pen.size.height / 2) + 0.5;

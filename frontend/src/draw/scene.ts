@@ -1,4 +1,4 @@
-/** What to draw, from the data: one list each of pins, blooms and boxes. Pure. */
+/** What to draw, derived from the data: lists of pins, blooms and boxes. Pure. */
 import type { Verdict } from '../contract/types';
 import { ageSeconds, freshness, type Ageing } from '../domain/time';
 import { readingText, type TemperatureUnit } from '../domain/format';
@@ -10,11 +10,11 @@ import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
 import { boundsOf, type MapPoint } from '../geometry/coordinates';
 
-/** Steps of fading; more cannot be told apart. */
+/** Steps of fading; more would be indistinguishable. */
 const FADE_STEPS = 6;
-/** A pin that needs somebody stays in sight, however old what it says. */
+/** A warning pin stays visible, however old its data. */
 const FAINTEST_WARNING = 5 / 6;
-/** What the filter leaves out stays in its place, and is not looked at. */
+/** Pins outside the filter stay, but faint. */
 const LEFT_OUT = 1 / 6;
 
 export type Pin = Shared<ReturnType<typeof pinOf>>;
@@ -23,7 +23,7 @@ export interface Scene {
   readonly pins: readonly Pin[];
   readonly blooms: readonly { readonly at: MapPoint; readonly look: BloomLook }[];
   readonly boxes: readonly (readonly MapPoint[])[];
-  /** How far pins are apart where they are many, m; else infinite. */
+  /** Distance between pins if they are many, m; else infinite. */
   readonly spacing: number;
 }
 
@@ -35,11 +35,11 @@ export interface SceneInput {
   /** ms on the monotonic clock. */
   readonly now: number;
   readonly ageing: Ageing;
-  /** The tags that the table's filter leaves; null: all of them. */
+  /** The tags that pass the table's filter; null: all. */
   readonly listed: ReadonlySet<string> | null;
 }
 
-/** What neither fades nor follows the sensor. */
+/** The parts that neither fade nor depend on the sensor. */
 const planted = memoOne((tags: readonly Tag[]): Pick<Scene, 'blooms' | 'boxes'> => {
   const looks = speciesLooks(speciesOf(tags));
   const blooms = tags.flatMap((tag) =>
@@ -55,10 +55,10 @@ export function buildScene(input: SceneInput): Scene {
   return { ...planted(input.tags), pins, spacing: spacingOf(pins) };
 }
 
-/** Fewer pins never hide what lies below them. */
+/** Fewer pins never hide what is below them. */
 const CROWD = 60;
 
-/** The side of the square that each would have if they were spread evenly over their bounds. */
+/** The side of each pin's square if pins were spread evenly over their bounds. */
 function spacingOf(pins: readonly Pin[]): number {
   const bounds = pins.length < CROWD ? null : boundsOf(pins.map(({ at }) => at));
   if (!bounds) return Infinity;
@@ -69,7 +69,7 @@ function spacingOf(pins: readonly Pin[]): number {
 function pinOf(tag: Tag, at: MapPoint, input: SceneInput) {
   const { health, sensor, unit, now, ageing, listed } = input;
   const isLeftOut = listed !== null && !listed.has(tag.id);
-  // The number of what is computed is the field's, which neighbours have a part in: it is no label.
+  // A computed number is the field's and includes neighbours, so it is no label.
   const parts = partsOf(sensor, (part) => tag.readings.has(part));
   const values = parts.map((part) => tag.readings.get(part));
   const isLacking = values.includes(undefined);
@@ -85,18 +85,18 @@ function pinOf(tag: Tag, at: MapPoint, input: SceneInput) {
     id: tag.id,
     at,
     /**
-     * - value: the tag has this sensor and a reading, or all that it is computed of
-     * - failed: it has this sensor, whose reading is not a number
-     * - lacking: it has no such sensor
+     * - value: the tag has a reading of this sensor, or all that it is computed from
+     * - failed: the tag has this sensor, but its reading is not a number
+     * - lacking: the tag has no such sensor
      */
     kind: isLacking ? ('lacking' as const) : isFailed ? ('failed' as const) : ('value' as const),
     verdict,
-    /** How fresh, 0.35 to 1; of a warning never faint; less where the filter leaves it out. */
+    /** Opacity by freshness, 0.35 to 1; a warning is never faint; less outside the filter. */
     strength: isLeftOut
       ? LEFT_OUT
       : Math.max(quantised(fresh, FADE_STEPS), isWarning ? FAINTEST_WARNING : 0),
     pest: tag.anomaly && !isLeftOut,
-    /** Label texts from the most to the least telling. */
+    /** Label texts, the most detailed first. */
     texts: isLeftOut ? [] : textsOf(tag)(sensor, unit),
     priority:
       (tag.anomaly ? 4 : 0) +

@@ -132,7 +132,7 @@ test('what an estimate is unsure of is hatched, the denser the less it is sure',
     const [drawn] = context.named('drawImage');
     return FakeContext.recordOf(drawn?.args[0] as HTMLCanvasElement)?.named('moveTo').length ?? 0;
   };
-  // Step by step twice as dense, so that each has all strokes of the one before.
+  // Each step is twice as dense, so that it contains all strokes of the previous one.
   expect(strokes(least?.gap)).toBeGreaterThan(3.6 * strokes(less?.gap));
 });
 

@@ -1,4 +1,4 @@
-/** What changes only with the data or the view: ground, SLAM map, heat map, grid, boxes. */
+/** The layers that change only with data or view: ground, SLAM map, heat map, grid, boxes. */
 import type { Field } from '../contract/types';
 import { written } from '../domain/format';
 import { stepsIn } from '../domain/field';
@@ -23,12 +23,12 @@ export function drawGround({ context, size, colour }: Pen): void {
   context.fillRect(0, 0, size.width, size.height);
 }
 
-/** The greys of /api/map.png between which a cell lies, from occupied to free. */
+/** The greys of /api/map.png, from occupied to free. */
 const OCCUPIED_GREY = 70;
 const FREE_GREY = 236;
 const LEAST_FREE_GREY = (OCCUPIED_GREY + FREE_GREY) / 2;
 
-/** Black where the SLAM map has something, as much as `share` says of its grey. */
+/** A black picture of the SLAM map, with the opacity that `share` gives for its grey. */
 function maskOf({ data, width, height }: ImageData, share: (grey: number) => number) {
   const mask = new Uint8ClampedArray(data.length);
   for (let at = 0; at < data.length; at += 4) {
@@ -46,7 +46,7 @@ function filled(mask: HTMLCanvasElement, colour: string): HTMLCanvasElement {
   return mask;
 }
 
-/** The SLAM map in the theme's colours: its grey becomes the way from wall to floor. */
+/** The SLAM map in the theme's colours: greys become mixtures of wall and floor. */
 export function tintMap(pixels: ImageData, colour: Colours): HTMLCanvasElement {
   const wall = (grey: number): number =>
     Math.min(1, Math.max(0, (FREE_GREY - grey) / (FREE_GREY - OCCUPIED_GREY)));
@@ -58,7 +58,7 @@ export function tintMap(pixels: ImageData, colour: Colours): HTMLCanvasElement {
   return tinted;
 }
 
-/** The floor of the SLAM map: what is inside the house. */
+/** The floor of the SLAM map: the inside of the greenhouse. */
 export const floorOf = (pixels: ImageData): HTMLCanvasElement =>
   maskOf(pixels, (grey) => Number(grey >= LEAST_FREE_GREY));
 
@@ -67,7 +67,7 @@ interface Placed {
   readonly placement: Placement;
 }
 
-/** Cell for cell and never blurred, unless cells are smaller than pixels. */
+/** Cells stay sharp unless they are smaller than pixels. */
 export function drawPicture(pen: Pen, picture: Placed): void {
   place(pen, picture, pen.view.scale * picture.placement.resolution * pen.ratio < 1);
 }
@@ -80,7 +80,7 @@ function place({ context, view }: Pen, { picture, placement }: Placed, isSmooth 
   context.restore();
 }
 
-/** A picture of a field, in any detail, where the field lies. */
+/** A picture of a field, in any resolution, at the field's place. */
 export function placedField(field: Field, picture: HTMLCanvasElement): Placed {
   const { originX, originY } = field;
   const { width, height } = picture;
@@ -100,7 +100,7 @@ function gridTicks({ size, view, textScale }: Pen) {
   };
 }
 
-/** Lines at round metres, so far apart that their numbers have room. */
+/** Lines at round metres, far enough apart for their numbers. */
 export function drawGridLines(pen: Pen): void {
   const { context, size, view, colour } = pen;
   const { columns, rows } = gridTicks(pen);
@@ -122,7 +122,7 @@ export function drawGridLines(pen: Pen): void {
   context.stroke();
 }
 
-/** Clear of the frame that the past has, CSS pixels. */
+/** Distance from the edge, where a past moment has a frame, CSS pixels. */
 const EDGE_PX = 8;
 
 export function drawGridLabels(pen: Pen): void {
@@ -134,7 +134,7 @@ export function drawGridLabels(pen: Pen): void {
   context.textAlign = 'left';
   for (const x of columns) {
     const at = view.x + x * view.scale + 4;
-    // The buttons are in the upper right corner, the other axis begins in the left one.
+    // Clear of the buttons in the upper right corner and the other axis in the left one.
     if (at > 30 * textScale && at < size.width - 96) context.fillText(tick(x), at, EDGE_PX);
   }
   context.textBaseline = 'bottom';
@@ -174,7 +174,7 @@ export function drawBoxes(
   context.stroke();
 }
 
-/** How far round its tags an area is drawn, m. */
+/** Margin of an area around its tags, m. */
 const AREA_M = 0.25;
 
 export function drawAreas(
@@ -198,7 +198,7 @@ export function drawAreas(
     context.strokeRect(x, y, (width + 2 * AREA_M) * view.scale, (height + 2 * AREA_M) * view.scale);
   }
   context.setLineDash([]);
-  // Over a heat map, and a line of another area.
+  // A halo, as the line may cross a heat map or another area.
   context.lineWidth = 4;
   context.strokeStyle = colour('sunken');
   for (const [name, x, y] of names) {
@@ -207,9 +207,9 @@ export function drawAreas(
   }
 }
 
-/** From stroke to stroke of the hatching, pixels of the page. */
+/** Distance between strokes of the hatching, CSS pixels. */
 const GAP_PX = 9;
-/** The same over what is known ever less surely: each has all strokes of the one before it. */
+/** The same for growing errors: each hatching contains all strokes of the previous one. */
 const UNSURE_GAPS_PX = [18, 9, 4.5] as const;
 
 /** The cells of a field for which `isIn` holds, top row first. */
@@ -232,7 +232,7 @@ const isKnown =
 
 export const knownOf = (field: Field): HTMLCanvasElement => cellsOf(field, isKnown(field));
 
-/** The cells that are hatched over their colours: what is `old`, or what an estimate is unsure of. */
+/** The cells that are hatched over their colours: `old` ones, or those of an unsure estimate. */
 export function hatchedOf(field: Field, old: Uint8Array | null) {
   const known = isKnown(field);
   const steps = old ?? (field.sureness && stepsIn(field.sureness));
@@ -242,11 +242,11 @@ export function hatchedOf(field: Field, old: Uint8Array | null) {
   });
 }
 
-/** Keeps the one canvas that the hatching is cut out on. */
+/** Reuses one canvas for cutting out the hatching. */
 export class Hatching {
   #canvas: HTMLCanvasElement | null = null;
 
-  /** Hatches all that `inside` covers and `known` does not. */
+  /** Hatches what `inside` covers and `known` does not. */
   draw(pen: Pen, inside: Placed, known: Placed | null, gap = GAP_PX): void {
     const { size, ratio } = pen;
     const width = Math.max(1, Math.round(size.width * ratio));

@@ -5,16 +5,16 @@ import type { Colours } from './colours';
 export interface Surface {
   readonly context: CanvasRenderingContext2D;
   readonly size: Size;
-  /** Device pixels a CSS pixel. */
+  /** Device pixels per CSS pixel. */
   readonly ratio: number;
 }
 
-/** What everything of the map is drawn with. */
+/** Everything needed to draw on the map. */
 export interface Pen extends Surface {
   readonly view: View;
   readonly colour: Colours;
   readonly sprites: Sprites;
-  /** How large the page's text is, 1 as usual. */
+  /** Scale of the page's text, usually 1. */
   readonly textScale: number;
 }
 
@@ -50,8 +50,8 @@ export function canvasOfPixels(
 const MOST_SPRITES = 1_000;
 
 /**
- * Small pictures painted once and then only copied: without a GPU a copy is many times cheaper
- * than a path. Emptied when there are too many, so that a page of days stays small.
+ * Small pictures, painted once and then copied: without a GPU a copy is many times cheaper than a
+ * path. Emptied when full, so that a page open for days stays small.
  */
 export class Sprites {
   readonly #sprites = new Map<string, HTMLCanvasElement>();
@@ -91,16 +91,16 @@ export class Sprites {
 const MARGIN_PX = 160;
 
 /**
- * Makes panning cheap: while only the place of a view changes, a layer is drawn once with a
- * margin around it and then only shifted. A still view is drawn directly, without a copy.
+ * Makes panning cheap: while only the position of a view changes, a layer is drawn once with a margin
+ * and then shifted. A still view is drawn directly, without a copy.
  */
 export class PanBuffer {
   #canvas: HTMLCanvasElement | null = null;
-  /** The view that the buffer shows, in the buffer's own pixels; null: nothing of use. */
+  /** The view in the buffer, in its own pixels; null: nothing usable. */
   #held: View | null = null;
   #last: View | null = null;
 
-  /** Drops what is held: the data, the theme or the size has changed. */
+  /** Invalidates the buffer: the data, the theme or the size has changed. */
   spoil(): void {
     this.#held = null;
   }
@@ -122,7 +122,7 @@ export class PanBuffer {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
   }
 
-  /** Where the buffer's corner goes for a view; null where the buffer does not cover it. */
+  /** Position of the buffer's corner for a view; null if the buffer does not cover it. */
   #shiftTo(view: View): { x: number; y: number } | null {
     if (this.#held?.scale !== view.scale) return null;
     const x = view.x - this.#held.x;

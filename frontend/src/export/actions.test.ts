@@ -96,11 +96,11 @@ test('a picture is taken of layers that are as on paper', async () => {
   let result: HTMLCanvasElement | null = null;
   vi.spyOn(HTMLCanvasElement.prototype, 'toBlob').mockImplementation(function (
     this: HTMLCanvasElement,
-    tell: BlobCallback,
+    callback: BlobCallback,
   ) {
     // eslint-disable-next-line @typescript-eslint/no-this-alias -- which one it was
     result = this;
-    tell(new Blob(['png']));
+    callback(new Blob(['png']));
   });
   const height = (): number => result?.height ?? 0;
   const drawn = (): number => {

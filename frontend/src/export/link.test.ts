@@ -48,18 +48,18 @@ test.each([
 });
 
 test('is that of the last eight hours until a period is chosen on the time bar', () => {
-  const asked = (): URLSearchParams => new URL(reportLink(), document.baseURI).searchParams;
-  const length = (): number => Number(asked().get('to')) - Number(asked().get('from'));
-  expect(asked().has('from')).toBe(false);
+  const query = (): URLSearchParams => new URL(reportLink(), document.baseURI).searchParams;
+  const length = (): number => Number(query().get('to')) - Number(query().get('from'));
+  expect(query().has('from')).toBe(false);
   const latest = stateFrame([wireTag()], { sec: 1_777_620_802 });
   receive(withState(latest, performance.now()));
   expect(length()).toBe(8 * HOUR);
-  expect(asked().get('lang')).toBe('en');
-  expect(asked().get('time_zone')).toBe(new Intl.DateTimeFormat().resolvedOptions().timeZone);
+  expect(query().get('lang')).toBe('en');
+  expect(query().get('time_zone')).toBe(new Intl.DateTimeFormat().resolvedOptions().timeZone);
   act({ period: { kind: 'hour' } });
   expect(length()).toBe(HOUR);
   act({ period: { kind: 'own', from: 1_777_000_000, to: 1_777_000_900 } });
-  expect([asked().get('from'), asked().get('to')]).toEqual(['1777000000', '1777000900']);
+  expect([query().get('from'), query().get('to')]).toEqual(['1777000000', '1777000900']);
   const value = timelineWith({ reach: { from: 1_777_020_802, to: 1_777_620_802 } });
   receive({ remembered: { value, state: 'ready', message: '' } });
   act({ period: { kind: 'all' } });

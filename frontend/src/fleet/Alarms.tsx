@@ -1,4 +1,4 @@
-/** Active alarms of the greenhouses that are shown, the worst first. */
+/** Active alarms of the shown greenhouses, the worst first. */
 import { useMemo, type JSX } from 'react';
 
 import { valuesOf, whenText, whereText, type Speech } from '../alarms/words';
@@ -26,7 +26,7 @@ export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Eleme
   const having = shown.filter((site) => (site.active_alarms ?? 0) > 0);
   const names = namesOf(having);
   const path = names === '' ? 'api/alarms' : `api/alarms?sites=${names}`;
-  // Another count, another list.
+  // Refetch when a count changes.
   const news = having.map((site) => `${site.site} ${site.active_alarms ?? 0}`).join();
   const { value, message } = useAnswer<{ alarms: readonly SiteAlarm[] }>(path, EVERY_MS, news);
   const rows = useMemo(() => {
@@ -89,7 +89,7 @@ function saidOf(alarm: SiteAlarm): readonly string[] {
 }
 
 function linkOf(alarm: SiteAlarm, raised: number): string {
-  // To the millisecond that holds the observation, and not to the one before it.
+  // Rounded up, to include the observation.
   const parts = new URLSearchParams({ at: String(Math.ceil(raised * 1000) / 1000) });
   if (alarm.tag_id) parts.set('tag', alarm.tag_id);
   return `${siteLink(alarm)}#${parts.toString()}`;

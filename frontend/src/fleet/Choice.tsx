@@ -1,7 +1,7 @@
 import type { JSX } from 'react';
 
 interface Props<Option extends string | number> {
-  /** None: these are the page's views. */
+  /** Without counts: the page's views. */
   readonly label?: string;
   readonly options: readonly Option[];
   readonly value: Option;

@@ -1,4 +1,4 @@
-/** One sensor of several greenhouses on one time axis: the outlier first. */
+/** One sensor of several greenhouses on one time axis, the outlier first. */
 import 'uplot/dist/uPlot.min.css';
 import '../styles/charts.css';
 
@@ -38,7 +38,7 @@ export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Elem
   const [picked, setPicked] = useState<readonly string[] | null>(null);
   const [at, setAt] = useState<number | null>(null);
   const compared = shown.slice(0, MOST_SITES);
-  // By name: where the worst one moves, the question stays.
+  // Sorted by name, so that a new worst site does not change the query.
   const sites = compared.map(({ site }) => site).sort();
   const hour = Math.floor(timeOfDay() / 3_600_000) * 3600;
   const { from } = periodSpan({ kind: period }, hour, null);
@@ -193,7 +193,7 @@ interface ComparedSite {
   readonly site: string;
   readonly name: string;
   readonly mean: number | null;
-  /** How far it is from the median of all, in the sensor's unit; null: it has no reading. */
+  /** Distance from the median of all, in the sensor's unit; null: no reading. */
   readonly deviation: number | null;
   readonly means: Values;
 }
@@ -210,14 +210,14 @@ interface Compared {
   readonly sites: readonly ComparedSite[];
 }
 
-/** What the server compares at most. */
+/** Most sites that the server compares. */
 const MOST_SITES = 50;
-/** So many lines can be told apart beside that of the median. */
+/** Distinguishable lines beside the median's. */
 const MOST_DRAWN = 6;
-/** The look that no greenhouse gets: grey, with dashes. */
+/** The median's own style: grey, dashed. */
 const MEDIAN_LOOK = 6;
 
-/** The median with its band, and the sites that are drawn, each with the look of its place there. */
+/** The median with its band, and the drawn sites, each with the style of its place in the list. */
 function linesOf(found: Compared, drawn: readonly string[], median: string): Line[] {
   const sites = drawn.flatMap((name, look) => {
     const site = found.sites.find((each) => each.site === name);
@@ -252,7 +252,7 @@ const spanOf = ({ from, to }: Compared): Span => ({
   to: secondsOf(to),
 });
 
-/** Of a site, what the bucket at a moment has; of none, its mean. */
+/** A site's value in the bucket at a moment; without a moment, its mean. */
 function valueAt(found: Compared, { mean, means }: ComparedSite, at: number | null) {
   if (at === null) return mean;
   return means[Math.floor((at - secondsOf(found.from)) / found.bucket_s)] ?? null;

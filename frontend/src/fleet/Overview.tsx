@@ -1,4 +1,4 @@
-/** All greenhouses, the worst first; their alarms; and one sensor of several beside each other. */
+/** All greenhouses, the worst first; their alarms; and one sensor of several compared. */
 import {
   type JSX,
   lazy,
@@ -33,7 +33,7 @@ import {
   words,
 } from './sites';
 
-// Loaded when somebody asks for them.
+// Loaded when first shown.
 const Alarms = lazy(() => import('./Alarms'));
 const Compare = lazy(() => import('./Compare'));
 const Report = lazy(() => import('./Report'));
@@ -41,7 +41,7 @@ const Report = lazy(() => import('./Report'));
 const VIEWS = ['sites', 'alarms', 'compare', 'report'] as const;
 type View = (typeof VIEWS)[number];
 
-const asked = new URLSearchParams(window.location.search);
+const query = new URLSearchParams(window.location.search);
 
 interface Props {
   readonly seen: Seen;
@@ -52,13 +52,13 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
   const [view, setView] = useState<View>('sites');
   const [filter, setFilter] = useState<Filter>('all');
   const [search, setSearch] = useState('');
-  const [group, setGroup] = useState(asked.get('group') ?? '');
+  const [group, setGroup] = useState(query.get('group') ?? '');
   const field = useRef<HTMLInputElement>(null);
   const sites = useDeferredValue(seen.sites);
   const counts = useMemo(() => countsOf(sites.values()), [sites]);
   const alarms = useMemo(() => alarmCount(sites.values()), [sites]);
-  // Before, there is nothing to count.
-  const isHere = seen.archive !== null;
+  // Until then there is nothing to count.
+  const hasArchive = seen.archive !== null;
   const groups = useMemo(() => groupNames(sites.values()), [sites]);
   const shown = useMemo(() => chosen(sites, filter, search, group), [sites, filter, search, group]);
 
@@ -84,7 +84,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
         <h1>{words.sites}</h1>
         {isKiosk && (
           <span className="fleet-alarms" data-any={alarms > 0}>
-            {!isHere ? '' : alarms === 0 ? words.noAlarms : S.alarmCount(alarms)}
+            {!hasArchive ? '' : alarms === 0 ? words.noAlarms : S.alarmCount(alarms)}
           </span>
         )}
         {!isKiosk && (
@@ -94,7 +94,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
               value={view}
               onChange={setView}
               text={(each) => (each === 'alarms' || each === 'report' ? S[each] : words[each])}
-              count={(each) => (each === 'alarms' && isHere ? alarms : null)}
+              count={(each) => (each === 'alarms' && hasArchive ? alarms : null)}
             />
             <input
               ref={field}
@@ -124,7 +124,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
               value={filter}
               onChange={setFilter}
               text={filterText}
-              count={(each) => (isHere ? counts[each] : null)}
+              count={(each) => (hasArchive ? counts[each] : null)}
             />
           </>
         )}
@@ -181,7 +181,7 @@ function Trouble({ seen }: { seen: Seen }): JSX.Element {
 }
 
 const STAYS_MS = 200;
-/** So long after its last word a greenhouse counts as silent, and the archive as down. */
+/** After this long without data, a greenhouse counts as silent, or the archive as down. */
 const LIVE_MS = 20_000;
 
 function Cards({
@@ -279,7 +279,7 @@ const SiteCard = memo(function SiteCard({ site, asOf }: Listed & { site: Site })
   );
 });
 
-/** Fetched once its card stays in sight: whoever scrolls past waits for none of them. */
+/** Fetched once its card stays in sight, not while scrolling past. */
 function SmallMap({ src }: { src: string }): JSX.Element {
   const place = useRef<HTMLSpanElement>(null);
   const [isShown, setShown] = useState(false);
@@ -306,7 +306,7 @@ function SmallMap({ src }: { src: string }): JSX.Element {
   );
 }
 
-/** What no robot observed, or not now; null: that is not known, or need not be said. */
+/** Says that data are simulated or recorded; null: not known, or from a robot. */
 function originText({ origin }: Site): string | null {
   return origin in S.origin ? S.origin[origin as keyof typeof S.origin] : null;
 }

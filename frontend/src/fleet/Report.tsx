@@ -1,4 +1,4 @@
-/** What happened at the greenhouses that are shown: a row for each, and what people said of them. */
+/** What happened at the shown greenhouses: a row for each, and people's notes. */
 import { useState, type JSX } from 'react';
 
 import { timeOfDay, timeZone } from '../clock';
@@ -80,7 +80,7 @@ export default function Report({ shown }: { shown: readonly Site[] }): JSX.Eleme
           </table>
           {notes.length > 0 && (
             <table className="fleet-table">
-              <caption className="fleet-note">{W.newestNotes}</caption>
+              <caption className="fleet-note">{W.latestNotes}</caption>
               <tbody>
                 {notes.map((note) => (
                   <NoteRow key={`${note.site} ${note.id}`} note={note} />
@@ -111,7 +111,7 @@ function NoteRow({ note }: { note: SiteNote }): JSX.Element {
   );
 }
 
-/** Its report to read, in the reader's language and time zone. */
+/** Address of its readable report, in the reader's language and time zone. */
 const pageOf = ({ report }: SiteReport): string => {
   const query = new URLSearchParams({ lang: LANGUAGE, time_zone: timeZone() });
   return `${report.replace('/api/report?', '/api/report.html?')}&${query.toString()}`;

@@ -13,7 +13,7 @@ class FakeSocket {
   }
 
   close(): void {
-    // It says nothing more.
+    // It sends nothing more.
   }
 }
 
@@ -24,19 +24,19 @@ afterEach(() => {
 test('a connection that is refused may be one of a session that has ended', () => {
   vi.useFakeTimers();
   vi.stubGlobal('WebSocket', FakeSocket);
-  const asked: string[] = [];
+  const requests: string[] = [];
   vi.stubGlobal('fetch', (url: URL) => {
-    asked.push(url.pathname);
+    requests.push(url.pathname);
     return Promise.resolve(new Response());
   });
   const stop = follow('ws://test/ws/sites', () => undefined);
   FakeSocket.last?.onopen?.();
   FakeSocket.last?.onclose?.({ code: 1006 });
-  expect(asked).toEqual([]);
-  // Tried again after a time that is random, and closed before it counts as silent.
+  expect(requests).toEqual([]);
+  // Reconnects after a random pause, and is closed before it counts as silent.
   const first = FakeSocket.last;
   while (FakeSocket.last === first) vi.advanceTimersByTime(100);
   FakeSocket.last?.onclose?.({ code: 1006 });
-  expect(asked).toEqual(['/readyz']);
+  expect(requests).toEqual(['/readyz']);
   stop();
 });

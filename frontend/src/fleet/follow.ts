@@ -1,29 +1,29 @@
-/** The overview as the server sends it: one socket, tried again whenever it ends. */
+/** The overview as the server sends it, over one socket that reconnects. */
 import { epochOf, now, onLapse } from '../clock';
 import { backoffMs } from '../connection/machine';
-import { signInIfAsked } from '../connection/socket';
+import { signInIfRequired } from '../connection/socket';
 import { parseSites, withFrame, type Archive, type Sites } from './sites';
 
 export interface Seen {
   readonly sites: Sites;
-  /** null: nothing has come yet. */
+  /** null: nothing received yet. */
   readonly archive: Archive | null;
-  /** Since when nothing comes any more, ms since the epoch; null: it does. */
+  /** When data stopped arriving, ms since the epoch; null: they arrive. */
   readonly lostAt: number | null;
 }
 
-/** The server sends something every five seconds at least. */
+/** The server sends something at least every five seconds. */
 const SILENT_MS = 12_000;
 
-/** Calls back with everything that is known, at each change; returns the way to stop. */
+/** Calls back with the full state on each change; returns a stop function. */
 export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
   let seen: Seen = { sites: new Map(), archive: null, lostAt: null };
   let socket: WebSocket | null = null;
   let failures = 0;
-  let heardAt = now();
+  let receivedAt = now();
   let timer: ReturnType<typeof setTimeout> | undefined;
 
-  const tell = (news: Partial<Seen>): void => {
+  const update = (news: Partial<Seen>): void => {
     seen = { ...seen, ...news };
     onSeen(seen);
   };
@@ -37,7 +37,7 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
   const lost = (code: number | null): void => {
     drop();
     failures += 1;
-    if (seen.lostAt === null) tell({ lostAt: epochOf(heardAt) });
+    if (seen.lostAt === null) update({ lostAt: epochOf(receivedAt) });
     timer = setTimeout(open, backoffMs(failures, Math.random(), code));
   };
   const wait = (): void => {
@@ -55,26 +55,26 @@ export function follow(url: string, onSeen: (seen: Seen) => void): () => void {
     };
     socket.onclose = ({ code }) => {
       lost(code);
-      // The server is away, or the session has ended.
-      if (!isOpened) void signInIfAsked();
+      // The server is unreachable, or the session has ended.
+      if (!isOpened) void signInIfRequired();
     };
     socket.onmessage = ({ data }) => {
       const frame = parseSites(data);
       if (!frame) return;
-      heardAt = now();
+      receivedAt = now();
       failures = 0;
       wait();
       const isEmpty = !frame.is_whole && frame.sites.length === 0 && frame.gone.length === 0;
       const isSame = isEmpty && frame.archive.is_reachable === seen.archive?.is_reachable;
       if (isSame && seen.lostAt === null) return;
-      tell({ sites: withFrame(seen.sites, frame), archive: frame.archive, lostAt: null });
+      update({ sites: withFrame(seen.sites, frame), archive: frame.archive, lostAt: null });
     };
     wait();
   };
   const again = (): void => {
     if (document.visibilityState === 'visible' && (seen.lostAt !== null || !socket)) open();
   };
-  // Whoever slept may have a socket that nobody answers.
+  // After sleep, the socket may be dead.
   const stopLapse = onLapse(() => {
     setTimeout(open);
   });

@@ -60,7 +60,7 @@ test('sites that share the part of their names before the first hyphen are a gro
   const known = groupNames(sites.values());
   expect(known).toEqual(['north', 'south']);
   const groups = grouped(chosen(sites, 'all', ''), known);
-  // The worst site decides, and whatever stands alone is together.
+  // The worst site decides, and sites without a group are together.
   expect(groups.map((group) => [group.name, group.sites.map(({ site: id }) => id)])).toEqual([
     ['north', ['north-2', 'north-1']],
     ['south', ['south-1-a', 'south-2']],

@@ -1,4 +1,4 @@
-/** What the server says of all sites, and in which order and choice it is shown. Pure. */
+/** The server's data on all sites, and their order, groups and filter on the page. Pure. */
 import { timeOfDay } from '../clock';
 import { isObject } from '../contract/check';
 import type { Verdict, WireTime } from '../contract/types';
@@ -13,14 +13,14 @@ export interface Site {
   readonly site: string;
   readonly name: string;
   readonly verdict: Verdict;
-  /** That of a silent site as it was known last; null: it is being worked out. */
+  /** The last known verdict of a silent site; null: being computed. */
   readonly last_verdict: Verdict | null;
   readonly active_alarms: number | null;
   readonly last_received: WireTime | null;
   readonly lag_s: number | null;
   readonly is_live: boolean;
   readonly origin: string;
-  /** Another one where its small map is another; null: it has none. */
+  /** Changes with its small map; null: it has none. */
   readonly map: string | null;
 }
 
@@ -40,11 +40,11 @@ export interface SitesFrame {
 
 const MOST_NAMED = 50;
 
-/** Sites for a query; empty: too many, so that all are asked for. Where the worst one moves, it stays. */
+/** Sites for a query, sorted so that a new worst site does not change it; empty: too many, so all. */
 export const namesOf = (sites: readonly Site[]): string =>
   sites.length > MOST_NAMED ? '' : String(sites.map(({ site }) => site).sort());
 
-/** The page of a site, as this one was asked for. */
+/** Address of a site's page, with this page's parameters. */
 export const siteLink = ({ site }: Pick<Site, 'site'>): string =>
   `sites/${encodeURIComponent(site)}/${window.location.search}`;
 
@@ -53,7 +53,7 @@ export type Sites = ReadonlyMap<string, Site>;
 export const FILTERS = ['all', 'critical', 'stressed', 'silent', 'healthy'] as const;
 export type Filter = (typeof FILTERS)[number];
 
-/** The worst first. Not those of `domain/health`, which the first view here does without. */
+/** The worst first. Not imported from `domain/health`, which the first view here does not need. */
 const VERDICTS: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'healthy'];
 
 function isSite(value: unknown): value is Site {
@@ -67,7 +67,7 @@ function isSite(value: unknown): value is Site {
   );
 }
 
-/** null: it is no frame of the contract. */
+/** null: no frame of the contract. */
 export function parseSites(data: unknown): SitesFrame | null {
   if (typeof data !== 'string') return null;
   let frame: unknown;
@@ -89,7 +89,7 @@ export function withFrame(before: Sites, frame: SitesFrame): Sites {
   return sites;
 }
 
-/** Which button it counts for; one that is live and not judged yet counts for none. */
+/** The filter button that counts it; a live site without a verdict counts for none. */
 function filterOf(site: Site): Filter {
   if (!site.is_live) return 'silent';
   return site.verdict === 'unknown' ? 'all' : site.verdict;
@@ -107,7 +107,7 @@ export function countsOf(sites: Iterable<Site>): Readonly<Record<Filter, number>
 
 const names = new Intl.Collator('en', { numeric: true, sensitivity: 'base' });
 
-/** By status, then the most alarms, then by name, as people count. */
+/** By status, then most alarms first, then by name, with numbers in order. */
 function worstFirst(a: Site, b: Site): number {
   return (
     VERDICTS.indexOf(a.verdict) - VERDICTS.indexOf(b.verdict) ||
@@ -119,10 +119,10 @@ function worstFirst(a: Site, b: Site): number {
 export const alarmCount = (sites: Iterable<Site>): number =>
   [...sites].reduce((sum, { active_alarms: count }) => sum + (count ?? 0), 0);
 
-/** What a site shares with others: its name up to the first "-"; none: it stands alone. */
+/** A site's group: its name up to the first "-"; without one it has none. */
 const prefixOf = ({ site }: Site): string => (site.includes('-') ? (site.split('-')[0] ?? '') : '');
 
-/** The groups that there are, by name; a single one would say nothing. */
+/** The groups, sorted by name; a single one is not offered. */
 export function groupNames(sites: Iterable<Site>): readonly string[] {
   const counts = new Map<string, number>();
   let all = 0;
@@ -137,7 +137,7 @@ export function groupNames(sites: Iterable<Site>): readonly string[] {
 
 export type Group = ReturnType<typeof grouped>[number];
 
-/** Sites in their groups, in the order in which the first of each comes; nameless: those of none. */
+/** Sites by group, in the order of each group's first site; the nameless group has the others. */
 export function grouped(shown: readonly Site[], known: readonly string[]) {
   const groups = groupedBy(shown, (site) => {
     const prefix = prefixOf(site);
@@ -146,7 +146,7 @@ export function grouped(shown: readonly Site[], known: readonly string[]) {
   return [...groups].map(([name, sites]) => ({ name, sites }));
 }
 
-/** The sites to show, the worst first; of one group, unless that is empty. */
+/** The sites to show, the worst first; of one group, unless `group` is empty. */
 export function chosen(sites: Sites, filter: Filter, search: string, group = ''): readonly Site[] {
   const wanted = search.trim().toLowerCase();
   return [...sites.values()]
@@ -163,13 +163,13 @@ const clockTime = new Intl.DateTimeFormat(LOCALE, { timeStyle: 'medium' });
 const dateAndTime = new Intl.DateTimeFormat(LOCALE, { dateStyle: 'medium', timeStyle: 'short' });
 const DAY_MS = 86_400_000;
 
-/** Of today the time of day is enough. */
+/** Today only the time of day is shown. */
 export function timeText(at: number): string {
   return (Math.abs(timeOfDay() - at) < DAY_MS / 2 ? clockTime : dateAndTime).format(at);
 }
 
 export const ms = ({ sec, nanosec }: WireTime): number => sec * 1000 + nanosec / 1e6;
 
-/** When that was, so many seconds ago, to the second. */
+/** The time that many seconds ago, to the second. */
 export const silentAt = (lagS: number): number =>
   Math.round((timeOfDay() - lagS * 1000) / 1000) * 1000;

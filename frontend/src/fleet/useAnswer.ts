@@ -1,4 +1,4 @@
-/** An answer of the server that is kept up to date while the page is looked at. */
+/** A server's answer, kept up to date while the page is visible. */
 import { useMemo } from 'react';
 
 import type { Speech } from '../alarms/words';
@@ -10,10 +10,10 @@ import { type Fetched, useFetched } from '../store/fetcher';
 import { openStorage, readSettings } from '../store/settings';
 import { useTicking } from '../widgets/useNow';
 
-/** What is asked for changes faster than anybody reads. */
+/** Pace, ms: the path may change faster than a reader can follow. */
 const SETTLE_MS = 300;
 
-/** Asks at once, when `path` or `news` is another, and every so many ms; the last answer stays. */
+/** Fetches at once, when `path` or `news` changes, and at an interval, ms; the last answer stays. */
 export function useAnswer<T>(path: string, everyMs: number, news = ''): Fetched<T> {
   const turn = useTicking((at) =>
     document.visibilityState === 'visible' ? String(Math.floor(at / everyMs)) : null,
@@ -35,7 +35,7 @@ export function useAnswer<T>(path: string, everyMs: number, news = ''): Fetched<
 
 const EVERY_MS = 600_000;
 
-/** What readings are named and written with: the sensors in force, and the reader's unit. */
+/** Names and formats of readings: the sensors in force, and the reader's unit. */
 export function useSpeech(): Speech {
   const file = useAnswer<SensorsFile>('api/sensors', EVERY_MS).value;
   return useMemo(

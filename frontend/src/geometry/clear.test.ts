@@ -111,7 +111,7 @@ describe('labels', () => {
     const buttons = { left: -100, top: -100, right: -20, bottom: 100 };
     const [between] = placeLabels([request({})], HEIGHT, { within, covered: [buttons] });
     expect(between).toMatchObject({ text: 'a', x: 12 });
-    // Out of sight anyway: it comes in with the pan.
+    // Out of sight anyway, until the map is panned.
     const [beyond] = placeLabels([request({ x: 50 })], HEIGHT, { within, covered: [] });
     expect(beyond).toMatchObject({ text: 'a · 21.5 °C', x: 62 });
   });

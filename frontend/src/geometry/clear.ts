@@ -1,4 +1,4 @@
-/** Keeps pins clear of what stands on the map, and labels clear of each other. Pure. */
+/** Keeps pins clear of elements over the map, and labels clear of each other. Pure. */
 import {
   type Bounds,
   type Box,
@@ -26,8 +26,8 @@ export function isClear(view: View, point: MapPoint, covered: readonly Box[]): b
 }
 
 /**
- * The view that shows all of `bounds` and has no pin below a covered box: where one would be, the
- * largest of the views that leave a side free for each box.
+ * The view that shows all of `bounds` with no pin below a covered box: otherwise the largest of the
+ * views that leave a side free for each box.
  */
 export function fitClear(
   bounds: Bounds,
@@ -55,7 +55,7 @@ export function fitClear(
   return views.find(clear) ?? plain;
 }
 
-/** The sides that a box leaves a third of the view to at least, and how deep it is from there. */
+/** The sides at which a box leaves at least a third of the view free, and its depth from there. */
 function waysAround(box: Box, { width, height }: Size): (readonly [keyof Box, number])[] {
   const ways: (readonly [keyof Box, number, number])[] = [
     ['top', box.bottom + REACH_PX, height],
@@ -69,9 +69,9 @@ function waysAround(box: Box, { width, height }: Size): (readonly [keyof Box, nu
 }
 
 /**
- * Placing labels so that they do not pile up: each tries its longest text and its places in
- * turn, and is left out when nothing is free. Important ones come first. Works in pixels
- * relative to the map's origin, so a pan reuses the result.
+ * Places labels without overlap: each tries its texts, longest first, at its places, and is left out if
+ * none is free. Important labels come first. Works in pixels relative to the map's origin, so a pan
+ * reuses the result.
  */
 
 export interface LabelRequest {
@@ -82,7 +82,7 @@ export interface LabelRequest {
   /** Half of the pin's size, pixels. */
   readonly radius: number;
   readonly priority: number;
-  /** Texts from the most to the least telling, each with its width in pixels. */
+  /** Texts, the most detailed first, each with its width in pixels. */
   readonly texts: readonly { readonly text: string; readonly width: number }[];
 }
 
@@ -91,13 +91,13 @@ export type PlacedLabel = ReturnType<typeof placeLabels>[number];
 
 /** Where labels may be seen: boxes in pixels relative to the map's origin. */
 export interface Room {
-  /** What is in sight; a label of a pin in there is not cut off. */
+  /** The visible part; labels of pins inside it are not cut off. */
   readonly within: Box;
   readonly covered: readonly Box[];
 }
 
 const GAP = 4;
-/** Priority of the least that needs somebody. */
+/** Lowest priority of a warning. */
 const URGENT = 3;
 const BUCKET = 64;
 
@@ -119,13 +119,13 @@ export function placeLabels(
     .sort((a, b) => b.request.priority - a.request.priority || a.index - b.index);
 
   return ordered.flatMap(({ request, pin }) => {
-    // Among pins that overlap only those that need somebody: of more labels none would be read.
+    // Among overlapping pins only warnings get labels: more would be unreadable.
     if (request.priority < URGENT && !taken.isFree(pin, pin)) return [];
     const spot = firstFree(request, height, taken, room?.within ?? null);
     if (!spot) return [];
     const { text, box, width } = spot;
     taken.add(box);
-    // Its width is not right less left, which is off by float noise and so by a pixel.
+    // The width is not right minus left: float noise would make it a pixel off.
     return [{ id: request.id, text, x: box.left, y: box.top, width }];
   });
 }
@@ -159,7 +159,7 @@ const contains = (outer: Box, inner: Box): boolean =>
   inner.right <= outer.right &&
   inner.bottom <= outer.bottom;
 
-/** Boxes by the squares they touch, so that a thousand labels do not cost a million checks. */
+/** Boxes by the squares they touch, so that a thousand labels do not need a million checks. */
 class Buckets {
   readonly #boxes = new Map<number, Box[]>();
 
@@ -171,7 +171,7 @@ class Buckets {
     }
   }
 
-  /** `own`: a box in there that does not count. */
+  /** `own`: a box that is ignored. */
   isFree(box: Box, own: Box | null = null): boolean {
     for (const key of keys(box)) {
       for (const other of this.#boxes.get(key) ?? []) {
@@ -188,7 +188,7 @@ class Buckets {
   }
 }
 
-/** Squares on one side of the map's origin, and so half of those in a row. */
+/** Squares on one side of the map's origin: half a row. */
 const HALF = 2 ** 25;
 
 function* keys(box: Box): Generator<number> {
@@ -199,7 +199,7 @@ function* keys(box: Box): Generator<number> {
   }
 }
 
-/** Between a pin and what stands beside it, and to the edge of the map, pixels. */
+/** Distance between a pin and a box beside it, and to the map's edge, pixels. */
 const GAP_PX = 10;
 const EDGE_PX = 6;
 
@@ -207,8 +207,8 @@ const clamp = (value: number, most: number): number =>
   Math.max(EDGE_PX, Math.min(value, most - EDGE_PX));
 
 /**
- * Upper left corner of a box beside a pin of half size `reach`: to its right if there is room,
- * else to its left, below or above; always within the view, as far as the view is large enough.
+ * Upper left corner of a box beside a pin of half size `reach`: to its right if there is room, else
+ * left, below or above; always within the view, if it is large enough.
  */
 export function beside(pin: CanvasPoint, reach: number, box: Size, within: Size): CanvasPoint {
   const away = reach + GAP_PX;

@@ -2,8 +2,7 @@
  * Two frames and the one pair of conversions between them.
  *
  * `MapPoint`: metres in the map frame, x right, y up. `CanvasPoint`: CSS pixels in the map view,
- * x right, y down. The branding makes a mix-up a compile error; the flip of y happens here and
- * nowhere else.
+ * x right, y down. The branding makes a mix-up a compile error; y is flipped only here.
  */
 export type MapPoint = Readonly<{ x: number; y: number }> & { readonly __frame: 'map' };
 export type CanvasPoint = Readonly<{ x: number; y: number }> & { readonly __frame: 'canvas' };
@@ -12,7 +11,7 @@ export const mapPoint = (x: number, y: number): MapPoint => ({ x, y }) as MapPoi
 export const canvasPoint = (x: number, y: number): CanvasPoint => ({ x, y }) as CanvasPoint;
 
 /**
- * Where the map is on the canvas: the map's origin lies at (x, y) pixels, one metre is `scale`
+ * Place of the map on the canvas: the map's origin is at (x, y) pixels, one metre is `scale`
  * pixels. The same numbers as a d3-zoom transform over the coordinates (x, -y) in metres.
  */
 export interface View {
@@ -34,7 +33,7 @@ export interface Bounds {
   readonly maxY: number;
 }
 
-/** The four sides of an upright box in pixels, or what is left free at each. */
+/** The four sides of an upright box in pixels, or the insets at each. */
 export type Box = Readonly<Record<'left' | 'top' | 'right' | 'bottom', number>>;
 
 export function toCanvas(view: View, point: MapPoint): CanvasPoint {
@@ -45,7 +44,7 @@ export function toMap(view: View, point: CanvasPoint): MapPoint {
   return mapPoint((point.x - view.x) / view.scale, (view.y - point.y) / view.scale);
 }
 
-/** The item closest to a canvas point within `reach` pixels, of equals the last; null: none. */
+/** The item closest to a canvas point within `reach` pixels; the last of equals; null: none. */
 export function nearest<T extends { readonly at: MapPoint }>(
   items: readonly T[],
   view: View,
@@ -78,7 +77,7 @@ export function boundsOf(points: Iterable<MapPoint>): Bounds | null {
   return minX <= maxX ? { minX, minY, maxX, maxY } : null;
 }
 
-/** Wider by so much on each side. */
+/** Widened by this much on each side. */
 export const widened = ({ minX, minY, maxX, maxY }: Bounds, by: number): Bounds => ({
   ...{ minX: minX - by, minY: minY - by, maxX: maxX + by, maxY: maxY + by },
 });
@@ -92,7 +91,7 @@ export function corners(bounds: Bounds): MapPoint[] {
   ];
 }
 
-/** As far out as a hand zooms before it is known what there is: then to half of its fit. */
+/** Least scale until the content is known; then half of its fit. */
 export const MIN_SCALE = 4;
 export const MAX_SCALE = 2000;
 /** A single tag has a box of no size; a fit shows at least this much around it, in metres. */
@@ -135,21 +134,21 @@ export function viewOf(camera: Camera, size: Size, leastScale = MIN_SCALE): View
   };
 }
 
-/** What of the bounds stays in sight, pixels along each side. */
-const KEPT_PX = 40;
+/** How much of the bounds stays visible, pixels along each side. */
+const VISIBLE_PX = 40;
 
-/** The view, moved back so far that some of the bounds is to be seen. */
+/** The view, moved back so that part of the bounds is visible. */
 export function inSight({ x, y, scale }: View, size: Size, bounds: Bounds): View {
   const clamp = (value: number, low: number, high: number): number =>
     Math.max(low, Math.min(high, value));
   return {
     scale,
-    x: clamp(x, KEPT_PX - bounds.maxX * scale, size.width - KEPT_PX - bounds.minX * scale),
-    y: clamp(y, KEPT_PX + bounds.minY * scale, size.height - KEPT_PX + bounds.maxY * scale),
+    x: clamp(x, VISIBLE_PX - bounds.maxX * scale, size.width - VISIBLE_PX - bounds.minX * scale),
+    y: clamp(y, VISIBLE_PX + bounds.minY * scale, size.height - VISIBLE_PX + bounds.maxY * scale),
   };
 }
 
-/** Largest of 1, 2, 5 times a power of ten that is not above `value`. */
+/** The largest 1, 2 or 5 times a power of ten that is not above `value`. */
 export function niceFloor(value: number): number {
   const power = 10 ** Math.floor(Math.log10(value));
   const digit = value / power;

@@ -1,14 +1,14 @@
 import type { OccupancyGrid } from '../contract/types';
 import { type Box, mapPoint, type MapPoint, type View } from './coordinates';
 
-/** Where an upright or turned picture lies in the map: its lower left corner, size and yaw. */
+/** Place of an upright or rotated picture in the map: its lower left corner, size and yaw. */
 export interface Placement {
   /** Lower left corner of the grid's cell (0, 0), metres in the map frame. */
   readonly originX: number;
   readonly originY: number;
-  /** Turn about that corner, radians, counter-clockwise. */
+  /** Rotation about that corner, radians, counter-clockwise. */
   readonly yaw: number;
-  /** Metres a pixel. */
+  /** Metres per pixel. */
   readonly resolution: number;
   /** Pixels. */
   readonly width: number;
@@ -18,11 +18,11 @@ export interface Placement {
 export interface MapPicture {
   readonly placement: Placement;
   readonly pixels: ImageData;
-  /** Corners of the box around what is known of the map; empty while nothing is. */
+  /** Corners of the box around the known part of the map; empty if nothing is known. */
   readonly known: readonly MapPoint[];
 }
 
-/** Yaw of a rotation about z; a quaternion of zeros counts as no turn. */
+/** Yaw of a rotation about z; a quaternion of zeros counts as no rotation. */
 export function yawOf(of: Readonly<Record<'x' | 'y' | 'z' | 'w', number | null>>): number {
   const [x, y, z, w] = [of.x ?? 0, of.y ?? 0, of.z ?? 0, of.w ?? 0];
   return Math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z);
@@ -41,9 +41,9 @@ export function mapPlacement(grid: OccupancyGrid): Placement {
 }
 
 /**
- * Takes a picture's pixels (column, row from the top) to canvas pixels. The picture's top row is
+ * Converts a picture's pixels (column, row from the top) to canvas pixels. The picture's top row is
  * the grid's last row: pixel (column, row) lies at ((column), (height - row)) * resolution in
- * the grid, which is then turned by yaw and moved to the origin.
+ * the grid, which is then rotated by yaw and moved to the origin.
  */
 export function imageToCanvas(placement: Placement, view: View) {
   const { originX, originY, yaw, resolution, height } = placement;

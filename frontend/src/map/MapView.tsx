@@ -10,7 +10,7 @@ export function MapView({ kiosk }: { kiosk: boolean }): JSX.Element {
   const pins = useRef<HTMLCanvasElement>(null);
   const overlay = useRef<HTMLCanvasElement>(null);
   const [failure, setFailure] = useState<{ readonly error: unknown } | null>(null);
-  // The page fails with its map: one that stands still beside a "Live" would be believed.
+  // If the map fails, the page fails: a frozen map beside "Live" would be believed.
   if (failure) throw failure.error;
   useEffect(() => {
     if (!element.current || !still.current || !pins.current || !overlay.current) return undefined;
@@ -26,7 +26,7 @@ export function MapView({ kiosk }: { kiosk: boolean }): JSX.Element {
       className="map-view"
       id="map-view"
       data-testid="map"
-      // An application: the arrow keys are the map's own while it has the focus.
+      // An application: with focus, the map uses the arrow keys itself.
       role={kiosk ? 'img' : 'application'}
       aria-label={kiosk ? S.mapPicture : S.mapLabel}
       tabIndex={kiosk ? undefined : 0}

@@ -162,7 +162,7 @@ describe('camera', () => {
 
   const mouse = (target: EventTarget, type: string, x: number): void => {
     const event = new MouseEvent(type, { clientX: x, clientY: 0, bubbles: true });
-    // Which the constructor does not take: in a test, `window` is a stand-in for jsdom's own.
+    // The constructor does not accept it: in a test, `window` is not jsdom's own.
     Object.defineProperty(event, 'view', { value: window });
     target.dispatchEvent(event);
   };
@@ -186,7 +186,7 @@ describe('camera', () => {
     const zoomed = viewport().view;
     expect(zoomed.scale).toBeGreaterThan(scale);
     mouse(element, 'mousedown', 100);
-    // The wheel's gesture ends by a pause, inside that of the hand.
+    // The wheel's gesture ends after a pause, during the drag.
     vi.runAllTimers();
     expect(onCamera).toHaveBeenCalledTimes(1);
     mouse(window, 'mousemove', 140);

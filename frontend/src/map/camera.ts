@@ -1,4 +1,4 @@
-/** Where the map is looked at from: the programmed moves. What a hand does is in `gestures.ts`. */
+/** The map's camera and its programmed moves; gestures are in `gestures.ts`. */
 import type { Field } from '../contract/types';
 import { fieldCorners } from '../domain/field';
 import { memoOne } from '../domain/memo';
@@ -25,7 +25,7 @@ import { createStore } from '../store/create';
 import type { House } from '../store/twin';
 
 export interface Hand {
-  /** The map was moved by something else; the hand goes on from there. */
+  /** The program moved the map; gestures continue from there. */
   readonly follow: (view: View) => void;
   readonly stop: () => void;
 }
@@ -39,16 +39,16 @@ export interface Held {
 
 type Gestures = (element: HTMLElement, held: Held) => Hand;
 
-/** Null until they are loaded, right behind the first view: the map is painted without. */
+/** Null until loaded, right after the first view, which does not need them. */
 export const gestures = createStore<Gestures | null>(null);
 
-/** A view that was told as a camera and comes back differs in its last digits, and moves nothing. */
+/** A view converted to a camera and back differs in its last digits, and must not move the map. */
 const isSame = (a: View, b: View): boolean =>
   Math.abs(a.x - b.x) < 1e-3 &&
   Math.abs(a.y - b.y) < 1e-3 &&
   Math.abs(a.scale / b.scale - 1) < 1e-9;
 
-/** Space around what is fitted: less on a phone, also on its side, where each pixel counts. */
+/** Insets of a fit: less on a phone, in both orientations, as each pixel counts. */
 function fitInsets({ width, height }: Size): Box {
   return width < 560 || height < 280
     ? { top: 26, right: 60, bottom: 40, left: 26 }
@@ -57,17 +57,17 @@ function fitInsets({ width, height }: Size): Box {
 
 const viewport = () => store.get().viewport;
 
-/** Fits, follows links and moves as told; where that leads is kept in the store. */
+/** Fits the view, follows links, and executes moves; the store has the result. */
 export class MapCamera {
   #hand: Hand | null = null;
   readonly #stop: () => void;
-  /** The view that the gestures under way began with. */
+  /** The view at the start of the current gestures. */
   #held: View | null = null;
-  /** What no move leads away from; null: not known yet. */
+  /** What moves must keep in sight; null: not known yet. */
   #content: Content | null = null;
   #leastScale = MIN_SCALE;
 
-  /** `isFixed`: the program alone moves it; no wheel, finger or mouse does. */
+  /** `isFixed`: only the program moves it, not wheel, finger or mouse. */
   constructor(element: HTMLElement, isFixed = false) {
     const take = (): void => {
       const start = gestures.get();
@@ -76,11 +76,11 @@ export class MapCamera {
         leastScale: () => this.#leastScale,
         inSight: (view) => this.#inSight(view),
         onStart: () => {
-          // Not anew by a hand that grabs the map before the gesture of the wheel has ended.
+          // Unchanged if a drag begins before the wheel's gesture has ended.
           this.#held ??= viewport().view;
         },
         onEnd: () => {
-          // A click is a gesture too, and moves nothing.
+          // A click is a gesture too, but moves nothing.
           const hasMoved = this.#held !== viewport().view;
           this.#held = null;
           if (hasMoved) this.#choose();
@@ -92,9 +92,8 @@ export class MapCamera {
   }
 
   /**
-   * Shows a camera, or everything there is, with no pin below what is `covered`: nobody's choice.
-   * While the operator has hold of the map it stays with the operator, whatever else
-   * arrives.
+   * Shows a camera, or all content with no pin below a `covered` box; not a choice of the operator.
+   * While the operator moves the map, it has no effect.
    */
   goTo(camera: Camera | null, content: Content | null, covered: readonly Box[] = []): void {
     if (this.#held !== null) return;
@@ -132,7 +131,7 @@ export class MapCamera {
     if (this.#held === null) this.#choose();
   }
 
-  /** Whether the operator has hold of the map, or the wheel has not yet come to rest. */
+  /** Whether the operator is moving the map, or the wheel has not come to rest yet. */
   get isHeld(): boolean {
     return this.#held !== null;
   }
@@ -150,7 +149,7 @@ export class MapCamera {
     this.#step({ ...view, x: view.x - x * size.width, y: view.y - y * size.height });
   }
 
-  /** Brings a point into view; one that is well inside the free part stays where it is. */
+  /** Brings a point into view; if it is well inside the free part, the view stays. */
   show(point: MapPoint, covered: readonly Box[] = []): void {
     const { view, size } = viewport();
     const { x, y } = toCanvas(view, point);
@@ -175,7 +174,7 @@ export interface Content {
 
 const NO_TAGS: readonly Tag[] = [];
 
-/** A planter that was seen by a robot that is lost does not make the map wider. */
+/** Without planters that are far off: a lost robot's observations must not widen the map. */
 const places = memoOne((tags: readonly Tag[]) => {
   const reach = reachOfTags(tags);
   const pins = tags.flatMap((tag) => (tag.at ? [tag.at] : []));
@@ -185,14 +184,14 @@ const places = memoOne((tags: readonly Tag[]) => {
 });
 
 /**
- * What a fit shows: everything pinned or planted, and the known part of the floor plan. Where there
- * is no plan, the heat map, whose grid is the same for every sensor, so that a switch moves nothing;
- * while the next one is on its way, the last one's stands in for it.
+ * The content of a fit: pins, planters and the known part of the floor plan. Without a plan, the heat
+ * map: its grid is the same for every sensor, so that a switch moves nothing. While the next one is
+ * being fetched, the last one is used.
  */
 export function contentOf({ snapshot, map }: House, field: Field | null): Content | null {
   const { pins, corners: planted } = places(snapshot?.tags ?? NO_TAGS);
   const known = (map.value?.known ?? []).filter(isPossible);
-  // A field whose tags are gone is one of a twin before this one.
+  // A field without tags belongs to a previous twin.
   const hasField = field && planted.length > 0 && known.length === 0;
   const bounds = boundsOf([...planted, ...(hasField ? fieldCorners(field) : []), ...known]);
   return bounds && { bounds, pins };
@@ -204,7 +203,7 @@ export function together(a: Content | null, b: Content | null): Content | null {
   return bounds && { bounds, pins: [...a.pins, ...b.pins] };
 }
 
-/** What in the page stands on the map and hides a pin: buttons, scale bar, notices. */
+/** Elements over the map that hide pins: buttons, scale bar, notices. */
 const OVER_MAP = '[data-over-map]';
 
 export function coveredBoxes(element: HTMLElement): Box[] {
@@ -217,7 +216,7 @@ export function coveredBoxes(element: HTMLElement): Box[] {
   });
 }
 
-/** Calls back when something that stands on the map may have changed its size; returns the end. */
+/** Calls back when an element over the map may have changed its size; returns a stop function. */
 export function watchCovered(element: HTMLElement, onChange: () => void): () => void {
   const observer = new ResizeObserver(onChange);
   for (const each of element.parentElement?.querySelectorAll('.map-controls, .map-foot') ?? []) {

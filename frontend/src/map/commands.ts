@@ -1,18 +1,18 @@
 import type { CanvasPoint, MapPoint, Size } from '../geometry/coordinates';
 import { createStore } from '../store/create';
 
-/** What can be done to the map from elsewhere in the page. */
+/** Actions on the map for the rest of the page. */
 export interface MapActions {
   readonly fit: () => void;
   readonly zoomBy: (factor: number) => void;
   /** By a share of the view's size; x to the right, y down. */
   readonly panBy: (x: number, y: number) => void;
   readonly show: (tagId: string) => void;
-  /** Shows the layers as on paper, without what moves or follows the pointer, while `draw` runs. */
+  /** Shows the layers as on paper while `draw` runs: without animation and pointer marks. */
   readonly take: (draw: () => void) => void;
 }
 
-/** Null: no map is in the page. */
+/** Null: the page shows no map. */
 export const theMap = createStore<MapActions | null>(null);
 
 const ARROWS: Readonly<Record<string, readonly [x: number, y: number]>> = {
@@ -23,7 +23,7 @@ const ARROWS: Readonly<Record<string, readonly [x: number, y: number]>> = {
 };
 const ZOOMS: Readonly<Record<string, number>> = { '+': 1.25, '=': 1.25, '-': 0.8 };
 
-/** What a key does to the map; null: nothing. */
+/** The action of a key on the map; null: none. */
 export function keyAction({ key, shiftKey }: KeyboardEvent): ((map: MapActions) => void) | null {
   const [arrow, factor] = [ARROWS[key], ZOOMS[key]];
   if (arrow) {
@@ -44,8 +44,8 @@ export function keyAction({ key, shiftKey }: KeyboardEvent): ((map: MapActions) 
 }
 
 /**
- * Where the operator points at in the map: the mouse, or the crosshair of the keyboard. Apart
- * from the page's state, because it moves sixty times a second and only the read-out follows.
+ * The operator's position on the map: the mouse, or the keyboard's crosshair. Not in the page's state,
+ * as it moves sixty times a second and only the read-out uses it.
  */
 export const pointedAt = createStore<MapPoint | null>(null);
 

@@ -40,7 +40,7 @@ const start = (isFixed = false): void => {
   stop = runMap(element, { still, pins, overlay }, isFixed, fail);
   paint();
 };
-/** Runs what waits for the next frame. */
+/** Runs the callbacks of the next frame. */
 const paint = (): void => {
   for (const frame of frames.splice(0)) frame(performance.now());
 };
@@ -74,15 +74,15 @@ beforeEach(() => {
   vi.stubGlobal(
     'ResizeObserver',
     class {
-      readonly #tell: ResizeObserverCallback;
-      constructor(tell: ResizeObserverCallback) {
-        this.#tell = tell;
+      readonly #callback: ResizeObserverCallback;
+      constructor(callback: ResizeObserverCallback) {
+        this.#callback = callback;
       }
       observe(): void {
-        this.#tell([{ contentRect: SIZE }] as never, this as never);
+        this.#callback([{ contentRect: SIZE }] as never, this as never);
       }
       disconnect(): void {
-        // Told once, and never again.
+        // Called only once.
       }
     },
   );
@@ -112,7 +112,7 @@ const observeAgain = (): void => {
 };
 
 describe('pulses', () => {
-  // They last a moment, which a busy machine may spend elsewhere.
+  // They are so short that a busy machine may miss them.
   beforeEach(() => {
     vi.useFakeTimers({ toFake: ['performance'] });
   });
@@ -188,7 +188,7 @@ describe('mouse and finger', () => {
     expect(store.get().view.hovered).toBe('b');
     const shown = pinUnderMouse.get();
     expect(shown).toMatchObject({ tagId: 'b', at: canvasPoint(x, y) });
-    // Whoever moves about on a pin draws nothing anew.
+    // Moving within a pin redraws nothing.
     pointer('pointermove', x + 4, y - 2);
     expect(pinUnderMouse.get()).toBe(shown);
     pointer('pointerleave', 0, 0);
@@ -296,7 +296,7 @@ test('everything is in sight, the heat map too', () => {
   for (const [x, y] of [place(-2, -4), place(4, 1)]) {
     expect(x >= 0 && x <= SIZE.width && y >= 0 && y <= SIZE.height).toBe(true);
   }
-  // Another sensor's heat map, which has the same grid, is on its way.
+  // Another sensor's heat map, on the same grid, is being fetched.
   const before = view();
   receive(withField(NOTHING));
   observeAgain();
@@ -317,7 +317,7 @@ test('a font that comes late is drawn with', () => {
   document.fonts.dispatchEvent(new Event('loadingdone'));
   paint();
   expect(labels?.calls.length).toBeGreaterThan(before ?? NaN);
-  // The labels' pictures are painted anew, not copied.
+  // The labels' sprites are repainted, not copied.
   expect(made).toHaveBeenCalledWith('canvas');
 });
 

@@ -1,4 +1,4 @@
-/** Ties the map's canvases to the store: draws what changed, once a frame, and nothing else. */
+/** Connects the map's canvases to the store: redraws only what changed, once per frame. */
 import { now } from '../clock';
 import { pinRadius, type Pulse, PULSE_MS } from '../draw/pins';
 import type { Pin } from '../draw/scene';
@@ -21,24 +21,24 @@ import {
   selectRange,
   selectSensor,
 } from '../store/derived';
-import { selectNewest, selectShown, selectTag, type Shown } from '../store/moment';
+import { selectLatest, selectShown, selectTag, type Shown } from '../store/moment';
 import { isPrinting, onThemeChange } from '../store/theme';
 import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
 import { keyAction, type MapActions, pinUnderMouse, pointedAt, theMap } from './commands';
 import { Painter, type Canvases } from './painter';
 
-/** A finger hits a pin from this far, a mouse from a bit less; CSS pixels. */
+/** A finger hits a pin within this distance, a mouse within a bit less; CSS pixels. */
 const TOUCH_REACH = 26;
 const MOUSE_REACH = 16;
 /** Usual size of the page's text, px (`font` of the body in `styles/base.css`). */
 const TEXT_PX = 14;
 
-/** What is to be drawn anew; "view": nothing but the place and the scale changed. */
+/** What to redraw; "view": only position and scale changed. */
 type Part = 'still' | 'pins' | 'overlay' | 'view';
 
 /**
- * `isFixed`: a wall screen, where nobody who brushes past chooses a tag or moves the map.
- * `onFailure` is told of what went wrong while drawing: the map then no longer shows what is.
+ * `isFixed`: a wall screen, where an accidental touch must not choose a tag or move the map.
+ * `onFailure` receives an error while drawing: the map is then out of date.
  */
 export function runMap(
   element: HTMLElement,
@@ -60,7 +60,7 @@ export function runMap(
   let pulses: readonly Pulse[] = [];
   let crosshair = false;
   let isTaken = false;
-  /** What of the map the page stands on. */
+  /** The parts of the map below other elements. */
   let covered: readonly Box[] = [];
   let drawn = store.get();
   let lastField = selectShown(drawn).field.value;
@@ -72,7 +72,7 @@ export function runMap(
     if (crosshair) pointedAt.set(centre());
   };
 
-  // A map that comes back into the page may never have to move.
+  // A map that returns to the page may not move, and then would not publish.
   publish(store.get().viewport.view);
 
   const spoil = (...parts: Part[]): void => {
@@ -81,7 +81,7 @@ export function runMap(
   };
 
   const paint = guarded(() => {
-    // It may be asked for before the frame that it was to have.
+    // It may be called before its scheduled frame.
     cancelAnimationFrame(frame);
     frame = 0;
     const live = store.get();
@@ -123,7 +123,7 @@ export function runMap(
     const last = selectShown(before);
     lastField = house.field.value ?? lastField;
     const changedTags = house.snapshot?.tags !== last.snapshot?.tags;
-    // What was news at another moment is none.
+    // Changing the moment makes no news.
     const isNews = house.moment === null && last.moment === null;
     if (changedTags && house.snapshot && isNews && !calm.matches) {
       pulses = [...pulses, ...newPulses(house)];
@@ -140,7 +140,7 @@ export function runMap(
       (changedTags && house.snapshot?.revision !== last.snapshot?.revision);
     if (state.viewport.view !== before.viewport.view) {
       publish(state.viewport.view);
-      // The pin has moved away from under the mouse.
+      // The pin has moved away from the mouse.
       pinUnderMouse.set(null);
       spoil('view');
     }
@@ -154,14 +154,14 @@ export function runMap(
       selectListed(state) !== selectListed(before)
     )
       spoil('pins', 'overlay');
-    // A mark follows the mouse, and nothing below it is drawn anew.
+    // Only the mark follows the mouse; the layers below stay.
     if (view.hovered !== before.view.hovered) spoil('overlay');
     if (view.selected !== before.view.selected) spoil('pins', 'overlay');
-    // Labels find their places anew.
+    // Labels are placed again.
     if (view.camera !== before.view.camera) spoil('pins');
     const { selected } = view;
     if (selected !== null && selected !== before.view.selected) {
-      // Once the card is there, which covers part of the map on a phone.
+      // After the card is laid out, which covers part of the map on a phone.
       requestAnimationFrame(() => {
         show(selected);
       });
@@ -170,12 +170,12 @@ export function runMap(
     if (view.camera !== before.view.camera || !sameContent) goToContent();
   };
 
-  /** Of the moment that is shown and of now: whoever drags through time keeps the same view. */
+  /** Of the shown moment and of now, so that dragging through time keeps the view. */
   const content = (state: AppState): Content | null => {
     const shown = contentOf(selectShown(state), lastField);
     return selectShown(state).moment === null
       ? shown
-      : together(contentOf(selectNewest(state), null), shown);
+      : together(contentOf(selectLatest(state), null), shown);
   };
 
   const goToContent = (): void => {
@@ -232,7 +232,7 @@ export function runMap(
     pointedAt.set(on ? centre() : null);
     spoil('overlay');
   };
-  /** From now on the keyboard is at work: the read-out is the crosshair's. */
+  /** Switches to the keyboard: the read-out follows the crosshair. */
   const aim = (): void => {
     if (!crosshair) setCrosshair(true);
   };
@@ -284,7 +284,7 @@ export function runMap(
   };
   theMap.set(actions);
 
-  /** Also before the map has a size. */
+  /** True also while the map has no size. */
   const isChosenSeen = (): boolean => {
     const state = store.get();
     const { view, size } = state.viewport;
@@ -300,16 +300,16 @@ export function runMap(
     const wasSeen = isChosenSeen();
     moveViewport({ size: { width, height } });
     if (width === 0 || height === 0) return;
-    // Its labels grow with the page's text: on a wall screen, and as the browser is set.
+    // Labels grow with the page's text: on a wall screen, and by the browser's setting.
     const textScale = parseFloat(getComputedStyle(element).fontSize) / TEXT_PX || 1;
     painter.resize({ width, height }, window.devicePixelRatio, textScale);
     covered = coveredBoxes(element);
     goToContent();
-    // A card that opens takes room from the map.
+    // An opening card takes room from the map.
     const { selected } = store.get().view;
     if (selected !== null && wasSeen) show(selected);
     spoil('still', 'pins', 'overlay');
-    // At once: a canvas of another size is empty, and would be seen so until the next frame.
+    // At once: resizing empties a canvas, which would show until the next frame.
     paint();
   });
   resize.observe(element);
@@ -324,11 +324,11 @@ export function runMap(
   const gone = new AbortController();
   const { signal } = gone;
 
-  // Pins fade while nothing arrives: look again now and then.
+  // Pins fade even if nothing arrives, so redraw them regularly.
   const fading = setInterval(() => {
     if (painter.hasFaded(store.get(), now())) spoil('pins');
   }, 5_000);
-  // Not `fonts.ready`: that is so while nothing is asked for, and the font comes after it.
+  // Not `fonts.ready`: it resolves before the font is even requested.
   document.fonts.addEventListener(
     'loadingdone',
     () => {
@@ -343,7 +343,7 @@ export function runMap(
     onThemeChange(() => {
       painter.recolour();
       spoil('still', 'pins', 'overlay');
-      // Not with the next frame: a page on its way to the printer gets none.
+      // Not in the next frame: a page being printed gets none.
       cancelAnimationFrame(frame);
       if (store.get().viewport.size.width > 0) paint();
     }),

@@ -1,4 +1,4 @@
-/** Wheel, pinch and drag on the map, by d3-zoom, which keeps a copy of the view on the element. */
+/** Wheel, pinch and drag on the map, by d3-zoom, which stores a copy of the view on the element. */
 import { select } from 'd3-selection';
 import { zoom, zoomIdentity, type D3ZoomEvent, type ZoomTransform } from 'd3-zoom';
 
@@ -13,17 +13,17 @@ const toView = ({ x, y, k }: ZoomTransform): View => ({ x, y, scale: k });
 
 function takeHold(element: HTMLElement, held: Held): Hand {
   const selection = select<HTMLElement, unknown>(element);
-  /** A move of the program's own is no choice of the operator's. */
+  /** During a programmed move: it is not the operator's choice. */
   let isFollowing = false;
   const behaviour = zoom<HTMLElement, unknown>()
-    // Without the browser's layout: the size is known from the resize observer.
+    // Avoids a layout: the resize observer has the size.
     .extent(() => [
       [0, 0],
       [store.get().viewport.size.width, store.get().viewport.size.height],
     ])
     .constrain((transform) => transformOf(held.inSight(toView(transform))))
     .clickDistance(6)
-    // At once, by the double click too: nothing here is animated (see `instantly.ts`).
+    // At once, also for the double click: nothing is animated (see `instantly.ts`).
     .duration(0);
   const follow = (view: View): void => {
     isFollowing = true;
@@ -31,13 +31,13 @@ function takeHold(element: HTMLElement, held: Held): Hand {
     behaviour.transform(selection, transformOf(view));
     isFollowing = false;
   };
-  const byHand = (tell: (event: D3ZoomEvent<HTMLElement, unknown>) => void) => {
+  const byHand = (listener: (event: D3ZoomEvent<HTMLElement, unknown>) => void) => {
     return (event: D3ZoomEvent<HTMLElement, unknown>): void => {
-      if (!isFollowing) tell(event);
+      if (!isFollowing) listener(event);
     };
   };
   selection.call(behaviour);
-  // A map that comes back into the page goes on where it was.
+  // A map that returns to the page continues where it was.
   follow(store.get().viewport.view);
   behaviour
     .on('start', byHand(held.onStart))

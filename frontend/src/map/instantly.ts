@@ -1,7 +1,6 @@
 /**
- * In the place of d3-transition and d3-interpolate, which d3-zoom asks for: no gesture of this map
- * is animated, so there is nothing to interrupt or to go through, and ten kilobytes of colours and
- * curves are not loaded.
+ * Replaces d3-transition and d3-interpolate, which d3-zoom imports: no gesture of this map is
+ * animated, so nothing needs interrupting or interpolating, and ten kilobytes are saved.
  */
 import { selection } from 'd3-selection';
 

@@ -108,7 +108,7 @@ describe('painter', () => {
       };
       const known = paint('range');
       const old = paint('old');
-      // What is not known, the field, and now the hatching over it.
+      // The unknown part, the field, and now the hatching over it.
       expect([known.pictures, old.pictures]).toEqual([2, 3]);
       expect(old.alpha).toBeGreaterThan(0);
       expect(old.alpha).toBeLessThan((known.alpha ?? 0) / 2);

@@ -56,20 +56,20 @@ import {
   selectSensor,
   type Heat,
 } from '../store/derived';
-import { keeping, memoLast, memoOne } from '../domain/memo';
+import { retainEqual, memoLast, memoOne } from '../domain/memo';
 import { selectShown, selectTag, selectTags } from '../store/moment';
 import type { MapPicture } from '../geometry/image';
 
 export type Canvases = Readonly<Record<'still' | 'pins' | 'overlay', HTMLCanvasElement>>;
 
-/** Fading is worked out anew this often even when nothing else changes, ms. */
+/** Fading is recomputed this often, ms, even if nothing else changes. */
 const FADE_TICK_MS = 5_000;
 
 const edges = memoOne(edgesOf);
 const knownPart = memoOne(knownOf);
 const hatched = memoLast(hatchedOf);
 const floor = memoOne(({ pixels }: MapPicture) => floorOf(pixels));
-/** Of what a field tells, what is not too old to say. */
+/** The cells of a field that are not too old. */
 const holding = memoLast((field: Field, old: Uint8Array | null) =>
   old ? cellsWhere(field, (cell) => old[cell] === 0) : field,
 );
@@ -80,9 +80,8 @@ interface RoomAt extends Room {
 }
 
 /**
- * Puts the state on three canvases: the still layers, the pins, and what moves by itself. It
- * keeps only what is dear to make (coloured pictures, sprites, label places), each under the
- * data that it was made from.
+ * Draws the state on three canvases: still layers, pins, and animations. It caches only what is
+ * expensive (coloured pictures, sprites, label places), each by its input data.
  */
 export class Painter {
   #size: Size = { width: 0, height: 0 };
@@ -90,28 +89,28 @@ export class Painter {
   #textScale = 1;
   #sprites = new Sprites(1);
   #widths = new Map<string, number>();
-  // Off the page, like those of the sprites: one in the page inherits the font's features from
-  // the style sheet. Made anew for another font: one off the page keeps what it first found.
+  // Off the page, like the sprites' canvases: one in the page would inherit the font's features from
+  // the style sheet. Recreated for another font: one off the page keeps the first font it found.
   #ruler = contextOf(newCanvas(1, 1));
-  /** Where labels found their places when the map last came to rest, and at which scale. */
+  /** Label places from when the map last came to rest, with their scale. */
   #room: RoomAt | null = null;
-  readonly #keptRoom = keeping<RoomAt>(equal);
+  readonly #retainedRoom = retainEqual<RoomAt>(equal);
   #paintedScene: Scene | null = null;
   readonly #hatching = new Hatching();
   readonly #stillBuffer = new PanBuffer();
   readonly #pinBuffer = new PanBuffer();
 
-  /** Another one where colours are others. */
+  /** A new object when colours change. */
   #colour: Colours;
 
   constructor(private readonly canvases: Canvases) {
     this.#colour = coloursOf(canvases.still);
   }
 
-  /** `textScale`: how large the page's text is there, 1 as usual. */
+  /** `textScale`: scale of the page's text, usually 1. */
   resize(size: Size, ratio: number, textScale = 1): void {
-    // The page's sizes are fractions at times. A canvas stretched to one would blur each pixel:
-    // these are whole, in pixels of the page and of the screen, and the frame cuts what is over.
+    // Layout sizes may be fractional, and a canvas stretched to one would blur. So canvas sizes are
+    // whole, in CSS and device pixels, and the frame clips the excess.
     this.#size = { width: Math.ceil(size.width), height: Math.ceil(size.height) };
     this.#ratio = ratio;
     this.#textScale = textScale;
@@ -147,7 +146,7 @@ export class Painter {
     return pen;
   }
 
-  /** `isNew`: more than the view changed since the last time. */
+  /** `isNew`: more than the view has changed. */
   paintStill(state: AppState, view: View, now: number, isNew: boolean): void {
     const pen = this.#penOn(this.canvases.still, view);
     if (isNew) this.#stillBuffer.spoil();
@@ -166,27 +165,27 @@ export class Painter {
       const { placement } = picture;
       drawPicture(pen, { picture: this.#mapPicture(picture, this.#colour), placement });
     }
-    const isTold = layers.has('field') && layers.has('unknown');
-    const mapped = isTold ? selectMapped(state) : null;
+    const isUnknownMarked = layers.has('field') && layers.has('unknown');
+    const mapped = isUnknownMarked ? selectMapped(state) : null;
     if (mapped) this.#drawUnknown(pen, mapped, picture);
     if (layers.has('grid')) drawGridLines(pen);
     if (layers.has('boxes')) drawBoxes(pen, this.scene(state, now).boxes);
     const heat = selectHeat(state);
     if (heat && layers.has('field')) {
       const detail = layers.has('smooth') ? smoothDetail(heat.field) : 1;
-      const coloured = this.#heatPicture(heat, selectSensor(state), detail, isTold);
+      const coloured = this.#heatPicture(heat, selectSensor(state), detail, isUnknownMarked);
       drawPicture(pen, placedField(heat.field, coloured));
-      if (isTold && !heat.isError) {
+      if (isUnknownMarked && !heat.isError) {
         for (const { cells, gap } of hatched(heat.field, heat.old)) {
           this.#hatching.draw(pen, placedField(heat.field, cells), null, gap);
         }
       }
-      if (isTold) drawEdges(pen, edges(holding(heat.field, heat.old)));
+      if (isUnknownMarked) drawEdges(pen, edges(holding(heat.field, heat.old)));
     }
     drawAreas(pen, selectAreas(state));
   }
 
-  /** Inside the house is the floor of its map; without one, as far as the field was asked for. */
+  /** The greenhouse's inside: the floor of its map; without one, the field's extent. */
   #drawUnknown(pen: Pen, field: Field, map: MapPicture | null): void {
     const inside = map
       ? { picture: floor(map), placement: map.placement }
@@ -194,7 +193,7 @@ export class Painter {
     this.#hatching.draw(pen, inside, placedField(field, knownPart(field)));
   }
 
-  /** `covered`: what stands on the map; null while the map moves, and labels with it. */
+  /** `covered`: elements over the map; null while the map moves, and labels with it. */
   paintPins(
     state: AppState,
     view: View,
@@ -205,12 +204,12 @@ export class Painter {
     const pen = this.#penOn(this.canvases.pins, view);
     if (covered) {
       const { width, height } = this.#size;
-      // From pixels of the map view to those relative to the map's origin.
+      // Pixels relative to the map's origin.
       const moved = ({ left, top, right, bottom }: Box): Box => ({
         ...{ left: left - view.x, right: right - view.x },
         ...{ top: top - view.y, bottom: bottom - view.y },
       });
-      this.#room = this.#keptRoom({
+      this.#room = this.#retainedRoom({
         scale: view.scale,
         within: moved({ left: 0, top: 0, right: width, bottom: height }),
         covered: covered.map(moved),
@@ -272,10 +271,10 @@ export class Painter {
     );
   }
 
-  readonly #sceneInput = keeping<SceneInput>();
-  /** The very same where nothing looks otherwise: labels stay in their places then. */
-  readonly #keptScene = keeping<Scene>(equal);
-  readonly #scene = memoOne((input: SceneInput) => this.#keptScene(buildScene(input)));
+  readonly #sceneInput = retainEqual<SceneInput>();
+  /** The same object if nothing looks different, so that labels stay in place. */
+  readonly #retainedScene = retainEqual<Scene>(equal);
+  readonly #scene = memoOne((input: SceneInput) => this.#retainedScene(buildScene(input)));
 
   readonly #labels = memoLast(
     (
@@ -311,7 +310,7 @@ export class Painter {
       { field, range, zones, difference, isError, old }: Heat,
       sensor: Sensor,
       detail: number,
-      isTold: boolean,
+      isUnknownMarked: boolean,
     ) => {
       const shade = difference
         ? divergingShade(range)
@@ -320,7 +319,9 @@ export class Painter {
           : zones
             ? idealShade(zones)
             : fieldShade(sensor, range);
-      return canvasOfPixels(fieldPixels(field, old ? withOld(shade, old, isTold) : shade, detail));
+      return canvasOfPixels(
+        fieldPixels(field, old ? withOld(shade, old, isUnknownMarked) : shade, detail),
+      );
     },
   );
 }

@@ -30,23 +30,23 @@ const ANNA = {
   can_write_notes: true,
 } as const;
 
-let asked: string[] = [];
+let requests: string[] = [];
 let notes: readonly Note[] = [];
 
 beforeEach(() => {
-  asked = [];
+  requests = [];
   notes = [];
   standingNotes.set([]);
   person.set(null);
   showTags([]);
   vi.stubGlobal('fetch', (url: URL, { method = 'GET', body }: RequestInit) => {
-    asked.push(`${method} ${url.pathname}${url.search} ${typeof body === 'string' ? body : ''}`);
+    requests.push(`${method} ${url.pathname}${url.search} ${typeof body === 'string' ? body : ''}`);
     return Promise.resolve(Response.json({ notes }));
   });
 });
 
 /** Receives a frame saying that the journal has this many notes. */
-const tell = (count: number): void => {
+const report = (count: number): void => {
   flush(() => {
     receive({ alarms: { ...alarms([alarm('cold')]), notes: count } });
   });
@@ -73,16 +73,16 @@ test('marks that would cover each other are one, and those outside of the span n
 test('what is said is fetched when there is more of it, and shown with name and time', async () => {
   const stop = startNotes();
   render(<Comments subject="tag:7" name="Tag 7" />);
-  tell(0);
-  expect(asked).toEqual([]);
+  report(0);
+  expect(requests).toEqual([]);
   notes = [said('leaf sample', 800), said('other', 800, { subject: 'tag:8' })];
-  tell(2);
+  report(2);
   await screen.findByText('leaf sample');
   expect(screen.getByTestId('comments').textContent).toContain('anna sim 00:13:20 leaf sample');
   expect(screen.queryByText('other')).toBeNull();
   expect(screen.queryByRole('button')).toBeNull();
-  tell(2);
-  expect(asked).toEqual(['GET /api/notes ']);
+  report(2);
+  expect(requests).toEqual(['GET /api/notes ']);
   stop();
 });
 
@@ -98,7 +98,7 @@ test('who may write does, and withdraws their own words alone', async () => {
   await waitFor(() => {
     expect(screen.queryByLabelText('Comment (now)')).toBeNull();
   });
-  expect(asked).toEqual([
+  expect(requests).toEqual([
     'DELETE /api/notes/mine ',
     'POST /api/notes {"kind":"comment","subject":"tag:7","text":"dry"}',
   ]);
@@ -124,7 +124,7 @@ test('who looks back says it about the moment that is shown', async () => {
   fireEvent.change(field, { target: { value: 'doors open' } });
   fireEvent.click(screen.getByRole('button', { name: 'Save' }));
   await waitFor(() => {
-    expect(asked.at(-1)).toBe(
+    expect(requests.at(-1)).toBe(
       'POST /api/notes {"kind":"comment","subject":"site","text":"doors open","until":"500.000"}',
     );
   });

@@ -124,8 +124,8 @@ describe('legend', () => {
     grades = { temperature: grade({ day: { scans: 9, inside: 7 }, share_day: 7 / 9 }) };
     showField(estimated([22.4], [0.5]));
     render(<EstimateFacts />);
-    const told = await screen.findByTestId('foretold');
-    expect(told.textContent).toBe('7 of 9 scans within the predicted range');
+    const prediction = await screen.findByTestId('foretold');
+    expect(prediction.textContent).toBe('7 of 9 scans within the predicted range');
   });
 
   test('warns where too few scans lay inside', async () => {

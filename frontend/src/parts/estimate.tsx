@@ -40,7 +40,7 @@ export function EstimateFacts(): JSX.Element {
   const field = useApp((state) => selectShown(state).field.value);
   const isNow = useApp((state) => selectShown(state).moment === null);
   const isError = useApp((state) => state.view.heat === 'error');
-  const graded = useAsked('EstimateQualities', 'quality').value?.sensors ?? {};
+  const graded = useEstimateQuery('EstimateQualities', 'quality').value?.sensors ?? {};
   const grade = Object.hasOwn(graded, sensor.name) ? (graded[sensor.name] ?? null) : null;
   if (!isMeasured(sensor)) {
     return (
@@ -59,7 +59,7 @@ export function EstimateFacts(): JSX.Element {
           {E.unsure(errorText(sensor, ofSensor.sureness.sdKnown, unit))}
         </span>
       )}
-      {grade && <Foretold grade={grade} isNow={isNow} />}
+      {grade && <Prediction grade={grade} isNow={isNow} />}
     </>
   );
 }
@@ -79,19 +79,19 @@ function Missing({ why, grade }: { why: NoEstimate; grade: Grade | null }): JSX.
 }
 
 /** "n of ten" predictions that held; with fewer than ten scans, of their number. */
-function foretoldText({ day, share_day: share }: Grade): string {
-  if (share === null) return E.foretoldNone;
+function predictionText({ day, share_day: share }: Grade): string {
+  if (share === null) return E.predictedNone;
   return day.scans < 10
-    ? E.foretold(day.inside, day.scans)
-    : E.foretold(Math.round(share * 10), 10);
+    ? E.predicted(day.inside, day.scans)
+    : E.predicted(Math.round(share * 10), 10);
 }
 
-function Foretold({ grade, isNow }: { grade: Grade; isNow: boolean }): JSX.Element {
+function Prediction({ grade, isNow }: { grade: Grade; isNow: boolean }): JSX.Element {
   const { day, week } = grade;
   const least = Math.min(grade.share_day ?? 1, grade.share_week ?? 1);
-  const behind = [
+  const details = [
     E.aboutText,
-    `${E.foretoldDay(day.inside, day.scans)}, ${E.foretoldWeek(week.inside, week.scans)}.`,
+    `${E.predictedDay(day.inside, day.scans)}, ${E.predictedWeek(week.inside, week.scans)}.`,
     ...(grade.fit_problem ? [`${E.fitProblem(shown(grade.fit_problem, 160))}.`] : []),
   ];
   return (
@@ -102,8 +102,8 @@ function Foretold({ grade, isNow }: { grade: Grade; isNow: boolean }): JSX.Eleme
         </strong>
       )}
       {/* The grade is always current: beside a past moment, it would be taken for that moment's. */}
-      {isNow && <span data-testid="foretold">{foretoldText(grade)}</span>}
-      <More label={E.about} text={behind.join(' ')} />
+      {isNow && <span data-testid="foretold">{predictionText(grade)}</span>}
+      <More label={E.about} text={details.join(' ')} />
     </>
   );
 }
@@ -215,7 +215,7 @@ export function CardEstimate({
   const unit = useApp((state) => state.settings.unit);
   // Expected values exist for now only.
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const expected = useAsked('ExpectedTags', 'tags').value?.tags ?? {};
+  const expected = useEstimateQuery('ExpectedTags', 'tags').value?.tags ?? {};
   const own = isNow && Object.hasOwn(expected, tag.id) ? expected[tag.id] : undefined;
   const changed = new Set(
     (health?.reasons ?? []).filter(({ kind }) => kind === 'changed').map((each) => each.sensor),
@@ -248,7 +248,7 @@ const PLACES = 5;
 /** Where another tag would help: numbers on the map, a list for screen readers. */
 export function AdviceMarks(): JSX.Element {
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const { value, state, message } = useAsked('Advice', 'advice', PLACES);
+  const { value, state, message } = useEstimateQuery('Advice', 'advice', PLACES);
   if (!isNow) return <Note text={E.adviceNow} />;
   if (!value) {
     return <Note text={state === 'failed' ? E.adviceFailed(shown(message, 160)) : ''} />;
@@ -326,7 +326,7 @@ const EVERY_MS = 10_000;
  * The bridge's answer about the shown sensor, polled over HTTP while connected, one request at a time.
  * The answer about another sensor is dropped.
  */
-function useAsked<Name extends 'EstimateQualities' | 'ExpectedTags' | 'Advice'>(
+function useEstimateQuery<Name extends 'EstimateQualities' | 'ExpectedTags' | 'Advice'>(
   name: Name,
   what: string,
   places?: number,
@@ -334,20 +334,23 @@ function useAsked<Name extends 'EstimateQualities' | 'ExpectedTags' | 'Advice'>(
   const sensor = useApp((state) => state.view.sensor);
   const isOpen = useApp((state) => state.twin.connection.socket.kind === 'open');
   const turn = useTicking((at) => String(Math.floor(at / EVERY_MS)));
-  const { value, ...rest } = useFetched<{ readonly of: string; readonly told: Schemas[Name] }>(
+  const { value, ...rest } = useFetched<{ readonly of: string; readonly result: Schemas[Name] }>(
     isOpen
       ? {
           key: turn,
           group: sensor,
           run: async (signal) => {
             const query = { sensor_type: sensor, places };
-            return { of: sensor, told: await answer(name, signal, `api/estimate/${what}`, query) };
+            return {
+              of: sensor,
+              result: await answer(name, signal, `api/estimate/${what}`, query),
+            };
           },
         }
       : null,
     EVERY_MS,
   );
-  return { ...rest, value: value?.of === sensor ? value.told : null };
+  return { ...rest, value: value?.of === sensor ? value.result : null };
 }
 
 const E = await estimateWordsOf(LANGUAGE);

@@ -11,7 +11,13 @@ import { mapPoint, toCanvas } from '../geometry/coordinates';
 import { act, type AppState, keepFetched, store, useApp } from '../store/app';
 import { withLayer } from '../store/view';
 import { robotFrame, useSelected } from '../store/create';
-import { isHeardNow, rosNow, selectIsCut, selectNewest, selectShown } from '../store/moment';
+import {
+  isReceivingNow,
+  rosNow,
+  selectIsDisconnected,
+  selectLatest,
+  selectShown,
+} from '../store/moment';
 import { S } from '../strings';
 import { Check } from '../widgets/controls';
 import { useTicking } from '../widgets/useNow';
@@ -24,7 +30,7 @@ const FADE_S = 10;
 export function RobotLayer(): ReactPortal | null {
   const { position, plan } = useRobot();
   const view = useApp((state) => state.viewport.view);
-  const isHeard = useApp(isHeardNow);
+  const isReceiving = useApp(isReceivingNow);
   const trail = useTrail();
   const ageAt = (now: number): number | null =>
     position && ageOf(position.observed_at, timeOf(store.get(), now));
@@ -33,7 +39,7 @@ export function RobotLayer(): ReactPortal | null {
     return known === null ? null : ageText(known);
   });
   const cutAt = useApp((state) =>
-    selectIsCut(state) ? selectNewest(state).snapshot?.takenAt : undefined,
+    selectIsDisconnected(state) ? selectLatest(state).snapshot?.takenAt : undefined,
   );
   // Without a connection, the banner gives the age; the mark ages only if it was old before.
   const isLive = useTicking((now) => ((ageAt(cutAt ?? now) ?? LIVE_S) < LIVE_S ? 'live' : 'old'));
@@ -45,7 +51,7 @@ export function RobotLayer(): ReactPortal | null {
     () => trailLines(trail, time === null ? null : Number(time)),
     [trail, time],
   );
-  const looks = isLive === 'live' && isHeard ? 'live' : 'old';
+  const looks = isLive === 'live' && isReceiving ? 'live' : 'old';
   const at = position && toCanvas(view, mapPoint(position.x, position.y));
   const text = (points: readonly (readonly [number, number])[]): string =>
     points.map((point) => point.join(',')).join(' ');
@@ -167,13 +173,13 @@ function useTrail(): readonly TrailPoint[] {
           ? { key: 'robot', run: (signal) => answer('Robot', signal, 'api/robot') }
           : null,
     );
-    const unhear = robotFrame.subscribe(() => {
+    const unsubscribe = robotFrame.subscribe(() => {
       const position = robotFrame.get()?.position;
       if (position) setTrail((last) => extended(last, position));
     });
     return () => {
       stop();
-      unhear();
+      unsubscribe();
     };
   }, []);
   return trail;

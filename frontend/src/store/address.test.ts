@@ -54,7 +54,7 @@ test('a wall screen shows now, whatever moment its link holds', () => {
 test('where a round goes through the sensors only the rest comes back to the link', () => {
   stop();
   stop = startAddress(true, true);
-  // No change of the sensor puts the return off.
+  // Changes of the sensor do not delay the return.
   for (const sensor of ['light', 'humidity', 'temperature']) {
     if (sensor === 'humidity') act(withLayer('grid', false));
     act({ sensor });
@@ -82,7 +82,7 @@ test('a wall screen chooses no tag, leaves its address alone, and comes back to 
 });
 
 describe('a card is a step of the browser’s history', () => {
-  /** What the browser does with a step, in its own time. */
+  /** The browser's asynchronous step. */
   const travel = async (steps: number): Promise<void> => {
     const arrived = new Promise((resolve) => {
       window.addEventListener('popstate', resolve, { once: true });
@@ -96,7 +96,7 @@ describe('a card is a step of the browser’s history', () => {
     });
 
   beforeEach(() => {
-    // The history's steps are timers too.
+    // Steps of the history use timers too.
     vi.useRealTimers();
     stop();
     history.replaceState(null, '', '/#sensor=co2');
@@ -149,7 +149,7 @@ describe('a card is a step of the browser’s history', () => {
     await vi.waitFor(() => {
       expect(location.hash).toBe('#at=400&sensor=co2');
     });
-    // One step for all of it.
+    // One step for all changes.
     expect(history.state).toMatchObject({ opened: 'moment', moment: 400 });
     await travel(-1);
     expect(store.get().view.moment).toBeNull();

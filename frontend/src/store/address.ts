@@ -21,11 +21,11 @@ import {
   type ViewState,
 } from './view';
 
-/** Which half a narrow screen shows is told by the alarms alone. */
+/** A link says which half a narrow screen shows only for the alarms. */
 export type Linked = Omit<ViewState, 'hovered' | 'chartedFrom' | 'pane'> &
   Partial<Pick<ViewState, 'pane'>>;
 
-/** The fragment, without "#"; what is as by default is left out. */
+/** The fragment, without "#"; defaults are left out. */
 export function toFragment(view: Linked): string {
   const parts = new URLSearchParams();
   if (view.moment !== null) parts.set('at', String(view.moment));
@@ -57,7 +57,7 @@ export function toFragment(view: Linked): string {
   return parts.toString().replaceAll('%2C', ',');
 }
 
-/** Reads a fragment; a part that makes no sense counts as left out. */
+/** Reads a fragment; an invalid part counts as left out. */
 export function fromFragment(fragment: string): Linked {
   const parts = new URLSearchParams(fragment.replace(/^#/, ''));
   const layers = parts.get('layers')?.split(',');
@@ -84,7 +84,7 @@ export function fromFragment(fragment: string): Linked {
   };
 }
 
-/** A name, or two moments in their order, ROS seconds. */
+/** A name, or two moments in order, ROS seconds. */
 function periodOf(text: string | null): Period {
   const kind = PERIOD_KINDS.find((each) => each === text);
   if (kind) return { kind };
@@ -93,7 +93,7 @@ function periodOf(text: string | null): Period {
   return { kind: 'own', from, to };
 }
 
-/** So many seconds before the moment that is shown, with a minus; or a moment, ROS seconds. */
+/** Seconds before the shown moment, with a minus; or a moment, ROS seconds. */
 const compareText = (compare: Compare): string =>
   String(compare.by === 'ago' ? -compare.seconds : compare.at);
 
@@ -118,7 +118,7 @@ function sortOf(text: string | null): Sort {
   return column ? { column, descending } : DEFAULT_VIEW.sort;
 }
 
-/** "range" is that of the sensor in view, "range.co2" that of another. */
+/** "range" belongs to the sensor in view, "range.co2" to another. */
 const rangeKey = (sensor: string, inView: string): string =>
   sensor === inView ? 'range' : `range.${sensor}`;
 
@@ -151,18 +151,18 @@ const layersText = (layers: ReadonlySet<Layer>): string =>
 
 /** Browsers refuse more than about a hundred changes of the address in half a minute. */
 const SETTLE_MS = 400;
-/** A wall screen that somebody has changed shows again what its link says after this long. */
+/** A changed wall screen returns to its link after this long. */
 const RETURN_MS = 120_000;
 
-/** What an entry of the browser's history that the page made tells about itself. */
+/** State of a history entry that the page made. */
 interface Entry {
-  /** Counts the links that were followed: Back to an entry of another one follows its address. */
+  /** Number of links followed: Back to an entry with another number follows its address. */
   readonly link: number;
   /** The tag whose card the entry is for; null: no card. */
   readonly tag: string | null;
-  /** The moment in the past that it is for, ROS seconds; null: now. */
+  /** The past moment that the entry is for, ROS seconds; null: now. */
   readonly moment: number | null;
-  /** What this step opened: the entry before is the same page without. Null: it is no such step. */
+  /** What this step opened; the entry before is the page without it. Null: no such step. */
   readonly opened: 'tag' | 'moment' | null;
 }
 
@@ -171,14 +171,14 @@ const placeOf = (view: Pick<ViewState, 'selected' | 'moment'>): Pick<Entry, 'tag
   moment: view.moment,
 });
 
-/** Null: a link was opened just now; nobody else keeps anything there. */
+/** Null: a link was just opened; only this module stores state there. */
 const entryNow = (): Entry | null => history.state as Entry | null;
 
 /**
- * Keeps the address a link to what is on the screen, and follows a link that is opened. A card
- * that opens is a step of the browser's history, so that Back closes it, and so is a look back,
- * from which Back leads to now. On a wall screen the address is the law: it is never rewritten, no
- * tag is chosen, and it always shows now. `isRound`: but for the sensor, which changes by itself.
+ * Keeps the address a link to the screen, and follows opened links. Opening a card or a past moment
+ * adds a step to the browser's history, so that Back closes it or returns to now. A wall screen
+ * always shows what its address says, at present and without a chosen tag; the address is never
+ * rewritten. `isRound`: the sensor alone changes by itself.
  */
 export function startAddress(kiosk = false, isRound = false): () => void {
   return kiosk ? keepToLink(isRound) : keepLink();
@@ -189,7 +189,7 @@ function keepToLink(isRound: boolean): () => void {
   let { view } = store.get();
   const follow = (): void => {
     act({ ...fromFragment(window.location.hash), selected: null, moment: null });
-    // What the link says needs no return to it.
+    // The screen already shows what the link says.
     clearTimeout(timer);
   };
   const comeBack = (): void => {
@@ -219,7 +219,7 @@ function keepLink(): () => void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let { view } = store.get();
   let entry: Entry = entryNow() ?? { link: 0, tag: null, moment: null, opened: null };
-  /** A step back that the page itself asked for, and that the browser takes in its own time. */
+  /** A step back that the page requested; the browser takes it asynchronously. */
   let isGoingBack = false;
 
   const address = (): string => {
@@ -227,7 +227,7 @@ function keepLink(): () => void {
     const { pathname, search } = window.location;
     return `${pathname}${search}${fragment ? `#${fragment}` : ''}`;
   };
-  /** Tells the browser's entry what it is for, and keeps its address or gives it another. */
+  /** Stores what the browser's entry is for, and updates its address. */
   const mark = (to: string): void => {
     const { pathname, search, hash } = window.location;
     const isSame = to === `${pathname}${search}${hash}` && equal(entryNow(), entry);
@@ -235,7 +235,7 @@ function keepLink(): () => void {
   };
   const write = (): void => {
     clearTimeout(timer);
-    // A link has been opened just now, and is followed as soon as the browser tells of it.
+    // A link was just opened; it is followed on the browser's event.
     if (!entryNow()) return;
     entry = { ...entry, ...placeOf(store.get().view) };
     mark(address());
@@ -248,7 +248,7 @@ function keepLink(): () => void {
     mark(window.location.href.slice(window.location.origin.length));
   };
   const onHashChange = (): void => {
-    // A step between entries that the page made: `onPopState` has seen to it.
+    // A step between the page's own entries: `onPopState` has handled it.
     if (entryNow()) return;
     entry = { link: entry.link + 1, tag: null, moment: null, opened: null };
     follow();
@@ -270,8 +270,7 @@ function keepLink(): () => void {
       if (!step(shown)) write();
       return;
     }
-    // The rest of the view stays, another moment in the past too: what was done since is not to
-    // be undone.
+    // The rest of the view stays, also another past moment: Back must not undo later changes.
     const isOtherTime = (now.moment === null) !== (shown.moment === null);
     if (isOtherTime || now.tag !== shown.selected) {
       const moment = isOtherTime ? now.moment : shown.moment;
@@ -279,7 +278,7 @@ function keepLink(): () => void {
     }
     write();
   };
-  /** Enters or leaves the step of a card or of a look back; true: there is nothing else to write. */
+  /** Enters or leaves the step of a card or past moment; true: nothing else to write. */
   const step = (shown: ViewState): boolean => {
     if (isGoingBack) return true;
     const place = placeOf(shown);

@@ -1,11 +1,11 @@
 import type { Size, View } from '../geometry/coordinates';
 import { type Change, changed, createStore, useSelected } from './create';
-import { createFetcher, type FetcherOptions, type Wish } from './fetcher';
+import { createFetcher, type FetcherOptions, type FetchTask } from './fetcher';
 import { DEFAULT_SETTINGS, type Settings } from './settings';
 import { NO_TWIN, type TwinState } from './twin';
 import { DEFAULT_VIEW, type ViewState, viewAfter } from './view';
 
-/** What of the map is on the screen just now; what the operator chose is the view's camera. */
+/** The part of the map on the screen; the operator's choice is the view's camera. */
 export type Viewport = typeof NO_VIEWPORT;
 
 export const NO_VIEWPORT = {
@@ -35,7 +35,7 @@ export const receive = (change: Change<TwinState>): void => {
   put({ twin: changed(store.get().twin, change) });
 };
 
-/** For the map's camera alone, which keeps it in step with wheel, finger and keys. */
+/** Only for the map's camera, which follows wheel, finger and keys. */
 export const moveViewport = (part: Partial<Viewport>): void => {
   put({ viewport: { ...store.get().viewport, ...part } });
 };
@@ -44,7 +44,7 @@ export const prefer = (part: Partial<Settings>): void => {
   put({ settings: { ...store.get().settings, ...part } });
 };
 
-/** Calls back when one of these parts of the state is another; returns the way to stop. */
+/** Calls back when one of these parts of the state changes; returns a stop function. */
 export function onChange(
   parts: (state: AppState) => readonly unknown[],
   listener: () => void,
@@ -58,21 +58,21 @@ export function onChange(
 }
 
 interface KeepOptions<T> extends FetcherOptions<T> {
-  /** What the wish follows from; none: all of the state. */
+  /** The parts of the state that the task depends on; none: all of it. */
   readonly parts?: (state: AppState) => readonly unknown[];
-  /** It follows from the time as well. */
+  /** The task depends on the time as well. */
   readonly everyMs?: number;
 }
 
-/** Fetches what the state wishes for; undefined: as before. Returns the way to stop. */
+/** Fetches what the state needs; undefined: as before. Returns a stop function. */
 export function keepFetched<T>(
   { everyMs, parts = (state) => [state], ...options }: KeepOptions<T>,
-  wishFor: (state: AppState) => Wish<T> | null | undefined,
+  taskFor: (state: AppState) => FetchTask<T> | null | undefined,
 ): () => void {
   const fetcher = createFetcher(options);
   const update = (): void => {
-    const wish = wishFor(store.get());
-    if (wish !== undefined) fetcher.want(wish);
+    const task = taskFor(store.get());
+    if (task !== undefined) fetcher.want(task);
   };
   update();
   const stop = onChange(parts, update);

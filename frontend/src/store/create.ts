@@ -21,7 +21,7 @@ export function createStore<State>(initial: State): Store<State> {
         try {
           listener();
         } catch (error) {
-          // One that fails keeps the news from nobody else; the browser tells of it.
+          // A failing listener must not stop the others; the browser reports it.
           queueMicrotask(() => {
             throw error;
           });
@@ -35,14 +35,14 @@ export function createStore<State>(initial: State): Store<State> {
   };
 }
 
-/** Parts that are to be others, or what makes them of those that are there. */
+/** Changed parts, or a function that computes them from the current state. */
 export type Change<State> = Partial<State> | ((state: State) => Partial<State>);
 
-/** The very same state where nothing in it is another. */
+/** The same object if nothing in it changes. */
 export const changed = <State extends object>(state: State, change: Change<State>): State =>
   withParts(state, typeof change === 'function' ? change(state) : change);
 
-/** All of a store, or what `select` picks, which must be the same thing for the same state. */
+/** All of a store, or what `select` picks; the same state must give the same object. */
 export function useSelected<State>(store: Store<State>): State;
 export function useSelected<State, Part>(store: Store<State>, select: (state: State) => Part): Part;
 export function useSelected<State>(
@@ -52,10 +52,10 @@ export function useSelected<State>(
   return useSyncExternalStore(store.subscribe, () => select(store.get()));
 }
 
-/** What a screen reader is told beside what it is led to. */
+/** What a screen reader announces beside the focused element. */
 export interface Announcement {
   readonly text: string;
-  /** Another one each time: the same words said again are news too. */
+  /** A new number each time: repeated words are announced again. */
   readonly key: number;
 }
 
@@ -68,10 +68,10 @@ export const announce = (voice: Store<Announcement>, text: string): void => {
 /** Who is signed in; null: not known yet. */
 export const person = createStore<Session | null>(null);
 
-/** Where people sign in, who may write notes acknowledges and shelves; else each browser for itself. */
+/** With sign-in, users who may write notes acknowledge and shelve; otherwise each browser for itself. */
 export const mayAct = (who: Session | null): boolean => who?.can_write_notes ?? true;
 
-/** The time that the mouse is on: in a chart, or on the time bar; each shows the other's. */
+/** The time under the mouse, in a chart or on the time bar; each shows the other's. */
 interface PointedTime {
   /** ROS seconds. */
   readonly at: number;
@@ -80,11 +80,11 @@ interface PointedTime {
 
 export const pointedTime = createStore<PointedTime | null>(null);
 
-/** What the other of the two points at, ROS seconds. */
+/** The time that the other one points at, ROS seconds. */
 export const pointedBy =
   (by: PointedTime['by']) =>
   (pointed: PointedTime | null): number | null =>
     pointed?.by === by ? pointed.at : null;
 
-/** The newest frame of a robot; null: none has come. */
+/** The robot's latest frame; null: none received. */
 export const robotFrame = createStore<RobotFrame | null>(null);

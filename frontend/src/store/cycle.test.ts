@@ -5,7 +5,7 @@ import { CATALOGUE } from '../testing/sensors';
 import { readings, stateFrame, tag, wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
 import { withState } from './twin';
-import { addressOfPage, cycleWish, nextSensor, sensorsOf, startCycle } from './cycle';
+import { addressOfPage, cycleSetting, nextSensor, sensorsOf, startCycle } from './cycle';
 import { DEFAULT_VIEW } from './view';
 
 let stop: () => void;
@@ -81,13 +81,16 @@ test('one sensor stays, and without a wish nothing changes', () => {
 
 describe('the wish', () => {
   test.each(['5', '30', '3600'])('%s seconds are taken', (text) => {
-    expect(cycleWish(`?kiosk=1&cycle=${text}`)).toEqual({ seconds: Number(text), refused: null });
+    expect(cycleSetting(`?kiosk=1&cycle=${text}`)).toEqual({
+      seconds: Number(text),
+      refused: null,
+    });
   });
 
   test.each(['4', '3601', '', '-30', '30.5', '3e1', 'soon', 'NaN', '99999'])(
     '“%s” is refused, and said',
     (text) => {
-      expect(cycleWish(`?cycle=${encodeURIComponent(text)}`)).toEqual({
+      expect(cycleSetting(`?cycle=${encodeURIComponent(text)}`)).toEqual({
         seconds: null,
         refused: text,
       });
@@ -95,7 +98,7 @@ describe('the wish', () => {
   );
 
   test('none is no mistake', () => {
-    expect(cycleWish('?kiosk=1')).toEqual({ seconds: null, refused: null });
+    expect(cycleSetting('?kiosk=1')).toEqual({ seconds: null, refused: null });
   });
 });
 

@@ -1,4 +1,4 @@
-/** On a wall screen, on wish: another sensor every so many seconds. */
+/** If set, a wall screen changes to the next sensor every few seconds. */
 import { now } from '../clock';
 import type { Sensor } from '../domain/sensors';
 import type { Tag } from '../domain/twin';
@@ -10,10 +10,10 @@ import { selectTags } from './moment';
 
 export const CYCLE_LIMITS = { least: 5, most: 3_600 } as const;
 
-export type CycleWish = ReturnType<typeof cycleWish>;
+export type CycleSetting = ReturnType<typeof cycleSetting>;
 
-/** The wish in an address: `?kiosk=1&cycle=30`. `seconds` a sensor; null: it stays. A bad one is `refused`, as written. */
-export function cycleWish(search: string) {
+/** The setting in an address: `?kiosk=1&cycle=30`. `seconds` per sensor; null: it stays. An invalid one is `refused`. */
+export function cycleSetting(search: string) {
   const text = new URLSearchParams(search).get('cycle');
   const seconds = text !== null && /^\d{1,4}$/.test(text) ? Number(text) : NaN;
   const isAllowed = seconds >= CYCLE_LIMITS.least && seconds <= CYCLE_LIMITS.most;
@@ -23,14 +23,14 @@ export function cycleWish(search: string) {
 export const sensorsOf = (tags: readonly Tag[], offered: readonly Sensor[]): readonly Sensor[] =>
   offered.filter(({ name }) => tags.some((tag) => tag.readings.has(name)));
 
-/** The one after `current`, the first after the last; null: there is no other. */
+/** The sensor after `current`, the first after the last; null: there is no other. */
 function sensorAfter(sensors: readonly Sensor[], current: string): Sensor | null {
   const index = sensors.findIndex(({ name }) => name === current);
   const next = sensors[(index + 1) % Math.max(1, sensors.length)];
   return next && next.name !== current ? next : null;
 }
 
-/** The address of the same page to be operated: without what makes it a wall screen. */
+/** The address of the same page with controls: without the wall screen's parameters. */
 export function addressOfPage(search: string, hash: string): string {
   const parts = new URLSearchParams(search);
   parts.delete('kiosk');
@@ -39,14 +39,14 @@ export function addressOfPage(search: string, hash: string): string {
   return `?${rest}${hash}`;
 }
 
-/** What comes next, and when, ms on the page's clock; null: the sensor in view stays. */
+/** The next sensor, and when, ms on the page's clock; null: the sensor in view stays. */
 export const nextSensor = createStore<{ readonly sensor: Sensor; readonly at: number } | null>(
   null,
 );
 
 const round = memoLast(sensorsOf);
 
-export function startCycle({ seconds }: CycleWish): () => void {
+export function startCycle({ seconds }: CycleSetting): () => void {
   if (seconds === null) return () => undefined;
   let timer: ReturnType<typeof setTimeout> | undefined;
   let shown: string | null = null;
@@ -55,7 +55,7 @@ export function startCycle({ seconds }: CycleWish): () => void {
     const state = store.get();
     const { view } = state;
     const sensors = round(selectTags(state), selectSensors(state));
-    // What once was is looked at in peace.
+    // A past moment does not cycle.
     const sensor = view.moment === null ? sensorAfter(sensors, view.sensor) : null;
     const before = nextSensor.get();
     if (sensor === null) {
@@ -64,7 +64,7 @@ export function startCycle({ seconds }: CycleWish): () => void {
       nextSensor.set(null);
       return;
     }
-    // Whoever chooses a sensor by hand has it for as long as any other.
+    // A sensor chosen by hand stays for the full time.
     const isSame = before !== null && shown === view.sensor;
     const at = isSame ? before.at : now() + seconds * 1000;
     if (isSame && before.sensor === sensor) return;

@@ -1,9 +1,9 @@
-/** What follows from the state; each remembers its last answer, so that it is worked out once. */
+/** Values derived from the state; each caches its last result. */
 import { houseHealth, type HouseHealth } from '../domain/health';
 import type { Field } from '../contract/types';
 import { symmetricRange } from '../domain/difference';
 import { errorField, onExplored } from '../domain/field';
-import { type Range, rangeOf, rounded, toldApart, withIdeal } from '../domain/ramp';
+import { type Range, rangeOf, rounded, withDistinctEnds, withIdeal } from '../domain/ramp';
 import {
   type CellGrid,
   oldCells,
@@ -32,8 +32,8 @@ import {
 } from '../domain/table';
 import { equal, type Tag } from '../domain/twin';
 import type { AppState } from './app';
-import { keeping, memoLast, memoOne } from '../domain/memo';
-import { isHeardNow, selectIsHeard, selectNewest, selectShown, selectTags } from './moment';
+import { retainEqual, memoLast, memoOne } from '../domain/memo';
+import { isReceivingNow, selectIsReceiving, selectLatest, selectShown, selectTags } from './moment';
 import type { MapPicture } from '../geometry/image';
 import type { Difference } from './twin';
 import { isColumnShown } from './settings';
@@ -43,18 +43,18 @@ const healthShown = memoLast(houseHealth);
 const healthNow = memoLast(houseHealth);
 
 export const selectHealth = (state: AppState): HouseHealth =>
-  healthShown(selectTags(state), selectShown(state).health, selectIsHeard(state));
+  healthShown(selectTags(state), selectShown(state).health, selectIsReceiving(state));
 
-/** As it is now, whatever moment is shown; null before anything has come. */
-export function selectNewestHealth(state: AppState): HouseHealth | null {
-  const { snapshot, health } = selectNewest(state);
-  return snapshot && healthNow(snapshot.tags, health, isHeardNow(state));
+/** The current health, whatever moment is shown; null before the first state. */
+export function selectLatestHealth(state: AppState): HouseHealth | null {
+  const { snapshot, health } = selectLatest(state);
+  return snapshot && healthNow(snapshot.tags, health, isReceivingNow(state));
 }
 
 export const selectCatalogues = (state: AppState): Catalogues =>
   state.twin.sensors.value ?? NO_CATALOGUES;
 
-/** The sensors with the ranges that held at the moment that is shown: by day, or by night. */
+/** The sensors with the ranges of the shown moment: by day or by night. */
 export function selectCatalogue(state: AppState): Catalogue {
   const { day, night } = selectCatalogues(state);
   return (selectShown(state).health?.house.day.is_day ?? true) ? day : night;
@@ -63,19 +63,19 @@ export function selectCatalogue(state: AppState): Catalogue {
 export const selectSensor = (state: AppState): Sensor =>
   selectCatalogue(state).named(state.view.sensor);
 
-/** What the heat map is made of: the estimate and its error come in one. */
+/** The heat map's source: the estimate and its error arrive together. */
 export type Source = 'nearest' | 'estimate';
 
-/** What is computed has no estimate: the twin estimates what tags read. */
+/** A computed sensor has no estimate: the twin estimates only what tags read. */
 export const sourceOf = (state: AppState): Source =>
   state.view.heat !== 'nearest' && isMeasured(selectSensor(state)) ? 'estimate' : 'nearest';
 
 /** A new snapshot with the same sensors keeps the same list. */
-const keptNames = keeping<readonly string[]>(equal);
+const retainedNames = retainEqual<readonly string[]>(equal);
 const namesIn = memoLast((tags: readonly Tag[], chosen: string): readonly string[] => {
   const names = new Set(tags.flatMap((tag) => [...tag.readings.keys()]));
   if (chosen) names.add(chosen);
-  return keptNames([...names].sort());
+  return retainedNames([...names].sort());
 });
 const offered = memoLast((catalogue: Catalogue, names: readonly string[]) => catalogue.with(names));
 
@@ -94,13 +94,13 @@ const notHidden = memoLast((columns: readonly Sensor[], hidden: readonly string[
 export const selectShownColumns = (state: AppState): readonly Sensor[] =>
   notHidden(selectColumns(state), state.settings.hidden);
 
-const keptRange = keeping<Range>();
+const retainedRange = retainEqual<Range>();
 
 const rangeOfReadings = memoLast((tags: readonly Tag[], sensor: string): Range | null =>
   rangeOf(tags.map((tag) => tag.readings.get(sensor))),
 );
 
-/** The range of colours by value: the fixed one, else what field or readings need, and the ideal. */
+/** The colour range by value: the fixed one, else that of field or readings, with the ideal. */
 export function selectRange(state: AppState): Range | null {
   const { view } = state;
   const fixed = fixedRange(view);
@@ -111,18 +111,18 @@ export function selectRange(state: AppState): Range | null {
   const needed =
     isMapped && held?.sensor === view.sensor ? held.range : readings && rounded(readings);
   if (!needed) return null;
-  return keptRange(toldApart(withIdeal(needed, selectSensor(state).ideal)));
+  return retainedRange(withDistinctEnds(withIdeal(needed, selectSensor(state).ideal)));
 }
 
 const siteOf = ({ at, sureSpecies: species }: Tag): Site[] => (at ? [{ at, species }] : []);
-/** New tags whose places and plants are those of before keep the list. */
-const keptSites = keeping<readonly Site[]>(equal);
-const sitesIn = memoOne((tags: readonly Tag[]) => keptSites(tags.flatMap(siteOf)));
+/** New tags with unchanged places and plants keep the list. */
+const retainedSites = retainEqual<readonly Site[]>(equal);
+const sitesIn = memoOne((tags: readonly Tag[]) => retainedSites(tags.flatMap(siteOf)));
 
-/** The same for all fields that lie alike. */
-const keptGrid = keeping<CellGrid>();
+/** The same object for all fields on the same grid. */
+const retainedGrid = retainEqual<CellGrid>();
 const gridOf = memoOne(({ width, height, originX, originY, resolution }: Field) =>
-  keptGrid({ width, height, originX, originY, resolution }),
+  retainedGrid({ width, height, originX, originY, resolution }),
 );
 
 const zonesBy = memoLast(zonesOf);
@@ -139,32 +139,34 @@ export function selectHasIdeal(state: AppState): boolean {
   );
 }
 
-/** By value where that is chosen, and where there is no ideal. */
+/** By value if chosen, or if there is no ideal. */
 export const selectColouring = (state: AppState): ViewState['colouring'] =>
   selectHasIdeal(state) ? state.view.colouring : 'value';
 
 export interface Heat {
   readonly field: Field;
   readonly range: Range;
-  /** The ranges that its colours are about; null: they tell its values, or a difference. */
+  /** The ranges that its colours show; null: they show values, or a difference. */
   readonly zones: Zones | null;
-  /** What it is the difference of; null: it is the field itself. */
+  /** The difference that it shows; null: it is the field itself. */
   readonly difference: Difference | null;
   readonly isError: boolean;
-  /** 1 in each cell whose reading is too old to say, row 0 at the bottom; null: none is. */
+  /** 1 in each cell whose reading is too old, row 0 at the bottom; null: none is. */
   readonly old: Uint8Array | null;
 }
 
-const keptHeat = keeping<Heat>();
+const retainedHeat = retainEqual<Heat>();
 const PLAIN = { zones: null, difference: null, isError: false, old: null } as const;
 
-const keptRead = keeping<readonly ReadSite[]>(equal);
-const readBy = memoLast((...given: Parameters<typeof readSites>) => keptRead(readSites(...given)));
+const retainedRead = retainEqual<readonly ReadSite[]>(equal);
+const readBy = memoLast((...given: Parameters<typeof readSites>) =>
+  retainedRead(readSites(...given)),
+);
 const oldBy = memoLast(oldCells);
 
 /**
- * Where a field of the nearest readings stands for one that is too old to say; what an estimate is
- * worth by then is in its own error.
+ * Where a field of the nearest readings shows one that is too old; an estimate has its growing
+ * error instead.
  */
 function selectOld(state: AppState, field: Field): Uint8Array | null {
   const { health } = selectShown(state);
@@ -176,11 +178,11 @@ const onMap = memoOne((field: Field) =>
   memoLast((map: MapPicture | null) => (map ? onExplored(field, map) : field)),
 );
 
-/** The field of the moment that is shown, as far as the house is explored. */
+/** The field of the shown moment, as far as the greenhouse is explored. */
 function selectField(state: AppState): Field | null {
   const { field, map } = selectShown(state);
   const { value } = field;
-  // The one of before is none of what is wanted: under its name it would be taken for it.
+  // The previous field is another one, and must not appear under this name.
   if (value?.sensor !== state.view.sensor) return null;
   const isEstimate = Boolean(value.sureness ?? value.noEstimate);
   if (isEstimate !== (sourceOf(state) === 'estimate')) return null;
@@ -192,9 +194,9 @@ const errorOf = memoOne((field: Field): Field | null =>
 );
 const errorRange = memoOne(({ valueMax }: Field): Range => ({ low: 0, high: valueMax }));
 
-const keptDifference = keeping<Range>();
+const retainedDifference = retainEqual<Range>();
 
-/** Null: there is none, or the one that is wanted is not here, or nobody knows its colours yet. */
+/** Null: there is none, the wanted one has not arrived, or its colours are not known yet. */
 export function selectHeat(state: AppState): Heat | null {
   if (!state.twin.sensors.value) return null;
   const { compare } = state.view;
@@ -203,17 +205,18 @@ export function selectHeat(state: AppState): Heat | null {
     const field = value?.field;
     if (field?.sensor !== state.view.sensor || field.sampleCount === 0) return null;
     const old = sourceOf(state) === 'nearest' ? selectOld(state, field) : null;
-    const range = keptDifference(symmetricRange(field, selectSensor(state)));
-    return keptHeat({ ...PLAIN, field, range, difference: value, old });
+    const range = retainedDifference(symmetricRange(field, selectSensor(state)));
+    return retainedHeat({ ...PLAIN, field, range, difference: value, old });
   }
   const field = selectField(state);
   const error = field && state.view.heat === 'error' ? errorOf(field) : null;
-  if (error) return keptHeat({ ...PLAIN, field: error, range: errorRange(error), isError: true });
+  if (error)
+    return retainedHeat({ ...PLAIN, field: error, range: errorRange(error), isError: true });
   const range = selectRange(state);
   if (!field || !range || field.sampleCount === 0) return null;
   const isIdeal = selectColouring(state) === 'ideal';
   const old = field.sureness ? null : selectOld(state, field);
-  return keptHeat({
+  return retainedHeat({
     ...PLAIN,
     field,
     range,
@@ -222,7 +225,7 @@ export function selectHeat(state: AppState): Heat | null {
   });
 }
 
-/** The field whose known part is shown, empty ones too; null: none of the sensor is here. */
+/** The field whose known part is shown, possibly empty; null: none of this sensor has arrived. */
 export function selectMapped(state: AppState): Field | null {
   const heated = selectHeat(state);
   return heated || state.view.compare ? (heated?.field ?? null) : selectField(state);
@@ -238,7 +241,7 @@ const filtered = memoLast(
   ): readonly Row[] => filterRows(rowsOf(tags, health), filter, verdict, catalogue),
 );
 
-/** By what the table's rows are together; null: by nothing. */
+/** What the table's rows are grouped by; null: nothing. */
 export const selectAreaOf = (state: AppState): Catalogue['areaOf'] | null =>
   state.settings.byArea ? selectCatalogue(state).areaOf : null;
 
@@ -260,7 +263,7 @@ const sorted = memoLast(
 
 const idsOf = memoOne((rows: readonly Row[]) => new Set(rows.map(({ tag }) => tag.id)));
 
-/** The tags that the table's filter leaves; null: all of them. */
+/** The tags that pass the table's filter; null: all. */
 export function selectListed(state: AppState): ReadonlySet<string> | null {
   const { filter, health } = state.view;
   return filter.trim() === '' && health === null ? null : idsOf(selectRows(state));

@@ -7,17 +7,17 @@ import { act, store } from './app';
 import { selectHeat } from './derived';
 import { startDifference } from './difference';
 
-let asked: URLSearchParams[] = [];
-/** What the bridge knows of the moment that is shown, and of the one before. */
+let requests: URLSearchParams[] = [];
+/** The bridge's data of the shown moment, and of the one before. */
 let known = { now: 22, then: 20.5, samplesThen: 1 };
 let stop: () => void;
 
 beforeEach(() => {
   vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'setInterval', 'clearInterval'] });
-  asked = [];
+  requests = [];
   known = { now: 22, then: 20.5, samplesThen: 1 };
   vi.stubGlobal('fetch', (url: URL) => {
-    asked.push(url.searchParams);
+    requests.push(url.searchParams);
     const isThen = url.searchParams.has('at');
     const value = isThen ? known.then : known.now;
     return Promise.resolve(
@@ -48,18 +48,20 @@ const settled = async (): Promise<void> => {
 
 test('nothing is fetched while nothing is compared', async () => {
   await settled();
-  expect(asked).toEqual([]);
+  expect(requests).toEqual([]);
 });
 
 test('both fields are asked for on one box, and their difference is the heat map', async () => {
   act({ compare: { by: 'moment', at: 500 } });
-  // What is shown meanwhile is no difference, and not shown as one.
+  // Until then nothing is shown as a difference.
   expect(selectHeat(store.get())).toBeNull();
   await settled();
-  expect(asked.map((query) => query.get('at'))).toEqual([null, '500.000']);
-  const boxes = asked.map((query) => [...query].filter(([key]) => key.startsWith('bbox')).join());
+  expect(requests.map((query) => query.get('at'))).toEqual([null, '500.000']);
+  const boxes = requests.map((query) =>
+    [...query].filter(([key]) => key.startsWith('bbox')).join(),
+  );
   expect(new Set(boxes).size).toBe(1);
-  expect(asked[0]?.get('bbox_max_y')).toBe('3.5');
+  expect(requests[0]?.get('bbox_max_y')).toBe('3.5');
   const heat = selectHeat(store.get());
   expect([...(heat?.field.values ?? [])]).toEqual([1.5, NaN]);
   expect(heat?.range).toEqual({ low: -1.5, high: 1.5 });
@@ -77,7 +79,7 @@ test('where memory has nothing of then, there is no heat map and it is told', as
 test('before all time nothing is asked for', async () => {
   act({ compare: { by: 'ago', seconds: 1e12 } });
   await settled();
-  expect(asked).toHaveLength(1);
+  expect(requests).toHaveLength(1);
   expect(store.get().twin.difference.value?.field).toBeNull();
 });
 

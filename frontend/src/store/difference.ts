@@ -1,6 +1,6 @@
 /**
- * Fetches what the heat map is when it is compared: the field of the moment that is shown, and that
- * of the other one, on one grid.
+ * Fetches what a compared heat map needs: the fields of the shown and of the other moment, on one
+ * grid.
  */
 import { now } from '../clock';
 import { differenceOf, otherMoment, type Compare } from '../domain/difference';
@@ -9,11 +9,11 @@ import type { Bounds } from '../geometry/coordinates';
 import { keepFetched, receive, type AppState } from './app';
 import { sourceOf } from './derived';
 import { boxOfPins, fetchHeat, fieldResolution } from './heat';
-import { rosNow, selectNewest, selectShown } from './moment';
-import { DRAG_PACE_MS, failed, NOTHING, ready, type Wish } from './fetcher';
+import { rosNow, selectLatest, selectShown } from './moment';
+import { DRAG_PACE_MS, failed, NOTHING, ready, type FetchTask } from './fetcher';
 import { type Difference } from './twin';
 
-/** Live, the other moment moves on with now; this far at once, seconds. */
+/** When live, the other moment follows now in steps of this length, seconds. */
 const STEP_S = 10;
 const TICK_MS = 2_000;
 
@@ -33,7 +33,7 @@ export function startDifference(): () => void {
     },
     (state) => {
       const { compare, sensor } = state.view;
-      // Of another sensor or source, or to another moment, it is none of what is wanted.
+      // A difference of another sensor, source or moment must not stay.
       const isOther =
         compare === null ||
         before?.view.compare !== compare ||
@@ -41,16 +41,16 @@ export function startDifference(): () => void {
         sourceOf(before) !== sourceOf(state);
       before = state;
       if (isOther && state.twin.difference !== NOTHING) receive({ difference: NOTHING });
-      return compare && wishFor(state, compare);
+      return compare && taskFor(state, compare);
     },
   );
 }
 
-function wishFor(state: AppState, compare: Compare): Wish<Difference> | undefined {
+function taskFor(state: AppState, compare: Compare): FetchTask<Difference> | undefined {
   const { moment, snapshot } = selectShown(state);
   const { epoch, socket } = state.twin.connection;
   const nowS = rosNow(state, now());
-  const resolution = fieldResolution(selectNewest(state).snapshot);
+  const resolution = fieldResolution(selectLatest(state).snapshot);
   const box = boxOf(snapshot, resolution);
   if (!snapshot || !box || nowS === null || socket.kind !== 'open') return undefined;
   const { sensor } = state.view;
@@ -74,7 +74,7 @@ function wishFor(state: AppState, compare: Compare): Wish<Difference> | undefine
   };
 }
 
-/** Around all pins, in whole cells: both fields lie on the same ones. */
+/** A box around all pins, in whole cells, so that both fields share them. */
 function boxOf(snapshot: Snapshot | null, resolution: number): Bounds | null {
   const bounds = boxOfPins(snapshot);
   if (!bounds) return null;

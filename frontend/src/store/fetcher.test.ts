@@ -2,9 +2,9 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { Refusal } from '../contract/api';
 import { S } from '../strings';
-import { createFetcher, DRAG_PACE_MS, type Wish } from './fetcher';
+import { createFetcher, DRAG_PACE_MS, type FetchTask } from './fetcher';
 
-let told: string[];
+let received: string[];
 let errors: { message: string; isLasting: boolean }[];
 let started: string[];
 let fetches: Map<string, { resolve: () => void; reject: (error: Error) => void; over: boolean }>;
@@ -12,7 +12,7 @@ let fetcher: ReturnType<typeof createFetcher<string>>;
 
 beforeEach(() => {
   vi.useFakeTimers();
-  told = [];
+  received = [];
   errors = [];
   started = [];
   fetches = new Map();
@@ -28,11 +28,11 @@ afterEach(async () => {
 const make = (options: { paceMs: number; isDragged?: boolean }): typeof fetcher =>
   createFetcher<string>({
     ...options,
-    onValue: (value) => told.push(value),
+    onValue: (value) => received.push(value),
     onError: (message, isLasting) => errors.push({ message, isLasting }),
   });
 
-const wish = (key: string, group?: string): Wish<string> => ({
+const task = (key: string, group?: string): FetchTask<string> => ({
   key,
   ...(group === undefined ? {} : { group }),
   run: (signal) =>
@@ -63,16 +63,16 @@ const fail = async (key: string, error: Error): Promise<void> => {
 const open = (): string[] => [...fetches].filter(([, { over }]) => !over).map(([key]) => key);
 
 test('the first wish is fetched at once', async () => {
-  fetcher.want(wish('a'));
+  fetcher.want(task('a'));
   expect(started).toEqual(['a']);
   await answer('a');
-  expect(told).toEqual(['a']);
+  expect(received).toEqual(['a']);
 });
 
 describe('while somebody drags', () => {
   test('two fetches run, the newest wish is the next, and those between are dropped', async () => {
     for (const key of ['a', 'b', 'c', 'd', 'e']) {
-      fetcher.want(wish(key));
+      fetcher.want(task(key));
       await pass(100);
     }
     expect(started).toEqual(['a', 'b']);
@@ -80,12 +80,12 @@ describe('while somebody drags', () => {
     expect(started).toEqual(['a', 'b', 'e']);
     await answer('b');
     await answer('e');
-    expect(told).toEqual(['a', 'b', 'e']);
+    expect(received).toEqual(['a', 'b', 'e']);
   });
 
   test('a dozen a second are started, however fast the answers are', async () => {
     for (let index = 0; index < 100; index++) {
-      fetcher.want(wish(`${index}`));
+      fetcher.want(task(`${index}`));
       await pass(10);
       for (const key of open()) await answer(key);
     }
@@ -93,84 +93,84 @@ describe('while somebody drags', () => {
     expect(started.length).toBeLessThanOrEqual(13);
     await pass(100);
     await answer('99');
-    expect(told.at(-1)).toBe('99');
+    expect(received.at(-1)).toBe('99');
   });
 
   test('what is overtaken is never told, and its fetch ends', async () => {
-    fetcher.want(wish('a'));
+    fetcher.want(task('a'));
     await pass(100);
-    fetcher.want(wish('b'));
+    fetcher.want(task('b'));
     await answer('b');
     expect(fetches.get('a')?.over).toBe(true);
-    expect(told).toEqual(['b']);
+    expect(received).toEqual(['b']);
   });
 
   test('but what is wanted again goes on, and is told', async () => {
-    fetcher.want(wish('a'));
+    fetcher.want(task('a'));
     await pass(100);
-    fetcher.want(wish('b'));
-    fetcher.want(wish('a'));
+    fetcher.want(task('b'));
+    fetcher.want(task('a'));
     await answer('b');
-    expect(told).toEqual(['b']);
+    expect(received).toEqual(['b']);
     await answer('a');
-    expect(told).toEqual(['b', 'a']);
+    expect(received).toEqual(['b', 'a']);
     expect(started).toEqual(['a', 'b']);
   });
 
   test('where it comes to rest, slow fetches of what was passed end', async () => {
     for (const key of ['a', 'b', 'c']) {
-      fetcher.want(wish(key));
+      fetcher.want(task(key));
       await pass(100);
     }
     expect(open()).toEqual(['a', 'b']);
     await pass(250);
     expect(open()).toEqual(['c']);
     await answer('c');
-    expect(told).toEqual(['c']);
+    expect(received).toEqual(['c']);
   });
 });
 
 test('what came a moment ago is there at once, but not for ever', async () => {
-  fetcher.want(wish('a'));
+  fetcher.want(task('a'));
   await answer('a');
   await pass(100);
-  fetcher.want(wish('b'));
+  fetcher.want(task('b'));
   await answer('b');
-  fetcher.want(wish('a'));
-  expect(told).toEqual(['a', 'b', 'a']);
+  fetcher.want(task('a'));
+  expect(received).toEqual(['a', 'b', 'a']);
   expect(started).toEqual(['a', 'b']);
   await pass(31_000);
-  fetcher.want(wish('b'));
+  fetcher.want(task('b'));
   expect(started).toEqual(['a', 'b', 'b']);
 });
 
 test('so many are kept, and the oldest goes', async () => {
   for (let index = 0; index <= 60; index++) {
-    fetcher.want(wish(`${index}`));
+    fetcher.want(task(`${index}`));
     await pass(100);
     await answer(`${index}`);
   }
-  fetcher.want(wish('1'));
-  expect(told.at(-1)).toBe('1');
-  fetcher.want(wish('0'));
+  fetcher.want(task('1'));
+  expect(received.at(-1)).toBe('1');
+  fetcher.want(task('0'));
   await pass(100);
   expect(started.filter((key) => key === '0' || key === '1')).toEqual(['0', '1', '0']);
 });
 
 test('nothing wanted ends all, and leaves nothing behind', async () => {
-  fetcher.want(wish('a'));
+  fetcher.want(task('a'));
   fetcher.want(null);
   expect(open()).toEqual([]);
   await pass(60_000);
-  expect([told, errors]).toEqual([[], []]);
-  fetcher.want(wish('a'));
+  expect([received, errors]).toEqual([[], []]);
+  fetcher.want(task('a'));
   await answer('a');
-  expect(told).toEqual(['a']);
+  expect(received).toEqual(['a']);
 });
 
 describe('a failure', () => {
   test('is told, and tried again ever more slowly', async () => {
-    fetcher.want(wish('a'));
+    fetcher.want(task('a'));
     for (const pause of [2_000, 4_000, 8_000]) {
       await fail('a', new Error('down'));
       const before = started.length;
@@ -181,11 +181,11 @@ describe('a failure', () => {
     }
     await answer('a');
     expect(errors).toEqual(Array(3).fill({ message: 'down', isLasting: false }));
-    expect(told).toEqual(['a']);
+    expect(received).toEqual(['a']);
   });
 
   test.each([400, 404])('that will last (%i) is not tried again', async (status) => {
-    fetcher.want(wish('a'));
+    fetcher.want(task('a'));
     await fail('a', new Refusal(status, 'never'));
     await pass(120_000);
     expect(errors).toEqual([{ message: 'never', isLasting: true }]);
@@ -193,13 +193,13 @@ describe('a failure', () => {
   });
 
   test('of what nobody wants any more is no news, but a server that asks for peace gets it', async () => {
-    fetcher.want(wish('a'));
+    fetcher.want(task('a'));
     await pass(100);
-    fetcher.want(wish('b'));
+    fetcher.want(task('b'));
     await fail('a', new Refusal(429, 'too much', 3));
     expect(errors).toEqual([]);
     await answer('b');
-    fetcher.want(wish('c'));
+    fetcher.want(task('c'));
     await pass(2_800);
     expect(started).toEqual(['a', 'b']);
     await pass(200);
@@ -207,7 +207,7 @@ describe('a failure', () => {
   });
 
   test('is also that no answer comes', async () => {
-    fetcher.want(wish('a'));
+    fetcher.want(task('a'));
     await pass(30_000);
     expect(errors).toEqual([{ message: S.serverBusy, isLasting: false }]);
   });
@@ -220,7 +220,7 @@ describe('a failure', () => {
     'for load (%i) is told in plain words, and tried again in %i s, soon at the latest',
     async (...of) => {
       const [status, retryAfterS, waitMs] = of;
-      fetcher.want(wish('a'));
+      fetcher.want(task('a'));
       await fail('a', new Refusal(status, 'client_rate', retryAfterS));
       expect(errors).toEqual([{ message: S.serverBusy, isLasting: false }]);
       await pass(waitMs - 1);
@@ -231,7 +231,7 @@ describe('a failure', () => {
   );
 
   test('is also that there is no network', async () => {
-    fetcher.want(wish('a'));
+    fetcher.want(task('a'));
     await fail('a', new TypeError('Failed to fetch'));
     expect(errors).toEqual([{ message: S.serverBusy, isLasting: false }]);
   });
@@ -243,39 +243,39 @@ describe('what keeps itself up to date', () => {
   });
 
   test('is fetched at once, and never again for the same key', async () => {
-    fetcher.want(wish('1'));
+    fetcher.want(task('1'));
     expect(started).toEqual(['1']);
     await answer('1');
-    fetcher.want(wish('1'));
+    fetcher.want(task('1'));
     await pass(10_000);
-    expect([started, told]).toEqual([['1'], ['1']]);
+    expect([started, received]).toEqual([['1'], ['1']]);
   });
 
   test('costs one fetch a pace, however often it changes, and the last change is fetched', async () => {
-    for (const key of ['1', '2', '3', '4']) fetcher.want(wish(key));
+    for (const key of ['1', '2', '3', '4']) fetcher.want(task(key));
     await answer('1');
     expect(started).toEqual(['1']);
     await pass(500);
     expect(started).toEqual(['1', '4']);
     await answer('4');
-    expect(told).toEqual(['1', '4']);
+    expect(received).toEqual(['1', '4']);
   });
 
   test('gives way to another group at once', async () => {
-    fetcher.want(wish('1', 'temperature'));
-    fetcher.want(wish('2', 'humidity'));
+    fetcher.want(task('1', 'temperature'));
+    fetcher.want(task('2', 'humidity'));
     expect(open()).toEqual(['2']);
     expect(started).toEqual(['1', '2']);
     await answer('2');
-    expect(told).toEqual(['2']);
+    expect(received).toEqual(['2']);
   });
 
   test('is tried again ever more slowly, though it has changed meanwhile and though it was refused', async () => {
     for (const [index, pause] of [2_000, 4_000, 8_000].entries()) {
-      fetcher.want(wish(`${index}`));
+      fetcher.want(task(`${index}`));
       await pass(0);
       await fail(`${index}`, new Refusal(404, 'not yet'));
-      fetcher.want(wish(`${index + 1}`));
+      fetcher.want(task(`${index + 1}`));
       await pass(pause - 1);
       expect(started).toHaveLength(index + 1);
       await pass(1);

@@ -1,6 +1,6 @@
 /**
- * Fetches what is wanted just now: the latest wish wins, nothing queues, and a failure is tried
- * again, ever more slowly.
+ * Fetches what is wanted now: the latest task wins, nothing queues, and failures are retried ever
+ * more slowly.
  */
 import { useEffect, useState } from 'react';
 
@@ -8,24 +8,24 @@ import { now } from '../clock';
 import { Refusal } from '../contract/api';
 import { failureText } from '../domain/format';
 
-/** While somebody drags: a dozen starts a second, which a server of this kind allows. */
+/** Pace while dragging: a dozen starts a second, which such a server allows. */
 export const DRAG_PACE_MS = 80;
-/** While somebody drags, so many at once: the next is on its way while one is being answered. */
+/** Concurrent fetches while dragging: one is sent while the other is being answered. */
 const MOST_DRAGGED = 2;
-/** A wish that has stood for so long is what the operator has come to; older fetches then end. */
+/** After this long without change, the drag has settled; older fetches then end. */
 const SETTLED_MS = 250;
 const TIMEOUT_MS = 30_000;
-/** While somebody drags, an answer serves again for so long: late readings may still change the past. */
-const KEEP_MS = 30_000;
-const MOST_KEPT = 60;
-/** After a failure nothing is fetched for so long at least. */
+/** Cache TTL while dragging: late readings may still change the past. */
+const CACHE_MS = 30_000;
+const MOST_CACHED = 60;
+/** Shortest pause after a failure. */
 const CALM_MS = 500;
 const RETRY_FIRST_MS = 2_000;
 const RETRY_LONGEST_MS = 30_000;
-/** A server that wants to be left alone for longer is asked all the same. */
+/** Longest honoured `Retry-After`. */
 const CALM_LONGEST_MS = 60_000;
 
-/** Something fetched beside the frames. While it is fetched again, the old value stays. */
+/** Something fetched in addition to the frames. During a refetch, the old value stays. */
 export interface Fetched<T> {
   readonly value: T | null;
   readonly state: 'waiting' | 'ready' | 'failed';
@@ -40,12 +40,12 @@ export const failed = <T>(message: string, value: T | null = null): Fetched<T> =
   ...{ value, state: 'failed', message },
 });
 
-export interface Wish<T> {
-  /** What it depends on; a wish with the key of the one before brings nothing new. */
+export interface FetchTask<T> {
+  /** What the result depends on; a task with the previous key changes nothing. */
   readonly key: string;
-  /** A wish of another group takes over at once; those of one group keep the pace. */
+  /** A task of another group starts at once; tasks of one group keep the pace. */
   readonly group?: string;
-  /** In place of the fetcher's own pace, ms. */
+  /** Overrides the fetcher's pace, ms. */
   readonly paceMs?: number;
   readonly run: (signal: AbortSignal) => Promise<T>;
 }
@@ -53,15 +53,15 @@ export interface Wish<T> {
 export interface FetcherOptions<T> {
   /** Shortest time between two starts, ms. */
   readonly paceMs: number;
-  /** For a wish that somebody drags: two fetches at once, and answers that serve again. */
+  /** For a dragged value: two concurrent fetches, and cached answers. */
   readonly isDragged?: boolean;
-  /** Something that was wanted, and nothing older than the value before. */
+  /** Receives a wanted value, never older than the previous one. */
   readonly onValue: (value: T) => void;
-  /** What is wanted cannot be had; unless `isLasting`, it is tried again. */
+  /** The fetch failed; unless `isLasting`, it is retried. */
   readonly onError?: (message: string, isLasting: boolean) => void;
 }
 
-/** A refusal that the same request gets again. */
+/** Whether the same request would be refused again. */
 const isRefused = (error: unknown): boolean =>
   error instanceof Refusal && (error.status === 400 || error.status === 404);
 
@@ -76,20 +76,20 @@ export function createFetcher<T>({
     readonly order: number;
     readonly abort: AbortController;
   }
-  let wanted: Wish<T> | null = null;
+  let wanted: FetchTask<T> | null = null;
   let wantedSince = 0;
-  /** The key whose value was handed on last, and the order of the wish that it was. */
+  /** Key of the value handed on last, and the order of its task. */
   let done: string | null = null;
   let doneOrder = 0;
   let order = 0;
   let running: readonly Running[] = [];
   let startedAt = -Infinity;
-  /** After a failure: no fetch before this, and none of what failed before that. */
+  /** After a failure: no fetch before `calmUntil`, and no retry before `retryAt`. */
   let calmUntil = -Infinity;
   let retryAt = -Infinity;
   let failures = 0;
   let timer: ReturnType<typeof setTimeout> | undefined;
-  const kept = new Map<string, { readonly value: T; readonly since: number }>();
+  const cached = new Map<string, { readonly value: T; readonly since: number }>();
 
   const end = (which: (each: Running) => boolean = () => true): void => {
     for (const each of running.filter(which)) each.abort.abort();
@@ -101,21 +101,21 @@ export function createFetcher<T>({
     done = key;
     doneOrder = Math.max(doneOrder, mine);
     failures = 0;
-    // Nobody waits any more for what was wanted before this.
+    // Nothing waits for earlier tasks any more.
     end((each) => each.order < mine && each.key !== wanted?.key);
     onValue(value);
   };
 
-  const keep = (key: string, value: T): void => {
-    kept.delete(key);
-    kept.set(key, { value, since: now() });
-    for (const oldest of kept.keys()) {
-      if (kept.size <= MOST_KEPT) break;
-      kept.delete(oldest);
+  const cache = (key: string, value: T): void => {
+    cached.delete(key);
+    cached.set(key, { value, since: now() });
+    for (const oldest of cached.keys()) {
+      if (cached.size <= MOST_CACHED) break;
+      cached.delete(oldest);
     }
   };
 
-  /** Starts what is wanted, or looks again when it may be started. */
+  /** Starts the wanted task, or schedules its start. */
   const pump = (): void => {
     clearTimeout(timer);
     if (!wanted || wanted.key === done) return;
@@ -123,7 +123,7 @@ export function createFetcher<T>({
     const at = now();
     if (running.some((each) => each.key === key)) return;
     if (running.length >= (isDragged ? MOST_DRAGGED : 1)) {
-      // What keeps the pace waits for its answer.
+      // Without dragging, the running fetch ends first.
       if (!isDragged) return;
       const settled = wantedSince + SETTLED_MS;
       if (at < settled) {
@@ -137,9 +137,9 @@ export function createFetcher<T>({
     else start(wanted);
   };
 
-  const start = (wish: Wish<T>): void => {
+  const start = (task: FetchTask<T>): void => {
     const abort = new AbortController();
-    const mine = { key: wish.key, order: ++order, abort };
+    const mine = { key: task.key, order: ++order, abort };
     running = [...running, mine];
     startedAt = now();
     const late = setTimeout(() => {
@@ -151,11 +151,11 @@ export function createFetcher<T>({
       running = running.filter((each) => each !== mine);
       return !wasRunning;
     };
-    wish.run(abort.signal).then(
+    task.run(abort.signal).then(
       (value) => {
         if (isOver()) return;
-        if (isDragged) keep(wish.key, value);
-        handOn(wish.key, mine.order, value);
+        if (isDragged) cache(task.key, value);
+        handOn(task.key, mine.order, value);
         pump();
       },
       (error: unknown) => {
@@ -163,9 +163,9 @@ export function createFetcher<T>({
         const isLasting = isDragged && isRefused(error);
         const waitMs = error instanceof Refusal ? (error.retryAfterS ?? 0) * 1_000 : 0;
         calmUntil = now() + Math.min(CALM_LONGEST_MS, Math.max(CALM_MS, waitMs));
-        // What nobody wants any more needs no second try.
-        if (wanted?.key === wish.key || !isDragged) {
-          if (isLasting) done = wish.key;
+        // A task that is no longer wanted needs no retry.
+        if (wanted?.key === task.key || !isDragged) {
+          if (isLasting) done = task.key;
           retryAt = now() + Math.min(RETRY_LONGEST_MS, RETRY_FIRST_MS * 2 ** failures);
           failures += 1;
           onError?.(failureText(error), isLasting);
@@ -176,11 +176,11 @@ export function createFetcher<T>({
   };
 
   return {
-    /** Null: nothing any more; all that is under way ends. */
-    want: (wish: Wish<T> | null): void => {
-      if (wish?.key === wanted?.key && wish?.group === wanted?.group) return;
-      const isOther = !wish || wish.group !== wanted?.group;
-      wanted = wish;
+    /** Null: nothing is wanted any more; running fetches end. */
+    want: (task: FetchTask<T> | null): void => {
+      if (task?.key === wanted?.key && task?.group === wanted?.group) return;
+      const isOther = !task || task.group !== wanted?.group;
+      wanted = task;
       wantedSince = now();
       if (isOther || isDragged) {
         failures = 0;
@@ -189,25 +189,25 @@ export function createFetcher<T>({
       if (isOther) {
         clearTimeout(timer);
         end();
-        kept.clear();
+        cached.clear();
         done = null;
         startedAt = -Infinity;
       }
-      if (!wish) return;
-      const known = kept.get(wish.key);
-      if (known && now() - known.since < KEEP_MS) handOn(wish.key, ++order, known.value);
+      if (!task) return;
+      const known = cached.get(task.key);
+      if (known && now() - known.since < CACHE_MS) handOn(task.key, ++order, known.value);
       else pump();
     },
   };
 }
 
 /**
- * What a component wishes for just now; null: nothing more. The value before stays until the next
- * has come, also that of another group: "waiting" then.
+ * Fetches what a component needs; null: nothing. The previous value stays until the next arrives;
+ * of another group it is "waiting".
  */
-export function useFetched<T>(wish: Wish<T> | null, paceMs: number): Fetched<T> {
+export function useFetched<T>(task: FetchTask<T> | null, paceMs: number): Fetched<T> {
   const [fetched, setFetched] = useState<Fetched<T>>(NOTHING);
-  const [group, setGroup] = useState(wish?.group);
+  const [group, setGroup] = useState(task?.group);
   const [fetcher] = useState(() =>
     createFetcher<T>({
       paceMs,
@@ -219,13 +219,13 @@ export function useFetched<T>(wish: Wish<T> | null, paceMs: number): Fetched<T> 
       },
     }),
   );
-  if (wish && wish.group !== group) {
-    setGroup(wish.group);
+  if (task && task.group !== group) {
+    setGroup(task.group);
     setFetched(({ value }) => ({ value, state: 'waiting', message: '' }));
   }
-  // The same wish as before changes nothing.
+  // An unchanged task has no effect.
   useEffect(() => {
-    fetcher.want(wish);
+    fetcher.want(task);
   });
   useEffect(
     () => () => {

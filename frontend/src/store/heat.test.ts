@@ -8,22 +8,22 @@ import { withState } from './twin';
 import { selectHeat } from './derived';
 import { startLoaders } from './loaders';
 
-let asked: string[];
+let requests: string[];
 let refusal: number | null;
 let stop: () => void;
 
 const tags = [wireTag({ readings: readings({ temperature: 20 }) })];
-const count = (part: string): number => asked.filter((url) => url.includes(part)).length;
+const count = (part: string): number => requests.filter((url) => url.includes(part)).length;
 const field = (): ReturnType<typeof store.get>['twin']['latest']['field'] =>
   store.get().twin.latest.field;
-/** Another state, and nothing else. */
-const hear = (sec: number): void => {
+/** Receives another state only. */
+const receiveState = (sec: number): void => {
   const latest = stateFrame(tags, { sec, revision: `heard ${sec}` });
   receive(withState(latest, performance.now()));
 };
-/** Its code is loaded with the first estimate, which no clock of a test hurries. */
+/** Waits for the code that loads with the first estimate: fake timers do not speed it up. */
 const until = async (look: () => boolean): Promise<void> => {
-  for (let tries = 0; tries < 1_000 && !look(); tries++) {
+  for (let attempts = 0; attempts < 1_000 && !look(); attempts++) {
     await vi.dynamicImportSettled();
     await vi.advanceTimersByTimeAsync(50);
   }
@@ -32,10 +32,10 @@ const until = async (look: () => boolean): Promise<void> => {
 
 beforeEach(() => {
   vi.useFakeTimers();
-  asked = [];
+  requests = [];
   refusal = null;
   vi.stubGlobal('fetch', (url: URL) => {
-    asked.push(`${url.pathname}${url.search}`);
+    requests.push(`${url.pathname}${url.search}`);
     if (url.pathname === '/api/field.npy') return Promise.resolve(npyField([1, 2]));
     if (url.pathname !== '/api/estimate.npy' || refusal !== null) {
       const detail = { detail: 'ten scans are needed' };
@@ -57,12 +57,12 @@ test('the estimate that is chosen takes the place of the nearest readings, with 
   await until(() => field().value !== null);
   expect(count('estimate')).toBe(0);
   act({ heat: 'estimate' });
-  // Under the estimate's name nothing else is shown.
+  // Nothing else appears under the estimate's name.
   expect(selectHeat(store.get())).toBeNull();
   await until(() => field().value?.sureness !== undefined);
   expect(selectHeat(store.get())).toMatchObject({ isError: false, field: { valueMax: 22 } });
   act({ heat: 'error' });
-  // Both came in one.
+  // Both arrived together.
   expect(selectHeat(store.get())?.isError).toBe(true);
   const before = count('estimate.npy');
   await vi.advanceTimersByTimeAsync(1_000);
@@ -94,7 +94,7 @@ test('a house that changes ten times a second costs one estimate a second', asyn
   act({ heat: 'estimate' });
   await until(() => count('estimate.npy') === 1);
   for (let change = 0; change < 30; change++) {
-    hear(1_000 + change);
+    receiveState(1_000 + change);
     await vi.advanceTimersByTimeAsync(100);
   }
   expect(count('estimate.npy')).toBeLessThanOrEqual(5);
@@ -113,10 +113,10 @@ test.each([
   expect(selectHeat(store.get())).toMatchObject({ isError: false, field: { sampleCount: 4 } });
   act({ heat: 'error' });
   expect(selectHeat(store.get())?.isError).toBe(false);
-  // Asked again now and then, and not with every reading.
+  // Retried at intervals, not with every reading.
   const before = count('estimate.npy');
   for (let change = 0; change < 5; change++) {
-    hear(2_000 + change);
+    receiveState(2_000 + change);
     await vi.advanceTimersByTimeAsync(1_000);
   }
   expect(count('estimate.npy')).toBe(before);

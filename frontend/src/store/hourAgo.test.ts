@@ -9,30 +9,30 @@ import { NO_HOUSE, withPast, withState } from './twin';
 
 const NOW_S = 100_000;
 
-let asked: (string | null)[];
+let requests: (string | null)[];
 let answers: boolean;
 let stop: () => void;
 
-const hear = (sec: number): void => {
+const receiveState = (sec: number): void => {
   const latest = stateFrame([wireTag()], { sec });
   receive(withState(latest, performance.now()));
 };
 
 beforeEach(() => {
   vi.useFakeTimers();
-  asked = [];
+  requests = [];
   answers = true;
   vi.stubGlobal('fetch', (url: URL) => {
     if (!answers) return Promise.reject(new Error('no past'));
     const { pathname, searchParams } = url;
     const at = Number(searchParams.get('at'));
     if (pathname.endsWith('health')) return Promise.resolve(Response.json(judgement({})));
-    asked.push(searchParams.get('at'));
+    requests.push(searchParams.get('at'));
     const tags = [wireTag({ readings: readings({ temperature: 20 }) })];
     return Promise.resolve(Response.json(stateFrame(tags, { sec: at }).state));
   });
   showTags([wireTag()]);
-  hear(NOW_S);
+  receiveState(NOW_S);
 });
 afterEach(() => {
   stop();
@@ -52,14 +52,14 @@ test('an hour before now is asked for once, and again after some minutes', async
   await pass(10);
   expect(hourAgo.get()?.tags.get('1')?.tag.readings.get('temperature')).toBe(20);
   for (const second of [1, 2, 100, 299]) {
-    hear(NOW_S + second);
+    receiveState(NOW_S + second);
     await pass(10);
   }
-  expect(asked).toHaveLength(1);
-  expect(Math.round(Number(asked[0]))).toBe(NOW_S - 3_600);
-  hear(NOW_S + 302);
+  expect(requests).toHaveLength(1);
+  expect(Math.round(Number(requests[0]))).toBe(NOW_S - 3_600);
+  receiveState(NOW_S + 302);
   await pass(1_000);
-  expect(asked).toHaveLength(2);
+  expect(requests).toHaveLength(2);
 });
 
 test('what a reading of now is compared with stays until there is a newer one', async () => {
@@ -67,13 +67,13 @@ test('what a reading of now is compared with stays until there is a newer one', 
   await pass(10);
   const first = hourAgo.get()?.tags.get('1');
   expect(thenOf(hourAgo.get(), at(22), 'temperature')).toBe(first);
-  hear(NOW_S + 302);
+  receiveState(NOW_S + 302);
   await pass(1_000);
   const second = hourAgo.get()?.tags.get('1');
   expect(second).not.toBe(first);
   expect(thenOf(hourAgo.get(), at(22), 'temperature')).toBe(first);
   expect(thenOf(hourAgo.get(), at(23), 'temperature')).toBe(second);
-  // Of a moment in the past it is what was an hour before, however somebody came there.
+  // At a past moment it is the state an hour before, however the moment was reached.
   act({ moment: 50_000 });
   receive(withPast({ at: 50_000, house: NO_HOUSE }));
   await pass(1_000);
@@ -94,10 +94,10 @@ test('a reading that is an hour old itself is compared with none that is older',
 
 test('where a day is a short one, so is its hour', async () => {
   goLive(status({ day_length_s: 1_440 }));
-  hear(NOW_S);
+  receiveState(NOW_S);
   stop = startHourAgo();
   await pass(10);
-  expect(Math.round(Number(asked[0]))).toBe(NOW_S - 60);
+  expect(Math.round(Number(requests[0]))).toBe(NOW_S - 60);
   goLive();
 });
 
@@ -107,10 +107,10 @@ test('nothing is asked until the bridge has said how long an hour is', async () 
   receive(withPast({ at: 50_000, house: NO_HOUSE }));
   stop = startHourAgo();
   await pass(1_000);
-  expect(asked).toEqual([]);
+  expect(requests).toEqual([]);
   goLive(status({ day_length_s: 1_440 }));
   await pass(1_000);
-  expect(asked.map(Number)).toEqual([49_940]);
+  expect(requests.map(Number)).toEqual([49_940]);
   goLive();
 });
 
@@ -123,17 +123,17 @@ test('of the moments that somebody drags through, few are fetched, and the last'
     await pass(100);
   }
   await pass(1_000);
-  expect(asked.slice(1).map(Number)).toEqual([46_600]);
+  expect(requests.slice(1).map(Number)).toEqual([46_600]);
 });
 
 test('nobody asks for a trend that nobody wants to see, nor for what was before all time', async () => {
   prefer({ hidden: ['trend'] });
   stop = startHourAgo();
   await pass(1_000);
-  hear(3_599);
+  receiveState(3_599);
   prefer({ hidden: [] });
   await pass(1_000);
-  expect(asked).toEqual([]);
+  expect(requests).toEqual([]);
 });
 
 test('a twin that keeps no past is asked again after a while, not with each frame', async () => {
@@ -141,9 +141,9 @@ test('a twin that keeps no past is asked again after a while, not with each fram
   stop = startHourAgo();
   await pass(10);
   answers = true;
-  hear(NOW_S + 1);
+  receiveState(NOW_S + 1);
   await pass(1_500);
-  expect(asked).toEqual([]);
+  expect(requests).toEqual([]);
   await pass(1_000);
-  expect(asked).toHaveLength(1);
+  expect(requests).toHaveLength(1);
 });

@@ -1,4 +1,4 @@
-/** The house an hour before what is shown, for the table's trends: one request now and then. */
+/** The greenhouse an hour before the shown moment, for the table's trends; fetched rarely. */
 import { now } from '../clock';
 import { fetchStateAt } from '../contract/past';
 import { intervalText } from '../domain/format';
@@ -7,26 +7,26 @@ import { sameReading, type TagThen } from '../domain/difference';
 import { snapshotOf, type Tag } from '../domain/twin';
 import { keepFetched, store, type AppState } from './app';
 import { createStore } from './create';
-import { rosNow, selectDayS, selectNewest, selectShown } from './moment';
+import { rosNow, selectDayS, selectLatest, selectShown } from './moment';
 import { isColumnShown } from './settings';
 import { NOT_JUDGED } from '../domain/health';
 
-/** An hour of the greenhouse's day, seconds of the twin's time: a demo's day is a short one. */
+/** An hour of the greenhouse's day, seconds of the twin's time: a demo has short days. */
 const selectHourS = (state: AppState): number => selectDayS(state) / 24;
 
-/** The length of the greenhouse's hour where that is shorter than one of the clock; else null. */
+/** The length of the greenhouse's hour if shorter than a real hour; else null. */
 export function shortHourText(): string | null {
   const hourS = selectHourS(store.get());
   return hourS < 3_600 ? intervalText(hourS) : null;
 }
 
-/** An answer serves for so much of an hour: less than anybody sees in a trend. */
+/** Cache TTL as a share of an hour: too short to show in a trend. */
 const SERVES = 1 / 12;
-/** Whoever drags through time does not fetch it at each step, ms. */
+/** Pace, ms: dragging through time must not fetch at each step. */
 const PACE_MS = 1_000;
 
 export interface HourAgo {
-  /** The moment that it lies an hour before, ROS seconds. */
+  /** One hour after the answer's moment, ROS seconds. */
   readonly of: number;
   readonly isNow: boolean;
   readonly tags: ReadonlyMap<string, TagThen>;
@@ -34,28 +34,28 @@ export interface HourAgo {
 
 export const hourAgo = createStore<HourAgo | null>(null);
 
-/** What was known an hour before what is shown, by the state's own stamp; null: not known. */
+/** The state an hour before the shown one, by the state's stamp; null: not known. */
 export function selectHourAgo(state: AppState, last: HourAgo | null): HourAgo | null {
   const { moment } = selectShown(state);
   if (moment === null) return selectHourAgoNow(state, last);
   return last && Math.abs(moment - last.of) <= 1 ? last : null;
 }
 
-/** What was known an hour before now, whatever moment is shown; null: not known. */
+/** The state an hour before now, whatever moment is shown; null: not known. */
 export function selectHourAgoNow(state: AppState, last: HourAgo | null): HourAgo | null {
-  const { snapshot } = selectNewest(state);
+  const { snapshot } = selectLatest(state);
   if (!last || !snapshot) return null;
-  // It may be twice as old as it serves: the next answer is on its way.
+  // Valid for twice the TTL: the next answer is on its way.
   const isNear = Math.abs(secondsOf(snapshot.at) - last.of) <= 2 * SERVES * selectHourS(state);
   return isNear ? last : null;
 }
 
-/** What a tag's reading of now was compared with first, by the tag and the sensor. */
+/** What each current reading was first compared with, by tag and sensor. */
 const compared = new Map<string, { readonly reading: string; readonly then: TagThen }>();
 
 /**
- * What a tag's reading is compared with; of now it stays as long as the reading does, which changes
- * a trend, and no clock: until that is an hour old itself.
+ * What a tag's reading is compared with. For a current reading it stays until the next one, or for
+ * an hour: readings change a trend, time alone does not.
  */
 export function thenOf(last: HourAgo | null, tag: Tag, sensor: string): TagThen | null {
   const then = last?.tags.get(tag.id) ?? null;
@@ -70,13 +70,13 @@ export function thenOf(last: HourAgo | null, tag: Tag, sensor: string): TagThen 
 }
 
 export function startHourAgo(): () => void {
-  // Where there is none, the table and the alarms do without.
+  // On failure, the table and the alarms show no trend.
   const stop = keepFetched<HourAgo>({ paceMs: PACE_MS, onValue: hourAgo.set }, (state) => {
     const { moment } = selectShown(state);
     const hourS = selectHourS(state);
     const base = moment ?? rosNow(state, now());
     const isSeen = isColumnShown(state.settings, 'trend') || state.view.list === 'alarms';
-    // The bridge's status says how long a day is, and with it an hour.
+    // The bridge's status has the length of a day, and so of an hour.
     const hasStatus = state.twin.connection.status !== null;
     if (base === null || base < hourS || !isSeen || !hasStatus) return null;
     return {

@@ -60,12 +60,12 @@ test('the first state is taken at once, as old as the bridge says', () => {
 test('of many frames the newest is taken, a few times a second', () => {
   FakeSocket.last.speak(status());
   let changes = 0;
-  const unhear = store.subscribe(() => (changes += 1));
+  const unsubscribe = store.subscribe(() => (changes += 1));
   for (let i = 0; i < 20; i++) {
     FakeSocket.last.speak(stateFrame([wireTag()], { seq: i, sec: 10 + i, revision: `r${i}` }));
     vi.advanceTimersByTime(100);
   }
-  unhear();
+  unsubscribe();
   vi.advanceTimersByTime(300);
   expect(revision()).toBe('r19');
   expect(changes).toBeLessThanOrEqual(10);
@@ -137,7 +137,7 @@ test('a bad message is told of for a minute after the last one', () => {
 
 describe('a machine that slept for an hour', () => {
   const HOUR = 3_600_000;
-  // Of each test's own: a state that is sent again is as old as it was.
+  // A new stamp per test: a repeated state keeps its age.
   let sec = 100_000;
   const ageing = (): string => selectShown(store.get()).ageing.kind;
   const age = (): number | null => {
@@ -193,7 +193,7 @@ describe('a machine that slept for an hour', () => {
     );
     expect(revision()).not.toBe('waits');
     vi.setSystemTime(Date.now() + HOUR);
-    // The timer that was to show it is the first to look at the clock.
+    // Its own timer is the first to read the clock.
     vi.advanceTimersByTime(300);
     expect(revision()).not.toBe('waits');
     expect(ageing()).toBe('unknown');

@@ -1,7 +1,7 @@
-/** The page's one connection, and what its frames do to the store. */
+/** The page's one connection, and how its frames change the store. */
 import { now, onLapse } from '../clock';
 import { latestAfter } from '../contract/frames';
-import { connect, type Link, signInIfAsked } from '../connection/socket';
+import { connect, type Link, signInIfRequired } from '../connection/socket';
 import { stateSocketUrl } from '../contract/api';
 import type { Latest } from '../contract/types';
 import { receive } from './app';
@@ -9,22 +9,22 @@ import { withConnection, withState, withUnread } from './twin';
 import { robotFrame } from './create';
 
 /**
- * Frames come up to ten times a second; the page takes the newest four times a second at most.
- * More could not be read, and would cost a tablet its battery. A table of hundreds takes a frame's
- * time to lay out, so a large house is shown once a second.
+ * Frames arrive up to ten times a second; the page takes the latest at most four times a second.
+ * More would be unreadable and drain a tablet's battery. A table of hundreds of rows is slow to lay
+ * out, so a large greenhouse updates once a second.
  */
 export function pauseMs(tags: number): number {
   return tags > 150 ? 1_000 : 250;
 }
 
-/** A message that could not be read is told of for so long after the last one. */
-const TOLD_MS = 60_000;
+/** How long an unreadable message is reported, ms. */
+const REPORT_MS = 60_000;
 
 let current: Link | null = null;
 
-/** Does not wait for the back-off any longer. */
+/** Reconnects without waiting for the back-off. */
 export function retryConnection(): void {
-  current?.tell('wake');
+  current?.dispatch('wake');
 }
 
 export function startLive(): () => void {
@@ -35,13 +35,13 @@ export function startLive(): () => void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let forget: ReturnType<typeof setTimeout> | undefined;
   /** The connection that `latest` came on, and the last one whose first state was taken. */
-  let heardOn = -1;
+  let receivedOn = -1;
   let greeted = -1;
 
   const take = (stateAgeSeconds: number | null): void => {
     clearTimeout(timer);
     timer = undefined;
-    // First, for it may find that time has lapsed: what waits here is then of no known age.
+    // First, as it may detect a lapse, after which the age of waiting frames is unknown.
     const at = now();
     if (!latest || !isNew) return;
     isNew = false;
@@ -49,30 +49,30 @@ export function startLive(): () => void {
     try {
       receive(withState(latest, arrivedAt, stateAgeSeconds));
     } catch (error) {
-      // The check of frames let something through: the page goes on with what it has.
-      tellBad(String(error));
-      link.tell('broken');
+      // The frame check missed something: the page keeps its state.
+      reportBad(String(error));
+      link.dispatch('broken');
     }
   };
 
-  const tellBad = (why: string): void => {
+  const reportBad = (why: string): void => {
     receive(withUnread(why));
     clearTimeout(forget);
     forget = setTimeout(() => {
       receive({ unread: null });
-    }, TOLD_MS);
+    }, REPORT_MS);
   };
 
   const link = connect(stateSocketUrl(), {
     onConnection: (connection) => {
       receive(withConnection(connection, now()));
     },
-    onRefused: () => void signInIfAsked(),
-    onBad: tellBad,
+    onRefused: () => void signInIfRequired(),
+    onBad: reportBad,
     onFrame: (frame, connection) => {
       const { epoch, status } = connection;
       if (frame.type === 'alarms') {
-        // As it is: alarms change seldom, and nobody is to wait for them.
+        // Not throttled: alarms change seldom and must show at once.
         receive({ alarms: frame });
         return;
       }
@@ -82,19 +82,19 @@ export function startLive(): () => void {
       }
       if (frame.type !== 'status') {
         const at = now();
-        const next = latestAfter(heardOn === epoch ? latest : null, frame);
+        const next = latestAfter(receivedOn === epoch ? latest : null, frame);
         if (!next) {
-          link.tell('broken');
+          link.dispatch('broken');
           return;
         }
         latest = next;
-        heardOn = epoch;
+        receivedOn = epoch;
         isNew = true;
         arrivedAt = at;
       }
-      if (!latest || heardOn !== epoch || !status) return;
+      if (!latest || receivedOn !== epoch || !status) return;
       if (greeted !== epoch) {
-        // The first state may be an old one that the bridge kept; its status says how old.
+        // The first state may be an old one that the bridge cached; its status has its age.
         greeted = epoch;
         take(status.state_age_seconds);
         return;
@@ -106,14 +106,14 @@ export function startLive(): () => void {
     },
   });
   current = link;
-  const unhear = onLapse(() => {
+  const unsubscribe = onLapse(() => {
     latest = null;
     isNew = false;
     receive({ isTimeLost: true });
-    link.tell('start');
+    link.dispatch('start');
   });
   return () => {
-    unhear();
+    unsubscribe();
     clearTimeout(timer);
     clearTimeout(forget);
     link.stop();

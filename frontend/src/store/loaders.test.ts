@@ -9,14 +9,14 @@ import { ready } from './fetcher';
 import { startLoaders } from './loaders';
 import { withLatest } from './twin';
 
-let asked: string[];
+let requests: string[];
 let stop: () => void;
 
 beforeEach(() => {
   vi.useFakeTimers();
-  asked = [];
+  requests = [];
   vi.stubGlobal('fetch', (url: URL) => {
-    asked.push(`${url.pathname}${url.search}`);
+    requests.push(`${url.pathname}${url.search}`);
     if (url.pathname === '/api/field.npy') return Promise.resolve(npyField([1, 2]));
     return Promise.resolve(Response.json({ detail: 'none here' }, { status: 404 }));
   });
@@ -30,14 +30,14 @@ afterEach(() => {
 });
 
 const settle = (): Promise<unknown> => vi.advanceTimersByTimeAsync(5);
-const count = (part: string): number => asked.filter((url) => url.includes(part)).length;
+const count = (part: string): number => requests.filter((url) => url.includes(part)).length;
 const tags = [wireTag({ readings: readings({ temperature: 20 }) })];
 
 describe('loaders', () => {
   test('fetch the field of the chosen sensor, with its place and range', async () => {
     showTags(tags);
     await settle();
-    expect(asked).toContain('/api/field.npy?sensor_type=temperature&resolution=0.05');
+    expect(requests).toContain('/api/field.npy?sensor_type=temperature&resolution=0.05');
     expect(store.get().twin.latest.field.value).toMatchObject({
       sensor: 'temperature',
       originX: -1.5,
@@ -80,7 +80,7 @@ describe('loaders', () => {
     showTags(tags);
     await settle();
     expect(count('/api/map')).toBeGreaterThan(0);
-    asked.length = 0;
+    requests.length = 0;
     goLive(status({ has_map: false }));
     showTags(tags);
     goLive(status({ has_map: false }));
@@ -118,8 +118,8 @@ describe('loaders', () => {
     await settle();
     expect(store.get().twin.latest.map.state).toBe('failed');
     goLost();
-    asked.length = 0;
+    requests.length = 0;
     await vi.advanceTimersByTimeAsync(60_000);
-    expect(asked).toEqual([]);
+    expect(requests).toEqual([]);
   });
 });

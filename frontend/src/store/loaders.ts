@@ -1,4 +1,4 @@
-/** Fetches what the frames do not carry, whenever the twin's revision says that it changed. */
+/** Fetches what frames do not carry, whenever the twin's revision changes. */
 import { now } from '../clock';
 import { answer, bodyOf, fetchQuality, get } from '../contract/api';
 import type { Field, FieldQuality, SensorsFile } from '../contract/types';
@@ -7,13 +7,13 @@ import { type MapPicture, mapPlacement, opaqueBox, pixelBoxCorners } from '../ge
 import { act, type AppState, keepFetched, onChange, receive, store } from './app';
 import { withField, withLatest } from './twin';
 import { sourceOf } from './derived';
-import { failed, NOTHING, ready, type Wish } from './fetcher';
+import { failed, NOTHING, ready, type FetchTask } from './fetcher';
 import { boxOfPins, fetchHeat, fieldResolution } from './heat';
-import { selectNewest } from './moment';
+import { selectLatest } from './moment';
 import { DEFAULT_VIEW } from './view';
 
 const FIELD_INTERVAL_MS = 500;
-/** An estimate costs the twin more, and goes on by itself: what nobody reads becomes less sure. */
+/** An estimate costs the twin more, and changes by itself: its error grows without readings. */
 const ESTIMATE_INTERVAL_MS = 1_000;
 const ESTIMATE_TICK_MS = 10_000;
 const MAP_INTERVAL_MS = 1_000;
@@ -31,10 +31,10 @@ export function startLoaders(): () => void {
           receive(withField(ready(value)));
         },
         onError: (message) => {
-          receive(withField(failed(message, selectNewest(store.get()).field.value)));
+          receive(withField(failed(message, selectLatest(store.get()).field.value)));
         },
       },
-      fieldWish,
+      fieldTask,
     ),
     keepFetched<MapPicture>(
       {
@@ -43,7 +43,7 @@ export function startLoaders(): () => void {
           receive(withLatest({ map: ready(value) }));
         },
         onError: (message) => {
-          receive(withLatest({ map: failed(message, selectNewest(store.get()).map.value) }));
+          receive(withLatest({ map: failed(message, selectLatest(store.get()).map.value) }));
         },
       },
       (state) => {
@@ -65,7 +65,7 @@ export function startLoaders(): () => void {
       (state) => {
         const base = baseKey(state);
         const { sensor } = state.view;
-        // Of the nearest readings: an estimate tells its own error.
+        // Only for the nearest readings: an estimate has its own error.
         if (base === null || sourceOf(state) === 'estimate') return null;
         const run = (signal: AbortSignal): Promise<FieldQuality> => fetchQuality(sensor, signal);
         return { key: `${base}|${sensor}`, group: sensor, run };
@@ -77,9 +77,9 @@ export function startLoaders(): () => void {
   };
 }
 
-function fieldWish(state: AppState): Wish<Field> | null {
+function fieldTask(state: AppState): FetchTask<Field> | null {
   const { sensor } = state.view;
-  const { snapshot } = selectNewest(state);
+  const { snapshot } = selectLatest(state);
   const base = baseKey(state);
   if (base === null || !boxOfPins(snapshot)) return null;
   const source = sourceOf(state);
@@ -94,21 +94,21 @@ function fieldWish(state: AppState): Wish<Field> | null {
   };
 }
 
-/** What the page does not show any more goes at once: a restarted twin begins empty. */
+/** Clears at once what no longer applies: a restarted twin begins empty. */
 function forgetOld(): void {
   const state = store.get();
-  const { field, map, snapshot } = selectNewest(state);
+  const { field, map, snapshot } = selectLatest(state);
   if (baseKey(state) === null) return;
   if (field.value && !boxOfPins(snapshot)) receive(withField(NOTHING));
   if (map.value && !state.twin.lastStatus?.has_map) receive(withLatest({ map: NOTHING }));
 }
 
 /**
- * Changes with the revision, and with each connection: another server may sit behind it. Null
- * while there is none, and until the bridge has said on it what there is to ask for.
+ * Changes with the revision and with each connection, which may lead to another server. Null without
+ * a connection, and until its first status and state.
  */
 function baseKey(state: AppState): string | null {
-  const { snapshot } = selectNewest(state);
+  const { snapshot } = selectLatest(state);
   const { epoch, socket, status } = state.twin.connection;
   return snapshot && status && socket.kind === 'open' ? `${epoch}|${snapshot.revision}` : null;
 }
@@ -118,7 +118,7 @@ const SENSORS_INTERVAL_MS = 500;
 const fetchFile = async (signal: AbortSignal): Promise<SensorsFile> =>
   bodyOf(await get('api/sensors', signal));
 
-/** Fetches the file of sensors: at once, and again on each new connection, behind which may be another. */
+/** Fetches the file of sensors at the start and on each new connection, as the server may be another. */
 export function startSensors(): () => void {
   let known = '';
   return keepFetched<SensorsFile>(
@@ -126,24 +126,24 @@ export function startSensors(): () => void {
       paceMs: SENSORS_INTERVAL_MS,
       onValue: (file) => {
         const text = JSON.stringify(file);
-        // The browser asks with its ETag, and mostly is told that it has it: nothing follows then.
+        // Mostly the bridge answers 304 and the file is unchanged.
         if (text === known) return;
         known = text;
         const value = cataloguesOf(file);
         receive({ sensors: ready(value) });
-        // A file without what the page opens with: then the first that it has.
+        // If the file lacks the default sensor, its first one is shown.
         const [first] = value.day.all;
         const { sensor } = store.get().view;
         const isChosen = sensor !== DEFAULT_VIEW.sensor || sensor in file.sensors;
         if (first && !isChosen) act({ sensor: first.name });
       },
       onError: (message) => {
-        // What was in force before goes on: a bridge that is away has no other ranges.
+        // The previous file stays in force: an unreachable bridge has no other ranges.
         if (known === '') receive({ sensors: failed(message) });
       },
     },
     ({ twin: { connection } }) => ({
-      // The first connection is made while this is fetched, and to the same bridge.
+      // The first connection opens during this fetch, and to the same bridge.
       key: String(Math.max(1, connection.epoch)),
       group: 'sensors',
       run: fetchFile,
@@ -152,8 +152,8 @@ export function startSensors(): () => void {
 }
 
 /**
- * Fetches the map's place and its picture. The map may grow between the two requests; a picture
- * of another size than announced is an error, and the caller tries again.
+ * Fetches the map's pose and its picture. The map may grow between the two requests; a picture of
+ * another size is an error, and the caller retries.
  */
 async function loadMap(signal: AbortSignal): Promise<MapPicture> {
   const [grid, blob] = await Promise.all([

@@ -162,11 +162,11 @@ test('nobody else reads the houses of the store', () => {
 
 test('nobody asks a clock of the browser but the page’s own clock', () => {
   const src = join(import.meta.dirname, '..');
-  const askers = readdirSync(src, { recursive: true, encoding: 'utf8' }).filter(
+  const readers = readdirSync(src, { recursive: true, encoding: 'utf8' }).filter(
     (name) =>
       /\.tsx?$/.test(name) &&
       !/\.test\.tsx?$|^testing/.test(name) &&
       /\b(performance|Date)\.now\b/.test(readFileSync(join(src, name), 'utf8')),
   );
-  expect(askers).toEqual(['clock.ts']);
+  expect(readers).toEqual(['clock.ts']);
 });

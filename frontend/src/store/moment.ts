@@ -1,6 +1,6 @@
 /**
- * What the page shows: a function of what came and of the moment to show. Table, card, legend,
- * map, notices and exports all ask here, so that another moment moves them all at once.
+ * What the page shows: a function of the received data and the requested moment. Table, card, legend,
+ * map, notices and exports all read it here, so that they change moment together.
  */
 import { now } from '../clock';
 import type { StatusFrame } from '../contract/types';
@@ -19,9 +19,9 @@ export interface Shown extends House {
 }
 
 /**
- * The same object for the same data and moment. A moment in the past is that of the data: while
- * another one is on its way, the last that came stays, with its own time. Data and moment are told
- * in one, so that nothing can be taken for what it is not.
+ * Returns the same object for the same data and moment. While another past moment is being fetched,
+ * the last one stays, with its own time. Data and moment come together, so that no data appear under
+ * another time.
  */
 export function shownAt(twin: TwinState, moment: number | null): Shown {
   if (moment === null || twin.past === null) return shownNow(twin.latest)(clockOf(twin));
@@ -33,18 +33,18 @@ const CLOCKS_LOST = new Set<unknown>(['no_clock', 'clock_stopped', 'clock_doubte
 
 type Clock = 'running' | 'paused' | 'unknown';
 
-/** How the time of the newest house goes on, as far as anybody knows. */
+/** How the latest state ages, as far as known. */
 function clockOf({ isTimeLost, connection, phase }: TwinState): Clock {
   const reason = connection.status?.reason;
   if (isTimeLost || CLOCKS_LOST.has(reason)) return 'unknown';
   if (reason !== 'paused') return 'running';
-  // Cut off, nobody hears that a pause is over.
+  // Without a connection, the end of a pause would go unnoticed.
   return phase === 'live' ? 'paused' : 'unknown';
 }
 
 const shownNow = memoOne((house: House) =>
   memoLast((clock: Clock): Shown => {
-    // While the twin's time stands still, every age does.
+    // While the twin's time stands still, ages do too.
     const ageing = { running: GROWING, unknown: AGES_UNKNOWN, paused: asTaken(house) }[clock];
     return { ...house, moment: null, ageing };
   }),
@@ -54,32 +54,32 @@ const asTaken = ({ snapshot }: House): Ageing => ({ kind: 'as-of', at: snapshot?
 
 const shownThen = memoLast((house: House, map: House['map'], moment: number): Shown => ({
   ...house,
-  // Of the map nobody keeps a past; walls and benches stay where they are.
+  // The map has no history; walls and benches stay where they are.
   map,
   moment,
-  // A past moment has one age a reading, however long it is looked at.
+  // At a past moment, each reading has one fixed age.
   ageing: asTaken(house),
 }));
 
 export const selectShown = ({ twin, view }: AppState): Shown => shownAt(twin, view.moment);
 
-/** Whether anybody knows what time it is now, whatever is shown. */
+/** Whether the current time is known, whatever is shown. */
 export const selectHasTime = ({ twin }: AppState): boolean => clockOf(twin) !== 'unknown';
 
-/** The newest there is, whatever is shown: for the connection's word, and for what to fetch. */
-export const selectNewest = ({ twin }: AppState): House => twin.latest;
+/** The latest state, whatever is shown: for the connection's status, and for what to fetch. */
+export const selectLatest = ({ twin }: AppState): House => twin.latest;
 
 export const selectPast = ({ twin }: AppState): Past | null => twin.past;
 
-/** The moment that is wanted and not shown yet, ROS seconds; null: what is shown is wanted. */
+/** The requested moment if not shown yet, ROS seconds; else null. */
 export function selectAwaited(state: AppState): number | null {
   const { moment } = state.view;
   return moment === null || selectShown(state).moment === moment ? null : moment;
 }
 
 /**
- * The twin's time now, ROS seconds, as far as anybody knows; `at` is the page's clock, ms. Null
- * before anything has come, and of a twin that has no time.
+ * The twin's current time, ROS seconds, as far as known; `at` is the page's clock, ms. Null before
+ * the first state, and if the twin has no time.
  */
 export function rosNow({ twin }: AppState, at: number): number | null {
   const { snapshot } = twin.latest;
@@ -91,22 +91,22 @@ export function rosNow({ twin }: AppState, at: number): number | null {
 }
 
 /**
- * Whether what is shown is heard of: the present of a twin that is silent, or cut off, is not. What
- * a past moment was like does not depend on it.
+ * Whether the shown data are up to date: not at present if the twin is silent or disconnected. A past
+ * moment does not depend on it.
  */
-export const selectIsHeard = (state: AppState): boolean =>
-  selectShown(state).moment !== null || isHeardNow(state);
+export const selectIsReceiving = (state: AppState): boolean =>
+  selectShown(state).moment !== null || isReceivingNow(state);
 
-/** Whether the bridge does not answer: nothing comes, and nothing that is done here gets there. */
-export const selectIsCut = ({ twin: { phase } }: AppState): boolean =>
+/** Whether the bridge is unreachable: nothing arrives, and actions are not sent. */
+export const selectIsDisconnected = ({ twin: { phase } }: AppState): boolean =>
   phase === 'stale' || phase === 'reconnecting';
 
-export const isHeardNow = ({ twin }: AppState): boolean =>
+export const isReceivingNow = ({ twin }: AppState): boolean =>
   twin.phase === 'live' && !twin.isTimeLost;
 
 export const selectSnapshot = (state: AppState): Snapshot | null => selectShown(state).snapshot;
 
-export const selectIsHere = (state: AppState): boolean => selectSnapshot(state) !== null;
+export const selectHasSnapshot = (state: AppState): boolean => selectSnapshot(state) !== null;
 
 const NO_TAGS: readonly Tag[] = [];
 
@@ -120,12 +120,12 @@ const byId = memoOne(
 export const selectTag = (state: AppState, tagId: string): Tag | undefined =>
   byId(selectTags(state)).get(tagId);
 
-export const selectNewestTag = ({ twin }: AppState, tagId: string): Tag | undefined =>
+export const selectLatestTag = ({ twin }: AppState, tagId: string): Tag | undefined =>
   byId(twin.latest.snapshot?.tags ?? NO_TAGS).get(tagId);
 
 /**
- * Where what the twin observed comes from, as it says, if that has to be told; null: a robot's, or of a twin
- * that does not say. A recording that is played is, in nothing, of now.
+ * The origin of the twin's data if it must be shown; null: a real robot, or not reported. A played
+ * recording shows nothing of the present.
  */
 type Origin = Exclude<StatusFrame['origin'], 'robot' | 'unknown'> | null;
 
@@ -134,23 +134,23 @@ export function selectOrigin({ twin }: AppState): Origin {
   return origin === 'simulated' || origin === 'recorded' || origin === 'sim_time' ? origin : null;
 }
 
-/** How long a day of the greenhouse takes, seconds of its time: in a demo it is a short one. */
+/** The length of the greenhouse's day, seconds of its time: short in a demo. */
 export const selectDayS = ({ twin }: AppState): number => twin.lastStatus?.day_length_s ?? DAY_S;
 
 export const selectIsRecorded = (state: AppState): boolean => selectOrigin(state) === 'recorded';
 
-/** Whether the twin's time may be another than that of the clock on the wall. */
+/** Whether the twin's time may differ from the time of day. */
 export const selectHasOwnTime = (state: AppState): boolean =>
   selectIsRecorded(state) || selectOrigin(state) === 'sim_time';
 
-/** The newest moment there is where that is not the time on the wall, ROS seconds; else null. */
+/** The latest moment if it is not the time of day, ROS seconds; else null. */
 export function ownTime(state: AppState, at: number): number | null {
   if (!selectHasOwnTime(state)) return null;
-  // Of one that is silent, that which was heard last.
-  return rosNow(state, isHeardNow(state) ? at : -Infinity);
+  // If the twin is silent, its last received time.
+  return rosNow(state, isReceivingNow(state) ? at : -Infinity);
 }
 
-/** What is drawn is what was fetched; until then it is what was asked for. */
+/** The source of the drawn field; until one arrives, the requested one. */
 export function barSpan(state: AppState, nowS: number): Span {
   const { value } = state.twin.remembered;
   if (value && value.to > value.from) return value;
@@ -158,11 +158,11 @@ export function barSpan(state: AppState, nowS: number): Span {
   return { from, to: Math.max(to, from + 1) };
 }
 
-/** The twin's time now, ROS seconds; null: nobody knows. */
+/** The twin's current time, ROS seconds; null: not known. */
 export const twinNow = (): number | null => rosNow(store.get(), now());
 
-/** What the end of the bar is called: of a recording it is no present, nor while nothing comes. */
-export const newestWord = (): string => {
+/** Label of the bar's end: in a recording, or while nothing arrives, it is not "now". */
+export const latestWord = (): string => {
   const { phase } = store.get().twin;
   if (phase !== 'live') return S.phase[phase];
   return selectIsRecorded(store.get()) ? S.origin.recorded : S.timebarLive;

@@ -10,14 +10,14 @@ import { selectHealth, selectMapped } from './derived';
 import { selectAwaited, selectShown } from './moment';
 import { startPast } from './past';
 
-interface Asked {
+interface SentRequest {
   readonly path: string;
   readonly at: number;
   readonly answer: (response?: Response) => Promise<void>;
   readonly signal: AbortSignal;
 }
 
-let asked: Asked[];
+let requests: SentRequest[];
 let stop: () => void;
 
 const pass = (ms: number): Promise<unknown> => vi.advanceTimersByTimeAsync(ms);
@@ -39,7 +39,7 @@ const usual = (path: string, at: number): Response => {
 
 beforeEach(() => {
   vi.useFakeTimers();
-  asked = [];
+  requests = [];
   vi.stubGlobal(
     'fetch',
     (url: URL, { signal }: { signal: AbortSignal }) =>
@@ -48,7 +48,7 @@ beforeEach(() => {
         signal.addEventListener('abort', () => {
           reject(signal.reason as Error);
         });
-        asked.push({
+        requests.push({
           path: url.pathname,
           at,
           signal,
@@ -66,13 +66,13 @@ beforeEach(() => {
 afterEach(async () => {
   act({ moment: null });
   stop();
-  // What was asked for only once a moment stays was not yet.
+  // What is fetched once a moment stays has not been requested yet.
   await pass(500);
   expect(vi.getTimerCount()).toBe(0);
   vi.useRealTimers();
 });
 
-/** What the page says that it shows, and what it shows. */
+/** The moment that the page states, and the data that it shows. */
 const shown = (): unknown[] => {
   const { moment, snapshot, field } = selectShown(store.get());
   return [
@@ -85,20 +85,20 @@ const go = (moment: number | null): void => {
   act({ moment });
 };
 const answerAll = async (at: number): Promise<void> => {
-  for (const each of asked.filter((one) => one.at === at)) await each.answer();
+  for (const each of requests.filter((one) => one.at === at)) await each.answer();
 };
 
 test('state, verdicts and field of a moment come together, or not at all', async () => {
   go(50);
-  expect(asked.map(({ path, at }) => [path, at])).toEqual([
+  expect(requests.map(({ path, at }) => [path, at])).toEqual([
     ['/api/state', 50],
     ['/api/health', 50],
     ['/api/field.npy', 50],
   ]);
-  await asked[0]?.answer();
-  await asked[2]?.answer();
+  await requests[0]?.answer();
+  await requests[2]?.answer();
   expect(shown()).toEqual([null, 1_000, null]);
-  await asked[1]?.answer();
+  await requests[1]?.answer();
   expect(shown()).toEqual([50, 50, 50]);
   expect(selectHealth(store.get()).byTag.get('1')?.reasons[0]?.value).toBe(50);
 });
@@ -149,7 +149,7 @@ test('back to now is at once, and what comes later is passed over', async () => 
   await pass(100);
   go(null);
   expect(shown()).toEqual([null, 1_000, null]);
-  expect(asked.filter(({ at }) => at === 40).every(({ signal }) => signal.aborted)).toBe(true);
+  expect(requests.filter(({ at }) => at === 40).every(({ signal }) => signal.aborted)).toBe(true);
   await answerAll(40);
   expect(shown()).toEqual([null, 1_000, null]);
   // Not the last look back either.
@@ -171,7 +171,7 @@ describe('what cannot be had', () => {
     await answerAll(50);
     go(40);
     await pass(100);
-    await asked.at(-3)?.answer(Response.json({ detail: 'busy' }, { status: 503 }));
+    await requests.at(-3)?.answer(Response.json({ detail: 'busy' }, { status: 503 }));
     expect(shown()).toEqual([50, 50, 50]);
     expect(store.get().twin.pastFault).toEqual({ at: 40, message: 'busy', isLasting: false });
     await pass(2_000);
@@ -182,7 +182,7 @@ describe('what cannot be had', () => {
 
   test('at all shows nothing, least of all now', async () => {
     go(50);
-    await asked[0]?.answer(Response.json({ detail: 'no journal is kept' }, { status: 404 }));
+    await requests[0]?.answer(Response.json({ detail: 'no journal is kept' }, { status: 404 }));
     expect(shown()).toEqual([50, null, null]);
     expect(store.get().twin.pastFault).toMatchObject({ at: 50, isLasting: true });
     go(null);
@@ -191,9 +191,9 @@ describe('what cannot be had', () => {
 
   test('of the field alone leaves the state, and says why', async () => {
     go(50);
-    await asked[0]?.answer();
-    await asked[1]?.answer();
-    await asked[2]?.answer(Response.json({ error_message: 'too many cells' }, { status: 400 }));
+    await requests[0]?.answer();
+    await requests[1]?.answer();
+    await requests[2]?.answer(Response.json({ error_message: 'too many cells' }, { status: 400 }));
     expect(shown()).toEqual([50, 50, null]);
     expect(selectShown(store.get()).field).toMatchObject({
       state: 'failed',
@@ -205,11 +205,11 @@ describe('what cannot be had', () => {
 test('each connection asks anew, a lost one does not', async () => {
   go(50);
   await answerAll(50);
-  const before = asked.length;
+  const before = requests.length;
   goLost();
   await pass(1_000);
   const states = (): number =>
-    asked.slice(before).filter(({ path }) => path.endsWith('state')).length;
+    requests.slice(before).filter(({ path }) => path.endsWith('state')).length;
   expect(states()).toBe(0);
   goLive();
   const { connection } = store.get().twin;
@@ -225,19 +225,19 @@ test('how far off the field is, is asked for once the moment stays', async () =>
   go(40);
   await pass(100);
   await answerAll(40);
-  expect(asked.some(({ path }) => path.endsWith('quality'))).toBe(false);
+  expect(requests.some(({ path }) => path.endsWith('quality'))).toBe(false);
   await pass(400);
-  await asked.at(-1)?.answer();
+  await requests.at(-1)?.answer();
   expect(selectShown(store.get()).quality).toMatchObject({ rmse: 40 });
   expect(shown()).toEqual([40, 40, 40]);
-  // What comes anew, on another connection, has none yet.
+  // A refetched field, on another connection, has none yet.
   const { connection } = store.get().twin;
   receive(withConnection({ ...connection, epoch: 9 }, performance.now()));
   await pass(100);
   await answerAll(40);
   expect(selectShown(store.get()).quality).toBeNull();
   await pass(400);
-  await asked.at(-1)?.answer();
+  await requests.at(-1)?.answer();
   expect(selectShown(store.get()).quality).toMatchObject({ rmse: 40 });
 });
 
@@ -248,14 +248,14 @@ test('an estimate that is chosen goes the same way: with its state, the newest f
     await vi.dynamicImportSettled();
     await pass(100);
   }
-  const estimates = asked.filter(({ path }) => path === '/api/estimate.npy');
+  const estimates = requests.filter(({ path }) => path === '/api/estimate.npy');
   expect(estimates.filter(({ signal }) => !signal.aborted)).toHaveLength(2);
-  expect(asked.some(({ path }) => path === '/api/field.npy')).toBe(false);
+  expect(requests.some(({ path }) => path === '/api/field.npy')).toBe(false);
   const { at = 0 } = estimates.at(-1) ?? {};
   await answerAll(at);
   expect(shown()).toEqual([at, at, at]);
   expect(selectShown(store.get()).field.value?.sureness?.sdKnown).toBe(1);
   await pass(2_000);
-  // How far off the nearest readings are is of no interest.
-  expect(asked.some(({ path }) => path.endsWith('field/quality'))).toBe(false);
+  // The error of the nearest readings is not needed.
+  expect(requests.some(({ path }) => path.endsWith('field/quality'))).toBe(false);
 });

@@ -1,4 +1,4 @@
-/** Fetches the greenhouse as of the moment that is wanted, and the field of that moment with it. */
+/** Fetches the greenhouse's state and field as of the requested moment. */
 import { pause } from '../clock';
 import { fetchQuality, Refusal } from '../contract/api';
 import { fetchStateAt } from '../contract/past';
@@ -7,21 +7,21 @@ import { snapshotOf } from '../domain/twin';
 import { type AppState, keepFetched, receive, store } from './app';
 import { sourceOf } from './derived';
 import { fetchHeat, fieldResolution } from './heat';
-import { selectNewest, selectPast } from './moment';
-import { DRAG_PACE_MS, failed, type Fetched, NOTHING, ready, type Wish } from './fetcher';
+import { selectLatest, selectPast } from './moment';
+import { DRAG_PACE_MS, failed, type Fetched, NOTHING, ready, type FetchTask } from './fetcher';
 import { NO_HOUSE, type Past, withPast } from './twin';
 
 /**
- * What was shown stays for so long while the first moment is on its way, with its own label: most
- * answers are there before anybody would see an empty page.
+ * How long the previous state stays, under its own label, while the first moment is fetched: most
+ * answers arrive before an empty page would show.
  */
 const PATIENCE_MS = 300;
-/** How far off a field is, is asked for once the moment stays. */
+/** The field's error is fetched once the moment has stayed this long. */
 const QUALITY_AFTER_MS = 400;
 
 export function startPast(): () => void {
   let patience: ReturnType<typeof setTimeout> | undefined;
-  let heardOn = 0;
+  let receivedOn = 0;
 
   const show = (past: Past): void => {
     clearTimeout(patience);
@@ -41,7 +41,7 @@ export function startPast(): () => void {
     receive({ pastFault: { at: moment, message, isLasting } });
   };
 
-  const wish = (state: AppState): Wish<Past> | null => {
+  const task = (state: AppState): FetchTask<Past> | null => {
     const { moment } = state.view;
     const past = selectPast(state);
     if (moment === null) {
@@ -52,19 +52,19 @@ export function startPast(): () => void {
     }
     const fault = state.twin.pastFault;
     if (fault && fault.at !== moment) receive({ pastFault: null });
-    if (!past && !selectNewest(state).snapshot) showNothing(moment);
+    if (!past && !selectLatest(state).snapshot) showNothing(moment);
     else if (!past) patience ??= setTimeout(losePatience, PATIENCE_MS);
     else patience = undefined;
     const { epoch, socket } = state.twin.connection;
-    // Each connection asks anew: another server may be behind it, or more was heard meanwhile.
-    if (socket.kind === 'open') heardOn = epoch;
-    return wishFor(state, moment, heardOn);
+    // Each connection refetches: it may lead to another server, or more data has arrived.
+    if (socket.kind === 'open') receivedOn = epoch;
+    return taskFor(state, moment, receivedOn);
   };
   const parts = ({ view, twin }: AppState): readonly unknown[] => [view, twin];
   const stops = [
     keepFetched<Past>(
       { paceMs: DRAG_PACE_MS, isDragged: true, parts, onValue: show, onError },
-      wish,
+      task,
     ),
     keepFetched<FieldQuality>(
       {
@@ -75,7 +75,7 @@ export function startPast(): () => void {
           if (past) receive(withPast({ ...past, house: { ...past.house, quality } }));
         },
       },
-      qualityWish,
+      qualityTask,
     ),
   ];
   return () => {
@@ -84,8 +84,8 @@ export function startPast(): () => void {
   };
 }
 
-/** For a field that has come without it; an estimate tells its own error. */
-function qualityWish(state: AppState): Wish<FieldQuality> | null {
+/** For a field without its error; an estimate has its own. */
+function qualityTask(state: AppState): FetchTask<FieldQuality> | null {
   const past = selectPast(state);
   const field = past?.house.field.value;
   if (!past || !field || field.sureness || past.house.quality) return null;
@@ -102,27 +102,27 @@ function qualityWish(state: AppState): Wish<FieldQuality> | null {
   };
 }
 
-function wishFor(state: AppState, at: number, epoch: number): Wish<Past> {
+function taskFor(state: AppState, at: number, epoch: number): FetchTask<Past> {
   const { sensor } = state.view;
   const source = sourceOf(state);
-  const resolution = fieldResolution(selectNewest(state).snapshot);
+  const resolution = fieldResolution(selectLatest(state).snapshot);
   return {
     key: `${epoch}|${at}|${sensor}|${resolution}|${source}`,
     run: async (signal) => {
-      // Both or none: no moment has the field of another one.
+      // Both or neither: no moment shows the field of another one.
       const [latest, field] = await Promise.all([
         fetchStateAt(at, signal),
         fetchHeat(source, { sensor, resolution, at }, signal).then(
           ready,
           (error: unknown): Fetched<Field> => {
-            // What may pass is tried again with the rest.
+            // A temporary failure is retried together with the state.
             if (!(error instanceof Refusal) || error.status !== 400) throw error;
             return failed(error.message);
           },
         ),
       ]);
       const before = selectPast(store.get())?.house.snapshot ?? null;
-      // In milliseconds of ROS time, where nothing but differences counts.
+      // In milliseconds of ROS time: only differences count.
       const snapshot = snapshotOf(latest, at * 1000, before);
       const hasPins = snapshot.tags.some((tag) => tag.at);
       const { health } = latest;

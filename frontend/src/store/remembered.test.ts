@@ -5,20 +5,20 @@ import { stateFrame, wireTag } from '../testing/tags';
 import { wireStretch, wireTimeline } from '../testing/timeline';
 import { act, receive, store } from './app';
 import { fromFragment } from './address';
-import { askedSpan, startOpening, startRemembered, turnOf } from './remembered';
+import { requestedSpan, startOpening, startRemembered, turnOf } from './remembered';
 import { withConnection, withState } from './twin';
 import { NOTHING } from './fetcher';
 
-let asked: URLSearchParams[];
+let requests: URLSearchParams[];
 let answer: () => Response;
 let stop: () => void;
 
 beforeEach(() => {
   vi.useFakeTimers();
-  asked = [];
+  requests = [];
   answer = () => Response.json(wireTimeline({ from: 0, to: 240 }));
   vi.stubGlobal('fetch', (url: URL) => {
-    asked.push(url.searchParams);
+    requests.push(url.searchParams);
     return Promise.resolve(answer());
   });
   receive({ remembered: NOTHING });
@@ -35,16 +35,16 @@ const pass = (ms: number): Promise<unknown> => vi.advanceTimersByTimeAsync(ms);
 
 describe('what is asked', () => {
   test('is whole buckets, so that those that have passed stay the same', () => {
-    const first = askedSpan({ kind: 'hour' }, 1_000_007);
-    const next = askedSpan({ kind: 'hour' }, 1_000_009);
+    const first = requestedSpan({ kind: 'hour' }, 1_000_007);
+    const next = requestedSpan({ kind: 'hour' }, 1_000_009);
     expect(first).toEqual({ from: 996_420, to: 1_000_020 });
     expect(next).toEqual(first);
-    expect(askedSpan({ kind: 'hour' }, 1_000_021)).toEqual({ from: 996_435, to: 1_000_035 });
+    expect(requestedSpan({ kind: 'hour' }, 1_000_021)).toEqual({ from: 996_435, to: 1_000_035 });
   });
 
   test('is all there is, or exactly what was chosen', () => {
-    expect(askedSpan({ kind: 'all' }, 50)).toBeNull();
-    expect(askedSpan({ kind: 'own', from: 3, to: 10 }, 50)).toEqual({ from: 3, to: 10 });
+    expect(requestedSpan({ kind: 'all' }, 50)).toBeNull();
+    expect(requestedSpan({ kind: 'own', from: 3, to: 10 }, 50)).toEqual({ from: 3, to: 10 });
   });
 
   test('is asked again once a bucket, and at least every half minute; not of what is over', () => {
@@ -59,9 +59,9 @@ describe('what is asked', () => {
 test('it is fetched when there is a twin, and again as time goes on', async () => {
   await pass(0);
   expect(store.get().twin.remembered).toMatchObject({ state: 'ready', value: { to: 240 } });
-  expect(asked).toHaveLength(1);
+  expect(requests).toHaveLength(1);
   await pass(31_000);
-  expect(asked.length).toBeGreaterThan(1);
+  expect(requests.length).toBeGreaterThan(1);
 });
 
 test('another period is fetched at once, and nothing of the last is left', async () => {
@@ -70,7 +70,7 @@ test('another period is fetched at once, and nothing of the last is left', async
   act({ period: { kind: 'all' } });
   expect(store.get().twin.remembered).toEqual(NOTHING);
   await pass(0);
-  expect(asked.at(-1)?.has('from')).toBe(false);
+  expect(requests.at(-1)?.has('from')).toBe(false);
   expect(store.get().twin.remembered).toMatchObject({ state: 'failed', message: 'busy' });
 });
 
@@ -81,7 +81,7 @@ test('a link that names no period brings back what the page opens on, at once', 
   answer = () => Response.json(wireTimeline({ from: 0, to: 240, reach: wireStretch(0, 240) }));
   await pass(1_100);
   expect(store.get().view.period).toEqual({ kind: 'hour' });
-  // Also twice, sooner than anything is fetched again.
+  // Also twice, before any refetch.
   for (const layers of ['map', 'map,pins']) {
     act(fromFragment(`layers=${layers}`));
     await pass(100);
@@ -89,7 +89,7 @@ test('a link that names no period brings back what the page opens on, at once', 
   await pass(1_000);
   expect(store.get().view.period).toEqual({ kind: 'hour' });
   expect(store.get().twin.remembered.state).toBe('ready');
-  const spans = asked.map((query) => Number(query.get('to')) - Number(query.get('from')));
+  const spans = requests.map((query) => Number(query.get('to')) - Number(query.get('from')));
   expect(spans.slice(1)).toEqual([3_600, 3_600, 3_600]);
   stopOpening();
 });
@@ -98,15 +98,15 @@ test('after a reconnect the gap is refilled', async () => {
   await pass(0);
   goLost();
   await pass(5_000);
-  const before = asked.length;
+  const before = requests.length;
   receive(withConnection({ ...store.get().twin.connection, epoch: 99 }, performance.now()));
   await pass(5_000);
-  expect(asked).toHaveLength(before);
+  expect(requests).toHaveLength(before);
   goLive();
   const { connection } = store.get().twin;
   receive(withConnection({ ...connection, epoch: 99 }, performance.now()));
   await pass(2_000);
-  expect(asked.length).toBeGreaterThan(before);
+  expect(requests.length).toBeGreaterThan(before);
 });
 
 test('what fails for now leaves what there was', async () => {

@@ -1,22 +1,22 @@
-/** Keeps what is remembered of the period in view up to date, calmly. */
+/** Keeps the timeline of the period in view up to date, at a slow pace. */
 import { now } from '../clock';
 import { fetchTimeline } from '../contract/past';
 import { endsNow, type Period, type Span, spanOf } from '../domain/time';
 import { type Timeline, timelineOf } from '../domain/timeline';
 import { act, keepFetched, receive, store } from './app';
 import { failed, NOTHING, ready } from './fetcher';
-import { rosNow, selectNewest } from './moment';
+import { rosNow, selectLatest } from './moment';
 import { DEFAULT_VIEW, SHORT_PERIOD } from './view';
 
-/** Enough for the widest bar: a bucket is two or three pixels there. */
+/** Enough for the widest bar, where a bucket is two or three pixels. */
 const BUCKETS = 240;
 const INTERVAL_MS = 1_000;
-/** What is new is looked for once a bucket, but not more and not less often than this, seconds. */
+/** Refetched once per bucket, within these bounds, seconds. */
 const SOONEST_S = 5;
 const LATEST_S = 30;
 
-/** The stretch to ask for: whole buckets, so that those that have passed stay as they are. */
-export function askedSpan(period: Period, nowS: number): Span | null {
+/** The span to request: whole buckets, so that past ones stay the same. */
+export function requestedSpan(period: Period, nowS: number): Span | null {
   if (period.kind === 'all') return null;
   const span = spanOf(period, nowS, null);
   if (!endsNow(period)) return span;
@@ -25,7 +25,7 @@ export function askedSpan(period: Period, nowS: number): Span | null {
   return { from: Math.max(0, to - (span.to - span.from)), to };
 }
 
-/** Which look at the period this is; another one may bring something new. */
+/** Number of the current refetch interval; a new number refetches. */
 export function turnOf(period: Period, nowS: number): number {
   if (period.kind === 'all') return Math.floor(nowS / LATEST_S);
   const { from, to } = spanOf(period, nowS, null);
@@ -35,7 +35,7 @@ export function turnOf(period: Period, nowS: number): number {
 }
 
 export function startRemembered(): () => void {
-  let asked = '';
+  let requested = '';
   let changes = 0;
   return keepFetched<Timeline>(
     {
@@ -44,7 +44,7 @@ export function startRemembered(): () => void {
       parts: (state) => [
         state.view.period,
         state.twin.connection.epoch,
-        selectNewest(state).snapshot === null,
+        selectLatest(state).snapshot === null,
       ],
       onValue: (value) => {
         receive({ remembered: ready(value) });
@@ -61,19 +61,19 @@ export function startRemembered(): () => void {
       }
       const { period } = state.view;
       const next = JSON.stringify(period);
-      if (next !== asked) {
-        asked = next;
+      if (next !== requested) {
+        requested = next;
         changes += 1;
-        // What is known of another period is of no use.
+        // The timeline of another period is of no use.
         if (state.twin.remembered.value) receive({ remembered: NOTHING });
-        // Which may have led back to the period before.
+        // That may have restored the previous period.
         if (store.get().view.period !== period) return undefined;
       }
       return {
         key: `${epoch}|${turnOf(period, nowS)}`,
         group: String(changes),
         run: (signal) =>
-          fetchTimeline(askedSpan(period, nowS), BUCKETS, signal).then((wire) =>
+          fetchTimeline(requestedSpan(period, nowS), BUCKETS, signal).then((wire) =>
             timelineOf(wire, nowS),
           ),
       };
@@ -81,18 +81,18 @@ export function startRemembered(): () => void {
   );
 }
 
-/** In a day's bar, memory that is shorter than this is squeezed into its right end, seconds. */
+/** A day's bar would squeeze a shorter history into its right end, seconds. */
 const SHORT_S = 10_800;
 const HOUR_S = 3_600;
 
-/** Whether the last hour tells more than the last day; a moment to show has to be in it. */
+/** Whether the last hour shows more than the last day; it must contain the requested moment. */
 function isShort(reach: Span, moment: number | null): boolean {
   return reach.to - reach.from < SHORT_S && (moment === null || moment >= reach.to - HOUR_S);
 }
 
 /**
- * Decides on which period the page opens, where neither link nor person has chosen one: once, as soon as it is
- * known how far memory reaches. No period changes by itself later.
+ * Chooses the period that the page opens on, if neither link nor user has chosen one: once, when the
+ * length of the history is known. Later no period changes by itself.
  */
 export function startOpening(): () => void {
   let opensShort: boolean | null = null;

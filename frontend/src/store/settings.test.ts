@@ -14,7 +14,7 @@ const storage = (text: string | null): { getItem: () => string | null } => ({
 });
 
 test('what was kept comes back', () => {
-  let kept = '';
+  let stored = '';
   const settings = {
     theme: 'dark',
     unit: 'F',
@@ -24,8 +24,8 @@ test('what was kept comes back', () => {
     byArea: true,
     dayBefore: true,
   } as const;
-  keepSettings({ setItem: (_, value) => (kept = value) }, settings);
-  expect(readSettings(storage(kept))).toEqual(settings);
+  keepSettings({ setItem: (_, value) => (stored = value) }, settings);
+  expect(readSettings(storage(stored))).toEqual(settings);
 });
 
 test.each([null, '', '{', 'null', '7', '[]', '{"hidden":5}', '{"hidden":null}'])(

@@ -1,15 +1,15 @@
-/** What the operator prefers on this device; kept in the browser's local storage. */
+/** The operator's settings on this device, in the browser's local storage. */
 import type { TemperatureUnit } from '../domain/format';
 
 export interface Settings {
   readonly theme: 'system' | 'light' | 'dark';
   readonly unit: TemperatureUnit;
-  /** Single-key shortcuts, which some speech input sets off by chance (WCAG 2.1.4). */
+  /** Single-key shortcuts, which speech input can trigger by accident (WCAG 2.1.4). */
   readonly shortcuts: boolean;
-  /** Columns of the table that are not wanted, by their ids; those of a sensor by its name. */
+  /** Ids of hidden table columns; a sensor's id is its name. */
   readonly hidden: readonly string[];
   readonly density: 'usual' | 'compact';
-  /** The table's rows are together by area, where there are areas. */
+  /** Whether the table's rows are grouped by area, if there are areas. */
   readonly byArea: boolean;
   readonly dayBefore: boolean;
 }
@@ -24,7 +24,7 @@ export const DEFAULT_SETTINGS: Settings = {
   dayBefore: false,
 };
 
-/** The tag's own column always is. */
+/** The tag's own column is always shown. */
 export const isColumnShown = ({ hidden }: Pick<Settings, 'hidden'>, id: string): boolean =>
   id === 'tag' || !hidden.includes(id);
 
@@ -37,19 +37,19 @@ export const withColumn = (
 
 const KEY = 'lupin-twin.settings';
 
-/** Reads what was kept; what is not there or damaged is as by default. */
+/** Reads the stored settings; missing or damaged ones get their defaults. */
 export function readSettings(storage: Pick<Storage, 'getItem'>): Settings {
   try {
-    const kept = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<Settings>;
-    // The first thing that looks for a column in no list would leave the page blank for good.
-    const hidden = Array.isArray(kept.hidden) ? kept.hidden : [];
-    return { ...DEFAULT_SETTINGS, ...kept, hidden };
+    const stored = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<Settings>;
+    // A stored value that is no list would crash the page on every load.
+    const hidden = Array.isArray(stored.hidden) ? stored.hidden : [];
+    return { ...DEFAULT_SETTINGS, ...stored, hidden };
   } catch {
     return DEFAULT_SETTINGS;
   }
 }
 
-/** The browser's storage; where it is forbidden, one that keeps nothing. */
+/** The browser's storage; if forbidden, one that stores nothing. */
 export function openStorage(): Pick<Storage, 'getItem' | 'setItem'> {
   try {
     return window.localStorage;
@@ -62,6 +62,6 @@ export function keepSettings(storage: Pick<Storage, 'setItem'>, settings: Settin
   try {
     storage.setItem(KEY, JSON.stringify(settings));
   } catch {
-    // Storage is full or forbidden: the settings then last as long as the page.
+    // Storage is full or blocked: the settings then last as long as the page.
   }
 }

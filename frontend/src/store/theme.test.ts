@@ -34,7 +34,7 @@ test('paper is light, and the screen is dark again after it', () => {
   prefer({ theme: 'dark' });
   fire('beforeprint');
   expect([isDark(), isPrinting(), root['theme']]).toEqual([false, true, 'light']);
-  // Nor has it the colours that a system forces upon the screen.
+  // Nor does paper have the screen's forced colours.
   expect(root['printing']).toBe('');
   fire('afterprint');
   expect(root['printing']).toBeUndefined();

@@ -4,7 +4,7 @@ const system = window.matchMedia('(prefers-color-scheme: dark)');
 const forced = window.matchMedia('(forced-colors: active)');
 let printing = false;
 
-/** Paper gets what holds still: nothing that pulses, and no mark of the mouse. */
+/** On paper nothing pulses, and the pointer leaves no mark. */
 export function isPrinting(): boolean {
   return printing;
 }
@@ -15,7 +15,7 @@ export function isDark(): boolean {
   return theme === 'system' ? system.matches : theme === 'dark';
 }
 
-/** Calls back whenever the colours in use may have changed; paper is always light. */
+/** Calls back whenever the colours may have changed; paper is always light. */
 export function onThemeChange(listener: () => void): () => void {
   const onPrint = ({ type }: Event): void => {
     printing = type === 'beforeprint';

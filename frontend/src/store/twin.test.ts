@@ -32,8 +32,8 @@ test('a frame that only moves the clock is no reason to render', () => {
   ].reduce((connection, event) => step(connection, event, 1).connection, INITIAL);
   const live = changed(NO_TWIN, withConnection(open, 3));
   expect(live.phase).toBe('live');
-  const heard = step(open, { type: 'frame', now: 100, status: null }, 1).connection;
-  expect(changed(live, withConnection(heard, 101))).toBe(live);
-  const silent = changed(live, withConnection(heard, 9_000));
+  const received = step(open, { type: 'frame', now: 100, status: null }, 1).connection;
+  expect(changed(live, withConnection(received, 101))).toBe(live);
+  const silent = changed(live, withConnection(received, 9_000));
   expect(silent.phase).toBe('stale');
 });

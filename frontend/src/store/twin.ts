@@ -1,4 +1,4 @@
-/** What came from the server: the connection, the greenhouse, and what is fetched about it. */
+/** Data from the server: the connection, the greenhouse, and what is fetched about it. */
 import type {
   Alarms,
   Field,
@@ -16,15 +16,15 @@ import { snapshotOf, type Snapshot } from '../domain/twin';
 import { NOTHING, type Fetched } from './fetcher';
 import type { MapPicture } from '../geometry/image';
 
-/** The greenhouse as it was or is at one moment, and what is fetched about that moment. */
+/** The greenhouse at one moment, and what is fetched about that moment. */
 export interface House {
   readonly snapshot: Snapshot | null;
-  /** What the bridge said of that very state. */
+  /** The bridge's judgement of this state. */
   readonly health: Judgement | null;
   readonly field: Fetched<Field>;
   readonly map: Fetched<MapPicture>;
   readonly quality: FieldQuality | null;
-  /** The range of the field's values, held calm over the fields before it. */
+  /** The range of the field's values, damped over successive fields. */
   readonly held: { readonly sensor: string; readonly range: Range } | null;
 }
 
@@ -38,9 +38,9 @@ export const NO_HOUSE: House = {
 };
 
 export interface Past {
-  /** The moment that the data are of, ROS seconds. */
+  /** The moment of the data, ROS seconds. */
   readonly at: number;
-  /** Empty while nothing has come. */
+  /** Empty until the first answer. */
   readonly house: House;
 }
 
@@ -48,7 +48,7 @@ interface PastFault {
   /** ROS seconds. */
   readonly at: number;
   readonly message: string;
-  /** Asking again would not help: nothing is kept, or the moment has not come. */
+  /** Retrying would not help: there is no history, or the moment is in the future. */
   readonly isLasting: boolean;
 }
 
@@ -60,23 +60,23 @@ export interface Difference {
   readonly against: number;
 }
 
-/** Read by `moment.ts` alone, which chooses what the page shows; everyone else asks there. */
+/** Snapshots are read only by `moment.ts`, which chooses what the page shows. */
 export interface TwinState {
   readonly phase: Phase;
   readonly connection: Connection;
-  /** The last one of a bridge that has received something: it is about what is shown. */
+  /** The last status of a bridge that had received data: it describes what is shown. */
   readonly lastStatus: StatusFrame | null;
-  /** Time has lapsed since the newest state: how old it is nobody knows. */
+  /** Time has lapsed since the latest state, so its age is unknown. */
   readonly isTimeLost: boolean;
-  /** Messages of late that were no frames, and what was wrong with the last; null: none. */
+  /** Recent unreadable messages, and the fault of the last; null: none. */
   readonly unread: { readonly count: number; readonly why: string } | null;
   readonly latest: House;
-  /** The alarms of now and of the last day, whatever moment is shown; null: none were told of yet. */
+  /** Alarms that are active or of the last day, whatever moment is shown; null: none received yet. */
   readonly alarms: Alarms | null;
-  /** As it was at the last moment in the past that has come; null: nobody looks back. */
+  /** The last past moment received; null: the present is shown. */
   readonly past: Past | null;
   readonly pastFault: PastFault | null;
-  /** What is remembered of the period in view. */
+  /** The timeline of the period in view. */
   readonly remembered: Fetched<Timeline>;
   readonly difference: Fetched<Difference>;
   readonly sensors: Fetched<Catalogues>;
@@ -110,20 +110,20 @@ export const withConnection =
     return { phase, connection, lastStatus };
   };
 
-/** `ageSeconds`: how old the state was when it was sent, of the first one of a connection. */
+/** `ageSeconds`: the state's age when sent, for the first one of a connection. */
 export const withState =
   (latest: Latest, now: number, ageSeconds: number | null = null): With =>
   ({ isTimeLost, latest: last }) => {
-    // No comparison of seq: one socket delivers in order, and a restarted server counts anew.
+    // `seq` is not compared: one socket delivers in order, and a restarted server counts anew.
     const arrivedAt = now - (ageSeconds ?? 0) * 1000;
-    // What was there before a lapse says nothing about how old a state that is sent again is.
+    // After a lapse, the previous snapshot cannot date a repeated state.
     const before = isTimeLost ? null : last.snapshot;
     const snapshot = snapshotOf(latest, arrivedAt, before);
     const health = sharedJudgement(last.health, latest.health);
     return { latest: { ...last, snapshot, health }, isTimeLost: false };
   };
 
-/** A message was dropped, for this reason. */
+/** Counts a dropped message, with its reason. */
 export const withUnread =
   (why: string): With =>
   ({ unread }) => ({ unread: { count: (unread?.count ?? 0) + 1, why } });
@@ -136,7 +136,7 @@ export const withField =
   (field: Fetched<Field>): With =>
   ({ latest }) => ({ latest: { ...latest, field, held: heldAfter(latest.held, field.value) } });
 
-/** Whoever drags through time begins with the colours of now. */
+/** The first past moment begins with the current colour range. */
 export const withPast =
   (next: Past | null): With =>
   ({ past, latest }) => {
@@ -145,7 +145,7 @@ export const withPast =
   };
 
 function heldAfter(before: House['held'], field: Field | null): House['held'] {
-  // Of an estimate that knows nothing there is no range, however many tags contribute.
+  // An estimate without any known cell has no range, however many tags contribute.
   if (!field?.values.some((value) => !Number.isNaN(value))) return before;
   const { sensor, valueMin: low, valueMax: high } = field;
   const held = before?.sensor === sensor ? before.range : null;
@@ -153,7 +153,7 @@ function heldAfter(before: House['held'], field: Field | null): House['held'] {
   return before && range === held ? before : { sensor, range };
 }
 
-/** Each frame moves the connection's clock; only the rest is worth a render. */
+/** Each frame moves the connection's clock; only other changes render. */
 function sameToTheEye(a: Connection, b: Connection): boolean {
   return (
     a.epoch === b.epoch &&
@@ -163,7 +163,7 @@ function sameToTheEye(a: Connection, b: Connection): boolean {
   );
 }
 
-/** The age of the twin's state is told beside it, and goes on with every frame. */
+/** Ignores the state's age, which changes with every frame. */
 const sameStatus = (a: StatusFrame | null, b: StatusFrame | null): boolean =>
   JSON.stringify({ ...a, state_age_seconds: null }) ===
   JSON.stringify({ ...b, state_age_seconds: null });

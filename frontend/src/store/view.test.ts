@@ -69,9 +69,9 @@ test('charts stand where the map is, and lead back to where they were opened', (
   expect(open.pane).toBe('map');
   expect(viewAfter(viewAfter(open, chart), close).pane).toBe('tags');
   expect(viewAfter(viewAfter(DEFAULT_VIEW, chart), close).pane).toBe('map');
-  // Who went on to the map by hand stays there.
+  // After a switch to the map by hand, the map stays.
   expect(viewAfter(viewAfter(open, { pane: 'map', chartedFrom: null }), close).pane).toBe('map');
-  // So does who went on to a list.
+  // So does a list.
   const alarms = viewAfter(viewAfter(DEFAULT_VIEW, chart), withList('alarms'));
   expect(viewAfter(alarms, close).pane).toBe('tags');
 });
@@ -82,7 +82,7 @@ test('the list beside the map: a narrow screen shows it, and a filter of the tab
   expect(viewAfter(alarms, { health: 'critical', list: 'tags' }).list).toBe('tags');
   const map = viewAfter(alarms, { pane: 'map', chartedFrom: null });
   expect(map.list).toBe('alarms');
-  // A link shows what was in sight when it was made.
+  // A link shows what was visible when it was made.
   const follow = (from: ViewState): ViewState =>
     viewAfter(DEFAULT_VIEW, fromFragment(toFragment(from)));
   expect(follow(alarms)).toMatchObject({ list: 'alarms', pane: 'tags' });

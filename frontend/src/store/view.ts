@@ -20,17 +20,17 @@ export const LAYERS = [
 ] as const;
 export type Layer = (typeof LAYERS)[number];
 
-/** What the heat map is made of: the readings nearest to a cell, an estimate, or its error alone. */
+/** The heat map's source: the nearest readings, an estimate, or its error alone. */
 export const HEATS = ['nearest', 'estimate', 'error'] as const;
 type HeatKind = (typeof HEATS)[number];
 
-/** What the page takes for a filter of the table, characters. */
+/** Longest table filter, characters. */
 export const LONGEST_FILTER = 200;
 
-/** More lines in one chart nobody can tell apart. */
+/** More lines in one chart are indistinguishable. */
 export const MOST_CHARTED = 8;
 
-/** What is charted: all sensors of the first tag, or the sensor in view of them all. */
+/** What is charted: all sensors of the first tag, or the sensor in view of every tag. */
 export interface Charted {
   readonly by: 'tag' | 'sensor';
   /** At least one, none twice. */
@@ -46,7 +46,7 @@ export interface Sort {
 export interface ViewState {
   /** The moment to show: null is now, a number a moment in the past, ROS seconds. */
   readonly moment: number | null;
-  /** The stretch of time that the bar below the map has, and charts too. */
+  /** The period of the time bar and the charts. */
   readonly period: Period;
   readonly sensor: string;
   /** Id of the tag whose card is open. */
@@ -55,23 +55,23 @@ export interface ViewState {
   readonly hovered: string | null;
   readonly layers: ReadonlySet<Layer>;
   readonly heat: HeatKind;
-  /** What the heat map is the difference to; null: it is the field itself. */
+  /** What the heat map is compared with; null: nothing. */
   readonly compare: Compare | null;
   readonly chart: Charted | null;
-  /** The half that the charts took the place of, and lead back to; null: none that is still wanted. */
+  /** The half that the charts replaced, and closing them returns to; null: none. */
   readonly chartedFrom: ViewState['pane'] | null;
-  /** Whether colours tell how values lie against their ideal range, or how high they are. */
+  /** Whether colours show values against their ideal range, or how high they are. */
   readonly colouring: 'ideal' | 'value';
-  /** Fixed colour scales by sensor; one without follows its data. */
+  /** Fixed colour scales by sensor; other scales follow the data. */
   readonly ranges: ReadonlyMap<string, Range>;
-  /** null: everything, and still so when the map grows. */
+  /** null: everything, also when the map grows. */
   readonly camera: Camera | null;
   readonly sort: Sort;
   readonly filter: string;
   readonly health: Verdict | null;
   /** Which half a narrow screen shows. */
   readonly pane: 'map' | 'tags';
-  /** What stands beside the map: the table of tags, or the alarms of now. */
+  /** The list beside the map: tags, or current alarms. */
   readonly list: 'tags' | 'alarms';
 }
 
@@ -101,10 +101,10 @@ export const DEFAULT_VIEW: ViewState = {
   list: 'tags',
 };
 
-/** What is in place of the default period where memory is short; neither is anybody's choice. */
+/** Replaces the default period if the history is short; neither is a user's choice. */
 export const SHORT_PERIOD: Period = { kind: 'hour' };
 
-/** Whether a link or a person has chosen it: told by which object it is, for a choice is a new one. */
+/** Whether a link or a user has chosen it: a choice is always a new object. */
 export const isChosen = (period: Period): boolean =>
   period !== DEFAULT_VIEW.period && period !== SHORT_PERIOD;
 
@@ -112,7 +112,7 @@ export function fixedRange({ ranges, sensor }: ViewState): Range | null {
   return ranges.get(sensor) ?? null;
 }
 
-/** Moments are told apart by the millisecond, and none is before the beginning of ROS time. */
+/** Rounds to milliseconds; no moment is before ROS time 0. */
 export const roundedMoment = (moment: number): number =>
   Math.max(0, Math.round(moment * 1000) / 1000);
 
@@ -125,7 +125,7 @@ export function viewAfter(view: ViewState, change: Change<ViewState>): ViewState
 
 type With = (view: ViewState) => Partial<ViewState>;
 
-/** Its charts follow a tag that is chosen, if they are a tag's. */
+/** Charts of a tag follow the chosen tag. */
 export const withTag =
   (tagId: string | null): With =>
   ({ chart }) => ({
@@ -139,7 +139,7 @@ export const withLayer =
     layers: new Set(LAYERS.filter((each) => (each === layer ? on : layers.has(each)))),
   });
 
-/** Fixes the colour scale of the sensor in view; null: it is as its data are. */
+/** Fixes the colour scale of the sensor in view; null: it follows the data. */
 export const withRange =
   (range: Range | null): With =>
   (view) => {
@@ -153,12 +153,12 @@ export const withSort =
   (column: string): With =>
   ({ sort }) => ({ sort: { column, descending: column === sort.column && !sort.descending } });
 
-/** On a narrow screen it comes into view. */
+/** On a narrow screen, the list replaces the map. */
 export const withList = (list: ViewState['list']): Partial<ViewState> => ({
   ...{ list, pane: 'tags', chartedFrom: null },
 });
 
-/** On a narrow screen the charts are where the map is. */
+/** On a narrow screen, the charts replace the map. */
 export const withChart =
   (wanted: Charted | null): With =>
   ({ pane, chartedFrom, chart: before }) => {
@@ -168,7 +168,7 @@ export const withChart =
       : { chart, pane: chartedFrom ?? pane, chartedFrom: null };
   };
 
-/** As many as a chart may have, none of them twice; without any there is no chart. */
+/** At most as many tags as a chart can show, none twice; without tags there is no chart. */
 export function chartOf(chart: Charted | null): Charted | null {
   const tagIds = [...new Set(chart?.tagIds)].slice(0, MOST_CHARTED);
   return chart && tagIds.length > 0 ? { by: chart.by, tagIds } : null;

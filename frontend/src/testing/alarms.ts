@@ -1,4 +1,4 @@
-/** Alarms as the bridge might tell of them. */
+/** Alarms as the bridge might send them. */
 import type { Alarm, Alarms, HealthReason } from '../contract/types';
 import { receive } from '../store/app';
 import { reason } from './health';
@@ -30,6 +30,6 @@ export const alarms = (list: readonly Alarm[], over: Partial<Alarms> = {}): Alar
   ...over,
 });
 
-export const tellAlarms = (...list: readonly Alarm[]): void => {
+export const reportAlarms = (...list: readonly Alarm[]): void => {
   receive({ alarms: alarms(list) });
 };

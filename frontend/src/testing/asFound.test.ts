@@ -5,12 +5,12 @@ import { asFound } from './asFound';
 test('what a file adds, starts and puts in the place of global things is gone with it', async () => {
   const before = Object.entries(window);
   const putBack = asFound();
-  const heard = vi.fn();
+  const listener = vi.fn();
   const rung = vi.fn();
   vi.stubGlobal('matchMedia', vi.fn());
   vi.spyOn(document, 'hidden', 'get').mockReturnValue(true);
-  window.addEventListener('online', heard);
-  document.addEventListener('keydown', heard);
+  window.addEventListener('online', listener);
+  document.addEventListener('keydown', listener);
   setInterval(rung, 1);
   setTimeout(rung, 1);
   document.body.append('text');
@@ -35,7 +35,7 @@ test('what a file adds, starts and puts in the place of global things is gone wi
   // One that rings later than those would have.
   await new Promise((rings) => setTimeout(rings, 5));
   expect(rung).not.toHaveBeenCalled();
-  expect(heard).not.toHaveBeenCalled();
+  expect(listener).not.toHaveBeenCalled();
 });
 
 test('modules of one file are not those of the next', async () => {

@@ -1,11 +1,11 @@
 /**
- * Test files share one process, and those of the page one window: to make these for each takes
- * longer than most files' tests. So each file leaves everything as it found it: what it sets on
- * global things, it sets with `vi`, which puts that back.
+ * Test files share one process, and page tests one window: creating these per file takes longer than
+ * most files' tests. So each file must restore what it changes: globals are stubbed with `vi`, which
+ * restores them.
  */
 import { vi } from 'vitest';
 
-/** Timers that still run when the file ends would call into the next one's window. */
+/** Tracks timers: those still running when a file ends would fire in the next one. */
 function timersEnd(): () => void {
   const stops: (() => void)[] = [];
   for (const name of ['setTimeout', 'setInterval'] as const) {
@@ -13,7 +13,7 @@ function timersEnd(): () => void {
     globalThis[name] = ((...given: Parameters<typeof setTimeout>) => {
       const timer = start(...given);
       stops.push(() => {
-        // Which ends either.
+        // Ends timeouts and intervals alike.
         clearTimeout(timer);
       });
       return timer;
@@ -24,7 +24,7 @@ function timersEnd(): () => void {
   };
 }
 
-/** Listeners on what outlives a file: no module of the last one hears the next one's events. */
+/** Tracks listeners on objects that outlive a file, so that old modules get no later events. */
 function listenersEnd(target: EventTarget): () => void {
   const stops: (() => void)[] = [];
   // eslint-disable-next-line @typescript-eslint/unbound-method
@@ -57,12 +57,12 @@ function pageAsFound(): () => void {
     }
     localStorage.clear();
     sessionStorage.clear();
-    // A new step, so that there is nothing to go forward to.
+    // A new step clears the forward history.
     history.pushState(null, '', '/');
   };
 }
 
-/** Looks round; what it returns puts everything back as it was. */
+/** Records the state; returns a function that restores it. */
 export function asFound(): () => Promise<void> {
   const { setTimeout, setInterval } = globalThis;
   const page = typeof document === 'undefined' ? () => undefined : pageAsFound();
@@ -73,10 +73,10 @@ export function asFound(): () => Promise<void> {
     vi.unstubAllGlobals();
     vi.unstubAllEnvs();
     timers();
-    // One that is half loaded when the modules are forgotten never comes in the next file either.
+    // A module still loading at the reset would never arrive in the next file either.
     await vi.dynamicImportSettled();
     timers();
-    // The page's modules keep state; each file has its own.
+    // Modules have state, so each file gets its own.
     vi.resetModules();
     page();
     Object.assign(globalThis, { setTimeout, setInterval });

@@ -1,4 +1,4 @@
-/** A 2d context that draws nothing and remembers what it was told. */
+/** A 2D context that draws nothing and records its calls. */
 export interface Call {
   readonly name: string;
   readonly args: readonly unknown[];

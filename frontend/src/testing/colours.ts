@@ -1,4 +1,4 @@
-/** The colours of the style sheet, without what they are mixed with. */
+/** The colours of the style sheet, without mixing. */
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 

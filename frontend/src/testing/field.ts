@@ -1,8 +1,8 @@
-/** Fields, as the page has them and as the server sends them. */
+/** Fields, as in the page and as on the wire. */
 import type { Field, Grade, Place, Schemas, Sureness } from '../contract/types';
 import { wireTime } from './timeline';
 
-/** These rows of cells, the lowest first, a metre each from the origin on. */
+/** A field of these rows, the lowest first, with cells of 1 m from the origin. */
 export function fieldWith(rows: readonly (readonly number[])[], over: Partial<Field> = {}): Field {
   const values = rows.flat();
   const known = values.filter((value) => !Number.isNaN(value));
@@ -42,7 +42,7 @@ const npyAnswer = (
   return new Response(body, { headers });
 };
 
-/** One row of cells from (-1.5, 0.5) on. */
+/** One row of cells, starting at (-1.5, 0.5). */
 export type Expected = Schemas['ExpectedReading'];
 
 export const npyField = (values: readonly number[]): Response =>
@@ -50,7 +50,7 @@ export const npyField = (values: readonly number[]): Response =>
     ...{ Resolution: 0.05, 'Value-Min': 1, 'Value-Max': 2 },
   });
 
-/** The same, 1 m each: the means, then their standard deviations. */
+/** The same with cells of 1 m: the means, then their standard deviations. */
 export const npyEstimate = (
   mean: readonly number[],
   sd: readonly number[],
@@ -60,13 +60,13 @@ export const npyEstimate = (
     ...{ Resolution: 1, 'Sd-Known': sdKnown, 'Reading-Count': 40 },
   });
 
-/** Where nothing surer than 1 is asked. */
+/** With a limit of 1 for known cells. */
 export const sureness = (sd: readonly number[]): Sureness => ({
   sd: Float32Array.from(sd),
   sdKnown: 1,
 });
 
-/** A row of cells from the origin on, 1 m each. */
+/** A row of cells of 1 m, starting at the origin. */
 export const estimated = (
   values: readonly number[],
   sd: readonly number[],

@@ -1,4 +1,4 @@
-/** What the bridge's judge might say. Nothing follows from readings here: verdicts are given. */
+/** Judgements of the bridge. Verdicts are given, not derived from readings. */
 import type { HealthReason, Judgement, Verdict } from '../contract/types';
 import { VERDICTS } from '../domain/health';
 
@@ -15,11 +15,11 @@ export const reason = (over: Partial<HealthReason> = {}): HealthReason => ({
   ...over,
 });
 
-/** Of a value that is back inside its limit: what it has to pass. */
+/** For a value that is back inside its limit: the value it must pass. */
 export const held = (release?: number): Pick<HealthReason, 'release'> =>
   release === undefined ? {} : { release };
 
-/** What is said of each tag: a verdict without a reason, or reasons, the worst of which decides. */
+/** For each tag a verdict without a reason, or reasons, of which the worst decides. */
 export function judgement(
   said: Readonly<Record<string, Verdict | readonly HealthReason[]>>,
   day: Judgement['house']['day'] = { is_day: true, source: 'assumed' },

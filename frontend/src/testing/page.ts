@@ -29,7 +29,7 @@ export const status = (over: Partial<StatusFrame> = {}): StatusFrame => ({
 
 let stamp = 1;
 
-/** The defaults, and a state with these tags, just received, and judged so. */
+/** The defaults, and a state with these tags and this judgement, just received. */
 export function showTags(tags: readonly TwinTagState[], health: Judgement = NOBODY): void {
   act(DEFAULT_VIEW);
   prefer(DEFAULT_SETTINGS);
@@ -49,26 +49,26 @@ export function showField(value: Field): void {
   receive(withField({ value, state: 'ready', message: '' }));
 }
 
-/** Runs a connection through events and hands it to the store as it is at `now`. */
+/** Runs a connection through events, and stores its state at `now`. */
 export function connection(now: number, ...events: readonly ConnectionEvent[]): void {
   const last = events.reduce((current, event) => step(current, event, 1).connection, INITIAL);
   receive(withConnection(last, now));
 }
 
-const heard = (now: number, bridge: StatusFrame): ConnectionEvent[] => [
+const receivedEvents = (now: number, bridge: StatusFrame): ConnectionEvent[] => [
   { type: 'start', now },
   { type: 'opened', now },
   { type: 'frame', now, status: bridge },
   { type: 'frame', now, status: null },
 ];
 
-/** Heard of, the last time so long ago. */
+/** A connection that last received something this long ago. */
 export function goLive(bridge: StatusFrame = status(), silentMs = 0): void {
   const now = performance.now();
-  connection(now + silentMs, ...heard(now, bridge));
+  connection(now + silentMs, ...receivedEvents(now, bridge));
 }
 
 export function goLost(): void {
   const now = performance.now();
-  connection(now, ...heard(now, status()), { type: 'closed', now, code: 1006 });
+  connection(now, ...receivedEvents(now, status()), { type: 'closed', now, code: 1006 });
 }

@@ -1,4 +1,4 @@
-/** The file of sensors that comes with the bridge, as the page gets it from there. */
+/** The bridge's default file of sensors, as the page receives it. */
 import file from '../../../backend/lupin_bridge/sensors.json';
 import type { SensorsFile } from '../contract/types';
 import { cataloguesOf, type Sensor } from '../domain/sensors';

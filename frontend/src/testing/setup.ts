@@ -1,4 +1,4 @@
-/** What jsdom lacks of a browser, as far as the page's modules touch it on import or mount. */
+/** Browser features that jsdom lacks, as far as modules need them on import or mount. */
 import { cleanup, configure } from '@testing-library/react';
 import { afterAll, afterEach } from 'vitest';
 
@@ -7,7 +7,7 @@ import { FakeContext } from './canvas';
 
 afterAll(asFound());
 
-// How long a busy machine takes is no matter.
+// Tolerates a busy machine.
 configure({ asyncUtilTimeout: 20_000 });
 afterEach(cleanup);
 
@@ -40,7 +40,7 @@ globalThis.Path2D = class {
   constructor(readonly d: string) {}
 } as unknown as typeof Path2D;
 
-// Nothing has a size here.
+// In jsdom nothing has a size.
 const nothing = (): void => undefined;
 globalThis.ResizeObserver = class {
   observe = nothing;

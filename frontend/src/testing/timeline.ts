@@ -2,7 +2,7 @@ import type { WireTime, Timeline as WireTimeline } from '../contract/types';
 import { type Point, readingAt, type Series } from '../domain/series';
 import type { Timeline } from '../domain/timeline';
 
-/** A hundred seconds in which nothing happened, but for what is told otherwise. */
+/** A hundred seconds without events, except the given ones. */
 export const timelineWith = (over: Partial<Timeline>): Timeline => ({
   from: 100,
   to: 200,
@@ -50,7 +50,7 @@ interface Given extends Partial<Series> {
   readonly readings?: readonly { readonly at: number; readonly value: number | null }[];
 }
 
-/** A hundred seconds without a reading, but for what is told otherwise. */
+/** A hundred seconds without readings, except the given ones. */
 export const seriesWith = ({ readings = [], ...over }: Given = {}): Series => ({
   tagId: '1',
   sensor: 'temperature',

@@ -34,20 +34,20 @@ test('header, frame and title say the moment of what is shown, not the one that 
       <PastFrame />
     </>,
   );
-  const told = (): unknown[] => [
+  const headerState = (): unknown[] => [
     screen.queryByTestId('past-header')?.querySelector('strong')?.textContent ?? null,
     screen.queryByTestId('past-frame') !== null,
     document.title,
   ];
-  expect(told()).toEqual([null, false, 'Lupin twin']);
+  expect(headerState()).toEqual([null, false, 'Lupin twin']);
   look(2_500, null);
-  expect(told()).toEqual([null, false, 'Lupin twin']);
+  expect(headerState()).toEqual([null, false, 'Lupin twin']);
   look(2_400, 2_500);
-  expect(told()).toEqual(['sim 00:41:40', true, 'sim 00:41:40 (past) · Lupin twin']);
+  expect(headerState()).toEqual(['sim 00:41:40', true, 'sim 00:41:40 (past) · Lupin twin']);
   expect(screen.getByTestId('past-header').textContent).toContain('2\u00a0h 5\u00a0min ago');
   fireEvent.click(screen.getByRole('button', { name: 'Back to live' }));
   expect(store.get().view.moment).toBeNull();
-  expect(told()).toEqual([null, false, 'Lupin twin']);
+  expect(headerState()).toEqual([null, false, 'Lupin twin']);
 });
 
 test.each([

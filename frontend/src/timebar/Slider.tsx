@@ -4,7 +4,7 @@ import { endsNow, rosText, type Span } from '../domain/time';
 import type { Timeline } from '../domain/timeline';
 import { act, store, useApp } from '../store/app';
 import { pointedBy, pointedTime, useSelected } from '../store/create';
-import { newestWord, selectAwaited, selectShown } from '../store/moment';
+import { latestWord, selectAwaited, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { useSize } from '../widgets/useSize';
 import {
@@ -41,7 +41,7 @@ export function Slider({
   const moment = useApp((state) => state.view.moment);
   const shown = useApp((state) => selectShown(state).moment);
   const awaited = useApp(selectAwaited);
-  const newest = useApp(newestWord);
+  const newest = useApp(latestWord);
   const ofChart = useSelected(pointedTime, pointedBy('chart'));
   const { from, to } = held ?? span;
   const axis = useMemo((): Axis => ({ from, to, width }), [from, to, width]);
@@ -181,7 +181,7 @@ function Bubble({
       style={{ left: `${left}px` }}
       aria-hidden="true"
     >
-      <strong>{chosen === null ? newestWord() : rosText(momentAt(axis, x))}</strong>
+      <strong>{chosen === null ? latestWord() : rosText(momentAt(axis, x))}</strong>
       {column && <span>{countsText(column)}</span>}
     </span>
   );

@@ -22,9 +22,9 @@ const remember = (from: number, to: number): void => {
 
 /** Stub ResizeObserver: the bar is as wide as a screen. */
 class Laid {
-  constructor(private readonly tell: (entries: readonly object[]) => void) {}
+  constructor(private readonly callback: (entries: readonly object[]) => void) {}
   observe = (): void => {
-    this.tell([{ contentRect: { width: 1_000, height: 62 } }]);
+    this.callback([{ contentRect: { width: 1_000, height: 62 } }]);
   };
   disconnect = (): void => undefined;
 }

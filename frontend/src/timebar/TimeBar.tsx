@@ -7,7 +7,7 @@ import { NoteMarks } from '../notes/NoteMarks';
 import { SiteComment } from '../notes/Comments';
 import { act, store, useApp } from '../store/app';
 import { useSelected } from '../store/create';
-import { barSpan, newestWord, rosNow, selectIsCut } from '../store/moment';
+import { barSpan, latestWord, rosNow, selectIsDisconnected } from '../store/moment';
 import { S } from '../strings';
 import { Disclosure, Select } from '../widgets/controls';
 import { useNow } from '../widgets/useNow';
@@ -18,7 +18,7 @@ import { chooseSpeed, playback, SPEEDS, togglePlayback } from './playback';
 export function TimeBar(): JSX.Element | null {
   const remembered = useApp((state) => state.twin.remembered);
   const period = useApp((state) => state.view.period);
-  const isCut = useApp(selectIsCut);
+  const isDisconnected = useApp(selectIsDisconnected);
   const tick = useNow();
   const nowS = rosNow(store.get(), tick);
   if (nowS === null) return null;
@@ -41,7 +41,7 @@ export function TimeBar(): JSX.Element | null {
       <NoteMarks span={span} />
       <Slider span={span} timeline={remembered.value} nowS={nowS} />
       {/* Without a connection, the banner says so. */}
-      {remembered.state === 'failed' && !isCut && (
+      {remembered.state === 'failed' && !isDisconnected && (
         <p className="timebar-note" role="status">
           {S.chartFailed(shown(remembered.message, 160))}
         </p>
@@ -85,7 +85,7 @@ function Player(): JSX.Element {
 /** The chosen moment, which may still be loading; without its year, which the header has. */
 function When(): JSX.Element {
   const moment = useApp((state) => state.view.moment);
-  const word = useApp(newestWord);
+  const word = useApp(latestWord);
   return (
     <span className="timebar-when" data-testid="timebar-when">
       {moment === null ? word : shortRosText(moment)}

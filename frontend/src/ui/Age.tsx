@@ -3,8 +3,8 @@ import type { JSX, ReactNode } from 'react';
 import { ageSeconds, ageStep, type When } from '../domain/time';
 import { ageText } from '../domain/format';
 import { shown } from '../domain/text';
-import { tryKind } from '../domain/health';
-import type { FailedTry } from '../domain/twin';
+import { attemptOutcome } from '../domain/health';
+import type { FailedAttempt } from '../domain/twin';
 import { useApp } from '../store/app';
 import { selectShown } from '../store/moment';
 import { S } from '../strings';
@@ -42,7 +42,7 @@ export function Age({ when, format = agoText }: { when: When; format?: Format })
   }
   if (text !== null) return <span className="age">{text}</span>;
   return (
-    <span className="age faint" title={when === 'unknown' ? S.ageUntoldLong : S.ageUnknownLong}>
+    <span className="age faint" title={when === 'unknown' ? S.ageUnreportedLong : S.ageUnknownLong}>
       {S.ageUnknown}
     </span>
   );
@@ -63,9 +63,9 @@ export const AgeFact = ({ label, when }: { label: string; when: When }): JSX.Ele
 );
 
 /** A failed attempt: when, and why. */
-export function Tried({ failed }: { failed: FailedTry }): JSX.Element {
+export function FailedAttemptText({ failed }: { failed: FailedAttempt }): JSX.Element {
   const age = useAgeText(failed.at, ageText);
-  const outcome = S.tried[tryKind(failed.status)];
+  const outcome = S.attemptOutcomes[attemptOutcome(failed.status)];
   const text = S.reasons.scanFailed(outcome, age);
   const detail = failed.detail === '' ? '' : `: ${shown(failed.detail, 160)}`;
   return <span title={text + detail}>{text}</span>;

@@ -8,7 +8,7 @@ import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { Announcer } from './Announcer';
 import { startKeys } from './keys';
-import { loadParts } from './later';
+import { loadParts } from './loadDeferred';
 
 beforeAll(() => loadParts());
 

@@ -14,7 +14,7 @@ import { fieldWith } from '../testing/field';
 import { goLive, goLost, showField, showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { App } from './App';
-import { loadParts } from './later';
+import { loadParts } from './loadDeferred';
 
 beforeAll(() => loadParts());
 

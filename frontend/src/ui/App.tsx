@@ -1,11 +1,11 @@
 import type { JSX } from 'react';
 
-import type { CycleWish } from '../store/cycle';
+import type { CycleSetting } from '../store/cycle';
 import { act, useApp } from '../store/app';
 import { withList } from '../store/view';
 import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
-import { selectIsHere, selectIsRecorded, selectShown } from '../store/moment';
+import { selectHasSnapshot, selectIsRecorded, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { AlarmsLabel } from './alarms/ListChoice';
 import { Announcer } from './Announcer';
@@ -16,14 +16,14 @@ import { Icon } from '../widgets/controls';
 import { MapPanel } from './MapPanel';
 import { TagsPanel } from './TagsPanel';
 import { toast } from './toast';
-import { WithParts } from './later';
+import { WithParts } from './loadDeferred';
 
 export function App({
   kiosk,
-  cycle = NO_WISH,
+  cycle = NO_CYCLE,
 }: {
   kiosk: boolean;
-  cycle?: CycleWish;
+  cycle?: CycleSetting;
 }): JSX.Element {
   const phase = useApp((state) => state.twin.phase);
   const pane = useApp((state) => state.view.pane);
@@ -51,7 +51,7 @@ export function App({
         </a>
       )}
       <Header kiosk={kiosk}>
-        {kiosk && <WithParts>{(parts) => <parts.KioskNote wish={cycle} />}</WithParts>}
+        {kiosk && <WithParts>{(parts) => <parts.KioskNote cycle={cycle} />}</WithParts>}
       </Header>
       <div className="banners">
         <FrozenBanner />
@@ -77,7 +77,7 @@ export function App({
   );
 }
 
-const NO_WISH: CycleWish = { seconds: null, refused: null };
+const NO_CYCLE: CycleSetting = { seconds: null, refused: null };
 
 /** Moves the focus in code, because the URL fragment belongs to the permalink. */
 function skipToTable(event: React.MouseEvent): void {
@@ -90,7 +90,7 @@ function skipToTable(event: React.MouseEvent): void {
 function PaneTabs(): JSX.Element {
   const shown = useApp(({ view }) => (view.pane === 'map' ? 'map' : view.list));
   const verdict = useApp((state) => selectHealth(state).verdict);
-  const isHere = useApp(selectIsHere);
+  const hasSnapshot = useApp(selectHasSnapshot);
   const tab = (name: 'map' | 'tags' | 'alarms', label: JSX.Element): JSX.Element => (
     <button
       type="button"
@@ -101,7 +101,7 @@ function PaneTabs(): JSX.Element {
     >
       <Icon name={name === 'map' ? 'map' : name === 'tags' ? 'list' : 'bell'} />
       <span>{label}</span>
-      {name === 'tags' && isHere && <HealthMark verdict={verdict} word={false} />}
+      {name === 'tags' && hasSnapshot && <HealthMark verdict={verdict} word={false} />}
     </button>
   );
   return (

@@ -3,7 +3,7 @@ import { expect, test } from 'vitest';
 
 import { shelveAlarm } from '../alarms/own';
 import { startAlarms } from '../alarms/watch';
-import { alarm, tellAlarms } from '../testing/alarms';
+import { alarm, reportAlarms } from '../testing/alarms';
 import { judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
@@ -69,7 +69,7 @@ test('of what ails many as well, since when it is active where it is worst', () 
   const stop = startAlarms();
   const cold = (at: number) => reason({ value: 9 - at / 10 });
   act(() => {
-    tellAlarms(alarm('a', { tag_id: '13', reason: cold(13) }));
+    reportAlarms(alarm('a', { tag_id: '13', reason: cold(13) }));
   });
   show(Object.fromEntries(Array.from({ length: 13 }, (_, at) => [`${at + 1}`, [cold(at + 1)]])));
   const [cause] = document.querySelectorAll('li[data-cause]');
@@ -107,9 +107,9 @@ test('where all is shelved, or the robot stands still, nobody says that nothing 
   const stop = startAlarms();
   render(<AttentionList />);
   act(() => {
-    const told = alarm('a', { tag_id: 'bug', reason: pest });
-    tellAlarms(told);
-    shelveAlarm({ alarm: told, verdict: 'critical' }, 15, 'treated');
+    const pestAlarm = alarm('a', { tag_id: 'bug', reason: pest });
+    reportAlarms(pestAlarm);
+    shelveAlarm({ alarm: pestAlarm, verdict: 'critical' }, 15, 'treated');
   });
   expect(ids()).toEqual([]);
   expect(screen.queryByRole('heading')).toBeNull();

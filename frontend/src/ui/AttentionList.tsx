@@ -9,9 +9,9 @@ import { isBad, severity, todoText, type HouseHealth } from '../domain/health';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
-import { addressOfPage, CYCLE_LIMITS, nextSensor, type CycleWish } from '../store/cycle';
+import { addressOfPage, CYCLE_LIMITS, nextSensor, type CycleSetting } from '../store/cycle';
 import { selectHealth, selectSensor } from '../store/derived';
-import { selectIsHere } from '../store/moment';
+import { selectHasSnapshot } from '../store/moment';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
 import { useSince, useUrgent, type Urgent } from './DoNow';
@@ -38,8 +38,8 @@ export function AttentionList(): JSX.Element {
   const urgent = useUrgent();
   const lines = useLines(urgent);
   const health = useApp(selectHealth);
-  const isHere = useApp(selectIsHere);
-  const heading = urgent.length > 0 ? S.attention : isHere ? noneText(health) : null;
+  const hasSnapshot = useApp(selectHasSnapshot);
+  const heading = urgent.length > 0 ? S.attention : hasSnapshot ? noneText(health) : null;
   const list = useRef<HTMLUListElement>(null);
   const count = useFitting(list, lines.length);
   const rest = lines.slice(count).reduce((sum, { tags }) => sum + tags.length, 0);
@@ -140,10 +140,10 @@ function noneText({ verdict, reasons, counts: { unknown } }: HouseHealth): strin
 }
 
 /** Most characters of a refused cycle setting that are quoted. */
-const LONGEST_WISH = 12;
+const LONGEST_SETTING = 12;
 
 /** In a wall screen's header: the time, the sensor and time to the next one, and how to leave. */
-export function KioskNote({ wish }: { wish: CycleWish }): JSX.Element {
+export function KioskNote({ cycle }: { cycle: CycleSetting }): JSX.Element {
   const next = useSelected(nextSensor);
   const sensor = useApp(selectSensor);
   const left = useTicking((now) =>
@@ -152,9 +152,13 @@ export function KioskNote({ wish }: { wish: CycleWish }): JSX.Element {
   const time = useTicking(() => minuteText(timeOfDay()));
   return (
     <div className="kiosk-note" data-testid="kiosk-note">
-      {wish.refused !== null && (
+      {cycle.refused !== null && (
         <span role="status">
-          {S.cycleRefused(shown(wish.refused, LONGEST_WISH), CYCLE_LIMITS.least, CYCLE_LIMITS.most)}
+          {S.cycleRefused(
+            shown(cycle.refused, LONGEST_SETTING),
+            CYCLE_LIMITS.least,
+            CYCLE_LIMITS.most,
+          )}
         </span>
       )}
       {next && left !== null && (
@@ -163,7 +167,7 @@ export function KioskNote({ wish }: { wish: CycleWish }): JSX.Element {
           <span>{S.cycleNext(shown(next.sensor.label, 24), left)}</span>
         </span>
       )}
-      <button type="button" className="text-button" onClick={leaveKiosk}>
+      <button type="button" className="text-button" onClick={closeKiosk}>
         {S.kioskLeave} <kbd>Esc</kbd>
       </button>
       <time className="kiosk-clock">{time}</time>
@@ -172,15 +176,15 @@ export function KioskNote({ wish }: { wish: CycleWish }): JSX.Element {
 }
 
 /** Opens the same view with controls; the browser's Back returns to the wall screen. */
-function leaveKiosk(): void {
+function closeKiosk(): void {
   const { search, hash } = window.location;
   window.location.assign(addressOfPage(search, hash));
 }
 
 /** Handles Esc, the key that `KioskNote` names. */
-export function startLeaving(): () => void {
+export function startKioskClose(): () => void {
   const onKeyDown = (event: KeyboardEvent): void => {
-    if (event.key === 'Escape' && !event.defaultPrevented) leaveKiosk();
+    if (event.key === 'Escape' && !event.defaultPrevented) closeKiosk();
   };
   document.addEventListener('keydown', onKeyDown);
   return () => {

@@ -13,7 +13,7 @@ import { act, store, useApp } from '../store/app';
 import { withList, withTag } from '../store/view';
 import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
-import { rosNow, selectIsHere, selectShown, selectTags } from '../store/moment';
+import { rosNow, selectHasSnapshot, selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { selectAreAlarmsKnown, useReasonText } from './Reasons';
@@ -228,8 +228,8 @@ export function Overall({
   const active = useSelected(alarmList, (list) => list.active.length);
   const shelved = useSelected(alarmList, (list) => list.shelved.length);
   const text = own ? reason : overallText(health, isNow ? active + shelved : 0);
-  const isHere = useApp(selectIsHere);
-  if (text === null || !isHere) return null;
+  const hasSnapshot = useApp(selectHasSnapshot);
+  if (text === null || !hasSnapshot) return null;
   return (
     <p className="do-why" data-testid={id} title={text}>
       {text}
@@ -272,10 +272,10 @@ function overallText({ verdict, counts }: HouseHealth, alarms: number): string |
 /** The most urgent task, above the map on a phone, where the table is a tab away. */
 export function HealthStrip(): JSX.Element {
   const verdict = useApp((state) => selectHealth(state).verdict);
-  const isHere = useApp(selectIsHere);
+  const hasSnapshot = useApp(selectHasSnapshot);
   return (
     <div className="health-strip" data-testid="health-strip" data-health={verdict}>
-      {isHere && <HealthMark verdict={verdict} word={false} />}
+      {hasSnapshot && <HealthMark verdict={verdict} word={false} />}
       <ShelvedCount />
       <DoNow most={1} id="health-first" />
     </div>

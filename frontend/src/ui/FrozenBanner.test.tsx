@@ -45,9 +45,9 @@ test.each([
   goLive(status({ twin: 'offline', reason }));
   render(<FrozenBanner />);
   expect(text()).toMatch(words);
-  const behind = document.querySelector('details.more');
-  if (more) expect(behind?.textContent).toMatch(more);
-  else expect(behind).toBeNull();
+  const details = document.querySelector('details.more');
+  if (more) expect(details?.textContent).toMatch(more);
+  else expect(details).toBeNull();
 });
 
 test('each state of the connection has a word of its own', () => {

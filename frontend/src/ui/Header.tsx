@@ -6,7 +6,7 @@ import { selectHasOwnTime, selectIsRecorded, selectOrigin, selectShown } from '.
 import { S } from '../strings';
 import { OriginNote, PastHeader } from '../timebar/Past';
 import { Disclosure, Icon } from '../widgets/controls';
-import { WithParts } from './later';
+import { WithParts } from './loadDeferred';
 
 /** The fleet's greenhouse that the page shows; undefined outside a fleet (no `/sites/` in the path). */
 function siteName(): string | undefined {

@@ -6,7 +6,7 @@ import { acknowledgeAlarms, shelveAlarm } from '../alarms/own';
 import { alarmList, startAlarms } from '../alarms/watch';
 import { act as look, receive, store } from '../store/app';
 import { NO_HOUSE, withPast } from '../store/twin';
-import { alarm, alarms, tellAlarms } from '../testing/alarms';
+import { alarm, alarms, reportAlarms } from '../testing/alarms';
 import { held, judgement, reason } from '../testing/health';
 import { goLost, showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
@@ -41,7 +41,7 @@ test('says what to do first, and since when', () => {
   });
   expect(house().textContent).not.toContain('second scan');
   act(() => {
-    tellAlarms(alarm('a', { tag_id: '5', raised: 100, reason: pest }));
+    reportAlarms(alarm('a', { tag_id: '5', raised: 100, reason: pest }));
   });
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
@@ -67,7 +67,7 @@ test('says what to do first, and since when', () => {
       tags,
       judgement({ 1: [back], 2: [failed], 5: [pest, { ...cold, verdict: 'stressed' }] }),
     );
-    tellAlarms(alarm('a', { tag_id: '5', raised: 100, reason: pest }));
+    reportAlarms(alarm('a', { tag_id: '5', raised: 100, reason: pest }));
   });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
     expect.stringMatching(/^CriticalTag 5: 2 pests seen.* acknowledged$/),
@@ -86,7 +86,7 @@ test('nobody is called for what is shelved, and all the rest is counted', () => 
   render(<HealthSummary kiosk={false} />);
   const todo = screen.getByRole('list', { name: 'Do this now' });
   act(() => {
-    tellAlarms(alarm('fan', { tag_id: '1' }));
+    reportAlarms(alarm('fan', { tag_id: '1' }));
   });
   expect(todo.textContent).toMatch(
     /^CriticalTag 1: .*also tags Stressed 2, 3 .*StressedTag 4: .*\+ 1 more$/,
@@ -107,7 +107,7 @@ test('nobody is called for what is shelved, and all the rest is counted', () => 
   expect(store.get().view.list).toBe('alarms');
   act(() => {
     showTags(tags, judgement({ 1: [reason()] }));
-    tellAlarms(alarm('fan', { tag_id: '1' }));
+    reportAlarms(alarm('fan', { tag_id: '1' }));
   });
   expect(todo.textContent).toBe('');
   expect(screen.getByRole('button', { name: 'Shelved (1)' })).toBeTruthy();
@@ -120,14 +120,14 @@ test('that it is too cold is not shelved with that it was too warm', () => {
   const stop = startAlarms();
   render(<HealthSummary kiosk={false} />);
   act(() => {
-    tellAlarms(alarm('warm', { tag_id: '5', reason: warm }));
+    reportAlarms(alarm('warm', { tag_id: '5', reason: warm }));
     for (const item of calling(alarmList.get())) shelveAlarm(item, 15, 'fan');
   });
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect(todo.textContent).toBe('');
   act(() => {
     showTags(TAGS, judgement({ 1: 'healthy', 5: [reason()] }));
-    tellAlarms(alarm('warm', { tag_id: '5', reason: warm }));
+    reportAlarms(alarm('warm', { tag_id: '5', reason: warm }));
   });
   expect(todo.textContent).toMatch(/^CriticalTag 5: Temperature 6.6.*waiting for a second scan$/);
   stop();
@@ -225,12 +225,12 @@ test('beside an active alarm, healthy says why', () => {
   const stop = startAlarms();
   render(<HealthSummary kiosk={false} />);
   act(() => {
-    tellAlarms(alarm('a'));
+    reportAlarms(alarm('a'));
   });
   expect(house().dataset['health']).toBe('healthy');
   expect(driver().textContent).toBe('1 alarm is still active: two good scans resolve it');
   act(() => {
-    tellAlarms(alarm('a', { cleared: 950 }));
+    reportAlarms(alarm('a', { cleared: 950 }));
   });
   expect(driver().textContent).toMatch(/^All assessed readings/);
   stop();
@@ -283,8 +283,8 @@ test.each([
   [true, 'light', 'Day ranges apply: by the light measured'],
   [false, 'clock', 'Night ranges apply: by the clock, as no light'],
   [true, 'assumed', 'Day ranges apply: assumed'],
-] as const)('whose ranges hold is said: day %s, by %s', (is_day, source, told) => {
+] as const)('whose ranges hold is said: day %s, by %s', (is_day, source, expected) => {
   showTags(TAGS, judgement({}, { is_day, source }));
   render(<HealthSummary kiosk={false} />);
-  expect(screen.getByRole('heading').title).toContain(told);
+  expect(screen.getByRole('heading').title).toContain(expected);
 });

@@ -6,7 +6,7 @@ import { ageSeconds } from '../domain/time';
 import { whenOf } from '../domain/twin';
 import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
-import { selectIsHere, selectShown } from '../store/moment';
+import { selectHasSnapshot, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
 import { DoNow, Overall, ShelvedCount } from './DoNow';
@@ -16,25 +16,25 @@ import { HealthMark, HealthShape } from './HealthMark';
 export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
   const health = useApp(selectHealth);
   const filter = useApp((state) => state.view.health);
-  const isHere = useApp(selectIsHere);
+  const hasSnapshot = useApp(selectHasSnapshot);
   const count = health.counts[health.verdict];
   return (
     <section
       className="health"
       aria-label={S.healthHeading}
       data-testid="house-health"
-      data-health={isHere ? health.verdict : undefined}
+      data-health={hasSnapshot ? health.verdict : undefined}
     >
       <div className="health-house">
         <h2 title={dayText(health)}>
           <span className="unseen">{S.healthHeading}: </span>
-          {isHere && (
+          {hasSnapshot && (
             <HealthMark
               verdict={health.verdict}
               text={isSilent(health) ? S.healthNotCurrent : undefined}
             />
           )}
-          {isHere && isBad(health.verdict) && count > 0 && !isSilent(health) && (
+          {hasSnapshot && isBad(health.verdict) && count > 0 && !isSilent(health) && (
             <span> {S.shownOf(count, count)}</span>
           )}
         </h2>
@@ -57,7 +57,7 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
               }}
             >
               <HealthShape verdict={verdict} />
-              <strong>{isHere ? health.counts[verdict] : S.noValue}</strong>{' '}
+              <strong>{hasSnapshot ? health.counts[verdict] : S.noValue}</strong>{' '}
               <span>{(health.counts[verdict] === 1 ? S.health : S.healthMany)[verdict]}</span>
               {!kiosk && <span className="unseen">{S.healthFilter}</span>}
             </button>
@@ -117,7 +117,7 @@ export function HouseLine(): JSX.Element | null {
   }
   const rest = [
     lastScan === null ? S.houseNever : last === null ? null : S.houseLast(last),
-    hasInterval ? S.houseRhythm(intervalText(interval)) : null,
+    hasInterval ? S.scanInterval(intervalText(interval)) : null,
   ].filter((part) => part !== null);
   return (
     <p className="house-line" data-testid="house-line">

@@ -19,8 +19,8 @@ const line = (patrol: Judgement['house']['patrol']): string | undefined => {
 
 test('tells the rhythm, the last scan and who is overdue', () => {
   // Built states are seconds old, whatever their stamp.
-  const told = line({ interval_s: 40, last_scan: { sec: 0, nanosec: 1 }, overdue: 2 });
-  expect(told).toMatch(/^2 tags overdue · last scan .+ ago · a scan every 40\u00a0s$/);
+  const lineText = line({ interval_s: 40, last_scan: { sec: 0, nanosec: 1 }, overdue: 2 });
+  expect(lineText).toMatch(/^2 tags overdue · last scan .+ ago · a scan every 40\u00a0s$/);
 });
 
 test.each([
@@ -30,9 +30,9 @@ test.each([
   [95, '1\u00a0min 35\u00a0s'],
   [600, '10\u00a0min'],
   [43_200, '12\u00a0h'],
-])('of %s s between two scans', (interval_s, told) => {
+])('of %s s between two scans', (interval_s, lineText) => {
   expect(line({ interval_s, last_scan: null, overdue: 0 })).toBe(
-    `no tag overdue · no scan yet · a scan every ${told}`,
+    `no tag overdue · no scan yet · a scan every ${lineText}`,
   );
 });
 
@@ -42,8 +42,8 @@ test.each([null, 0.04])('without a rhythm it has none to tell: %s', (interval_s)
 
 test('nothing is told of readings of which nobody knows when they were', () => {
   const patrol = { interval_s: null, last_scan: null, overdue: 1 };
-  const told = [{ name: 'temperature', value: 22, observed_at: null }];
-  showTags([wireTag({ readings: told })], judgement({ '1': 'unknown' }, undefined, patrol));
+  const lineText = [{ name: 'temperature', value: 22, observed_at: null }];
+  showTags([wireTag({ readings: lineText })], judgement({ '1': 'unknown' }, undefined, patrol));
   render(<HouseLine />);
   expect(screen.queryByTestId('house-line')).toBeNull();
 });
@@ -70,7 +70,7 @@ test.each([
   ['not within a minute', 1.2, 59, /^no tag overdue/],
   ['not within ten intervals', 30, 299, /^no tag overdue/],
   ['of tags that report all at once', 0.04, 600, /^no tag overdue/],
-])('who drives no more is looked after: %s', (_, interval_s, late, told) => {
+])('who drives no more is looked after: %s', (_, interval_s, late, lineText) => {
   const health = judgement({ '1': 'healthy' }, undefined, {
     ...{ interval_s, last_scan: { sec: 1, nanosec: 0 }, overdue: 0 },
   });
@@ -84,7 +84,7 @@ test.each([
   };
   showTags([wireTag()]);
   render(<HouseLine />);
-  expect(show()).toMatch(told);
+  expect(show()).toMatch(lineText);
   // The clock is paused, for an unknown time.
   expect(show(status({ reason: 'paused' }))).toMatch(/^no tag overdue/);
   const then = { ...NO_HOUSE, snapshot: snapshotOf(latest, 0, null), health };

@@ -14,7 +14,7 @@ afterEach(() => {
 
 test('names the key that leads out and says the time, and nothing else without a round', () => {
   showTags([]);
-  render(<KioskNote wish={NONE} />);
+  render(<KioskNote cycle={NONE} />);
   expect(screen.getByTestId('kiosk-note').textContent).toMatch(/^Exit kiosk Esc\d\d:\d\d$/);
   expect(screen.getByRole('button')).toBeInstanceOf(HTMLButtonElement);
 });
@@ -22,13 +22,13 @@ test('names the key that leads out and says the time, and nothing else without a
 test('says which sensor is shown, which comes next and when', () => {
   showTags([]);
   nextSensor.set({ sensor: sensorNamed('humidity'), at: performance.now() + 22_500 });
-  render(<KioskNote wish={{ seconds: 30, refused: null }} />);
+  render(<KioskNote cycle={{ seconds: 30, refused: null }} />);
   expect(screen.getByTestId('cycle').textContent).toBe('Temperature next: Humidity in 23\u00a0s');
 });
 
 test('a wish that cannot be had is said, with its limits and no more of it than fits', () => {
   showTags([]);
-  render(<KioskNote wish={{ seconds: null, refused: 'x'.repeat(500) }} />);
+  render(<KioskNote cycle={{ seconds: null, refused: 'x'.repeat(500) }} />);
   const said = screen.getByRole('status').textContent;
   expect(said).toContain('5 to 3600 seconds');
   expect(said.length).toBeLessThan(120);

@@ -8,7 +8,7 @@ import { fieldWith } from '../testing/field';
 import { judgement, NOBODY, reason } from '../testing/health';
 import { showField, showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
-import { loadParts } from './later';
+import { loadParts } from './loadDeferred';
 import { Legend } from './Legend';
 
 beforeAll(() => loadParts());

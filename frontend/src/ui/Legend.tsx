@@ -21,12 +21,12 @@ import {
   selectRange,
   selectSensor,
 } from '../store/derived';
-import { selectIsHere, selectShown, selectTags } from '../store/moment';
+import { selectHasSnapshot, selectShown, selectTags } from '../store/moment';
 import { HEATS } from '../store/view';
 import { S } from '../strings';
 import { Segmented, Select } from '../widgets/controls';
-import { ErrorScale, EstimateFacts } from './inTime';
-import { WithParts } from './later';
+import { ErrorScale, EstimateFacts } from './lazyParts';
+import { WithParts } from './loadDeferred';
 import { SensorLabel } from './SensorPicker';
 
 export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
@@ -39,24 +39,26 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   const samples = field?.sensor === name ? field.sampleCount : 0;
   const isFetching = useApp(
     (state) =>
-      !selectIsHere(state) ||
+      !selectHasSnapshot(state) ||
       (selectShown(state).field.value?.sensor !== name &&
         selectTags(state).some((tag) => tag.at && tag.readings.get(name) != null)),
   );
   const isCompared = useApp((state) => state.view.compare !== null);
-  const isIdealWished = useApp((state) => state.view.colouring === 'ideal');
+  const isIdealChosen = useApp((state) => state.view.colouring === 'ideal');
   const hasIdeal = useApp(selectHasIdeal);
   const isIdeal = useApp((state) => selectColouring(state) === 'ideal');
   const isEstimate = useApp((state) => state.view.heat !== 'nearest');
   const isError = useApp((state) => selectHeat(state)?.isError ?? false);
   const ideals = useApp((state) => idealsText(sensor, selectTags(state), unit));
   const isOld = useApp((state) => Boolean(selectHeat(state)?.old));
-  const told = useApp((state) => state.twin.sensors);
-  if (!told.value) {
+  const fetched = useApp((state) => state.twin.sensors);
+  if (!fetched.value) {
     return (
       <section className="legend" aria-label={S.legend} data-testid="legend">
         <p role="status">
-          {told.state === 'failed' ? S.legendFailed(shown(told.message, 300)) : S.legendWaiting}
+          {fetched.state === 'failed'
+            ? S.legendFailed(shown(fetched.message, 300))
+            : S.legendWaiting}
         </p>
       </section>
     );
@@ -97,7 +99,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
           <HatchedSign isFaint /> {S.legendOld}
         </span>
       )}
-      {isIdealWished && !hasIdeal && !isCompared && (
+      {isIdealChosen && !hasIdeal && !isCompared && (
         <span className="faint" data-testid="no-ideal">
           {S.legendNoIdeal}
         </span>

@@ -17,14 +17,14 @@ import { S } from '../strings';
 import { PastFrame } from '../timebar/Past';
 import { Check, Disclosure, Icon, IconButton, type IconName } from '../widgets/controls';
 import { HealthStrip } from './DoNow';
-import { AdviceMarks, EstimateReadout, inTime } from './inTime';
-import { WithParts } from './later';
+import { AdviceMarks, EstimateReadout, lazyPart } from './lazyParts';
+import { WithParts } from './loadDeferred';
 import { HeatControl, Legend } from './Legend';
 import { Notices } from './Notices';
 import { SensorPicker } from './SensorPicker';
 
 // Charts and their library load after the first paint.
-const ChartView = inTime(async () => (await import('../charts/ChartView')).default);
+const ChartView = lazyPart(async () => (await import('../charts/ChartView')).default);
 
 export function MapPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
   const mapState = useApp((state) => selectShown(state).map.state);

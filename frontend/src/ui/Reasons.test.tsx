@@ -55,11 +55,11 @@ beforeEach(() => {
 
 test.each(CASES)('$name', (state) => {
   const values = Object.entries(state.readings).map(([name, [value]]) => [name, value] as const);
-  const told = state.reasons.map(([kind, verdict, sensor, value, limit]) => ({
+  const reported = state.reasons.map(([kind, verdict, sensor, value, limit]) => ({
     ...{ kind, verdict, sensor, value, limit },
     since: { sec: 0, nanosec: 0 },
   }));
-  const judged = judgement({ 7: told.length > 0 ? told : state.verdict });
+  const judged = judgement({ 7: reported.length > 0 ? reported : state.verdict });
   expect(judged.tags['7']?.verdict).toBe(state.verdict);
   showTags([wireTag({ tag_id: '7', readings: readings(Object.fromEntries(values)) })], judged);
   act(withTag('7'));
@@ -77,8 +77,8 @@ test.each(CASES)('$name', (state) => {
   const row = document.querySelector<HTMLElement>('tr[data-tag-id="7"]');
   expect(row?.dataset['health']).toBe(state.verdict);
   const lines = [...document.querySelectorAll('[data-testid=reasons] li')];
-  expect(lines).toHaveLength(told.length);
-  for (const [index, { kind, verdict, sensor, value, limit }] of told.entries()) {
+  expect(lines).toHaveLength(reported.length);
+  for (const [index, { kind, verdict, sensor, value, limit }] of reported.entries()) {
     const line = lines[index];
     expect(line?.children[1]?.textContent).toMatch(SAYS[kind]);
     expect(line?.querySelector('.health-mark')?.getAttribute('data-health')).toBe(verdict);
@@ -93,7 +93,7 @@ test.each(CASES)('$name', (state) => {
     // Arrows are reserved for trends.
     expect(cell?.querySelector('svg')).toBeNull();
   }
-  const ranged = told.filter(({ kind, sensor }) => kind === 'range' && state.readings[sensor]);
+  const ranged = reported.filter(({ kind, sensor }) => kind === 'range' && state.readings[sensor]);
   expect(row?.querySelectorAll('.beyond')).toHaveLength(ranged.length);
   flush(() => {
     act(withTag(null));

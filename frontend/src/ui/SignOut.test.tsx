@@ -6,17 +6,17 @@ import { SignOut } from './Menu';
 import { toast } from './toast';
 
 const server = (session: unknown, status = 204): string[] => {
-  const asked: string[] = [];
+  const requests: string[] = [];
   vi.stubGlobal('fetch', (url: URL, { method = 'GET', headers }: RequestInit) => {
     const own = new Headers(headers).has('X-Lupin-Twin') ? ' by us' : '';
-    asked.push(`${method} ${url.pathname}${own}`);
+    requests.push(`${method} ${url.pathname}${own}`);
     return Promise.resolve(
       url.pathname === '/api/session'
         ? Response.json(session)
         : new Response(null, { status, statusText: 'No' }),
     );
   });
-  return asked;
+  return requests;
 };
 
 const SESSION = {
@@ -27,14 +27,14 @@ const SESSION = {
 const Toast = (): string => useSelected(toast);
 
 test('a session can be ended, and the page leaves', async () => {
-  const asked = server(SESSION);
+  const requests = server(SESSION);
   const [close, leave] = [vi.fn(), vi.fn<(url: URL) => void>()];
   render(<SignOut close={close} leave={leave} />);
   fireEvent.click(await screen.findByRole('button', { name: 'Sign out' }));
   await waitFor(() => {
     expect(leave.mock.lastCall?.[0].pathname).toBe('/signin');
   });
-  expect(asked).toEqual(['GET /api/session', 'POST /api/signout by us']);
+  expect(requests).toEqual(['GET /api/session', 'POST /api/signout by us']);
   expect(close).toHaveBeenCalledOnce();
 });
 
@@ -55,10 +55,10 @@ test('one that cannot be ended is said to go on', async () => {
 test.each([[{ can_sign_out: false, seconds_left: null }], [{}], [null]])(
   'without a session there is nothing to offer: %j',
   async (session) => {
-    const asked = server(session);
+    const requests = server(session);
     render(<SignOut close={() => undefined} />);
     await waitFor(() => {
-      expect(asked).toHaveLength(1);
+      expect(requests).toHaveLength(1);
     });
     expect(screen.queryByRole('button')).toBeNull();
   },

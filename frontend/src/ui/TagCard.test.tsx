@@ -163,11 +163,11 @@ describe('card', () => {
     const line = await screen.findByRole('img', { name: /Last 2 readings, between 9\.0/ });
     expect(line.querySelector('polyline')).not.toBeNull();
     expect(screen.getByText('Fixed sensor')).toBeTruthy();
-    const tries = screen.getByRole('region', { name: 'Last attempts' });
-    const told = [...tries.querySelectorAll('li')].map((each) => each.textContent);
-    expect(told).toHaveLength(2);
-    expect(told[0]).toMatch(/attemptnot readable blurred$/);
-    expect(told[1]).toMatch(/scanOK$/);
+    const list = screen.getByRole('region', { name: 'Last attempts' });
+    const texts = [...list.querySelectorAll('li')].map((each) => each.textContent);
+    expect(texts).toHaveLength(2);
+    expect(texts[0]).toMatch(/attemptnot readable blurred$/);
+    expect(texts[1]).toMatch(/scanOK$/);
   });
 
   test('each reading is as old as it is itself, and the look at the flowers apart', () => {

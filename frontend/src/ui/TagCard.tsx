@@ -12,7 +12,7 @@ import {
   valueText,
   type TemperatureUnit,
 } from '../domain/format';
-import { isBack, isBad, rangeReason, sideOf, tryKind } from '../domain/health';
+import { isBack, isBad, rangeReason, sideOf, attemptOutcome } from '../domain/health';
 import { speciesText } from '../domain/marks';
 import { memoLast } from '../domain/memo';
 import { rangesFor } from '../domain/sensors';
@@ -25,8 +25,8 @@ import { act, useApp } from '../store/app';
 import { withTag } from '../store/view';
 import { selectCatalogue, selectHealth } from '../store/derived';
 import {
-  selectIsHere,
-  selectNewestTag,
+  selectHasSnapshot,
+  selectLatestTag,
   selectShown,
   selectSnapshot,
   selectTag,
@@ -38,11 +38,11 @@ import { Age, AgeFact, Fact, useAgeStep } from './Age';
 import { CardAlarms } from './alarms/CardAlarms';
 import { HealthMark } from './HealthMark';
 import { Sparkline } from './Sparkline';
-import { CardEstimate, inTime } from './inTime';
+import { CardEstimate, lazyPart } from './lazyParts';
 import { Reasons } from './Reasons';
 
 // Charts and their library load after the first paint.
-const CardChart = inTime(async () => (await import('../charts/CardChart')).default);
+const CardChart = lazyPart(async () => (await import('../charts/CardChart')).default);
 
 /** Everything about the selected tag. */
 export function TagCard({ tagId }: { tagId: string }): JSX.Element {
@@ -50,10 +50,10 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
   const health = useApp((state) => selectHealth(state).byTag.get(tagId));
   const unit = useApp((state) => state.settings.unit);
   const moment = useApp((state) => selectShown(state).moment);
-  const isHere = useApp(selectIsHere);
+  const hasSnapshot = useApp(selectHasSnapshot);
   // The latest observation decides whether to fetch again, whatever moment is shown.
   const newest = useApp((state) =>
-    JSON.stringify(selectNewestTag(state, tagId)?.wire.last_observed),
+    JSON.stringify(selectLatestTag(state, tagId)?.wire.last_observed),
   );
   const fetched = useHistory(tagId, newest);
   const history = fetched && asOf(fetched, moment);
@@ -85,7 +85,7 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
       {tag ? (
         <CardBody tag={tag} health={health} unit={unit} history={history} />
       ) : (
-        isHere && <p>{moment === null ? S.cardGone : S.cardGoneThen}</p>
+        hasSnapshot && <p>{moment === null ? S.cardGone : S.cardGoneThen}</p>
       )}
     </aside>
   );
@@ -145,17 +145,18 @@ function CardBody({
           </Fact>
         )}
         <AgeFact label={S.cardScanned} when={tag.scannedAt} />
-        {tag.lookedAt !== 'never' && <AgeFact label={S.cardLooked} when={tag.lookedAt} />}
+        {tag.inspectedAt !== 'never' && <AgeFact label={S.cardInspected} when={tag.inspectedAt} />}
         {history?.source && (
           <Fact label={S.cardSource}>
             <bdi>{sourceText(history.source)}</bdi>
           </Fact>
         )}
-        {tag.failedTry && (
-          <Fact label={S.cardTry}>
-            <Age when={tag.failedTry.at} /> · {S.tried[tryKind(tag.failedTry.status)]}
-            {tag.failedTry.detail && (
-              <span className="faint"> {shown(tag.failedTry.detail, 160)}</span>
+        {tag.failedAttempt && (
+          <Fact label={S.cardLastAttempt}>
+            <Age when={tag.failedAttempt.at} /> ·{' '}
+            {S.attemptOutcomes[attemptOutcome(tag.failedAttempt.status)]}
+            {tag.failedAttempt.detail && (
+              <span className="faint"> {shown(tag.failedAttempt.detail, 160)}</span>
             )}
           </Fact>
         )}
@@ -185,7 +186,7 @@ function CardBody({
           )}
         </Fact>
       </dl>
-      {history && <Tries tries={history.tries} />}
+      {history && <Attempts attempts={history.tries} />}
     </div>
   );
 }
@@ -253,14 +254,14 @@ function CardReading({
 const LONGEST = 5;
 
 /** A tag's last scans and inspections, newest first, failed ones included. */
-export function Tries({ tries }: { tries: readonly PastAttempt[] }): JSX.Element | null {
+export function Attempts({ attempts }: { attempts: readonly PastAttempt[] }): JSX.Element | null {
   const snapshot = useApp(selectSnapshot);
-  if (!snapshot || tries.length === 0) return null;
+  if (!snapshot || attempts.length === 0) return null;
   return (
-    <section className="card-tries" aria-label={S.cardTries}>
-      <h3>{S.cardTries}</h3>
+    <section className="card-tries" aria-label={S.cardAttempts}>
+      <h3>{S.cardAttempts}</h3>
       <ol>
-        {tries
+        {attempts
           .slice(-LONGEST)
           .reverse()
           .map((each, index) => (
@@ -268,7 +269,7 @@ export function Tries({ tries }: { tries: readonly PastAttempt[] }): JSX.Element
               <Age when={whenOf(each.stamp, snapshot)} />
               <span>{kindOf(each.kind)}</span>
               <span>
-                {S.tried[tryKind(each.status)]}
+                {S.attemptOutcomes[attemptOutcome(each.status)]}
                 {each.status_detail && (
                   <span className="faint"> {shown(each.status_detail, 160)}</span>
                 )}
@@ -281,7 +282,11 @@ export function Tries({ tries }: { tries: readonly PastAttempt[] }): JSX.Element
 }
 
 const kindOf = (kind: number | null): string =>
-  kind === 0 ? S.cardTryKinds.scan : kind === 1 ? S.cardTryKinds.look : S.cardTryKinds.any;
+  kind === 0
+    ? S.cardAttemptKinds.scan
+    : kind === 1
+      ? S.cardAttemptKinds.look
+      : S.cardAttemptKinds.any;
 
 /** The history up to `moment`, ROS seconds; null: all of it. */
 export const asOf = memoLast((history: TagHistory, moment: number | null): TagHistory => {

@@ -26,7 +26,7 @@ import type { Tag } from '../domain/twin';
 import { shortHourText, thenOf, type HourAgo } from '../store/hourAgo';
 import { isColumnShown } from '../store/settings';
 import { S } from '../strings';
-import { Age, Tried, useAgeStep } from './Age';
+import { Age, FailedAttemptText, useAgeStep } from './Age';
 import { HealthMark } from './HealthMark';
 
 interface Props {
@@ -66,20 +66,20 @@ export const TagRow = memo(function TagRow({
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
   const all = reasonsText(catalogue, health.reasons, unit);
   // Mention a failed scan once, with its age.
-  const others = health.reasons.filter(({ kind }) => !tag.failedTry || kind !== 'scan_failed');
+  const others = health.reasons.filter(({ kind }) => !tag.failedAttempt || kind !== 'scan_failed');
   const texts = others.map((reason, place): ReactNode =>
     // The row's mark already gives the worst reason's verdict.
     reasonText(catalogue, reason, unit, null, place === 0),
   );
-  if (tag.failedTry) {
-    const tried = (
+  if (tag.failedAttempt) {
+    const attempt = (
       <span className="tried">
-        <Tried failed={tag.failedTry} />
+        <FailedAttemptText failed={tag.failedAttempt} />
       </span>
     );
     // The verdict's own reason comes first.
-    if (worstReason(health)?.kind === 'scan_failed') texts.unshift(tried);
-    else texts.push(tried);
+    if (worstReason(health)?.kind === 'scan_failed') texts.unshift(attempt);
+    else texts.push(attempt);
   }
   const [why, ...more] = texts;
   return (

@@ -2,13 +2,13 @@ import { useEffect, useRef, type JSX } from 'react';
 
 import { act, useApp } from '../store/app';
 import { selectRows } from '../store/derived';
-import { selectIsHere, selectTags } from '../store/moment';
+import { selectHasSnapshot, selectTags } from '../store/moment';
 import { LONGEST_FILTER } from '../store/view';
 import { S } from '../strings';
 import { Disclosure, Icon } from '../widgets/controls';
 import { FILTER_ID, ListChoice } from './alarms/ListChoice';
 import { HealthSummary } from './HealthSummary';
-import { loadParts, WithParts } from './later';
+import { loadParts, WithParts } from './loadDeferred';
 import { EmptyTable } from './Notices';
 import { TagTable } from './TagTable';
 import { LONGEST_ON_PAPER } from './visibleRows';
@@ -75,7 +75,7 @@ function FilterBar(): JSX.Element {
   const status = useApp((state) => state.view.health);
   const all = useApp((state) => selectTags(state).length);
   const count = useApp((state) => selectRows(state).length);
-  const isHere = useApp(selectIsHere);
+  const hasSnapshot = useApp(selectHasSnapshot);
   return (
     <div className="filter-bar">
       <ListChoice />
@@ -96,7 +96,7 @@ function FilterBar(): JSX.Element {
         />
       </label>
       <span className="count" role="status" data-all={count === all} data-testid="row-count">
-        {isHere && S.shownOf(count, all)}
+        {hasSnapshot && S.shownOf(count, all)}
         {status && ` · ${S.health[status]}`}
       </span>
       <button type="button" className="text-button" title={S.saveCsv} onClick={saveTable}>

@@ -5,7 +5,7 @@ import type { Journal } from '../contract/types';
 import { act, receive } from '../store/app';
 import { NO_HOUSE, withPast, withUnread } from '../store/twin';
 import { goLive, showTags, status } from '../testing/page';
-import { later } from './later';
+import { deferred } from './loadDeferred';
 import { Troubles } from './Troubles';
 
 beforeEach(() => {
@@ -39,11 +39,11 @@ test('messages that could not be read are counted, and the last is named', () =>
 test('a part of the page that has not arrived is told', () => {
   render(<Troubles />);
   flush(() => {
-    later.set({ parts: null, isLate: true });
+    deferred.set({ parts: null, isLate: true });
   });
   expect(lines()).toEqual([expect.stringMatching(/^Part of the page has not loaded\. Cards/)]);
   flush(() => {
-    later.set({ parts: null, isLate: false });
+    deferred.set({ parts: null, isLate: false });
   });
   expect(lines()).toEqual([]);
 });

@@ -8,12 +8,12 @@ import { rosText } from '../domain/time';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { retryConnection } from '../store/live';
-import { selectNewest, selectShown } from '../store/moment';
+import { selectLatest, selectShown } from '../store/moment';
 import type { TwinState } from '../store/twin';
 import { LANGUAGE_TROUBLE, S } from '../strings';
 import { More } from '../widgets/controls';
 import { useNow } from '../widgets/useNow';
-import { later } from './later';
+import { deferred } from './loadDeferred';
 
 /** A problem that the operator should know about while the page keeps working. */
 export interface Trouble {
@@ -51,7 +51,7 @@ function troublesOf(
     );
   }
   troubles.push(...journalTroubles(status?.journal));
-  troubles.push(...outwardTroubles(status?.outward ?? []));
+  troubles.push(...notificationTroubles(status?.outward ?? []));
   // If nothing is shown at all, the notice on the map says why.
   if (pastFault && moment !== null && pastFault.at !== moment) {
     troubles.push({
@@ -77,39 +77,41 @@ function troublesOf(
 /** Longest input problem that the twin reports, in characters: its end says what to do. */
 const MAX_PROBLEM = 500;
 
-const TOLD = new Map<string, { title: string; hint: string }>(Object.entries(S.journal));
+const JOURNAL_TROUBLES = new Map<string, { title: string; hint: string }>(
+  Object.entries(S.journal),
+);
 
 /** A journal that does not record, or a damaged one that was quarantined. */
 function journalTroubles(journal: Journal | undefined): readonly Trouble[] {
   if (!journal) return [];
   const troubles: Trouble[] = [];
-  const told = TOLD.get(journal.state);
-  if (told) {
-    const detail = `${sentence(journal.detail)} ${told.hint}`.trim();
+  const trouble = JOURNAL_TROUBLES.get(journal.state);
+  if (trouble) {
+    const detail = `${sentence(journal.detail)} ${trouble.hint}`.trim();
     troubles.push({
       id: `journal ${journal.state}`,
-      title: told.title,
+      title: trouble.title,
       detail,
       more: S.journalMore,
     });
   }
   if (journal.set_aside) {
-    const detail = S.setAsideHint(shown(journal.set_aside, 160));
-    troubles.push({ id: 'journal set aside', title: S.setAside, detail });
+    const detail = S.quarantinedHint(shown(journal.set_aside, 160));
+    troubles.push({ id: 'journal set aside', title: S.quarantined, detail });
   }
   return troubles;
 }
 
-const CHANNELS = new Map<string, string>(Object.entries(S.outward));
+const CHANNELS = new Map<string, string>(Object.entries(S.notificationChannels));
 
 /** Failing notification channels. A channel unknown to this page is called by its name. */
-function outwardTroubles(channels: readonly Outward[]): readonly Trouble[] {
+function notificationTroubles(channels: readonly Outward[]): readonly Trouble[] {
   return channels
     .filter((it) => it.is_failing)
     .map(({ channel, detail }) => ({
       id: `outward ${channel}`,
-      title: CHANNELS.get(channel) ?? S.outwardOther(shown(channel, 40)),
-      detail: `${sentence(detail)} ${S.outwardHint}`.trim(),
+      title: CHANNELS.get(channel) ?? S.notificationOther(shown(channel, 40)),
+      detail: `${sentence(detail)} ${S.notificationHint}`.trim(),
     }));
 }
 
@@ -122,7 +124,7 @@ function sentence(text: string, most = 240): string {
 export function Troubles(): JSX.Element {
   const twin = useApp((state) => state.twin);
   const moment = useApp((state) => selectShown(state).moment);
-  const isLate = useSelected(later, (it) => it.isLate);
+  const isLate = useSelected(deferred, (it) => it.isLate);
   return (
     // Rendered even when empty: screen readers announce only changes in an existing region.
     <div role="status" className="troubles" data-testid="troubles">
@@ -148,7 +150,7 @@ export const offlineMore = (status: StatusFrame | null): string =>
 /** Banner across the page while it is not live. */
 export function FrozenBanner(): JSX.Element | null {
   const phase = useApp((state) => state.twin.phase);
-  const takenAt = useApp((state) => selectNewest(state).snapshot?.takenAt);
+  const takenAt = useApp((state) => selectLatest(state).snapshot?.takenAt);
   const isTimeLost = useApp((state) => state.twin.isTimeLost);
   const connection = useApp((state) => state.twin.connection);
   const isPast = useApp((state) => selectShown(state).moment !== null);

@@ -20,13 +20,13 @@ import { selectShown, selectTag, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { Age, AgeFact } from './Age';
 import { HealthMark, HealthShape } from './HealthMark';
-import { inTime } from './inTime';
+import { lazyPart } from './lazyParts';
 import { Reasons } from './Reasons';
 
 const robot = (): Promise<typeof RobotParts> => import('../parts/robot');
-const RobotLayer = inTime(async () => (await robot()).RobotLayer);
-const RobotFact = inTime(async () => (await robot()).RobotFact);
-const RobotChoice = inTime(async () => (await robot()).RobotChoice);
+const RobotLayer = lazyPart(async () => (await robot()).RobotLayer);
+const RobotFact = lazyPart(async () => (await robot()).RobotFact);
+const RobotChoice = lazyPart(async () => (await robot()).RobotChoice);
 
 const useHasRobot = (): boolean => useSelected(robotFrame, (frame) => frame !== null);
 

@@ -5,13 +5,13 @@ import { store } from '../store/app';
 import { showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { startKeys } from './keys';
-import { later, loadParts } from './later';
+import { deferred, loadParts } from './loadDeferred';
 
 test('a key that comes before what it is for is not lost, and from then on each is taken at once', async () => {
   showTags([wireTag()]);
   const stop = startKeys();
   fireEvent.keyDown(document.body, { key: 'a' });
-  expect(later.get().parts).toBeNull();
+  expect(deferred.get().parts).toBeNull();
   expect(store.get().view.list).toBe('tags');
   await loadParts();
   expect(store.get().view.list).toBe('alarms');

@@ -1,9 +1,9 @@
-import { later, loadParts } from './later';
+import { deferred, loadParts } from './loadDeferred';
 
 /** Listens for the global shortcuts; a key pressed before its parts are loaded waits for them. */
 export function startKeys(): () => void {
   const onKeyDown = (event: KeyboardEvent): void => {
-    const { parts } = later.get();
+    const { parts } = deferred.get();
     if (parts) {
       parts.onKey(event);
       return;

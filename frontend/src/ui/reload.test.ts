@@ -3,41 +3,41 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 import { pauseAfterFailure, reloadByItself } from './reload';
 
 const session = (): Pick<Storage, 'getItem' | 'setItem'> => {
-  const kept = new Map<string, string>();
+  const stored = new Map<string, string>();
   return {
-    getItem: (key) => kept.get(key) ?? null,
-    setItem: (key, value) => kept.set(key, value),
+    getItem: (key) => stored.get(key) ?? null,
+    setItem: (key, value) => stored.set(key, value),
   };
 };
 
 describe('pause before a reload', () => {
   test('grows from reload to reload, up to five minutes, and never is none', () => {
-    const kept = session();
-    const pauses = Array.from({ length: 9 }, (_, i) => pauseAfterFailure(kept, i * 1_000, 1));
+    const stored = session();
+    const pauses = Array.from({ length: 9 }, (_, i) => pauseAfterFailure(stored, i * 1_000, 1));
     expect(pauses.slice(0, 4)).toEqual([5_000, 10_000, 20_000, 40_000]);
     expect(pauses.at(-1)).toBe(300_000);
     expect(pauseAfterFailure(session(), 0, 0)).toBe(2_500);
   });
 
   test('begins afresh once the page has held for ten minutes', () => {
-    const kept = session();
-    pauseAfterFailure(kept, 0, 1);
-    expect(pauseAfterFailure(kept, 599_999, 1)).toBe(10_000);
-    expect(pauseAfterFailure(kept, 1_199_999, 1)).toBe(5_000);
+    const stored = session();
+    pauseAfterFailure(stored, 0, 1);
+    expect(pauseAfterFailure(stored, 599_999, 1)).toBe(10_000);
+    expect(pauseAfterFailure(stored, 1_199_999, 1)).toBe(5_000);
   });
 
   test('a clock that was set back does not make it hot', () => {
-    const kept = session();
-    pauseAfterFailure(kept, 1e12, 1);
-    expect(pauseAfterFailure(kept, 0, 1)).toBe(10_000);
+    const stored = session();
+    pauseAfterFailure(stored, 1e12, 1);
+    expect(pauseAfterFailure(stored, 0, 1)).toBe(10_000);
   });
 
   test.each(['{', 'null', '7', '{"failures":"x","at":0}', '{"failures":1}'])(
     'what is damaged counts as nothing: %s',
     (text) => {
-      const kept = session();
-      kept.setItem('lupin-twin.reload', text);
-      expect(pauseAfterFailure(kept, 0, 1)).toBe(5_000);
+      const stored = session();
+      stored.setItem('lupin-twin.reload', text);
+      expect(pauseAfterFailure(stored, 0, 1)).toBe(5_000);
     },
   );
 

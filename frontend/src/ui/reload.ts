@@ -7,7 +7,7 @@ const LONGEST_MS = 300_000;
 /** A page that worked for this long restarts the back-off when it fails, ms. */
 const PROVEN_MS = 600_000;
 
-interface Kept {
+interface StoredFailures {
   readonly failures: number;
   /** Time of the last failure, ms since the epoch: a reload resets every other clock. */
   readonly at: number;
@@ -26,24 +26,26 @@ export function pauseAfterFailure(session: Session, now: number, random: number)
   const before = read(session);
   // A clock set back says nothing about how long the page worked.
   const failures = before && now - before.at < PROVEN_MS ? before.failures + 1 : 1;
-  const isKept = keep(session, { failures, at: now });
+  const isStored = write(session, { failures, at: now });
   const doubled = FIRST_MS * 2 ** Math.min(failures - 1, 10);
-  return (isKept ? Math.min(LONGEST_MS, doubled) : LONGEST_MS) * (0.5 + 0.5 * random);
+  return (isStored ? Math.min(LONGEST_MS, doubled) : LONGEST_MS) * (0.5 + 0.5 * random);
 }
 
-function read(session: Session): Kept | null {
+function read(session: Session): StoredFailures | null {
   try {
-    const kept: unknown = JSON.parse(session.getItem(KEY) ?? 'null');
-    const { failures, at } = (kept ?? {}) as Partial<Kept>;
-    return Number.isSafeInteger(failures) && Number.isFinite(at) ? (kept as Kept) : null;
+    const stored: unknown = JSON.parse(session.getItem(KEY) ?? 'null');
+    const { failures, at } = (stored ?? {}) as Partial<StoredFailures>;
+    return Number.isSafeInteger(failures) && Number.isFinite(at)
+      ? (stored as StoredFailures)
+      : null;
   } catch {
     return null;
   }
 }
 
-function keep(session: Session, kept: Kept): boolean {
+function write(session: Session, stored: StoredFailures): boolean {
   try {
-    session.setItem(KEY, JSON.stringify(kept));
+    session.setItem(KEY, JSON.stringify(stored));
     return true;
   } catch {
     return false;

@@ -7,7 +7,7 @@ import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { playback } from '../timebar/playback';
 import { startKeys } from './keys';
-import { loadParts } from './later';
+import { loadParts } from './loadDeferred';
 
 beforeAll(() => loadParts());
 

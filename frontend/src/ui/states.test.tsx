@@ -7,11 +7,17 @@ import { afterAll, beforeAll, beforeEach, describe, expect, test, vi } from 'vit
 
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 
-type Told = readonly [HealthReason['kind'], Verdict, string, number | null, number | null];
+type ReportedReason = readonly [
+  HealthReason['kind'],
+  Verdict,
+  string,
+  number | null,
+  number | null,
+];
 interface Tag {
   readonly readings: Readonly<Record<string, readonly [number | null, number]>>;
   readonly verdict: Verdict;
-  readonly reasons: readonly Told[];
+  readonly reasons: readonly ReportedReason[];
   readonly species?: string;
 }
 interface House {
@@ -121,7 +127,7 @@ const tagsOf = (state: State): [string, Tag][] =>
   });
 
 const SINCE = { sec: 0, nanosec: 0 };
-const reasonOf = ([kind, verdict, sensor, value, limit]: Told): HealthReason => ({
+const reasonOf = ([kind, verdict, sensor, value, limit]: ReportedReason): HealthReason => ({
   ...{ kind, verdict, sensor, value, limit },
   since: SINCE,
 });
@@ -156,7 +162,7 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
   /** Asserts that a text names a reason's kind, sensor and side. */
   const expectSaid = (
     text: string,
-    [kind, , sensor, value, limit]: Told,
+    [kind, , sensor, value, limit]: ReportedReason,
     says = words.says,
   ): void => {
     expect(text).toMatch(says[kind]);
@@ -225,7 +231,7 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
 
     for (const [tag_id, kind, sensor, verdict] of state.alarms) {
       const of = tags.find(([id]) => id === tag_id)?.[1].reasons ?? [];
-      const told: Told = of.find((it) => it[0] === kind && it[2] === sensor) ?? [
+      const reported: ReportedReason = of.find((it) => it[0] === kind && it[2] === sensor) ?? [
         kind,
         verdict,
         sensor,
@@ -234,13 +240,13 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
       ];
       const alarm: Alarm = {
         ...{ id: `${tag_id} ${kind}`, tag_id, raised_at: SINCE, cleared_at: null, worst: null },
-        reason: reasonOf(told),
+        reason: reasonOf(reported),
       };
       const text = page.textNow(page.store.get(), alarm);
       expect(text.startsWith(tag_id === '' ? words.house : words.tag.replace('1', tag_id))).toBe(
         true,
       );
-      expectSaid(text.slice(text.indexOf(': ') + 2), told, { ...words.says, ...words.alarms });
+      expectSaid(text.slice(text.indexOf(': ') + 2), reported, { ...words.says, ...words.alarms });
     }
     const calls = state.alarms.length;
     expect(page.titleOf(calls, null)).toBe(calls === 0 ? 'Lupin twin' : `(${calls}) Lupin twin`);

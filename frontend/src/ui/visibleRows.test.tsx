@@ -71,7 +71,7 @@ describe('a long table', () => {
       </Profiler>,
     );
   };
-  const hear = (wires: readonly ReturnType<typeof wireTag>[], sec: number): void => {
+  const receiveState = (wires: readonly ReturnType<typeof wireTag>[], sec: number): void => {
     settle(() => {
       receive(withState(stateFrame(wires, { sec, revision: `r${sec}` }), performance.now()));
     });
@@ -84,7 +84,7 @@ describe('a long table', () => {
   test('up to its length has all rows in the page, and one more has not', () => {
     show(SHORT_TABLE);
     expect(rows()).toHaveLength(SHORT_TABLE);
-    hear(house(SHORT_TABLE + 1), 50_000);
+    receiveState(house(SHORT_TABLE + 1), 50_000);
     expect(rows().length).toBeLessThan(70);
   });
 
@@ -120,7 +120,7 @@ describe('a long table', () => {
     show(LONGEST_ON_PAPER);
     fireEvent(window, new Event('beforeprint'));
     expect(rows()).toHaveLength(LONGEST_ON_PAPER);
-    hear(house(LONGEST_ON_PAPER + 1), 60_000);
+    receiveState(house(LONGEST_ON_PAPER + 1), 60_000);
     expect(rows()).toHaveLength(LONGEST_ON_PAPER);
     fireEvent(window, new Event('afterprint'));
     expect(rows().length).toBeLessThan(70);
@@ -131,7 +131,7 @@ describe('a long table', () => {
     vi.useFakeTimers({ toFake: ['performance', 'setInterval', 'clearInterval'] });
     show(1_000);
     const before = commits;
-    hear(house(1_000), nextStamp());
+    receiveState(house(1_000), nextStamp());
     expect(commits).toBe(before);
 
     // Only a row reads this property, once per render.
@@ -148,7 +148,7 @@ describe('a long table', () => {
     }
     const changed = house(1_000);
     changed[2] = wireTag({ tag_id: '3', readings: readings({ temperature: 31 }) });
-    hear(changed, nextStamp() + 1);
+    receiveState(changed, nextStamp() + 1);
     expect(document.querySelector('tr[data-tag-id="3"]')?.textContent).toContain('31.0');
     expect(rendered).toEqual([]);
   });

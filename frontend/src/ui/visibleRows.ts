@@ -146,7 +146,7 @@ export function useChosenInSight(
     const size = new ResizeObserver(() => {
       const before = height;
       height = frame.clientHeight;
-      if (frame.scrollHeight > height) keep(frame, chosen, before);
+      if (frame.scrollHeight > height) keepInView(frame, chosen, before);
     });
     size.observe(frame);
     return () => {
@@ -158,7 +158,7 @@ export function useChosenInSight(
     const frame = body.current?.closest('.table-scroll, .alarms');
     if (chosen === null || !frame) return undefined;
     const painted = requestAnimationFrame(() => {
-      keep(frame, chosen, frame.clientHeight);
+      keepInView(frame, chosen, frame.clientHeight);
     });
     return () => {
       cancelAnimationFrame(painted);
@@ -178,7 +178,7 @@ const rowOf = (frame: Element, chosen: string): Element | null => {
 };
 
 /** Keeps the selected row in view, unless the user has scrolled it out of view. */
-function keep(frame: Element, chosen: string, height: number): void {
+function keepInView(frame: Element, chosen: string, height: number): void {
   const row = rowOf(frame, chosen);
   const down = row && row.getBoundingClientRect().bottom - frame.getBoundingClientRect().top;
   if (row && down && down > 0 && down - row.clientHeight < height) row.scrollIntoView(NEAREST);

@@ -110,19 +110,34 @@ const english = saidBy({ ...ENGLISH, ...ESTIMATE }, parameters);
 /** Texts that are the same in English and another language: names, signs and shared words. */
 const SAME: Readonly<Record<string, readonly string[]>> = {
   de: [
-    ...['phase.live', 'timebarLive', 'keys.time.3.1', 'themes.system', 'tried.ok', 'sensors'],
+    ...[
+      'phase.live',
+      'timebarLive',
+      'keys.time.3.1',
+      'themes.system',
+      'attemptOutcomes.ok',
+      'sensors',
+    ],
     ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'legendMore'],
     ...['keys.global.12.0', 'idealParts.any', 'colourings.ideal', 'differenceTimes'],
     'densities.usual',
   ],
   nl: [
-    ...['phase.live', 'timebarLive', 'keys.time.3.1', 'menu', 'tried.ok', 'sensors', 'alarmCount'],
+    ...[
+      'phase.live',
+      'timebarLive',
+      'keys.time.3.1',
+      'menu',
+      'attemptOutcomes.ok',
+      'sensors',
+      'alarmCount',
+    ],
     ...['rangeAuto', 'saveCsvShort', 'trend', 'legendMore', 'robotLayer', 'robotAt'],
     ...['keys.global.12.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
     ...['speciesNames.gerbera', 'densities.compact', 'phase.offline', 'reasons.wasBeyond'],
   ],
   es: [
-    ...['robotLayer', 'robotAt', 'tried.ok', 'sensors', 'rangeAuto', 'saveCsvShort'],
+    ...['robotLayer', 'robotAt', 'attemptOutcomes.ok', 'sensors', 'rangeAuto', 'saveCsvShort'],
     ...['speciesNames.gerbera', 'keys.global.12.0', 'idealParts.any', 'colourings.ideal'],
   ],
 };

@@ -22,7 +22,7 @@ const ENGLISH = {
   activeAlarms: 'Alarms now',
   completeTo: 'Complete up to',
   wholeHours: 'Counted in whole hours. Click a name for the report of that greenhouse.',
-  newestNotes: 'Newest notes',
+  latestNotes: 'Newest notes',
   kinds: { acknowledge: 'alarm acknowledged', shelve: 'alarm shelved' },
   withdrawn: (name: string): string => `withdrawn by ${name}`,
 };
@@ -47,7 +47,7 @@ const GERMAN: In<typeof ENGLISH> = {
   activeAlarms: 'Alarme jetzt',
   completeTo: 'Vollständig bis',
   wholeHours: 'Gezählt in vollen Stunden. Der Name führt zum Bericht des Gewächshauses.',
-  newestNotes: 'Neueste Notizen',
+  latestNotes: 'Neueste Notizen',
   kinds: { acknowledge: 'Alarm quittiert', shelve: 'Alarm zurückgestellt' },
   withdrawn: (name) => `zurückgenommen von ${name}`,
 };
@@ -72,7 +72,7 @@ const DUTCH: In<typeof ENGLISH> = {
   activeAlarms: 'Alarmen nu',
   completeTo: 'Volledig tot',
   wholeHours: 'Geteld per heel uur. Klik op een naam voor het rapport van die kas.',
-  newestNotes: 'Nieuwste notities',
+  latestNotes: 'Nieuwste notities',
   kinds: { acknowledge: 'alarm bevestigd', shelve: 'alarm uitgesteld' },
   withdrawn: (name) => `ingetrokken door ${name}`,
 };
@@ -97,7 +97,7 @@ const SPANISH: In<typeof ENGLISH> = {
   activeAlarms: 'Alarmas ahora',
   completeTo: 'Completo hasta',
   wholeHours: 'Recuento por horas enteras. Pulse un nombre para ver el informe de ese invernadero.',
-  newestNotes: 'Notas más recientes',
+  latestNotes: 'Notas más recientes',
   kinds: { acknowledge: 'alarma reconocida', shelve: 'alarma aplazada' },
   withdrawn: (name) => `retirada por ${name}`,
 };

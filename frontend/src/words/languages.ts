@@ -33,14 +33,14 @@ export interface Choice {
 
 /** The language of `?lang=`, else the browser's first supported language, else English. */
 export function chosenLanguage(search: string, preferred: readonly string[]): Choice {
-  const asked = new URLSearchParams(search).get('lang');
-  const spoken = asked === null ? null : languageOf(asked);
-  const own = asked === null ? preferred.map(languageOf).find((each) => each !== null) : spoken;
+  const requested = new URLSearchParams(search).get('lang');
+  const spoken = requested === null ? null : languageOf(requested);
+  const own = requested === null ? preferred.map(languageOf).find((each) => each !== null) : spoken;
   const language = own ?? 'en';
   return {
     language,
-    locale: localeFor(language, asked === null ? preferred : [asked, ...preferred]),
-    unknown: spoken === null ? asked : null,
+    locale: localeFor(language, requested === null ? preferred : [requested, ...preferred]),
+    unknown: spoken === null ? requested : null,
   };
 }
 

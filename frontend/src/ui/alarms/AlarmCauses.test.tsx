@@ -1,17 +1,17 @@
 import { act, fireEvent, render, screen } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test } from 'vitest';
 
-import { acknowledge, NOTHING_KEPT, own } from '../../alarms/own';
+import { acknowledge, NO_LOCAL_ALARMS, own } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
 import type { Alarm } from '../../contract/types';
-import { alarm, tellAlarms } from '../../testing/alarms';
+import { alarm, reportAlarms } from '../../testing/alarms';
 import { showTags } from '../../testing/page';
 import { wireTag } from '../../testing/tags';
 import { AlarmPanel } from './AlarmPanel';
 
 let stop: () => void;
 beforeEach(() => {
-  own.set(NOTHING_KEPT);
+  own.set(NO_LOCAL_ALARMS);
   showTags([wireTag()]);
   stop = startAlarms();
   render(<AlarmPanel />);
@@ -20,9 +20,9 @@ afterEach(() => {
   stop();
 });
 
-const tell = (...list: readonly Alarm[]): void => {
+const report = (...list: readonly Alarm[]): void => {
   act(() => {
-    tellAlarms(...list);
+    reportAlarms(...list);
   });
 };
 const group = (name: string): Element[] => [
@@ -30,7 +30,7 @@ const group = (name: string): Element[] => [
 ];
 
 test('of many of one cause five, then a hundred more at a time', () => {
-  tell(...Array.from({ length: 150 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) })));
+  report(...Array.from({ length: 150 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) })));
   // By text: a role query over hundreds of buttons takes seconds.
   expect(screen.getByText('Active (150)')).toBeTruthy();
   expect(group('active')).toHaveLength(0);
@@ -51,10 +51,10 @@ test('many of one cause that one person has acknowledged say who, and when the l
       const acknowledged_at = { sec: 1_000 + at, nanosec: 0 };
       return alarm(`a${at}`, { tag_id: `${at}`, acknowledged_by, acknowledged_at });
     });
-    tell(...list);
+    report(...list);
     act(() => {
       const items = list.map((each) => ({ alarm: each, verdict: each.reason.verdict }));
-      own.set(acknowledge(NOTHING_KEPT, items, 0));
+      own.set(acknowledge(NO_LOCAL_ALARMS, items, 0));
     });
   };
   const status = (): string | null | undefined =>
@@ -66,7 +66,7 @@ test('many of one cause that one person has acknowledged say who, and when the l
 });
 
 test('many of one cause that are resolved have nothing to do, and say when the last was', () => {
-  tell(
+  report(
     ...Array.from({ length: 5 }, (_, at) =>
       alarm(`a${at}`, { tag_id: `${at}`, cleared: 950 + at }),
     ),

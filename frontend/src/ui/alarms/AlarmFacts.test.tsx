@@ -3,7 +3,7 @@ import { expect, test } from 'vitest';
 
 import { startAlarms } from '../../alarms/watch';
 import { receive } from '../../store/app';
-import { alarm, tellAlarms } from '../../testing/alarms';
+import { alarm, reportAlarms } from '../../testing/alarms';
 import { goLost, showTags } from '../../testing/page';
 import { readings, wireTag } from '../../testing/tags';
 import { AlarmPanel } from './AlarmPanel';
@@ -13,7 +13,7 @@ test('how old the last value is nobody knows after a sleep', () => {
   const stop = startAlarms();
   render(<AlarmPanel />);
   flush(() => {
-    tellAlarms(alarm('a'));
+    reportAlarms(alarm('a'));
     goLost();
   });
   const now = (): string | undefined => document.querySelector('[data-fact=now]')?.textContent;

@@ -4,31 +4,31 @@ import { alarmOf, isAwaited } from '../../alarms/list';
 import {
   notifyState,
   soundState,
-  wishNotify,
-  wishSound,
+  setNotify,
+  setSound,
   type NotifyState,
   type SoundState,
 } from '../../alarms/notify';
-import { done, own, undo } from '../../alarms/own';
+import { lastAction, own, undo } from '../../alarms/own';
 import { textNow } from '../../alarms/speech';
 import { alarmList, meanwhile } from '../../alarms/watch';
 import { shown } from '../../domain/text';
 import { rosText, secondsOf } from '../../domain/time';
 import { act, useApp, type AppState } from '../../store/app';
 import { person, useSelected } from '../../store/create';
-import { selectNewestHealth } from '../../store/derived';
-import { selectIsCut, selectNewest, selectShown } from '../../store/moment';
+import { selectLatestHealth } from '../../store/derived';
+import { selectIsDisconnected, selectLatest, selectShown } from '../../store/moment';
 import { S } from '../../strings';
 import { Check } from '../../widgets/controls';
 import { selectAreAlarmsKnown } from '../Reasons';
-import { once } from './AlarmRow';
-import { whoseWord } from './people';
+import { ignoreDoubleClick } from './AlarmRow';
+import { sharingText } from './people';
 
 /** How many tags have a reason that waits for a second scan; null: none, or unknown. */
 export function AlarmsWait(): JSX.Element | null {
   const isKnown = useApp(selectIsKnown);
   const listed = useSelected(alarmList);
-  const health = useApp(selectNewestHealth);
+  const health = useApp(selectLatestHealth);
   const waiting = useMemo(() => {
     const all = [...listed.active, ...listed.shelved];
     return [...(health?.byTag ?? [])].filter(([id, { reasons }]) =>
@@ -41,7 +41,7 @@ export function AlarmsWait(): JSX.Element | null {
 
 // With a silent twin, alarms stay known: the silence itself is an alarm.
 const selectIsKnown = (state: AppState): boolean =>
-  selectAreAlarmsKnown(state) && !selectIsCut(state);
+  selectAreAlarmsKnown(state) && !selectIsDisconnected(state);
 
 /** Notes above the list: what it covers, and what is unknown. */
 export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
@@ -50,7 +50,9 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
   const isStarting = alarms?.source === 'starting';
   const isKnown = useApp(selectIsKnown);
   // The banner says from when.
-  const isLast = useApp((state) => selectIsCut(state) && selectNewest(state).snapshot !== null);
+  const isLast = useApp(
+    (state) => selectIsDisconnected(state) && selectLatest(state).snapshot !== null,
+  );
   return (
     <div className="alarm-notes">
       {moment !== null && !isLast && <p data-note="now">{S.alarmsOfNow(rosText(moment))}</p>}
@@ -65,7 +67,7 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
       {isEmpty && isKnown && <p className="faint">{S.alarmsNoneHint}</p>}
       {alarms?.source === 'heard' && alarms.since && (
         <p className="faint" data-note="heard">
-          {S.alarmsHeard(rosText(secondsOf(alarms.since)))}
+          {S.alarmsReceived(rosText(secondsOf(alarms.since)))}
         </p>
       )}
     </div>
@@ -73,9 +75,9 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
 }
 
 /** Below the list: whether actions stay in this browser or are shared. */
-export function WhoseWord(): JSX.Element {
+export function SharingNote(): JSX.Element {
   const who = useSelected(person);
-  return <p className="alarms-mine faint">{whoseWord(who)}</p>;
+  return <p className="alarms-mine faint">{sharingText(who)}</p>;
 }
 
 /** Says that alarms were raised while a past moment is shown, and links back to live. */
@@ -101,7 +103,7 @@ export function Meanwhile(): JSX.Element | null {
 }
 
 /** Line above the list: new alarms that a held list does not show yet, and the last action to undo. */
-export function DoneLine({
+export function LastActionLine({
   added,
   onShow,
   children,
@@ -112,7 +114,7 @@ export function DoneLine({
   /** Actions on the whole list. */
   children: ReactNode;
 }): JSX.Element {
-  const last = useSelected(done);
+  const last = useSelected(lastAction);
   return (
     <div className="alarm-line">
       {children}
@@ -125,7 +127,7 @@ export function DoneLine({
         {last && (
           <span data-line="done">
             {S.alarmDone[last.what](last.count)}{' '}
-            <button type="button" onClick={once(undo)}>
+            <button type="button" onClick={ignoreDoubleClick(undo)}>
               {S.alarmUndo}
             </button>
           </span>
@@ -142,15 +144,15 @@ const soundHint = (state: SoundState): string =>
 const notifyHint = (state: NotifyState): string =>
   ({
     granted: S.alarmNotifyHint,
-    asks: S.alarmNotifyHint,
+    prompt: S.alarmNotifyHint,
     refused: S.alarmNotifyRefused,
     insecure: S.alarmNotifyInsecure,
     none: S.alarmNotifyNone,
   })[state];
 
 /** Opt-in sound and notifications for alarms while nobody is looking at the page. */
-export function TellMe(): JSX.Element {
-  const kept = useSelected(own);
+export function NotifySettings(): JSX.Element {
+  const local = useSelected(own);
   const sound = useSelected(soundState);
   const notify = useSelected(notifyState);
   return (
@@ -158,19 +160,19 @@ export function TellMe(): JSX.Element {
       <Way
         name="sound"
         label={S.alarmSound}
-        isOn={kept.sound && sound !== 'none'}
+        isOn={local.sound && sound !== 'none'}
         isPossible={sound !== 'none'}
         // While sound is off, "waits" does not apply.
-        hint={soundHint(kept.sound || sound === 'none' ? sound : 'ready')}
-        onChange={wishSound}
+        hint={soundHint(local.sound || sound === 'none' ? sound : 'ready')}
+        onChange={setSound}
       />
       <Way
         name="notify"
         label={S.alarmNotify}
-        isOn={kept.notify && notify === 'granted'}
-        isPossible={notify === 'granted' || notify === 'asks'}
+        isOn={local.notify && notify === 'granted'}
+        isPossible={notify === 'granted' || notify === 'prompt'}
         hint={notifyHint(notify)}
-        onChange={wishNotify}
+        onChange={setNotify}
       />
     </>
   );
@@ -189,7 +191,7 @@ function Way({
   isOn: boolean;
   isPossible: boolean;
   hint: string;
-  onChange: (isWished: boolean) => Promise<void>;
+  onChange: (isRequested: boolean) => Promise<void>;
 }): JSX.Element {
   const id = useId();
   return (
@@ -199,7 +201,7 @@ function Way({
         isOn={isOn}
         disabled={!isPossible}
         aria-describedby={id}
-        onChange={(isWished) => void onChange(isWished)}
+        onChange={(isRequested) => void onChange(isRequested)}
       />
       <p className="faint" id={id} role="status">
         {hint}

@@ -1,22 +1,22 @@
 import { act as flush, fireEvent, render, screen, within } from '@testing-library/react';
 import { beforeEach, expect, test, vi } from 'vitest';
 
-import { acknowledge, done, NOTHING_KEPT, own, shelveAlarm } from '../../alarms/own';
+import { acknowledge, lastAction, NO_LOCAL_ALARMS, own, shelveAlarm } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
 import { notifyState } from '../../alarms/notify';
 import type { Alarm, HealthReason } from '../../contract/types';
 import { act as dispatch, receive, store } from '../../store/app';
 import { person } from '../../store/create';
 import { NO_HOUSE, withPast } from '../../store/twin';
-import { alarm, alarms, tellAlarms } from '../../testing/alarms';
+import { alarm, alarms, reportAlarms } from '../../testing/alarms';
 import { goLost, showTags } from '../../testing/page';
 import { judgement, reason } from '../../testing/health';
 import { readings, wireTag } from '../../testing/tags';
 import { AlarmPanel } from './AlarmPanel';
 
 beforeEach(() => {
-  own.set(NOTHING_KEPT);
-  done.set(null);
+  own.set(NO_LOCAL_ALARMS);
+  lastAction.set(null);
   person.set(null);
   showTags([wireTag()]);
   const stop = startAlarms();
@@ -24,9 +24,9 @@ beforeEach(() => {
   return stop;
 });
 
-const tell = (...list: readonly Alarm[]): void => {
+const report = (...list: readonly Alarm[]): void => {
   flush(() => {
-    tellAlarms(...list);
+    reportAlarms(...list);
   });
 };
 const group = (name: string): HTMLElement[] => [
@@ -61,7 +61,7 @@ const act = (tag: string, name: string): void => {
 };
 
 test('each in words: for how long, what, where, now, at worst; what is resolved when asked for', () => {
-  tell(
+  report(
     alarm('a', { tag_id: '5', raised: 500, worst: 4.2 }),
     alarm('b', { tag_id: '', raised: 100, cleared: 160, reason: { kind: 'stopped', sensor: '' } }),
   );
@@ -90,7 +90,7 @@ test('the value of now follows the newest state, with its own severity', () => {
         [wireTag({ readings: readings({ temperature: value }) })],
         judgement({ '1': reasons }),
       );
-      tellAlarms(alarm('a', { worst: 4.2 }));
+      reportAlarms(alarm('a', { worst: 4.2 }));
     });
   };
   see(8.1, reason({ value: 8.1 }));
@@ -109,7 +109,7 @@ test('what is worse now than the alarm has said yet has its severity, and no wor
     const tag = wireTag({ readings: readings({ temperature: 8.1 }) });
     showTags([tag], judgement({ 1: [reason({ value: 8.1 })] }));
   });
-  tell(alarm('a', { worst: 12, reason: { value: 12, limit: 18, verdict: 'stressed' } }));
+  report(alarm('a', { worst: 12, reason: { value: 12, limit: 18, verdict: 'stressed' } }));
   const now = fact(first('active'), 'now');
   expect([now.title, now.dataset['status']]).toEqual(['now 8.1\u00a0°C', 'critical']);
   expect(first('active').textContent).not.toContain('worst');
@@ -122,7 +122,7 @@ test('what is well again waits for one more good scan, and pests for an inspecti
     showTags(tags, judgement({ 5: 'healthy', 6: 'healthy' }));
   });
   const pest = { kind: 'pest', sensor: '', value: 2, limit: null } as const;
-  tell(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6', reason: pest }));
+  report(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6', reason: pest }));
   const todo = (tag: string): string | null | undefined =>
     document.querySelector(`[data-where='${tag}'] .alarm-do`)?.textContent;
   expect([todo('5'), todo('6')]).toEqual([
@@ -135,16 +135,16 @@ test('what is well again waits for one more good scan, and pests for an inspecti
 
 test('who acknowledged it and when, by the clock of the twin', () => {
   const said = { acknowledged_by: 'anna', acknowledged_at: { sec: 1_000, nanosec: 0 } };
-  tell(alarm('a', { tag_id: '5', ...said }));
+  report(alarm('a', { tag_id: '5', ...said }));
   flush(() => {
-    own.set(acknowledge(NOTHING_KEPT, [{ alarm: alarm('a'), verdict: 'critical' }], 0));
+    own.set(acknowledge(NO_LOCAL_ALARMS, [{ alarm: alarm('a'), verdict: 'critical' }], 0));
   });
   expect(status('5')).toBe('acknowledged by anna, sim 00:16:40');
 });
 
 test('who may not act on what is shared is offered nothing of it', () => {
   const session = { can_sign_out: true, seconds_left: null, role: 'viewer' } as const;
-  tell(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6' }));
+  report(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6' }));
   expect(screen.getAllByRole('button', { name: /^Acknowledge/ })).toHaveLength(3);
   flush(() => {
     person.set({ ...session, name: 'vera', can_write_notes: false });
@@ -161,7 +161,7 @@ test('who may not act on what is shared is offered nothing of it', () => {
 });
 
 test('acknowledged, shelved, and back', () => {
-  tell(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6', reason: { verdict: 'stressed' } }));
+  report(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6', reason: { verdict: 'stressed' } }));
   const acknowledged = (): (string | undefined)[] =>
     group('active').map(({ dataset }) => dataset['acknowledged']);
   press(/^Acknowledge: Tag 5/);
@@ -188,7 +188,7 @@ test('acknowledged, shelved, and back', () => {
 });
 
 test('a critical alarm takes a reason, and is shelved for no more than an hour', () => {
-  tell(alarm('a', { tag_id: '5' }));
+  report(alarm('a', { tag_id: '5' }));
   act('5', 'Shelve');
   expect(screen.getByText(/^Shelve: Tag 5: Temperature below 10.0.°C$/)).toBeTruthy();
   const times = screen.getAllByRole<HTMLButtonElement>('button', { name: /^For / });
@@ -203,14 +203,14 @@ test('a critical alarm takes a reason, and is shelved for no more than an hour',
   expect(first('shelved').textContent).toMatch(/shelved until [\d:]+: fan is being mended/);
   // A shelved alarm shows no action.
   expect(document.querySelector('.alarm-do')).toBeNull();
-  tell(alarm('a', { tag_id: '5', shelved_by: 'anna' }));
+  report(alarm('a', { tag_id: '5', shelved_by: 'anna' }));
   expect(first('shelved').textContent).toMatch(/shelved by anna until [\d:]+: fan is being mended/);
 });
 
 test('what is shelved while the list is held says so where it stands, and all is without it', () => {
   fireEvent.pointerEnter(screen.getByTestId('alarms'));
   const mild = { verdict: 'stressed' } as const;
-  tell(alarm('a', { tag_id: '5', reason: mild }), alarm('b', { tag_id: '6', reason: mild }));
+  report(alarm('a', { tag_id: '5', reason: mild }), alarm('b', { tag_id: '6', reason: mild }));
   act('5', 'Shelve');
   fireEvent.change(screen.getByLabelText(/^Reason/), { target: { value: 'fan' } });
   press('For 1 h');
@@ -231,11 +231,11 @@ test('what is shelved while the list is held says so where it stands, and all is
 
 test('what is resolved while the list is held says so where it stands, and no count has it', () => {
   const bad = Array.from({ length: 5 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) }));
-  tell(...bad);
+  report(...bad);
   const list = screen.getByTestId('alarms');
   fireEvent.click(screen.getByText(/5 alarms/));
   fireEvent.pointerEnter(list);
-  tell(...bad.slice(1), alarm('a0', { tag_id: '0', cleared: 950 }));
+  report(...bad.slice(1), alarm('a0', { tag_id: '0', cleared: 950 }));
   expect(status('0')).toBe('resolved');
   expect(group('active')).toHaveLength(5);
   for (const row of group('active')) expect(fact(row, 'since').textContent).not.toMatch(/resolved/);
@@ -253,7 +253,7 @@ test('what is worst now stands first, whatever was worse once', () => {
     wireTag({ tag_id, readings: readings({ temperature: 12 }) }),
   );
   const mild = reason({ value: 12, limit: 18, verdict: 'stressed' });
-  tell(
+  report(
     alarm('was', { tag_id: '5' }),
     alarm('is', { tag_id: '6', reason: { verdict: 'stressed' } }),
   );
@@ -273,23 +273,23 @@ test('while the pointer is in the list no row moves, and what is new is counted 
   const a = alarm('a', { reason: { verdict: 'stressed' } });
   // An empty list has nothing to hold.
   fireEvent.pointerEnter(list);
-  tell(a);
+  report(a);
   expect(ids()).toEqual(['a']);
-  tell(a, alarm('worse', { tag_id: '2' }));
+  report(a, alarm('worse', { tag_id: '2' }));
   expect(ids()).toEqual(['a']);
   expect(screen.getByRole('heading').textContent).toBe('Active (2)');
   expect(screen.getByTestId('alarm-line').textContent).toBe('1 new');
   press('1 new');
   expect(ids()).toEqual(['worse', 'a']);
   expect(screen.getByTestId('alarm-line').textContent).toBe('');
-  tell(a);
+  report(a);
   expect(ids()).toEqual(['worse', 'a']);
   fireEvent.pointerLeave(list);
   expect(ids()).toEqual(['a']);
 });
 
 test('a row leads to its tag', () => {
-  tell(alarm('a', { tag_id: '5' }));
+  report(alarm('a', { tag_id: '5' }));
   fireEvent.click(within(first('active')).getByText(/Temperature/));
   expect(store.get().view.selected).toBe('5');
 });
@@ -300,27 +300,27 @@ test('without an alarm it says so; where that is not known it says that', () => 
     receive({ alarms: alarms([], { source: 'starting', since: null }) });
   });
   expect(notes()).toEqual(['starting', 'unknown']);
-  tell();
+  report();
   expect(notes()).toEqual(['none']);
   expect(screen.getByText('No alarm is active')).toBeTruthy();
   flush(() => {
     showTags([wireTag()], judgement({ 1: [reason({ kind: 'pest', sensor: '' })] }));
   });
-  tell();
+  report();
   expect(notes()).toEqual(['none']);
   flush(() => {
     showTags([wireTag()], judgement({ 1: [reason()] }));
   });
-  tell();
+  report();
   const wait = '1 tag waiting for a second scan: no alarm yet';
   expect(notes()).toEqual(['none', 'wait']);
   expect(screen.getByText(wait)).toBeTruthy();
   // Also shown beside another tag's alarm, but not beside its own.
-  tell(alarm('a', { tag_id: '5' }));
+  report(alarm('a', { tag_id: '5' }));
   // Below the rows, so that they do not move.
   expect(screen.getByText(wait).previousElementSibling).toBe(first('active').closest('section'));
   const ofTag = alarm('a', { tag_id: '1' });
-  tell(ofTag);
+  report(ofTag);
   expect(screen.queryByText(wait)).toBeNull();
   flush(() => {
     shelveAlarm({ alarm: ofTag, verdict: 'critical' }, 15, 'fan');
@@ -331,13 +331,13 @@ test('without an alarm it says so; where that is not known it says that', () => 
     receive({ alarms: alarms([], { source: 'heard' }) });
   });
   expect(notes()).toEqual(['none', 'wait', 'heard']);
-  tell();
+  report();
   flush(goLost);
   expect(notes()).toEqual(['lost']);
 });
 
 test('it is of now, and says so while another moment is shown', () => {
-  tell(alarm('a'));
+  report(alarm('a'));
   expect(notes()).toEqual([]);
   flush(() => {
     dispatch({ moment: 50 });
@@ -350,7 +350,7 @@ test('it is of now, and says so while another moment is shown', () => {
 
 test('many of one cause are one heading, which is acknowledged as one and names the worst', () => {
   const bad = Array.from({ length: 5 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) }));
-  tell(...bad, alarm('b', { tag_id: '9', reason: { sensor: 'humidity', verdict: 'stressed' } }));
+  report(...bad, alarm('b', { tag_id: '9', reason: { sensor: 'humidity', verdict: 'stressed' } }));
   // On paper everything is expanded.
   fireEvent(window, new Event('beforeprint'));
   expect(group('active')).toHaveLength(6);
@@ -378,7 +378,7 @@ test('Escape empties the filter first, and only then what lies over the map', ()
 });
 
 test('what is filtered away is not acknowledged with all', () => {
-  tell(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6' }));
+  report(alarm('a', { tag_id: '5' }), alarm('b', { tag_id: '6' }));
   fireEvent.change(screen.getByLabelText('Filter alarms'), { target: { value: 'tag 6' } });
   expect(group('active').map(({ dataset }) => dataset['where'])).toEqual(['6']);
   expect(screen.getByRole('heading').textContent).toBe('Active (1/2)');

@@ -30,15 +30,15 @@ import { secondsOf } from '../../domain/time';
 import { saveCsv } from '../../export/save';
 import { store, useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
-import { selectNewestTag } from '../../store/moment';
+import { selectLatestTag } from '../../store/moment';
 import { LONGEST_FILTER } from '../../store/view';
 import { S } from '../../strings';
 import { Disclosure, Icon, Select } from '../../widgets/controls';
 import { HealthMark } from '../HealthMark';
 import { useChosenInSight, usePaper } from '../visibleRows';
 import { AlarmTimes, ResolvedNote } from './AlarmFacts';
-import { AlarmNotes, AlarmsWait, DoneLine, TellMe, WhoseWord } from './AlarmNotes';
-import { Acknowledge, AlarmRow, once } from './AlarmRow';
+import { AlarmNotes, AlarmsWait, LastActionLine, NotifySettings, SharingNote } from './AlarmNotes';
+import { Acknowledge, AlarmRow, ignoreDoubleClick } from './AlarmRow';
 import { ALARMS_ID, ListChoice } from './ListChoice';
 import { useIsRefused, useWhoAcknowledged } from './people';
 
@@ -46,7 +46,7 @@ import { useIsRefused, useWhoAcknowledged } from './people';
 const MOST_OF_CAUSE = 5;
 const MOST_ROWS = 100;
 
-const isTag = (id: string): boolean => selectNewestTag(store.get(), id) !== undefined;
+const isTag = (id: string): boolean => selectLatestTag(store.get(), id) !== undefined;
 
 /** The current alarms, beside the map: active, shelved and resolved. */
 export function AlarmPanel(): JSX.Element {
@@ -64,7 +64,7 @@ export function AlarmPanel(): JSX.Element {
   const speech = useApp(selectSpeech);
   const [filter, setFilter] = useState('');
   const [order, setOrder] = useState<Order>('cause');
-  const { shown, added, release, ...hold } = useHeldOrder(all);
+  const { shown, added, showNew, ...hold } = useHeldOrder(all);
   const seen = filtered(shown, filter, speech, isTag);
   // Counts follow the live list, like all others on the page, even while the order is held.
   const counted = filtered(all, filter, speech, isTag);
@@ -124,23 +124,23 @@ export function AlarmPanel(): JSX.Element {
           <Icon name="download" size={18} /> <span className="csv-word">{S.saveCsvShort}</span>
         </button>
       </div>
-      <DoneLine added={added.length} onShow={release}>
+      <LastActionLine added={added.length} onShow={showNew}>
         {isAble && (
           <button
             type="button"
             className="text-button all-seen"
             disabled={waiting.length === 0 || isRefused}
-            onClick={once(() => {
+            onClick={ignoreDoubleClick(() => {
               acknowledgeAlarms(waiting);
             })}
           >
             <Icon name="check" size={18} /> {S.alarmAcknowledgeAll(waiting.length)}
           </button>
         )}
-        <Disclosure label={S.alarmTell} button={<Icon name="bell" />} className="tell-me">
-          <TellMe />
+        <Disclosure label={S.alarmNotifyMe} button={<Icon name="bell" />} className="tell-me">
+          <NotifySettings />
         </Disclosure>
-      </DoneLine>
+      </LastActionLine>
       <div
         ref={list}
         className="alarms"
@@ -172,7 +172,7 @@ export function AlarmPanel(): JSX.Element {
             {name === 'active' && hasAny && <AlarmsWait />}
           </Fragment>
         ))}
-        {hasAny && <WhoseWord />}
+        {hasAny && <SharingNote />}
       </div>
     </>
   );
@@ -221,11 +221,11 @@ function Rows({
   block: Block;
   group: keyof AlarmList;
 }): JSX.Element {
-  const [wished, setMost] = useState(cause === null ? MOST_ROWS : MOST_OF_CAUSE);
+  const [requestedMost, setMost] = useState(cause === null ? MOST_ROWS : MOST_OF_CAUSE);
   const [isOpen, setOpen] = useState(false);
   // On paper everything is expanded.
   const isPaper = usePaper();
-  const most = isPaper ? items.length : wished;
+  const most = isPaper ? items.length : requestedMost;
   const rest = items.length - most;
   return (
     <>
@@ -352,7 +352,7 @@ function lastOfOne(alarms: readonly Alarm[]): Alarm | null {
 
 interface HeldOrder extends HeldList {
   /** Shows the new alarms, and holds that order. */
-  readonly release: () => void;
+  readonly showNew: () => void;
   readonly onPointerEnter: () => void;
   readonly onPointerLeave: () => void;
   readonly onFocus: (event: FocusEvent) => void;
@@ -370,7 +370,7 @@ function useHeldOrder(list: AlarmList): HeldOrder {
   if (isHeld ? !hasRows && held !== list : held !== null) setHeld(isHeld ? list : null);
   return {
     ...heldList(held ?? list, list),
-    release: () => {
+    showNew: () => {
       setHeld(null);
     },
     onPointerEnter: () => {

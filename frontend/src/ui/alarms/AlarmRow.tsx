@@ -51,7 +51,7 @@ export const AlarmRow = memo(function AlarmRow({
         type="button"
         className="alarm-go"
         title={S.alarmShow}
-        onClick={once(() => {
+        onClick={ignoreDoubleClick(() => {
           showAlarm(alarm);
         })}
       >
@@ -136,7 +136,7 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
   }, [form]);
   const act = (text: string, action: () => void, isPossible = !isRefused): JSX.Element => (
     <li>
-      <button type="button" disabled={!isPossible} onClick={once(action)}>
+      <button type="button" disabled={!isPossible} onClick={ignoreDoubleClick(action)}>
         {text}
       </button>
     </li>
@@ -211,7 +211,7 @@ function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
             key={minutes}
             type="button"
             disabled={isNeeded && given === ''}
-            onClick={once(() => {
+            onClick={ignoreDoubleClick(() => {
               close();
               shelveAlarm(item, minutes, given);
             })}
@@ -255,7 +255,7 @@ export function Acknowledge({
       aria-label={status === null ? label : undefined}
       aria-disabled={status !== null}
       disabled={isRefused}
-      onClick={once(() => {
+      onClick={ignoreDoubleClick(() => {
         if (status === null) onAcknowledge();
       })}
     >
@@ -274,7 +274,7 @@ let last = { at: -Infinity, x: 0, y: 0 };
  * Ignores the second click of a double click: it would undo the first, or hit whatever has moved
  * there since.
  */
-export const once =
+export const ignoreDoubleClick =
   (act: () => void) =>
   ({ detail, timeStamp, clientX, clientY }: MouseEvent): void => {
     const isAgain =

@@ -1,12 +1,12 @@
 import { act as flush, fireEvent, render, screen } from '@testing-library/react';
 import { afterEach, beforeEach, expect, test } from 'vitest';
 
-import { acknowledgeAlarms, NOTHING_KEPT, own, shelveAlarm } from '../../alarms/own';
+import { acknowledgeAlarms, NO_LOCAL_ALARMS, own, shelveAlarm } from '../../alarms/own';
 import { alarmList, startAlarms } from '../../alarms/watch';
 import { act, receive } from '../../store/app';
 import { person } from '../../store/create';
 import { NO_HOUSE, withPast } from '../../store/twin';
-import { alarm, tellAlarms } from '../../testing/alarms';
+import { alarm, reportAlarms } from '../../testing/alarms';
 import { held, judgement, reason } from '../../testing/health';
 import { goLive, goLost, showTags } from '../../testing/page';
 import { readings, wireTag } from '../../testing/tags';
@@ -18,7 +18,7 @@ import { CardAlarms } from './CardAlarms';
 let stop: () => void;
 
 beforeEach(() => {
-  own.set(NOTHING_KEPT);
+  own.set(NO_LOCAL_ALARMS);
   showTags([wireTag({ tag_id: '7' })]);
   stop = startAlarms();
   render(<CardAlarms tagId="7" />);
@@ -29,7 +29,7 @@ afterEach(() => {
 
 test('a tag without an alarm has nothing to acknowledge', () => {
   flush(() => {
-    tellAlarms(alarm('a', { tag_id: '8' }));
+    reportAlarms(alarm('a', { tag_id: '8' }));
   });
   expect(screen.queryByTestId('card-alarms')).toBeNull();
 });
@@ -38,7 +38,7 @@ test('a tag that is well again says what its alarm still waits for', () => {
   flush(() => {
     const warm = { readings: readings({ temperature: 22 }) };
     showTags([wireTag({ tag_id: '7', ...warm })], judgement({ 7: 'healthy' }));
-    tellAlarms(alarm('a', { tag_id: '7' }));
+    reportAlarms(alarm('a', { tag_id: '7' }));
   });
   const line = screen.getByTestId('card-alarms');
   expect(line.textContent).toContain(' · The next good scan resolves it');
@@ -46,7 +46,7 @@ test('a tag that is well again says what its alarm still waits for', () => {
 
 test('all alarms of a tag are acknowledged where it is looked at, and no others', () => {
   flush(() => {
-    tellAlarms(
+    reportAlarms(
       alarm('a', { tag_id: '7', raised: 500 }),
       alarm('b', { tag_id: '7', raised: 900, reason: { kind: 'pest', sensor: '' } }),
       alarm('c', { tag_id: '8' }),
@@ -77,7 +77,7 @@ test('all alarms of a tag are acknowledged where it is looked at, and no others'
 test('of one alarm it says who has acknowledged it, and when', () => {
   flush(() => {
     const said = { acknowledged_by: 'vera', acknowledged_at: { sec: 950, nanosec: 0 } };
-    tellAlarms(alarm('a', { tag_id: '7', ...said }));
+    reportAlarms(alarm('a', { tag_id: '7', ...said }));
     acknowledgeAlarms(alarmList.get().active);
   });
   expect(screen.getByTestId('card-alarms').textContent).toMatch(
@@ -93,7 +93,7 @@ test('of two reasons it is said which waits for a second scan; what the deadband
     [...screen.getByTestId('reasons').children].map(({ textContent }) => textContent);
   expect(lines().filter((text) => text?.includes('second scan'))).toEqual([]);
   flush(() => {
-    tellAlarms(alarm('a', { tag_id: '7' }));
+    reportAlarms(alarm('a', { tag_id: '7' }));
   });
   expect(lines()).toEqual([
     expect.stringMatching(/close the vents $/),
@@ -108,7 +108,7 @@ test('what is shelved says until when and why, has its way back, and is no order
   const order = (): string | undefined =>
     screen.getByTestId('reasons').querySelector('strong')?.textContent;
   flush(() => {
-    tellAlarms(alarm('a', { tag_id: '7' }), alarm('b', { tag_id: '8' }));
+    reportAlarms(alarm('a', { tag_id: '7' }), alarm('b', { tag_id: '8' }));
     for (const item of alarmList.get().active) shelveAlarm(item, 15, 'fan ordered');
   });
   expect(screen.queryByTestId('card-alarms')).toBeNull();
@@ -129,11 +129,11 @@ test('the count of alarms is of all behind the sign of the worst, and none of no
     container.querySelector<HTMLElement>('.health-mark')?.dataset['health'];
   const bad = ['8', '9'].map((id) => alarm(id, { tag_id: id, reason: { verdict: 'stressed' } }));
   flush(() => {
-    tellAlarms(...bad);
+    reportAlarms(...bad);
   });
   expect([sign(), count()]).toEqual(['stressed', '(2)']);
   flush(() => {
-    tellAlarms(...bad, alarm('c', { reason: { verdict: 'critical' } }));
+    reportAlarms(...bad, alarm('c', { reason: { verdict: 'critical' } }));
   });
   expect([sign(), count()]).toEqual(['critical', '(3)']);
   flush(() => {
@@ -149,7 +149,7 @@ test('the count of alarms is of all behind the sign of the worst, and none of no
   // Whether an empty list is still empty is unknown.
   flush(() => {
     act({ moment: null });
-    tellAlarms();
+    reportAlarms();
   });
   expect(container.textContent).toBe('Alarms');
   flush(goLive);

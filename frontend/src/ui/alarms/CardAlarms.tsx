@@ -11,7 +11,7 @@ import { mayAct, person, useSelected } from '../../store/create';
 import { rosNow } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
-import { once } from './AlarmRow';
+import { ignoreDoubleClick } from './AlarmRow';
 import { useIsRefused, useWhoAcknowledged } from './people';
 
 /** A tag's alarms on its card: active since when, or shelved until when. */
@@ -46,7 +46,7 @@ function Active({ tagId }: { tagId: string }): JSX.Element | null {
         <button
           type="button"
           disabled={isRefused}
-          onClick={once(() => {
+          onClick={ignoreDoubleClick(() => {
             acknowledgeAlarms(waiting);
           })}
         >
@@ -89,7 +89,7 @@ function Shelved({ tagId }: { tagId: string }): JSX.Element {
                 <button
                   type="button"
                   disabled={isRefused}
-                  onClick={once(() => {
+                  onClick={ignoreDoubleClick(() => {
                     unshelveAlarm(alarm);
                   })}
                 >

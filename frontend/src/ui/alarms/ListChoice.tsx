@@ -5,7 +5,7 @@ import { worstNow } from '../../alarms/speech';
 import { alarmList } from '../../alarms/watch';
 import { act, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
-import { selectIsCut } from '../../store/moment';
+import { selectIsDisconnected } from '../../store/moment';
 import { type ViewState, withList } from '../../store/view';
 import { S } from '../../strings';
 import { Segmented } from '../../widgets/controls';
@@ -47,11 +47,11 @@ export function AlarmsLabel(): JSX.Element {
   const { length } = list.active;
   const isKnown = useApp(selectAreAlarmsKnown);
   const isNow = useApp((state) => state.view.moment === null);
-  const isCut = useApp(selectIsCut);
+  const isDisconnected = useApp(selectIsDisconnected);
   const worst = useApp((state) =>
     unacknowledged.length === 0 ? null : worstNow(state, list.active),
   );
-  if (isCut && !isNow) return <>{S.alarms}</>;
+  if (isDisconnected && !isNow) return <>{S.alarms}</>;
   return (
     <>
       {worst && isNow && <HealthShape verdict={worst} />}
@@ -64,7 +64,7 @@ export function AlarmsLabel(): JSX.Element {
           </span>
         )}
       </span>
-      {isKnown && (length > 0 || !isCut) && (
+      {isKnown && (length > 0 || !isDisconnected) && (
         <span className="unseen">, {S.alarmsCount(unacknowledged.length, length)}</span>
       )}
     </>

@@ -1,12 +1,19 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
-import { alarm, tellAlarms } from '../../testing/alarms';
-import { acknowledgeAlarms, done, NOTHING_KEPT, own, undo, whatOf } from '../../alarms/own';
+import { alarm, reportAlarms } from '../../testing/alarms';
+import {
+  acknowledgeAlarms,
+  lastAction,
+  NO_LOCAL_ALARMS,
+  own,
+  undo,
+  faultKey,
+} from '../../alarms/own';
 import { person } from '../../store/create';
 import { SILENCE_MS } from '../../connection/machine';
-import { goLive, goLost, status as told } from '../../testing/page';
+import { goLive, goLost, status as bridgeStatus } from '../../testing/page';
 import { toast } from '../toast';
-import { merged, startPeople, whoseWord, wordsFor } from './people';
+import { merged, startPeople, sharingText, wordsFor } from './people';
 
 const COLD = alarm('cold');
 const STAMP = { sec: 1_000, nanosec: 0 };
@@ -18,55 +25,55 @@ const SHELVED = {
 const until = (): number => 60_000;
 
 test('what somebody else acknowledged is acknowledged here, until it is withdrawn', () => {
-  const first = merged(NOTHING_KEPT, [SAID], until);
+  const first = merged(NO_LOCAL_ALARMS, [SAID], until);
   expect([...first.acknowledged.keys()]).toEqual(['cold']);
   expect(merged(first, [SAID], until)).toBe(first);
   expect(merged(first, [COLD], until).acknowledged.size).toBe(0);
 });
 
 test('a shelf is taken over with its reason, and goes with the word of who shelved', () => {
-  const kept = merged(NOTHING_KEPT, [SHELVED], until);
-  expect(kept.shelved.get(whatOf(COLD))).toMatchObject({
+  const local = merged(NO_LOCAL_ALARMS, [SHELVED], until);
+  expect(local.shelved.get(faultKey(COLD))).toMatchObject({
     until: 60_000,
     reason: 'pipe under repair',
   });
-  expect(merged(kept, [SHELVED], () => 61_000)).toBe(kept);
-  expect(merged(kept, [COLD], until).shelved.size).toBe(0);
+  expect(merged(local, [SHELVED], () => 61_000)).toBe(local);
+  expect(merged(local, [COLD], until).shelved.size).toBe(0);
   // Also after an alarm that differs.
   const said = { ...SAID, id: 'other', tag_id: '2' };
-  expect(merged(kept, [said, COLD], until).shelved.size).toBe(0);
+  expect(merged(local, [said, COLD], until).shelved.size).toBe(0);
 });
 
 test('an operator at a bridge that writes no notes is not called a reader', () => {
   const anna = { can_sign_out: true, seconds_left: null, name: 'anna', can_write_notes: false };
-  expect(whoseWord({ ...anna, role: 'viewer' })).toContain('(viewer)');
-  expect(whoseWord({ ...anna, role: 'operator' })).toContain('this server stores no notes');
+  expect(sharingText({ ...anna, role: 'viewer' })).toContain('(viewer)');
+  expect(sharingText({ ...anna, role: 'operator' })).toContain('this server stores no notes');
 });
 
-interface Asked {
+interface SentRequest {
   readonly method: string;
   readonly path: string;
   readonly body: unknown;
 }
 
-let asked: Asked[] = [];
+let requests: SentRequest[] = [];
 let status = 201;
 let isAway = false;
 let role = 'operator';
 
 beforeEach(() => {
-  asked = [];
+  requests = [];
   status = 201;
   isAway = false;
   role = 'operator';
-  own.set(NOTHING_KEPT);
+  own.set(NO_LOCAL_ALARMS);
   const note = {
     ...{ id: 'n1', kind: 'acknowledge', subject: 'alarm:cold', text: '', until: null },
     ...{ made_at: { sec: 1, nanosec: 0 }, by: 'anna', withdrawn_by: null, withdrawn_at: null },
   };
   vi.stubGlobal('fetch', (url: URL, { method = 'GET', body }: RequestInit) => {
     const path = `${url.pathname}${url.search}`;
-    asked.push({ method, path, body: typeof body === 'string' ? JSON.parse(body) : null });
+    requests.push({ method, path, body: typeof body === 'string' ? JSON.parse(body) : null });
     if (path === '/api/session') {
       if (isAway) return Promise.reject(new TypeError('Failed to fetch'));
       return Promise.resolve(
@@ -93,7 +100,7 @@ const signedIn = async (): Promise<void> => {
   await vi.waitFor(() => {
     expect(person.get()?.name).toBe('anna');
   });
-  asked = [];
+  requests = [];
 };
 
 test('who has signed in is known also where the bridge was away at first', async () => {
@@ -101,7 +108,7 @@ test('who has signed in is known also where the bridge was away at first', async
   isAway = true;
   stops.push(startPeople(), () => vi.useRealTimers());
   await vi.advanceTimersByTimeAsync(100);
-  expect(asked).toHaveLength(1);
+  expect(requests).toHaveLength(1);
   isAway = false;
   await vi.advanceTimersByTimeAsync(10_000);
   expect(person.get()?.name).toBe('anna');
@@ -112,24 +119,24 @@ test('what a viewer had acknowledged by themselves holds no more', async () => {
   acknowledgeAlarms([{ alarm: COLD, verdict: 'stressed' }]);
   role = 'viewer';
   await signedIn();
-  tellAlarms(COLD);
+  reportAlarms(COLD);
   expect(own.get().acknowledged.size).toBe(0);
-  expect(asked).toEqual([]);
+  expect(requests).toEqual([]);
 });
 
 test('what is done here is said to the bridge, and taken back there', async () => {
   await signedIn();
-  tellAlarms(COLD);
+  reportAlarms(COLD);
   acknowledgeAlarms([{ alarm: COLD, verdict: 'stressed' }]);
   await vi.waitFor(() => {
-    expect(asked).toEqual([
+    expect(requests).toEqual([
       { method: 'POST', path: '/api/notes', body: { kind: 'acknowledge', subject: 'alarm:cold' } },
     ]);
   });
-  tellAlarms(SAID);
+  reportAlarms(SAID);
   undo();
   await vi.waitFor(() => {
-    expect(asked.slice(1).map(({ method, path }) => `${method} ${path}`)).toEqual([
+    expect(requests.slice(1).map(({ method, path }) => `${method} ${path}`)).toEqual([
       'GET /api/notes?subject=alarm%3Acold',
       'DELETE /api/notes/n1',
     ]);
@@ -138,7 +145,7 @@ test('what is done here is said to the bridge, and taken back there', async () =
 
 test('what the bridge has taken holds here before the frame that says so', async () => {
   await signedIn();
-  tellAlarms(COLD);
+  reportAlarms(COLD);
   let isAnswered = false;
   const said = fetch;
   vi.stubGlobal('fetch', async (...given: Parameters<typeof fetch>) => {
@@ -153,20 +160,20 @@ test('what the bridge has taken holds here before the frame that says so', async
   // The answer's callbacks have run by the next event-loop turn.
   await new Promise((resolve) => setTimeout(resolve));
   expect(own.get().acknowledged.size).toBe(1);
-  tellAlarms(COLD);
+  reportAlarms(COLD);
   expect(own.get().acknowledged.size).toBe(0);
 });
 
 test('what the bridge refuses does not hold here either', async () => {
   await signedIn();
-  tellAlarms(COLD);
+  reportAlarms(COLD);
   status = 503;
   acknowledgeAlarms([{ alarm: COLD, verdict: 'stressed' }]);
   await vi.waitFor(() => {
     expect(own.get().acknowledged.size).toBe(0);
   });
-  expect(asked).toHaveLength(1);
-  expect([done.get(), toast.get()]).toEqual([null, expect.stringMatching(/^Not saved: /)]);
+  expect(requests).toHaveLength(1);
+  expect([lastAction.get(), toast.get()]).toEqual([null, expect.stringMatching(/^Not saved: /)]);
 });
 
 test.each([
@@ -174,30 +181,30 @@ test.each([
   [
     'where nothing comes any more',
     () => {
-      goLive(told(), SILENCE_MS + 1);
+      goLive(bridgeStatus(), SILENCE_MS + 1);
     },
   ],
 ])('%s all are refused at once, as one is, and nothing looks done', async (_, lose) => {
   await signedIn();
   const other = alarm('other', { tag_id: '2' });
-  tellAlarms(COLD, other);
+  reportAlarms(COLD, other);
   lose();
   acknowledgeAlarms([COLD, other].map((each) => ({ alarm: each, verdict: 'critical' })));
-  expect([own.get().acknowledged.size, done.get()]).toEqual([0, null]);
+  expect([own.get().acknowledged.size, lastAction.get()]).toEqual([0, null]);
   expect(toast.get()).toBe('Not saved: The server is busy or unreachable.');
-  expect(asked).toEqual([]);
+  expect(requests).toEqual([]);
 });
 
 test('a shelf is said with its reason and its end by the clock of the twin', async () => {
   const shelf = { verdict: 'critical', until: 5_000, reason: 'sprayed' } as const;
-  const kept = { ...NOTHING_KEPT, shelved: new Map([[whatOf(COLD), shelf]]) };
+  const local = { ...NO_LOCAL_ALARMS, shelved: new Map([[faultKey(COLD), shelf]]) };
   const words = [
-    ...wordsFor(NOTHING_KEPT, kept, [COLD], (at) => at / 1000),
-    ...wordsFor(kept, NOTHING_KEPT, [COLD], () => null),
+    ...wordsFor(NO_LOCAL_ALARMS, local, [COLD], (at) => at / 1000),
+    ...wordsFor(local, NO_LOCAL_ALARMS, [COLD], () => null),
   ];
   for (const word of words) await word();
   const subject = 'alarm:cold';
-  expect(asked.map(({ body }) => body)).toEqual([
+  expect(requests.map(({ body }) => body)).toEqual([
     { kind: 'shelve', subject, text: 'sprayed', until: '5.000' },
     { kind: 'shelve', subject, until: null },
   ]);

@@ -11,13 +11,20 @@ import { secondsOf } from '../../domain/time';
 import { shown } from '../../domain/text';
 import { onChange, store, useApp } from '../../store/app';
 import { createFetcher } from '../../store/fetcher';
-import { rosNow, selectIsCut } from '../../store/moment';
+import { rosNow, selectIsDisconnected } from '../../store/moment';
 import { person, useSelected } from '../../store/create';
 import { say } from '../toast';
 import { LANGUAGE, S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { PEOPLE } from '../../words/people';
-import { acting, done, LONGEST_REASON, own, whatOf, type Kept } from '../../alarms/own';
+import {
+  acting,
+  lastAction,
+  LONGEST_REASON,
+  own,
+  faultKey,
+  type LocalAlarms,
+} from '../../alarms/own';
 
 export const P = PEOPLE[LANGUAGE];
 
@@ -29,19 +36,19 @@ let pending = 0;
 /** Tolerance for a shelf's end, ms: the bridge has ROS time, we keep it by this browser's clock. */
 const SAME_MS = 3_000;
 
-/** `kept`, updated to the bridge's alarms; what the bridge does not have is removed. */
+/** `local`, updated to the bridge's alarms; what the bridge does not have is removed. */
 export function merged(
-  kept: Kept,
+  local: LocalAlarms,
   alarms: readonly Alarm[],
   untilOf: (alarm: Alarm) => number | null,
-): Kept {
-  const acknowledged = new Map(kept.acknowledged);
-  const shelved = new Map(kept.shelved);
+): LocalAlarms {
+  const acknowledged = new Map(local.acknowledged);
+  const shelved = new Map(local.shelved);
   let isSame = true;
   for (const alarm of alarms) {
     const { id, acknowledged_at: at, shelved_by: by, reason } = alarm;
     const { verdict } = reason;
-    const what = whatOf(alarm);
+    const what = faultKey(alarm);
     if (at) {
       isSame &&= acknowledged.has(id);
       if (!acknowledged.has(id)) acknowledged.set(id, { verdict, at: timeOfDay() });
@@ -60,7 +67,7 @@ export function merged(
       isSame = false;
     }
   }
-  return isSame ? kept : { ...kept, acknowledged, shelved };
+  return isSame ? local : { ...local, acknowledged, shelved };
 }
 
 const alarmsNow = (): readonly Alarm[] => store.get().twin.alarms?.alarms ?? [];
@@ -79,8 +86,8 @@ function take(): void {
 
 /** The requests that tell the bridge what changed here. */
 export function wordsFor(
-  before: Kept,
-  next: Kept,
+  before: LocalAlarms,
+  next: LocalAlarms,
   alarms: readonly Alarm[],
   rosOf: (at: number) => number | null,
 ): readonly (() => Promise<void>)[] {
@@ -91,7 +98,10 @@ export function wordsFor(
     if (is && is !== was) found.push(() => postNote({ kind: 'acknowledge', subject }));
     if (was && !is) found.push(() => withdrawNote('acknowledge', subject));
     if (alarm.cleared_at !== null) continue;
-    const [shelf, shelfNow] = [before.shelved.get(whatOf(alarm)), next.shelved.get(whatOf(alarm))];
+    const [shelf, shelfNow] = [
+      before.shelved.get(faultKey(alarm)),
+      next.shelved.get(faultKey(alarm)),
+    ];
     if (shelfNow && shelfNow !== shelf) {
       const until = rosOf(shelfNow.until);
       const note = { kind: 'shelve', subject, text: shelfNow.reason } as const;
@@ -103,7 +113,7 @@ export function wordsFor(
   return found;
 }
 
-async function tell(before: Kept, next: Kept): Promise<void> {
+async function share(before: LocalAlarms, next: LocalAlarms): Promise<void> {
   const nowS = rosNow(store.get(), now());
   const at = timeOfDay();
   const words = wordsFor(before, next, alarmsNow(), (until) =>
@@ -111,7 +121,7 @@ async function tell(before: Kept, next: Kept): Promise<void> {
   );
   const { alarms } = store.get().twin;
   // Without a connection, do not send: it would look done until the request failed.
-  let failure = selectIsCut(store.get()) ? S.serverBusy : null;
+  let failure = selectIsDisconnected(store.get()) ? S.serverBusy : null;
   pending += 1;
   try {
     // Sequential, in list order: of two conflicting requests, the later one wins.
@@ -122,7 +132,7 @@ async function tell(before: Kept, next: Kept): Promise<void> {
   pending -= 1;
   if (failure !== null) {
     say(P.failed(failure));
-    done.set(null);
+    lastAction.set(null);
   }
   // The frame with the changes may follow the answer; merging the old frame would revert them.
   if (failure !== null || store.get().twin.alarms !== alarms) take();
@@ -134,7 +144,7 @@ export function startPeople(): () => void {
     paceMs: PACE_MS,
     onValue: (found) => {
       person.set(found.name ? found : null);
-      acting.tell = found.can_write_notes ? (before, next) => void tell(before, next) : null;
+      acting.share = found.can_write_notes ? (before, next) => void share(before, next) : null;
       take();
     },
     onError: () => {
@@ -154,7 +164,7 @@ export function startPeople(): () => void {
   return () => {
     for (const stop of stops) stop();
     session.want(null);
-    acting.tell = null;
+    acting.share = null;
     person.set(null);
   };
 }
@@ -162,11 +172,11 @@ export function startPeople(): () => void {
 /** Whether actions would be refused: they are shared, and the bridge does not answer. */
 export function useIsRefused(): boolean {
   const isShared = useSelected(person, (who) => who?.can_write_notes === true);
-  return useApp(selectIsCut) && isShared;
+  return useApp(selectIsDisconnected) && isShared;
 }
 
 /** Says whether actions stay in this browser or are shared. */
-export function whoseWord(who: Session | null): string {
+export function sharingText(who: Session | null): string {
   if (!who?.name) return S.alarmsMine;
   if (who.can_write_notes) return P.shared(who.name);
   return (who.role === 'viewer' ? P.reads : P.elsewhere)(who.name);

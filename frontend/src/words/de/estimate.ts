@@ -17,12 +17,12 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   noModel: 'Noch keine Schätzung: Sie braucht zehn Messungen eines Sensors',
   unsure: (error) => `Schraffiert: ungenauer als ±${error}. Ohne Farbe: keine Daten`,
   error: 'Unsicherheit der Schätzung',
-  foretold: (inside, scans) =>
+  predicted: (inside, scans) =>
     `${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')} im vorhergesagten Bereich`,
-  foretoldNone: 'Noch mit keiner Messung verglichen',
-  foretoldDay: (inside, scans) =>
+  predictedNone: 'Noch mit keiner Messung verglichen',
+  predictedDay: (inside, scans) =>
     `Letzter Tag: ${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')}`,
-  foretoldWeek: (inside, scans) =>
+  predictedWeek: (inside, scans) =>
     `letzte Woche: ${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')}`,
   fitProblem: (reason) => `Das Modell passt nicht gut zu diesem Gewächshaus: ${reason}`,
   notTrusted: (count) => `Fehlerbereich zu eng: Nur ${count} statt 9 von 10 Messungen lagen darin.`,

@@ -143,8 +143,8 @@ export const TAGS: In<typeof EN.TAGS> = {
   neverObservedLong: 'Noch keine Messung hat einen Wert geliefert.',
   notKnownThen: 'unbekannt',
   notKnownThenLong: 'Das ist nicht mehr gespeichert oder war noch nicht aufgezeichnet.',
-  ageUntoldLong: 'Dieser Zwilling meldet nicht, von wann seine Messwerte sind.',
-  tried: {
+  ageUnreportedLong: 'Dieser Zwilling meldet nicht, von wann seine Messwerte sind.',
+  attemptOutcomes: {
     ok: 'OK',
     unreachable: 'nicht erreichbar',
     undecoded: 'nicht lesbar',
@@ -197,10 +197,10 @@ export const TAGS: In<typeof EN.TAGS> = {
   cardFixed: 'Fester Sensor',
   cardVisited: 'Vom Roboter gemessen',
   cardScanned: 'Letzter Messwert',
-  cardLooked: 'Blüten kontrolliert',
-  cardTry: 'Letzter Versuch',
-  cardTries: 'Letzte Versuche',
-  cardTryKinds: { scan: 'Messung', look: 'Blütenkontrolle', any: 'Versuch' },
+  cardInspected: 'Blüten kontrolliert',
+  cardLastAttempt: 'Letzter Versuch',
+  cardAttempts: 'Letzte Versuche',
+  cardAttemptKinds: { scan: 'Messung', look: 'Blütenkontrolle', any: 'Versuch' },
   cardArea: 'Bereich',
   cardPosition: 'Position',
 };
@@ -250,5 +250,5 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   chartGap: (length) => `${length} lang keine Daten`,
   missing: { not_kept: 'nicht mehr gespeichert', not_recorded: 'nicht aufgezeichnet' },
   chartFailures: (count) => counted(count, 'fehlgeschlagener Versuch', 'fehlgeschlagene Versuche'),
-  chartLooks: (count) => counted(count, 'Blütenkontrolle', 'Blütenkontrollen'),
+  chartInspections: (count) => counted(count, 'Blütenkontrolle', 'Blütenkontrollen'),
 };

@@ -104,13 +104,13 @@ export const PAGE: In<typeof EN.PAGE> = {
       hint: 'Darin wurde nichts verändert. Dem Zwilling eine andere Datei geben oder diese verschieben.',
     },
   },
-  outward: {
+  notificationChannels: {
     mqtt: 'Die Hausautomation (MQTT) empfängt keine Daten.',
     webhook: 'Der Webhook empfängt keine Alarme.',
     push: 'Handys erhalten keine Alarme.',
   },
-  outwardOther: (channel) => `${channel} empfängt keine Daten.`,
-  outwardHint: 'Der Server versucht es weiter. Diese Seite ist nicht betroffen.',
+  notificationOther: (channel) => `${channel} empfängt keine Daten.`,
+  notificationHint: 'Der Server versucht es weiter. Diese Seite ist nicht betroffen.',
   journalMore: 'Die Datei nennt der Parameter „journal“ des Zwillings; „off“ zeichnet nichts auf.',
   origin: { simulated: 'Simuliert', recorded: 'Aufzeichnung', sim_time: 'Simulierte Zeit' },
   originDay: (length: string): string => `1 Gewächshaustag = ${length}`,
@@ -125,8 +125,8 @@ export const PAGE: In<typeof EN.PAGE> = {
   recordedPausedHint: 'Sie ist angehalten oder zu Ende; die Messwerte altern nicht.',
   simulated: 'Simuliert.',
   simulatedHint: (until) => `Alle Daten bis ${until} sind Demodaten, nicht gemessen.`,
-  setAside: 'Eine beschädigte Aufzeichnung wurde in Quarantäne genommen.',
-  setAsideHint: (name) =>
+  quarantined: 'Eine beschädigte Aufzeichnung wurde in Quarantäne genommen.',
+  quarantinedHint: (name) =>
     `Lesbare Daten wurden übernommen, die Aufzeichnung läuft weiter. Die beschädigte Datei ist ${name}.`,
   failedTitle: 'Diese Seite ist abgestürzt',
   failedHint:

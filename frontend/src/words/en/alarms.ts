@@ -82,14 +82,14 @@ export const ALARMS = {
   alarmNotYet: 'waiting for a second scan',
   alarmsNotYet: 'Waiting for the list of alarms',
   alarmsStarting: 'Recorded data is still being read: more alarms may follow.',
-  alarmsHeard: (since: string): string =>
+  alarmsReceived: (since: string): string =>
     `Nothing is recorded, so alarms before ${since} are unknown.`,
   alarmsLost: 'As last received. Later events are unknown.',
   alarmsOfNow: (moment: string): string =>
     `These are the current alarms. The rest of the page shows ${moment}.`,
   alarmsMine: '“Acknowledged” and “shelved” apply in this browser only.',
 
-  alarmTell: 'Notify me of alarms',
+  alarmNotifyMe: 'Notify me of alarms',
   alarmSound: 'Sound',
   alarmSoundHint: 'A short sound for new alarms, at most one in 10 s.',
   alarmSoundWaits: 'The browser allows sound after your first click on this page.',
@@ -211,7 +211,7 @@ export const HEALTH = {
   healthNotCurrent: 'Not current',
   healthNothing: 'No reading to assess yet',
   healthFilter: ', show only these tags',
-  houseRhythm: (interval: string): string => `a scan every ${interval}`,
+  scanInterval: (interval: string): string => `a scan every ${interval}`,
   houseLast: (age: string): string => `last scan ${age} ago`,
   houseNever: 'no scan yet',
   houseLate: (age: string, interval: string): string =>

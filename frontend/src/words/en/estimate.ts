@@ -15,12 +15,12 @@ export const ESTIMATE = {
   unsure: (error: string): string => `Hatched: less certain than ±${error}. No colour: no data`,
   /** Beside the error's colour scale. */
   error: 'Uncertainty of the estimate',
-  foretold: (inside: number, scans: number): string =>
+  predicted: (inside: number, scans: number): string =>
     `${whole(inside)} of ${counted(scans, 'scan', 'scans')} within the predicted range`,
-  foretoldNone: 'No scan has been compared with it yet',
-  foretoldDay: (inside: number, scans: number): string =>
+  predictedNone: 'No scan has been compared with it yet',
+  predictedDay: (inside: number, scans: number): string =>
     `Last day: ${whole(inside)} of ${counted(scans, 'scan', 'scans')}`,
-  foretoldWeek: (inside: number, scans: number): string =>
+  predictedWeek: (inside: number, scans: number): string =>
     `last week: ${whole(inside)} of ${counted(scans, 'scan', 'scans')}`,
   fitProblem: (reason: string): string => `The model does not fit this greenhouse well: ${reason}`,
   notTrusted: (count: number): string =>

@@ -139,8 +139,8 @@ export const TAGS = {
   neverObservedLong: 'No scan has returned a reading yet.',
   notKnownThen: 'unknown',
   notKnownThenLong: 'This is no longer stored, or was not recorded yet.',
-  ageUntoldLong: 'This twin does not report when readings were taken.',
-  tried: {
+  ageUnreportedLong: 'This twin does not report when readings were taken.',
+  attemptOutcomes: {
     ok: 'OK',
     unreachable: 'not reachable',
     undecoded: 'not readable',
@@ -196,10 +196,10 @@ export const TAGS = {
   cardFixed: 'Fixed sensor',
   cardVisited: 'Visited by the robot',
   cardScanned: 'Last reading',
-  cardLooked: 'Flowers inspected',
-  cardTry: 'Last attempt',
-  cardTries: 'Last attempts',
-  cardTryKinds: { scan: 'scan', look: 'inspection', any: 'attempt' },
+  cardInspected: 'Flowers inspected',
+  cardLastAttempt: 'Last attempt',
+  cardAttempts: 'Last attempts',
+  cardAttemptKinds: { scan: 'scan', look: 'inspection', any: 'attempt' },
   cardArea: 'Area',
   cardPosition: 'Position',
 } as const;
@@ -257,5 +257,6 @@ export const CHARTS = {
   chartGap: (length: string): string => `no data for ${length}`,
   missing: { not_kept: 'no longer stored', not_recorded: 'not recorded' },
   chartFailures: (count: number): string => counted(count, 'failed attempt', 'failed attempts'),
-  chartLooks: (count: number): string => counted(count, 'flower inspection', 'flower inspections'),
+  chartInspections: (count: number): string =>
+    counted(count, 'flower inspection', 'flower inspections'),
 } as const;

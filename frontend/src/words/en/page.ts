@@ -105,13 +105,13 @@ export const PAGE = {
     },
   },
   /** For a notification channel that fails. */
-  outward: {
+  notificationChannels: {
     mqtt: 'Home automation (MQTT) receives no updates.',
     webhook: 'The webhook receives no alarms.',
     push: 'Phones receive no alarms.',
   },
-  outwardOther: (channel: string): string => `${channel} receives no updates.`,
-  outwardHint: 'The server keeps trying. This page is not affected.',
+  notificationOther: (channel: string): string => `${channel} receives no updates.`,
+  notificationHint: 'The server keeps trying. This page is not affected.',
   journalMore: 'The file is named by the twin’s parameter “journal”; “off” records nothing.',
   /** Origin of the data, unless it is a real robot's, live. */
   origin: { simulated: 'Simulated', recorded: 'Recording', sim_time: 'Simulated time' },
@@ -126,8 +126,8 @@ export const PAGE = {
   recordedPausedHint: 'It is paused or has ended, so ages do not increase.',
   simulated: 'Simulated.',
   simulatedHint: (until: string): string => `All data until ${until} is demo data, not measured.`,
-  setAside: 'A damaged recording was quarantined.',
-  setAsideHint: (name: string): string =>
+  quarantined: 'A damaged recording was quarantined.',
+  quarantinedHint: (name: string): string =>
     `Readable data was kept, and recording continues. The damaged file is ${name}.`,
   failedTitle: 'The page has failed',
   failedHint: 'Do not rely on what it shows. The twin and the server are not affected.',

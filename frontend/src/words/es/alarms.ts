@@ -79,13 +79,14 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmNotYet: 'a la espera de otra medición',
   alarmsNotYet: 'Esperando la lista de alarmas',
   alarmsStarting: 'Todavía se está leyendo el registro: pueden aparecer más alarmas.',
-  alarmsHeard: (since) => `No se registra nada: se desconocen las alarmas anteriores a ${since}.`,
+  alarmsReceived: (since) =>
+    `No se registra nada: se desconocen las alarmas anteriores a ${since}.`,
   alarmsLost: 'Últimos datos recibidos. Se desconoce lo ocurrido después.',
   alarmsOfNow: (moment) =>
     `Estas son las alarmas actuales. El resto de la página muestra ${moment}.`,
   alarmsMine: '«Reconocida» y «aplazada» solo valen en este navegador.',
 
-  alarmTell: 'Avisarme de las alarmas',
+  alarmNotifyMe: 'Avisarme de las alarmas',
   alarmSound: 'Sonido',
   alarmSoundHint: 'Un sonido breve con las alarmas nuevas, como mucho uno cada 10 s.',
   alarmSoundWaits: 'El navegador permite el sonido tras su primer clic en esta página.',
@@ -205,7 +206,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthNotCurrent: 'Desactualizado',
   healthNothing: 'Aún no hay lecturas que evaluar',
   healthFilter: ', mostrar solo estos puntos',
-  houseRhythm: (interval) => `una medición cada ${interval}`,
+  scanInterval: (interval) => `una medición cada ${interval}`,
   houseLast: (age) => `última medición hace ${age}`,
   houseNever: 'aún sin mediciones',
   houseLate: (age, interval) => `Sin mediciones desde hace ${age} (normalmente cada ${interval})`,

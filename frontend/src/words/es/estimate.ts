@@ -16,12 +16,12 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   noModel: 'Aún no hay estimación: hacen falta diez mediciones de un sensor',
   unsure: (error) => `Rayado: menos preciso que ±${error}. Sin color: sin datos`,
   error: 'Incertidumbre de la estimación',
-  foretold: (inside, scans) =>
+  predicted: (inside, scans) =>
     `${whole(inside)} de ${counted(scans, 'medición', 'mediciones')} dentro del rango previsto`,
-  foretoldNone: 'Aún no se ha comparado con ninguna medición',
-  foretoldDay: (inside, scans) =>
+  predictedNone: 'Aún no se ha comparado con ninguna medición',
+  predictedDay: (inside, scans) =>
     `Último día: ${whole(inside)} de ${counted(scans, 'medición', 'mediciones')}`,
-  foretoldWeek: (inside, scans) =>
+  predictedWeek: (inside, scans) =>
     `última semana: ${whole(inside)} de ${counted(scans, 'medición', 'mediciones')}`,
   fitProblem: (reason) => `El modelo no se ajusta bien a este invernadero: ${reason}`,
   notTrusted: (count) =>

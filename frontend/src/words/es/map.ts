@@ -141,8 +141,8 @@ export const TAGS: In<typeof EN.TAGS> = {
   neverObservedLong: 'Ninguna medición ha dado todavía una lectura.',
   notKnownThen: 'desconocido',
   notKnownThenLong: 'Esto ya no se conserva o aún no estaba registrado.',
-  ageUntoldLong: 'Este gemelo no comunica de cuándo son sus lecturas.',
-  tried: {
+  ageUnreportedLong: 'Este gemelo no comunica de cuándo son sus lecturas.',
+  attemptOutcomes: {
     ok: 'OK',
     unreachable: 'inaccesible',
     undecoded: 'ilegible',
@@ -195,10 +195,10 @@ export const TAGS: In<typeof EN.TAGS> = {
   cardFixed: 'Sensor fijo',
   cardVisited: 'Medido por el robot',
   cardScanned: 'Última lectura',
-  cardLooked: 'Flores revisadas',
-  cardTry: 'Último intento',
-  cardTries: 'Últimos intentos',
-  cardTryKinds: { scan: 'medición', look: 'revisión de flores', any: 'intento' },
+  cardInspected: 'Flores revisadas',
+  cardLastAttempt: 'Último intento',
+  cardAttempts: 'Últimos intentos',
+  cardAttemptKinds: { scan: 'medición', look: 'revisión de flores', any: 'intento' },
   cardArea: 'Zona',
   cardPosition: 'Posición',
 };
@@ -248,5 +248,5 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   chartGap: (length) => `sin datos durante ${length}`,
   missing: { not_kept: 'ya no se conserva', not_recorded: 'sin registro' },
   chartFailures: (count) => counted(count, 'intento fallido', 'intentos fallidos'),
-  chartLooks: (count) => counted(count, 'revisión de flores', 'revisiones de flores'),
+  chartInspections: (count) => counted(count, 'revisión de flores', 'revisiones de flores'),
 };

@@ -102,13 +102,13 @@ export const PAGE: In<typeof EN.PAGE> = {
       hint: 'Su contenido no se ha tocado. Dé al gemelo otro archivo o mueva este.',
     },
   },
-  outward: {
+  notificationChannels: {
     mqtt: 'La domótica (MQTT) no recibe datos.',
     webhook: 'El webhook no recibe alarmas.',
     push: 'Los teléfonos no reciben alarmas.',
   },
-  outwardOther: (channel) => `${channel} no recibe datos.`,
-  outwardHint: 'El servidor lo sigue intentando. Esta página no se ve afectada.',
+  notificationOther: (channel) => `${channel} no recibe datos.`,
+  notificationHint: 'El servidor lo sigue intentando. Esta página no se ve afectada.',
   journalMore:
     'El archivo lo indica el parámetro «journal» del gemelo; con «off» no se registra nada.',
   origin: { simulated: 'Simulado', recorded: 'Grabación', sim_time: 'Tiempo simulado' },
@@ -123,8 +123,8 @@ export const PAGE: In<typeof EN.PAGE> = {
   recordedPausedHint: 'Está en pausa o ha terminado; la antigüedad no aumenta.',
   simulated: 'Simulado.',
   simulatedHint: (until) => `Los datos hasta ${until} son de demostración, no medidos.`,
-  setAside: 'Se ha puesto en cuarentena un registro dañado.',
-  setAsideHint: (name) =>
+  quarantined: 'Se ha puesto en cuarentena un registro dañado.',
+  quarantinedHint: (name) =>
     `Se han conservado los datos legibles y el registro continúa. El archivo dañado es ${name}.`,
   failedTitle: 'La página ha fallado',
   failedHint: 'No se fíe de lo que muestra. El gemelo y el servidor no se ven afectados.',

@@ -16,12 +16,12 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   noModel: 'Nog geen schatting: er zijn tien metingen van een sensor nodig',
   unsure: (error) => `Gearceerd: minder zeker dan ±${error}. Geen kleur: geen gegevens`,
   error: 'Onzekerheid van de schatting',
-  foretold: (inside, scans) =>
+  predicted: (inside, scans) =>
     `${whole(inside)} van ${counted(scans, 'meting', 'metingen')} binnen het voorspelde bereik`,
-  foretoldNone: 'Er is nog geen meting mee vergeleken',
-  foretoldDay: (inside, scans) =>
+  predictedNone: 'Er is nog geen meting mee vergeleken',
+  predictedDay: (inside, scans) =>
     `Afgelopen dag: ${whole(inside)} van ${counted(scans, 'meting', 'metingen')}`,
-  foretoldWeek: (inside, scans) =>
+  predictedWeek: (inside, scans) =>
     `afgelopen week: ${whole(inside)} van ${counted(scans, 'meting', 'metingen')}`,
   fitProblem: (reason) => `Het model past niet goed bij deze kas: ${reason}`,
   notTrusted: (count) =>

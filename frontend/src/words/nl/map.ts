@@ -141,8 +141,8 @@ export const TAGS: In<typeof EN.TAGS> = {
   neverObservedLong: 'Nog geen meting heeft een waarde opgeleverd.',
   notKnownThen: 'onbekend',
   notKnownThenLong: 'Dit wordt niet meer bewaard of was nog niet vastgelegd.',
-  ageUntoldLong: 'Deze digital twin meldt niet van wanneer zijn meetwaarden zijn.',
-  tried: {
+  ageUnreportedLong: 'Deze digital twin meldt niet van wanneer zijn meetwaarden zijn.',
+  attemptOutcomes: {
     ok: 'OK',
     unreachable: 'niet bereikbaar',
     undecoded: 'niet leesbaar',
@@ -195,10 +195,10 @@ export const TAGS: In<typeof EN.TAGS> = {
   cardFixed: 'Vaste sensor',
   cardVisited: 'Bezocht door de robot',
   cardScanned: 'Laatste meetwaarde',
-  cardLooked: 'Bloemen gecontroleerd',
-  cardTry: 'Laatste poging',
-  cardTries: 'Laatste pogingen',
-  cardTryKinds: { scan: 'meting', look: 'bloemcontrole', any: 'poging' },
+  cardInspected: 'Bloemen gecontroleerd',
+  cardLastAttempt: 'Laatste poging',
+  cardAttempts: 'Laatste pogingen',
+  cardAttemptKinds: { scan: 'meting', look: 'bloemcontrole', any: 'poging' },
   cardArea: 'Afdeling',
   cardPosition: 'Positie',
 };
@@ -248,5 +248,5 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   chartGap: (length) => `${length} geen gegevens`,
   missing: { not_kept: 'niet meer bewaard', not_recorded: 'niet vastgelegd' },
   chartFailures: (count) => counted(count, 'mislukte poging', 'mislukte pogingen'),
-  chartLooks: (count) => counted(count, 'bloemcontrole', 'bloemcontroles'),
+  chartInspections: (count) => counted(count, 'bloemcontrole', 'bloemcontroles'),
 };

@@ -105,13 +105,13 @@ export const PAGE: In<typeof EN.PAGE> = {
       hint: 'Er is niets in veranderd. Geef de digital twin een ander bestand, of verplaats dit.',
     },
   },
-  outward: {
+  notificationChannels: {
     mqtt: 'De domotica (MQTT) ontvangt geen gegevens.',
     webhook: 'De webhook ontvangt geen alarmen.',
     push: 'Telefoons ontvangen geen alarmen.',
   },
-  outwardOther: (channel) => `${channel} ontvangt geen gegevens.`,
-  outwardHint: 'De server blijft het proberen. Deze pagina heeft er geen last van.',
+  notificationOther: (channel) => `${channel} ontvangt geen gegevens.`,
+  notificationHint: 'De server blijft het proberen. Deze pagina heeft er geen last van.',
   journalMore:
     'Het bestand staat in de parameter “journal” van de digital twin; “off” legt niets vast.',
   origin: { simulated: 'Gesimuleerd', recorded: 'Opname', sim_time: 'Gesimuleerde tijd' },
@@ -126,8 +126,8 @@ export const PAGE: In<typeof EN.PAGE> = {
   recordedPausedHint: 'Gepauzeerd of afgelopen; de meetwaarden worden niet ouder.',
   simulated: 'Gesimuleerd.',
   simulatedHint: (until) => `Alle gegevens tot ${until} zijn demogegevens, niet gemeten.`,
-  setAside: 'Een beschadigd bestand is in quarantaine gezet.',
-  setAsideHint: (name) =>
+  quarantined: 'Een beschadigd bestand is in quarantaine gezet.',
+  quarantinedHint: (name) =>
     `Leesbare gegevens zijn bewaard en het vastleggen gaat door. Het bestand heet ${name}.`,
   failedTitle: 'Deze pagina is vastgelopen',
   failedHint:

@@ -1,15 +1,15 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
-import type { later as Store, loadParts as Load, Parts } from './later';
+import type { deferred as Store, loadParts as Load, Parts } from './loadDeferred';
 
 const PARTS = {} as Parts;
-let later: typeof Store;
+let deferred: typeof Store;
 let loadParts: typeof Load;
 
 beforeEach(async () => {
   vi.useFakeTimers();
   vi.resetModules();
-  ({ later, loadParts } = await import('./later'));
+  ({ deferred, loadParts } = await import('./loadDeferred'));
 });
 afterEach(() => {
   vi.useRealTimers();
@@ -20,7 +20,7 @@ test('they are asked for once, however many wait for them', async () => {
   const all = await Promise.all([loadParts(load), loadParts(load), loadParts(load)]);
   expect(all).toEqual([PARTS, PARTS, PARTS]);
   expect(load).toHaveBeenCalledTimes(1);
-  expect(later.get()).toEqual({ parts: PARTS, isLate: false });
+  expect(deferred.get()).toEqual({ parts: PARTS, isLate: false });
 });
 
 test('where they do not come it is told, and they are asked for again, ever less often', async () => {
@@ -29,7 +29,7 @@ test('where they do not come it is told, and they are asked for again, ever less
     isThere ? Promise.resolve(PARTS) : Promise.reject(new TypeError('gone')),
   );
   const coming = loadParts(load);
-  for (const [pauseMs, tries] of [
+  for (const [pauseMs, attempts] of [
     [0, 1],
     [999, 1],
     [1, 2],
@@ -37,8 +37,8 @@ test('where they do not come it is told, and they are asked for again, ever less
     [1, 3],
   ] as const) {
     await vi.advanceTimersByTimeAsync(pauseMs);
-    expect(load).toHaveBeenCalledTimes(tries);
-    expect(later.get()).toEqual({ parts: null, isLate: true });
+    expect(load).toHaveBeenCalledTimes(attempts);
+    expect(deferred.get()).toEqual({ parts: null, isLate: true });
   }
   // 4, 8, 16 s, then every 30 s.
   await vi.advanceTimersByTimeAsync(28_000);
@@ -48,5 +48,5 @@ test('where they do not come it is told, and they are asked for again, ever less
   isThere = true;
   await vi.advanceTimersByTimeAsync(30_000);
   expect(await coming).toBe(PARTS);
-  expect(later.get()).toEqual({ parts: PARTS, isLate: false });
+  expect(deferred.get()).toEqual({ parts: PARTS, isLate: false });
 });

@@ -1,6 +1,6 @@
 /**
  * What the first view does not need, as one chunk loaded right after it: cards, lists and tools that
- * open on request. Only `later.tsx` loads it.
+ * open on request. Only `loadDeferred.tsx` loads it.
  */
 import '../styles/card.css';
 import '../styles/hover.css';
@@ -25,7 +25,7 @@ export { TimeBar } from '../timebar/TimeBar';
 export { AlarmPanel } from './alarms/AlarmPanel';
 export { Meanwhile } from './alarms/AlarmNotes';
 export { startPeople } from './alarms/people';
-export { AttentionList, KioskNote, startLeaving } from './AttentionList';
+export { AttentionList, KioskNote, startKioskClose } from './AttentionList';
 export { CompareControl, DifferenceLegend } from './CompareControl';
 export { HelpDialog, openHelp, onKey } from './HelpDialog';
 export { InLayers, InLegend, OnMap } from './extras';

@@ -6,14 +6,14 @@ import {
   isShelfHeld,
   acknowledge,
   nextEnd,
-  NOTHING_KEPT,
+  NO_LOCAL_ALARMS,
   pruned,
-  readKept,
+  readStored,
   shelfMinutes,
   shelve,
-  whatOf,
-  writeKept,
-  type Kept,
+  faultKey,
+  writeStored,
+  type LocalAlarms,
   type Rated,
 } from './own';
 
@@ -23,22 +23,26 @@ const rated = (id: string, verdict: Rated['verdict'] = 'stressed'): Rated => ({
   verdict,
 });
 
-const through = (kept: Kept): Kept => {
+const through = (local: LocalAlarms): LocalAlarms => {
   let text = '';
-  writeKept({ setItem: (_, value) => (text = value) }, kept);
-  return readKept({ getItem: () => text });
+  writeStored({ setItem: (_, value) => (text = value) }, local);
+  return readStored({ getItem: () => text });
 };
 
 test('what was acknowledged, shelved and wished for comes back after a reload', () => {
-  const acknowledged = acknowledge({ ...NOTHING_KEPT, sound: true }, [rated('a', 'critical')], AT);
-  const kept = shelve(acknowledged, rated('b'), AT + 900_000, 'fan off');
-  expect(through(kept)).toEqual(kept);
+  const acknowledged = acknowledge(
+    { ...NO_LOCAL_ALARMS, sound: true },
+    [rated('a', 'critical')],
+    AT,
+  );
+  const local = shelve(acknowledged, rated('b'), AT + 900_000, 'fan off');
+  expect(through(local)).toEqual(local);
 });
 
 test.each([null, '', '{', 'null', '7', '{"acknowledged":7,"shelved":{}}'])(
   '%j counts as nothing kept',
   (text) => {
-    expect(readKept({ getItem: () => text })).toEqual(NOTHING_KEPT);
+    expect(readStored({ getItem: () => text })).toEqual(NO_LOCAL_ALARMS);
   },
 );
 
@@ -49,22 +53,22 @@ test('a full storage does no harm', () => {
     },
   };
   expect(() => {
-    writeKept(full, NOTHING_KEPT);
+    writeStored(full, NO_LOCAL_ALARMS);
   }).not.toThrow();
 });
 
 test('what was acknowledged long ago is forgotten, unless it is still listed', () => {
-  const kept = acknowledge(NOTHING_KEPT, [rated('a'), rated('b')], AT);
-  expect(pruned(kept, new Set(), AT + FORGET_MS - 1)).toBe(kept);
-  expect([...pruned(kept, new Set(['b']), AT + FORGET_MS).acknowledged.keys()]).toEqual(['b']);
+  const local = acknowledge(NO_LOCAL_ALARMS, [rated('a'), rated('b')], AT);
+  expect(pruned(local, new Set(), AT + FORGET_MS - 1)).toBe(local);
+  expect([...pruned(local, new Set(['b']), AT + FORGET_MS).acknowledged.keys()]).toEqual(['b']);
 });
 
 test('a shelf ends by itself, at its very moment', () => {
-  const kept = shelve(NOTHING_KEPT, rated('a'), AT + 1_000, '');
-  expect(pruned(kept, new Set(), AT + 999)).toBe(kept);
-  expect(pruned(kept, new Set(), AT + 1_000).shelved.size).toBe(0);
-  expect(nextEnd(kept, AT)).toBe(AT + 1_000);
-  expect(nextEnd(kept, AT + 1_000)).toBe(Infinity);
+  const local = shelve(NO_LOCAL_ALARMS, rated('a'), AT + 1_000, '');
+  expect(pruned(local, new Set(), AT + 999)).toBe(local);
+  expect(pruned(local, new Set(), AT + 1_000).shelved.size).toBe(0);
+  expect(nextEnd(local, AT)).toBe(AT + 1_000);
+  expect(nextEnd(local, AT + 1_000)).toBe(Infinity);
 });
 
 test('a shelf holds until it ends, or the alarm gets worse', () => {
@@ -88,18 +92,20 @@ test('a critical alarm is shelved for an hour at most, whatever the storage says
   expect(isShelfHeld(shelf, 'critical', AT)).toBe(true);
   expect(isShelfHeld(shelf, 'critical', AT - 1)).toBe(false);
   const text = JSON.stringify({ shelved: [['a', 'critical', AT + 28_800_000, 'x']] });
-  expect(pruned(readKept({ getItem: () => text }), new Set(), AT).shelved.size).toBe(0);
+  expect(pruned(readStored({ getItem: () => text }), new Set(), AT).shelved.size).toBe(0);
 });
 
 test('too cold is not too warm, here is not there, and the next time is the same again', () => {
   const cold = alarm('a', { reason: { value: 6, limit: 10 } });
-  expect(whatOf(alarm('b', { raised: 990, reason: { value: 7, limit: 10 } }))).toBe(whatOf(cold));
+  expect(faultKey(alarm('b', { raised: 990, reason: { value: 7, limit: 10 } }))).toBe(
+    faultKey(cold),
+  );
   for (const other of [
     alarm('b', { reason: { value: 40, limit: 35 } }),
     alarm('b', { tag_id: '2', reason: { value: 6, limit: 10 } }),
     alarm('b', { reason: { sensor: 'co2', value: 6, limit: 10 } }),
     alarm('b', { reason: { kind: 'old' } }),
   ]) {
-    expect(whatOf(other)).not.toBe(whatOf(cold));
+    expect(faultKey(other)).not.toBe(faultKey(cold));
   }
 });

@@ -5,7 +5,7 @@ import type * as EstimateParts from '../parts/estimate';
 import { S } from '../strings';
 
 /** A lazy component; if it cannot be loaded, it says so and the rest of the page keeps working. */
-export function inTime<Props extends object>(
+export function lazyPart<Props extends object>(
   load: () => Promise<ComponentType<Props>>,
 ): (props: Props) => JSX.Element {
   const Part = lazy(async (): Promise<{ default: ComponentType<Props> }> => {
@@ -15,7 +15,7 @@ export function inTime<Props extends object>(
       return { default: Missing };
     }
   });
-  return function InTime(props: Props): JSX.Element {
+  return function LazyPart(props: Props): JSX.Element {
     return <Suspense>{createElement(Part as ComponentType<Props>, props)}</Suspense>;
   };
 }
@@ -28,8 +28,8 @@ const Missing = (): JSX.Element => (
 
 const parts = (): Promise<typeof EstimateParts> => import('../parts/estimate');
 
-export const AdviceMarks = inTime(async () => (await parts()).AdviceMarks);
-export const CardEstimate = inTime(async () => (await parts()).CardEstimate);
-export const ErrorScale = inTime(async () => (await parts()).ErrorScale);
-export const EstimateFacts = inTime(async () => (await parts()).EstimateFacts);
-export const EstimateReadout = inTime(async () => (await parts()).EstimateReadout);
+export const AdviceMarks = lazyPart(async () => (await parts()).AdviceMarks);
+export const CardEstimate = lazyPart(async () => (await parts()).CardEstimate);
+export const ErrorScale = lazyPart(async () => (await parts()).ErrorScale);
+export const EstimateFacts = lazyPart(async () => (await parts()).EstimateFacts);
+export const EstimateReadout = lazyPart(async () => (await parts()).EstimateReadout);

@@ -5,7 +5,7 @@ import type { Alarm } from '../contract/types';
 import { act, receive, store } from '../store/app';
 import { announce } from '../store/create';
 import { NO_HOUSE, withPast } from '../store/twin';
-import { alarm, tellAlarms } from '../testing/alarms';
+import { alarm, reportAlarms } from '../testing/alarms';
 import { goLive, goLost, showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import {
@@ -16,10 +16,10 @@ import {
   startBadge,
   startNotify,
   startSound,
-  wishNotify,
-  wishSound,
+  setNotify,
+  setSound,
 } from './notify';
-import { acknowledgeAlarms, NOTHING_KEPT, own } from './own';
+import { acknowledgeAlarms, NO_LOCAL_ALARMS, own } from './own';
 import { calling } from './list';
 import {
   alarmList,
@@ -39,11 +39,11 @@ let stops: (() => void)[];
 const start = (...starts: (() => () => void)[]): void => {
   stops = [startAlarms, ...starts].map((each) => each());
   // The alarms that the page starts with.
-  tellAlarms();
+  reportAlarms();
 };
 
 beforeEach(() => {
-  own.set(NOTHING_KEPT);
+  own.set(NO_LOCAL_ALARMS);
   showTags([wireTag()]);
 });
 afterEach(() => {
@@ -56,14 +56,14 @@ describe('title', () => {
   test('counts what is active, acknowledged or not, and says which moment is shown', () => {
     start(startTitle);
     expect(document.title).toBe('Lupin twin');
-    tellAlarms(cold, warm, alarm('over', { cleared: 950 }));
+    reportAlarms(cold, warm, alarm('over', { cleared: 950 }));
     expect(document.title).toBe('(2) Lupin twin');
     act({ moment: 50 });
     receive(withPast({ at: 50, house: NO_HOUSE }));
     expect(document.title).toBe('(2) sim 00:00:50 (past) · Lupin twin');
     acknowledgeAlarms(calling(alarmList.get()));
     expect(document.title).toBe('(2) sim 00:00:50 (past) · Lupin twin');
-    tellAlarms();
+    reportAlarms();
     expect(document.title).toBe('sim 00:00:50 (past) · Lupin twin');
     expect(titleOf(0, null)).toBe('Lupin twin');
     expect(titleOf(2, null, 'Recording')).toBe('(2) Recording · Lupin twin');
@@ -87,11 +87,11 @@ describe('icon', () => {
     start(startBadge);
     const drawn = (): string => decodeURIComponent(link.href);
     expect(link.href).toMatch(/\/lupin\.svg$/);
-    tellAlarms(warm);
+    reportAlarms(warm);
     expect(drawn()).toMatch(/^data:image\/svg\+xml,<svg .*<circle.*>1<\/text>/);
-    tellAlarms(warm, cold);
+    reportAlarms(warm, cold);
     expect(drawn()).toMatch(/<path.*>2<\/text>/);
-    tellAlarms();
+    reportAlarms();
     expect(link.href).toMatch(/\/lupin\.svg$/);
     link.remove();
   });
@@ -112,21 +112,24 @@ describe('voices', () => {
     announce(urgentVoice, '');
     start(startVoices);
     const before = keys();
-    tellAlarms(warm);
+    reportAlarms(warm);
     expect(said()).toEqual(['New: Tag 2: Temperature above 26.0\u00a0°C, worst 30.0\u00a0°C', '']);
-    tellAlarms(cold, warm, alarm('other', { tag_id: '3' }));
+    reportAlarms(cold, warm, alarm('other', { tag_id: '3' }));
     expect(said()[1]).toMatch(/^New: Tag 1: [^;]*; Tag 3: [^;]*$/);
     expect(keys()).toBe(before + 2);
     // Neither a frame without news nor a state announces anything.
-    tellAlarms(cold, warm, alarm('other', { tag_id: '3' }));
+    reportAlarms(cold, warm, alarm('other', { tag_id: '3' }));
     showTags([wireTag()]);
     expect(keys()).toBe(before + 2);
   });
 
   test('what is resolved is told once, in the same breath as what is new', () => {
     start(startVoices);
-    tellAlarms(warm);
-    tellAlarms({ ...warm, cleared_at: { sec: 990, nanosec: 0 } }, alarm('x', { reason: STRESSED }));
+    reportAlarms(warm);
+    reportAlarms(
+      { ...warm, cleared_at: { sec: 990, nanosec: 0 } },
+      alarm('x', { reason: STRESSED }),
+    );
     expect(said()[0]).toMatch(/^New: Tag 1: .*\. Resolved: Tag 2: Temperature/);
   });
 });
@@ -177,29 +180,29 @@ describe('sound', () => {
     const clock = vi.spyOn(performance, 'now').mockReturnValue(at);
     vi.spyOn(Date, 'now').mockReturnValue(1_800_000_000_000);
     start(() => startSound(make));
-    tellAlarms(...many(1));
+    reportAlarms(...many(1));
     expect(audio.notes).toBe(0);
-    await wishSound(true, make);
+    await setSound(true, make);
     expect(soundState.get()).toBe('ready');
     expect(audio.notes).toBe(2);
     clock.mockReturnValue(at + QUIET_MS - 1);
-    tellAlarms(...many(2));
+    reportAlarms(...many(2));
     expect(audio.notes).toBe(2);
     clock.mockReturnValue(at + QUIET_MS);
-    tellAlarms(...many(3));
+    reportAlarms(...many(3));
     expect(audio.notes).toBe(4);
     clock.mockReturnValue(at + 2 * QUIET_MS);
-    tellAlarms(cold, ...many(3));
+    reportAlarms(cold, ...many(3));
     expect(audio.notes).toBe(8);
     clock.mockReturnValue(at + 3 * QUIET_MS);
-    await wishSound(false, make);
-    tellAlarms(...many(4));
+    await setSound(false, make);
+    reportAlarms(...many(4));
     expect(audio.notes).toBe(8);
   });
 
   test('kept from another day it waits for a click, and says so', async () => {
     const audio = new Audio(false);
-    own.set({ ...NOTHING_KEPT, sound: true });
+    own.set({ ...NO_LOCAL_ALARMS, sound: true });
     start(() => startSound(() => audio as unknown as AudioContext));
     expect(soundState.get()).toBe('waits');
     document.dispatchEvent(new Event('pointerup'));
@@ -214,13 +217,13 @@ describe('sound', () => {
     await vi.waitFor(() => {
       expect(soundState.get()).toBe('ready');
     });
-    tellAlarms(warm);
+    reportAlarms(warm);
     expect(audio.notes).toBe(2);
   });
 
   test('a browser that cannot says so', async () => {
     start();
-    await wishSound(true, () => {
+    await setSound(true, () => {
       throw new Error('no device');
     });
     expect(soundState.get()).toBe('none');
@@ -232,12 +235,12 @@ describe('notification', () => {
   const shown: { title: string; body: string; onclick?: () => void; close: () => void }[] = [];
   const tags: string[] = [];
   /** Stand-in for the browser's Notification, which jsdom lacks. */
-  const browser = (permission: string, answer = permission): { asked: number } => {
-    const log = { asked: 0 };
+  const browser = (permission: string, answer = permission): { requests: number } => {
+    const log = { requests: 0 };
     class Shown {
       static permission = permission;
       static requestPermission(): Promise<string> {
-        log.asked += 1;
+        log.requests += 1;
         Shown.permission = answer;
         return Promise.resolve(answer);
       }
@@ -267,11 +270,11 @@ describe('notification', () => {
   test('is asked for by the click alone, and tells of all that is new in one', async () => {
     const log = browser('default', 'granted');
     start(startNotify);
-    tellAlarms(warm);
-    expect([log.asked, shown.length]).toEqual([0, 0]);
-    await wishNotify(true);
-    expect([log.asked, own.get().notify, notifyState.get()]).toEqual([1, true, 'granted']);
-    tellAlarms(cold, warm, alarm('other', { tag_id: '3' }));
+    reportAlarms(warm);
+    expect([log.requests, shown.length]).toEqual([0, 0]);
+    await setNotify(true);
+    expect([log.requests, own.get().notify, notifyState.get()]).toEqual([1, true, 'granted']);
+    reportAlarms(cold, warm, alarm('other', { tag_id: '3' }));
     expect(shown.map(({ title }) => title)).toEqual(['2 new alarms']);
     expect(shown[0]?.body).toMatch(/^New: Tag 1: .*; Tag 3: /);
     shown[0]?.onclick?.();
@@ -282,10 +285,10 @@ describe('notification', () => {
   test('what comes later takes its place, and not in silence as under the same tag', async () => {
     browser('granted');
     start(startNotify);
-    await wishNotify(true);
-    tellAlarms();
-    tellAlarms(warm);
-    tellAlarms(warm, cold);
+    await setNotify(true);
+    reportAlarms();
+    reportAlarms(warm);
+    reportAlarms(warm, cold);
     expect(shown.map(({ title }) => title)).toEqual(['1 new alarm']);
     expect(new Set(tags).size).toBe(2);
   });
@@ -293,26 +296,26 @@ describe('notification', () => {
   test('not while somebody looks', async () => {
     browser('granted');
     start(startNotify);
-    await wishNotify(true);
+    await setNotify(true);
     vi.spyOn(document, 'hasFocus').mockReturnValue(true);
-    tellAlarms(warm);
+    reportAlarms(warm);
     expect(shown).toEqual([]);
   });
 
   test('refused, not secure, or not to be had: it stays off and is said', async () => {
     browser('default', 'denied');
     start(startNotify);
-    await wishNotify(true);
+    await setNotify(true);
     expect([own.get().notify, notifyState.get()]).toEqual([false, 'refused']);
     vi.stubGlobal('isSecureContext', false);
-    await wishNotify(true);
+    await setNotify(true);
     expect([own.get().notify, notifyState.get()]).toEqual([false, 'insecure']);
   });
 
   test('a browser that lets no page make them is found out, and said', async () => {
     browser('granted');
     start(startNotify);
-    await wishNotify(true);
+    await setNotify(true);
     const Failing = Object.assign(
       function fail() {
         throw new TypeError('Illegal constructor');
@@ -320,7 +323,7 @@ describe('notification', () => {
       { permission: 'granted' },
     );
     vi.stubGlobal('Notification', Failing);
-    tellAlarms(warm);
+    reportAlarms(warm);
     expect([own.get().notify, notifyState.get()]).toEqual([false, 'none']);
   });
 });

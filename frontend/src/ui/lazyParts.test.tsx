@@ -2,13 +2,13 @@ import { render, screen } from '@testing-library/react';
 import { expect, test, vi } from 'vitest';
 import type { JSX } from 'react';
 
-import { inTime } from './inTime';
+import { lazyPart } from './lazyParts';
 
 const Greeting = ({ name }: { name: string }): JSX.Element => <p>Hello {name}</p>;
 
 test('a part is loaded when it is first shown, once, and is given what it was given', async () => {
   const load = vi.fn(() => Promise.resolve(Greeting));
-  const Part = inTime(load);
+  const Part = lazyPart(load);
   expect(load).not.toHaveBeenCalled();
   render(
     <>
@@ -22,7 +22,7 @@ test('a part is loaded when it is first shown, once, and is given what it was gi
 });
 
 test('one that does not come says so, and what is beside it stays', async () => {
-  const Part = inTime<{ name: string }>(() => Promise.reject(new TypeError('gone')));
+  const Part = lazyPart<{ name: string }>(() => Promise.reject(new TypeError('gone')));
   render(
     <>
       <Part name="you" />

@@ -7,7 +7,7 @@ row `j` (along y), its centre lies at `bbox_min + (index + 0.5) * resolution`. R
 `bbox_min_y`; `values` is row-major. NaN is "unknown" and never a reading.
 
 A lost robot may pin a tag anywhere, and one such pin must not decide how wide the map is. The page
-has the same rule (`domain/farOff.ts`), and `tests/twin/core/far_off.json` tests both.
+has the same rule (`domain/twin.ts`), and `tests/twin/core/far_off.json` tests both.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-// The page itself and its files, for when the bridge cannot be reached: the page then opens and says
-// so. Everything else goes past this script, so data is never kept and never old. It also shows the
+// Caches the page and its files. If the bridge cannot be reached, the page still opens, and says so.
+// All other requests bypass this script, so data is never cached and never old. It also shows the
 // notifications that the bridge pushes while the page is closed.
 const SCOPE = self.registration.scope;
 const CACHE = `lupin-shell ${SCOPE}`;
@@ -12,7 +12,7 @@ self.addEventListener('fetch', (event) => {
   else if (address.startsWith(`${SCOPE}assets/`)) event.respondWith(file(request));
 });
 
-// As the bridge has it now; the copy only where there is no answer at all.
+// The bridge's current page; the cached copy only if there is no answer at all.
 async function page(request) {
   let response;
   try {
@@ -26,7 +26,7 @@ async function page(request) {
   return response;
 }
 
-// Another page has other files: what the one before had goes.
+// A changed page has other files: the files of the previous one are deleted.
 async function keep(response) {
   const known = await (await caches.open(CACHE)).match(SCOPE);
   if (known && known.headers.get('etag') === response.headers.get('etag')) return;
@@ -34,7 +34,7 @@ async function keep(response) {
   await (await caches.open(CACHE)).put(SCOPE, response);
 }
 
-// Its name changes with what is in it, so a copy is never an old one.
+// A file's name changes with its content, so a cached copy is never old.
 async function file(request) {
   const cache = await caches.open(CACHE);
   const kept = await cache.match(request);
@@ -44,7 +44,7 @@ async function file(request) {
   return response;
 }
 
-// There is no room for a copy: the page opens as long as there is an answer.
+// No room for a copy: the page still opens while the bridge answers.
 const isFull = () => undefined;
 
 self.addEventListener('push', (event) => {

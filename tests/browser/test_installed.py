@@ -63,7 +63,7 @@ def test_the_shell_opens_without_the_bridge_and_no_data_is_kept(
             expect(app).to_have_attribute("data-connection-state", "live")
             assert page.evaluate(FETCHED, "./api/session") == 200
             wait_for(
-                lambda: any("behind" in path for path in page.evaluate(CACHED)),
+                lambda: any("deferred" in path for path in page.evaluate(CACHED)),
                 "the page's files",
                 meanwhile=lambda _: None,
             )

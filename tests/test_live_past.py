@@ -43,6 +43,7 @@ def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
             scan("late", {"co2": 1.0}, stamp_s=T + 10_000.0),
         )
         peer.tag("late")
+        peer.tag("pinned")  # of another topic, which may be later
         wait_for(
             lambda: select(path, "SELECT count(*) FROM scan") == [(5,)],
             "all of it in the journal",

@@ -1,4 +1,4 @@
-"""The application: what answers at which path, and the page."""
+"""The application: its routes, and the page."""
 
 import asyncio
 from pathlib import Path
@@ -16,7 +16,7 @@ PAGE = '<!doctype html><title>HMI</title><script type="module" src="/assets/a.js
 
 @pytest.fixture
 def static(tmp_path: Path) -> Path:
-    """A built page, and a file beside it that is nobody's business."""
+    """A built page, and a file beside it that must not be served."""
     folder = tmp_path / "static"
     (folder / "assets").mkdir(parents=True)
     (folder / "index.html").write_text(PAGE)
@@ -37,7 +37,7 @@ def request(app: FastAPI, method: str, path: str, prefix: str = "") -> httpx.Res
 
 
 def ask(static_folder: Path, method: str, path: str) -> httpx.Response:
-    """Of one without a twin."""
+    """A request to an application without a twin."""
     return request(create_app(None, static_folder), method, path)
 
 
@@ -61,7 +61,7 @@ def test_the_page_and_its_files_are_served_from_the_same_origin(static: Path) ->
     assert ask(static, "HEAD", "/").text == ""
 
 
-def test_the_page_does_not_hide_a_route(static: Path) -> None:
+def test_the_page_hides_no_route(static: Path) -> None:
     (static / "docs").write_text("a file of that name")
     assert "API" in ask(static, "GET", "/docs").text
 
@@ -92,7 +92,7 @@ def test_nothing_outside_the_folder_is_served(static: Path, path: str) -> None:
 
 @pytest.mark.parametrize("built", [True, False])
 @pytest.mark.parametrize("path", ["/nowhere", "/api/nowhere", "/api/field.gif", "/API/state"])
-def test_what_is_not_there_is_said_in_json(static: Path, path: str, built: bool) -> None:
+def test_a_missing_path_is_reported_in_json(static: Path, path: str, built: bool) -> None:
     answer = ask(static if built else static / "nonexistent", "GET", path)
     assert answer.status_code == 404
     message = schema.ErrorMessage.model_validate_json(answer.content)
@@ -101,7 +101,7 @@ def test_what_is_not_there_is_said_in_json(static: Path, path: str, built: bool)
 
 
 @pytest.mark.parametrize("built", [True, False])
-def test_a_websocket_that_is_not_there_is_refused_in_json(static: Path, built: bool) -> None:
+def test_a_missing_websocket_is_refused_in_json(static: Path, built: bool) -> None:
     sent: list[dict[str, Any]] = []
 
     async def receive() -> dict[str, str]:
@@ -125,5 +125,5 @@ def test_a_websocket_that_is_not_there_is_refused_in_json(static: Path, built: b
     assert message.detail == "there is nothing at '/ws/nope'; see /docs"
 
 
-def test_a_long_path_is_cut_in_the_answer(tmp_path: Path) -> None:
+def test_a_long_path_is_shortened_in_the_answer(tmp_path: Path) -> None:
     assert len(ask(tmp_path, "GET", "/" + "x" * 4_000).text) < 300

@@ -1,4 +1,4 @@
-"""From a source to listeners: pace, status, watch; and that nothing is left behind."""
+"""From a source to connections: pace, status, watch; and nothing is left behind."""
 
 import asyncio
 import itertools
@@ -39,7 +39,7 @@ from tests.support.web import ws_url
 
 
 class Script:
-    """A source that tells what the test makes it tell. What a real one does, others test."""
+    """A source that reports what the test makes it report. Real sources have their own tests."""
 
     world = World()
 
@@ -48,7 +48,7 @@ class Script:
         self.die: Callable[[], None]
         self.thread = ThreadState()
         self.workers = Workers("script")
-        self.relay = Relay(lambda: cast("Any", self), cast("Any", self))  # listened to by nobody
+        self.relay = Relay(lambda: cast("Any", self), cast("Any", self))  # with no clients
 
     async def start(
         self, on_state: Callable[[TwinUpdate], None], on_death: Callable[[], None]
@@ -90,12 +90,12 @@ class Ear:
 
 
 def state(number: int) -> TwinUpdate:
-    """The state after so many changes."""
+    """The state after that many changes."""
     return TwinUpdate(Snapshot(number, "map", (TagState(f"t{number}"),)), f"r{number}")
 
 
 class Stage:
-    """A bridge between a script and an ear."""
+    """A bridge between a scripted source and a connection."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, **limits: Any) -> None:
         self.script, self.ear = Script(), Ear()
@@ -114,7 +114,7 @@ class Stage:
 
 
 class Beat:
-    """A bridge whose clock and whose timer for the next frame are the test's."""
+    """A bridge whose clock and frame timer belong to the test."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now_s = 100.0
@@ -137,7 +137,7 @@ class Beat:
         self._monkeypatch.setattr(loop, "call_later", noting)
 
     def change(self, at_s: float) -> float:
-        """Tell a change; how long it has waited once it is out."""
+        """Report a change; returns how long it waited until it was sent."""
         self.now_s = at_s
         self._number += 1
         newest = f"r{self._number}"
@@ -148,10 +148,10 @@ class Beat:
         return self.now_s - at_s
 
 
-async def test_of_a_producer_that_keeps_to_the_rate_no_change_waits(
+async def test_no_change_waits_when_the_producer_keeps_to_the_rate(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """However late single ones are, by up to an interval: the others are not held to their beat."""
+    """Single ones may be late by up to an interval: the others do not wait for them."""
     beat = Beat(monkeypatch)
     late_s = [0.0, 0.09, 0.0, 0.03, 0.0, 0.099, 0.0, 0.0] * 20
     async with Stage(clock=lambda: beat.now_s, frames_per_s=10.0) as stage:
@@ -162,7 +162,7 @@ async def test_of_a_producer_that_keeps_to_the_rate_no_change_waits(
 
 @settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(pauses_s=st.lists(st.floats(0.0, 0.3), min_size=1, max_size=60))
-def test_the_mean_rate_is_kept_whatever_the_producer_does(
+def test_the_mean_rate_holds_whatever_the_producer_does(
     monkeypatch: pytest.MonkeyPatch, pauses_s: list[float]
 ) -> None:
     async def test() -> None:
@@ -181,7 +181,7 @@ def test_the_mean_rate_is_kept_whatever_the_producer_does(
     asyncio.run(test())
 
 
-async def test_what_a_frame_carries_is_the_newest_of_all_that_came_since_the_last() -> None:
+async def test_a_frame_carries_the_latest_of_all_changes_since_the_last() -> None:
     async with Stage(frames_per_s=50.0) as stage:
         for number in range(1, 101):
             stage.script.tell(state(number))
@@ -191,7 +191,7 @@ async def test_what_a_frame_carries_is_the_newest_of_all_that_came_since_the_las
         assert stage.bridge.latest == state(100)
 
 
-async def test_a_heartbeat_right_after_a_frame_tells_nobody_anything_and_is_spared() -> None:
+async def test_a_heartbeat_right_after_a_frame_is_omitted() -> None:
     async with Stage(frames_per_s=100.0) as stage:
         stage.script.tell(state(1))
         for _ in range(3):
@@ -204,7 +204,7 @@ async def test_a_heartbeat_right_after_a_frame_tells_nobody_anything_and_is_spar
 # --- status -------------------------------------------------------------------------------------
 
 
-async def test_a_status_goes_out_when_it_changes_and_only_then() -> None:
+async def test_a_status_is_sent_when_it_changes_and_only_then() -> None:
     now_s = 100.0
     async with Stage(lambda: now_s) as stage:
         stage.bridge.liveness.stale_after_s = 0.3
@@ -228,7 +228,7 @@ async def test_a_status_goes_out_when_it_changes_and_only_then() -> None:
     ]
 
 
-async def test_a_memory_that_is_busy_at_the_start_is_asked_again(
+async def test_a_busy_memory_at_the_start_is_queried_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("lupin_bridge.alarms.feed.LEARN_AGAIN_S", 0.01)
@@ -248,13 +248,13 @@ async def test_a_memory_that_is_busy_at_the_start_is_asked_again(
         stage.script.tell(state(4 * hour_ns))
 
         def is_learnt() -> bool:
-            stage.script.tell(state(4 * hour_ns))  # judged anew with the next frame
+            stage.script.tell(state(4 * hour_ns))  # judged again with the next frame
             return stage.bridge.seen().holds_ns.get(tag_id) == 3 * hour_ns
 
         await until(is_learnt, "the rhythm")
 
 
-async def test_a_second_twin_is_told_of(caplog: pytest.LogCaptureFixture) -> None:
+async def test_a_second_twin_is_reported(caplog: pytest.LogCaptureFixture) -> None:
     async with Stage() as stage:
         stage.script.tell(state(1))
         stage.script.tell(replace(state(2), twin_count=2))
@@ -267,7 +267,7 @@ async def test_a_second_twin_is_told_of(caplog: pytest.LogCaptureFixture) -> Non
 # --- the watch ----------------------------------------------------------------------------------
 
 
-async def test_the_watch_outlives_an_error(
+async def test_the_watch_survives_an_error(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with Stage() as stage:
@@ -283,10 +283,10 @@ async def test_the_watch_outlives_an_error(
         assert "the watch had an error and continues" in caplog.text
 
 
-async def test_who_asked_for_a_low_rate_gets_the_newest_although_nothing_more_happens() -> None:
+async def test_a_client_with_a_low_rate_gets_the_latest_although_nothing_more_happens() -> None:
     now_s = 100.0
     async with Stage(clock=lambda: now_s, frames_per_s=100.0) as stage:
-        stage.bridge.liveness.stale_after_s = math.inf  # no status takes it along
+        stage.bridge.liveness.stale_after_s = math.inf  # no status carries it along
         rare = Ear()
         stage.bridge.join(Client(rare, min_interval_s=0.3))
         for number in range(1, 6):
@@ -302,9 +302,9 @@ async def test_who_asked_for_a_low_rate_gets_the_newest_although_nothing_more_ha
 # --- alarms -------------------------------------------------------------------------------------
 
 
-async def test_alarms_are_told_at_once_and_those_right_behind_once_a_second() -> None:
+async def test_alarms_are_sent_at_once_and_those_right_after_once_a_second() -> None:
     async with Stage() as stage:
-        await stage.bridge._alarm_feed.stop()  # these are the test's alone
+        await stage.bridge._alarm_feed.stop()  # only those of the test
 
         def put(tag_ids: Sequence[str]) -> None:
             found = board_of(map(alarm, tag_ids))
@@ -321,21 +321,21 @@ async def test_alarms_are_told_at_once_and_those_right_behind_once_a_second() ->
         first_s = loop.time()
         for count in range(2, 6):
             put("abcde"[:count])
-            for _ in range(5):  # as a frame of its own would, were it written now
+            for _ in range(5):  # as a frame would, if it were written now
                 await asyncio.wrap_future(stage.script.workers.submit(lambda _: None))
         await until(lambda: told()[-1] == 5, "the newest")
         assert told() == [1, 5]
         assert loop.time() - first_s > 0.8 * ALARMS_REST_S
 
 
-async def test_a_channel_that_an_alarm_breaks_costs_the_page_no_alarms(
+async def test_a_channel_that_fails_on_an_alarm_costs_the_page_no_alarms(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     hook = Settings(webhook_url="http://127.0.0.1:9/hook")
     stage = Stage()
     stage.bridge.outward = Channels(Targets.of(hook, Secrets(webhook_secret="s" * 16)))
     async with stage:
-        await stage.bridge._alarm_feed.stop()  # these are the test's alone
+        await stage.bridge._alarm_feed.stop()  # only those of the test
         stage.script.tell(state(1))
         monkeypatch.setattr(Webhook, "on_alarms", lambda *_: 1 / 0)
         stage.bridge.alarms.put(board_of([alarm("a")]), Change(()), "heard", 1)
@@ -348,7 +348,7 @@ async def test_a_channel_that_an_alarm_breaks_costs_the_page_no_alarms(
 SECOND = 1_000_000_000
 
 
-async def test_while_the_twin_is_silent_its_status_comes_again_and_again() -> None:
+async def test_while_the_twin_is_silent_its_status_is_repeated() -> None:
     now_s = 100.0
 
     def a_second_later(reason: str) -> bool:
@@ -391,7 +391,7 @@ async def test_a_twin_whose_clock_stops_is_silent_since_its_last_time() -> None:
         await until(lambda: not stage.bridge.alarms.now.active, "its end")
 
 
-async def test_a_clock_that_goes_back_withdraws_the_silences_of_what_has_not_been_yet() -> None:
+async def test_a_clock_that_goes_back_withdraws_the_silences_of_its_future() -> None:
     async with Stage() as stage:
         board = stage.bridge.alarms
 
@@ -427,7 +427,7 @@ def test_no_thread_and_no_descriptor_is_left_behind(domain: int) -> None:
             await listener.recv()
             assert (await served.http.get("/api/field.png?sensor_type=co2")).status_code == 200
 
-    run(domain, once())  # what is made once for a process stays
+    run(domain, once())  # what is made once per process stays
     threads, files = left()  # some of which may be about to end
     for _ in range(3):
         run(domain, once())

@@ -15,7 +15,7 @@ from tests.support.waiting import until
 
 
 def judged_state(number: int) -> TwinUpdate:
-    """The state after so many scans of two tags."""
+    """The state after that many scans of two tags."""
     stamp_ns = number * 10**9
     readings = (Reading("temperature", 24.0, stamp_ns),)
     tags = tuple(
@@ -25,7 +25,7 @@ def judged_state(number: int) -> TwinUpdate:
 
 
 @pytest.mark.parametrize("error", [None, TwinUnavailableError("not yet")])
-async def test_a_robot_has_not_stopped_before_the_log_was_looked_at(
+async def test_a_robot_is_not_reported_as_stopped_before_the_log_was_read(
     error: Exception | None,
 ) -> None:
     asked, may_answer = asyncio.Event(), asyncio.Event()
@@ -54,7 +54,7 @@ async def test_a_robot_has_not_stopped_before_the_log_was_looked_at(
         assert [reason["kind"] for reason in house["reasons"]] == ["stopped"]
 
 
-async def test_a_state_that_cannot_be_judged_goes_out_and_all_is_unknown(
+async def test_a_state_that_cannot_be_judged_is_sent_with_everything_unknown(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     is_broken = False

@@ -8,7 +8,7 @@ import pytest
 from lupin_bridge.console import say, tell
 from tests.support.waiting import PATIENCE_S
 
-# It says, tells and says again, and a file that it opens gets neither of the two.
+# It writes a message twice, and opens a file that must get neither.
 SCRIPT = """
 import os, sys
 from lupin_bridge.console import say, tell
@@ -25,7 +25,7 @@ sys.exit(7)
 
 
 def run(path: Path, streams: str) -> subprocess.CompletedProcess[str]:
-    """The script with its streams led there by a shell."""
+    """The script, with its streams redirected by a shell."""
     command = f'exec "$@" {streams}'
     return subprocess.run(
         ["sh", "-c", command, "sh", sys.executable, "-c", SCRIPT, str(path)],
@@ -50,7 +50,7 @@ NO_ROOM = "lupin-twin: cannot write to the standard output: No space left on dev
         (">/dev/full 2>/dev/full", "", ""),
     ],
 )
-def test_what_cannot_be_said_ends_nothing_and_is_in_no_file(
+def test_output_that_cannot_be_written_ends_nothing_and_gets_into_no_file(
     tmp_path: Path, streams: str, out: str, err: str
 ) -> None:
     ended = run(tmp_path / "file", streams)
@@ -58,14 +58,14 @@ def test_what_cannot_be_said_ends_nothing_and_is_in_no_file(
     assert (tmp_path / "file").read_bytes() == b"its own"
 
 
-def test_output_that_has_no_room_is_told_once(tmp_path: Path) -> None:
+def test_a_full_output_is_reported_once(tmp_path: Path) -> None:
     ended = run(tmp_path / "file", ">/dev/full")
     assert ended.returncode == 7
     assert ended.stderr.count(NO_ROOM) == 1
     assert "Error" not in ended.stderr
 
 
-def test_who_reads_no_more_is_told_nothing(
+def test_a_closed_pipe_is_silent(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     reader, writer = os.pipe()
@@ -77,12 +77,12 @@ def test_who_reads_no_more_is_told_nothing(
         monkeypatch.setattr(sys, "stderr", pipe)
         for _ in range(2):
             say("nobody hears it")
-        # Nothing waits that would be tried again, and fail, as it is closed.
+        # Nothing stays buffered that would fail again when it is closed.
     monkeypatch.setattr(sys, "stderr", None)
     say("nobody hears it")
 
 
-def test_a_stream_that_somebody_has_closed_ends_nothing(
+def test_a_stream_that_was_closed_ends_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with (tmp_path / "log").open("w") as log:

@@ -1,4 +1,4 @@
-"""A copy of a journal: made while its twin writes, whole, and enough for another start."""
+"""A copy of a journal: made while its twin writes, complete, and enough for a restart."""
 
 import sqlite3
 import subprocess
@@ -24,9 +24,7 @@ def journal(*words: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def test_a_backup_of_a_twin_at_work_is_what_another_twin_starts_with(
-    domain: int, tmp_path: Path
-) -> None:
+def test_another_twin_starts_from_a_backup_of_a_running_one(domain: int, tmp_path: Path) -> None:
     source, copy = tmp_path / "twin.sqlite", tmp_path / "copy.sqlite"
 
     def tags(url: str) -> set[str]:
@@ -42,7 +40,7 @@ def test_a_backup_of_a_twin_at_work_is_what_another_twin_starts_with(
         wait_for(lambda: "before" in tags(url), "the first tag")
         wait_for(lambda: "before" in journal("export", "--journal", source).stdout, "its row")
         assert journal("backup", copy, "--journal", source).returncode == 0
-        # It is whole by itself: nothing lies beside it.
+        # It is complete by itself: no file lies beside it.
         assert list(tmp_path.glob("copy.sqlite*")) == [copy]
         robot.observe(scan("after", {"co2": 3.0}))
         wait_for(lambda: "after" in tags(url), "the last tag")
@@ -53,12 +51,12 @@ def test_a_backup_of_a_twin_at_work_is_what_another_twin_starts_with(
         source.with_name(source.name + beside).unlink(missing_ok=True)
     source.write_bytes(copy.read_bytes())
     assert journal("check", "--journal", source).returncode == 0
-    # The robot has gone: what it had said after the copy would be heard again.
+    # The robot has gone: it would repeat what it published after the copy.
     with lupin_twin(domain, "serve", "--ros-args", "-p", f"journal:={source}") as twin:
         assert tags(url_of(twin)) == {"before"}
 
 
-def test_what_is_written_meanwhile_neither_gets_in_nor_begins_it_anew(tmp_path: Path) -> None:
+def test_writes_during_the_backup_do_not_get_in_and_do_not_restart_it(tmp_path: Path) -> None:
     source, copy = tmp_path / "large.sqlite", tmp_path / "copy.sqlite"
     shares: list[float] = []
     with closing(sqlite3.connect(source, isolation_level=None)) as writer:
@@ -78,7 +76,7 @@ def test_what_is_written_meanwhile_neither_gets_in_nor_begins_it_anew(tmp_path: 
         assert found.execute("SELECT name FROM sqlite_schema").fetchall() == [("large",)]
 
 
-def test_nothing_is_overwritten_and_what_cannot_be_made_is_named(
+def test_nothing_is_overwritten_and_a_failed_backup_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = tmp_path / "twin.sqlite"
@@ -98,11 +96,11 @@ def test_nothing_is_overwritten_and_what_cannot_be_made_is_named(
     assert taken.read_text(encoding="ascii") == "mine"
 
 
-def test_of_a_backup_that_failed_nothing_is_left(tmp_path: Path) -> None:
+def test_a_failed_backup_leaves_no_file(tmp_path: Path) -> None:
     source, copy = tmp_path / "twin.sqlite", tmp_path / "copy.sqlite"
     kept(source, [row(at_ns=NOW + n, a=n / 3) for n in range(2000)])
     assert source.stat().st_size > 40_960
-    # A disk that takes 40 kB a file: not the copy, but SQLite's 32 kB beside the journal.
+    # A limit of 40 kB a file: enough for SQLite's 32 kB beside the journal, not for the copy.
     # Its signal is ignored, so that SQLite sees the error.
     limit = "import resource as r, signal as s, runpy, sys; s.signal(s.SIGXFSZ, s.SIG_IGN);"
     limit += " r.setrlimit(r.RLIMIT_FSIZE, (40_960, 40_960));"

@@ -31,7 +31,7 @@ def scrape(url: str) -> dict[str, float]:
     }
 
 
-def test_every_metric_is_there_and_follows_what_happens(domain: int) -> None:
+def test_every_metric_exists_and_follows_what_happens(domain: int) -> None:
     with lupin_twin(domain, "serve") as process, Peer(domain) as peer:
         url = url_of(process)
         before = scrape(url)
@@ -65,7 +65,7 @@ def test_every_metric_is_there_and_follows_what_happens(domain: int) -> None:
         assert after["lupin_ros_callback_errors_total"] == 0.0
 
 
-def test_what_is_counted_by_a_name_has_it_as_a_label_gauges_too() -> None:
+def test_metrics_by_name_have_it_as_a_label_gauges_too() -> None:
     labelled = [("lupin_outward_waiting", {"mqtt": 3}), ("lupin_outward_sent", {"webhook": 2})]
     text = Metrics(lambda: labelled).text().decode()
     assert '\nlupin_outward_waiting{channel="mqtt"} 3.0\n' in text
@@ -73,7 +73,7 @@ def test_what_is_counted_by_a_name_has_it_as_a_label_gauges_too() -> None:
     assert '\nlupin_outward_sent_total{channel="webhook"} 2.0\n' in text
 
 
-def test_estimates_that_are_wrong_are_told_by_sensor() -> None:
+def test_wrong_estimates_are_counted_by_sensor() -> None:
     source: Any = Script()
     bridge = Bridge(source, Settings())
     right, wrong = (Record(1, tally, tally) for tally in (Tally(90, 81), Tally(90, 10)))

@@ -1,4 +1,4 @@
-"""The OpenAPI document: complete, and to be had without ROS."""
+"""The OpenAPI document: complete, and available without ROS."""
 
 import json
 import subprocess
@@ -12,14 +12,14 @@ from tests.support.web import ROUTES
 DOCUMENT: dict[str, Any] = json.loads(document())
 
 
-def test_it_lists_every_route_of_the_contract_and_none_besides() -> None:
+def test_it_lists_every_route_of_the_contract_and_no_others() -> None:
     described = {route for route, documented in ROUTES.items() if documented}
-    # For people, and for programs, alone: see test_people and test_observations.
+    # Only for people, and only for programs: see test_people and test_observations.
     described |= {"/api/notes/{note_id}", "/api/audit", "/api/observations", "/api/push"}
     assert set(DOCUMENT["paths"]) == described
 
 
-def test_every_route_is_described_for_get_alone_but_those_that_write() -> None:
+def test_only_the_writing_routes_have_more_than_get() -> None:
     written = {
         "/api/notes": ["get", "post"],
         "/api/notes/{note_id}": ["delete"],
@@ -57,7 +57,7 @@ def test_every_reference_leads_to_a_type() -> None:
     assert found <= known
 
 
-def test_the_copy_that_the_browsers_types_are_made_from_is_fresh() -> None:
+def test_the_copy_for_the_browsers_types_is_up_to_date() -> None:
     copy = Path(__file__).parents[2] / "frontend" / "openapi.json"
     assert copy.read_bytes() == document(), (
         f"stale: run `python -m lupin_bridge.app > {copy}` and `npm run types:gen`"

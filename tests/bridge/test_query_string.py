@@ -1,4 +1,4 @@
-"""The values of a query string, read by a dataclass; and OpenAPI is told of just these."""
+"""Query strings, parsed by a dataclass, and the same values in OpenAPI."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -47,27 +47,27 @@ def test_each_name_has_its_value() -> None:
         ([("a", "1"), ("c", "z")], "c is 'z': input should be 'x' or 'y'"),
     ],
 )
-def test_what_cannot_be_is_refused_in_the_callers_way_by_name(
+def test_an_invalid_value_is_refused_by_name_in_the_callers_way(
     parameters: list[tuple[str, str]], why: str
 ) -> None:
     assert refusal(*parameters).startswith(why)
 
 
 @given(st.lists(st.tuples(st.sampled_from(["a", "from", "c"]) | st.text(), st.text()), max_size=3))
-def test_any_query_string_is_read_or_refused(pairs: list[tuple[str, str]]) -> None:
+def test_any_query_string_is_parsed_or_refused(pairs: list[tuple[str, str]]) -> None:
     with suppress(PastRefused):
         read(Some, pairs)
 
 
-# --- what a WebSocket client may ask for ----------------------------------------------------------
+# --- options of a WebSocket client ----------------------------------------------------------------
 
 
-def test_who_asks_for_nothing_gets_every_state_whole() -> None:
+def test_without_options_a_client_gets_every_state_whole() -> None:
     asked = read(ListenQuery, [])
     assert (asked.delta, asked.min_interval_s) == (False, 0.0)
 
 
-def test_the_lowest_rate_is_one_and_anything_lower_is_not() -> None:
+def test_the_lowest_rate_is_one_and_anything_lower_is_refused() -> None:
     asked = read(ListenQuery, [("delta", "1"), ("max_rate_hz", "0.01")])
     assert (asked.delta, asked.min_interval_s) == (True, 100.0)
     for value in ("0.0099", "0", "-1", "nan", "fast", ""):

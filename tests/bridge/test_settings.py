@@ -1,4 +1,4 @@
-"""Settings: one table, and what each may be."""
+"""Settings: one table, and their ranges."""
 
 from typing import Any, get_args, get_origin
 
@@ -24,7 +24,7 @@ RANGES = {
 }
 
 
-def test_every_default_may_be_given() -> None:
+def test_every_default_is_a_valid_value() -> None:
     for spec in table():
         value = list(spec.default) if spec.default == () else str(spec.default)
         pair = {"tls_cert": "tls_key", "tls_key": "tls_cert"}.get(spec.name, spec.name)
@@ -32,7 +32,7 @@ def test_every_default_may_be_given() -> None:
 
 
 @pytest.mark.parametrize("name", RANGES)
-def test_both_ends_of_a_range_belong_to_it_and_what_is_beyond_is_named(name: str) -> None:
+def test_both_ends_of_a_range_are_included_and_a_value_beyond_is_named(name: str) -> None:
     low: Any = RANGES[name].ge
     high: Any = RANGES[name].le
     for end in (low, high):
@@ -46,7 +46,7 @@ def test_both_ends_of_a_range_belong_to_it_and_what_is_beyond_is_named(name: str
 
 
 @pytest.mark.parametrize("name", [name for name in types() if limits_of(name).count(" or ")])
-def test_what_is_none_of_the_choices_is_named_with_them(name: str) -> None:
+def test_an_invalid_choice_is_named_with_the_valid_ones(name: str) -> None:
     choices = get_args(types()[name])
     assert get_origin(types()[name]) is not None
     for choice in choices:

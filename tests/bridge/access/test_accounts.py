@@ -1,4 +1,4 @@
-"""The file of accounts: who may, for how long, and what is kept of a secret."""
+"""The accounts file: roles, session lifetimes, and what is stored of a secret."""
 
 import asyncio
 import sqlite3
@@ -24,7 +24,7 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "state" / "accounts.sqlite"
 
 
-def test_the_file_is_its_owners_alone_and_holds_no_secret(path: Path) -> None:
+def test_only_its_owner_can_read_the_file_and_it_holds_no_secret(path: Path) -> None:
     add(path, anna="operator")
     add(path, "token", scada="viewer")
     with changing(path) as accounts:
@@ -37,7 +37,7 @@ def test_the_file_is_its_owners_alone_and_holds_no_secret(path: Path) -> None:
     assert b"$argon2id$" in raw
 
 
-def test_a_session_ends_in_its_time_and_with_its_account(path: Path) -> None:
+def test_a_session_ends_when_it_expires_and_with_its_account(path: Path) -> None:
     add(path, anna="operator")
     with changing(path) as accounts:
         name = digest(accounts.begin_session("anna", "::1", NOW))
@@ -54,7 +54,7 @@ def test_a_session_ends_in_its_time_and_with_its_account(path: Path) -> None:
         assert accounts.of_session(name, NOW) is None, "of another anna"
 
 
-def test_one_name_has_so_many_sessions(path: Path) -> None:
+def test_sessions_per_name_are_limited(path: Path) -> None:
     add(path, anna="operator")
     with changing(path) as accounts:
         names = [digest(accounts.begin_session("anna", "", NOW + n)) for n in range(25)]
@@ -62,7 +62,7 @@ def test_one_name_has_so_many_sessions(path: Path) -> None:
         assert [it is not None for it in found] == [False] * 5 + [True] * 20
 
 
-def test_a_name_is_one_persons_or_one_tokens(path: Path) -> None:
+def test_a_name_belongs_to_one_person_or_one_token(path: Path) -> None:
     add(path, anna="operator")
     with pytest.raises(AccountError, match="there is account 'anna' already"):
         add(path, "token", anna="admin")
@@ -74,12 +74,12 @@ def test_a_name_is_one_persons_or_one_tokens(path: Path) -> None:
 
 
 @pytest.mark.parametrize("length", [0, 9, 513, 10**6])
-def test_a_password_has_a_length(length: int) -> None:
+def test_a_password_has_length_limits(length: int) -> None:
     with pytest.raises(AccountError, match=f"has {length} characters, must have 10 to 512"):
         check_password("x" * length)
 
 
-def test_somebody_elses_file_is_left_alone(path: Path) -> None:
+def test_another_users_file_is_left_alone(path: Path) -> None:
     path.parent.mkdir()
     path.write_text("no database, but something dear to somebody")
     with pytest.raises(AccountError):
@@ -92,7 +92,7 @@ def test_somebody_elses_file_is_left_alone(path: Path) -> None:
         Accounts(path)
 
 
-def test_a_reader_cannot_write_and_the_trail_keeps_the_newest(
+def test_a_reader_cannot_write_and_the_audit_trail_drops_its_oldest_rows(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("lupin_bridge.access.accounts._MAX_AUDITED", 3)
@@ -106,11 +106,11 @@ def test_a_reader_cannot_write_and_the_trail_keeps_the_newest(
             accounts.note(Audited(NOW, "anna", "comment", "", ""))
 
 
-async def test_a_wrong_name_takes_the_same_work_as_a_wrong_password(
+async def test_an_unknown_name_takes_as_much_work_as_a_wrong_password(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     add(path, anna="operator")
-    with changing(path) as accounts:  # who signs in elsewhere
+    with changing(path) as accounts:  # signs in elsewhere
         accounts.add("bert", "account", "operator", "", by="a test", now_s=NOW)
     worked: list[str] = []
     verify = PasswordHasher.verify
@@ -128,7 +128,7 @@ async def test_a_wrong_name_takes_the_same_work_as_a_wrong_password(
     assert [kept[:10] for kept in worked] == ["$argon2id$"] * 5
 
 
-async def test_a_flood_of_sign_ins_waits_in_a_short_queue_and_lets_others_write(
+async def test_a_flood_of_sign_ins_waits_in_a_short_queue_while_other_writes_go_on(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     add(path, anna="operator")
@@ -153,7 +153,7 @@ async def test_a_flood_of_sign_ins_waits_in_a_short_queue_and_lets_others_write(
     await asyncio.gather(*flood, return_exceptions=True)
 
 
-async def test_whoever_leaves_amid_a_sign_in_has_tried(path: Path) -> None:
+async def test_a_sign_in_that_its_client_cancels_still_counts_as_an_attempt(path: Path) -> None:
     add(path, anna="operator")
     people = People(path)
     for _ in range(ATTEMPT_BURST):
@@ -165,7 +165,7 @@ async def test_whoever_leaves_amid_a_sign_in_has_tried(path: Path) -> None:
         await people.check("anna", PASSWORD, "1")
 
 
-def test_a_file_that_has_gone_opens_nothing(path: Path) -> None:
+def test_a_deleted_accounts_file_opens_nothing(path: Path) -> None:
     people = People(path)
     before = people.is_on
     add(path, "token", scada="viewer")
@@ -179,7 +179,7 @@ def test_a_file_that_has_gone_opens_nothing(path: Path) -> None:
     assert people.by_token(TOKEN) is None
 
 
-def test_a_file_that_was_there_at_the_start_and_one_that_cannot_be_looked_for_open_nothing(
+def test_an_accounts_file_that_was_deleted_or_is_unreadable_opens_nothing(
     path: Path,
 ) -> None:
     add(path, "token", scada="viewer")
@@ -190,7 +190,7 @@ def test_a_file_that_was_there_at_the_start_and_one_that_cannot_be_looked_for_op
     assert People(path).is_on
 
 
-def test_whom_a_proxy_names_is_asked_after_again(path: Path) -> None:
+def test_a_name_from_a_proxy_is_checked_again_on_every_use(path: Path) -> None:
     add(path, anna="operator")
     people = People(path, is_proxied=True)
     anna = people.by_proxy("anna")
@@ -200,7 +200,7 @@ def test_whom_a_proxy_names_is_asked_after_again(path: Path) -> None:
     assert not people.still(anna)
 
 
-def test_notified_are_devices_of_who_may_read_the_site(path: Path) -> None:
+def test_only_devices_of_people_who_may_read_the_site_are_notified(path: Path) -> None:
     with changing(path) as accounts:
         accounts.add("anna", "account", "viewer", "", by="a test", now_s=NOW, sites=["north"])
         accounts.add_device("anna", Device("https://push.example/x", "", "", "en"), "::1", NOW)

@@ -1,4 +1,4 @@
-"""The shared token's rules, and the sessions that it opens."""
+"""The rules of the shared token, and the sessions that it opens."""
 
 import pytest
 
@@ -48,7 +48,7 @@ def test_a_session_holds_at_every_replica_of_the_token_until_it_ends() -> None:
 
 
 @pytest.mark.parametrize("made_up", ["", ".", "\u0660", "x" * 8_000])
-def test_a_cookie_that_was_changed_is_none(made_up: str) -> None:
+def test_a_changed_cookie_is_refused(made_up: str) -> None:
     ends, name, mac = OURS.cookie(NOW_S).split(".")
     for cookie in (
         made_up,
@@ -62,7 +62,7 @@ def test_a_cookie_that_was_changed_is_none(made_up: str) -> None:
         assert not OURS.session_of(cookie, NOW_S)
 
 
-def test_so_many_are_remembered_as_signed_out_and_those_that_last_longest_are(
+def test_signed_out_sessions_are_remembered_up_to_a_limit_the_longest_lasting_first(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(credentials, "MAX_SIGNED_OUT", 2)
@@ -95,18 +95,18 @@ NAME = "lupin_session_0011aabb"
         (f'{NAME}="a\\"b"', ['"a\\"b"']),
     ],
 )
-def test_every_value_of_the_name_and_nothing_else(header: str, values: list[str]) -> None:
+def test_every_value_of_the_name_is_found_and_nothing_else(header: str, values: list[str]) -> None:
     assert cookies_of(NAME, [(b"host", b"x"), (b"cookie", header.encode())]) == values
 
 
-def test_all_lines_count_and_what_is_no_text_does_no_harm() -> None:
+def test_all_header_lines_count_and_bytes_that_are_no_text_do_no_harm() -> None:
     lines = [(b"cookie", f"{NAME}=a".encode()), (b"cookie", f"{NAME}=\xff".encode("latin-1"))]
     assert cookies_of(NAME, lines) == ["a", "\xff"]
     assert cookies_of(NAME, [(b"set-cookie", f"{NAME}=a".encode())]) == []
 
 
 @pytest.mark.parametrize("lines", [1, 2])
-def test_as_long_as_the_limit_and_no_longer(lines: int) -> None:
+def test_a_cookie_header_is_read_up_to_its_limit(lines: int) -> None:
     own = f"{NAME}=a".encode()
     fill = (MAX_COOKIE_BYTES - lines * len(own)) // lines
     headers = [(b"cookie", own + b";" * fill) for _ in range(lines)]

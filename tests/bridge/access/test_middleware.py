@@ -1,4 +1,4 @@
-"""The doorman of a live bridge: foreign hosts and pages, tokens, and a discreet log."""
+"""The access checks of a live bridge: foreign hosts and pages, tokens, and no secret in the log."""
 
 from collections.abc import Iterator
 
@@ -28,7 +28,7 @@ PATHS = [path.replace("{tag_id}", "7") for path in ROUTES]
 
 @pytest.fixture(scope="module")
 def open_bridge() -> Iterator[Served]:
-    """Without a token; pages of one foreign origin may read, and it has a name of its own."""
+    """Without a token. Pages of one foreign origin may read, under an allowed host name."""
     with served("--allow-origin", PANEL, "--allow-host", "twin.example") as running:
         assert "LUPIN_TOKEN" not in running.process.output, "nobody else reaches it"
         yield running
@@ -37,7 +37,7 @@ def open_bridge() -> Iterator[Served]:
 
 @pytest.fixture(scope="module")
 def closed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    """With a token; at its end, its logs are searched for it, and for the wrong one."""
+    """With a token. At the end, neither the right nor the wrong one may be in the logs."""
     folder = tmp_path_factory.mktemp("log")
     with served(LUPIN_TOKEN=TOKEN, ROS_LOG_DIR=str(folder)) as running:
         yield running
@@ -47,7 +47,7 @@ def closed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 
 def refusal_of(answer: httpx.Response) -> str:
-    """The detail of a refusal that has all the headers of one."""
+    """The detail of a refusal, whose headers are checked."""
     assert answer.headers["x-content-type-options"] == "nosniff"
     assert answer.headers["cross-origin-resource-policy"] == "same-origin"
     assert answer.headers["cache-control"] == "no-store"
@@ -57,7 +57,7 @@ def refusal_of(answer: httpx.Response) -> str:
 # --- Host ---------------------------------------------------------------------------------------
 
 
-def test_an_allowed_host_is_a_name_and_no_origin(open_bridge: Served) -> None:
+def test_an_allowed_host_is_a_name_and_not_an_origin(open_bridge: Served) -> None:
     assert open_bridge.get("/api/state", {"Host": "twin.example:8000"}).status_code == 200
     assert open_bridge.get("/api/state", {"Host": "sub.twin.example"}).status_code == 403
     foreign = open_bridge.get("/api/state", {"Origin": "http://twin.example"})
@@ -79,7 +79,7 @@ def test_a_rebound_name_gets_nothing(open_bridge: Served) -> None:
 # --- Origin -------------------------------------------------------------------------------------
 
 
-def test_a_foreign_page_gets_neither_an_answer_nor_leave_to_read_it(open_bridge: Served) -> None:
+def test_a_foreign_page_gets_no_answer_and_no_permission_to_read_one(open_bridge: Served) -> None:
     evil = {"Origin": "http://evil.example"}
     answer = open_bridge.get("/api/state", evil)
     assert answer.status_code == 403
@@ -106,7 +106,7 @@ def test_a_cache_keeps_the_origins_apart(open_bridge: Served) -> None:
     assert {part.strip() for part in both.split(",")} == {"Accept", "Origin"}
 
 
-def test_an_allowed_page_may_ask_before_it_sends_a_token(open_bridge: Served) -> None:
+def test_an_allowed_page_may_send_a_preflight_with_a_token(open_bridge: Served) -> None:
     asks = {"Access-Control-Request-Method": "GET"}
     answer = open_bridge.get("/api/state", {"Origin": PANEL, **asks}, method="OPTIONS")
     assert (answer.status_code, answer.content) == (204, b"")
@@ -120,14 +120,14 @@ def test_an_allowed_page_may_ask_before_it_sends_a_token(open_bridge: Served) ->
         assert "access-control-allow-origin" not in other.headers
 
 
-def test_an_allowed_page_cannot_write_either(open_bridge: Served) -> None:
+def test_an_allowed_page_cannot_write(open_bridge: Served) -> None:
     for path in ("/api/state", "/api/notes", "/api/signin"):
         answer = open_bridge.post(path, {"Origin": PANEL})
         assert answer.status_code == 403
         assert "may only read here" in refusal_of(answer)
 
 
-def test_a_picture_in_a_foreign_page_is_not_even_computed(open_bridge: Served) -> None:
+def test_a_picture_in_a_foreign_page_is_not_computed(open_bridge: Served) -> None:
     hidden = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}
     answer = open_bridge.get("/api/field.png?sensor_type=co2", hidden)
     assert answer.status_code == 403
@@ -135,13 +135,13 @@ def test_a_picture_in_a_foreign_page_is_not_even_computed(open_bridge: Served) -
 
 
 @pytest.mark.parametrize("path", ["/", "/docs", "/signin", "/api/report.html"])
-def test_a_link_to_a_page_may_stand_anywhere(open_bridge: Served, path: str) -> None:
+def test_any_page_may_link_to_the_bridge(open_bridge: Served, path: str) -> None:
     linked = {**PAGE, "Referer": "http://wiki.example/greenhouse"}
     assert open_bridge.get(path, linked).status_code in (200, 303)
     assert open_bridge.get("/api/state", linked).status_code == 403, "a frame looks the same"
 
 
-def test_an_address_has_a_limit(open_bridge: Served) -> None:
+def test_a_request_target_has_a_length_limit(open_bridge: Served) -> None:
     for path in ("/" + "a/" * 2_047 + "b", "/api/field?" + "a&" * 2_042 + "b"):
         room = MAX_TARGET_BYTES - len(path.replace("?", ""))
         longest = path + "b" * room
@@ -156,12 +156,12 @@ def test_an_address_has_a_limit(open_bridge: Served) -> None:
 # --- the token ----------------------------------------------------------------------------------
 
 
-# Without it, what is there looks like what is not.
+# Without a token, existing and missing paths look the same.
 NOWHERE = ["/nowhere", "/assets/app.js", "/manifest.webmanifest", "/healthz/", "/SIGNIN"]
 
 
 @pytest.mark.parametrize("path", [*(path for path in PATHS if path not in OPEN_PATHS), *NOWHERE])
-def test_every_route_wants_the_token(closed: Served, path: str) -> None:
+def test_every_route_needs_the_token(closed: Served, path: str) -> None:
     answer = closed.get(path)
     assert answer.status_code == 401
     assert answer.headers["www-authenticate"].startswith("Bearer")
@@ -172,7 +172,7 @@ def test_every_route_wants_the_token(closed: Served, path: str) -> None:
 
 
 @pytest.mark.parametrize("path", sorted(OPEN_PATHS))
-def test_life_shows_and_signing_in_works_without_it(closed: Served, path: str) -> None:
+def test_liveness_and_the_sign_in_page_need_no_token(closed: Served, path: str) -> None:
     assert closed.get(path).status_code == 200
 
 
@@ -188,19 +188,19 @@ def test_life_shows_and_signing_in_works_without_it(closed: Served, path: str) -
         ("//evil", "../signin"),
     ],
 )
-def test_a_person_is_sent_to_the_sign_in_page(closed: Served, path: str, location: str) -> None:
+def test_a_browser_is_sent_to_the_sign_in_page(closed: Served, path: str, location: str) -> None:
     answer = closed.get(closed.url + path, PAGE)
     assert (answer.status_code, answer.headers["location"]) == (303, location)
     assert answer.headers["cache-control"] == "no-store"
 
 
-def test_a_method_that_writes_is_not_discussed_with_strangers(closed: Served) -> None:
+def test_a_writing_method_is_refused_before_its_path_is_checked(closed: Served) -> None:
     assert closed.get("/api/state", method="POST").status_code == 401
     assert closed.get("/api/state", BEARER, method="POST").status_code == 405
 
 
 @pytest.mark.parametrize("path", ["/ws/state", "/rosbridge", "/foxglove"])
-def test_a_websocket_wants_the_token(closed: Served, path: str) -> None:
+def test_a_websocket_needs_the_token(closed: Served, path: str) -> None:
     assert closed.handshake(path) == 401
     answer = closed.get(path, UPGRADE)
     assert answer.headers["www-authenticate"].startswith("Bearer")
@@ -230,31 +230,31 @@ def test_a_session_is_found_among_other_cookies_up_to_the_limit(closed: Served) 
 
 
 @pytest.mark.parametrize("inside", ['\\"', "\\012", ";"])
-def test_a_hostile_cookie_keeps_nobody_waiting(closed: Served, inside: str) -> None:
+def test_a_hostile_cookie_delays_no_other_client(closed: Served, inside: str) -> None:
     name = session_of(closed).partition("=")[0]
-    # A longer head does not come as far as to be looked at.
+    # A longer request head is refused before its cookies are read.
     hostile = f'{name}="{inside * ((MAX_HEAD_BYTES - 2_000) // len(inside))}"'
     with closed.client() as client:
         before_s = cpu_s(closed.process.pid)
         for _ in range(10):
             assert client.get("/signin", headers={"Cookie": hostile}).status_code == 200
-        # One alone takes a second in the standard library's parser; these all, a tenth.
+        # Alone, one takes the standard library's parser a second; all of these take a tenth.
         assert cpu_s(closed.process.pid) - before_s < 5.0
 
 
-def test_a_token_elsewhere_opens_nothing(closed: Served) -> None:
+def test_a_token_anywhere_else_opens_nothing(closed: Served) -> None:
     assert closed.get("/api/state", {"Authorization": f"Basic {TOKEN}"}).status_code == 401
     for query in (f"?token={TOKEN}", f"?access_token={TOKEN}", f"?LUPIN_TOKEN={TOKEN}"):
         assert closed.get("/api/state" + query).status_code == 401
         assert closed.handshake("/ws/state" + query) == 401
 
 
-def test_a_good_token_does_not_open_the_door_to_foreign_pages(closed: Served) -> None:
+def test_a_valid_token_does_not_admit_a_foreign_page(closed: Served) -> None:
     assert closed.get("/api/state", {**BEARER, "Origin": "http://evil.example"}).status_code == 403
     assert closed.get("/api/state", {**BEARER, "Host": "evil.example"}).status_code == 403
 
 
-def test_guessing_is_slowed_down_for_the_guesser_alone(closed: Served) -> None:
+def test_guessing_slows_down_only_the_guesser(closed: Served) -> None:
     session, taken = session_of(closed), 0
     with closed.client("127.0.5.1") as guesser, closed.client("127.0.5.2") as other:
 
@@ -271,13 +271,13 @@ def test_guessing_is_slowed_down_for_the_guesser_alone(closed: Served) -> None:
 
         wait_for(is_right_one_refused, "no oracle: the right token is not looked at either")
         assert taken >= GUESS_BURST
-        # A session cannot be guessed, so it goes on; and other addresses do not notice.
+        # A session cannot be guessed, so it goes on. Other addresses notice nothing.
         assert guesser.get("/api/state", headers={"Cookie": session}).status_code == 200
         assert other.get("/api/state", headers=BEARER).status_code == 200
     assert closed.process.output.count("wrong token from 127.0.5.1") == taken
 
 
-def test_good_tokens_and_old_cookies_are_no_guesses(closed: Served) -> None:
+def test_valid_tokens_and_expired_cookies_do_not_count_as_guesses(closed: Served) -> None:
     with closed.client("127.0.6.1") as client:
         for _ in range(GUESS_BURST + 5):
             assert client.get("/api/state", headers=BEARER).status_code == 200
@@ -296,11 +296,13 @@ def test_good_tokens_and_old_cookies_are_no_guesses(closed: Served) -> None:
         ("--allow-host", "https://twin.example", "a host's name"),
     ],
 )
-def test_what_can_never_be_allowed_ends_the_start(option: str, wrong: str, is_no: str) -> None:
+def test_an_impossible_host_or_origin_is_refused_at_the_start(
+    option: str, wrong: str, is_no: str
+) -> None:
     assert f"lupin-twin: {option}: '{wrong}' is not {is_no}" in refused_start(option, wrong)
 
 
-def test_listening_further_than_this_machine_is_said_loudly() -> None:
+def test_listening_beyond_loopback_is_logged_as_a_warning() -> None:
     with served("--host", "0.0.0.0") as live:
         warnings = [line for line in live.process.output.splitlines() if "WARNING" in line]
         assert "without LUPIN_TOKEN" in warnings[0]

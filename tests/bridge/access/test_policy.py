@@ -1,4 +1,4 @@
-"""Host, Origin and Sec-Fetch: which requests may pass, and what the others are told."""
+"""Host, Origin and Sec-Fetch: which requests may pass, and how the others are refused."""
 
 import pytest
 from hypothesis import given
@@ -48,7 +48,7 @@ def headers(*given: tuple[str, str]) -> Headers:
         "twin.example:8443",
     ],
 )
-def test_a_host_that_is_the_bridges_own_passes(host: str) -> None:
+def test_the_bridges_own_host_passes(host: str) -> None:
     assert judge(host) == PASS
 
 
@@ -62,7 +62,7 @@ def test_a_host_that_is_the_bridges_own_passes(host: str) -> None:
         "sub.panel.example",
     ],
 )
-def test_a_foreign_host_is_named_with_the_way_to_allow_it(host: str) -> None:
+def test_a_foreign_host_is_refused_with_how_to_allow_it(host: str) -> None:
     refusal = judge(host).refusal
     assert refusal is not None
     assert repr(host.partition(":")[0]) in refusal
@@ -72,25 +72,25 @@ def test_a_foreign_host_is_named_with_the_way_to_allow_it(host: str) -> None:
 @pytest.mark.parametrize(
     "host", ["", " ", "a b", "evil.example/x", "user@127.0.0.1", "127.0.0.1:x", "[::1", "h\u00e4"]
 )
-def test_what_is_no_host_is_refused(host: str) -> None:
+def test_an_invalid_host_is_refused(host: str) -> None:
     refusal = judge(host).refusal
     assert refusal is not None
     assert repr(host) in refusal
 
 
 @pytest.mark.parametrize("hosts", [[], ["127.0.0.1", "evil.example"]])
-def test_there_is_one_host_header(hosts: list[str]) -> None:
+def test_exactly_one_host_header_is_accepted(hosts: list[str]) -> None:
     refusal = POLICY.judge("http", headers(*(("host", it) for it in hosts))).refusal
     assert refusal == f"the request has {len(hosts)} Host headers, expected one"
 
 
-def test_a_long_host_is_cut_in_the_answer() -> None:
+def test_a_long_host_is_shortened_in_the_answer() -> None:
     assert len(judge("x" * 60_000).refusal or "") < 500
     assert len(judge("127.0.0.1", "http://" + "x" * 60_000).refusal or "") < 500
 
 
 @pytest.mark.parametrize("name", ["", "*", "a b", "twin.example:80", "http://twin.example", "a/b"])
-def test_an_allowed_host_has_to_be_a_name(name: str) -> None:
+def test_an_allowed_host_has_to_be_a_valid_name(name: str) -> None:
     with pytest.raises(ValueError, match="expected it without scheme and port") as refused:
         AccessPolicy("127.0.0.1", allowed_hosts=["twin.example", name])
     assert repr(name) in str(refused.value)
@@ -121,7 +121,7 @@ def test_the_bridges_own_pages_pass(host: str, origin: str, scheme: str) -> None
         ("http://[fd00::7]", "http://[fd00::7]"),
     ],
 )
-def test_an_allowed_foreign_origin_passes_and_is_told_apart(origin: str, allowed: str) -> None:
+def test_an_allowed_foreign_origin_is_marked_as_foreign(origin: str, allowed: str) -> None:
     assert judge("127.0.0.1:8000", origin) == Decision(foreign=allowed)
 
 
@@ -138,7 +138,7 @@ def test_an_allowed_foreign_origin_passes_and_is_told_apart(origin: str, allowed
         "http://panel.example:3000 http://evil.example",
     ],
 )
-def test_a_foreign_origin_is_refused_by_name(origin: str) -> None:
+def test_a_foreign_origin_is_refused_with_its_name(origin: str) -> None:
     verdict = judge("127.0.0.1:8000", origin)
     assert verdict.foreign is None
     assert verdict.refusal is not None
@@ -150,8 +150,8 @@ def test_two_origin_headers_are_refused_even_if_each_is_allowed() -> None:
     assert judge("127.0.0.1:8000", *origins).refusal is not None
 
 
-def test_a_good_origin_does_not_make_up_for_a_foreign_host() -> None:
-    # This is DNS rebinding: to the browser, page and bridge are one origin.
+def test_an_allowed_origin_does_not_excuse_a_foreign_host() -> None:
+    # DNS rebinding: to the browser, page and bridge are one origin.
     assert "name 'evil.example'" in str(judge("evil.example", "http://evil.example").refusal)
 
 
@@ -170,14 +170,14 @@ def test_a_good_origin_does_not_make_up_for_a_foreign_host() -> None:
         "http://panel.example\n",
     ],
 )
-def test_what_is_no_origin_is_refused_with_what_was_expected(text: str) -> None:
+def test_an_invalid_origin_is_refused_with_what_was_expected(text: str) -> None:
     with pytest.raises(ValueError, match="expected http:// or https://") as refused:
         parse_origin(text)
     assert repr(text) in str(refused.value)
 
 
 @given(st.text(max_size=40))
-def test_any_text_is_an_origin_or_none(text: str) -> None:
+def test_any_text_is_a_valid_origin_or_refused(text: str) -> None:
     try:
         origin = parse_origin(text)
     except ValueError:
@@ -194,8 +194,8 @@ def test_any_text_is_an_origin_or_none(text: str) -> None:
     [
         ("none", "navigate", "document", True),  # typed into the address bar
         ("same-origin", "cors", "empty", True),
-        ("same-origin", "navigate", "iframe", True),  # whom the page frames, it may
-        ("cross-site", "navigate", "document", True),  # a link, which no page can read through
+        ("same-origin", "navigate", "iframe", True),  # a frame in an allowed page
+        ("cross-site", "navigate", "document", True),  # a link, through which no page can read
         ("same-site", "navigate", "document", True),
         ("cross-site", "no-cors", "image", False),  # <img>, <script>, <link>
         ("same-site", "no-cors", "image", False),  # the same from another port of this host
@@ -204,7 +204,7 @@ def test_any_text_is_an_origin_or_none(text: str) -> None:
         ("cross-site", "no-cors", "document", False),
     ],
 )
-def test_a_foreign_page_that_does_not_name_itself_gets_nothing(
+def test_a_foreign_page_without_an_origin_header_gets_nothing(
     site: str, mode: str, dest: str, passes: bool
 ) -> None:
     refusal = judge(sec_fetch_site=site, sec_fetch_mode=mode, sec_fetch_dest=dest).refusal
@@ -212,7 +212,7 @@ def test_a_foreign_page_that_does_not_name_itself_gets_nothing(
     assert passes or "--allow-origin" in str(refusal)
 
 
-def test_an_allowed_origin_that_names_itself_may_be_cross_site() -> None:
+def test_an_allowed_origin_may_send_cross_site_requests() -> None:
     asked = ("127.0.0.1", "http://panel.example:3000")
     assert judge(*asked, sec_fetch_site="cross-site", sec_fetch_mode="cors").refusal is None
 
@@ -223,7 +223,7 @@ def test_an_allowed_origin_that_names_itself_may_be_cross_site() -> None:
 @pytest.mark.parametrize(
     ("referer", "passes"),
     [
-        ("", True),  # a program, or a page that keeps its name to itself
+        ("", True),  # a program, or a page that sends no referrer
         ("http://127.0.0.1:8000/docs?a=http://evil.example", True),
         ("http://panel.example:3000/board", True),
         ("http://evil.example", False),
@@ -234,7 +234,7 @@ def test_an_allowed_origin_that_names_itself_may_be_cross_site() -> None:
         ("android-app://com.example/", False),
     ],
 )
-def test_without_sec_fetch_the_referer_names_the_page(referer: str, passes: bool) -> None:
+def test_without_sec_fetch_the_referer_identifies_the_page(referer: str, passes: bool) -> None:
     assert (judge(referer=referer).refusal is None) == passes
     assert judge(referer=referer, wants_page=True).refusal is None, "it may be a link"
     assert judge(referer=referer, sec_fetch_site="same-origin").refusal is None
@@ -242,7 +242,7 @@ def test_without_sec_fetch_the_referer_names_the_page(referer: str, passes: bool
     assert hidden.refusal is not None, "it tells more than a Referer does"
 
 
-# --- what is said at the start ------------------------------------------------------------------
+# --- warnings at the start ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1", "127.8.8.8", "::1"])
@@ -251,7 +251,7 @@ def test_loopback_needs_no_warning(address: str) -> None:
 
 
 @pytest.mark.parametrize("address", ["0.0.0.0", "::", "192.168.7.20", "fe80::1%eth0"])
-def test_listening_further_warns_of_what_is_missing(address: str) -> None:
+def test_listening_beyond_loopback_warns_about_missing_protection(address: str) -> None:
     without_both = exposure(address, has_token=False, has_tls=False)
     assert len(without_both) == 2
     assert "without LUPIN_TOKEN" in without_both[0]

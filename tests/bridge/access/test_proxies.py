@@ -1,4 +1,4 @@
-"""Proxies and the path prefix: whose word counts, and what the application sees."""
+"""Proxies and the path prefix: whose headers are trusted, and what the application receives."""
 
 import asyncio
 from collections.abc import Iterator
@@ -29,16 +29,16 @@ def seen(proxies: Proxies, path: str = "/", kind: str = "http", **scope: Any) ->
     return scopes[0]
 
 
-# --- whose word counts ----------------------------------------------------------------------------
+# --- which headers are trusted --------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("peer", "forwarded", "client"),
     [
-        ("10.0.0.7", ["6.6.6.6, 203.0.113.5"], "203.0.113.5"),  # the left one is its own claim
+        ("10.0.0.7", ["6.6.6.6, 203.0.113.5"], "203.0.113.5"),  # the left one is unverified
         ("10.0.0.7", ["6.6.6.6", "203.0.113.5"], "203.0.113.5"),  # lines are one list
         ("10.0.0.7", ["203.0.113.5, 192.168.0.2"], "203.0.113.5"),  # through both proxies
-        ("10.0.0.7", ["192.168.0.3, 192.168.0.2"], "192.168.0.3"),  # a proxy asks for itself
+        ("10.0.0.7", ["192.168.0.3, 192.168.0.2"], "192.168.0.3"),  # a request of the proxy itself
         ("10.0.0.7", ["203.0.113.5:4711"], "203.0.113.5"),
         ("10.0.0.7", ["[2001:db8::1]:4711"], "2001:db8::1"),
         ("10.0.0.7", ["::ffff:203.0.113.5"], "203.0.113.5"),
@@ -46,11 +46,11 @@ def seen(proxies: Proxies, path: str = "/", kind: str = "http", **scope: Any) ->
         ("fd00::1%eth0", ["203.0.113.5"], "203.0.113.5"),
         ("10.0.0.7", ["203.0.113.5, unknown"], "10.0.0.7"),
         ("10.0.0.7", [], "10.0.0.7"),
-        ("10.0.0.8", ["203.0.113.5"], "10.0.0.8"),  # not a proxy that was named
+        ("10.0.0.8", ["203.0.113.5"], "10.0.0.8"),  # not a configured proxy
         ("", ["203.0.113.5"], ""),
     ],
 )
-def test_the_client_is_the_nearest_that_no_trusted_proxy_stands_for(
+def test_the_client_is_the_nearest_address_that_is_not_a_trusted_proxy(
     peer: str, forwarded: list[str], client: str
 ) -> None:
     assert BEHIND_TWO.client(peer, forwarded) == client
@@ -60,7 +60,7 @@ def test_the_client_is_the_nearest_that_no_trusted_proxy_stands_for(
 
 
 @given(st.lists(st.text(max_size=20), max_size=5))
-def test_no_claim_breaks_anything_nor_makes_a_stranger_another(lines: list[str]) -> None:
+def test_a_forged_header_breaks_nothing_and_does_not_change_the_client(lines: list[str]) -> None:
     assert BEHIND_TWO.client("203.0.113.5", lines) == "203.0.113.5"
     assert isinstance(BEHIND_TWO.client("10.0.0.7", lines), str)
 
@@ -76,7 +76,7 @@ def test_no_claim_breaks_anything_nor_makes_a_stranger_another(lines: list[str])
         ("http", ["gopher"], "http"),
     ],
 )
-def test_the_scheme_is_the_nearest_proxys_word(kind: str, lines: list[str], scheme: str) -> None:
+def test_the_scheme_is_that_of_the_nearest_proxy(kind: str, lines: list[str], scheme: str) -> None:
     headers = [(b"x-forwarded-proto", line.encode()) for line in lines]
     assert seen(BEHIND_TWO, kind=kind, headers=headers)["scheme"] == scheme
     assert seen(BEHIND_TWO, client=("6.6.6.6", 9), headers=headers)["scheme"] == "http"
@@ -98,14 +98,14 @@ def test_a_proxy_is_an_address_or_a_network(proxy: str) -> None:
 @pytest.mark.parametrize(
     ("path", "whole"),
     [
-        ("/gh1/api/state", "/gh1/api/state"),  # a proxy that leaves it on
-        ("/api/state", "/gh1/api/state"),  # one that cuts it off
+        ("/gh1/api/state", "/gh1/api/state"),  # a proxy that keeps it
+        ("/api/state", "/gh1/api/state"),  # a proxy that strips it
         ("/gh1", "/gh1"),
         ("/", "/gh1/"),
         ("/gh12", "/gh1/gh12"),
     ],
 )
-def test_the_prefix_may_be_cut_off_or_not(path: str, whole: str) -> None:
+def test_the_prefix_may_be_stripped_or_kept(path: str, whole: str) -> None:
     scope = seen(Proxies(path_prefix="/gh1"), path)
     assert (scope["path"], scope["root_path"]) == (whole, "/gh1")
     assert path_of(scope) == whole.removeprefix("/gh1")
@@ -120,7 +120,7 @@ def test_a_prefix_is_a_path(prefix: str) -> None:
 @pytest.mark.parametrize(
     "prefix", ["gh1", "/", "/gh1/", "//gh1", "/gh 1", "/..", "/a/./b", "/a?b", "http://x/gh1", "/ä"]
 )
-def test_what_is_no_path_is_refused(prefix: str) -> None:
+def test_an_invalid_path_is_refused(prefix: str) -> None:
     with pytest.raises(
         SettingError, match=r"--path-prefix is .* must be a path such as /gh1"
     ) as it:
@@ -148,7 +148,7 @@ def status(live: Served, address: str, **headers: str) -> int:
         return client.get("/api/state", headers={**BEARER, **named}).status_code
 
 
-def test_the_scheme_in_origins_and_cookies_is_the_proxys(live: Served) -> None:
+def test_origins_and_cookies_use_the_scheme_of_the_proxy(live: Served) -> None:
     ours = {"Host": "twin.example", "Origin": "https://twin.example"}
     assert status(live, PROXY, X_Forwarded_Proto="https", **ours) == 200
     assert status(live, PROXY, X_Forwarded_Proto="http", **ours) == 403
@@ -164,7 +164,7 @@ def test_the_scheme_in_origins_and_cookies_is_the_proxys(live: Served) -> None:
         assert "Secure" not in answer.headers["set-cookie"]
 
 
-def test_everything_is_found_with_the_prefix_and_without(live: Served) -> None:
+def test_every_route_is_served_with_the_prefix_and_without(live: Served) -> None:
     for prefix in ("", "/gh1"):
         assert live.get(f"{prefix}/healthz").status_code == 200
         assert live.get(f"{prefix}/api/state").status_code == 401
@@ -176,14 +176,14 @@ def test_everything_is_found_with_the_prefix_and_without(live: Served) -> None:
     assert live.get("/gh1/gh1/healthz", BEARER).status_code == 404
 
 
-def test_what_leads_elsewhere_stays_below_the_prefix(live: Served) -> None:
+def test_redirects_and_links_stay_below_the_prefix(live: Served) -> None:
     page = {"Accept": "text/html"}
     for path, location in (("/", "signin"), ("/gh1/a/b", "../signin")):
         assert live.get(path, page).headers["location"] == location
     assert live.get("/gh1", BEARER).headers["location"].endswith("/gh1/")
 
 
-# --- whom a proxy names ---------------------------------------------------------------------------
+# --- names from a proxy ---------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -208,7 +208,7 @@ def who(live: Served, address: str, *headers: tuple[str, str]) -> str:
     return f"{body['name']} {body['role']}"
 
 
-def test_a_name_is_believed_of_the_proxy_and_of_nobody_else(behind: Served) -> None:
+def test_only_the_proxys_user_header_is_trusted(behind: Served) -> None:
     anna = ("Remote-User", "anna@example.org")
     assert who(behind, PROXY, anna) == "anna@example.org operator"
     assert who(behind, PROXY, ("remote-user", "new@example.org")) == "new@example.org viewer"
@@ -219,7 +219,7 @@ def test_a_name_is_believed_of_the_proxy_and_of_nobody_else(behind: Served) -> N
     assert who(behind, PROXY) == "401", "who has not signed in there"
 
 
-def test_what_a_client_adds_to_the_proxys_word_names_nobody(behind: Served) -> None:
+def test_a_user_header_that_the_client_adds_is_ignored(behind: Served) -> None:
     anna = ("Remote-User", "anna@example.org")
     assert who(behind, PROXY, anna, ("Remote-User", "boss")) == "401"
     assert who(behind, PROXY, anna, anna) == "401"
@@ -227,7 +227,7 @@ def test_what_a_client_adds_to_the_proxys_word_names_nobody(behind: Served) -> N
         assert who(behind, PROXY, ("Remote-User", name)) == "401", name
 
 
-def test_the_settings_of_a_proxy_go_together() -> None:
+def test_proxy_settings_that_depend_on_each_other_are_checked_together() -> None:
     assert "no proxy is trusted" in refused_start("--proxy-user-header", "Remote-User")
     wrong = refused_start("--proxy-user-header", "a b", "--trusted-proxy", PROXY)
     assert "must be a header's name" in wrong

@@ -1,4 +1,4 @@
-"""What holds for every answer of a live bridge: reads only, and the security headers."""
+"""What holds for every answer of a live bridge: no writing, and the security headers."""
 
 from collections.abc import Iterator
 
@@ -18,7 +18,7 @@ SENSOR = {"sensor_type": "co2"}
 OF_SENSOR = {f"/api/estimate/{name}" for name in ("advice", "quality", "tags")}
 POSTED = ("/api/signin", "/api/signout")
 SERIES = {"tag_id": "7", "sensor_type": "co2"}
-# Without an end, a period ends now, and so says the name of its file: to the second.
+# Without an end, a period ends now, and its file name contains that second.
 PERIOD = {"from": "1", "to": "5"}
 PAST = {"/api/history": SERIES, "/api/timeline": {}, "/api/export.csv": {}}
 
@@ -43,14 +43,14 @@ def test_head_is_get_without_the_body(live: Bridge, path: str) -> None:
     got, head = (ask(live, method, path) for method in ("GET", "HEAD"))
     assert (got.status_code, head.status_code, head.content) == (200, 200, b"")
     assert got.content
-    # What else there is goes by the moment: lengths, ETags, names of files.
+    # The other headers depend on the time: lengths, ETags, file names.
     for name in ("content-type", "cache-control", "vary"):
         assert head.headers.get(name) == got.headers.get(name), name
 
 
 @pytest.mark.parametrize("path", [*(path for path in PATHS if path != "/api/notes"), *ELSEWHERE])
 @pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE", "BREW"])
-def test_anything_but_a_read_is_refused(live: Bridge, path: str, method: str) -> None:
+def test_any_method_but_a_read_is_refused(live: Bridge, path: str, method: str) -> None:
     answer = ask(live, method, path)
     assert answer.status_code == 405
     assert answer.headers["allow"] == "GET, HEAD"
@@ -59,7 +59,7 @@ def test_anything_but_a_read_is_refused(live: Bridge, path: str, method: str) ->
 
 
 @pytest.mark.parametrize("path", POSTED)
-def test_signing_in_and_out_is_posted_with_a_header_that_no_form_can_send(
+def test_signing_in_and_out_needs_post_with_a_header_that_no_form_can_send(
     live: Bridge, path: str
 ) -> None:
     for method in ("GET", "HEAD", "PUT", "DELETE", "OPTIONS"):

@@ -1,4 +1,4 @@
-"""TLS: bad files are told before anything starts, and good ones make https and wss."""
+"""TLS: bad files are reported at the start, and good ones serve https and wss."""
 
 import signal
 import socket
@@ -49,7 +49,7 @@ def refusal(cert: Path, key: Path) -> str:
 # --- the files ----------------------------------------------------------------------------------
 
 
-def test_a_pair_that_cannot_be_served_is_named(ours: Certificate, tmp_path: Path) -> None:
+def test_a_pair_of_files_that_cannot_be_served_is_named(ours: Certificate, tmp_path: Path) -> None:
     nowhere, odd = tmp_path / "nowhere.pem", tmp_path / "odd.pem"
     assert refusal(nowhere, ours.key) == f"--tls-cert {nowhere}: No such file or directory"
     assert refusal(ours.cert, nowhere) == f"--tls-key {nowhere}: No such file or directory"
@@ -61,7 +61,7 @@ def test_a_pair_that_cannot_be_served_is_named(ours: Certificate, tmp_path: Path
     assert f"--tls-key {odd} is not a usable private key" in refusal(ours.cert, odd)
     other = certificate(tmp_path)
     assert refusal(ours.cert, other.key) == f"--tls-key {other.key} is not the key of {ours.cert}"
-    # Without asking the terminal.
+    # Without a prompt on the terminal.
     key = load_pem_private_key(ours.key.read_bytes(), None)
     odd.write_bytes(
         key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, BestAvailableEncryption(b"secret"))
@@ -86,10 +86,10 @@ def test_https_and_wss_are_served_and_announced(secure: Served, ours: Certificat
             assert connection.next_state()["seq"] == first + number
 
 
-def test_who_asks_in_one_piece_with_the_end_of_the_handshake_is_not_cut_off(
+def test_a_request_in_the_same_packet_as_the_end_of_the_handshake_is_answered(
     ours: Certificate,
 ) -> None:
-    """As a quick client does: the server's tickets are still unsent when the request comes."""
+    """As a fast client sends it: the server's tickets are still unsent when the request arrives."""
     with served(*ours.options, *limits(client_timeout_s=2), trust=ours.trust) as live:
         address = urlsplit(live.url)
         incoming, outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
@@ -119,12 +119,12 @@ def test_who_asks_in_one_piece_with_the_end_of_the_handshake_is_not_cut_off(
         assert "cut off" not in live.process.output
 
 
-def test_the_own_origin_is_https_and_the_cookie_never_leaves_tls(secure: Served) -> None:
+def test_the_bridges_own_origin_is_https_and_its_cookie_is_secure(secure: Served) -> None:
     for origin, status in ((secure.url, 200), (secure.url.replace("https", "http"), 403)):
         assert secure.get("/api/state", {**BEARER, "Origin": origin}).status_code == status
     cookie = secure.post("/api/signin", BEARER).headers["set-cookie"]
     assert "secure" in [part.strip().lower() for part in cookie.split(";")]
-    # A certificate that may be self-signed is not nailed down in a browser.
+    # No HSTS: a self-signed certificate must not be pinned in a browser.
     assert "strict-transport-security" not in secure.get("/signin").headers
 
 
@@ -141,7 +141,7 @@ def test_old_versions_of_tls_are_refused(secure: Served, ours: Certificate) -> N
 
 
 def renew(ours: Certificate, folder: Path) -> Certificate:
-    """Put a new pair into the place of the one that is served."""
+    """Replace the served pair by a new one."""
     folder.mkdir()
     new = certificate(folder)
     new.key.replace(ours.key)
@@ -150,7 +150,7 @@ def renew(ours: Certificate, folder: Path) -> Certificate:
 
 
 def put(path: Path, content: bytes) -> None:
-    """Put a file in another's place at once: the bridge looks every two seconds, in between too."""
+    """Replace a file atomically: the bridge checks every two seconds, also in between."""
     new = path.with_name("new")
     new.write_bytes(content)
     new.replace(path)
@@ -164,9 +164,7 @@ def is_trusted(live: Served, trust: ssl.SSLContext) -> bool:
 
 
 @pytest.mark.parametrize("is_told", [True, False])
-def test_a_new_pair_is_served_to_whoever_connects_from_now_on(
-    tmp_path: Path, is_told: bool
-) -> None:
+def test_a_renewed_pair_is_served_to_every_new_connection(tmp_path: Path, is_told: bool) -> None:
     old = certificate(tmp_path)
     with (
         served(*old.options, trust=old.trust) as live,
@@ -181,7 +179,7 @@ def test_a_new_pair_is_served_to_whoever_connects_from_now_on(
         wait_for(lambda: is_trusted(live, new.trust), "the new certificate")
         assert not is_trusted(live, old.trust)
         assert live.process.output.count("new connections use the renewed TLS certificate") == 1
-        # Who was there before goes on.
+        # Open connections go on.
         now_s = kept.get("/api/state").json()["header"]["stamp"]["sec"]
         wait_for(
             lambda: connection.next_state()["state"]["header"]["stamp"]["sec"] > now_s,
@@ -190,7 +188,9 @@ def test_a_new_pair_is_served_to_whoever_connects_from_now_on(
         assert kept.get("/healthz").status_code == 200
 
 
-def test_a_broken_new_pair_is_told_once_and_the_old_one_goes_on(tmp_path: Path) -> None:
+def test_a_broken_new_pair_is_logged_once_and_the_old_one_served(
+    tmp_path: Path,
+) -> None:
     ours = certificate(tmp_path)
     key = ours.key.read_bytes()
     with served(*ours.options, trust=ours.trust) as live:

@@ -1,4 +1,4 @@
-"""The board, a page of its alarms, and what people said, joined to them."""
+"""The board of alarms, the alarms of a page, and the notes that people added."""
 
 import random
 from dataclasses import replace
@@ -25,7 +25,7 @@ from tests.support.seen import Alarms, alarm
 A, B = alarm("a"), alarm("b", raised_ns=2)
 
 
-def test_a_change_is_told_once_it_is_made() -> None:
+def test_a_change_is_reported_after_the_board_has_it() -> None:
     board, told = Alarms(), list[tuple[Change, int]]()
     board.show([A], is_past=True)
     board.on_change = lambda change: told.append((change, board.now.number))
@@ -35,7 +35,7 @@ def test_a_change_is_told_once_it_is_made() -> None:
     assert (board.now.alarms, board.now.active) == ((cleared, B), (B,))
 
 
-def test_the_same_again_is_no_change_and_another_source_is() -> None:
+def test_the_same_alarms_are_no_change_but_another_source_is_one() -> None:
     board, heard = Alarms(), list[Change]()
     board.show([A])
     board.on_change, number = heard.append, board.now.number
@@ -45,7 +45,7 @@ def test_the_same_again_is_no_change_and_another_source_is() -> None:
     assert (heard, board.now.number) == ([Change(())], number + 1)
 
 
-def test_those_that_are_active_come_before_worse_ones_that_are_over() -> None:
+def test_active_alarms_come_before_worse_ones_that_are_over() -> None:
     over, still = alarm(cleared_ns=9), alarm("b", Verdict.STRESSED)
     worst = alarm("c")
     assert sorted([over, still, worst], key=active_first) == [worst, still, over]
@@ -89,7 +89,7 @@ def test_a_page_has_all_in_their_order_and_a_change_is_what_differs(seed: int) -
         assert {it.id for it in change.changed} == {
             name for name, it in known.items() if was.get(name) != it
         }
-        # What is old falls out without a word; what never was is said to be none.
+        # Old alarms are dropped silently. Alarms that turn out never to have been are withdrawn.
         assert {it.id for it in change.withdrawn} == {
             name
             for name, it in was.items()
@@ -98,7 +98,7 @@ def test_a_page_has_all_in_their_order_and_a_change_is_what_differs(seed: int) -
         before = page
 
 
-def test_changes_are_told_in_the_order_in_which_they_happened_and_what_stays_is_not() -> None:
+def test_changes_are_reported_in_the_order_in_which_they_happened_without_the_unchanged() -> None:
     first, second = alarm("a", raised_ns=3), alarm("b", raised_ns=5)
     before = board_of([second, first])
     assert change_between(before, board_of([first, second])) == Change(())
@@ -108,7 +108,7 @@ def test_changes_are_told_in_the_order_in_which_they_happened_and_what_stays_is_
     assert page.alarms == (third, cleared, first)
 
 
-def test_what_its_tag_has_had_too_many_since_was_all_the_same() -> None:
+def test_an_alarm_suppressed_for_its_tags_many_alarms_is_reported_unchanged() -> None:
     many = [
         replace(alarm("a", raised_ns=number), id=str(number), cleared_at_ns=number + 1)
         for number in range(MAX_EPISODES + 1)
@@ -126,7 +126,7 @@ def test_the_worst_come_first() -> None:
     assert board_of(many).worst == tuple(reversed(many))[:MAX_WORST]
 
 
-# --- what people said of alarms -------------------------------------------------------------------
+# --- notes on alarms ------------------------------------------------------------------------------
 
 NOW = 10**18
 HOUR = 3_600 * 10**9
@@ -135,7 +135,7 @@ SHELF = Note("1", NOW, "anna", SHELVE, "alarm:a", "heater", NOW + HOUR)
 SEEN = Note("0", NOW, "bert", ACKNOWLEDGE, "alarm:a")
 
 
-def test_who_acknowledged_and_who_shelved_until_when_is_told_and_nothing_else() -> None:
+def test_an_alarm_shows_who_acknowledged_it_and_who_shelved_it_until_when() -> None:
     said = [SEEN, SHELF]
     found = alarm_json(COLD, notes_of_alarms([COLD], said, NOW).get("a"))
     assert {name: value for name, value in found.items() if "_by" in name} == {
@@ -149,7 +149,7 @@ def test_who_acknowledged_and_who_shelved_until_when_is_told_and_nothing_else() 
     assert notes_of_alarms([COLD], said, None) == {}
 
 
-def test_a_shelf_ends_in_its_time_by_a_later_word_and_by_withdrawal() -> None:
+def test_a_shelf_ends_at_its_time_or_by_a_later_note_or_by_withdrawal() -> None:
     assert "a" in notes_of_alarms([COLD], [SHELF], NOW + HOUR - 1)
     assert notes_of_alarms([COLD], [SHELF], NOW + HOUR) == {}
     ended = Note("2", NOW, "bert", SHELVE, "alarm:a")
@@ -158,7 +158,7 @@ def test_a_shelf_ends_in_its_time_by_a_later_word_and_by_withdrawal() -> None:
 
 
 @pytest.mark.parametrize("said", [SHELF, SEEN], ids=["shelved", "acknowledged"])
-def test_what_was_said_ends_when_its_alarm_gets_worse_and_what_is_said_from_then_on_holds(
+def test_notes_end_when_their_alarm_gets_worse_and_later_ones_hold(
     said: Note,
 ) -> None:
     bad = replace(COLD.reason, verdict=Verdict.CRITICAL)
@@ -169,7 +169,7 @@ def test_what_was_said_ends_when_its_alarm_gets_worse_and_what_is_said_from_then
     assert "a" in notes_of_alarms([worse], [said, again], NOW + 2)
 
 
-def test_what_comes_back_is_shelved_too_unless_it_is_worse_or_another_thing() -> None:
+def test_an_alarm_that_comes_back_stays_shelved_unless_it_is_worse_or_of_another_kind() -> None:
     again = replace(COLD, id="b")
     worse = replace(again, reason=replace(COLD.reason, verdict=Verdict.CRITICAL))
     warm = replace(again, reason=replace(COLD.reason, value=40.0, limit=30.0))

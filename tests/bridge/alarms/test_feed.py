@@ -1,4 +1,4 @@
-"""The feed of alarms by itself; `test_live_notes` has it in `serve` and in `web`."""
+"""The feed of alarms by itself. `test_live_notes` covers it in `serve` and in `web`."""
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -29,7 +29,7 @@ def without_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Journal:
-    """As much of a source as the feed asks: writes that a test makes up."""
+    """The part of a source that the feed uses: writes that a test makes up."""
 
     def __init__(self) -> None:
         self.workers = Workers("test")
@@ -39,11 +39,11 @@ class Journal:
         self.written = 0
 
     def journal(self) -> Condition:
-        """How many it has written, of which `told` need not know."""
+        """The number of writes in the log. `told`, the reported number, may be lower."""
         return Condition(JournalState.RECORDING, written=self.written)
 
     async def writes(self, request: WritesRequest) -> PastWrites:
-        """The next of them."""
+        """The next write of the log."""
         self.asked += 1
         if self.is_removed:
             raise TwinUnavailableError("no twin offers /twin/get_writes")
@@ -82,14 +82,12 @@ async def following() -> AsyncIterator[tuple[AlarmFeed, AlarmBoard, Journal]]:
 
 
 async def changed(board: AlarmBoard) -> None:
-    """The next change of the board."""
+    """Wait for the next change of the board."""
     number = board.now.number
     await until(lambda: board.now.number > number, "the next change")
 
 
-async def test_it_reads_the_past_once_then_what_is_new_and_another_journal_from_its_beginning() -> (
-    None
-):
+async def test_it_reads_the_past_once_then_new_writes_and_a_new_journal_whole() -> None:
     async with following() as (feed, board, source):
         source.writes_now = [pest(number, number % 2) for number in range(1, 1_200)]
         heard: list[Change] = []
@@ -117,7 +115,7 @@ async def test_it_reads_the_past_once_then_what_is_new_and_another_journal_from_
         assert [alarm.worst for alarm in board.now.alarms] == [4.0]
 
 
-async def test_an_error_over_a_silence_does_not_end_the_alarms() -> None:
+async def test_an_error_in_a_silence_does_not_end_the_alarms() -> None:
     async with following() as (feed, board, source):
 
         def fail_once(_: Change) -> None:
@@ -133,12 +131,12 @@ async def test_an_error_over_a_silence_does_not_end_the_alarms() -> None:
         assert len(board.now.active) == 2
 
 
-async def test_what_is_written_is_read_also_where_the_state_stays_as_it_is() -> None:
+async def test_writes_are_read_also_when_the_state_does_not_change() -> None:
     async with following() as (feed, board, source):
         source.writes_now, source.written = [pest(1, 2)], 1
         feed.on_state(told(1))
         await changed(board)
-        # Once more it asks by itself, for a disk that is slow; then it has to be woken.
+        # For a slow disk the feed reads once more by itself. After that it has to be woken.
         feed._ask_again(1_000_000.0)
         source.writes_now += [pest(2, 0), pest(3, 0)]
         source.written = 3
@@ -147,7 +145,7 @@ async def test_what_is_written_is_read_also_where_the_state_stays_as_it_is() -> 
         assert board.now.active == ()
 
 
-async def test_what_is_older_than_what_is_kept_is_counted_and_told(
+async def test_writes_older_than_the_window_are_counted_and_reported(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     defaults = alarm_fold.AlarmFolder.__init__.__kwdefaults__
@@ -167,7 +165,7 @@ async def test_what_is_older_than_what_is_kept_is_counted_and_told(
     assert "too late for its alarms" in caplog.text
 
 
-async def test_a_twin_that_is_gone_answers_nothing_and_is_an_alarm_beside_those_of_before() -> None:
+async def test_a_missing_twin_adds_its_alarm_to_those_of_before() -> None:
     async with following() as (feed, board, source):
         source.writes_now = [pest(1, 2)]
         feed.on_state(told(1))
@@ -183,7 +181,7 @@ async def test_a_twin_that_is_gone_answers_nothing_and_is_an_alarm_beside_those_
         assert [alarm.reason.kind for alarm in board.now.active] == ["pest"]
 
 
-async def test_alarms_that_a_journal_has_not_confirmed_for_long_are_not_told_as_all_there_is(
+async def test_alarms_that_the_journal_has_long_not_confirmed_are_reported_as_incomplete(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("lupin_bridge.alarms.feed.UNANSWERED_S", 0.0)
@@ -203,7 +201,7 @@ async def test_alarms_that_a_journal_has_not_confirmed_for_long_are_not_told_as_
         assert (board.now.source, len(board.now.alarms)) == ("journal", 1)
 
 
-async def test_without_a_journal_states_tell_and_a_silent_twin_is_one_alarm_of_the_house() -> None:
+async def test_without_a_journal_states_raise_alarms_and_a_silent_twin_is_one() -> None:
     async with following() as (feed, board, source):
         feed.on_state(told(3, journal=Condition(JournalState.FAILING)))
         await changed(board)
@@ -220,7 +218,7 @@ async def test_without_a_journal_states_tell_and_a_silent_twin_is_one_alarm_of_t
         assert (over.id, over.cleared_at_ns) == (silent.id, NOW)
 
 
-async def test_a_state_as_of_when_a_site_was_heard_last_withdraws_no_silence_since() -> None:
+async def test_a_state_from_before_a_silence_does_not_withdraw_it() -> None:
     async with following() as (feed, board, source):
         source.writes_now = [pest(1, 2)]
         feed.on_state(told(1))
@@ -247,7 +245,7 @@ def after(store: TwinStore, *writes: Scan | Inspection) -> Snapshot:
     return store.snapshot(NOW, "map")
 
 
-def test_what_is_new_is_told_once_in_the_order_of_time_and_numbered() -> None:
+def test_new_alarms_are_reported_once_in_the_order_of_time_and_numbered() -> None:
     store = TwinStore()
     pest = Flower(species="tulip", confidence=0.9, anomaly=True, bug_count=3)
     first = after(

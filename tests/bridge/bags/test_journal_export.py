@@ -1,4 +1,4 @@
-"""A period of a journal as a recording, and what a twin knows that hears it."""
+"""A period of a journal as a recording, and the state of a twin that receives it."""
 
 from contextlib import closing
 from dataclasses import replace
@@ -36,7 +36,7 @@ ROWS: list[Write] = [
     look("8", NOW + SECOND, anomaly=True),
     scan("7", NOW + 2 * SECOND, temperature=21.0, light=float("nan")),
     replace(FAILED_LOOK, arrival_ns=NOW + 2000),
-    # Late, and of a robot whose clock goes ahead: by which it does not count.
+    # Late, and from a robot whose clock is ahead: such a clock does not count.
     replace(scan("8", NOW + SECOND), own_stamp_ns=NOW * 3),
     replace(scan("8", NOW + 3 * SECOND), readings=(), status=1, status_detail="no way"),
     look("7", NOW + 4 * SECOND),
@@ -65,7 +65,7 @@ def exported(
 
 
 def fed(target: Path) -> tuple[dict[str, str], list[str]]:
-    """The tags of a fresh twin that hears a recording, and what it writes of observations."""
+    """The tags of a new twin that receives a recording, and its journal's observations."""
     store, repeats, written = TwinStore(), Repeats(), list[str]()
     for topic, log_ns, _, data in read(target):
         if topic == "/floranova/observations":
@@ -83,7 +83,7 @@ def fed(target: Path) -> tuple[dict[str, str], list[str]]:
 
 
 def by_id(tags: tuple[TagState, ...]) -> dict[str, str]:
-    """By their ids, and NaN comparable; in which order a tag's sensors came is not told."""
+    """By their ids, with NaN comparable. A recording does not keep the order of a tag's sensors."""
     return {
         tag.tag_id: repr(replace(tag, readings=tuple(sorted(tag.readings, key=lambda r: r.name))))
         for tag in tags
@@ -91,7 +91,7 @@ def by_id(tags: tuple[TagState, ...]) -> dict[str, str]:
 
 
 @pytest.mark.parametrize(("until_s", "lot"), [(0, 2_000), (2, 3), (5, 2), (7, 1)])
-def test_who_hears_it_knows_what_the_journal_says_of_its_end(
+def test_a_twin_that_receives_the_recording_has_the_state_at_its_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, until_s: int, lot: int
 ) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
@@ -112,7 +112,7 @@ def test_who_hears_it_knows_what_the_journal_says_of_its_end(
     ]
 
 
-def test_other_programs_learn_types_and_qos_from_the_file(tmp_path: Path) -> None:
+def test_types_and_qos_are_read_from_the_file(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     kept(path, [scan("7", 60 * SECOND)], SIMULATED)
     exported(path, target)
@@ -132,7 +132,7 @@ def test_other_programs_learn_types_and_qos_from_the_file(tmp_path: Path) -> Non
         }
 
 
-def test_a_period_begins_with_the_places_of_before(tmp_path: Path) -> None:
+def test_a_recording_begins_with_the_earlier_positions(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     kept(path, ROWS)
     made = exported(path, target, NOW + 4 * SECOND, NOW + 6 * SECOND, namespace="/house/")
@@ -148,7 +148,7 @@ def test_a_period_begins_with_the_places_of_before(tmp_path: Path) -> None:
     assert made == (1, 2)
 
 
-def test_simulated_time_is_told_by_the_clock(tmp_path: Path) -> None:
+def test_simulated_time_comes_with_a_clock_topic(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     row = scan("7", 60 * SECOND)
     late = replace(scan("7", 61 * SECOND), arrival_ns=65 * SECOND)
@@ -159,11 +159,11 @@ def test_simulated_time_is_told_by_the_clock(tmp_path: Path) -> None:
     time = convert.nanoseconds(deserialize_message(data, ClockMessage).clock)
     assert row.stamp_ns <= time <= row.stamp_ns + SECOND
     assert observation[:2] == ("/floranova/observations", row.arrival_ns)
-    # Not when it was observed, but when it was heard: a clock does not go back.
+    # By arrival, not by observation: a clock does not go back.
     assert convert.nanoseconds(deserialize_message(later, ClockMessage).clock) == 65 * SECOND
 
 
-def test_what_comes_while_it_is_read_is_read_too(
+def test_writes_during_the_export_are_exported_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, later = tmp_path / "j.sqlite", scan("10", NOW + 9 * SECOND, light=1.0)
@@ -176,7 +176,7 @@ def test_what_comes_while_it_is_read_is_read_too(
         assert [*first, *(row for _, row in reading)] == [*ROWS[:4], later]
 
 
-def test_of_an_earlier_run_the_places_are_known(tmp_path: Path) -> None:
+def test_positions_from_an_earlier_run_are_exported(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     again = Clock(50 * SECOND, NOW + 60 * SECOND, is_simulated=True)
     row = replace(scan("7", 60 * SECOND), arrival_ns=NOW + 70 * SECOND)
@@ -192,7 +192,7 @@ def test_of_an_earlier_run_the_places_are_known(tmp_path: Path) -> None:
     ]
 
 
-def test_of_nothing_or_a_part_no_file_is_left_and_none_is_overwritten(tmp_path: Path) -> None:
+def test_an_empty_or_failed_export_leaves_no_file_and_overwrites_none(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     kept(path, ROWS)
     assert exported(path, target, 0, NOW) == (0, 0)
@@ -202,7 +202,7 @@ def test_of_nothing_or_a_part_no_file_is_left_and_none_is_overwritten(tmp_path: 
         exported(path, target)
     assert target.read_bytes() == b"mine"
     target.unlink()
-    # Room for what SQLite has beside a journal that is read, 32 KiB, and not for all of it.
+    # Room for SQLite's 32 KiB beside a journal that is read, but not for the recording.
     kept(path, [scan("7", NOW + 9 * SECOND + n, temperature=float(n)) for n in range(2_000)])
     with no_file_above(45_000), pytest.raises(OSError, match="File too large"):
         exported(path, target)

@@ -1,4 +1,4 @@
-"""`demo --from`: what the page shows of a recording that is played, by real processes over DDS."""
+"""`demo --from`: what the page shows of a played recording, with real processes over DDS."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,7 +30,7 @@ def time_of(frame: Any) -> int:
 
 @contextmanager
 def demo_of(domain: int, *words: object) -> Iterator[tuple[Process, Listener]]:
-    """A demo of recordings and what it shows; of its journal and its player nothing is left."""
+    """A demo of recordings. It deletes its journal and its player at the end."""
     folder = Path(str(words[0])).parent
     with (
         lupin_twin(domain, "demo", "--from", *map(str, words), TMPDIR=str(folder)) as demo,
@@ -44,7 +44,7 @@ def demo_of(domain: int, *words: object) -> Iterator[tuple[Process, Listener]]:
         assert not any(map(is_running, players))
 
 
-def test_silences_are_announced_and_jumped_over_on_request(domain: int, tmp_path: Path) -> None:
+def test_silences_are_reported_and_skipped_on_request(domain: int, tmp_path: Path) -> None:
     sent = [seen("before", 5_000.0), seen("after", 5_000.0 + DAY_S)]
     path = write_bag(tmp_path / "run.mcap", sent)
     with demo_of(domain, path) as (demo, screen):
@@ -55,10 +55,10 @@ def test_silences_are_announced_and_jumped_over_on_request(domain: int, tmp_path
         assert time_of(last) >= 5_000 + DAY_S
 
 
-def test_what_came_before_the_start_is_known_and_of_maps_the_last(
+def test_with_a_start_time_earlier_positions_and_the_last_map_are_known(
     domain: int, tmp_path: Path
 ) -> None:
-    """More observations than the 50 that a publisher keeps."""
+    """More observations than the 50 that a publisher stores."""
     names = {f"early {number}" for number in range(70)}
     sent = [seen(name, 5_000.0 + number) for number, name in enumerate(sorted(names))]
     sent += [Sent("/map", 5_000.0 + it, occupancy_grid([[0] * (it + 1)])) for it in range(3)]
@@ -72,7 +72,7 @@ def test_what_came_before_the_start_is_known_and_of_maps_the_last(
 
 
 def test_a_recorded_clock_is_the_time(domain: int, tmp_path: Path) -> None:
-    """Though everything was recorded by another clock; and at the end the time stands."""
+    """The other stamps are from another clock. At the end of the recording, time stops."""
     sent = [Sent("/clock", 90_000.0 + it, Clock(clock=Time(sec=5_000 + it))) for it in range(20)]
     sent.append(Sent(OBSERVATIONS, 90_010.5, scan("1", {"co2": 1.0}, stamp_s=5_010.0)))
     path = write_bag(tmp_path / "run.mcap", sorted(sent, key=lambda it: it.at_s))
@@ -88,7 +88,7 @@ def test_a_recorded_clock_is_the_time(domain: int, tmp_path: Path) -> None:
         assert len(list(tmp_path.glob("lupin-twin-*/journal.sqlite"))) == 1
 
 
-def test_a_clock_that_tells_no_time_is_named_with_its_file(tmp_path: Path) -> None:
+def test_a_clock_topic_without_times_is_named_with_its_file(tmp_path: Path) -> None:
     told = b"\0\1\0\0" + b"1111"
     sent = [Sent("/clock", 5_000.0, Clock(clock=Time(sec=0x31313131))), seen("a", 5_002.0)]
     path = write_bag(tmp_path / "run.mcap", sent, is_chunked=False)
@@ -101,8 +101,8 @@ def test_a_clock_that_tells_no_time_is_named_with_its_file(tmp_path: Path) -> No
         Player(recording, None, parser().parse_args([str(path), "--start", "1"]))  # type: ignore[arg-type]  # it comes to no node
 
 
-def test_a_loop_begins_again_with_nothing_of_what_is_to_come(domain: int, tmp_path: Path) -> None:
-    """Of files in any order, and of a topic that has another name here."""
+def test_a_loop_starts_again_without_later_data(domain: int, tmp_path: Path) -> None:
+    """With files in any order, and a topic that is renamed."""
     later = write_bag(tmp_path / "run_1.mcap", [seen("b", 5_020.0, "/gh1/seen")])
     first = write_bag(tmp_path / "run.mcap", [seen("a", 5_000.0, "/gh1/seen")])
     with demo_of(domain, later, first, "--loop", "--speed", "5") as (_, screen):
@@ -112,7 +112,7 @@ def test_a_loop_begins_again_with_nothing_of_what_is_to_come(domain: int, tmp_pa
         assert screen.until("state", lambda frame: time_of(frame) < 5_010)
 
 
-def test_a_second_twin_ends_the_player_for_its_journal_would_keep_what_is_played(
+def test_a_second_twin_stops_the_player_because_its_journal_would_store_the_recording(
     domain: int, tmp_path: Path
 ) -> None:
     path = write_bag(tmp_path / "run.mcap", [seen("a", 5_000.0)])

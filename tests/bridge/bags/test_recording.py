@@ -1,4 +1,4 @@
-"""What of files and folders is played, and what is refused with a word on what to do."""
+"""Which files and folders are played, and how the others are refused with a remedy."""
 
 import os
 from collections.abc import Callable
@@ -22,10 +22,10 @@ def times(*paths: Path) -> list[int]:
 
 
 @pytest.mark.parametrize("compression", list(CompressionType))
-def test_files_and_folders_are_one_recording_in_the_order_of_time(
+def test_files_and_folders_are_played_as_one_recording_in_the_order_of_time(
     tmp_path: Path, compression: CompressionType
 ) -> None:
-    """Overlapping ones too, and of every compression that a recorder may choose."""
+    """Overlapping ones too, with every compression that a recorder supports."""
     folder = tmp_path / "part"
     folder.mkdir()
     write_bag(folder / "b.mcap", sent(2, 5, 6), compression=compression)
@@ -38,12 +38,12 @@ def test_files_and_folders_are_one_recording_in_the_order_of_time(
         assert [it.log_ns // 10**9 for it in part] == [3, 4]
 
 
-def test_a_file_without_chunks_or_without_messages_is_read_too(tmp_path: Path) -> None:
+def test_a_file_without_chunks_or_without_messages_is_read(tmp_path: Path) -> None:
     plain = write_bag(tmp_path / "plain.mcap", sent(1, 2), is_chunked=False)
     assert times(plain, write_bag(tmp_path / "empty.mcap", [])) == [1, 2]
 
 
-def test_of_several_grids_those_that_are_called_map_are_played(tmp_path: Path) -> None:
+def test_of_several_grids_only_maps_are_played(tmp_path: Path) -> None:
     grid = occupancy_grid([[0]])
     names = ["/costmap", "/gh1/map", "/local_costmap"]
     path = write_bag(tmp_path / "a.mcap", [*sent(1), *(Sent(name, 1, grid) for name in names)])
@@ -66,7 +66,7 @@ def foreign(path: Path) -> Path:
 
 
 @pytest.mark.parametrize("make", [unfinished, cut_off, foreign])
-def test_what_cannot_be_read_is_named_with_what_repairs_it(
+def test_an_unreadable_file_is_named_with_the_command_that_repairs_it(
     tmp_path: Path, make: Callable[[Path], Path]
 ) -> None:
     path = make(tmp_path / "bad.mcap")
@@ -74,7 +74,7 @@ def test_what_cannot_be_read_is_named_with_what_repairs_it(
         Recording([path])
 
 
-def test_a_flipped_byte_is_met_where_it_is(tmp_path: Path) -> None:
+def test_a_flipped_byte_is_reported_where_it_is(tmp_path: Path) -> None:
     path = write_bag(tmp_path / "a.mcap", sent(*range(200)), compression=CompressionType.NONE)
     data = bytearray(path.read_bytes())
     at = data.index(b"tag 150")
@@ -94,13 +94,13 @@ def test_a_flipped_byte_is_met_where_it_is(tmp_path: Path) -> None:
         ([Sent("/map", 1, occupancy_grid([[0]]))], "has nothing that a twin subscribes to"),
     ],
 )
-def test_what_a_twin_cannot_use_is_refused(tmp_path: Path, messages: list[Sent], why: str) -> None:
+def test_a_message_of_no_use_is_refused(tmp_path: Path, messages: list[Sent], why: str) -> None:
     path = write_bag(tmp_path / "a.mcap", messages)
     with pytest.raises(RecordingError, match=why), Recording([path]) as recording:
         _ = recording.inputs
 
 
-def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_no_recording_is_refused(tmp_path: Path) -> None:
     one = write_bag(tmp_path / "b.mcap", sent(1))
     json = write_bag(tmp_path / "a.mcap", sent(1), encoding="json")
     tags = write_bag(tmp_path / "c.mcap", [Sent(OBSERVATIONS, 1, discovered({"a": pose(1, 2)}))])
@@ -118,7 +118,7 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
             Recording(paths)
 
 
-def test_a_start_behind_the_end_is_refused(tmp_path: Path) -> None:
+def test_a_start_after_the_end_is_refused(tmp_path: Path) -> None:
     path = write_bag(tmp_path / "a.mcap", [*sent(10, 12), Sent(TAGS, 11, discovered({}))])
     with Recording([path]) as recording:
         recording.check_start(2.0)

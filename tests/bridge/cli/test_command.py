@@ -18,7 +18,7 @@ from tests.support.web import bridge
 
 @pytest.fixture
 def signals() -> Iterator[None]:
-    """The command holds signals back; the tests' own process needs them."""
+    """The command holds signals back; restore them for the test process."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
     yield
     signal.pthread_sigmask(signal.SIG_SETMASK, before)
@@ -40,7 +40,7 @@ def signals() -> Iterator[None]:
         (["serve", "--", "x"], ["serve", "--", "x"], []),
     ],
 )
-def test_what_follows_ros_args_is_ros_up_to_a_double_dash(
+def test_arguments_after_ros_args_belong_to_ros_up_to_a_double_dash(
     given_: list[str], own: list[str], ros: list[str]
 ) -> None:
     assert split_ros_args(given_) == (own, ros)
@@ -71,14 +71,14 @@ def test_a_mistake_in_the_command_line_is_named(
 # --- the process ----------------------------------------------------------------------------------
 
 
-def test_without_a_home_directory_it_serves_all_the_same(tmp_path: Path) -> None:
+def test_without_a_home_directory_it_still_serves(tmp_path: Path) -> None:
     with bridge(HOME="", ROS_LOG_DIR="", TMPDIR=str(tmp_path)) as live:
         assert live.get("/healthz").status_code == 200
 
 
-def test_a_signal_before_it_serves_is_kept_for_then(domain: int) -> None:
+def test_a_signal_before_it_serves_ends_it_once_it_serves(domain: int) -> None:
     with lupin_twin(domain, "serve", afresh=True) as process:
-        # The command holds both back from before its first slow import; see /proc/[pid]/status.
+        # The command blocks both before its first slow import; see /proc/[pid]/status.
         held_back = 1 << (signal.SIGINT - 1) | 1 << (signal.SIGTERM - 1)
         wait_for(lambda: blocked_signals(process.pid) & held_back == held_back, "them held back")
         process.send(signal.SIGINT)
@@ -87,7 +87,7 @@ def test_a_signal_before_it_serves_is_kept_for_then(domain: int) -> None:
 
 
 def blocked_signals(pid: int) -> int:
-    """The signals that a process's main thread holds back, as a bit mask."""
+    """The blocked signals of a process's main thread, as a bit mask."""
     status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
     (mask,) = [line.split()[1] for line in status.splitlines() if line.startswith("SigBlk")]
     return int(mask, 16)
@@ -100,7 +100,7 @@ LEVELS = ["debug", "info", "warning", "error"]
 
 @pytest.fixture(autouse=True)
 def untouched_root(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """`set_up` works on the root logger, which the test run has set up for itself."""
+    """`set_up` changes the root logger, which the test run uses too."""
     monkeypatch.setattr(logging.root, "handlers", [])
     monkeypatch.setattr(logging.root, "level", logging.WARNING)
     yield
@@ -110,13 +110,15 @@ def untouched_root(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.fixture
 def now_s(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The steady clock, to be set."""
+    """The steady clock, set by the test."""
     now_s = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
     return now_s
 
 
-def test_json_is_one_object_a_line_with_the_error(capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_is_one_object_a_line_with_the_error(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     command.set_up_log("json")
     log = logging.getLogger("lupin_bridge.test")
     log.info("tag %s\nsecond line", "7°")
@@ -130,11 +132,11 @@ def test_json_is_one_object_a_line_with_the_error(capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize("level", LEVELS)
-def test_what_is_below_the_level_stays_out(level: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_lines_below_the_level_are_left_out(level: str, capsys: pytest.CaptureFixture[str]) -> None:
     command.set_up_log("text", level)
     for least in LEVELS:
         logging.getLogger("lupin_bridge.test").log(getattr(logging, least.upper()), "ours")
-        # As the nodes' lines come: past every logger.
+        # As the nodes log: bypassing all loggers.
         record = logging.LogRecord("ros", getattr(logging, least.upper()), "", 0, "ros", (), None)
         logging.root.handle(record)
     logging.getLogger("asyncio").debug("a library's")
@@ -145,7 +147,7 @@ def test_what_is_below_the_level_stays_out(level: str, capsys: pytest.CaptureFix
     assert "library" not in said
 
 
-def test_each_of_our_own_errors_leaves_its_trace_and_a_strangers_bytes_leave_none(
+def test_an_error_of_our_own_has_a_traceback_and_one_from_bad_input_has_none(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     command.set_up_log("text")
@@ -162,13 +164,13 @@ def test_each_of_our_own_errors_leaves_its_trace_and_a_strangers_bytes_leave_non
 
 
 def said_by(name: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
-    """What a logger has said so far, line by line."""
+    """What a logger has written so far, line by line."""
     lines = capsys.readouterr().err.splitlines()
     return [line.partition(f" {name}: ")[2] for line in lines if f" {name}: " in line]
 
 
 @pytest.mark.parametrize("name", ["lupin_bridge.access", "lupin_twin", "lupin_web"])
-def test_of_our_own_some_are_said_at_once(
+def test_some_of_our_own_lines_are_never_rate_limited(
     name: str, now_s: list[float], capsys: pytest.CaptureFixture[str]
 ) -> None:
     command.set_up_log("text")
@@ -184,7 +186,7 @@ def test_of_our_own_some_are_said_at_once(
 
 
 @pytest.mark.parametrize("name", ["asyncio", "uvicorn.error", "websockets.server", "nobodys"])
-def test_every_librarys_words_are_rationed_whatever_numbers_stand_in_them(
+def test_library_messages_are_rate_limited_regardless_of_the_numbers_in_them(
     name: str, now_s: list[float], capsys: pytest.CaptureFixture[str]
 ) -> None:
     command.set_up_log("text")
@@ -202,7 +204,7 @@ def test_every_librarys_words_are_rationed_whatever_numbers_stand_in_them(
 
 
 @pytest.mark.usefixtures("now_s")
-def test_one_logger_has_an_end_whatever_it_thinks_of(capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_logger_is_limited_over_all_its_messages(capsys: pytest.CaptureFixture[str]) -> None:
     command.set_up_log("text")
     for number in range(10 * command.LOGGER_AT_ONCE):
         logging.getLogger("lupin_twin").warning("%s", "x" * number)

@@ -1,4 +1,4 @@
-"""Settings from the command line, the environment and a file: what comes first, what is named."""
+"""Settings from the command line, the environment and a file: precedence and error messages."""
 
 from pathlib import Path
 from typing import Any
@@ -41,10 +41,10 @@ def refusal(
     return str(refused.value)
 
 
-# --- what comes first -----------------------------------------------------------------------------
+# --- precedence -----------------------------------------------------------------------------------
 
 
-def test_the_command_line_comes_before_the_environment_that_before_the_file(config: Any) -> None:
+def test_the_command_line_overrides_the_environment_and_that_the_file(config: Any) -> None:
     path = config("port = 1\nmax_clients = 1\nreading_validity_s = 1\n")
     environment = {"LUPIN_PORT": "2", "LUPIN_MAX_CLIENTS": "2"}
     settings = settings_from({"port": "3"}, environment, path)
@@ -54,7 +54,7 @@ def test_the_command_line_comes_before_the_environment_that_before_the_file(conf
     assert settings.called("reading_validity_s") == f"{path} line 3: reading_validity_s"
 
 
-def test_a_list_is_the_first_places_alone(config: Any) -> None:
+def test_a_list_is_taken_whole_from_the_first_place_that_sets_it(config: Any) -> None:
     path = config('allow_host = ["of.the.file"]\n')
     environment = {"LUPIN_ALLOW_HOST": "one.example, two.example ,"}
     assert settings_from({}, {}, path).allow_host == ("of.the.file",)
@@ -62,7 +62,7 @@ def test_a_list_is_the_first_places_alone(config: Any) -> None:
     assert settings_from({"allow_host": ["mine"]}, environment, path).allow_host == ("mine",)
 
 
-def test_the_file_may_be_named_by_the_environment(config: Any, tmp_path: Path) -> None:
+def test_an_environment_variable_may_name_the_file(config: Any, tmp_path: Path) -> None:
     environment = {"LUPIN_CONFIG": config("port = 1\n")}
     assert settings_from({}, environment).port == 1
     assert refusal({}, environment, str(tmp_path / "no")) == (
@@ -81,7 +81,7 @@ def test_the_file_may_be_named_by_the_environment(config: Any, tmp_path: Path) -
         ("LUPIN_HOST", "", "LUPIN_HOST is '': string should have at least 1 char"),
     ],
 )
-def test_a_mistake_in_a_variable_is_named(name: str, value: str, named: str) -> None:
+def test_a_mistake_in_a_variable_names_the_variable(name: str, value: str, named: str) -> None:
     assert refusal({}, {name: value}).startswith(named)
 
 
@@ -131,7 +131,7 @@ def test_an_address_that_may_hold_a_password_is_never_repeated(
     assert "pa55" not in message
 
 
-def test_what_is_no_file_of_settings_is_named(tmp_path: Path) -> None:
+def test_an_invalid_settings_file_is_named(tmp_path: Path) -> None:
     assert refusal({}, {}, str(tmp_path)) == f"--config {tmp_path}: Is a directory"
     odd = tmp_path / "odd"
     odd.write_bytes(b"\xff")
@@ -143,7 +143,7 @@ def test_what_is_no_file_of_settings_is_named(tmp_path: Path) -> None:
     assert refusal({}, {}, "/dev/zero").endswith("has more than 65536 bytes, the limit")
 
 
-def test_a_strange_variable_is_warned_of_and_others_are_nobodys_business() -> None:
+def test_an_unknown_variable_of_ours_is_warned_about_and_others_are_ignored() -> None:
     environment = {"LUPIN_PROT": "1", "LUPIN_PORT": "1", "LUPIN_TOKEN": "", "PORT": "1"}
     (warning,) = strange_variables(environment)
     assert warning == (
@@ -155,7 +155,7 @@ def test_a_strange_variable_is_warned_of_and_others_are_nobodys_business() -> No
 
 
 @pytest.mark.parametrize("name", ["token", "mqtt_password", "webhook_secret"])
-def test_a_secret_goes_by_a_variable_that_is_taken_away_or_by_a_file(
+def test_a_secret_comes_from_a_variable_which_is_then_removed_or_from_a_file(
     name: str, tmp_path: Path
 ) -> None:
     environment = {variable(name): "of the environment", "HOME": "/"}
@@ -173,7 +173,7 @@ def test_a_secret_goes_by_a_variable_that_is_taken_away_or_by_a_file(
     assert "hunter2" not in repr(Secrets("hunter2", "hunter2", "hunter2"))
 
 
-def test_a_file_that_anyone_can_read_is_warned_of(
+def test_a_world_readable_file_causes_a_warning(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     file = tmp_path / "token"
@@ -188,7 +188,7 @@ def test_a_file_that_anyone_can_read_is_warned_of(
 # --- the process ----------------------------------------------------------------------------------
 
 
-def test_the_process_takes_all_three(config: Any, tmp_path: Path) -> None:
+def test_the_process_reads_all_three_sources(config: Any, tmp_path: Path) -> None:
     secret = tmp_path / "token"
     secret.write_text(TOKEN, encoding="ascii")
     secret.chmod(0o644)
@@ -207,7 +207,7 @@ def test_the_process_takes_all_three(config: Any, tmp_path: Path) -> None:
         assert "LUPIN_TOKEN_FILE" in live.process.wait_for_output("can read the token")
 
 
-def test_a_mistake_anywhere_ends_the_start_with_one_line(config: Any, tmp_path: Path) -> None:
+def test_any_mistake_ends_the_start_with_one_line(config: Any, tmp_path: Path) -> None:
     path = config("port = 1\nprot = 2\n")
     assert refused_start("--config", path) == (
         f"lupin-twin: {path} line 2: prot is not a setting of the bridge (did you mean port?)"

@@ -1,4 +1,4 @@
-"""`lupin-twin import`: what a CSV file has, what of it is refused, and what a journal then has."""
+"""`lupin-twin import`: how a CSV file is read, which rows are refused, and what is written."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ ROWS = """at,bench,t,rh,note
 2024-05-01T10:05:00Z,A,22.5,,wet
 1714558200,B,20.0,0.6,
 """
-# As InfluxDB 2 exports it: lines end with CRLF, the first column is empty, and series with other
-# tags have a header of their own.
+# As InfluxDB 2 exports it: CRLF line ends, an empty first column, and a header of its own for
+# each set of tags.
 ANNOTATED = """#group,false,false,true,true,false,false,true,true,true
 #datatype,string,long,dateTime:RFC3339,dateTime:RFC3339,dateTime:RFC3339,double,string,string,string
 #default,last,,,,,,,,
@@ -53,7 +53,7 @@ ANNOTATED = """#group,false,false,true,true,false,false,true,true,true
 ,,1,2024-04-01T00:00:00Z,2024-06-01T00:00:00Z,7,2024-05-01T10:00:20Z,3.1,battery,climate,A
 
 """.replace("\n", "\r\n")
-# As the history page of Home Assistant downloads it, of several entities.
+# As Home Assistant's history page exports it, with several entities.
 HISTORY = """entity_id,state,last_changed
 sensor.bench_temperature,unknown,2024-05-01T09:59:00.000Z
 sensor.bench_temperature,21.5,2024-05-01T10:00:00.000Z
@@ -65,7 +65,7 @@ light.bench,on,2024-05-01T10:00:00.000Z
 
 
 class Import:
-    """A file to be imported, and the command that does it."""
+    """A file to import, and the command that imports it."""
 
     def __init__(self, folder: Path) -> None:
         self.file = folder / "r.csv"
@@ -81,7 +81,7 @@ class Import:
         return said("import", self.file, "--map", self.map, "--journal", self.journal, *more)
 
     def written(self) -> str:
-        """What it says of what it has written."""
+        """The part of the output about what was written."""
         done = self.run("--write")
         assert done.returncode == 0, done.stderr
         return done.stdout
@@ -100,7 +100,7 @@ def importing(tmp_path: Path) -> Import:
     return Import(tmp_path)
 
 
-def test_without_write_it_says_what_it_would_do_and_does_nothing(importing: Import) -> None:
+def test_a_dry_run_reports_what_would_be_written_and_writes_nothing(importing: Import) -> None:
     done = importing.given(WIDE, ROWS).run()
     assert done.returncode == 0
     assert done.stdout.splitlines() == [
@@ -113,7 +113,7 @@ def test_without_write_it_says_what_it_would_do_and_does_nothing(importing: Impo
     assert not importing.journal.exists()
 
 
-def test_what_is_written_is_in_the_journal_once(importing: Import) -> None:
+def test_importing_twice_writes_each_row_once(importing: Import) -> None:
     importing.given(WIDE | {"places": {"A": [1.5, 2]}}, ROWS)
     assert "3 scans are new" in importing.written()
     then_ns = int(datetime(2024, 5, 1, 10, tzinfo=UTC).timestamp()) * SECOND
@@ -127,7 +127,7 @@ def test_what_is_written_is_in_the_journal_once(importing: Import) -> None:
     assert select(importing.journal, "SELECT tag, x, y FROM place") == [("A", 1.5, 2.0)]
 
 
-def test_influxdbs_annotated_export_has_tables_of_their_own_columns(importing: Import) -> None:
+def test_in_influxdbs_annotated_export_each_table_has_its_own_columns(importing: Import) -> None:
     out = importing.given(LONG, ANNOTATED).written().splitlines()
     then_ns = int(datetime(2024, 5, 1, 10, tzinfo=UTC).timestamp()) * SECOND
     assert [(row[1], row[3], row[4]) for row in importing.rows()] == [
@@ -140,7 +140,7 @@ def test_influxdbs_annotated_export_has_tables_of_their_own_columns(importing: I
     ]
 
 
-def test_home_assistants_history_names_its_entities_and_says_what_is_not_known(
+def test_home_assistants_history_names_its_entities_and_reports_what_is_unknown(
     importing: Import,
 ) -> None:
     columns = yaml.safe_load(block_named("import-home-assistant").text)
@@ -168,12 +168,12 @@ def test_home_assistants_history_names_its_entities_and_says_what_is_not_known(
         "20240501T101000Z",
     ],
 )
-def test_a_time_is_a_date_or_seconds_or_parts_of_them(importing: Import, text: str) -> None:
+def test_a_time_is_a_date_or_seconds_or_fractions_of_them(importing: Import, text: str) -> None:
     importing.given(WIDE, f"\ufeffat,bench,t,rh\n{text},A,1,\n").written()
     assert importing.rows()[0][1] == 1_714_558_200 * SECOND
 
 
-def test_what_came_before_a_twin_is_in_its_past(importing: Import) -> None:
+def test_rows_from_before_the_twin_are_in_its_past(importing: Import) -> None:
     kept(importing.journal, [scan("A", NOW, temperature=25.0)])
     importing.given(WIDE, ROWS).written()
     assert [row[5] for row in importing.rows()] == ["import"] * 3 + ["robot"]
@@ -197,7 +197,7 @@ def test_what_came_before_a_twin_is_in_its_past(importing: Import) -> None:
         ("1714558200,A\0B,1,", "a tag with NUL"),
     ],
 )
-def test_a_row_that_cannot_be_is_counted_and_named_and_the_others_come(
+def test_an_invalid_row_is_counted_and_named_and_the_others_are_imported(
     importing: Import, row: str, reason: str
 ) -> None:
     out = importing.given(WIDE, f"at,bench,t,rh\n{row}\n1714558200,B,20,0.5\n").written()
@@ -212,7 +212,7 @@ def test_more_sensors_than_a_tag_may_have_are_refused(importing: Import) -> None
     assert "refused: 6: sensors: 65, the limit is 64 (line 66, 67, 68)" in done.stdout
 
 
-def test_a_time_without_offset_is_in_the_zone_that_is_given_and_an_hour_may_come_twice(
+def test_a_time_without_offset_is_in_the_given_zone_and_an_hour_may_occur_twice(
     importing: Import,
 ) -> None:
     rows = (
@@ -242,7 +242,7 @@ def test_a_time_without_offset_is_in_the_zone_that_is_given_and_an_hour_may_come
         (WIDE, "at,bench,t,rh\n" + "," * 1_000_001, "line 2 has 1,000,000 characters or more"),
     ],
 )
-def test_what_cannot_be_imported_at_all_is_one_line(
+def test_a_file_that_cannot_be_imported_is_refused_in_one_line(
     importing: Import, columns: Any, rows: str | bytes, complaint: str
 ) -> None:
     done = importing.given(columns, rows).run("--write")
@@ -252,21 +252,21 @@ def test_what_cannot_be_imported_at_all_is_one_line(
     assert importing.rows() == []
 
 
-def test_a_journal_that_a_twin_writes_is_in_use(importing: Import) -> None:
+def test_a_journal_in_use_by_a_twin_is_refused(importing: Import) -> None:
     with closing(Lock(importing.journal, "/lupin_twin")):
         done = importing.given(WIDE, ROWS).run("--write")
     assert done.returncode == 1
     assert "is in use by /lupin_twin" in done.stderr
 
 
-def test_a_journal_of_a_simulation_is_left_alone(importing: Import) -> None:
+def test_a_journal_of_a_simulation_is_refused(importing: Import) -> None:
     kept(importing.journal, [scan("A", 5 * SECOND)], Clock(5 * SECOND, NOW, is_simulated=True))
     done = importing.given(WIDE, ROWS).run("--write")
     assert done.returncode == 1
     assert "is a simulation's: import into another one" in done.stderr
 
 
-def test_the_page_has_what_was_imported(domain: int, importing: Import) -> None:
+def test_the_page_shows_imported_rows(domain: int, importing: Import) -> None:
     columns = yaml.safe_load(block_named("import").text)
     importing.given(columns, block_named("import-rows").text).written()
     parameters = ("-p", f"journal:={importing.journal}", "-p", "journal_days:=3650")

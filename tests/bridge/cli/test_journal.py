@@ -1,4 +1,4 @@
-"""`lupin-twin journal`: which file it takes, what it says of it, and how it ends."""
+"""`lupin-twin journal`: which file it reads, what it prints, and its exit codes."""
 
 import subprocess
 import sys
@@ -19,7 +19,7 @@ from tests.support.journal import NOW, SECOND, is_whole, kept, look, pin, record
 from tests.support.processes import said
 from tests.support.waiting import PATIENCE_S, wait_for
 
-# Of a twin that starts when all of it is written.
+# Of a twin that starts after all of it was written.
 LATER = Clock(NOW + 3000 * SECOND, NOW + 3000 * SECOND, is_simulated=False)
 SIMULATED = Clock(5 * SECOND, NOW, is_simulated=True)
 
@@ -41,7 +41,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def journal(*words: object) -> CompletedProcess[str]:
-    """What `lupin-twin journal` says."""
+    """What `lupin-twin journal` prints."""
     return said("journal", *words)
 
 
@@ -54,7 +54,7 @@ def told(*words: object) -> dict[str, str]:
 # --- which file ----------------------------------------------------------------------------------
 
 
-def test_the_file_is_that_of_the_node_s_own_rule(
+def test_the_default_file_is_found_by_the_rule_of_the_node(
     monkeypatch: pytest.MonkeyPatch, home: Path
 ) -> None:
     environ = {"XDG_STATE_HOME": str(home.parent)}
@@ -77,7 +77,7 @@ def test_the_file_is_that_of_the_node_s_own_rule(
 ACTIONS = ("info", "check", "export", "vacuum")
 
 
-def test_a_file_that_is_not_there_is_named_and_not_made(tmp_path: Path, path: Path) -> None:
+def test_a_missing_file_is_named_and_not_created(tmp_path: Path, path: Path) -> None:
     before = sorted(tmp_path.iterdir())
     for action in ACTIONS:
         done = journal(action, "--journal", tmp_path / "none.sqlite")
@@ -117,7 +117,7 @@ def test_a_mistake_is_one_clear_line(words: list[str], named: str) -> None:
         ("--journal x --domain 5", "0", "--domain 5 is for a twin's own file, not with x"),
     ],
 )
-def test_a_domain_or_a_journal_that_cannot_be_is_one_clear_line(
+def test_an_invalid_domain_or_journal_is_one_clear_line(
     words: str, domain: str, named: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", domain)
@@ -126,7 +126,7 @@ def test_a_domain_or_a_journal_that_cannot_be_is_one_clear_line(
     assert named in done.stderr
 
 
-def test_a_place_that_cannot_be_looked_at_is_named(home: Path) -> None:
+def test_an_inaccessible_path_is_named(home: Path) -> None:
     home.mkdir(parents=True)
     for action, option in product(ACTIONS, ("--journal", "--namespace")):
         done = journal(action, option, "x" * 300)
@@ -135,7 +135,7 @@ def test_a_place_that_cannot_be_looked_at_is_named(home: Path) -> None:
         assert done.stderr.endswith(": File name too long\n")
 
 
-def test_somebody_else_s_file_is_left_and_named(tmp_path: Path) -> None:
+def test_a_file_of_another_application_is_left_alone_and_named(tmp_path: Path) -> None:
     foreign, recorded, empty = (tmp_path / name for name in ("theirs.sqlite", "rot.mcap", "empty"))
     with closing(open_writer(foreign)) as connection:
         connection.execute("PRAGMA application_id = 7")
@@ -155,11 +155,11 @@ def test_somebody_else_s_file_is_left_and_named(tmp_path: Path) -> None:
         assert path.read_bytes() == before
 
 
-# --- what it says --------------------------------------------------------------------------------
+# --- what it prints ------------------------------------------------------------------------------
 
 
-def test_info_tells_what_is_in_it(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_DOMAIN_ID", "x")  # which a file that is named does not need
+def test_info_lists_the_content(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "x")  # not needed for a file that is named
     kept(path, [scan("9", 7 * SECOND)], SIMULATED)
     path.with_name("j.sqlite.damaged-20261121T141500Z").write_bytes(b"x" * 2_000_000)
     done = journal("info", "--journal", path)
@@ -174,7 +174,7 @@ def test_info_tells_what_is_in_it(path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert "2: simulated clock, begun 2025-11-21T04:40:00Z: second 7.000 to 7.000\n" in done.stdout
 
 
-def test_while_a_twin_records_all_can_be_read_and_nothing_shrunk(path: Path) -> None:
+def test_a_journal_in_use_can_be_read_and_not_shrunk(path: Path) -> None:
     with recording(path, LATER) as twin:
         for number in range(300):
             twin.write(scan("new", NOW + number, a=1.0))
@@ -190,17 +190,17 @@ def test_while_a_twin_records_all_can_be_read_and_nothing_shrunk(path: Path) -> 
         wait_for(lambda: twin.condition.written == 301, "one more")
 
 
-def test_the_log_of_a_killed_twin_is_read_too(path: Path) -> None:
+def test_the_wal_of_a_killed_twin_is_read_too(path: Path) -> None:
     connection = open_writer(path)
     connection.execute("DELETE FROM look")
-    # As a killed process leaves them: file and log, nobody's.
+    # As a killed process leaves them: file and WAL, with no owner.
     for name in ("j.sqlite", "j.sqlite-wal"):
         path.with_name(name.replace("j", "k", 1)).write_bytes(path.with_name(name).read_bytes())
     connection.close()
     assert told("--journal", path.with_name("k.sqlite"))["inspections"] == "0"
 
 
-def test_check_says_what_is_damaged_and_ends_with_1(path: Path) -> None:
+def test_check_reports_the_damage_and_exits_with_1(path: Path) -> None:
     whole = journal("check", "--journal", path)
     assert (whole.returncode, whole.stdout) == (0, f"{path} is whole\n")
     assert whole.stderr == "structure\nscan\nlook\nplace\n"
@@ -223,7 +223,7 @@ def test_check_says_what_is_damaged_and_ends_with_1(path: Path) -> None:
     assert "damaged" in done.stdout + done.stderr
 
 
-def test_export_writes_the_rows_of_a_period_as_the_route_does(path: Path) -> None:
+def test_export_writes_the_same_rows_as_the_route(path: Path) -> None:
     def exported(*words: str) -> list[str]:
         done = journal("export", "--journal", path, *words)
         assert (done.returncode, done.stderr) == (0, "")
@@ -239,7 +239,7 @@ def test_export_writes_the_rows_of_a_period_as_the_route_does(path: Path) -> Non
     assert exported("--sensor", "none") == every[:1]
 
 
-def test_export_has_the_units_of_the_operators_file(
+def test_export_uses_the_units_of_the_operators_file(
     monkeypatch: pytest.MonkeyPatch, path: Path, tmp_path: Path
 ) -> None:
     sensors = tmp_path / "own.json"
@@ -264,16 +264,14 @@ def test_export_has_the_units_of_the_operators_file(
         (["--from", "2", "--to", "1"], "--to is 1.000000000, before --from, 2.000000000"),
     ],
 )
-def test_an_export_that_cannot_be_made_is_one_clear_line(
-    words: list[str], named: str, path: Path
-) -> None:
+def test_an_export_that_fails_is_one_clear_line(words: list[str], named: str, path: Path) -> None:
     done = journal("export", "--journal", path, *words)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith(f"lupin-twin: {named}")
     assert done.stderr.count("\n") == 1
 
 
-def test_vacuum_says_before_and_after(path: Path) -> None:
+def test_vacuum_prints_the_size_before_and_after(path: Path) -> None:
     with closing(open_writer(path)) as connection:
         connection.execute("DELETE FROM scan")
         connection.execute("DELETE FROM hour")
@@ -289,13 +287,13 @@ def test_vacuum_says_before_and_after(path: Path) -> None:
     ("words", "code", "out", "err"),
     [
         ("export >/dev/full", 1, "", "lupin-twin: cannot write to the standard output: No space"),
-        # As after >/dev/null: who closes it wants to hear nothing.
+        # As after >/dev/null: closed output means that no output is wanted.
         ("export >&-", 0, "", ""),
-        ("export | true", 1, "", ""),  # its reader goes away
+        ("export | true", 1, "", ""),  # its reader closes it
         ("check 2>/dev/full", 0, "is whole", ""),
     ],
 )
-def test_an_output_that_takes_nothing_is_named_if_somebody_wants_it(
+def test_a_closed_output_is_an_error_only_where_output_is_wanted(
     path: Path, words: str, code: int, out: str, err: str
 ) -> None:
     action, _, redirected = words.partition(" ")
@@ -313,7 +311,7 @@ def test_an_output_that_takes_nothing_is_named_if_somebody_wants_it(
         assert printed.count("\n") == bool(expected)
 
 
-def test_a_name_that_is_no_text_is_told_as_it_is(path: Path) -> None:
+def test_a_name_that_is_not_valid_text_is_printed_escaped(path: Path) -> None:
     strange = path.with_name("j\udcff.sqlite")
     path.rename(strange)
     done = journal("check", "--journal", strange)

@@ -1,4 +1,4 @@
-"""`lupin-twin user`, `token` and `audit`: what they print, and whom a bridge's file then knows."""
+"""`lupin-twin user`, `token` and `audit`: what they print, and what the file then holds."""
 
 import csv
 import re
@@ -29,7 +29,7 @@ def ended(file: Path, words: str) -> CompletedProcess[str]:
 
 
 def printed(file: Path, words: str) -> str:
-    """What it prints; it must end well."""
+    """What it prints; it must succeed."""
     done = ended(file, words)
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -87,7 +87,7 @@ def test_a_token_is_printed_once_listed_and_revoked(file: Path) -> None:
         assert accounts.of_token(digest(token)) is None
 
 
-def test_the_audit_trail_is_csv_with_the_newest_first(file: Path) -> None:
+def test_the_audit_trail_is_csv_with_the_latest_row_first(file: Path) -> None:
     printed(file, "user add anna --role admin --no-password")
     token = printed(file, "token add scada --role viewer").strip()
     with closing(Accounts(file, is_writer=True)) as accounts:
@@ -119,7 +119,7 @@ def test_the_audit_trail_is_csv_with_the_newest_first(file: Path) -> None:
         ("token revoke anna", "there is no token 'anna'"),
     ],
 )
-def test_what_cannot_be_done_is_one_line_and_changes_nothing(
+def test_a_failed_command_is_one_line_and_changes_nothing(
     file: Path, words: str, reason: str
 ) -> None:
     printed(file, "user add anna --role viewer --no-password")

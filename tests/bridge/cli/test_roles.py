@@ -1,4 +1,4 @@
-"""The roles as processes: what stops them at once, what they show, and how they end."""
+"""The roles as processes: what refuses their start, what they serve, and how they end."""
 
 import os
 import re
@@ -24,15 +24,15 @@ from tests.support.web import listener, tag_ids
 
 ROLES = ["serve", "demo", "web"]
 ALL_TAGS = 29
-# Of a demo: no past is filled in either.
+# As for a demo: no past is filled in.
 NO_JOURNAL = ("--ros-args", "-p", "journal:=off")
 
 
-# --- what is wrong is said in one line ------------------------------------------------------------
+# --- refused with one line ------------------------------------------------------------------------
 
 
 def refused(process: Process) -> str:
-    """The one line with which the command has refused to run."""
+    """The one line with which the command refuses to run."""
     assert process.wait() == 2
     lines = [line for line in process.output.splitlines() if "[rcl]" not in line]
     assert len(lines) == 1, lines
@@ -61,7 +61,7 @@ def test_a_bad_ros_argument_is_named(domain: int, arguments: list[str], named: s
         assert named in refused(process)
 
 
-def test_an_archive_is_no_journal_of_a_web(domain: int) -> None:
+def test_the_web_role_refuses_an_archive_as_its_journal(domain: int) -> None:
     with lupin_twin(domain, "web", "--journal", "postgresql://db/lupin") as process:
         assert "'postgresql://db/lupin', expected a file" in refused(process)
 
@@ -70,14 +70,14 @@ def test_an_archive_is_no_journal_of_a_web(domain: int) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_the_web_role_ends_at_once_and_quietly(domain: int, number: signal.Signals) -> None:
+def test_the_web_role_stops_at_once_without_errors(domain: int, number: signal.Signals) -> None:
     with lupin_twin(domain, "web") as process:
         url_of(process)
         assert process.stop(number) == 0
         assert "Traceback" not in process.output
 
 
-def test_the_patrol_ends_although_the_demo_is_killed(domain: int) -> None:
+def test_the_patrol_ends_when_the_demo_is_killed(domain: int) -> None:
     with lupin_twin(domain, "demo", *NO_JOURNAL) as demo:
         url_of(demo)
         (patrol,) = wait_for(lambda: patrols_of(demo.pid), "the patrol")
@@ -87,8 +87,8 @@ def test_the_patrol_ends_although_the_demo_is_killed(domain: int) -> None:
         wait_for(lambda: not is_running(patrol), "the end of the patrol")
 
 
-def test_the_player_ends_although_the_demo_is_killed(domain: int, tmp_path: Path) -> None:
-    """Or a twin that is started later would hear it, and might keep it."""
+def test_the_player_ends_when_the_demo_is_killed(domain: int, tmp_path: Path) -> None:
+    """Otherwise a twin that starts later would receive it, and might store it."""
     path = write_bag(tmp_path / "run.mcap", [Sent(OBSERVATIONS, 5_000.0, scan("1"))])
     with lupin_twin(domain, "demo", "--from", str(path), TMPDIR=str(tmp_path)) as demo:
         demo.wait_for_output("the end: 1 messages were published")
@@ -98,7 +98,7 @@ def test_the_player_ends_although_the_demo_is_killed(domain: int, tmp_path: Path
         wait_for(lambda: not is_running(player), "the end of the player")
 
 
-def test_the_process_that_looks_back_ends_with_its_bridge_and_not_before(domain: int) -> None:
+def test_the_past_process_ends_with_its_bridge_and_not_before(domain: int) -> None:
     with lupin_twin(domain, "serve") as parent:
         url = f"{url_of(parent)}/api/timeline"
         wait_for(lambda: httpx.get(url, timeout=PATIENCE_S).status_code == 200, "the past")
@@ -106,15 +106,15 @@ def test_the_process_that_looks_back_ends_with_its_bridge_and_not_before(domain:
         assert os.getpgid(child) != os.getpgid(parent.pid), "a terminal's Ctrl-C"
         for number in (signal.SIGINT, signal.SIGTERM):
             os.kill(child, number)
-        parent.freeze()  # so that nobody could start another one
+        parent.freeze()  # so that no other one could be started
         assert is_running(child)
         parent.thaw()
         parent.kill()
         wait_for(lambda: not is_running(child), "the end of the child")
 
 
-def test_a_demo_has_a_past_from_its_first_moment_on(domain: int, tmp_path: Path) -> None:
-    """Filled in once, and told to be simulated; the patrol goes on where it ends."""
+def test_a_demo_has_a_past_from_the_start(domain: int, tmp_path: Path) -> None:
+    """Filled in once, and marked as simulated. The patrol goes on where it ends."""
     state, path = str(tmp_path), tmp_path / "lupin-twin" / "demo-seed-0.sqlite"
     filled_in = "SELECT max(stamp_ns), count(*) FROM scan WHERE source LIKE '%past)'"
     pasts = []
@@ -141,7 +141,7 @@ def test_a_demo_has_a_past_from_its_first_moment_on(domain: int, tmp_path: Path)
 
 
 def unbidden(output: str) -> list[str]:
-    """Lines of a log that say something went wrong, beside what a busy machine makes true."""
+    """Lines of a log that report a fault, without those that a busy machine explains."""
     return [
         line
         for line in output.splitlines()
@@ -156,7 +156,7 @@ ENV = {"XDG_STATE_HOME": "/state"}
 SHORT = ["--speed=50"]
 
 
-def test_a_demo_keeps_a_journal_of_its_own_by_seed() -> None:
+def test_a_demo_has_one_journal_per_seed() -> None:
     for patrol_args, name in (([], "demo-seed-0"), (["--seed=3"], "demo-seed-3")):
         path = f"/state/lupin-twin/{name}.sqlite"
         args = ["--ros-args", "-p", f'journal:="{path}"', "--"]
@@ -165,14 +165,14 @@ def test_a_demo_keeps_a_journal_of_its_own_by_seed() -> None:
 
 
 @pytest.mark.parametrize("patrol_args", [[], ["--speed=1"], ["--speed=50"], ["--speed=0.5"]])
-def test_a_demo_s_twin_knows_how_long_its_patrol_s_day_takes(patrol_args: list[str]) -> None:
+def test_a_demos_twin_gets_the_length_of_its_patrols_day(patrol_args: list[str]) -> None:
     patrol = patrol_parser().parse_args(patrol_args)
     day_s = SECONDS_PER_DAY / patrol.day_speed / patrol.speed
     assert patrolled(ENV, patrol_args, []).world == World("simulated", day_s)
 
 
 @pytest.mark.parametrize("speed", ["0", "nan", "inf", "-1"])
-def test_what_is_no_speed_is_left_for_the_patrol_to_refuse(speed: str) -> None:
+def test_an_invalid_speed_is_refused_by_the_patrol(speed: str) -> None:
     assert patrolled(ENV, [f"--speed={speed}"], []).world.day_length_s == 1440.0
 
 
@@ -185,7 +185,7 @@ def test_what_is_no_speed_is_left_for_the_patrol_to_refuse(speed: str) -> None:
         ["-p", "use_sim_time:=true"],
     ],
 )
-def test_another_journal_or_none_or_another_clock_gets_no_past(ros_args: list[str]) -> None:
+def test_a_named_journal_or_no_journal_or_real_time_gets_no_past(ros_args: list[str]) -> None:
     assert patrolled(ENV, [], ["--ros-args", *ros_args]).journal is None
 
 
@@ -194,7 +194,7 @@ def feed_of(path: Path, options: list[str]) -> Feed:
     return Feed("patrol", command, [], World(), path, options)
 
 
-def test_started_again_it_goes_on_with_the_day(tmp_path: Path) -> None:
+def test_a_restarted_demo_goes_on_with_the_day(tmp_path: Path) -> None:
     path = tmp_path / "demo.sqlite"
     feed = feed_of(path, SHORT)
     assert with_past(feed) == feed, "the first time it is nine"
@@ -211,7 +211,9 @@ def test_started_again_it_goes_on_with_the_day(tmp_path: Path) -> None:
     assert 0.0 <= patrol_parser().parse_args([since]).since_morning < DAY_S
 
 
-def test_somebody_s_journal_is_left(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_journal_of_another_twin_is_left_alone(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     path = tmp_path / "demo.sqlite"
     kept(path, [row()], CLOCK)
     assert with_past(feed_of(path, SHORT)) == feed_of(path, SHORT)
@@ -219,7 +221,7 @@ def test_somebody_s_journal_is_left(tmp_path: Path, caplog: pytest.LogCaptureFix
     assert caplog.records == []
 
 
-def test_what_hinders_it_is_told_and_is_no_end(
+def test_a_failure_to_fill_in_the_past_is_reported_and_the_demo_goes_on(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     (tmp_path / "no").write_text("a file where a folder should be")

@@ -1,4 +1,4 @@
-"""What systemd is told, over the socket that it listens on."""
+"""What the bridge reports to systemd, over the socket that systemd listens on."""
 
 import asyncio
 import re
@@ -20,7 +20,7 @@ from tests.support.waiting import PATIENCE_S, wait_for
 
 
 class Manager:
-    """The service manager's side: a datagram socket, and what has come."""
+    """The service manager's side: a datagram socket, and the messages that arrived."""
 
     def __init__(self, address: str) -> None:
         self.address = address
@@ -34,7 +34,7 @@ class Manager:
         return dict(line.split("=", 1) for line in lines)
 
     def rest(self) -> list[dict[str, str]]:
-        """What has come so far and was not read."""
+        """What has arrived and was not read."""
         found = []
         try:
             while True:
@@ -51,7 +51,9 @@ def manager(tmp_path: Path) -> Iterator[Manager]:
     manager.socket.close()
 
 
-def test_it_tells_what_it_is_told_to_and_nothing_of_it_is_inherited(manager: Manager) -> None:
+def test_it_sends_what_the_manager_requests_and_no_child_inherits_it(
+    manager: Manager,
+) -> None:
     environment = {"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": "30000000", "HOME": "/"}
     supervisor = Supervisor(environment)
     assert environment == {"HOME": "/"}
@@ -68,13 +70,13 @@ def test_it_tells_what_it_is_told_to_and_nothing_of_it_is_inherited(manager: Man
     "environment",
     [
         {},
-        {"WATCHDOG_USEC": "1000", "WATCHDOG_PID": "1"},  # another process's watchdog
+        {"WATCHDOG_USEC": "1000", "WATCHDOG_PID": "1"},  # the watchdog of another process
         {"WATCHDOG_USEC": "soon"},
         {"NOTIFY_SOCKET": "vsock:1:2"},
         {"NOTIFY_SOCKET": "/nowhere/at/all"},
     ],
 )
-def test_without_a_manager_there_is_nobody_to_tell(
+def test_without_a_manager_nothing_is_sent(
     environment: dict[str, str], caplog: pytest.LogCaptureFixture
 ) -> None:
     has_socket = "NOTIFY_SOCKET" in environment
@@ -98,7 +100,7 @@ def listening(tmp_path: Path) -> Iterator[Manager]:
     manager.socket.close()
 
 
-def test_the_bridge_is_ready_when_it_serves_and_says_when_it_stops(
+def test_the_bridge_reports_when_it_is_ready_and_when_it_stops(
     domain: int, listening: Manager
 ) -> None:
     env = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "1000000", "LUPIN_TOKEN": TOKEN}
@@ -111,18 +113,18 @@ def test_the_bridge_is_ready_when_it_serves_and_says_when_it_stops(
         for _ in range(3):
             assert listening.next() == {"WATCHDOG": "1"}
         (patrol,) = wait_for(lambda: patrols_of(process.pid), "the patrol")
-        environment = Path(f"/proc/{patrol}/environ")  # empty for a moment, as it starts
+        environment = Path(f"/proc/{patrol}/environ")  # empty while it starts
         wait_for(lambda: b"ROS_DOMAIN_ID" in environment.read_bytes(), "what it inherits")
         inherited = environment.read_bytes()
         assert b"NOTIFY_SOCKET" not in inherited
         assert TOKEN.encode() not in inherited
-        listening.rest()  # of words that nobody takes, the socket holds ten, and no more
+        listening.rest()  # unread, the socket holds no more than ten messages
         process.send(signal.SIGTERM)
         wait_for(lambda: {"STOPPING": "1"} in listening.rest(), "the word that it stops")
         assert process.wait() == 0
 
 
-def test_a_callback_that_hangs_is_told_to_health_checks_and_ends_the_watchdogs_words(
+def test_a_hanging_callback_fails_health_checks_and_stops_the_watchdog_messages(
     domain: int, listening: Manager
 ) -> None:
     hangs = faults("--hang", "lupin_twin.core.state:TwinStore.record:hang me")

@@ -23,7 +23,7 @@ from tests.support.looking import Endless
 from tests.support.waiting import PATIENCE_S, until
 
 
-async def test_a_thread_that_is_held_up_ends_a_request_by_the_setting_that_says_so(
+async def test_a_busy_thread_ends_a_request_after_the_configured_timeout(
     domain: int,
 ) -> None:
     busy, gate = threading.Event(), threading.Event()
@@ -43,7 +43,7 @@ async def test_a_thread_that_is_held_up_ends_a_request_by_the_setting_that_says_
         assert (await twin.estimate_report(ReportRequest("co2"))).tags == ()
 
 
-async def test_its_names_and_its_rules_are_those_of_its_node(domain: int) -> None:
+async def test_names_and_limits_are_those_of_the_node(domain: int) -> None:
     async with started(LocalTwin, "--ros-args", "-r", "/twin/state:=/north/state") as (twin, _):
         assert twin.names.state_topic == "/north/state"
         assert twin.names.field_service == "/twin/get_field"
@@ -54,15 +54,13 @@ async def test_its_names_and_its_rules_are_those_of_its_node(domain: int) -> Non
         assert twin.revision() != revision
 
 
-async def test_two_twins_of_the_same_content_have_different_revisions(domain: int) -> None:
+async def test_two_twins_with_equal_content_have_different_revisions(domain: int) -> None:
     async with started(LocalTwin) as (first, _), started(LocalTwin) as (second, _):
         assert first.revision() != second.revision()
 
 
 @pytest.mark.usefixtures("children_know_the_tests")
-async def test_damage_that_is_met_looking_back_has_the_file_set_aside(
-    domain: int, tmp_path: Path
-) -> None:
+async def test_damage_found_by_a_query_quarantines_the_file(domain: int, tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     begun_ns = time.time_ns() - 9_000 * SECOND
     kept(
@@ -76,7 +74,7 @@ async def test_damage_that_is_met_looking_back_has_the_file_set_aside(
         with path.open("r+b") as file:
             file.seek(path.stat().st_size // 4)
             file.write(b"\xff" * (path.stat().st_size // 2))
-        # The twin may meet the damage first by itself: then nothing is left to refuse.
+        # The twin may find the damage first. Then there is nothing left to refuse.
         refused = None
         try:
             [lot async for lot in twin.rows(0, end_ns, None, None, len)]
@@ -90,13 +88,13 @@ async def test_damage_that_is_met_looking_back_has_the_file_set_aside(
 
 
 @pytest.mark.usefixtures("children_know_the_tests")
-async def test_an_answer_that_takes_too_long_ends_and_delays_no_observation(domain: int) -> None:
+async def test_a_query_that_takes_too_long_ends_and_delays_no_observation(domain: int) -> None:
     async with started(LocalTwin) as (twin, _):
         await until(lambda: twin.journal().state == "recording", "the journal")
         await twin.past.ask(partial(as_found, 0), await twin.now(), 0.0)
         waiting = asyncio.create_task(twin.ask(Endless(), 0.0))
         await until(lambda: len(twin.past.pending) == 1, "the question")
-        # Meanwhile the ROS thread answers as ever.
+        # Meanwhile the ROS thread answers as usual.
         await twin.thread.call(lambda node: node.notify_listener())
         assert not waiting.done()
         twin.timeout_s = 0.1

@@ -1,4 +1,4 @@
-"""The process that looks back: pending, cancelled, killed, started again."""
+"""The past process: pending, cancelled, killed and restarted queries."""
 
 import asyncio
 import logging
@@ -45,7 +45,7 @@ Run = Callable[[Callable[[PastProcess], Coroutine[Any, Any, None]]], None]
 
 @pytest.fixture(scope="module")
 def run() -> Iterator[Run]:
-    """Runs a test with the one process of all that only ask."""
+    """Run a test with the process that the tests of reading share."""
     past = PastProcess()
     with asyncio.Runner() as runner:
         yield lambda test: runner.run(test(past))
@@ -65,7 +65,7 @@ def now(path: Path) -> Now:
     return Now(NOW_NS, "map", Condition(JournalState.RECORDING, path=str(path)))
 
 
-def test_it_answers_at_a_lower_priority_and_with_bodies_of_any_size(path: Path, run: Run) -> None:
+def test_it_runs_at_a_lower_priority_and_returns_bodies_of_any_size(path: Path, run: Run) -> None:
     async def test(past: PastProcess) -> None:
         assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
         nice = os.getpriority(os.PRIO_PROCESS, 0) + NICENESS
@@ -79,7 +79,7 @@ def test_it_answers_at_a_lower_priority_and_with_bodies_of_any_size(path: Path, 
     run(test)
 
 
-def test_what_it_meets_is_raised_here(path: Path, run: Run) -> None:
+def test_its_errors_are_raised_here(path: Path, run: Run) -> None:
     async def test(past: PastProcess) -> None:
         with pytest.raises(PastRefused, match="x is 7, the limit is 6"):
             await past.ask(Failing("refused"), now(path), 0.0)
@@ -97,7 +97,7 @@ def test_what_it_meets_is_raised_here(path: Path, run: Run) -> None:
     run(test)
 
 
-def test_what_nobody_waits_for_any_more_ends_there(path: Path, run: Run) -> None:
+def test_a_query_that_is_no_longer_awaited_ends_in_the_process(path: Path, run: Run) -> None:
     async def test(past: PastProcess) -> None:
         asking = [
             asyncio.create_task(past.ask(Endless(), now(path), 1.0)) for _ in range(MAX_PENDING)
@@ -118,7 +118,7 @@ def test_what_nobody_waits_for_any_more_ends_there(path: Path, run: Run) -> None
     run(test)
 
 
-def test_a_map_is_sent_once(path: Path, run: Run) -> None:
+def test_a_map_is_sent_to_the_process_once(path: Path, run: Run) -> None:
     def a_map(revision: int) -> OccupancyMap:
         return map_of(np.zeros((revision, 1_000)), revision=revision)
 
@@ -132,7 +132,7 @@ def test_a_map_is_sent_once(path: Path, run: Run) -> None:
     run(test)
 
 
-async def test_an_export_goes_on_where_it_was_in_another_process_too(
+async def test_an_export_goes_on_in_a_restarted_process(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(past_process, "REST_S", 0.0)
@@ -149,7 +149,7 @@ async def test_an_export_goes_on_where_it_was_in_another_process_too(
         assert (found, past.starts) == ([1_000, 1_000, 500], 2)
 
 
-async def test_one_that_dies_or_cannot_be_started_is_told_of_and_another_is_started(
+async def test_a_process_that_dies_or_cannot_start_is_reported_and_replaced(
     path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(past_process, "REST_S", 0.2)

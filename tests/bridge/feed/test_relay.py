@@ -1,4 +1,4 @@
-"""The relay over a script of ROS: who hears what, how much is held, and for how long."""
+"""The relay over a scripted ROS: who receives what, how much is buffered, and for how long."""
 
 import asyncio
 import weakref
@@ -20,7 +20,7 @@ LIVE = replace(interfaces.DIAGNOSTICS, depth=1, max_bytes=10)
 
 
 class Ros:
-    """A ROS thread that runs on the loop, and does what the test says."""
+    """A ROS thread on the loop, which does what the test says."""
 
     def __init__(self) -> None:
         self.takes: dict[str, Callable[[Sample], None]] = {}
@@ -60,14 +60,14 @@ class Ros:
         return lambda: self.takes.__delitem__(topic.name)
 
     async def publish(self, *samples: bytes, topic: Topic = STATE) -> None:
-        """Until the loop has handed out what it was woken for."""
+        """Until the loop has delivered what it was woken for."""
         for data in samples:
             self.takes[topic.name](Sample(data, len(data)))
         await self.nothing_on_the_way.wait()
 
 
 class Ear:
-    """What a listener has heard."""
+    """What a listener has received."""
 
     def __init__(self) -> None:
         self.heard: list[bytes] = []
@@ -89,12 +89,12 @@ def relay(ros: Ros) -> Relay:
 
 
 async def all_has_ended(ros: Ros, relay: Relay) -> None:
-    """Until what nobody listens to any more has ended: the last to be closed ends last."""
+    """Until every subscription without listeners has ended: the last to be closed ends last."""
     (await relay.listen(LIVE, Ear()))()
     await until(lambda: LIVE.name not in ros.takes, "the end of the last that was closed")
 
 
-async def test_all_who_listen_share_one_subscription(ros: Ros, relay: Relay) -> None:
+async def test_all_listeners_share_one_subscription(ros: Ros, relay: Relay) -> None:
     assert (ros.subscribed, len(relay)) == ([], 0)
     ears = [Ear() for _ in range(3)]
     await asyncio.gather(*(relay.listen(STATE, ear) for ear in ears))
@@ -103,7 +103,7 @@ async def test_all_who_listen_share_one_subscription(ros: Ros, relay: Relay) -> 
     assert (ros.subscribed, ros.wake_ups, len(relay)) == (["/twin/state"], 2, 1)
 
 
-async def test_who_comes_late_hears_the_last_of_what_is_latched_and_nothing_else(
+async def test_a_late_listener_receives_the_last_latched_message_and_nothing_else(
     ros: Ros, relay: Relay
 ) -> None:
     for topic, expected in ((STATE, [b"2", b"3"]), (LIVE, [])):
@@ -115,7 +115,7 @@ async def test_who_comes_late_hears_the_last_of_what_is_latched_and_nothing_else
         assert late.heard == expected
 
 
-async def test_the_oldest_give_way_within_depth_and_bytes_and_the_too_large_never_comes(
+async def test_depth_and_bytes_drop_the_oldest_and_a_too_large_message_is_never_sent(
     ros: Ros, relay: Relay
 ) -> None:
     ear = Ear()
@@ -134,7 +134,7 @@ async def test_the_oldest_give_way_within_depth_and_bytes_and_the_too_large_neve
     assert relay.skipped == 2, "the oldest, and the one that is too large"
 
 
-async def test_a_topic_is_heard_until_the_last_has_closed(ros: Ros, relay: Relay) -> None:
+async def test_a_subscription_ends_with_its_last_listener(ros: Ros, relay: Relay) -> None:
     relay.linger_s = 0.0
     ear = Ear()
     first = await relay.listen(STATE, Ear())
@@ -152,7 +152,7 @@ async def test_a_topic_is_heard_until_the_last_has_closed(ros: Ros, relay: Relay
     assert ros.subscribed == ["/twin/state", "/diagnostics", "/twin/state"]
 
 
-async def test_who_comes_and_goes_makes_no_work_for_ros(ros: Ros, relay: Relay) -> None:
+async def test_listeners_that_come_and_go_cause_no_work_in_ros(ros: Ros, relay: Relay) -> None:
     gone: list[weakref.ref[Callable[[], None]]] = []
     for _ in range(100):
         close = await relay.listen(STATE, Ear())
@@ -167,7 +167,7 @@ async def test_who_comes_and_goes_makes_no_work_for_ros(ros: Ros, relay: Relay) 
     assert (ros.subscribed, ros.calls, len(relay)) == (["/twin/state"], 1, 1)
 
 
-async def test_who_comes_just_in_time_keeps_it(ros: Ros, relay: Relay) -> None:
+async def test_a_listener_just_in_time_reuses_the_subscription(ros: Ros, relay: Relay) -> None:
     relay.linger_s = 0.0
     (await relay.listen(STATE, Ear()))()
     ear = Ear()
@@ -177,7 +177,7 @@ async def test_who_comes_just_in_time_keeps_it(ros: Ros, relay: Relay) -> None:
     assert (ear.heard, ros.subscribed) == ([b"1"], ["/twin/state", "/diagnostics"])
 
 
-async def test_one_who_leaves_while_it_opens_spoils_it_for_nobody(ros: Ros, relay: Relay) -> None:
+async def test_a_listener_may_leave_while_a_subscription_opens(ros: Ros, relay: Relay) -> None:
     ros.gate.clear()
     ear = Ear()
     leaving = asyncio.create_task(relay.listen(STATE, Ear()))
@@ -191,7 +191,7 @@ async def test_one_who_leaves_while_it_opens_spoils_it_for_nobody(ros: Ros, rela
     assert ear.heard == [b"1"]
 
 
-async def test_without_its_thread_nothing_is_heard_and_nothing_breaks(
+async def test_without_the_thread_nothing_is_received_and_nothing_breaks(
     ros: Ros, relay: Relay
 ) -> None:
     relay.linger_s = 0.0
@@ -224,7 +224,7 @@ def test_the_prefixes_of_a_sourced_ros_come_first(tmp_path: Path) -> None:
         f"{rule}\nMSG: here_msgs/Two\nstd_msgs/msg/Header header 'x'\n"
         f"{rule}\nMSG: std_msgs/Header\nstring<=5 mine\n"
     )
-    # What is in none of them is where Python keeps it.
+    # Packages in none of them are found where Python installs them.
     assert "sec" in schema_text("builtin_interfaces/msg/Time", sourced)
 
 
@@ -238,12 +238,12 @@ def test_the_prefixes_of_a_sourced_ros_come_first(tmp_path: Path) -> None:
         ("", "'' is not a message type"),
     ],
 )
-def test_what_is_not_installed_is_named(type_name: str, said: str) -> None:
+def test_a_type_that_is_not_installed_is_named(type_name: str, said: str) -> None:
     with pytest.raises(LookupError, match=said):
         schema_text(type_name)
 
 
-def test_a_part_that_is_not_installed_is_named_with_the_whole(tmp_path: Path) -> None:
+def test_a_nested_type_that_is_not_installed_is_named_with_the_whole(tmp_path: Path) -> None:
     package(tmp_path, "here_msgs", One="gone_msgs/Two two\n")
     with pytest.raises(LookupError, match="gone_msgs/msg/Two, a part of here_msgs/msg/One, is not"):
         schema_text("here_msgs/msg/One", {"AMENT_PREFIX_PATH": str(tmp_path)})

@@ -1,4 +1,4 @@
-"""Real topics, heard raw in both roles: the bytes are the message, and nothing is made of them."""
+"""Real topics, relayed raw in both roles: the bytes of the message, unchanged."""
 
 from collections.abc import Iterator
 from contextlib import nullcontext
@@ -33,13 +33,13 @@ def peer(domain: int) -> Iterator[Peer]:
 
 @pytest.fixture(params=[LocalTwin, WebTwin])
 def source_type(request: pytest.FixtureRequest, domain: int) -> Iterator[type]:
-    """A kind of source; for `WebTwin`, with a twin in a process of its own."""
+    """A kind of source. For `WebTwin`, with a twin in a process of its own."""
     with twin_node(domain, *OFTEN) if request.param is WebTwin else nullcontext():
         yield request.param
 
 
-async def only_what_is_published_as_wanted(relay: Relay, topic: Topic, domain: int) -> None:
-    """Whoever uses a name for something else hides nothing, and who listens is no publisher."""
+async def only_the_expected_type_counts(relay: Relay, topic: Topic, domain: int) -> None:
+    """Another type under the same name hides nothing, and a subscriber is no publisher."""
 
     def published_as(kind: str) -> Any:
         return relay.published(lambda *topic_and_type: topic_and_type == (topic.name, kind))
@@ -53,7 +53,7 @@ async def only_what_is_published_as_wanted(relay: Relay, topic: Topic, domain: i
         assert await published_as(topic.type_name) == {}
 
 
-async def test_a_twins_topics_come_as_they_are_on_the_wire(
+async def test_a_twins_topics_are_relayed_byte_for_byte(
     domain: int, source_type: Any, peer: Peer
 ) -> None:
     async with started(source_type, *OFTEN) as (source, told):
@@ -76,10 +76,10 @@ async def test_a_twins_topics_come_as_they_are_on_the_wire(
         def first(topic: Topic, message_type: Any) -> Any:
             return deserialize_message(heard[topic.name][0].data, message_type)
 
-        # Latched, and from before anybody asked.
+        # Latched, and published before the subscription.
         assert first(observations, Observation) == seen
         assert first(map_, OccupancyGrid) == grid
-        # And as a message, its lengths checked before it is made.
+        # And as a message, whose lengths are checked before it is decoded.
         assert relay.read(observations, heard[observations.name][0]) == seen
         for data in (heard[map_.name][0].data[:-1], b"\0" * (map_.max_bytes + 1)):
             with pytest.raises(ValueError, match="bytes"):
@@ -116,7 +116,7 @@ async def test_a_twins_topics_come_as_they_are_on_the_wire(
             "/twin/state": "lupin_msgs/msg/TwinState",
             "/twin/times": "lupin_msgs/msg/TwinTimes",
         }
-        await only_what_is_published_as_wanted(relay, discovered, domain)
+        await only_the_expected_type_counts(relay, discovered, domain)
         now = await relay.time()
         assert (now.is_simulated, abs(now.now_ns - came_ns) < 60e9) == (False, True)
         for topic, said in (
@@ -127,7 +127,7 @@ async def test_a_twins_topics_come_as_they_are_on_the_wire(
                 with pytest.raises(NotRelayedError, match=f"{topic.name} cannot be .*{said}"):
                     await relay.listen(topic, lambda _: None)
         assert len(relay) == 0
-    # A thread that has not ended in time is left behind, and ends for itself.
+    # A thread that has not ended in time is left behind, and ends by itself.
     await until(lambda: not source.thread.is_alive, "its end")
     with pytest.raises(TwinUnavailableError):
         await source.estimate_report(ReportRequest("co2"))

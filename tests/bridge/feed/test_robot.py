@@ -1,4 +1,4 @@
-"""What is kept of a robot: the newest of each, a bounded trail, and a plan until it is done."""
+"""What is stored of a robot: the latest of each, a bounded trail, and a plan until it is done."""
 
 import pytest
 
@@ -20,7 +20,7 @@ def places(log: RobotLog) -> list[float]:
     return [it.x for it in log.trail]
 
 
-def test_the_newest_of_each_stays_and_only_news_is_told() -> None:
+def test_the_latest_of_each_is_stored_and_only_changes_are_reported() -> None:
     log = RobotLog()
     here, full = position(1.0, 100.0), Battery(64.0, 90 * S)
     assert log.take(Robot(position=here), 100 * S)
@@ -32,7 +32,7 @@ def test_the_newest_of_each_stays_and_only_news_is_told() -> None:
     assert log.now.position == here
 
 
-def test_a_trail_has_points_apart_in_place_and_in_time() -> None:
+def test_points_of_a_trail_are_apart_in_distance_and_in_time() -> None:
     log = RobotLog()
     drive(
         log,
@@ -45,7 +45,7 @@ def test_a_trail_has_points_apart_in_place_and_in_time() -> None:
     assert places(log) == [0.0, 0.1, 0.3]
 
 
-def test_a_trail_ends_after_an_hour_and_also_while_the_robot_is_silent() -> None:
+def test_a_trail_ends_after_an_hour_also_while_the_robot_is_silent() -> None:
     log = RobotLog()
     drive(log, position(0.0, 100.0), position(1.0, 200.0))
     log.take(Robot(), 3_700 * S)
@@ -57,7 +57,7 @@ def test_a_trail_ends_after_an_hour_and_also_while_the_robot_is_silent() -> None
     assert log.now.position is not None, "where it was last is still known"
 
 
-def test_a_trail_is_bounded_and_still_goes_back_an_hour() -> None:
+def test_a_bounded_trail_still_covers_an_hour() -> None:
     log = RobotLog()
     drive(log, *(position(float(second), 100.0 + second) for second in range(3_600)))
     trail = places(log)
@@ -68,7 +68,7 @@ def test_a_trail_is_bounded_and_still_goes_back_an_hour() -> None:
 
 
 @pytest.mark.parametrize(("back_s", "is_known"), [(10.0, True), (10.1, False)])
-def test_a_clock_that_went_back_makes_the_future_unknown(back_s: float, is_known: bool) -> None:
+def test_a_clock_that_goes_back_removes_the_future(back_s: float, is_known: bool) -> None:
     log = RobotLog()
     log.take(
         Robot(position(1.0, 100.0), Plan(((3.0, 0.0),), 100 * S), Battery(50.0, 100 * S)), 100 * S
@@ -80,7 +80,7 @@ def test_a_clock_that_went_back_makes_the_future_unknown(back_s: float, is_known
     assert log.now.position == (position(2.0, 20.0) if not is_known else log.now.position)
 
 
-def test_a_plan_is_done_where_it_ends_and_not_where_a_round_begins() -> None:
+def test_a_plan_is_done_at_its_end_and_not_where_a_round_begins() -> None:
     log = RobotLog()
     round_trip = Plan(((0.0, 0.0), (5.0, 0.0), (0.0, 0.1)), 99 * S)
     log.take(Robot(position=position(0.0, 100.0), plan=round_trip), 100 * S)
@@ -91,7 +91,7 @@ def test_a_plan_is_done_where_it_ends_and_not_where_a_round_begins() -> None:
     assert log.now.plan is None
 
 
-def test_a_plan_that_is_made_anew_on_the_way_is_done_too() -> None:
+def test_a_plan_that_is_replaced_on_the_way_is_done_too() -> None:
     log = RobotLog()
     for at in range(6):
         there = Plan(((float(at), 0.0), (5.0, 0.0)), (100 + at) * S)
@@ -99,7 +99,7 @@ def test_a_plan_that_is_made_anew_on_the_way_is_done_too() -> None:
         assert (log.now.plan is None) is (at == 5)
 
 
-def test_an_empty_plan_and_one_of_ten_minutes_ago_are_none() -> None:
+def test_an_empty_plan_and_one_from_ten_minutes_ago_are_ignored() -> None:
     log = RobotLog()
     there = Plan(((9.0, 0.0),), 100 * S)
     again = Plan(((9.0, 0.0),), 800 * S)
@@ -116,9 +116,9 @@ def test_an_empty_plan_and_one_of_ten_minutes_ago_are_none() -> None:
     assert plans == [there, there, None, again, None]
 
 
-def test_without_a_time_all_is_taken_as_it_is_stamped() -> None:
+def test_without_a_clock_stamps_are_taken_as_they_are() -> None:
     log = RobotLog()
-    # Of a clock that stands still, the last is the newest.
+    # With a clock that stands still, the last one is the latest.
     for x in (1.0, 2.0):
         log.take(Robot(position=position(x, 50.0)), None)
         assert log.now == Robot(position(x, 50.0))

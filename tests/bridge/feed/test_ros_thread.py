@@ -1,4 +1,4 @@
-"""The ROS thread, with real nodes: what crosses, in both directions, and how it ends."""
+"""The ROS thread, with real nodes: calls and events in both directions, and its end."""
 
 import asyncio
 import json
@@ -23,7 +23,7 @@ from tests.support.waiting import until
 
 
 class Probe(Node):  # type: ignore[misc]  # rclpy is not typed
-    """A node that does nothing by itself, and tells of what it is made to do."""
+    """A node that does nothing by itself, and reports what the test makes it do."""
 
     def __init__(self, context: Any, post: Callable[[int], None]) -> None:
         super().__init__("probe", context=context)
@@ -42,7 +42,7 @@ class Probe(Node):  # type: ignore[misc]  # rclpy is not typed
 
 
 class Stage:
-    """A ROS thread with a probe, and what the loop has been told."""
+    """A ROS thread with a probe, and the events that the loop has received."""
 
     def __init__(self) -> None:
         self.events: list[int] = []
@@ -70,7 +70,7 @@ class Stage:
 # --- towards ROS --------------------------------------------------------------------------------
 
 
-async def test_a_call_runs_in_the_nodes_thread_and_its_result_comes_back(domain: int) -> None:
+async def test_a_call_runs_in_the_thread_of_the_nodes_and_returns_its_result(domain: int) -> None:
     stage = Stage()
     with pytest.raises(TwinUnavailableError, match="not running"):
         await stage.ros.call(lambda _: None)
@@ -87,7 +87,7 @@ async def test_a_call_runs_in_the_nodes_thread_and_its_result_comes_back(domain:
         assert (stage.ros.is_alive, stage.ros.callback_errors) == (True, 0)
 
 
-async def test_a_caller_that_leaves_is_not_missed(domain: int) -> None:
+async def test_a_cancelled_caller_is_ignored(domain: int) -> None:
     async with Stage() as stage:
         gate, begun = threading.Event(), list[Probe]()
         held = asyncio.create_task(stage.ros.call(lambda _: gate.wait(20.0)))
@@ -104,7 +104,7 @@ async def test_a_caller_that_leaves_is_not_missed(domain: int) -> None:
         assert not begun, "nobody waits for it"
 
 
-async def test_a_heartbeat_tells_of_a_callback_that_hangs_and_that_it_goes_on(domain: int) -> None:
+async def test_a_heartbeat_reports_a_hanging_callback_and_its_recovery(domain: int) -> None:
     async with Stage() as stage:
         gate = threading.Event()
         held = asyncio.create_task(stage.ros.call(lambda _: gate.wait(20.0)))
@@ -117,7 +117,7 @@ async def test_a_heartbeat_tells_of_a_callback_that_hangs_and_that_it_goes_on(do
 # --- towards the loop ---------------------------------------------------------------------------
 
 
-async def test_the_loop_is_told_the_newest_and_skips_what_came_in_between(domain: int) -> None:
+async def test_the_loop_receives_the_latest_event_and_skips_those_before_it(domain: int) -> None:
     async with Stage() as stage:
 
         def post_many(node: Probe) -> None:
@@ -131,7 +131,7 @@ async def test_the_loop_is_told_the_newest_and_skips_what_came_in_between(domain
         assert stage.told_by == {threading.current_thread()}
 
 
-def test_events_of_a_node_whose_loop_is_gone_do_no_harm(domain: int) -> None:
+def test_events_after_the_loop_has_closed_do_no_harm(domain: int) -> None:
     with ros_domain(domain):
         stage = Stage()
         with asyncio.Runner() as runner:
@@ -151,7 +151,7 @@ def test_events_of_a_node_whose_loop_is_gone_do_no_harm(domain: int) -> None:
 # --- futures of ROS -----------------------------------------------------------------------------
 
 
-async def test_what_a_future_of_ros_meets_is_raised(domain: int) -> None:
+async def test_an_error_of_a_ros_future_is_raised(domain: int) -> None:
     def start(node: Probe) -> Future:
         future = Future(executor=node.executor)
         future.set_exception(OSError("no"))
@@ -162,7 +162,7 @@ async def test_what_a_future_of_ros_meets_is_raised(domain: int) -> None:
             await stage.ros.ask(start, lambda *_: None)
 
 
-async def test_who_waits_no_longer_gives_the_future_up_in_the_nodes_thread(domain: int) -> None:
+async def test_a_cancelled_future_is_released_in_the_thread_of_the_nodes(domain: int) -> None:
     async with Stage() as stage:
         asked, given_up = Future(), list[tuple[Future, threading.Thread]]()
         waiting = asyncio.create_task(
@@ -171,7 +171,7 @@ async def test_who_waits_no_longer_gives_the_future_up_in_the_nodes_thread(domai
                 lambda _, future: given_up.append((future, threading.current_thread())),
             )
         )
-        # Only then has the call brought the future back, and it is the answer that is awaited.
+        # Only then has the call returned the future, and its result is awaited.
         await stage.ros.call(lambda _: None)
         await until(lambda: stage.ros.calls_waiting == 0, "the question to be asked")
         waiting.cancel()
@@ -179,7 +179,7 @@ async def test_who_waits_no_longer_gives_the_future_up_in_the_nodes_thread(domai
         assert given_up == [(asked, stage.ros.require_node().thread)]
 
 
-async def test_who_leaves_while_the_question_is_asked_leaves_nothing_behind(domain: int) -> None:
+async def test_a_caller_cancelled_while_its_call_starts_leaves_nothing_behind(domain: int) -> None:
     async with Stage() as stage:
         gate, busy = threading.Event(), threading.Event()
         open_questions: list[Future] = []
@@ -198,7 +198,7 @@ async def test_who_leaves_while_the_question_is_asked_leaves_nothing_behind(doma
         with pytest.raises(asyncio.CancelledError):
             await waiting
         gate.set()
-        # What was handed over before this has run after it, at the latest.
+        # By then, all that was handed over before has run.
         for _ in range(3):
             await stage.ros.call(lambda _: None)
         assert open_questions == []
@@ -208,7 +208,7 @@ async def test_who_leaves_while_the_question_is_asked_leaves_nothing_behind(doma
 # --- the end ------------------------------------------------------------------------------------
 
 
-async def test_a_callback_that_raises_is_reported_and_the_thread_lives_on(domain: int) -> None:
+async def test_a_callback_that_raises_is_logged_and_the_thread_lives_on(domain: int) -> None:
     async with Stage() as stage:
         await stage.ros.call(lambda node: node.create_timer(0.01, lambda: 1 / 0))
         await until(lambda: stage.ros.callback_errors > 2, "errors of the callback")
@@ -216,7 +216,7 @@ async def test_a_callback_that_raises_is_reported_and_the_thread_lives_on(domain
         assert stage.deaths == 0
 
 
-async def test_the_end_of_the_thread_is_told_once_and_said_aloud(
+async def test_the_end_of_the_thread_is_reported_once_and_logged(
     domain: int, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with Stage() as stage:
@@ -232,18 +232,18 @@ async def test_the_end_of_the_thread_is_told_once_and_said_aloud(
     assert "the end" in str(record.exc_info[1])
 
 
-async def test_a_thread_that_is_being_stopped_has_not_died(domain: int) -> None:
+async def test_a_thread_that_is_being_stopped_is_not_reported_as_dead(domain: int) -> None:
     async with Stage() as stage:
         thread = await stage.ros.call(lambda node: node.thread)
         stopping = asyncio.create_task(stage.ros.stop())
         await asyncio.sleep(0)
-        thread.join()  # on the loop, which cannot have been told yet
+        thread.join()  # on the loop, which cannot have received it yet
         assert stage.ros.is_alive
         await stopping
         assert not stage.ros.is_alive
 
 
-def test_a_thread_that_only_a_restart_helps_is_told() -> None:
+def test_a_thread_that_needs_a_restart_is_reported() -> None:
     assert ailment(ThreadState(is_alive=True, stuck_s=STUCK_AFTER_S - 0.001)) is None
     stuck = "The ROS thread has been stuck in a callback for 10 s. Restart."
     assert ailment(ThreadState(is_alive=True, stuck_s=STUCK_AFTER_S)) == stuck
@@ -258,12 +258,12 @@ BROKEN = faults("--raise", "lupin_twin.core.state:TwinStore.record:boom")
 
 
 def entries(output: str) -> list[dict[str, Any]]:
-    """The log of a process, of which every line but the address is an object."""
+    """The log of a process. Every line but the address is a JSON object."""
     lines = [line for line in output.splitlines() if not line.startswith("lupin-twin: http")]
     return [json.loads(line) for line in lines]
 
 
-def test_of_a_bridge_that_logs_json_every_line_is_an_object(domain: int) -> None:
+def test_with_json_logging_every_line_of_a_bridge_is_an_object(domain: int) -> None:
     arguments = ("--log-format", "json", "--ros-args", "-p", "idw_power:=3")
     with (
         lupin_twin(domain, "serve", *BROKEN, *arguments) as process,
@@ -280,7 +280,7 @@ def test_of_a_bridge_that_logs_json_every_line_is_an_object(domain: int) -> None
     assert "Traceback" in told["error"]["message"], "a trace of many lines is in one"
 
 
-def test_all_severities_are_handed_on_once_and_as_they_are(
+def test_every_severity_is_passed_on_once_with_its_level(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     forward()

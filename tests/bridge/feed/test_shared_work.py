@@ -1,4 +1,4 @@
-"""Work that is done once for all who ask for the same, and only while somebody waits."""
+"""Work that is done once for all equal requests, and only while one of them waits."""
 
 import asyncio
 
@@ -6,7 +6,7 @@ from lupin_bridge.feed.tasks import Shared
 from tests.support.waiting import until
 
 
-async def test_who_comes_as_the_last_one_leaves_gets_work_of_its_own() -> None:
+async def test_a_request_that_arrives_as_the_last_one_is_cancelled_starts_new_work() -> None:
     shared, begun, may_end = Shared[int](), list[None](), asyncio.Event()
 
     async def work() -> int:
@@ -18,7 +18,7 @@ async def test_who_comes_as_the_last_one_leaves_gets_work_of_its_own() -> None:
     leaving = asyncio.create_task(shared.get("a", work))
     await until(lambda: begun, "the work")
     leaving.cancel()
-    await asyncio.sleep(0)  # it has left; the work has not heard of it yet
+    await asyncio.sleep(0)  # it has left; the work has not been cancelled yet
     coming = asyncio.create_task(shared.get("a", work))
     await asyncio.wait([leaving])
     may_end.set()
@@ -26,7 +26,7 @@ async def test_who_comes_as_the_last_one_leaves_gets_work_of_its_own() -> None:
     assert len(shared) == 0
 
 
-async def test_an_error_is_everybodys_and_is_not_kept() -> None:
+async def test_an_error_reaches_all_waiters_and_is_not_cached() -> None:
     shared, begun = Shared[int](), list[None]()
 
     async def work() -> int:

@@ -43,7 +43,7 @@ def state_of(value: float) -> TwinState:
     return TwinState(tags=[TwinTagState(tag_id="1", readings=[reading])])
 
 
-async def test_a_map_alone_is_another_revision_and_no_sign_of_life(domain: int) -> None:
+async def test_a_new_map_is_a_new_revision_and_no_sign_of_life(domain: int) -> None:
     with Peer(domain) as peer:
         async with started(WebTwin) as (twin, told):
             states = peer.publish("/twin/state", state_of(1.0), depth=1)
@@ -53,7 +53,7 @@ async def test_a_map_alone_is_another_revision_and_no_sign_of_life(domain: int) 
             await until(lambda: twin.occupancy_map() is not None, "the map")
             assert twin.revision() != told[-1].revision
             assert len(told) == before
-            # Nor does a new node forget the state for it.
+            # Nor does a new node drop the state for it.
             peer.node.destroy_publisher(states)
             await twin.thread.stop()
             await twin._join()
@@ -65,14 +65,14 @@ async def test_a_map_alone_is_another_revision_and_no_sign_of_life(domain: int) 
             assert twin.update.snapshot is told[-1].snapshot
 
 
-async def test_without_a_twin_its_service_is_named(domain: int) -> None:
+async def test_without_a_twin_the_missing_service_is_named(domain: int) -> None:
     async with started(WebTwin) as (twin, _):
         with pytest.raises(TwinUnavailableError, match=f"no twin offers {NAME}: is it running"):
             await twin.estimate_report(ReportRequest("co2"))
     assert all(task.get_name() != LOOK for task in asyncio.all_tasks()), "it looks on"
 
 
-async def test_after_a_silence_all_goes_on_with_a_new_node(domain: int) -> None:
+async def test_after_a_silence_a_new_node_recovers_everything(domain: int) -> None:
     scans, samples = list[Observation](), list[Sample]()
     with Peer(domain) as peer:
         peer.node.create_service(GetEstimateReport, NAME, lambda _, response: response)
@@ -120,7 +120,7 @@ async def test_after_a_silence_all_goes_on_with_a_new_node(domain: int) -> None:
             await until(twin.occupancy_map, "the map")
             peer.node.destroy_publisher(maps)
             twin.rejoin_after_s = 0.1
-            # The peer does not spin: nobody would ever answer.
+            # The peer does not spin: it never answers.
             with pytest.raises(TwinUnavailableError, match="not running"):
                 await twin.estimate_report(ReportRequest("co2"))
             twin.rejoin_after_s = math.inf
@@ -129,7 +129,7 @@ async def test_after_a_silence_all_goes_on_with_a_new_node(domain: int) -> None:
             assert twin.occupancy_map() is not None, "and nobody publishes it any more"
 
 
-async def test_what_a_lost_twin_said_last_is_no_news_to_a_new_node(domain: int) -> None:
+async def test_the_last_state_of_a_lost_twin_is_no_news_to_a_new_node(domain: int) -> None:
     samples = list[Sample]()
     with Peer(domain) as peer:
         async with started(WebTwin) as (twin, told):
@@ -144,7 +144,7 @@ async def test_what_a_lost_twin_said_last_is_no_news_to_a_new_node(domain: int) 
             revision = twin.revision()
             assert revision != before, "what is made by other rules is another answer"
             twin.rejoin_after_s = 0.1
-            # DDS goes on in a twin that is stuck, and what it latched comes to who is new.
+            # In a twin that is stuck, DDS goes on: its latched state reaches new subscribers.
             await until(lambda: len(samples) > 1, "what is latched, again")
             twin.rejoin_after_s = math.inf
             peer.publish_map(occupancy_grid([[0, 100]]))
@@ -157,7 +157,7 @@ async def test_what_a_lost_twin_said_last_is_no_news_to_a_new_node(domain: int) 
             assert [it.snapshot.tags[0].readings[0].value for it in told] == [1.0, 2.0]
 
 
-async def test_a_node_is_made_again_after_as_long_a_silence_again_and_five_minutes_at_most(
+async def test_a_node_is_replaced_after_ever_longer_silences_of_five_minutes_at_most(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     twin = WebTwin(ros_args=(), timeout_s=1.0, rejoin_after_s=Limits().rejoin_after_s)
@@ -179,7 +179,9 @@ async def test_a_node_is_made_again_after_as_long_a_silence_again_and_five_minut
     assert joined == [begun + each for begun in (1_000.0, 3_000.0) for each in after]
 
 
-async def test_refusals_are_the_services_and_no_answer_is_waited_for_for_ever(domain: int) -> None:
+async def test_refusals_are_the_services_and_no_wait_is_endless(
+    domain: int,
+) -> None:
     def answer(request: Any, response: Any) -> Any:
         response.error_message = SAYS[request.sensor_type]
         return response
@@ -211,7 +213,7 @@ async def test_refusals_are_the_services_and_no_answer_is_waited_for_for_ever(do
 
 
 def copies(folder: Path, *ages_s: float) -> list[Path]:
-    """One file for each age, of a journal of its own."""
+    """One file of each age, each a copy of its own journal."""
     paths = [folder / f"{number:032}.sqlite" for number in range(len(ages_s))]
     for path, age_s in zip(paths, ages_s, strict=True):
         write(path, Lot(path.stem, (), 0, is_all=True), 1)
@@ -220,7 +222,7 @@ def copies(folder: Path, *ages_s: float) -> list[Path]:
 
 
 def left_after_start(folder: Path) -> tuple[str | None, list[Path]]:
-    """The file that is read at once, and those that are left."""
+    """The file that is read first, and those that are left."""
 
     async def test() -> str | None:
         async def query(_after: int) -> Lot:
@@ -235,18 +237,18 @@ def left_after_start(folder: Path) -> tuple[str | None, list[Path]]:
     return asyncio.run(test()), sorted(folder.glob("*.sqlite"))
 
 
-def test_a_copy_that_was_not_written_for_long_is_deleted_at_the_start(tmp_path: Path) -> None:
+def test_an_old_copy_is_deleted_at_the_start(tmp_path: Path) -> None:
     newest, recent, _ = paths = copies(tmp_path, 60.0, RETAINED_S - 60.0, RETAINED_S + 60.0)
     assert left_after_start(tmp_path) == (str(newest), paths[:2])
     assert recent.exists()
 
 
-def test_the_newest_stays_however_old_it_is(tmp_path: Path) -> None:
+def test_the_latest_copy_stays_whatever_its_age(tmp_path: Path) -> None:
     newest, _ = copies(tmp_path, RETAINED_S + 60.0, RETAINED_S + 120.0)
     assert left_after_start(tmp_path) == (str(newest), [newest])
 
 
-def test_a_file_that_is_named_is_read_before_its_twin_is_heard(tmp_path: Path) -> None:
+def test_a_configured_file_is_read_before_its_twin_is_received(tmp_path: Path) -> None:
     journal = tmp_path / "j.sqlite"
     with recording(journal, world=World("simulated", 1_440.0)) as twin:
         twin.write(scan())

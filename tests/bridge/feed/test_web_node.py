@@ -1,4 +1,4 @@
-"""The ROS side of the role `web`: a real node, and a peer that plays the twin."""
+"""The ROS side of the role `web`: a real node, and a peer in place of the twin."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -21,7 +21,7 @@ from tests.support.waiting import wait_for
 
 
 class Stage:
-    """A node that is spun by hand, what it has told, and the peer."""
+    """A node that the test spins, the updates that it reports, and the peer."""
 
     def __init__(self, domain: int, *ros_args: str) -> None:
         self._context = Context()
@@ -38,21 +38,21 @@ class Stage:
         rclpy.try_shutdown(context=self._context)
 
     def until(self, look: Callable[[], Any], what: str) -> Any:
-        """Spin the node until `look` gives something true, and return that."""
+        """Spin the node until `look` returns something true, and return that."""
         return wait_for(look, what, meanwhile=self._executor.spin_once)
 
     def first_map(self) -> OccupancyMap:
-        """The first map that comes."""
+        """Wait for the first map."""
         found: OccupancyMap = self.until(lambda: self.node.occupancy_map, "a map")
         return found
 
     def take(self, peer: Peer, *tags: TagState) -> Snapshot:
-        """Let a twin publish a state and its times, and return what the node makes of them."""
+        """Publish a state and its times as the twin does, and return the node's update."""
         self.stamp_s += 1
         snapshot = Snapshot(self.stamp_s * S, "map", tags)
         peer.publish("/twin/times", convert.StateMessages().times(snapshot), depth=1)
         peer.publish("/twin/state", convert.StateMessages().build(snapshot), depth=1)
-        if not has_times(self.told_of(self.stamp_s * S)):  # it came before its own
+        if not has_times(self.told_of(self.stamp_s * S)):  # it arrived before its times
             self.until(lambda: has_times(self.told[-1]), "its times")
         return self.told[-1]
 
@@ -90,7 +90,7 @@ def has_times(snapshot: Snapshot) -> bool:
 def tag(
     tag_id: str = "1", value: float = 1.0, x: float | None = 1.0, at_s: int = 5, **more: Any
 ) -> TagState:
-    """A tag as it is after one scan."""
+    """A tag after one scan."""
     pose = None if x is None else Pose(x, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     readings = (Reading("co2", value, at_s * S),)
     return TagState(tag_id, pose, readings, at_s * S, last_try=Attempt(at_s * S), **more)
@@ -115,15 +115,13 @@ def test_the_revision_changes_with_poses_and_readings_and_with_nothing_else(
         revisions.append(stage.node.revision)
     assert len(set(revisions)) == len(revisions)
     assert told[1].tags[0] is not told[0].tags[0]
-    # What did not change is the very same value.
+    # Unchanged values are the same objects.
     assert told[-1].tags[0] is told[-2].tags[0]
     stage.take(peer, tag("1", 2.0, at_s=6), tag("2", 2.0, flower=Flower(species="rose")))
     assert stage.node.revision == revisions[-1]
 
 
-def test_readings_that_are_not_of_one_scan_any_more_are_another_revision(
-    stage: Stage, peer: Peer
-) -> None:
+def test_readings_no_longer_from_one_scan_are_another_revision(stage: Stage, peer: Peer) -> None:
     revisions = []
     for temperature_s, humidity_s in ((1, 1), (2, 2), (3, 2)):
         readings = (
@@ -135,7 +133,7 @@ def test_readings_that_are_not_of_one_scan_any_more_are_another_revision(
     assert revisions[0] == revisions[1] != revisions[2]
 
 
-def test_a_twin_that_was_started_anew_is_another_revision_for_all_replicas(domain: int) -> None:
+def test_a_restarted_twin_is_another_revision_for_all_replicas(domain: int) -> None:
     with stage_in(domain) as one, stage_in(domain) as two:
         replicas, revisions = (one, two), set[str]()
         for _ in range(2):
@@ -152,24 +150,24 @@ def test_a_twin_that_was_started_anew_is_another_revision_for_all_replicas(domai
 
 
 def spare(_: float) -> None:
-    """What has been waited for comes with the next state."""
+    """The condition of an earlier wait holds with the next state."""
 
 
 # --- times --------------------------------------------------------------------------------------
 
 
-def test_a_state_waits_for_its_times_and_for_no_others(stage: Stage, peer: Peer) -> None:
+def test_a_state_waits_for_its_own_times_alone(stage: Stage, peer: Peer) -> None:
     told = stage.take(peer, tag())
     assert told.tags[0].readings[0].observed_at_ns == 5 * S
     count = len(stage.told)
-    # A state whose times are not there: it comes without them, since the twin must not seem dead.
+    # A state without its times is passed on without them, so that the twin does not seem dead.
     late = Snapshot(90 * S, "map", (tag(value=7.0, at_s=80),))
     peer.publish("/twin/state", convert.StateMessages().build(late), depth=1)
     alone = stage.told_of(90 * S)
     assert not has_times(alone)
     assert alone.tags[0].readings[0] == Reading("co2", 7.0)
     assert len(stage.told) == count + 1
-    # And with them as soon as they come.
+    # And again with them as soon as they arrive.
     times = convert.StateMessages().times(late)
     peer.publish("/twin/times", times, depth=1)
     stage.until(lambda: has_times(stage.told[-1]), "the times")
@@ -179,7 +177,7 @@ def test_a_state_waits_for_its_times_and_for_no_others(stage: Stage, peer: Peer)
 # --- maps ---------------------------------------------------------------------------------------
 
 
-def test_a_map_that_is_told_again_changes_nothing_and_is_the_same_in_every_replica(
+def test_a_repeated_map_changes_nothing_and_all_replicas_have_the_same_one(
     domain: int, stage: Stage, peer: Peer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     peer.publish_map(occupancy_grid([[0, 100]]))
@@ -197,7 +195,7 @@ def test_a_map_that_is_told_again_changes_nothing_and_is_the_same_in_every_repli
     assert stage.node.occupancy_map is first
     assert stage.node.revision == revision
     assert stage.node.utilities.callback_errors == 0
-    with stage_in(domain) as later:  # which hears the copy alone
+    with stage_in(domain) as later:  # which receives only the repeated one
         later.first_map()
         assert later.node.revision == revision
     peer.publish_map(occupancy_grid([[100, 0]], stamp_s=6))
@@ -215,6 +213,6 @@ def test_a_map_that_is_told_again_changes_nothing_and_is_the_same_in_every_repli
         ("field_service_name:='a b'", "parameter field_service_name is 'a b'"),
     ],
 )
-def test_a_parameter_that_cannot_be_is_named(domain: int, override: str, complaint: str) -> None:
+def test_an_invalid_parameter_is_named(domain: int, override: str, complaint: str) -> None:
     with pytest.raises(ParameterError, match=complaint):
         Stage(domain, "--ros-args", "-p", override)

@@ -1,4 +1,4 @@
-"""The formats of a field and of an estimate: decoded again and compared with the grid."""
+"""The formats of a field and of an estimate, decoded and compared with the grid."""
 
 import io
 import json
@@ -69,7 +69,7 @@ def test_a_colour_is_the_one_that_a_browser_shows(
 # --- JSON ---------------------------------------------------------------------------------------
 
 
-def test_json_has_no_number_that_json_does_not_know_and_short_decimals() -> None:
+def test_json_has_null_for_what_is_not_finite_and_short_decimals() -> None:
     text = formats.write_json(GRID)
     body = json.loads(text, parse_constant=pytest.fail)
     assert body["values"] == [10.0, None, 20.0, 12.5, 15.0, 30.0]
@@ -78,7 +78,7 @@ def test_json_has_no_number_that_json_does_not_know_and_short_decimals() -> None
     assert (body["value_min"], body["value_max"], body["sample_count"]) == (10.0, 30.0, 5)
 
 
-def test_a_large_field_is_written_in_parts_that_are_one_list(
+def test_a_large_field_is_written_in_parts_that_form_one_list(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     whole = formats.write_json(GRID)
@@ -98,8 +98,8 @@ def test_a_large_field_is_written_in_parts_that_are_one_list(
         ROWS,
         [[7.0, 7.0]],  # one value everywhere
         [[math.nan, math.nan]],
-        [[-3e38, 2e38, 3e38]],  # the span is past float32
-        [[0.0, 1.4e-45, 4.2e-45]],  # its inverse is
+        [[-3e38, 2e38, 3e38]],  # the span exceeds float32
+        [[0.0, 1.4e-45, 4.2e-45]],  # its inverse does
     ],
 )
 def test_every_pixel_of_a_png_is_the_ramps(rows: list[list[float]], scale: int) -> None:
@@ -125,7 +125,7 @@ def test_every_pixel_of_a_png_is_the_ramps(rows: list[list[float]], scale: int) 
 
 # --- estimates ------------------------------------------------------------------------------------
 
-# Known are the first five of six: sds 0, 0.5, .. below 2.25.
+# The first five of six are known: standard deviations 0, 0.5, .. below 2.25.
 ESTIMATE = an_estimate(width=3, height=2)
 
 
@@ -136,25 +136,25 @@ def written(field_format: FieldFormat, layer: Literal["mean", "sd"] = "mean") ->
 
 
 @pytest.mark.parametrize(("layer", "highest"), [("mean", 24.0), ("sd", 2.0)])
-def test_a_picture_is_transparent_where_it_is_not_known(
+def test_a_picture_is_transparent_where_nothing_is_known(
     layer: Literal["mean", "sd"], highest: float
 ) -> None:
     field = formats.estimate_picture(ESTIMATE, layer)
     assert field.value_max == highest
     assert np.isnan(field.values).tolist() == [False] * 5 + [True]
     alpha = np.asarray(Image.open(io.BytesIO(written(PNG, layer))).convert("RGBA"))[..., 3]
-    # Its top row is the one of the greatest y.
+    # Its top row has the greatest y.
     assert alpha[0, 2] == alpha[1, 0] == 0
     assert alpha[1, 1] < alpha[1, 2] < alpha[0, 0] < alpha[0, 1]
 
 
-def test_a_picture_of_nothing_known_is_transparent() -> None:
+def test_a_picture_with_nothing_known_is_transparent() -> None:
     field = formats.estimate_picture(an_estimate(2, 2, sd_known=0.0), "mean")
     assert (field.value_min, field.value_max) == (0.0, 0.0)
     assert np.isnan(field.values).all()
 
 
-def test_headers_say_what_an_array_cannot() -> None:
+def test_headers_describe_what_an_array_cannot() -> None:
     assert formats.estimate_metadata(ESTIMATE, SENSORS.named("co2")) == {
         "Sensor": "co2",
         "Unit": "ppm",
@@ -169,7 +169,7 @@ def test_headers_say_what_an_array_cannot() -> None:
     }
 
 
-def test_known_is_only_what_is_sure_to_a_part_of_the_narrowest_ideal_range() -> None:
+def test_an_estimate_is_known_where_it_is_certain_to_a_part_of_the_narrowest_ideal_range() -> None:
     wide, narrow = (Ranges(ideal=Span(20.0, high)) for high in (60.0, 26.0))
     sensor = replace(SENSORS.named("ph"), day=wide, night=narrow)
     found = formats.within_ideal(ESTIMATE, sensor).grid

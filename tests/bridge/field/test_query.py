@@ -32,14 +32,14 @@ def test_a_full_query() -> None:
     assert query.box == (-1.0, 0.5, 20.0, 3.0)
 
 
-def test_what_is_left_out_has_a_default_and_the_box_is_left_to_the_server() -> None:
+def test_omitted_values_have_defaults_and_the_server_chooses_the_box() -> None:
     query = parse([("sensor_type", "co2")])
     assert query == FieldQuery("co2")
     assert query.box is None
     assert query.request((0.0, 1.0, 2.0, 3.0), 400) == FieldRequest("co2", 0.1, 0.0, 1.0, 2.0, 3.0)
 
 
-def test_cells_of_a_default_box_are_wide_enough_unless_the_query_says_how_wide() -> None:
+def test_cells_of_a_default_box_get_wide_enough_unless_the_query_sets_their_size() -> None:
     whole = (0.0, 1.0, 2.0, 3.0)
     coarser = parse([("sensor_type", "co2")]).request(whole, 399)
     assert coarser == FieldRequest("co2", 0.2, *whole)
@@ -48,7 +48,7 @@ def test_cells_of_a_default_box_are_wide_enough_unless_the_query_says_how_wide()
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "1001", "1.5", "", "²", "٣", "1e2", "9" * 5_000, "x"])
-def test_a_scale_out_of_its_range_is_refused(text: str) -> None:
+def test_a_scale_out_of_range_is_refused(text: str) -> None:
     with pytest.raises(PastRefused, match=f"^scale is '{text[:64]}': "):
         parse([("scale", text)])
 
@@ -74,12 +74,12 @@ def test_a_scale_out_of_its_range_is_refused(text: str) -> None:
         (",;q=,/", None),
     ],
 )
-def test_accept_decides_the_format(accept: str | None, expected: FieldFormat | None) -> None:
+def test_accept_chooses_the_format(accept: str | None, expected: FieldFormat | None) -> None:
     assert field_query.negotiate(accept) == expected
 
 
 @given(st.text(st.characters(codec="latin-1"), max_size=60))
-def test_any_accept_header_gives_a_format_or_none(accept: str) -> None:
+def test_any_accept_header_chooses_a_format_or_none(accept: str) -> None:
     assert field_query.negotiate(accept) in (None, *FORMATS)
 
 
@@ -90,7 +90,7 @@ def test_any_accept_header_gives_a_format_or_none(accept: str) -> None:
     ("if_none_match", "holds"),
     [(None, False), ('"x","abc" ,"y"', True), ('"ab"', False), ("abc", False), ('"abc', False)],
 )
-def test_if_none_match_names_the_tag_or_does_not(if_none_match: str | None, holds: bool) -> None:
+def test_if_none_match_matches_the_etag_or_does_not(if_none_match: str | None, holds: bool) -> None:
     assert field_query.matches(if_none_match, '"abc"') is holds
 
 

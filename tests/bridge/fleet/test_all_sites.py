@@ -1,4 +1,4 @@
-"""Alarms of all sites, the worst first; one sensor of several, the outlier first."""
+"""Alarms of all sites, the worst first; one sensor of several sites, the outlier first."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -20,7 +20,7 @@ HOUR_S = 3600
 
 
 def hours_ago(hours: int, temperature: float, tags: int = 2) -> list[Write]:
-    """A scan of each tag in the middle of an hour, so many hours before this one."""
+    """A scan of each tag in the middle of an hour, that many hours ago."""
     middle_s = (int(time.time()) // HOUR_S - hours) * HOUR_S + HOUR_S // 2
     return [
         scan(str(tag), middle_s * SECOND + tag, temperature=temperature + tag, humidity=60.0)
@@ -47,7 +47,7 @@ class All:
 
 @pytest.fixture(scope="module")
 def every(shared_archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> Iterator[All]:
-    """Sites that no test changes but "over" and "noted", for one test each."""
+    """Sites that no test changes, except "over" and "noted": one test each."""
     archive, folder = shared_archive, tmp_path_factory.mktemp("sites")
     sites: dict[str, Sequence[Write]] = {
         "gh1": scans_lately(temperature=28.0, tags=2),
@@ -77,7 +77,7 @@ def alarms(page: Page, sites: str = "") -> dict[str, Any]:
     return found
 
 
-def test_alarms_of_all_sites_the_worst_first(every: All) -> None:
+def test_alarms_of_all_sites_come_with_the_worst_first(every: All) -> None:
     page = every.page
     page.site("gh1", active_alarms=2)
     page.site("gh2", active_alarms=1)
@@ -87,10 +87,10 @@ def test_alarms_of_all_sites_the_worst_first(every: All) -> None:
     assert said[0] == ("gh2", "0", "critical")
     assert sorted(said[1:]) == [("gh1", "0", "stressed"), ("gh1", "1", "stressed")]
     assert alarms(page)["total"] == sum(site["active_alarms"] for site in page.sites().values())
-    # The newest first among equals.
+    # The latest first among equals.
     raised = [it["raised_at"] for it in found["alarms"][1:]]
     assert raised == sorted(raised, key=lambda at: (-at["sec"], -at["nanosec"]))
-    # As the site itself has it, with who it is of in front.
+    # As the site itself lists it, prefixed with the site.
     first = dict(found["alarms"][0])
     assert (first.pop("site"), first.pop("name")) == ("gh2", "gh2")
     assert first.pop("is_live") is True
@@ -101,7 +101,7 @@ def test_alarms_of_all_sites_the_worst_first(every: All) -> None:
     assert alarms(page, "well") == {"alarms": [], "total": 0}
 
 
-def test_alarms_that_are_over_are_gone_and_the_etag_says_so(every: All) -> None:
+def test_cleared_alarms_are_gone_and_the_etag_changes(every: All) -> None:
     page, path = every.page, "/api/alarms?sites=over"
     page.site("over", active_alarms=1)
     etag = page.http.get(path).headers["etag"]
@@ -113,7 +113,7 @@ def test_alarms_that_are_over_are_gone_and_the_etag_says_so(every: All) -> None:
     assert alarms(page, "over") == {"alarms": [], "total": 0}
 
 
-def test_there_are_so_many_of_a_site_and_in_all_and_the_rest_is_counted(
+def test_alarms_are_limited_per_site_and_in_all_and_the_rest_is_counted(
     archive: Archive, tmp_path: Path
 ) -> None:
     many = MAX_LISTED // MAX_ALARMS + 1
@@ -133,14 +133,14 @@ def test_there_are_so_many_of_a_site_and_in_all_and_the_rest_is_counted(
         assert f"sites are {50 + many}, the limit is 50" in answer.json()["detail"]
 
 
-def test_what_people_said_of_an_alarm_is_beside_it(every: All) -> None:
+def test_an_alarm_comes_with_its_notes(every: All) -> None:
     archive, page = every.archive, every.page
     page.site("noted", active_alarms=2)
     etag = page.http.get("/api/alarms?sites=noted").headers["etag"]
     first, second = alarms(page, "noted")["alarms"]
     now_ns = time.time_ns()
     until_ns = now_ns + HOUR_S * SECOND
-    # The word of one greenhouse is not that of another.
+    # A note of one greenhouse is not that of another.
     for site, by, kind, alarm, until in (
         ("noted", "anna", "shelve", second, until_ns),
         ("gh1", "bert", "acknowledge", first, "NULL"),
@@ -153,7 +153,7 @@ def test_what_people_said_of_an_alarm_is_beside_it(every: All) -> None:
     def said() -> dict[str, Any]:
         return {it["id"]: it for it in alarms(page, "noted")["alarms"]}
 
-    # Without a row of the log that would be new.
+    # Without a new row in the log.
     wait_for(lambda: said()[second["id"]].get("shelved_by") == "anna", "who said what")
     assert said()[second["id"]]["shelved_until"]["sec"] == until_ns // SECOND
     assert "acknowledged_by" not in said()[first["id"]]
@@ -174,13 +174,13 @@ def known(values: list[float | None]) -> list[float]:
     return [value for value in values if value is not None]
 
 
-def test_one_sensor_of_several_sites_the_outlier_first(every: All) -> None:
+def test_one_sensor_of_several_sites_is_compared_with_the_outlier_first(every: All) -> None:
     found = compared(every.page, sites="a,b,c,odd,empty")
     assert [it["site"] for it in found["sites"]] == ["odd", "a", "b", "c", "empty"]
     assert found["unit"] == "°C"
     assert found["bucket_s"] == HOUR_S
     odd, empty = found["sites"][0], found["sites"][-1]
-    # Two tags, of which one is a degree warmer.
+    # Two tags, one of them a degree warmer.
     assert known(odd["means"]) == [35.5, 35.5, 35.5]
     assert odd["mean"] == 35.5
     assert odd["deviation"] == pytest.approx(35.5 - 22.0)
@@ -198,7 +198,7 @@ def test_one_sensor_of_several_sites_the_outlier_first(every: All) -> None:
     )
 
 
-def test_what_is_compared_can_be_chosen(every: All) -> None:
+def test_the_compared_sensor_and_period_can_be_chosen(every: All) -> None:
     http, three = every.page.http, "sites=a,b,odd"
     two = compared(every.page, sites="odd,a")
     assert [it["site"] for it in two["sites"]] == ["a", "odd"]
@@ -234,7 +234,7 @@ def test_bad_queries_are_refused_in_a_line(every: All, route: str, status: int, 
     assert said in answer.json()["detail"]
 
 
-def test_the_sensors_in_force_are_those_of_a_bridge(every: All) -> None:
+def test_the_configured_sensors_are_those_of_a_bridge(every: All) -> None:
     sensors = every.page.http.get("/api/sensors")
     assert sensors.json()["sensors"]["temperature"]["unit"] == "°C"
     assert sensors.content == every.page.http.get("/sites/gh1/api/sensors").content

@@ -1,4 +1,4 @@
-"""Whoever asks, whatever is in the archive: the fleet's page goes on, and no site costs another."""
+"""Hostile clients and rows: the fleet's page goes on, and no site slows another."""
 
 import os
 import signal
@@ -46,7 +46,7 @@ def made(server: Postgres, journal: Path, *sites: str) -> Archive:
 
 @pytest.fixture(scope="module")
 def page(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    """One of which two sites may be open, and a client may have one answer under way."""
+    """At most two sites may be open, and a client may have one request under way."""
     archive = made(postgresql, tmp_path_factory.mktemp("hostile") / "journal", *SITES[1:])
     bounds = limits(client_timeout_s=TIMEOUT_S, open_sites=2, concurrency=1)
     soon = constants(**{"lupin_bridge.feed.past_process:REST_S": 0.2})
@@ -84,7 +84,7 @@ STRANGE = {
 }
 
 
-def test_a_strange_path_is_refused_as_a_request_and_as_a_websocket(page: Page) -> None:
+def test_a_malformed_path_is_refused_as_a_request_and_as_a_websocket(page: Page) -> None:
     for path, expected in STRANGE.items():
         line = b"GET " + path + b" HTTP/1.1\r\n"
         plain = raw_http.answer(page.url, line + b"Host: 127.0.0.1\r\nConnection: close\r\n\r\n")
@@ -93,7 +93,7 @@ def test_a_strange_path_is_refused_as_a_request_and_as_a_websocket(page: Page) -
         assert 400 <= status(raw_http.answer(page.url, line + UPGRADE + b"\r\n")) < 500, path
 
 
-def test_sites_that_are_none_are_opened_by_nobody(page: Page) -> None:
+def test_no_process_is_started_for_unknown_sites(page: Page) -> None:
     before = page.metric("lupin_fleet_sites_open")
     for number in range(100):
         assert page.http.get(f"/sites/none{number}/api/state").status_code == 404
@@ -103,7 +103,7 @@ def test_sites_that_are_none_are_opened_by_nobody(page: Page) -> None:
 # --- readers --------------------------------------------------------------------------------------
 
 
-def test_who_reads_many_sites_gives_one_up_to_another_client(page: Page) -> None:
+def test_a_client_that_reads_many_sites_loses_one_to_another_client(page: Page) -> None:
     with (
         open_websocket(ws(page, "/sites/gh1/ws/state")) as kept_on,
         open_websocket(ws(page, "/sites/gh2/ws/state")) as given_up,
@@ -115,18 +115,18 @@ def test_who_reads_many_sites_gives_one_up_to_another_client(page: Page) -> None
             assert other.get("/sites/gh3/api/state").status_code == 200
         with pytest.raises(ConnectionClosed, match="2 sites are open here, the limit"):
             deque(iter(lambda: given_up.recv(timeout=PATIENCE_S), None))
-        # The first one is as it was.
+        # The first one is unchanged.
         while '"type":"s' not in str(kept_on.recv(timeout=PATIENCE_S)):
             pass
         assert page.metric("lupin_clients", "/sites/gh1") == 1
     assert page.metric("lupin_fleet_sites_open") <= 2
 
 
-def test_sites_that_are_opened_at_once_are_opened_once(page: Page) -> None:
+def test_simultaneous_requests_open_a_site_once(page: Page) -> None:
     for name in SITES[:2]:
         assert page.http.get(f"/sites/{name}/api/state").status_code == 200
     with ExitStack() as held:
-        # Handshakes for a site whose place has to be made, all of them under way at once.
+        # Simultaneous handshakes for a site that has to replace another.
         clients = [held.enter_context(raw_http.connect(page.url)) for _ in range(6)]
         for client in clients:
             client.sendall(b"GET /sites/gh4/ws/state HTTP/1.1\r\n" + UPGRADE + b"\r\n")
@@ -136,7 +136,7 @@ def test_sites_that_are_opened_at_once_are_opened_once(page: Page) -> None:
         assert page.metric("lupin_fleet_sites_open") <= 2
 
 
-def test_a_client_that_does_not_read_has_no_more_answers_under_way_over_all_sites(
+def test_a_client_that_does_not_read_has_no_more_requests_under_way_over_all_sites(
     page: Page,
 ) -> None:
     dear = "api/field.json?sensor_type=temperature&resolution=0.005"
@@ -158,10 +158,10 @@ def test_a_client_that_does_not_read_has_no_more_answers_under_way_over_all_site
     )
 
 
-def test_a_browser_of_the_overview_that_never_reads_is_dismissed(
+def test_an_overview_client_that_never_reads_is_disconnected(
     postgresql: Postgres, tmp_path: Path
 ) -> None:
-    # A frame of so many sites is more than a socket takes.
+    # A frame of so many sites is more than a socket buffers.
     sites = [f"gh{number}" for number in range(2, 1_500)]
     archive = made(postgresql, tmp_path / "journal")
     archive.do(f"INSERT INTO site SELECT unnest('{{{','.join(sites)}}}'::text[]), ''")
@@ -182,7 +182,7 @@ def test_a_browser_of_the_overview_that_never_reads_is_dismissed(
 # --- processes ------------------------------------------------------------------------------------
 
 
-def test_a_process_that_is_killed_is_started_again_and_counted(page: Page) -> None:
+def test_a_killed_process_is_restarted_and_counted(page: Page) -> None:
     assert page.http.get(f"/sites/gh1/{HISTORY}").status_code == 200
 
     def is_started_again(kind: str) -> None:
@@ -191,7 +191,7 @@ def test_a_process_that_is_killed_is_started_again_and_counted(page: Page) -> No
         (child,) = children_of(page.process.pid, kind.encode())
         os.kill(child, signal.SIGKILL)
         assert page.http.get("/sites/gh1/api/state").status_code == 200
-        # The reader is started again at once, the first time; a query waits for it or is refused.
+        # The first time, the reader restarts at once; a query waits for it or is refused.
         wait_for(lambda: page.http.get(f"/sites/gh1/{HISTORY}").status_code == 200, "the past")
         wait_for(lambda: page.metric(name) > before, f"another {kind}")
         wait_for(lambda: page.http.get("/readyz").status_code == 200, "an archive that is read")
@@ -200,7 +200,7 @@ def test_a_process_that_is_killed_is_started_again_and_counted(page: Page) -> No
     is_started_again("reader")
 
 
-def test_an_archive_that_hangs_is_said_and_goes_on(tmp_path: Path) -> None:
+def test_an_archive_that_hangs_is_reported_and_recovers(tmp_path: Path) -> None:
     with server() as own:
         archive = made(own, tmp_path / "journal", "gh2")
         soon = constants(**{"lupin_bridge.fleet.source:STUCK_S": 3.0})
@@ -235,7 +235,7 @@ def test_an_archive_that_hangs_is_said_and_goes_on(tmp_path: Path) -> None:
 # --- what is in the archive -----------------------------------------------------------------------
 
 
-def test_rows_that_cannot_be_read_are_said_on_their_sites_page(
+def test_unreadable_rows_are_reported_on_the_page_of_their_site(
     archive: Archive, tmp_path: Path
 ) -> None:
     journal = tmp_path / "journal"
@@ -251,7 +251,7 @@ def test_rows_that_cannot_be_read_are_said_on_their_sites_page(
         for name, path in (("gh1", HISTORY), ("gh1", "api/export.csv"), ("gh2", HISTORY)):
             found = running.http.get(f"/sites/{name}/{path}")
             if name == "gh2" and found.status_code == 200:
-                continue  # a history of readings needs no inspection
+                continue  # A history of readings needs no inspection.
             assert found.status_code == 503, found.text
             assert "ows of the site cannot be read" in found.json()["detail"]
         kept(journal, [scan("0", time.time_ns())])
@@ -263,7 +263,7 @@ def test_rows_that_cannot_be_read_are_said_on_their_sites_page(
         looks = running.metric("lupin_fleet_looks")
         wait_for(lambda: running.metric("lupin_fleet_looks") > looks + 1, "it to be tried again")
         assert running.process.output.count("site gh1 is unchanged: rows of the site") == 1
-        # What was last known stays.
+        # The last known state stays.
         assert len(running.http.get("/sites/gh1/api/state").json()["tags"]) == 5
         assert running.http.get("/readyz").status_code == 200
         archive.do("UPDATE scan SET readings = '[21.5]' WHERE site = 'gh1'")
@@ -271,7 +271,7 @@ def test_rows_that_cannot_be_read_are_said_on_their_sites_page(
         wait_for(lambda: problem() == "[]", "all to be well again")
 
 
-def test_a_site_that_cannot_be_read_or_takes_too_long_costs_no_other_its_status(
+def test_an_unreadable_or_slow_site_costs_no_other_site_its_status(
     archive: Archive, tmp_path: Path
 ) -> None:
     journal = tmp_path / "journal"
@@ -299,7 +299,7 @@ def test_a_site_that_cannot_be_read_or_takes_too_long_costs_no_other_its_status(
         assert "Traceback" not in running.process.output
 
 
-def test_what_a_site_writes_of_itself_ends_no_look_at_the_others(
+def test_nothing_that_a_site_writes_stops_the_overview_of_the_others(
     archive: Archive, tmp_path: Path
 ) -> None:
     forward(archive, tmp_path / "journal", scans_lately())
@@ -323,7 +323,7 @@ def test_what_a_site_writes_of_itself_ends_no_look_at_the_others(
         assert "a value cannot be read or written: invalid input" in compared.json()["detail"]
 
 
-def test_a_sites_clock_that_is_wrong_by_a_year(archive: Archive, tmp_path: Path) -> None:
+def test_a_sites_clock_may_be_wrong_by_a_year(archive: Archive, tmp_path: Path) -> None:
     sites = {"ahead": wall().stamp_ns + YEAR_NS, "behind": wall().stamp_ns - YEAR_NS}
     for name, now_ns in sites.items():
         rows = [scan("7", now_ns - number * 10**9) for number in range(5, 0, -1)]
@@ -338,12 +338,12 @@ def test_a_sites_clock_that_is_wrong_by_a_year(archive: Archive, tmp_path: Path)
             (tag,) = running.http.get(f"{below}/state").json()["tags"]
             assert tag["stale_seconds"] >= 0
             past = running.http.get(f"{below}/state?at={now_ns // 10**9 - 3}")
-            # A moment that has come for the site has come.
+            # A moment in the past of the site can be queried.
             assert [it["tag_id"] for it in past.json()["tags"]] == ["7"]
             assert len(running.http.get(f"{below}/export.csv").text.splitlines()) == 6
 
 
-# --- what can never work, and what may pass -------------------------------------------------------
+# --- fatal and passing errors ---------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -354,14 +354,14 @@ def test_a_sites_clock_that_is_wrong_by_a_year(archive: Archive, tmp_path: Path)
         (("--ros-args", "-p", "a:=1"), "fleet takes no ROS arguments"),
     ],
 )
-def test_what_can_never_work_ends_it(args: tuple[str, ...], said: str) -> None:
+def test_an_error_that_cannot_pass_ends_the_process(args: tuple[str, ...], said: str) -> None:
     done = run("fleet", "--port", "0", *args)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert said in done.stderr
 
 
-def test_what_may_pass_is_said_and_the_page_is_served(archive: Archive) -> None:
+def test_an_error_that_may_pass_is_reported_and_the_page_is_served(archive: Archive) -> None:
     archive.do("UPDATE archive SET version = 99")
     with fleet(archive) as page:
         page.process.wait_for_output("the archive is of version 99")
@@ -387,7 +387,7 @@ def test_what_may_pass_is_said_and_the_page_is_served(archive: Archive) -> None:
         assert answer.status_code == 403
 
 
-def test_an_archive_that_answers_late_and_badly_is_said_once() -> None:
+def test_a_slow_and_failing_archive_is_reported_once() -> None:
     soon = constants(**{"lupin_bridge.fleet.source:_START_S": 0.5})
     with socket.create_server(("127.0.0.1", 0)) as database:
         url = f"postgresql://a@127.0.0.1:{database.getsockname()[1]}/b"
@@ -401,7 +401,7 @@ def test_an_archive_that_answers_late_and_badly_is_said_once() -> None:
             assert process.output.count("server closed the connection") == 1
 
 
-def test_a_fleet_is_shown_without_ros() -> None:
+def test_the_fleet_page_needs_no_ros() -> None:
     code = "import sys, lupin_bridge.cli.roles; print('rclpy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"

@@ -1,4 +1,4 @@
-"""What an operator says at the fleet's page is a row of the site's log, on every replica."""
+"""A note from the fleet's page is a row of the site's log, on every replica."""
 
 import time
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ def here(shared_archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> I
 
 
 def alarm_of(browser: httpx.Client, **said: str) -> dict[str, Any]:
-    """The alarm of the hot tag, once this is said of it."""
+    """The alarm of the hot tag, once it has this note."""
 
     def look() -> dict[str, Any] | None:
         answer = browser.get(ALARMS)
@@ -57,7 +57,7 @@ def post(browser: httpx.Client, **note: Any) -> httpx.Response:
     return browser.post(NOTES, json=note)
 
 
-def test_an_alarm_is_acknowledged_and_every_replica_shows_it(here: Here) -> None:
+def test_an_acknowledged_alarm_is_shown_by_every_replica(here: Here) -> None:
     archive = here.archive
     with (
         fleet(archive, "--accounts", str(here.accounts)) as other,
@@ -81,7 +81,7 @@ def test_an_alarm_is_acknowledged_and_every_replica_shows_it(here: Here) -> None
             return any(it.get("acknowledged_by") == "anna" for it in every)
 
         wait_for(overview, "the word beside the alarm of all sites")
-        # Withdrawn, it is kept.
+        # A withdrawn note stays stored.
         assert anna.delete(f"{NOTES}/{note['id']}").status_code == 200
         wait_for(lambda: "acknowledged_by" not in alarm_of(vera), "the alarm as before")
         kinds = archive.select("SELECT kind FROM note ORDER BY id")
@@ -92,7 +92,7 @@ def test_an_alarm_is_acknowledged_and_every_replica_shows_it(here: Here) -> None
         assert rows_of(here.journal)["note"] == []
 
 
-def test_who_may_not_is_refused(here: Here) -> None:
+def test_a_person_without_the_right_is_refused(here: Here) -> None:
     page, written = here.page, here.archive.select("SELECT count(*) FROM note")
     with signed_in(page.url, "vera") as vera, signed_in(page.url, "anna") as anna:
         subject = f"alarm:{alarm_of(vera)['id']}"
@@ -110,7 +110,7 @@ def test_who_may_not_is_refused(here: Here) -> None:
         assert post(anna, kind="comment", subject="site", text="\x00").status_code == 400
         other = anna.post("/sites/other/api/notes", json={"kind": "comment"})
         assert other.status_code == 404
-        # Notes are written of a site, and nothing else is.
+        # Notes belong to a site; the fleet has no others.
         for path in ("/api/notes", "/sites/gh1/", "/sites/gh1/api/state", "/api/sites"):
             assert anna.post(path, json={}).status_code in {404, 405, 413}, path
         assert here.archive.select("SELECT count(*) FROM note") == written
@@ -120,7 +120,7 @@ def test_who_may_not_is_refused(here: Here) -> None:
             assert "frame-ancestors" in headers["content-security-policy"], path
 
 
-def test_an_archive_that_cannot_be_written_is_said(here: Here) -> None:
+def test_an_archive_that_cannot_be_written_is_reported(here: Here) -> None:
     archive = here.archive
     with signed_in(here.page.url, "anna") as anna:
         alarm_of(anna)
@@ -139,7 +139,7 @@ def test_an_archive_that_cannot_be_written_is_said(here: Here) -> None:
         assert archive.select("SELECT 1 FROM note WHERE text = 'who waits'") == []
 
 
-# --- people of some sites -------------------------------------------------------------------------
+# --- people with some sites -----------------------------------------------------------------------
 
 OURS = {"Authorization": f"Bearer {TOKEN}"}
 ALL = {"Authorization": f"Bearer all-{TOKEN}"}
@@ -154,7 +154,7 @@ def accounts(tmp_path: Path) -> Path:
     return path
 
 
-def test_who_is_for_one_site_sees_that_one_alone_by_every_way(
+def test_a_person_of_one_site_sees_that_site_alone_on_every_route(
     archive: Archive, tmp_path: Path, accounts: Path
 ) -> None:
     for site in ("gh1", "gh2"):
@@ -200,7 +200,7 @@ def names(page: Page, headers: dict[str, str]) -> set[str]:
     return {it["site"] for it in page.http.get("/api/sites", headers=headers).json()["sites"]}
 
 
-def test_a_bridge_of_another_site_or_of_none_that_is_named_lets_them_do_nothing(
+def test_on_a_bridge_of_another_or_an_unnamed_site_they_may_do_nothing(
     accounts: Path,
 ) -> None:
     with served("--accounts", str(accounts)) as live:

@@ -1,4 +1,4 @@
-"""The page over all sites: who lives, how each one is, and what is said where nobody knows."""
+"""The page over all sites: which are live, their status, and what is shown where it is unknown."""
 
 import random
 import time
@@ -26,7 +26,7 @@ def journal(tmp_path: Path) -> Path:
     return tmp_path / "journal.sqlite"
 
 
-def test_a_site_is_live_and_judged_and_a_scan_is_there_without_being_asked_for(
+def test_a_site_is_live_and_judged_and_new_scans_are_pushed(
     archive: Archive, journal: Path
 ) -> None:
     write(journal, scans_lately())
@@ -41,7 +41,7 @@ def test_a_site_is_live_and_judged_and_a_scan_is_there_without_being_asked_for(
         with frames(page) as received:
             first = next(received)
             assert first["is_whole"]
-            # A page that was asked a moment ago may be ahead of the frame that waits for browsers.
+            # An HTTP answer may be ahead of the frame that waits for browsers.
             sites = chain(first["sites"], chain.from_iterable(it["sites"] for it in received))
             assert next(sites)["site"] == "gh1"
             now_ns = wall().stamp_ns
@@ -55,7 +55,7 @@ def test_a_site_is_live_and_judged_and_a_scan_is_there_without_being_asked_for(
         assert news[0]["last_received"] != before["last_received"]
 
 
-def test_who_is_not_forwarded_is_silent_and_what_was_known_is_the_last(
+def test_a_site_that_is_not_forwarded_is_silent_and_keeps_its_last_state(
     archive: Archive, journal: Path
 ) -> None:
     write(journal, scans_lately(temperature=45.0))
@@ -74,7 +74,7 @@ def test_who_is_not_forwarded_is_silent_and_what_was_known_is_the_last(
         assert status.status_code == 503
         assert status.json()["state_age_seconds"] >= 10
         page.process.wait_for_output("site gh1: The twin has fallen silent.")
-        # The state is that of when it was heard last.
+        # The state is as of the last row.
         stamp = page.http.get("/sites/gh1/api/state").json()["header"]["stamp"]["sec"]
         assert stamp <= time.time() - 10
 
@@ -85,20 +85,18 @@ def test_who_is_not_forwarded_is_silent_and_what_was_known_is_the_last(
         found = wait_for(silence, "the alarm of a twin that is silent")
         assert found is not None
         assert found["raised_at"]["sec"] <= time.time() - 10
-        # The same of all sites.
+        # The same over all sites.
         every = page.http.get("/api/alarms").json()
         assert every["total"] == count
         (silent,) = [it for it in every["alarms"] if it["reason"]["kind"] == "silent"]
         assert (silent["site"], silent["is_live"]) == ("gh1", False)
         assert silent["id"] == found["id"]
-        # Who is heard again is not silent any more.
+        # A site that is received again is no longer silent.
         archive.keep_live()
         page.site(is_live=True, active_alarms=before["active_alarms"])
 
 
-def test_what_was_known_last_of_a_silent_site_does_not_grow_old(
-    archive: Archive, journal: Path
-) -> None:
+def test_the_last_state_of_a_silent_site_does_not_age(archive: Archive, journal: Path) -> None:
     days_ns = 3 * 86_400 * 10**9
     then = replace(wall(), stamp_ns=wall().stamp_ns - days_ns)
     hot = [
@@ -116,10 +114,10 @@ def test_what_was_known_last_of_a_silent_site_does_not_grow_old(
         assert page.http.get("/sites/gh1/readyz").json()["twin"] != "live"
 
 
-def test_a_small_map_of_each_site(archive: Archive, journal: Path, tmp_path: Path) -> None:
+def test_each_site_has_a_small_map(archive: Archive, journal: Path, tmp_path: Path) -> None:
     write(journal, scans_lately(tags=30))
     bare = archive.of_site("bare")
-    forward(bare, tmp_path / "bare", [scan("0", wall().stamp_ns)])  # no tag has a place
+    forward(bare, tmp_path / "bare", [scan("0", wall().stamp_ns)])  # no tag has a position
     with forwarder(archive, journal), fleet(archive) as page:
         found = page.site(is_live=True, verdict="healthy")
         path = "/api/sites/gh1/map.svg"
@@ -141,19 +139,19 @@ def test_a_small_map_of_each_site(archive: Archive, journal: Path, tmp_path: Pat
 
 
 def dots_of(picture: str) -> dict[str, list[str]]:
-    """Places by verdict."""
+    """Positions by verdict."""
     paths = [it for it in ElementTree.fromstring(picture) if it.tag.endswith("path")]
     return {it.attrib["class"]: it.attrib["d"].split("M")[1:] for it in paths}
 
 
-# --- where it comes from --------------------------------------------------------------------------
+# --- source of the data ---------------------------------------------------------------------------
 
-# Site, what its twin says, by which clock, and what is shown.
+# Site, what its twin reports, its clock, and what is shown.
 SITES: tuple[tuple[str, Origin, bool, str], ...] = (
     ("robot", "robot", False, "robot"),
     ("simulated", "simulated", False, "simulated"),
     ("recorded", "recorded", True, "recorded"),
-    # By such a clock no robot works.
+    # No robot runs on such a clock.
     ("clock", "robot", True, "sim_time"),
 )
 
@@ -167,15 +165,15 @@ def record(archive: Archive, journal: Path, origin: Origin, *, is_simulated: boo
     forward_once(archive, journal)
 
 
-def test_where_it_comes_from_is_in_the_log(archive: Archive, tmp_path: Path) -> None:
+def test_the_source_is_read_from_the_log(archive: Archive, tmp_path: Path) -> None:
     for site, origin, is_simulated, _ in SITES:
         record(archive.of_site(site), tmp_path / site, origin, is_simulated=is_simulated)
-    forward(archive, tmp_path / "gh1", scans_lately())  # which does not say it
+    forward(archive, tmp_path / "gh1", scans_lately())  # which does not contain it
     with fleet(archive) as page:
         for site, said in [*((site, said) for site, _, _, said in SITES), ("gh1", "unknown")]:
             page.site(site, origin=said)
             assert page.http.get(f"/sites/{site}/readyz").json()["origin"] == said
-        # A journal that is used for something else says that.
+        # A journal with another use is shown as such.
         record(archive.of_site("simulated"), tmp_path / "simulated", "robot")
         page.site("simulated", origin="robot")
 
@@ -200,20 +198,20 @@ def test_y_grows_upwards_and_the_worst_is_drawn_last() -> None:
     )
 
 
-def test_it_is_in_the_middle_and_as_wide_as_it_is_high() -> None:
+def test_the_map_is_centred_and_square() -> None:
     assert drawn((0.0, 0.0, WELL), (0.0, 5.0, WELL)) == (
         '<path class="healthy" d="M20 0h0M20 20h0"/>'
     )
     assert drawn((7.0, 3.0, WELL)) == '<path class="healthy" d="M20 10h0"/>'
 
 
-def test_of_tags_at_one_place_the_worst_is_drawn() -> None:
+def test_of_tags_at_one_position_the_worst_is_drawn() -> None:
     one = drawn((0.0, 0.0, WELL), (0.001, 0.0, BAD), (10.0, 0.0, WELL))
     assert one.count("M") == 2
     assert 'class="critical" d="M0 10h0"' in one
 
 
-def test_ten_thousand_tags_are_no_more_than_seven_kb() -> None:
+def test_ten_thousand_tags_take_at_most_seven_kb() -> None:
     chance = random.Random(1)
     many = [
         (chance.uniform(0, 100), chance.uniform(0, 60), chance.choice([WELL, BAD]))
@@ -222,12 +220,12 @@ def test_ten_thousand_tags_are_no_more_than_seven_kb() -> None:
     assert len(map_svg(drawn(*many))) < 7_500
 
 
-def test_a_tag_that_is_far_off_leaves_the_others_as_they_are() -> None:
+def test_a_tag_far_off_does_not_move_the_others() -> None:
     near = [(float(n % 6), float(n // 6), WELL) for n in range(30)]
     assert drawn(*near, (5e5, 0.0, BAD)) == drawn(*near)
 
 
-def test_a_tag_without_a_place_is_not_drawn_and_nothing_has_no_version() -> None:
+def test_a_tag_without_a_position_is_not_drawn_and_an_empty_map_has_no_version() -> None:
     assert dots([TagState("a")], {"a": Health(WELL)}) == ""
     assert map_version("") is None
     assert map_version(drawn((0.0, 0.0, WELL))) != map_version(drawn((0.0, 0.0, BAD)))

@@ -1,4 +1,4 @@
-"""Shift reports of a fleet: a site's own, as its twin's bridge gives it, and counts of all."""
+"""Shift reports of a fleet: a site's own report equals its bridge's, and totals cover all sites."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def rows_of(begun_s: int) -> list[Write]:
     return sorted(found, key=lambda row: row.stamp_ns)
 
 
-def test_a_sites_report_is_that_of_its_journal_and_all_are_counted(
+def test_a_sites_report_is_that_of_its_journal_and_the_totals_cover_all(
     archive: Archive, tmp_path: Path
 ) -> None:
     begun_s = int(time.time()) // HOUR_S * HOUR_S - 4 * HOUR_S
@@ -69,7 +69,9 @@ def test_a_sites_report_is_that_of_its_journal_and_all_are_counted(
             assert answer.status_code == status, answer.text
 
 
-def test_the_newest_notes_of_all_and_who_took_one_back(archive: Archive, tmp_path: Path) -> None:
+def test_the_latest_notes_of_all_sites_and_who_withdrew_one(
+    archive: Archive, tmp_path: Path
+) -> None:
     at_s = int(time.time()) // HOUR_S * HOUR_S - 2 * HOUR_S
     for site in ("gh1", "gh2"):
         forward(archive.of_site(site), tmp_path / f"{site}.sqlite", rows_of(at_s)[:10])
@@ -95,7 +97,7 @@ def test_the_newest_notes_of_all_and_who_took_one_back(archive: Archive, tmp_pat
         ]
         assert [it["withdrawn_by"] for it in found["notes"]] == ["Ben", None, None]
         assert found["notes"][0]["withdrawn_at"] == {"sec": at_s + 90, "nanosec": 0}
-        # As each site says them itself.
+        # As each site lists them.
         own = page.http.get(f"/sites/gh1/api/report?from={at_s}").json()["notes"]
         mine = [it for it in found["notes"] if it.pop("site") == "gh1" and it.pop("name")]
         assert mine == own

@@ -1,4 +1,4 @@
-"""A site's page, and every answer below it, is that of its log: as the journal itself gives it."""
+"""A site's page and every route below it answer from its log, as the journal itself would."""
 
 import io
 import signal
@@ -28,7 +28,7 @@ from tests.support.ws_client import open_websocket
 MINUTE_NS = 60_000_000_000
 
 
-def test_a_greenhouse_is_also_judged_by_its_last_day_as_on_its_own_page(
+def test_a_site_is_also_judged_by_its_last_day_as_on_its_own_page(
     archive: Archive, tmp_path: Path
 ) -> None:
     journal = tmp_path / "journal.sqlite"
@@ -49,7 +49,7 @@ def test_a_greenhouse_is_also_judged_by_its_last_day_as_on_its_own_page(
 def test_a_sites_page_is_below_its_path_and_follows_its_log(
     archive: Archive, tmp_path: Path
 ) -> None:
-    """Answer by answer it is compared with `serve` in `test_live_same_answers`."""
+    """`test_live_same_answers` compares it with `serve`, answer by answer."""
     journal = tmp_path / "journal.sqlite"
     write(journal, scans_lately())
     with forwarder(archive, journal), fleet(archive) as page:
@@ -71,15 +71,15 @@ def test_a_sites_page_is_below_its_path_and_follows_its_log(
         past = get(f"api/state?at={at}").json()
         assert len(past["tags"]) == 5
         assert past["header"]["stamp"]["sec"] == int(float(at))
-        # The twin has sent no map; and how right estimates were, it has counted itself.
+        # The twin has sent no map, and has graded its estimates itself.
         assert get("api/map").status_code == 404
         assert "the greenhouse's own twin knows" in get("api/estimate/quality").json()["detail"]
         write(journal, [scan("new", time.time_ns(), temperature=22.0)])
         wait_for(lambda: len(get("api/state").json()["tags"]) == 6, "the tag that is new")
 
 
-def test_the_floor_plan_is_that_of_the_twin(archive: Archive, tmp_path: Path) -> None:
-    # In half of it nobody has been: tags 0 to 2 stand in the other.
+def test_the_floor_plan_is_the_same_as_the_twins(archive: Archive, tmp_path: Path) -> None:
+    # One half is unexplored: tags 0 to 2 stand in the other.
     floor = maps.map_of([[0] * 6 + [-1] * 6] * 8, resolution=0.5)
     journal = tmp_path / "journal.sqlite"
     write(journal, scans_lately())
@@ -105,11 +105,11 @@ def test_the_floor_plan_is_that_of_the_twin(archive: Archive, tmp_path: Path) ->
                 assert picture.size == (shown.width, shown.height)
             if shown is floor:
                 after = get(whole)
-        # Where nobody has been there is no field, as at the greenhouse; and it is another answer.
+        # There is no field in unexplored space, as at the greenhouse; the ETag differs.
         assert 0 < known(after) < known(before)
         assert after.headers["etag"] != before.headers["etag"]
         with opened(journal) as file:
-            file.put_map("", str)  # one that is too large
+            file.put_map("", str)  # too large
         write(journal, [scan("0", time.time_ns(), temperature=22.0)])
         wait_for(lambda: get("map").status_code == 404, "no floor plan")
         archive.do("UPDATE meta SET value = '{\"width\": 5}' WHERE site = 'gh1' AND key = 'map'")
@@ -164,7 +164,7 @@ ANSWERS = (
 )
 
 
-def test_an_answer_has_one_etag_on_all_replicas(replicas: Replicas) -> None:
+def test_all_replicas_give_an_answer_the_same_etag(replicas: Replicas) -> None:
     for page in replicas.pages:
         # Silent, so that nothing changes any more.
         page.site(is_live=False, last_verdict="healthy", active_alarms=1)
@@ -174,9 +174,9 @@ def test_an_answer_has_one_etag_on_all_replicas(replicas: Replicas) -> None:
             found = [page.http.get(path) for page in replicas.pages]
             assert [it.status_code for it in found] == [200] * 3, path
             (etag,) = {it.headers["etag"] for it in found}
-            if path != "/api/sites":  # which says how long ago it was that something came
+            if path != "/api/sites":  # it contains how long ago the last row arrived
                 assert len({it.content for it in found}) == 1, path
-            # From whichever nginx takes next.
+            # From whichever replica nginx chooses next.
             for _ in range(3):
                 again = browser.get(path, headers={"If-None-Match": etag})
                 assert again.status_code == 304, path
@@ -187,7 +187,7 @@ def until_critical(browser: ClientConnection) -> None:
         pass
 
 
-def test_a_replica_that_is_killed_is_missed_by_nobody(replicas: Replicas) -> None:
+def test_killing_a_replica_interrupts_no_client(replicas: Replicas) -> None:
     for page in replicas.pages:
         page.site(last_verdict="healthy")
         assert page.http.get("/sites/gh1/api/state").status_code == 200
@@ -209,7 +209,7 @@ def test_a_replica_that_is_killed_is_missed_by_nobody(replicas: Replicas) -> Non
             try:
                 until_critical(browser)
             except ConnectionClosed:
-                # Another replica takes whoever was cut off, at the first attempt.
+                # Another replica takes each disconnected client at the first attempt.
                 returns += 1
                 until_critical(stack.enter_context(open_websocket(base + path)))
         assert 0 < returns < len(browsers), "browsers are spread"

@@ -96,7 +96,7 @@ def plain(alarm: Alarm) -> Plain:
 def follow(
     lots: Iterable[Sequence[PastWrite]], spans: Sequence[RunSpan], now_ns: int
 ) -> tuple[Alarm, ...]:
-    """What a bridge does that is asked now and then."""
+    """As a bridge does that is queried now and then."""
     follower = AlarmFolder(BY, spans)
     for lot in lots:
         follower.take(lot)
@@ -107,7 +107,7 @@ def follow(
 
 @settings(max_examples=150)
 @given(st.integers(0, 2**32))
-def test_alarms_are_those_of_the_plainest_way_in_any_order_and_however_often_heard(
+def test_alarms_equal_the_simplest_rule_in_any_order_and_with_repeats(
     seed: int,
 ) -> None:
     chance = random.Random(seed)
@@ -136,17 +136,17 @@ def test_alarms_are_those_of_the_plainest_way_in_any_order_and_however_often_hea
 
 @settings(max_examples=150)
 @given(st.integers(0, 2**32))
-def test_what_is_old_is_forgotten_and_changes_nothing_of_what_is_told(seed: int) -> None:
+def test_old_writes_are_dropped_and_change_no_result(seed: int) -> None:
     chance = random.Random(seed)
     heard = [some_write(chance, number) for number in range(chance.randint(1, 60))]
     heard.sort(key=lambda write: write.stamp_ns)
     spans, now_ns = chance.choice(SPANS), heard[-1].stamp_ns + chance.randint(0, 300) * MINUTE
     expected = alarms(heard, spans, now_ns, SENSORS, day_of)
-    # What there is no room for is kept as what it led to.
+    # Writes beyond the limit are stored only as their result.
     follower = AlarmFolder(BY, spans, kept=chance.choice([3, 24, 300]))
     since_ns = 0
     while heard:
-        # Late, but not as late as that.
+        # Late, but not too late.
         count = min(len(heard), chance.randint(1, 9))
         lot, heard = heard[:count], heard[count:]
         chance.shuffle(lot)
@@ -162,7 +162,7 @@ def test_what_is_old_is_forgotten_and_changes_nothing_of_what_is_told(seed: int)
     assert {plain(alarm) for alarm in page.alarms} == expected
 
 
-def test_what_is_older_than_what_is_kept_is_not_taken_in_and_counted() -> None:
+def test_writes_older_than_the_window_are_counted_and_not_used() -> None:
     follower, heard = AlarmFolder(BY, SPANS[0], kept=4), scans([22] * 9)
     follower.take(heard[:5])
     follower.take(heard[5:])
@@ -179,8 +179,8 @@ def test_what_is_older_than_what_is_kept_is_not_taken_in_and_counted() -> None:
     assert follower.missed == 2
 
 
-def test_nothing_grows_with_the_days() -> None:
-    """A round a day, and a lamp that goes on and off: gaps, pauses and turns without end."""
+def test_memory_does_not_grow_with_the_days() -> None:
+    """One round a day, and a lamp that switches: gaps, pauses and turns without end."""
     follower = AlarmFolder(BY, SPANS[0])
     for day in range(60):
         for at in (0, 1):
@@ -209,7 +209,7 @@ def told(heard: Sequence[PastWrite], later_ns: int = 0) -> list[Alarm]:
     return list(follow([heard], SPANS[0], heard[-1].stamp_ns + later_ns))
 
 
-def test_two_scans_raise_and_two_clear() -> None:
+def test_two_scans_raise_an_alarm_and_two_clear_it() -> None:
     assert told(scans([22, 17, 22, 17, 22])) == []
     (alarm,) = told(scans([22, 17, 16, 22, 16.5, 22, 22, 17]))
     at = [(at_ns - START) // MINUTE for at_ns in (alarm.raised_at_ns, alarm.cleared_at_ns or 0)]
@@ -221,7 +221,7 @@ def test_two_scans_raise_and_two_clear() -> None:
     assert alarm.worst == 16
 
 
-def test_one_that_gets_worse_is_the_same_and_its_verdict_and_worst_are_worse() -> None:
+def test_an_alarm_that_gets_worse_is_the_same_alarm_with_a_worse_verdict() -> None:
     (stressed,) = told(scans([17, 17]))
     (critical,) = told(scans([17, 17, 6, 12]))
     assert critical.id == stressed.id
@@ -233,8 +233,8 @@ def test_one_that_gets_worse_is_the_same_and_its_verdict_and_worst_are_worse() -
     assert (bad.raised_as, bad.is_worse, bad.worse_at_ns) == ("critical", False, None)
 
 
-def test_whatever_a_verdict_can_be_of_becomes_an_alarm_but_what_the_estimate_says() -> None:
-    """A silent twin is the feed's to tell."""
+def test_every_kind_of_reason_becomes_an_alarm_except_those_of_the_estimate() -> None:
+    """A silent twin is reported by the feed."""
     good = (22.0, 60.0)
 
     def at(minute: int, tag: str, *values: float, status: int = 0) -> PastWrite:
@@ -262,7 +262,7 @@ def test_whatever_a_verdict_can_be_of_becomes_an_alarm_but_what_the_estimate_say
     assert {kind for _, kind, _ in found} == set(Kind) - {Kind.CHANGED, Kind.SILENT}
 
 
-def test_it_says_when_it_will_be_another_by_itself() -> None:
+def test_the_fold_reports_when_it_will_change_without_news() -> None:
     follower = AlarmFolder(BY, SPANS[0])
     heard = scans([22, 22])
     follower.take(heard)
@@ -273,7 +273,7 @@ def test_it_says_when_it_will_be_another_by_itself() -> None:
     assert follower.found(due_ns).due_ns == FOREVER
 
 
-def test_what_stays_as_it_is_is_the_very_same() -> None:
+def test_unchanged_alarms_are_the_same_objects() -> None:
     follower = AlarmFolder(BY, SPANS[0])
     heard = scans([17, 17, 16, 22, 22])
     follower.take(heard[:2])
@@ -294,7 +294,7 @@ def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false
     last_ns = heard[-1].stamp_ns
     raised = follow([heard], SPANS[0], last_ns)
     counts = Counter((one.reason.kind.value, one.reason.sensor) for one in raised)
-    # The climate's own nights and places, and noise where it is as wide as the range's margin.
+    # The climate's own nights and positions, with noise as wide as the range's margin.
     assert counts == {
         ("pest", ""): 17,
         ("range", "temperature"): 22,
@@ -311,13 +311,13 @@ def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false
     for day in range(3):
         of_day = [one for one in raised if day * DAY_NS <= one.raised_at_ns < (day + 1) * DAY_NS]
         assert len(of_day) < 24 * 6 / 3
-    # Pests are those that are: one from the first look that saw them to the second that did not.
+    # Pests are real: from the first inspection that saw one to the second that did not.
     clean: dict[str, int] = {}
     broke_out = 0
     for look in (write for write in heard if write.has_seen):
         broke_out += look.anomaly and clean.get(look.tag_id, 2) >= 2
         clean[look.tag_id] = 0 if look.anomaly else clean.get(look.tag_id, 2) + 1
     assert counts["pest", ""] == broke_out
-    # Tries that failed twice in one round are not told, those that failed in two rounds are.
+    # Attempts that failed twice in one round are not reported; failures in two rounds are.
     (lost,) = (one for one in raised if one.reason.kind == "scan_failed")
     assert lost.raised_at_ns - (lost.reason.since_ns or 0) > 48 * MINUTE

@@ -1,4 +1,4 @@
-"""Alarms of quantities of a day: from dawn to dawn by the clock, one value a day and a tag."""
+"""Alarms of daily quantities: from dawn to dawn by the clock, one value per day and tag."""
 
 import math
 import random
@@ -71,7 +71,7 @@ def dawn(day: int) -> int:
 def test_a_days_mean_raises_at_the_next_dawn_and_one_good_day_clears() -> None:
     [cold] = found(scans({"temperature": [20.0, 14.0, 13.0, 20.0, 20.0]}))
     assert (cold.tag_id, cold.reason.sensor, cold.reason.verdict) == ("a", MEAN, Verdict.STRESSED)
-    # The last hour of that day was on the way to the next one's temperature.
+    # The last hour of that day already moved towards the next one's temperature.
     assert cold.reason.value == pytest.approx(14.0, abs=0.1)
     assert cold.worst == pytest.approx(13.0, abs=0.2)
     assert cold.reason.limit == 17.0
@@ -79,7 +79,7 @@ def test_a_days_mean_raises_at_the_next_dawn_and_one_good_day_clears() -> None:
     assert cold.cleared_at_ns == dawn(4)
 
 
-def test_the_value_is_that_of_the_history_at_that_moment() -> None:
+def test_the_value_equals_that_of_the_history_at_that_moment() -> None:
     chance = random.Random(4)
     heard = [
         replace(one, values=(chance.uniform(5.0, 14.0),))
@@ -94,13 +94,13 @@ def test_the_value_is_that_of_the_history_at_that_moment() -> None:
         assert alarm.reason.value == pytest.approx(at_dawn)
 
 
-def test_a_quantity_of_a_day_has_no_deadband() -> None:
+def test_a_daily_quantity_has_no_deadband() -> None:
     wobbling = found(scans({"temperature": [16.8, 17.2, 16.8, 17.4, 20.0]}))
     told = [(one.raised_at_ns, one.cleared_at_ns) for one in wobbling]
     assert told == [(dawn(1), dawn(2)), (dawn(3), dawn(4))]
 
 
-def test_of_too_little_of_a_day_nothing_is_said() -> None:
+def test_too_little_of_a_day_gives_no_value() -> None:
     assert found(scans({"temperature": [14.0, 14.0]}, first_h=DAWN + 5)) == []
     assert found(scans({"temperature": [14.0] * 4}, every_h=4.0)) == []
     assert found(scans({"temperature": [14.0]})) == []  # its dawn is still to come
@@ -109,7 +109,7 @@ def test_of_too_little_of_a_day_nothing_is_said() -> None:
     assert alarm.is_active
 
 
-def test_what_comes_late_puts_the_day_right() -> None:
+def test_a_late_scan_corrects_its_day() -> None:
     heard = scans({"temperature": [14.0, 14.0, 14.0]})
     late = [one for one in heard if dawn(0) + 4 * HOUR < one.stamp_ns < dawn(0) + 15 * HOUR]
     early = [one for one in heard if one not in late]
@@ -123,7 +123,7 @@ def test_what_comes_late_puts_the_day_right() -> None:
     assert [one.raised_at_ns for one in found(heard)] == [dawn(1)]
 
 
-def test_a_range_of_light_is_a_crops() -> None:
+def test_a_range_of_light_belongs_to_a_crop() -> None:
     heard = scans({"light": [4_000.0, 4_000.0]})
     assert found(heard) == []
     look = PastWrite(10_000, 1, "a", HOUR, 1, 0, has_seen=True, species="Lettuce")
@@ -133,7 +133,7 @@ def test_a_range_of_light_is_a_crops() -> None:
     assert dim.reason.limit == 12.0
 
 
-def test_a_sensor_that_reads_the_quantity_goes_first() -> None:
+def test_a_sensor_that_reads_the_quantity_itself_takes_precedence() -> None:
     own = [
         replace(one, sensors=("temperature", MEAN), values=(14.0, 20.0))
         for one in scans({"temperature": [14.0] * 3})
@@ -149,11 +149,11 @@ def test_without_a_clock_a_day_is_24_hours_of_ros_time() -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_what_a_moments_last_scans_say_of_days_is_what_all_of_the_log_up_to_then_does(
+def test_at_any_moment_the_recent_window_gives_the_days_that_the_whole_log_gives(
     seed: int,
 ) -> None:
     chance = random.Random(seed)
-    # Of some days the last hours are missing, and much of the next one.
+    # Some days lack their last hours and much of the next day.
     gaps = [(dawn(day) + 20 * HOUR, dawn(day) + 44 * HOUR) for day in range(seed % 3, 7, 3)]
     heard = [
         replace(one, values=(chance.choice([*3 * [5.0, 14.0, 20.0], math.nan, 1e9]),))
@@ -174,12 +174,12 @@ def test_what_a_moments_last_scans_say_of_days_is_what_all_of_the_log_up_to_then
 
 
 def counting(days: Mapping[str, Sequence[Reading]], at_ns: int) -> set[Reading]:
-    """Those that count at a moment."""
+    """The alarms that count at a moment."""
     every = [day for of_tag in days.values() for day in of_tag]
     return {day for day in every if at_ns - (day.observed_at_ns or 0) <= COUNTS_NS}
 
 
-def test_the_value_of_the_last_whole_day_is_known_until_the_next_scan_after_a_dawn() -> None:
+def test_the_last_whole_days_value_holds_until_the_next_scan_after_a_dawn() -> None:
     heard = scans({"temperature": [14.0, 20.0, 20.0]})
 
     def mean(at_ns: int) -> float | None:
@@ -193,7 +193,7 @@ def test_the_value_of_the_last_whole_day_is_known_until_the_next_scan_after_a_da
     assert mean(dawn(2)) == pytest.approx(20.0, abs=0.2)
 
 
-def test_a_day_that_was_left_out_is_not_judged_by_the_one_before() -> None:
+def test_a_day_without_scans_is_not_judged_by_the_day_before() -> None:
     heard = scans({"temperature": [14.0, 14.0, 14.0, 14.0]})
     late = [one for one in heard if not dawn(1) <= one.stamp_ns < dawn(2)]
     assert [one.raised_at_ns for one in found(late)] == [dawn(3)]

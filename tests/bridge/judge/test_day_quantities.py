@@ -11,12 +11,12 @@ AT = 100 * DAY_NS
 
 
 def is_day(at_ns: int) -> bool:
-    """From 6 to 18."""
+    """Daylight from 6 to 18."""
     return 6 <= at_ns % DAY_NS / HOUR < 18
 
 
 def value(name: str, of: Callable[[float], float], hours: float = 24.0, step: float = 0.5) -> float:
-    """The quantity at midnight of a sensor whose course over the hours of the day is `of`."""
+    """The quantity at midnight of a sensor whose value over the hours of the day is `of`."""
     count = round(hours / step)
     readings = [
         (AT - round(step * HOUR * back), of(24.0 - step * back)) for back in range(count, -1, -1)
@@ -28,7 +28,7 @@ def test_a_daily_light_integral_is_the_sum_of_the_photons() -> None:
     # 10 h of 54,000 lx are 10 h of 1000 umol/m2/s.
     lit = value("daily_light_integral", lambda hour: 54_000.0 * (7.0 <= hour <= 17.0), step=0.01)
     assert lit == pytest.approx(36.0, rel=2e-3)
-    # Half a sine of 12 h: its mean is 2 / pi of the highest.
+    # Half a sine of 12 h: its mean is 2 / pi of its maximum.
     sun = value("daily_light_integral", lambda hour: max(0.0, math.sin((hour - 6) * math.pi / 12)))
     assert sun == pytest.approx(12 * 3600 * 2 / math.pi / LX_PER_UMOL / 1e6, rel=5e-3)
 
@@ -44,13 +44,13 @@ def test_temperature_over_a_day() -> None:
     assert value("growing_degree_days", lambda _: 4.0) == 0.0
 
 
-def test_a_dose_of_co2_is_of_the_hours_of_day() -> None:
+def test_a_dose_of_co2_covers_the_hours_of_daylight() -> None:
     dose = value("co2_dose", lambda hour: 800.0 if 6.0 <= hour <= 18.0 else 5000.0, step=0.01)
     assert dose == pytest.approx(12 * 800.0, rel=5e-3)
 
 
 @pytest.mark.parametrize("name", DAILY)
-def test_of_too_little_of_a_day_there_is_no_value(name: str) -> None:
+def test_too_little_of_a_day_has_no_value(name: str) -> None:
     assert math.isfinite(value(name, lambda _: 20.0, hours=22.0))
     assert math.isnan(value(name, lambda _: 20.0, hours=21.0))
     # Between readings that are too far apart nothing is known.
@@ -59,15 +59,15 @@ def test_of_too_little_of_a_day_there_is_no_value(name: str) -> None:
     assert math.isnan(DAILY[name].at(AT, [], is_day))
 
 
-def test_of_a_day_whose_noon_is_missing_there_is_no_value() -> None:
-    """Its light would be a half of what it was."""
+def test_a_day_without_its_noon_has_no_value() -> None:
+    """Its light would be half of the real one."""
     noon = range(11, 15)
     readings = [(AT + (h - 24) * HOUR, 20_000.0) for h in range(25) if h not in noon]
     for daily in DAILY.values():
         assert math.isnan(daily.at(AT, readings, is_day))
 
 
-def test_what_was_read_before_that_day_or_after_counts_for_nothing() -> None:
+def test_readings_from_before_the_day_or_after_it_do_not_count() -> None:
     daily = DAILY["temperature_24h_mean"]
     readings = [(AT + hour * HOUR, 20.0 if -24 <= hour <= 0 else 99.0) for hour in range(-30, 4)]
     assert daily.at(AT, readings, is_day) == 20.0

@@ -16,12 +16,12 @@ def light_of(*readings_lx: float) -> bool | None:
     return light.is_day
 
 
-def test_light_goes_before_the_clock() -> None:
+def test_light_readings_take_precedence_over_the_clock() -> None:
     assert judge_day(light_of(900.0, 800.0), CLOCK, MIDNIGHT_S) == Day(True, "light")
     assert judge_day(light_of(0.0, 0.0), CLOCK, NOON_S) == Day(False, "light")
 
 
-def test_most_of_the_sensors_decide() -> None:
+def test_the_majority_of_the_sensors_decides() -> None:
     assert judge_day(light_of(0.0, 900.0, 900.0), None, None).is_day
     assert not judge_day(light_of(0.0, 0.0, 900.0), None, None).is_day
 
@@ -31,7 +31,7 @@ def test_a_broken_sensor_does_not_decide() -> None:
     assert judge_day(light_of(float("nan")), CLOCK, MIDNIGHT_S) == Day(False, "clock")
 
 
-def test_the_limit_itself_is_day() -> None:
+def test_exactly_the_limit_is_day() -> None:
     assert judge_day(light_of(DAY_FROM_LX), None, None).is_day
     assert not judge_day(light_of(DAY_FROM_LX - 0.1), None, None).is_day
 
@@ -44,7 +44,7 @@ def test_by_the_clock_a_day_begins_and_ends(hour: int, is_day: bool) -> None:
     assert judge_day(light_of(), CLOCK, at_s) == Day(is_day, "clock")
 
 
-def test_the_clock_is_that_of_the_house() -> None:
+def test_the_clock_is_that_of_the_greenhouse() -> None:
     east = ClockDay(timezone(timedelta(hours=9)))
     assert judge_day(light_of(), east, MIDNIGHT_S).is_day
     assert not judge_day(light_of(), east, NOON_S).is_day
@@ -68,7 +68,7 @@ def test_from_an_hour_to_the_same_it_is_always_day(hour: time) -> None:
     [
         (CLOCK, 0, 24, [(-4, 6), (20, 30)]),
         (CLOCK, 6, 20, []),
-        # Told as it is, and not as far as the period goes.
+        # The real length, beyond the end of the period.
         (CLOCK, 22, 23, [(20, 30)]),
         (CLOCK, 1, 50, [(-4, 6), (20, 30), (44, 54)]),
         (ClockDay(UTC, time(14), time(2)), 0, 48, [(2, 14), (26, 38)]),

@@ -45,7 +45,7 @@ GOOD = tag("a", START, temperature=22.0)
 COLD = tag("b", START, temperature=6.0)
 
 
-def test_nothing_that_stays_is_told_again() -> None:
+def test_unchanged_state_is_not_reported_again() -> None:
     judge = Judge(BY_LIGHT)
     first = judge.see(snapshot(START, GOOD, COLD))
     assert first.tags.keys() == {"a", "b"}
@@ -65,10 +65,10 @@ def test_time_alone_makes_readings_old() -> None:
     assert old.tags["a"].verdict is old.house.verdict is Verdict.UNKNOWN
 
 
-def test_scanned_once_a_tag_has_a_day_as_it_has_for_alarms() -> None:
+def test_for_alarms_a_tag_scanned_once_has_a_day() -> None:
     judge, day = Judge(BY_LIGHT), 24 * 60 * MINUTE
     judge.see(snapshot(START, GOOD, COLD))
-    judge.learn([scan("b", START - day, temperature=6.0)])  # and no interval makes it longer
+    judge.learn([scan("b", START - day, temperature=6.0)])  # and no interval extends it
     judge.see(snapshot(START, GOOD, COLD))
     assert judge.holds_ns() == {"a": day, "b": day}
     judge.see(snapshot(START, GOOD))
@@ -76,10 +76,10 @@ def test_scanned_once_a_tag_has_a_day_as_it_has_for_alarms() -> None:
     assert judge.see(snapshot(START + day + 1, GOOD)).tags["a"].verdict is Verdict.UNKNOWN
 
 
-def test_a_value_that_wobbles_about_a_limit_flaps_at_no_scan() -> None:
-    """From 18 to 26 the deadband is 0.4: what has been out is so until it lies further within.
+def test_a_value_that_wobbles_at_a_limit_does_not_change_its_status_at_every_scan() -> None:
+    """From 18 to 26 the deadband is 0.4: a value out of range stays so until it is further within.
 
-    The limit stays the configured one; beside it stands what ends it.
+    The limit stays the configured one; `clears_at` stands beside it.
     """
     judge = Judge(BY_LIGHT)
     found = []
@@ -102,7 +102,7 @@ def test_a_value_that_wobbles_about_a_limit_flaps_at_no_scan() -> None:
     ]
 
 
-def test_what_was_out_of_its_range_nine_scans_ago_is_forgotten() -> None:
+def test_a_value_that_was_out_of_range_nine_scans_ago_is_forgotten() -> None:
     judge, found = Judge(BY_LIGHT), []
     for number in range(10):
         at_ns, value = START + number * MINUTE, 25.9 if number else 26.1
@@ -111,7 +111,7 @@ def test_what_was_out_of_its_range_nine_scans_ago_is_forgotten() -> None:
     assert found == [Verdict.STRESSED] * 9 + [Verdict.HEALTHY]
 
 
-def test_the_patrols_rhythm_says_how_long_readings_hold() -> None:
+def test_the_scan_interval_sets_how_long_readings_hold() -> None:
     judge = Judge(BY_LIGHT)
     for round_ in range(3):
         at_ns = START + round_ * 60 * MINUTE
@@ -127,7 +127,7 @@ def scan(tag_id: str, at_ns: int, **values: float) -> PastWrite:
     return PastWrite(at_ns, 1, tag_id, at_ns, 0, 0, names, numbers)
 
 
-def test_after_a_restart_the_patrol_has_the_interval_that_it_had_before() -> None:
+def test_after_a_restart_the_patrol_has_its_earlier_interval() -> None:
     judge, now_ns = Judge(BY_LIGHT), START + 3 * MINUTE
     judge.see(snapshot(now_ns, tag("a", START + 2 * MINUTE, temperature=22.0)))
     judge.learn(scan("a", START + at * MINUTE, temperature=22.0) for at in range(3))
@@ -135,7 +135,7 @@ def test_after_a_restart_the_patrol_has_the_interval_that_it_had_before() -> Non
     assert patrol == Patrol(MINUTE, START + 2 * MINUTE)
 
 
-def test_a_sensor_that_scans_leave_out_is_no_part_of_the_rhythm() -> None:
+def test_a_sensor_missing_from_scans_does_not_change_the_interval() -> None:
     dead = Reading("light", 900.0, START)
     scans = [START + round_ * 10 * MINUTE for round_ in range(40)]
     judge, late = Judge(BY_LIGHT), Judge(BY_LIGHT)
@@ -145,20 +145,20 @@ def test_a_sensor_that_scans_leave_out_is_no_part_of_the_rhythm() -> None:
         judge.see(snapshot(at_ns, now))
         held.add(judge.holds_ns()["a"])
     assert held == {24 * 60 * MINUTE, 30 * MINUTE}
-    # The same where it is the past that tells of the rhythm.
+    # The same where the past gives the interval.
     late.see(snapshot(scans[-1], now))
     late.learn(scan("a", at_ns, temperature=22.0) for at_ns in scans[-9:])
     late.see(snapshot(scans[-1], now))
     assert late.holds_ns()["a"] == 30 * MINUTE
 
 
-def test_a_fixed_limit_goes_before_the_rhythm() -> None:
+def test_a_configured_limit_takes_precedence_over_the_scan_interval() -> None:
     judge = Judge(replace(BY_LIGHT, recent_s=30.0))
     assert judge.see(snapshot(START + 30 * S, GOOD)).tags["a"].verdict == "healthy"
     assert judge.see(snapshot(START + 31 * S, GOOD)).tags["a"].verdict == "unknown"
 
 
-def test_a_reading_is_judged_by_the_day_and_the_plants_of_its_own_time() -> None:
+def test_a_reading_is_judged_by_the_daylight_and_the_plants_of_its_own_time() -> None:
     judge = Judge(BY_LIGHT)
     warm, light = tag("a", START, temperature=25.0), tag("b", START, light=900.0)
     by_day = judge.see(snapshot(START, warm, light))
@@ -166,18 +166,18 @@ def test_a_reading_is_judged_by_the_day_and_the_plants_of_its_own_time() -> None
     dark = tag("b", START + MINUTE, light=0.0)
     by_night = judge.see(snapshot(START + MINUTE, warm, dark))
     assert (by_night.tags["a"].verdict, by_night.day) == (Verdict.HEALTHY, Day(False, "light"))
-    # The next reading is of the night.
+    # The next reading is from the night.
     warm = tag("a", START + 2 * MINUTE, temperature=25.0)
     later = judge.see(snapshot(START + 2 * MINUTE, warm, dark))
     assert told(later.tags["a"]) == [("stressed", 25.0, 24.0)]
-    # Plants that are seen later are those of the next reading too.
+    # Plants that are seen later apply to the next reading too.
     tulips = replace(warm, flower=Flower("tulip", 0.9), looked_at_ns=START + 3 * MINUTE)
     seen = judge.see(snapshot(START + 3 * MINUTE, tulips, dark))
     assert told(seen.tags["a"]) == [("stressed", 25.0, 24.0)]
     reading = (Reading("temperature", 25.5, START + 4 * MINUTE),)
     again = judge.see(snapshot(START + 4 * MINUTE, replace(tulips, readings=reading), dark))
     assert told(again.tags["a"]) == [("critical", 25.5, 25.0)]
-    # A camera that is not sure says nothing else.
+    # An uncertain detection changes nothing.
     reading = (Reading("temperature", 25.5, START + 6 * MINUTE),)
     unsure = replace(tulips, flower=Flower("orchid", 0.05), looked_at_ns=START + 5 * MINUTE)
     still = judge.see(snapshot(START + 6 * MINUTE, replace(unsure, readings=reading), dark))
@@ -188,7 +188,7 @@ def told(health: Health) -> list[tuple[str, float | None, float | None]]:
     return [(it.verdict, it.value, it.limit) for it in health.reasons]
 
 
-def test_a_reason_that_lasts_keeps_its_beginning() -> None:
+def test_a_lasting_reason_keeps_its_start_time() -> None:
     judge = Judge(BY_LIGHT)
     judge.see(snapshot(START, COLD))
     still = tag("b", START + MINUTE, temperature=6.5)
@@ -205,7 +205,7 @@ def test_without_a_clock_nothing_is_known() -> None:
     assert (back.house.verdict, back.tags["a"].verdict) == ("healthy", "healthy")
 
 
-def test_what_the_house_is_doing_is_told_beside_its_verdict() -> None:
+def test_the_greenhouses_activity_is_reported_beside_its_verdict() -> None:
     judge = Judge(replace(BY_LIGHT, recent_s=600.0))
     tags = [tag(str(i), START + i * 40 * S, temperature=22.0) for i in range(4)]
     judged = judge.see(snapshot(START + 120 * S, *tags))
@@ -214,14 +214,14 @@ def test_what_the_house_is_doing_is_told_beside_its_verdict() -> None:
         judge_once(snapshot(START + 120 * S, *tags), (), replace(BY_LIGHT, recent_s=600.0)).patrol
         == judged.patrol
     )
-    # Nobody is scanned any more: the last one stays, and all grow old.
+    # No more scans: the last one stays, and all readings age.
     judged = judge.see(snapshot(START + 721 * S, *tags))
     assert judged.patrol == Patrol(40 * S, START + 120 * S, 4)
     again = [replace(tags[0], readings=(Reading("temperature", 22.0, START + 722 * S),)), *tags[1:]]
     assert judge.see(snapshot(START + 722 * S, *again)).patrol.overdue == 3
     assert judge.see(snapshot(START + 722 * S, *tags[1:])).patrol.overdue == 3
     assert judge.see(snapshot(START + 722 * S)).patrol.overdue == 0
-    # A clock that goes back has nothing of what is still to come.
+    # A clock that goes back drops what is still to come.
     begun = tag("b", START, temperature=22.0)
     assert judge.see(snapshot(START, begun)).patrol == Patrol(None, START, 0)
 
@@ -237,7 +237,7 @@ EVENTS = st.tuples(st.sampled_from("abc"), VALUES, LOOK, st.integers(0, 7200))
 
 @settings(max_examples=100)
 @given(st.lists(EVENTS, max_size=40))
-def test_judging_bit_by_bit_is_judging_all_of_it_by_the_log(
+def test_incremental_judging_equals_judging_the_whole_log(
     events: list[tuple[str, dict[str, float], Flower | None, int]],
 ) -> None:
     """Live, as of a moment, and after a restart: the same."""
@@ -267,13 +267,13 @@ def test_judging_bit_by_bit_is_judging_all_of_it_by_the_log(
 
 
 @pytest.mark.parametrize("stops", [False, True])
-def test_a_clock_that_goes_back_begins_anew(stops: bool) -> None:
+def test_a_clock_that_goes_back_starts_anew(stops: bool) -> None:
     judge = Judge(BY_LIGHT)
     for minute in (0, 30, 60):
         at_ns = START + minute * MINUTE
         judge.see(snapshot(at_ns, tag("a", at_ns, temperature=22.0)))
     assert judge.holds_ns() == {"a": 90 * MINUTE}
-    if stops:  # as it does before a simulation is started anew
+    if stops:  # as it does before a simulation restarts
         judge.see(replace(snapshot(at_ns, tag("a", at_ns, temperature=22.0)), clock="stopped"))
     for minute in (-50, -45, -40):
         at_ns = START + minute * MINUTE
@@ -282,7 +282,7 @@ def test_a_clock_that_goes_back_begins_anew(stops: bool) -> None:
     assert judged.patrol == Patrol(5 * MINUTE, at_ns, 0)
 
 
-def test_what_is_judged_at_once_is_bounded_by_readings() -> None:
+def test_judging_at_once_is_bounded_by_readings() -> None:
     """A tag of sixty sensors takes as long as ten of five."""
     many = {f"s{number}": 1.0 for number in range(59)}
     judge = Judge(BY_LIGHT)
@@ -293,7 +293,7 @@ def test_what_is_judged_at_once_is_bounded_by_readings() -> None:
     assert len(told.tags) == 150
 
 
-def test_a_sensor_that_has_changed_is_a_reason_until_it_has_come_back() -> None:
+def test_a_changed_sensor_is_a_reason_until_it_has_recovered() -> None:
     judge = Judge(BY_LIGHT)
     before = judge.see(snapshot(START, GOOD, COLD))
     judge.note_changed({"a": {"temperature": START - S, "light": 1}, "gone": {"co2": 2}})
@@ -327,7 +327,7 @@ def test_a_tag_is_also_judged_by_the_day_before_for_thirty_hours() -> None:
     assert kinds(4 * S) == []
     days = {"a": (day,)}
     assert kinds(30 * 60 * MINUTE, **days) == [Kind.RANGE, Kind.OLD]
-    # That it is over by itself is seen without any news.
+    # Its end is seen without news.
     assert kinds(30 * 60 * MINUTE + 1, **days) == [Kind.OLD]
 
 
@@ -346,7 +346,7 @@ def test_a_first_round_that_stops_is_not_healthy_for_a_day() -> None:
     stopped = [(Kind.STOPPED, last_ns)]
     assert reasons(last_ns + 30 * MINUTE + 1, *house) == (Verdict.UNKNOWN, stopped)
     assert judge.see(snapshot(last_ns + 20 * 60 * MINUTE, *house)).tags["a"].verdict == "healthy"
-    # The next round: two of three tags have an interval, and that holds for hours.
+    # The next round: two of three tags have an interval, which holds for hours.
     again_ns = last_ns + 21 * 60 * MINUTE
     later = [tag(name, again_ns, temperature=22.0) for name in "ab"]
     assert reasons(again_ns, *later, house[2]) == (Verdict.HEALTHY, [])
@@ -354,7 +354,7 @@ def test_a_first_round_that_stops_is_not_healthy_for_a_day() -> None:
 
 
 def writes_of(*tags: TagState) -> list[PastWrite]:
-    """The scans of these states, as the log has them."""
+    """The scans of these states, as they are in the log."""
     return [
         scan(one.tag_id, one.last_observed_ns or 0, **{it.name: it.value for it in one.readings})
         for one in tags

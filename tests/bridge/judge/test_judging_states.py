@@ -1,8 +1,8 @@
-"""The table of `states.json`: a house as the bridge sees it, and what an expert says of it.
+"""The table `states.json`: a greenhouse as the bridge sees it, and an expert's verdict.
 
-Each state goes the bridge's own way: scans and looks into a store, its snapshots to the judge, and
-the same as a journal tells them to the alarms. The page's tests render the same table. Its form is
-told in `tests/README.md`.
+Each state goes the bridge's own way: scans and inspections into a store, its snapshots to the
+judge, and the journal's rows to the alarms. The page's tests render the same table.
+`tests/README.md` describes its form.
 """
 
 import asyncio
@@ -53,7 +53,7 @@ def tags_of(state: dict[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 def writes_of(state: dict[str, Any]) -> list[Write]:
-    """All that was heard, in the order of time."""
+    """All received observations, in the order of time."""
     heard = [
         write for tag_id, tag in tags_of(state).items() for write in of_tag(state, tag_id, tag)
     ]
@@ -157,7 +157,7 @@ def expected(reasons: list[list[Any]]) -> list[list[Any]]:
 
 
 @pytest.mark.parametrize("state", STATES, ids=[state["name"] for state in STATES])
-def test_a_house_is_judged_as_an_expert_would(
+def test_a_greenhouse_is_judged_as_an_expert_would(
     state: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(feed_module, "JOURNAL_S", 0.0)

@@ -13,7 +13,7 @@ def criteria(**settings: Any) -> Criteria:
     return Criteria.of(Settings(**settings))
 
 
-def test_without_a_choice_it_is_our_own_file_and_the_patrols_rhythm() -> None:
+def test_the_default_is_our_own_file_and_the_scan_interval() -> None:
     chosen = criteria()
     assert chosen.sensors == own_sensors()
     assert chosen.recent_s is None
@@ -26,7 +26,7 @@ def test_an_operators_file_replaces_ours(tmp_path: Path) -> None:
     assert criteria(sensors=str(file)).sensors.named("soil_moisture").label == "Bodenfeuchte"
 
 
-def test_what_is_wrong_with_the_file_is_told_with_its_line(tmp_path: Path) -> None:
+def test_a_mistake_in_the_file_is_reported_with_its_line(tmp_path: Path) -> None:
     file = tmp_path / "mine.json"
     file.write_text(own_sensors().text.replace('"ideal": [18, 26]', '"ideal": [26, 18]'), "utf-8")
     says = f"--sensors {file}: sensors.temperature: ideal is [26.0, 18.0], and low must be"
@@ -34,7 +34,7 @@ def test_what_is_wrong_with_the_file_is_told_with_its_line(tmp_path: Path) -> No
         criteria(sensors=str(file))
 
 
-def test_a_file_that_is_not_there_or_no_text_is_refused(tmp_path: Path) -> None:
+def test_a_missing_file_or_one_that_is_no_text_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match=r"nowhere\.json: No such file"):
         criteria(sensors=str(tmp_path / "nowhere.json"))
     with pytest.raises(SettingError, match="Is a directory"):
@@ -57,7 +57,7 @@ def test_a_file_is_not_read_past_its_limit(tmp_path: Path) -> None:
         criteria(sensors="/dev/zero")
 
 
-def test_the_hours_of_the_day_are_those_of_the_house() -> None:
+def test_the_hours_of_the_day_are_those_of_the_greenhouse() -> None:
     clock = criteria(time_zone="Europe/Amsterdam", day_hours="07:30-19:00").clock
     summer = datetime(2026, 7, 1, 5, 29, tzinfo=UTC).timestamp()
     assert not clock.is_day(summer)
@@ -68,17 +68,17 @@ def test_the_hours_of_the_day_are_those_of_the_house() -> None:
 
 
 @pytest.mark.parametrize("zone", ["Mars/Olympus", "../../etc/passwd", "Europe"])
-def test_a_zone_that_nobody_knows_is_refused(zone: str) -> None:
+def test_an_unknown_time_zone_is_refused(zone: str) -> None:
     with pytest.raises(SettingError, match=f"--time-zone is '{re.escape(zone)}', which this mach"):
         criteria(time_zone=zone)
 
 
 @pytest.mark.parametrize("hours", ["", "6-20", "06:00-24:00", "06:60-20:00", "06:00–20:00", "day"])
-def test_hours_that_are_none_are_refused(hours: str) -> None:
+def test_invalid_hours_are_refused(hours: str) -> None:
     with pytest.raises(SettingError, match=f"--day-hours is '{hours}', expected HH:MM-HH:MM"):
         criteria(day_hours=hours)
 
 
-def test_simulated_time_has_no_hours_of_a_wall() -> None:
+def test_simulated_time_has_no_hours_of_a_wall_clock() -> None:
     assert unix_s(3_600 * 10**9) is None
     assert unix_s(1_790_000_000 * 10**9) == 1_790_000_000

@@ -9,7 +9,7 @@ def add_stamps(*stamps_s: float) -> Patrol:
     return scans.patrol(0)
 
 
-def test_a_way_back_or_a_pause_does_not_change_the_rhythm() -> None:
+def test_a_way_back_or_a_pause_does_not_change_the_interval() -> None:
     assert add_stamps(0, 40, 80, 120, 700, 740).interval_ns == 40 * S
 
 
@@ -19,7 +19,7 @@ def test_only_the_last_intervals_count() -> None:
     assert add_stamps(*slow, *fast).interval_ns == 5 * S
 
 
-def test_what_is_known_already_or_is_still_to_come_is_no_scan() -> None:
+def test_scans_already_counted_or_still_to_come_do_not_count() -> None:
     scans = Scans()
     scans.add_stamps([100 * S, 140 * S], 150 * S)
     scans.add_stamps([151 * S, 140 * S, 100 * S, 120 * S], 150 * S)

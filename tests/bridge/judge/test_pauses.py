@@ -4,14 +4,14 @@ from lupin_bridge.judge import scans
 from lupin_bridge.judge.scans import SHORTEST_NS, Stretches
 
 
-def test_what_is_old_is_forgotten_and_so_many_pauses_are_kept(
+def test_old_pauses_are_dropped_and_the_number_stored_is_bounded(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     stretches = Stretches()
     for number in range(8):
         stretches.add(2 * number * SHORTEST_NS)
     assert not stretches.add(0), "it is no news"
-    # The pause that ends at the moment itself is kept.
+    # A pause that ends exactly at the limit stays.
     assert stretches.forget(4 * SHORTEST_NS) == 4 * SHORTEST_NS
     assert next(stretches.pauses()) == (2 * SHORTEST_NS, 4 * SHORTEST_NS)
     assert stretches.forget(4 * SHORTEST_NS + 1) == 4 * SHORTEST_NS + 1

@@ -36,7 +36,7 @@ PLAIN = json.dumps(GOOD)
 
 
 def text_with(path: str, value: Any) -> str:
-    """The good file, indented, with one value replaced."""
+    """The valid file, indented, with one value replaced."""
     table = json.loads(json.dumps(GOOD))
     *way, last = path.split("/")
     at = table
@@ -49,7 +49,7 @@ def text_with(path: str, value: Any) -> str:
     return json.dumps(table, indent=1)
 
 
-def test_the_file_that_comes_with_the_bridge_is_good() -> None:
+def test_the_shipped_file_is_valid() -> None:
     sensors = parse(OURS)
     assert (sensors.text, sensors.max_alpha) == (OURS, 0.6)
     assert sensors.named("temperature").unit == "°C"
@@ -57,7 +57,7 @@ def test_the_file_that_comes_with_the_bridge_is_good() -> None:
     assert {"vpd", "dew_point"} <= sensors.by_name.keys()
 
 
-def test_every_judged_sensor_of_it_has_a_source_and_what_is_measured_can_be_plausible() -> None:
+def test_every_judged_sensor_of_it_has_a_source_and_every_measured_one_a_plausible_range() -> None:
     for name, entry in json.loads(OURS)["sensors"].items():
         assert re.search(r"(19|20)\d\d", entry["source"]), name
         assert ("plausible" in entry) is not ("derived" in entry), name
@@ -71,7 +71,7 @@ def test_every_judged_sensor_of_it_has_a_source_and_what_is_measured_can_be_plau
     )
 
 
-def test_the_file_says_what_is_derived() -> None:
+def test_the_file_says_which_sensors_are_derived() -> None:
     vpd = {"label": "", "unit": "kPa", "hue": 1, "lightness": 50, "ideal": None}
     with pytest.raises(SensorsError, match=r"sensors\.vpd\.derived is \[\], and must be \['temp"):
         parse(text_with("sensors/vpd", vpd))
@@ -92,7 +92,7 @@ def test_the_file_says_what_is_derived() -> None:
 
 def test_every_sensor_has_a_hue_of_its_own() -> None:
     hues = [sensor.hue for sensor in parse(OURS).by_name.values()]
-    # 20 degrees apart, around the circle: colours that a person can tell from one another.
+    # 20 degrees apart, around the circle: colours that people can distinguish.
     assert all(20 <= abs(a - b) <= 340 for a, b in itertools.combinations(hues, 2))
 
 
@@ -105,12 +105,12 @@ def test_day_night_and_species_have_their_own_ranges() -> None:
     assert temperature.ranges(is_day=False, species="ORCHID") == Ranges()
 
 
-def test_a_night_that_says_nothing_is_as_the_day() -> None:
+def test_a_night_without_ranges_uses_those_of_the_day() -> None:
     temperature = parse(text_with("sensors/temperature/night", ...)).named("temperature")
     assert temperature.night == temperature.day
 
 
-def test_a_sensor_that_nobody_declared_is_never_judged() -> None:
+def test_an_undeclared_sensor_is_never_judged() -> None:
     ph = parse(json.dumps(GOOD)).named("ph")
     assert (ph.name, ph.label, ph.unit, ph.hue) == ("ph", "ph", "", 265)
     assert ph.ranges(is_day=True) == Ranges()
@@ -159,13 +159,13 @@ def test_a_sensor_that_nobody_declared_is_never_judged() -> None:
         ("sensors/\ud83c", GOOD["sensors"]["temperature"], "end of hex escape at line"),
     ],
 )
-def test_what_cannot_be_is_refused_by_name(path: str, value: Any, says: str) -> None:
+def test_an_impossible_value_is_refused_by_name(path: str, value: Any, says: str) -> None:
     with pytest.raises(SensorsError, match=re.escape(says)):
         parse(text_with(path, value))
 
 
 @pytest.mark.parametrize("ideal", [[-1e9, 1e9], [0, 5e-324], [-5e-324, 0], [1e9 - 1e-7, 1e9]])
-def test_the_widest_and_the_narrowest_ranges_are_judged_by(ideal: list[float]) -> None:
+def test_the_widest_and_the_narrowest_ranges_are_accepted(ideal: list[float]) -> None:
     sensor = {**GOOD["sensors"]["temperature"], "ideal": ideal, "critical": None}
     sensors = parse(text_with("sensors/temperature", sensor))
     assert sensors.named("temperature").day.ideal == Span(*ideal)
@@ -177,7 +177,7 @@ def test_the_widest_and_the_narrowest_ranges_are_judged_by(ideal: list[float]) -
     assert {alarm.worst for alarm in episodes.alarms()} == {-1e300, 1e308}
 
 
-def test_the_file_that_comes_with_the_bridge_speaks_all_languages() -> None:
+def test_the_shipped_file_has_texts_in_all_languages() -> None:
     sensors = json.loads(OURS)["sensors"]
     silent = {
         name
@@ -201,12 +201,12 @@ def test_the_file_that_comes_with_the_bridge_speaks_all_languages() -> None:
     ],
     ids=["nothing", "a mark", "no number", "a long number", "nested"],
 )
-def test_what_is_no_json_is_refused_with_its_line(text: str, says: str) -> None:
+def test_text_that_is_no_json_is_refused_with_its_line(text: str, says: str) -> None:
     with pytest.raises(SensorsError, match=says):
         parse(text)
 
 
-def test_what_is_wrong_is_one_line_whatever_a_name_has_in_it() -> None:
+def test_a_mistake_is_one_line_whatever_characters_a_name_has() -> None:
     with pytest.raises(SensorsError) as refused:
         parse(text_with("sensors/a\n\x1b[2Jb", {}))
     assert str(refused.value) == "sensors.a\\n\\x1b[2Jb.ideal: Field required"

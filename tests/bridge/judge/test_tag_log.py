@@ -18,7 +18,7 @@ def write(number: int, at_s: int, light: float = 900.0) -> PastWrite:
     return PastWrite(number, 1, "a", at_s * S, 0, 0, ("light",), (light,))
 
 
-def test_what_comes_in_order_is_gone_through_once_and_what_is_late_from_a_mark_on() -> None:
+def test_ordered_writes_are_read_once_and_late_ones_from_a_mark_on() -> None:
     asked: list[int] = []
 
     def is_day(at_ns: int) -> bool:

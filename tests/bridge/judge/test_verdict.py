@@ -1,4 +1,4 @@
-"""The table of `verdicts.json`: value and age (s) of each reading, and what an expert says."""
+"""The table `verdicts.json`: value and age (s) of each reading, and an expert's verdict."""
 
 import json
 import math
@@ -65,12 +65,12 @@ def test_a_tag_is_judged_as_an_expert_would(case: dict[str, Any]) -> None:
     ]
 
 
-def test_every_kind_of_reason_is_in_the_table_but_those_of_the_house_and_the_estimate() -> None:
+def test_the_table_has_every_kind_of_reason_that_a_tag_can_have() -> None:
     told = {kind for case in CASES for kind, *_ in case["reasons"]}
     assert told == set(Kind) - {Kind.SILENT, Kind.STOPPED, Kind.CHANGED}
 
 
-def test_a_reason_says_which_observation_it_comes_from() -> None:
+def test_a_reason_names_the_observation_that_it_comes_from() -> None:
     by_name = {case["name"]: case for case in CASES}
     (cold,) = judge(by_name["a lethal cold"]).reasons
     assert cold.since_ns == ago(60)
@@ -82,7 +82,7 @@ def test_a_reason_says_which_observation_it_comes_from() -> None:
     assert never.since_ns is None
 
 
-def test_what_was_observed_after_now_is_as_old_as_now() -> None:
+def test_a_reading_from_the_future_counts_as_read_now() -> None:
     assert judge(CASES[0], NOW_NS - 10**12).verdict is Verdict.HEALTHY
 
 
@@ -99,7 +99,7 @@ def test_what_was_observed_after_now_is_as_old_as_now() -> None:
         ([], "unknown"),
     ],
 )
-def test_a_house_is_its_worst_tag_and_unknown_where_most_tags_are(
+def test_a_greenhouse_has_its_worst_tags_verdict_or_is_unknown_where_most_tags_are(
     tags: list[str], house: str
 ) -> None:
     assert judge_site(Counter(map(Verdict, tags)), is_silent=False).verdict == house

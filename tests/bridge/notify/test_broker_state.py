@@ -1,4 +1,4 @@
-"""What a broker has to be told: what is new, once, and the newest of it."""
+"""What is sent to a broker: changes, once, in their latest form."""
 
 import json
 import math
@@ -23,7 +23,7 @@ def mirror(discovery: str = "homeassistant") -> Mirror:
 
 
 def told(mirror: Mirror, now: GreenhouseState) -> dict[str, Any]:
-    """What is said of the house as it is now: topic to payload, None: gone."""
+    """What is sent about the greenhouse as it is now: topic to payload, None to remove."""
     mirror.see(now)
     messages = list(mirror.messages())
     assert mirror.waiting == 0
@@ -36,16 +36,16 @@ def announcements(found: Mapping[str, Any]) -> set[str]:
     return {topic for topic in found if topic.startswith("homeassistant/")}
 
 
-def test_all_is_told_once_and_then_only_what_is_new() -> None:
+def test_everything_is_sent_once_and_then_only_changes() -> None:
     one = mirror()
     a, b = tag("a", temperature=21.0, humidity=60.0), tag("b", temperature=22.0)
     first = told(one, seen(a, b))
     assert first["lt/tags/a/readings/temperature"]["value"] == 21.0
     assert first["lt/tags/b/health"]["verdict"] == "healthy"
     assert first["lt/house/health"]["verdict"] == "healthy"
-    # Made of temperature and humidity, judged, and told like a sensor.
+    # Derived from temperature and humidity, judged, and sent like a sensor.
     assert first["lt/tags/a/readings/vpd"]["unit"] == "kPa"
-    # Of a: five readings, verdict, alarm; of b: one, and these two; of the house: three.
+    # For a: five readings, verdict, alarm. For b: one, and these two. For the greenhouse: three.
     assert len(announcements(first)) == 7 + 3 + 3
     assert told(one, seen(a, b)) == {}
     later = tag("b", NOW_NS + 60 * S, temperature=6.0)
@@ -54,7 +54,7 @@ def test_all_is_told_once_and_then_only_what_is_new() -> None:
     assert news["lt/tags/b/health"]["verdict"] == "critical"
 
 
-def test_a_reading_that_does_not_hold_any_more_is_told_to_be_unknown() -> None:
+def test_an_expired_reading_is_sent_as_unknown() -> None:
     one = mirror()
     state = tag("a", temperature=21.0)
     told(one, seen(state))
@@ -65,7 +65,7 @@ def test_a_reading_that_does_not_hold_any_more_is_told_to_be_unknown() -> None:
     assert news["lt/tags/a/health"]["verdict"] == "unknown"
 
 
-def test_a_verdict_that_changes_by_itself_is_told_and_no_other() -> None:
+def test_only_the_verdict_that_changes_by_itself_is_sent() -> None:
     one = mirror()
     day = seen(tag("a", temperature=16.0), tag("b", temperature=20.0))
     told(one, day)
@@ -75,7 +75,7 @@ def test_a_verdict_that_changes_by_itself_is_told_and_no_other() -> None:
     assert news["lt/tags/a/health"]["verdict"] == "healthy"
 
 
-def test_of_a_silent_twin_readings_grow_old_all_the_same() -> None:
+def test_readings_of_a_silent_twin_still_expire() -> None:
     one = mirror()
     now = seen(tag("a", temperature=21.0))
     told(one, now)
@@ -93,7 +93,7 @@ def test_while_the_clock_does_not_run_nothing_is_known() -> None:
     assert told(one, seen(state))["lt/tags/a/readings/temperature"]["value"] == 21.0
 
 
-def test_everything_says_where_it_comes_from_and_anew_when_that_is_another_place() -> None:
+def test_each_message_names_its_source_and_a_new_source_sends_all_again() -> None:
     one = mirror()
     state = tag("a", temperature=6.0)
     then = seen(state, alarms=(alarm("a"),))
@@ -104,7 +104,7 @@ def test_everything_says_where_it_comes_from_and_anew_when_that_is_another_place
     assert {topic: it["origin"] for topic, it in news.items()} == dict.fromkeys(said, "recorded")
 
 
-def test_alarms_are_told_of_the_tag_and_of_the_house() -> None:
+def test_alarms_are_sent_for_the_tag_and_for_the_greenhouse() -> None:
     one = mirror()
     state = tag("a", temperature=21.0)
     starting = replace(seen(state), board=Board())
@@ -124,7 +124,7 @@ def test_alarms_are_told_of_the_tag_and_of_the_house() -> None:
     assert (news["lt/tags/a/alarms"]["state"], news["lt/house/alarms"]["state"]) == ("OFF", "OFF")
 
 
-def test_an_announcement_is_made_anew_where_it_says_something_else() -> None:
+def test_an_announcement_that_changes_is_sent_again() -> None:
     one = mirror()
     state = tag("a", temperature=21.0)
     told(one, seen(state))
@@ -138,7 +138,7 @@ def test_an_announcement_is_made_anew_where_it_says_something_else() -> None:
     assert announcements(more) == {"homeassistant/sensor/lt/tag_a_-_reading_co2/config"}
 
 
-def test_a_tag_that_is_gone_is_taken_back() -> None:
+def test_a_tag_that_is_gone_is_removed() -> None:
     one = mirror()
     first = told(one, seen(tag("a", temperature=21.0), tag("b", temperature=21.0)))
     news = told(one, seen(tag("a", temperature=21.0)))
@@ -152,7 +152,7 @@ def test_without_a_discovery_prefix_nothing_is_announced() -> None:
     assert announcements(told(mirror(""), seen(tag("a", temperature=21.0)))) == set()
 
 
-def test_what_waits_is_bounded_by_the_house_and_what_gives_way_is_counted() -> None:
+def test_the_queue_is_bounded_by_the_greenhouse_and_dropped_messages_are_counted() -> None:
     one = mirror()
     for number in range(100):
         one.see(seen(tag("a", NOW_NS + number, temperature=20.0 + number), now_ns=NOW_NS + 200))
@@ -161,7 +161,7 @@ def test_what_waits_is_bounded_by_the_house_and_what_gives_way_is_counted() -> N
     assert json.loads(found)["value"] == 119.0
 
 
-def test_what_changes_during_a_turn_is_told_with_its_newest() -> None:
+def test_a_change_during_a_send_is_sent_in_its_latest_form() -> None:
     one = mirror()
     one.see(seen(tag("a", temperature=1.0), tag("b", temperature=1.0)))
     messages = one.messages()
@@ -181,10 +181,10 @@ HOUSES = st.lists(st.tuples(VALUES, VALUES, st.booleans()), min_size=1, max_size
 
 
 @given(HOUSES, st.sets(st.integers(0, 5)))
-def test_however_it_comes_the_broker_knows_the_newest(
+def test_in_any_order_the_broker_ends_up_with_the_latest_state(
     houses: list[tuple[float | None, float | None, bool]], cuts: set[int]
 ) -> None:
-    """Whatever was heard before, and however often the connection was lost."""
+    """Whatever it received before, and however often the connection was lost."""
     one, knows = mirror(), dict[str, Any]()
     for number, (first, second, has_alarm) in enumerate(houses):
         at_ns = NOW_NS + number * S
@@ -214,7 +214,7 @@ def test_however_it_comes_the_broker_knows_the_newest(
         (Reading("temperature", math.inf, NOW_NS), NOW_NS, None),
     ],
 )
-def test_what_failed_or_does_not_hold_any_more_is_not_known(
+def test_failed_and_expired_values_are_unknown(
     reading: Reading, now_ns: int | None, value: float | None
 ) -> None:
     sensor = SENSORS.named("temperature")

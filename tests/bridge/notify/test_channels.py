@@ -1,4 +1,4 @@
-"""All channels together: started with a bridge, told of by it, stopped with it."""
+"""All channels together: started, notified and stopped with a bridge."""
 
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
@@ -18,13 +18,13 @@ from tests.support.seen import NOW_NS, SENSORS, Alarms, alarm, seen, tag
 from tests.support.waiting import until
 
 
-class House:
+class Greenhouse:
     """A bridge as the channels need it."""
 
     ros_time_ns = NOW_NS
     origin: Origin = "simulated"
     criteria = Criteria.of(Settings())
-    source: Any = None  # of the past nothing is asked
+    source: Any = None  # no past is queried
 
     def __init__(self) -> None:
         board = Alarms()
@@ -36,10 +36,10 @@ class House:
         return seen(tag("a", temperature=20.0))
 
 
-async def test_where_nobody_wants_to_be_told_nothing_is_started() -> None:
+async def test_without_a_configured_channel_nothing_is_started() -> None:
     channels = Channels()
     before = len(asyncio.all_tasks())
-    channels.start(House(), SENSORS)
+    channels.start(Greenhouse(), SENSORS)
     assert len(asyncio.all_tasks()) == before
     assert channels.status() == {}
     assert {name: dict(counts) for name, counts in channels.counts()} == {
@@ -49,14 +49,14 @@ async def test_where_nobody_wants_to_be_told_nothing_is_started() -> None:
     await channels.stop()
 
 
-async def test_one_that_fails_is_told_and_the_other_goes_on(tmp_path: Path) -> None:
+async def test_a_failing_channel_is_reported_and_the_other_goes_on(tmp_path: Path) -> None:
     broker = Broker(tmp_path)
     with receiver(status(200)) as server:
         hook = f"http://127.0.0.1:{server.port}/hook"
         settings = Settings(mqtt_url=broker.url, webhook_url=hook)
         channels = Channels(Targets.of(settings, Secrets(webhook_secret="s" * 16)))
-        channels.start(House(), SENSORS)
-        # A name that is looked up does not hold up the end.
+        channels.start(Greenhouse(), SENSORS)
+        # A slow name lookup does not delay the shutdown.
         pool = asyncio.get_running_loop()._default_executor  # type: ignore[attr-defined]
         assert type(pool) is not ThreadPoolExecutor
         await until(lambda: channels.status()["mqtt"], "the broker's absence")
@@ -70,4 +70,4 @@ async def test_one_that_fails_is_told_and_the_other_goes_on(tmp_path: Path) -> N
         assert counts["lupin_outward_failed"]["mqtt"] >= 1
         assert counts["lupin_outward_waiting"]["mqtt"] == 2
         await channels.stop()
-    assert server.posted[0].json["origin"] == House.origin
+    assert server.posted[0].json["origin"] == Greenhouse.origin

@@ -1,4 +1,4 @@
-"""The report of a day: each day once, also after a restart, and none that was missed is hidden."""
+"""The daily report: each day once, also after a restart, and no missed day is hidden."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -40,8 +40,8 @@ def ns(text: str) -> int:
 
 
 @dataclass
-class House:
-    """A bridge as a report needs it: a clock, and a log that says which period it was asked of."""
+class Greenhouse:
+    """A bridge as a report needs it: a clock, and a log that records the queried period."""
 
     ros_time_ns: int
     criteria: Criteria = field(default_factory=lambda: Criteria.of(Settings(time_zone="UTC")))
@@ -82,7 +82,7 @@ def in_a_hurry(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @asynccontextmanager
 async def sending(
-    house: House, folder: Path, port: int, zone: tzinfo | None = UTC
+    house: Greenhouse, folder: Path, port: int, zone: tzinfo | None = UTC
 ) -> AsyncIterator[Webhook]:
     target = Targets.of(Settings(webhook_url=f"http://127.0.0.1:{port}/"), SECRETS).webhook
     assert target is not None
@@ -109,17 +109,17 @@ async def noted(folder: Path) -> None:
 @asynccontextmanager
 async def begun(
     folder: Path, *answers: Reply, now: str = "2026-05-01T07:00Z"
-) -> AsyncIterator[tuple[House, Receiver]]:
-    """A bridge that has noted the day that is over, and sends those that follow."""
-    house = House(ns(now))
+) -> AsyncIterator[tuple[Greenhouse, Receiver]]:
+    """A bridge that has recorded the last day as sent, and sends the next ones."""
+    house = Greenhouse(ns(now))
     with receiver(*answers) as at:
         async with sending(house, folder, at.port):
             await noted(folder)
             yield house, at
 
 
-async def looks(house: House, count: int = 5) -> None:
-    """It has looked again so often, and found nothing to do."""
+async def looks(house: Greenhouse, count: int = 5) -> None:
+    """Wait until it has checked that often and found nothing to do."""
     before = house.looks
     await until(lambda: house.looks >= before + count, "more looks")
 
@@ -127,7 +127,7 @@ async def looks(house: House, count: int = 5) -> None:
 async def test_each_day_is_sent_once_from_the_first_hour_on_also_after_restarts(
     tmp_path: Path,
 ) -> None:
-    house = House(ns("2026-05-01T05:00Z"))
+    house = Greenhouse(ns("2026-05-01T05:00Z"))
     with receiver(status(200)) as at:
         async with sending(house, tmp_path, at.port):
             await noted(tmp_path)
@@ -148,10 +148,10 @@ async def test_each_day_is_sent_once_from_the_first_hour_on_also_after_restarts(
         assert {it.json["id"] for it in at.posted} == set(at.ids)
 
 
-async def test_missed_days_are_sent_in_their_order_and_no_more_than_a_week_of_them(
+async def test_missed_days_are_sent_in_order_and_at_most_a_week_of_them(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    house = House(ns("2026-05-01T07:00Z"))
+    house = Greenhouse(ns("2026-05-01T07:00Z"))
     with receiver(status(200)) as at:
         async with sending(house, tmp_path, at.port):
             await noted(tmp_path)
@@ -171,7 +171,7 @@ async def test_missed_days_are_sent_in_their_order_and_no_more_than_a_week_of_th
         assert "too many were missed" in caplog.text
 
 
-async def test_a_day_with_too_much_in_it_holds_up_no_other(
+async def test_a_day_with_too_much_data_holds_up_no_other(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with begun(tmp_path, status(200)) as (house, at):
@@ -183,7 +183,7 @@ async def test_a_day_with_too_much_in_it_holds_up_no_other(
     assert periods(at) == [[ns("2026-05-02T06:00Z"), ns("2026-05-03T06:00Z")]]
 
 
-async def test_one_that_is_not_taken_is_tried_again_also_by_the_next_process(
+async def test_a_report_that_is_not_accepted_is_sent_again_also_by_the_next_process(
     tmp_path: Path,
 ) -> None:
     async with begun(tmp_path, status(500)) as (house, at):
@@ -196,7 +196,7 @@ async def test_one_that_is_not_taken_is_tried_again_also_by_the_next_process(
     assert len({*at.ids, *again.ids}) == 1
 
 
-async def test_one_that_cannot_be_noted_is_not_sent_again_and_again(
+async def test_a_report_that_cannot_be_recorded_as_sent_is_not_repeated_endlessly(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with begun(tmp_path, status(200)) as (house, at):
@@ -213,7 +213,7 @@ async def test_one_that_cannot_be_noted_is_not_sent_again_and_again(
         assert len(at.posted) == 1
 
 
-async def test_one_that_the_receiver_refuses_is_given_up_and_that_is_said(
+async def test_a_report_that_the_receiver_refuses_is_dropped_and_logged(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with begun(tmp_path, *[status(413)] * MAX_REFUSALS, status(200)) as (house, at):
@@ -224,7 +224,7 @@ async def test_one_that_the_receiver_refuses_is_given_up_and_that_is_said(
     assert at.posted[-1].json["lost"] == 1
 
 
-async def test_it_waits_for_the_log_and_says_why_there_is_none(
+async def test_it_waits_for_the_log_and_reports_why_there_is_none(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with begun(tmp_path, status(200)) as (house, at):
@@ -239,7 +239,7 @@ async def test_it_waits_for_the_log_and_says_why_there_is_none(
         await until(lambda: at.posted, "the report")
 
 
-async def test_a_clock_that_was_ahead_ends_no_reports_and_a_simulated_one_has_none(
+async def test_a_clock_that_was_ahead_stops_no_reports_and_simulated_time_has_none(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with begun(tmp_path, status(200), now="2036-05-01T07:00Z") as (house, at):
@@ -251,8 +251,8 @@ async def test_a_clock_that_was_ahead_ends_no_reports_and_a_simulated_one_has_no
         await until(lambda: "the time is simulated" in caplog.text, "why there is none")
 
 
-async def test_two_greenhouses_with_one_receiver_have_reports_of_their_own(tmp_path: Path) -> None:
-    houses = [House(ns("2026-05-01T07:00Z"), journal_id=name) for name in ("j1", "j2")]
+async def test_two_greenhouses_with_one_receiver_have_separate_reports(tmp_path: Path) -> None:
+    houses = [Greenhouse(ns("2026-05-01T07:00Z"), journal_id=name) for name in ("j1", "j2")]
     with receiver(status(200)) as at:
         for house in houses:
             async with sending(house, tmp_path, at.port):
@@ -293,11 +293,13 @@ def test_days_follow_each_other_without_a_gap_for_a_year() -> None:
                 end_ns = next_ns
 
 
-async def test_a_broker_gets_it_once_it_is_there_and_keeps_it(tmp_path: Path) -> None:
+async def test_a_broker_gets_it_once_reachable_and_retains_it(
+    tmp_path: Path,
+) -> None:
     broker = Broker(tmp_path)
     target = Targets.of(Settings(mqtt_url=broker.url, mqtt_prefix="lt"), Secrets()).mqtt
     assert target is not None
-    house = House(ns("2026-05-01T07:00Z"))
+    house = Greenhouse(ns("2026-05-01T07:00Z"))
     channel = Mqtt(target, Mirror(target.topics, SENSORS))
     of: Any = house
     channel.start(of)
@@ -320,7 +322,7 @@ async def test_a_broker_gets_it_once_it_is_there_and_keeps_it(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("text", ["6:00", "24:00", "06:60", "06:00:00", "six"])
-def test_an_hour_that_is_none_is_refused(text: str) -> None:
+def test_an_invalid_hour_is_refused(text: str) -> None:
     settings = Settings(report_at=text, webhook_url=f"http://127.0.0.1:{free_port()}/")
     with pytest.raises(SettingError, match="must be from 00:00 to 23:59"):
         Targets.of(settings, SECRETS)

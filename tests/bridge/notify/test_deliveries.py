@@ -1,4 +1,4 @@
-"""Changes of alarms: in order, each with an id, bounded, and none lost without being counted."""
+"""Changes of alarms: ordered, each with an id, bounded, and every lost one counted."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ def put(news: AlarmNews, *alarms: Alarm, is_past: bool = False) -> list[tuple[st
     return [(it.change, it.id) for it in found]
 
 
-def test_raised_and_cleared_are_told_in_their_order_each_with_an_id_of_its_own() -> None:
+def test_raised_and_cleared_are_sent_in_order_each_with_its_own_id() -> None:
     news = AlarmNews()
     a, b = alarm("a", raised_ns=NOW_NS), alarm("b", raised_ns=NOW_NS - S)
     assert put(news, a, b) == [("raised", f"{b.id}.raised"), ("raised", f"{a.id}.raised")]
@@ -22,7 +22,7 @@ def test_raised_and_cleared_are_told_in_their_order_each_with_an_id_of_its_own()
     assert put(news, cleared) == [("cleared", f"{a.id}.cleared.{NOW_NS + S}")]
 
 
-def test_one_that_turns_critical_is_told_once_and_a_worse_value_alone_is_not() -> None:
+def test_an_alarm_that_turns_critical_is_sent_once_and_a_worse_value_alone_is_not() -> None:
     news = AlarmNews()
     mild = replace(alarm("a", Verdict.STRESSED), raised_as=Verdict.STRESSED)
     bad = replace(mild, reason=replace(mild.reason, verdict=Verdict.CRITICAL))
@@ -31,7 +31,7 @@ def test_one_that_turns_critical_is_told_once_and_a_worse_value_alone_is_not() -
     assert put(news, *(replace(mild, worst=float(value)) for value in range(99))) == []
     assert put(news, bad) == [("worse", worse)]
     assert put(news, *(replace(bad, worst=float(value)) for value in range(99))) == []
-    # After a restart both are told once more; who had the one only learns of the other.
+    # After a restart both are sent once more; a receiver of the first only learns of the second.
     again = AlarmNews()
     assert put(again, bad, is_past=True) == [("raised", raised), ("worse", worse)]
     assert [it for it, _ in put(again, replace(bad, cleared_at_ns=NOW_NS + S))] == ["cleared"]
@@ -41,7 +41,7 @@ def test_one_that_turns_critical_is_told_once_and_a_worse_value_alone_is_not() -
     ]
 
 
-def test_an_alarm_that_goes_on_after_all_is_raised_again_with_another_id() -> None:
+def test_an_alarm_that_continues_after_all_is_raised_again_with_another_id() -> None:
     news = AlarmNews()
     put(news, alarm("a"))
     put(news, alarm("a", cleared_ns=NOW_NS + S))
@@ -50,15 +50,15 @@ def test_an_alarm_that_goes_on_after_all_is_raised_again_with_another_id() -> No
     assert name != f"{alarm('a').id}.raised"
 
 
-def test_what_was_told_and_never_was_is_withdrawn_and_nothing_else() -> None:
+def test_a_sent_alarm_that_turns_out_never_to_have_been_is_withdrawn_and_no_other() -> None:
     news = AlarmNews()
     put(news, alarm("a"))
     found = news.of(Change((), (alarm("a"), alarm("b"))), NOW_NS, "robot")
     assert [(it.change, getattr(it.alarm, "tag_id", None)) for it in found] == [("withdrawn", "a")]
 
 
-def test_of_the_past_what_is_active_and_the_last_day_is_told_with_the_same_ids() -> None:
-    """So that nothing is missed over a restart, and a receiver knows what it has had."""
+def test_active_alarms_and_those_of_the_last_day_are_sent_again_with_the_same_ids() -> None:
+    """So that a restart loses none, and a receiver recognises those it has."""
     before = AlarmNews()
     old, active = alarm("old", raised_ns=1, cleared_ns=2), alarm("a", raised_ns=1)
     edge = NOW_NS - RESENT_NS
@@ -70,7 +70,7 @@ def test_of_the_past_what_is_active_and_the_last_day_is_told_with_the_same_ids()
     assert after == [*ids, ("cleared", f"{just.id}.cleared.{edge}")]
 
 
-def test_where_no_time_is_known_the_newest_alarm_says_what_day_it_is() -> None:
+def test_without_a_known_time_the_latest_alarm_sets_the_day() -> None:
     news = AlarmNews()
     old, new = alarm("old", raised_ns=1, cleared_ns=2), alarm("new", raised_ns=NOW_NS)
     found = news.of(Change((old, new), is_past=True), None, "robot")

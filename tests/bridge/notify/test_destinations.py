@@ -1,4 +1,4 @@
-"""Where things are sent: what cannot be is refused at the start, and no secret is in a message."""
+"""Destinations: an invalid one is refused at the start, and no message contains a secret."""
 
 import logging
 import ssl
@@ -29,7 +29,7 @@ def refusal(secrets: Secrets = SIGNED, **settings: Any) -> str:
         ("mqtts://[::1]", "::1", 8883, True, "mqtts://[::1]:8883"),
     ],
 )
-def test_a_broker_is_named_by_its_address(
+def test_a_broker_is_logged_with_its_address(
     url: str, host: str, port: int, has_tls: bool, called: str
 ) -> None:
     target = Targets.of(Settings(mqtt_url=url), Secrets()).mqtt
@@ -48,7 +48,7 @@ def test_a_broker_is_named_by_its_address(
         ("http://hook.lan:8080/secret-path", 8080, "/secret-path", "http://hook.lan:8080"),
     ],
 )
-def test_a_receiver_is_named_without_its_path(url: str, port: int, path: str, called: str) -> None:
+def test_a_receiver_is_logged_without_its_path(url: str, port: int, path: str, called: str) -> None:
     target = Targets.of(Settings(webhook_url=url), SIGNED).webhook
     assert target is not None
     assert (target.port, target.path, target.called) == (port, path, called)
@@ -73,7 +73,7 @@ def test_a_receiver_is_named_without_its_path(url: str, port: int, path: str, ca
         ("https://me:hunter2@a", "--webhook-url has a user or a password in it"),
     ],
 )
-def test_what_is_no_address_is_refused(url: str, named: str) -> None:
+def test_an_invalid_address_is_refused(url: str, named: str) -> None:
     said = refusal(mqtt_url=url) if "mqtt" in named else refusal(webhook_url=url)
     assert said.startswith(named)
     assert "hunter2" not in said
@@ -88,7 +88,7 @@ def test_a_prefix_that_no_topic_may_have_is_refused(prefix: str) -> None:
 
 
 @pytest.mark.parametrize("prefix", ["ferme/été 1", "a" * MAX_PREFIX])
-def test_other_prefixes_will_do_and_both_must_differ(prefix: str) -> None:
+def test_other_prefixes_are_accepted_and_both_must_differ(prefix: str) -> None:
     settings = Settings(mqtt_url="mqtt://a", mqtt_prefix=prefix, mqtt_discovery_prefix="")
     target = Targets.of(settings, Secrets()).mqtt
     assert target is not None
@@ -98,7 +98,7 @@ def test_other_prefixes_will_do_and_both_must_differ(prefix: str) -> None:
     )
 
 
-def test_a_password_needs_a_user_and_is_better_sent_over_tls(
+def test_a_password_needs_a_user_and_a_warning_is_given_without_tls(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     secrets = Secrets(mqtt_password="hunter2")
@@ -113,7 +113,7 @@ def test_a_password_needs_a_user_and_is_better_sent_over_tls(
     assert "hunter2" not in repr(target)
 
 
-def test_a_webhook_needs_a_secret_that_is_one() -> None:
+def test_a_webhook_needs_a_valid_secret() -> None:
     assert "--webhook-secret-file" in refusal(Secrets(), webhook_url="http://a")
     said = refusal(Secrets(webhook_secret=SECRET[1:]), webhook_url="http://a")
     assert f"has {MIN_SECRET_LENGTH - 1} characters" in said
@@ -129,18 +129,18 @@ def test_a_webhook_needs_a_secret_that_is_one() -> None:
         ("webhook_ca", "webhook_url"),
     ],
 )
-def test_a_setting_that_is_of_no_use_is_told(name: str, url: str) -> None:
+def test_an_unused_setting_is_reported(name: str, url: str) -> None:
     given: dict[str, Any] = {name: "x"}
     said = refusal(**given)
     assert said.startswith(f"--{name.replace('_', '-')} is given without --{url.replace('_', '-')}")
 
 
-def test_a_mistake_is_called_what_its_operator_called_it() -> None:
+def test_a_mistake_is_named_as_the_operator_wrote_it() -> None:
     said = refusal(mqtt_url="x", given_as={"mqtt_url": "LUPIN_MQTT_URL"})
     assert said.startswith("LUPIN_MQTT_URL must begin with")
 
 
-def test_an_authority_of_ones_own_is_trusted_and_a_file_that_is_none_is_named(
+def test_a_private_authority_is_trusted_and_an_invalid_file_of_one_is_named(
     tmp_path: Path,
 ) -> None:
     made = certificate(tmp_path)

@@ -1,4 +1,4 @@
-"""What Home Assistant is told: devices, units and classes that it takes, and when to stop."""
+"""What is announced to Home Assistant: valid devices, units and classes, and expiry times."""
 
 from dataclasses import replace
 from typing import Any
@@ -21,7 +21,7 @@ def announced(tag_id: str, *sensors: str) -> dict[str, dict[str, Any]]:
     return dict(tag_configs(TOPICS, tag_id, [SENSORS.named(it) for it in sensors], HOLDS_NS))
 
 
-def test_a_sensor_has_what_home_assistant_wants_of_it() -> None:
+def test_a_sensor_has_the_fields_that_home_assistant_needs() -> None:
     found = announced("12", "temperature")
     config = found["homeassistant/sensor/lupin-twin/tag_12_-_reading_temperature/config"]
     assert config == {
@@ -60,20 +60,20 @@ def test_a_sensor_has_what_home_assistant_wants_of_it() -> None:
         ("ph", None),
     ],
 )
-def test_every_sensor_of_ours_has_its_class(name: str, expected: str | None) -> None:
+def test_each_of_our_sensors_has_its_class(name: str, expected: str | None) -> None:
     config = next(iter(announced("12", name).values()))
     assert config.get("device_class") == expected
     assert ("unit_of_measurement" in config) is (expected is not None)
 
 
-def test_a_unit_that_is_not_of_the_class_makes_it_none() -> None:
+def test_a_unit_that_does_not_fit_the_class_removes_it() -> None:
     odd = replace(SENSORS.named("temperature"), unit="mK")
     config = next(iter(dict(tag_configs(TOPICS, "12", [odd], HOLDS_NS)).values()))
     assert "device_class" not in config
     assert config["unit_of_measurement"] == "mK"
 
 
-def test_a_tag_and_the_house_have_a_verdict_and_an_alarm() -> None:
+def test_a_tag_and_the_greenhouse_have_a_verdict_and_an_alarm() -> None:
     for found in (announced("12"), dict(greenhouse_configs(TOPICS))):
         by_name = {config["name"]: config for config in found.values()}
         assert by_name["Verdict"]["options"] == ["critical", "stressed", "healthy"]
@@ -81,7 +81,7 @@ def test_a_tag_and_the_house_have_a_verdict_and_an_alarm() -> None:
         assert by_name["Alarm"]["json_attributes_topic"] == by_name["Alarm"]["state_topic"]
 
 
-def test_a_tags_verdict_is_not_available_while_the_twin_is_silent_and_the_houses_is() -> None:
+def test_a_silent_twin_makes_only_the_verdicts_of_tags_unavailable() -> None:
     tags = {it["name"]: it for it in announced("12", "co2").values()}
     house = {it["name"]: it for it in dict(greenhouse_configs(TOPICS)).values()}
     for name in ("Verdict", "Alarm"):
@@ -92,14 +92,14 @@ def test_a_tags_verdict_is_not_available_while_the_twin_is_silent_and_the_houses
     assert house["Twin"]["device_class"] == "connectivity"
 
 
-def test_no_two_entities_are_known_by_the_same_name() -> None:
+def test_no_two_entities_have_the_same_name() -> None:
     odd = [*announced("a", "x/y", "x y", "verdict").items(), *announced("a_-_verdict").items()]
     odd += greenhouse_configs(TOPICS)
     assert len({topic for topic, _ in odd}) == len(odd)
     assert len({config["unique_id"] for _, config in odd}) == len(odd)
 
 
-def test_readings_are_shown_in_steps_no_shorter_than_they_hold() -> None:
+def test_readings_expire_no_sooner_than_they_hold() -> None:
     assert expire_after_s(600 * S) == 600
     assert expire_after_s(600 * S + 1) == 900
     assert expire_after_s(STEPS_S[-1] * S) == STEPS_S[-1] == 604_800

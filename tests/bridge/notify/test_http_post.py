@@ -1,4 +1,4 @@
-"""One POST to a real server: what it says, and how little is taken of what comes back."""
+"""One POST to a real server: what is sent, and how little of the answer is read."""
 
 import asyncio
 import socket
@@ -39,13 +39,13 @@ def refusal(url: str, answer_s: float = 60.0, ca: str = "") -> str:
 
 
 def said(port: int) -> tuple[int, int]:
-    """The status of what is not taken, and its wish."""
+    """The status of a refusal, and its Retry-After."""
     with pytest.raises(PostError) as refused:
         sent(f"http://127.0.0.1:{port}/")
     return refused.value.status, refused.value.retry_after_s
 
 
-def test_a_post_says_what_it_is() -> None:
+def test_a_post_has_its_headers_and_body() -> None:
     with receiver(status(204)) as server:
         sent(f"http://127.0.0.1:{server.port}/hook?a=b")
     (posted,) = server.posted
@@ -56,7 +56,7 @@ def test_a_post_says_what_it_is() -> None:
 
 
 @pytest.mark.parametrize("code", [302, 404, 500])
-def test_any_other_status_is_none_and_a_redirect_is_not_followed(code: int) -> None:
+def test_any_other_status_fails_and_a_redirect_is_not_followed(code: int) -> None:
     with receiver(status(200)) as elsewhere:
         place = f"Location: http://127.0.0.1:{elsewhere.port}/"
         with receiver(status(code, place, "Retry-After: 7")) as server:
@@ -64,18 +64,18 @@ def test_any_other_status_is_none_and_a_redirect_is_not_followed(code: int) -> N
     assert elsewhere.posted == []
 
 
-def test_nobody_there_is_told_in_the_systems_words() -> None:
+def test_a_missing_receiver_is_reported_in_the_systems_words() -> None:
     assert refusal(f"http://127.0.0.1:{free_port()}/") == "Connection refused"
     assert refusal("http://a..b/") == "its host name cannot be looked up"
 
 
 @pytest.mark.parametrize("begin", [b"", b"HTTP/1.1 200 OK\r\nX: "])
-def test_no_answer_in_time_is_none_and_nor_is_a_part_of_one(begin: bytes) -> None:
+def test_no_answer_in_time_is_a_failure_and_so_is_a_partial_one(begin: bytes) -> None:
     with receiver(lambda _: iter([begin, None])) as server:
         assert refusal(f"http://127.0.0.1:{server.port}/", 0.05) == "no answer within 0.05 s"
 
 
-def test_a_body_is_not_read_however_much_comes() -> None:
+def test_a_body_is_not_read_however_much_arrives() -> None:
     given: list[int] = []
 
     def flood(_: Posted) -> Iterator[bytes | None]:
@@ -86,7 +86,7 @@ def test_a_body_is_not_read_however_much_comes() -> None:
 
     with receiver(flood) as server:
         sent(f"http://127.0.0.1:{server.port}/")
-    assert sum(given) < 20_000_000  # what the sockets hold
+    assert sum(given) < 20_000_000  # more than the sockets hold
 
 
 @pytest.mark.parametrize(
@@ -112,12 +112,12 @@ def test_a_head_is_read_up_to_a_limit(begin: bytes, more: bytes) -> None:
         (b"HTTP/1.1 200", "the connection was closed before an answer"),
     ],
 )
-def test_what_is_no_answer_is_told(said: bytes, why: str) -> None:
+def test_an_invalid_answer_is_reported(said: bytes, why: str) -> None:
     with receiver(lambda _: iter([said])) as server:
         assert refusal(f"http://127.0.0.1:{server.port}/").startswith(why)
 
 
-def test_what_is_said_before_the_answer_is_none() -> None:
+def test_an_interim_response_is_skipped() -> None:
     first = b"HTTP/1.1 103 Early Hints\r\n\r\nHTTP/1.1 202 OK\r\n\r\n"
     with receiver(lambda _: iter([first])) as server:
         sent(f"http://127.0.0.1:{server.port}/")
@@ -127,12 +127,12 @@ def test_what_is_said_before_the_answer_is_none() -> None:
     ("wish", "told_s"),
     [("Wed, 21 Oct 2026 07:28:00 GMT", 0), ("9" * 5_000, 999_999_999)],
 )
-def test_a_wish_to_be_left_alone_is_a_number(wish: str, told_s: int) -> None:
+def test_retry_after_is_a_number(wish: str, told_s: int) -> None:
     with receiver(status(503, f"Retry-After: {wish}")) as server:
         assert said(server.port) == (503, told_s)
 
 
-def test_https_is_trusted_by_its_authority_alone(tmp_path: Path) -> None:
+def test_https_trusts_its_authority_alone(tmp_path: Path) -> None:
     made = certificate(tmp_path)
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.load_cert_chain(made.cert, made.key)
@@ -145,13 +145,13 @@ def test_https_is_trusted_by_its_authority_alone(tmp_path: Path) -> None:
     assert len(server.posted) == 1
 
 
-async def test_a_connection_that_is_reset_is_told() -> None:
+async def test_a_reset_connection_is_reported() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         listener.setblocking(False)
         url = f"http://127.0.0.1:{listener.getsockname()[1]}/"
         sending = asyncio.create_task(post(target(url), {}, b"{}"))
         client, _ = await asyncio.get_running_loop().sock_accept(listener)
-        # Closed with a time of 0, it is reset (socket(7)).
+        # Closed with a linger time of 0, it is reset (socket(7)).
         client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         client.close()
         with pytest.raises(PostError):

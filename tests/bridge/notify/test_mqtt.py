@@ -1,4 +1,4 @@
-"""MQTT and a real mosquitto: absent, refusing, hanging, killed, and then told everything."""
+"""MQTT with a real mosquitto: absent, refusing, hanging, killed, and brought up to date again."""
 
 import asyncio
 import gc
@@ -24,8 +24,8 @@ READING = "lt/tags/a/readings/temperature"
 CONFIG = "homeassistant/sensor/lt/tag_a_-_reading_temperature/config"
 
 
-class House:
-    """How a house is, for a channel to look at."""
+class Greenhouse:
+    """The state of a greenhouse, as a channel reads it."""
 
     def __init__(self) -> None:
         self.now = seen(tag("a", temperature=20.0))
@@ -37,7 +37,7 @@ class House:
         return self.now
 
     def scan(self) -> float:
-        """Another scan of the tag, a second later; returns what it read."""
+        """Another scan of the tag, a second later; returns its reading."""
         self._number += 1
         value, at_ns = 20.0 + self._number / 100, NOW_NS + self._number * S
         self.now = seen(tag("a", at_ns, temperature=value), now_ns=at_ns)
@@ -47,12 +47,12 @@ class House:
 @asynccontextmanager
 async def telling(
     broker: Broker,
-    house: House,
+    house: Greenhouse,
     answer_s: float = PATIENCE_S,
     secrets: Secrets | None = None,
     **settings: Any,
 ) -> AsyncIterator[Mqtt]:
-    """A channel to that broker, in a hurry."""
+    """A channel to that broker, with short waits."""
     chosen = Settings(mqtt_url=broker.url, mqtt_prefix="lt", **settings)
     target = Targets.of(chosen, secrets or Secrets()).mqtt
     assert target is not None
@@ -68,20 +68,22 @@ async def telling(
 
 
 async def told(heard: Subscriber, value: float) -> None:
-    """Wait until a broker was told of this temperature."""
+    """Wait until a broker has received this temperature."""
     await until(lambda: (heard.last(READING) or {}).get("value") == value, f"the reading {value}")
 
 
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
-    """A broker that goes on; who uses it leaves nothing behind but its status."""
+    """A broker for several tests; each leaves only its status behind."""
     broker = Broker(tmp_path_factory.mktemp("mosquitto"))
     with broker.running():
         yield broker
 
 
-async def test_a_broker_is_told_of_the_house_and_of_what_is_new(shared: Broker) -> None:
-    house = House()
+async def test_a_broker_gets_the_state_and_then_its_changes(
+    shared: Broker,
+) -> None:
+    house = Greenhouse()
     house.now = seen(tag("a", temperature=20.0), alarms=(alarm("a"),))
     with Subscriber(shared) as heard:
         async with telling(shared, house) as channel:
@@ -99,10 +101,10 @@ async def test_a_broker_is_told_of_the_house_and_of_what_is_new(shared: Broker) 
     assert {message.qos for message in heard.heard} == {1}
 
 
-async def test_nothing_is_retained_but_the_status_of_tags_that_are_gone_neither(
+async def test_only_the_status_is_retained_and_that_of_removed_tags_is_not(
     shared: Broker,
 ) -> None:
-    house = House()
+    house = Greenhouse()
     house.now = seen(tag("a", temperature=20.0), tag("gone", temperature=20.0))
     async with telling(shared, house) as channel:
         await until(lambda: channel.condition.sent > 14, "all of it")
@@ -112,18 +114,18 @@ async def test_nothing_is_retained_but_the_status_of_tags_that_are_gone_neither(
             gone = CONFIG.replace("tag_a_", "tag_gone_")
             await until(lambda: heard.of(gone) == [b""], "the end of its entity")
         with Subscriber(shared) as late:
-            # Told in order: who has this has all that was retained.
+            # Sent in order: whoever has this has all that was retained.
             late.say("marker", "x")
             await until(lambda: late.of("marker"), "the marker")
             retained = {it.topic: it.payload for it in late.heard if it.retain}
             assert retained == {"lt/status": b"online"}
 
 
-async def test_at_home_assistants_birth_everything_is_told_again(
+async def test_at_home_assistants_birth_everything_is_sent_again(
     shared: Broker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(mqtt, "REPEAT_S", 0.1)
-    async with telling(shared, House()) as channel:
+    async with telling(shared, Greenhouse()) as channel:
         await until(lambda: channel.condition.sent > 1, "the first time")
         await until(lambda: channel.condition.waiting == 0, "the first time")
         with Subscriber(shared) as later:
@@ -134,14 +136,14 @@ async def test_at_home_assistants_birth_everything_is_told_again(
             assert later.last(CONFIG)["expire_after"] == 600
 
 
-async def test_a_flood_of_good_byes_and_births_is_answered_once_in_a_while(
+async def test_a_flood_of_wills_and_births_is_answered_at_a_limited_rate(
     shared: Broker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The will of the process before, or the good-bye of another one, may come late."""
+    """The last process's will, or another one's offline message, may arrive late."""
     for name in ("STATUS_S", "REPEAT_S"):
         monkeypatch.setattr(mqtt, name, 2.0)
     with Subscriber(shared) as heard:
-        async with telling(shared, House()) as channel:
+        async with telling(shared, Greenhouse()) as channel:
             await until(lambda: channel.condition.sent > 10, "the first time")
             await until(lambda: heard.of("lt/status")[-1:] == [b"online"], "that it has come")
             before, sent = len(heard.of("lt/status")), channel.condition.sent
@@ -157,10 +159,10 @@ async def test_a_flood_of_good_byes_and_births_is_answered_once_in_a_while(
             assert channel.condition.sent <= 3 * sent
 
 
-async def test_a_broker_that_sends_a_packet_of_256_mb_is_left_before_it_is_read(
+async def test_a_broker_that_sends_a_packet_of_256_mb_is_disconnected_before_it_is_read(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    """As none does that was asked for less; before the connection is over, it is in no memory."""
+    """None should, as the limit was announced. The packet never gets into memory."""
     taken: list[int] = []
 
     def serve(listener: socket.socket) -> None:
@@ -168,7 +170,7 @@ async def test_a_broker_that_sends_a_packet_of_256_mb_is_left_before_it_is_read(
         with client, suppress(OSError):
             client.recv(4_096)
             client.sendall(b"\x20\x03\x00\x00\x00")  # CONNACK, no property
-            client.sendall(b"\x30\xff\xff\xff\x7f")  # PUBLISH, the longest that there can be
+            client.sendall(b"\x30\xff\xff\xff\x7f")  # PUBLISH, with the longest possible length
             taken.append(0)
             while taken[0] < 256_000_000:
                 taken[0] += client.send(bytes(1 << 20))
@@ -176,7 +178,7 @@ async def test_a_broker_that_sends_a_packet_of_256_mb_is_left_before_it_is_read(
     with socket.create_server(("127.0.0.1", 0)) as listener:
         serving = asyncio.create_task(asyncio.to_thread(serve, listener))
         broker = Broker(Path(), listener.getsockname()[1])
-        async with telling(broker, House(), answer_s=2.0) as channel:
+        async with telling(broker, Greenhouse(), answer_s=2.0) as channel:
             await until(lambda: channel.condition.failed, "the end of the connection")
         await serving
     assert taken[0] < 32_000_000, "what the sockets of the two hold, and no more"
@@ -184,17 +186,17 @@ async def test_a_broker_that_sends_a_packet_of_256_mb_is_left_before_it_is_read(
     assert "never retrieved" not in caplog.text
 
 
-async def test_two_bridges_of_one_prefix_do_not_throw_each_other_out(shared: Broker) -> None:
-    async with telling(shared, House()) as one, telling(shared, House()) as two:
+async def test_two_bridges_with_one_prefix_do_not_disconnect_each_other(shared: Broker) -> None:
+    async with telling(shared, Greenhouse()) as one, telling(shared, Greenhouse()) as two:
         await until(lambda: one.condition.sent > 10, "what the one tells")
         await until(lambda: two.condition.sent > 10, "what the other tells")
         assert (one.condition.failed, two.condition.failed) == (0, 0)
 
 
-async def test_a_broker_that_is_absent_comes_and_is_killed_knows_the_newest(
+async def test_a_broker_that_is_absent_appears_and_is_killed_gets_the_latest_state(
     tmp_path: Path,
 ) -> None:
-    broker, house = Broker(tmp_path), House()
+    broker, house = Broker(tmp_path), Greenhouse()
     async with telling(broker, house) as channel:
         await until(lambda: channel.condition.failed > 2, "some tries")
         assert channel.condition.detail == f"[Errno 111] Connection refused ({broker.url})"
@@ -209,10 +211,10 @@ async def test_a_broker_that_is_absent_comes_and_is_killed_knows_the_newest(
         await until(lambda: channel.condition.waiting == 2, "the tag and the house")
 
 
-async def test_a_house_that_cannot_be_looked_at_for_a_while_is_told_of_again(
+async def test_after_a_failure_to_read_the_greenhouse_everything_is_sent_again(
     shared: Broker,
 ) -> None:
-    house = House()
+    house = Greenhouse()
     with Subscriber(shared) as heard:
         async with telling(shared, house) as channel:
             await told(heard, 20.0)
@@ -222,8 +224,8 @@ async def test_a_house_that_cannot_be_looked_at_for_a_while_is_told_of_again(
             await told(heard, house.scan())
 
 
-async def test_a_broker_that_hangs_is_tried_anew_and_told_the_newest(tmp_path: Path) -> None:
-    broker, house = Broker(tmp_path), House()
+async def test_a_broker_that_hangs_is_reconnected_and_gets_the_latest_state(tmp_path: Path) -> None:
+    broker, house = Broker(tmp_path), Greenhouse()
     with broker.running() as process:
         async with telling(broker, house, answer_s=0.3) as channel:
             with Subscriber(broker) as heard:
@@ -231,7 +233,7 @@ async def test_a_broker_that_hangs_is_tried_anew_and_told_the_newest(tmp_path: P
             process.freeze()
             house.scan()
             failed = channel.condition.failed
-            # Once in what it was told, and then without being let in at all.
+            # Once while connected, and then without accepting a connection.
             await until(lambda: channel.condition.failed > failed + 2, "some tries")
             assert not channel.condition.is_connected
             last = house.scan()
@@ -241,19 +243,19 @@ async def test_a_broker_that_hangs_is_tried_anew_and_told_the_newest(tmp_path: P
                 await until(lambda: channel.condition.is_connected, "the connection")
 
 
-async def test_it_ends_at_once_while_a_broker_hangs(tmp_path: Path) -> None:
+async def test_it_stops_at_once_while_a_broker_hangs(tmp_path: Path) -> None:
     broker = Broker(tmp_path)
     with broker.running() as process:
-        async with telling(broker, House()) as channel:
+        async with telling(broker, Greenhouse()) as channel:
             await until(lambda: channel.condition.sent > 10, "the connection")
             process.freeze()
-            async with asyncio.timeout(PATIENCE_S / 4):  # what it waits for may take a minute
+            async with asyncio.timeout(PATIENCE_S / 4):  # its own time-out may be a minute
                 await channel.stop()
 
 
-# What of a handshake that fails, paho leaves its socket to be collected.
+# After a failed handshake, paho leaves its socket to the garbage collector.
 @pytest.mark.filterwarnings("ignore:.*ssl.SSLSocket:pytest.PytestUnraisableExceptionWarning")
-async def test_a_password_and_an_authority_are_what_a_broker_asks_for(tmp_path: Path) -> None:
+async def test_a_password_and_an_authority_satisfy_a_broker_that_needs_them(tmp_path: Path) -> None:
     made = certificate(tmp_path)
     ca = tmp_path / "ca.pem"
     made.authority.cert_pem.write_to_path(str(ca))
@@ -261,12 +263,12 @@ async def test_a_password_and_an_authority_are_what_a_broker_asks_for(tmp_path: 
     known, wrong = Secrets(mqtt_password=PASSWORD), Secrets(mqtt_password="wrong")
     given: dict[str, Any] = {"mqtt_user": USER, "mqtt_ca": str(ca)}
     with broker.running():
-        async with telling(broker, House(), secrets=known, **given) as channel:
+        async with telling(broker, Greenhouse(), secrets=known, **given) as channel:
             await until(lambda: channel.condition.sent > 10, "all of it")
-        async with telling(broker, House(), secrets=wrong, **given) as channel:
+        async with telling(broker, Greenhouse(), secrets=wrong, **given) as channel:
             await until(lambda: channel.condition.failed > 0, "the refusal")
             assert "Not authorized" in channel.condition.detail
             assert "wrong" not in channel.condition.detail
-        async with telling(broker, House(), secrets=known, mqtt_user=USER) as channel:
+        async with telling(broker, Greenhouse(), secrets=known, mqtt_user=USER) as channel:
             await until(lambda: channel.condition.failed > 0, "the refusal")
             assert "certificate verify failed" in channel.condition.detail

@@ -1,4 +1,4 @@
-"""Web Push: a browser's subscription, and a push service of our own that reads what is posted."""
+"""Web Push: a browser's subscription, and our own push service, which decrypts each message."""
 
 from __future__ import annotations
 
@@ -67,14 +67,14 @@ class Phone:
 
     @property
     def subscription(self) -> dict[str, Any]:
-        """As a browser gives it."""
+        """As a browser sends it."""
         public = self.private.public_key()
         raw = public.public_bytes(Encoding.X962, PublicFormat.UncompressedPoint)
         keys = {"p256dh": encoded(raw), "auth": encoded(self.auth)}
         return {"endpoint": self.endpoint, "expirationTime": None, "keys": keys}
 
     def read(self, posted: Posted) -> dict[str, str]:
-        """The message, as only this browser can."""
+        """The message, which only this browser can decrypt."""
         plain = http_ece.decrypt(
             posted.body, private_key=self.private, auth_secret=self.auth, version="aes128gcm"
         )
@@ -84,7 +84,7 @@ class Phone:
 
 @dataclass
 class Stage:
-    """A push service, and the accounts whose browsers are notified by it."""
+    """A push service, and the accounts whose browsers it notifies."""
 
     service: Receiver
     accounts: Path
@@ -116,7 +116,7 @@ def push_service(folder: Path, *answers: Answer) -> Iterator[tuple[Stage, Certif
 
 @dataclass
 class Pushing(Stage):
-    """Push without a bridge: what it does with each answer, in a hurry."""
+    """Push without a bridge: how it reacts to each answer, with short waits."""
 
     push: Push
     board: Alarms
@@ -153,7 +153,7 @@ def source_of(board: AlarmBoard) -> Any:
     )
 
 
-async def test_a_phone_that_is_known_no_more_is_forgotten_and_a_busy_one_is_tried_again(
+async def test_an_expired_subscription_is_removed_and_a_busy_service_is_tried_again(
     tmp_path: Path,
 ) -> None:
     elsewhere = "Location: https://localhost/"
@@ -191,7 +191,7 @@ async def test_while_the_accounts_cannot_be_read_a_message_waits(
         await until(lambda: len(on.service.posted) == 2, "the next attempt")
 
 
-async def test_a_phone_that_is_switched_off_meanwhile_is_not_tried_again(tmp_path: Path) -> None:
+async def test_a_browser_that_unsubscribes_meanwhile_is_not_tried_again(tmp_path: Path) -> None:
     def switched_off(posted: Posted) -> Iterator[bytes | None]:
         with changing(tmp_path / "accounts.sqlite") as accounts:
             accounts.remove_device(one.endpoint)
@@ -209,7 +209,7 @@ async def test_a_phone_that_is_switched_off_meanwhile_is_not_tried_again(tmp_pat
         assert len(on.posted_to(one)) == 1
 
 
-async def test_a_push_service_that_wants_to_be_left_alone_holds_up_no_other_phone(
+async def test_a_push_service_with_retry_after_delays_no_other_browser(
     tmp_path: Path,
 ) -> None:
     async with pushing(tmp_path, status(503, "Retry-After: 60"), status(201)) as on:
@@ -224,7 +224,7 @@ async def test_a_push_service_that_wants_to_be_left_alone_holds_up_no_other_phon
         assert both.read(on.posted_to(both)[1])["body"].startswith("Tag 8:")
 
 
-async def test_without_internet_for_half_an_hour_nothing_is_lost(
+async def test_half_an_hour_without_internet_loses_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now_s = 0.0
@@ -244,7 +244,7 @@ async def test_without_internet_for_half_an_hour_nothing_is_lost(
     )
 
 
-async def test_an_alarm_that_is_raised_while_the_log_is_read_at_the_start_is_new(
+async def test_an_alarm_raised_while_the_log_is_read_at_the_start_is_new(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     notified: list[str] = []
@@ -262,7 +262,7 @@ async def test_an_alarm_that_is_raised_while_the_log_is_read_at_the_start_is_new
     before, meanwhile = alarm("before", raised_ns=NOW_NS - 9 * S), alarm("meanwhile")
     push.on_alarms(Change((before, meanwhile), is_past=True))
     await until(lambda: notified == ["meanwhile"], "what is new")
-    # The log is read again, as another journal is begun.
+    # The log is read again, since another journal starts.
     push.on_alarms(Change((before, meanwhile, alarm("again")), is_past=True))
     push.on_alarms(Change((alarm("later"),)))
     await until(lambda: notified == ["meanwhile", "later"], "the next one")
@@ -274,7 +274,7 @@ async def test_an_alarm_that_is_raised_while_the_log_is_read_at_the_start_is_new
 
 @dataclass
 class Live(Stage):
-    """A bridge with people."""
+    """A bridge with accounts."""
 
     live: Bridge
 
@@ -292,7 +292,7 @@ def open_to(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
         with bridge(*SOON, *options, *private, **trusts) as live:
             live.peer.wait_for_twin()
             bearer = {"Authorization": f"Bearer {TOKEN}"}
-            # What is active at the start is nothing new.
+            # Alarms that are active at the start are not new.
             wait_for(
                 lambda: live.get("/api/alarms", bearer).json()["source"] != "starting", "the alarms"
             )
@@ -305,7 +305,7 @@ def subscribe(browser: httpx.Client, phone: Phone, language: str = "en") -> None
     assert answer.status_code == 204, answer.text
 
 
-def test_a_critical_alarm_reaches_those_phones_alone_that_may_have_it_and_until_they_may_not(
+def test_a_critical_alarm_reaches_exactly_the_browsers_that_may_have_it(
     open_to: Live,
 ) -> None:
     on = open_to
@@ -328,7 +328,7 @@ def test_a_critical_alarm_reaches_those_phones_alone_that_may_have_it_and_until_
         authorization = to_anna.headers["authorization"]
         assert authorization.endswith(f"k={key}")
         assert Vapid02.verify(authorization)
-        for phone in (annas, berts):  # hers is not his to remove
+        for phone in (annas, berts):  # only she may remove hers
             bert.post("/api/push", json={"endpoint": phone.endpoint})
         on.live.peer.observe(look("8", anomaly=True, bug_count=1))
         wait_for(lambda: len(on.posted_to(annas)) == 2, "the next one")
@@ -358,7 +358,7 @@ def test_a_critical_alarm_reaches_those_phones_alone_that_may_have_it_and_until_
         "",
     ],
 )
-def test_an_address_that_no_push_service_has_is_refused(open_to: Live, endpoint: str) -> None:
+def test_an_address_of_no_push_service_is_refused(open_to: Live, endpoint: str) -> None:
     with signed_in_once(open_to.live) as anna:
         answer = anna.post("/api/push", json=Phone(endpoint).subscription)
     assert (answer.status_code, "endpoint" in answer.json()["detail"]) == (400, True), answer.text
@@ -367,7 +367,7 @@ def test_an_address_that_no_push_service_has_is_refused(open_to: Live, endpoint:
 @pytest.mark.parametrize(
     ("name", "value"), [("p256dh", "BAAA"), ("p256dh", "*"), ("auth", "AAAA"), ("auth", "ä")]
 )
-def test_a_key_that_is_none_is_refused(open_to: Live, name: str, value: str) -> None:
+def test_an_invalid_key_is_refused(open_to: Live, name: str, value: str) -> None:
     given = open_to.phone("x").subscription
     given["keys"][name] = value
     with signed_in_once(open_to.live) as anna:
@@ -376,10 +376,10 @@ def test_a_key_that_is_none_is_refused(open_to: Live, name: str, value: str) -> 
 
 
 @pytest.mark.parametrize("host", ["127.1", "0x7f.0.0.1"])
-def test_a_name_that_leads_into_a_private_network_is_posted_nothing(
+def test_nothing_is_posted_to_a_name_that_leads_into_a_private_network(
     open_to: Live, host: str
 ) -> None:
-    """What it leads to is looked at before each post, and connected to."""
+    """Its address is checked before each post, and is the one that is connected to."""
     phone = Phone(f"https://{host}/x")
     with signed_in_once(open_to.live) as anna:
         before, posted = count(anna, "dropped"), len(open_to.service.posted)
@@ -392,7 +392,7 @@ def test_a_name_that_leads_into_a_private_network_is_posted_nothing(
 
 
 def count(client: httpx.Client, what: str) -> int:
-    """A number of the channel's."""
+    """A counter of the channel."""
     found = re.search(
         rf'lupin_outward_{what}(?:_total)?\{{channel="push"\}} ([0-9.]+)',
         client.get("/metrics").text,
@@ -401,7 +401,7 @@ def count(client: httpx.Client, what: str) -> int:
     return int(float(found[1]))
 
 
-def test_who_has_no_account_is_notified_of_nothing(open_to: Live) -> None:
+def test_without_an_account_there_are_no_notifications(open_to: Live) -> None:
     given = open_to.phone("x").subscription
     for token in (TOKEN, f"shared-{TOKEN}"):
         headers = {**OWN, "Authorization": f"Bearer {token}"}
@@ -411,7 +411,7 @@ def test_who_has_no_account_is_notified_of_nothing(open_to: Live) -> None:
     assert open_to.live.http.post("/api/push", json=given, headers=OWN).status_code == 401
 
 
-def test_of_one_person_so_many_browsers_are_notified_and_the_trail_has_each_once(
+def test_notified_browsers_per_person_are_limited_and_the_audit_trail_has_each_once(
     open_to: Live,
 ) -> None:
     def added() -> int:
@@ -429,7 +429,7 @@ def test_of_one_person_so_many_browsers_are_notified_and_the_trail_has_each_once
     assert "anna has written more than" in answers[-1].text, "or they would fill the trail"
 
 
-def test_who_signs_out_everywhere_else_is_notified_there_no_more(open_to: Live) -> None:
+def test_signing_out_everywhere_else_stops_notifications_there(open_to: Live) -> None:
     add(open_to.accounts, carl="viewer")
     with signed_in(open_to.live.url, "carl") as lost, signed_in(open_to.live.url, "carl") as kept:
         phone = open_to.phone("lost")

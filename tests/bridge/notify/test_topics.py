@@ -1,4 +1,4 @@
-"""Any name becomes a part of a topic that is safe, and no two become the same."""
+"""Any name becomes a safe part of a topic, and no two become the same."""
 
 import re
 
@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from lupin_bridge.notify.messages import MAX_PLAIN, Topics, safe
 
 
-def test_a_name_is_kept_whole_up_to_the_limit_and_past_it_by_a_digest() -> None:
+def test_a_name_is_used_whole_up_to_the_limit_and_past_it_by_a_digest() -> None:
     assert safe("x" * MAX_PLAIN) == "x" * MAX_PLAIN
     long = safe("x" * (MAX_PLAIN + 1))
     assert long.startswith("x" * 24 + "__")
@@ -21,16 +21,16 @@ def test_a_name_is_kept_whole_up_to_the_limit_and_past_it_by_a_digest() -> None:
 def test_no_two_names_have_the_same_part(one: str, other: str) -> None:
     assert (safe(one) == safe(other)) is (one == other)
     assert re.fullmatch(r"[A-Za-z0-9_-]{1,64}", safe(one))
-    # What stands between a place and what is announced of it.
+    # The separator between a prefix and what is announced below it.
     assert "_-" not in safe(one)
 
 
 @given(st.text(alphabet="/+#_ éx", min_size=20, max_size=80))
-def test_long_odd_names_are_cut_between_characters(name: str) -> None:
+def test_long_unusual_names_are_cut_between_characters(name: str) -> None:
     assert re.fullmatch(r"(?:[A-Za-z0-9-]|_[0-9A-F]{2})*(?:__[0-9a-f]{32})?", safe(name))
 
 
-def test_topics_stand_below_the_prefix() -> None:
+def test_topics_start_with_the_prefix() -> None:
     topics = Topics("farm/gh1", "homeassistant")
     assert topics.status == "farm/gh1/status"
     assert topics.birth == "homeassistant/status"
@@ -42,7 +42,7 @@ def test_topics_stand_below_the_prefix() -> None:
     )
 
 
-def test_a_tag_that_is_called_house_is_not_the_house() -> None:
+def test_a_tag_called_house_is_not_the_greenhouse() -> None:
     topics = Topics("p", "d")
     assert topics.device("house") != topics.device(None)
     assert topics.of("house", "health") != topics.of(None, "health")

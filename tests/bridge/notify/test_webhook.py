@@ -1,4 +1,4 @@
-"""The webhook and a real receiver: refusing, slow, failing, and then taking all of it."""
+"""The webhook and a real receiver: refusing, slow, failing, and then accepting everything."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -33,7 +33,7 @@ async def telling(
     origin_s: float = ORIGIN_S,
     first_wait_s: float = 0.001,
 ) -> AsyncIterator[tuple[Webhook, Alarms]]:
-    """A webhook that is in a hurry, and the board of alarms that it looks at."""
+    """A webhook with short waits, and the board of alarms that it reads."""
     settings = Settings(webhook_url=f"http://127.0.0.1:{port}/hook")
     target = Targets.of(settings, Secrets(webhook_secret=SECRET)).webhook
     assert target is not None
@@ -43,14 +43,14 @@ async def telling(
         hook, board = Webhook(target), Alarms()
     board.show(alarms)
 
-    class House:
+    class Greenhouse:
         alarms, ros_time_ns = board, NOW_NS
 
         @property
         def origin(self) -> Origin:
             return origin()
 
-    hook.start(House())  # type: ignore[arg-type]  # what it needs of one
+    hook.start(Greenhouse())  # type: ignore[arg-type]  # what it needs of one
     board.on_change = hook.on_alarms
     try:
         yield hook, board
@@ -66,7 +66,7 @@ def verified(posted: Posted, secret: str, now_s: float) -> bool:
     return bool(shown["is_genuine"](posted.headers, posted.body, secret))
 
 
-async def test_past_the_limit_the_oldest_is_given_up_counted_and_told() -> None:
+async def test_past_the_limit_the_oldest_is_dropped_counted_and_reported() -> None:
     many = [alarm(str(number), raised_ns=NOW_NS + number) for number in range(MAX_WAITING + 2)]
     with receiver(status(200)) as server:
         async with telling(server.port, *many) as (hook, _):
@@ -76,7 +76,7 @@ async def test_past_the_limit_the_oldest_is_given_up_counted_and_told() -> None:
     assert said == [("2", 2), ("3", 0)]
 
 
-async def test_what_was_lost_while_one_was_sent_is_told_with_the_next() -> None:
+async def test_losses_during_a_post_are_reported_with_the_next() -> None:
     many = [alarm(str(number), raised_ns=NOW_NS + 1 + number) for number in range(MAX_WAITING + 1)]
     with receiver(status(500), status(500), status(200)) as server:
         async with telling(server.port, A) as (hook, board):
@@ -115,7 +115,7 @@ def cut(_: Posted) -> Iterator[bytes | None]:
 
 
 @pytest.mark.parametrize("bad", [status(500), status(302), status(429, "Retry-After: 0"), cut])
-async def test_what_is_not_taken_comes_again_with_the_same_id_and_the_rest_behind_it(
+async def test_a_refused_message_is_sent_again_with_the_same_id_and_the_rest_after_it(
     bad: Answer,
 ) -> None:
     origins: list[Origin] = ["robot"]
@@ -129,7 +129,7 @@ async def test_what_is_not_taken_comes_again_with_the_same_id_and_the_rest_behin
     assert {it.json["origin"] for it in server.posted} == {"robot"}, "what it was as it was heard"
 
 
-async def test_nothing_is_posted_before_it_is_known_where_it_comes_from() -> None:
+async def test_nothing_is_posted_before_the_source_is_known() -> None:
     asked: list[int] = []
     origins: list[Origin] = ["unknown"]
 
@@ -146,16 +146,14 @@ async def test_nothing_is_posted_before_it_is_known_where_it_comes_from() -> Non
     assert [it.json["origin"] for it in server.posted] == ["robot", "robot"]
 
 
-async def test_of_a_twin_that_never_says_where_it_comes_from_alarms_are_posted_all_the_same() -> (
-    None
-):
+async def test_alarms_of_a_twin_that_never_reports_its_source_are_posted() -> None:
     with receiver(status(200)) as server:
         async with telling(server.port, A, origin=lambda: "unknown", origin_s=0.5) as (hook, _):
             await until(lambda: hook.condition.sent == 1, "it")
     assert [it.json["origin"] for it in server.posted] == ["unknown"]
 
 
-async def test_one_that_refuses_and_comes_later_gets_all_of_it() -> None:
+async def test_a_receiver_that_refuses_and_recovers_gets_all_of_it() -> None:
     port = free_port()
     async with telling(port, A) as (hook, _):
         await until(lambda: hook.condition.failed > 3, "some tries")
@@ -166,7 +164,7 @@ async def test_one_that_refuses_and_comes_later_gets_all_of_it() -> None:
         assert server.ids == [f"{A.id}.raised"]
 
 
-async def test_a_message_that_the_receiver_will_not_have_does_not_hold_up_the_others() -> None:
+async def test_a_message_that_the_receiver_rejects_does_not_hold_up_the_others() -> None:
     with receiver(*[status(422)] * MAX_REFUSALS, status(200)) as server:
         async with telling(server.port, A, B) as (hook, _):
             await until(lambda: hook.condition.sent == 1, "the second")
@@ -175,7 +173,7 @@ async def test_a_message_that_the_receiver_will_not_have_does_not_hold_up_the_ot
     assert server.posted[-1].json["lost"] == 1
 
 
-async def test_words_of_any_length_are_said_once_and_cut(caplog: pytest.LogCaptureFixture) -> None:
+async def test_texts_of_any_length_are_sent_once_and_cut(caplog: pytest.LogCaptureFixture) -> None:
     with receiver(lambda _: iter([b"x" * 3_000 + b"\r\n\r\n"])) as server:
         async with telling(server.port, A) as (hook, _):
             await until(lambda: hook.condition.failed > 2, "some tries")
@@ -183,7 +181,7 @@ async def test_words_of_any_length_are_said_once_and_cut(caplog: pytest.LogCaptu
     assert len(said) < 300
 
 
-async def test_what_cannot_even_be_sent_is_a_failure_and_the_next_one_waits(
+async def test_an_error_before_sending_is_a_failure_and_the_next_message_waits(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def broken(*_: object) -> bytes:
@@ -196,9 +194,9 @@ async def test_what_cannot_even_be_sent_is_a_failure_and_the_next_one_waits(
         assert hook.condition.detail.startswith("TypeError (http://")
 
 
-async def test_it_ends_at_once_while_somebody_hangs() -> None:
+async def test_it_stops_at_once_while_a_receiver_hangs() -> None:
     with receiver(silence) as server:
         async with telling(server.port, A) as (hook, _):
             await until(lambda: len(server.posted) == 1, "the post")
-            async with asyncio.timeout(5.0):  # the answer may take 10 s
+            async with asyncio.timeout(5.0):  # its time-out may be 10 s
                 await hook.stop()

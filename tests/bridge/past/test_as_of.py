@@ -1,4 +1,4 @@
-"""Answers as of a moment: what they say, and ETags that stand for exactly that."""
+"""Answers as of a moment: their content, and ETags that identify exactly that."""
 
 import json
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ def body(plan: Plan) -> dict[str, Any]:
     return found
 
 
-def test_a_field_is_that_of_the_tags_of_then_over_the_box_of_then() -> None:
+def test_a_field_has_the_tags_and_the_box_of_its_moment() -> None:
     found = body(field_of(SITE, asked(), JSON))
     schema.GetFieldResponse.model_validate(found)
     assert (found["origin_x"], found["origin_y"]) == (-1.5, -1.5)
@@ -69,7 +69,7 @@ def test_a_field_is_that_of_the_tags_of_then_over_the_box_of_then() -> None:
     assert (found["sample_count"], found["rmse"]) == (2, 100.0)
 
 
-def test_a_tag_that_a_lost_robot_pinned_far_away_is_left_out_and_named() -> None:
+def test_a_tag_pinned_far_away_by_a_lost_robot_is_left_out_and_named() -> None:
     lost = replace(SITE, tags=(*SITE.tags, tag("c", 0.5, 450.0), tag("lost", 5_000.0, 40.0)))
     written = field_of(lost, asked(), JSON).write(lambda: False)
     found = json.loads(written.body)
@@ -80,7 +80,7 @@ def test_a_tag_that_a_lost_robot_pinned_far_away_is_left_out_and_named() -> None
     assert set(body(field_of(lost, there, JSON))["values"]) == {40.0}
 
 
-def test_a_broken_sensor_is_no_part_of_a_field() -> None:
+def test_a_broken_sensor_is_not_used_for_a_field() -> None:
     broken = replace(SITE, tags=(*SITE.tags, tag("c", 0.5, -1.0)))
     assert (
         body(field_of(broken, asked(), JSON))["values"]
@@ -89,7 +89,7 @@ def test_a_broken_sensor_is_no_part_of_a_field() -> None:
     assert body(field_of(broken, asked())) == body(field_of(SITE, asked()))
 
 
-def test_a_broken_sensor_is_no_part_of_an_estimate() -> None:
+def test_a_broken_sensor_is_not_used_for_an_estimate() -> None:
     query = read(EstimateQuery, [("sensor_type", "co2")])
     estimated = Estimated(5 * NS, query, JSON, RULES, None, CRITERIA, 86_400.0)
 
@@ -102,7 +102,7 @@ def test_a_broken_sensor_is_no_part_of_an_estimate() -> None:
     assert made_of(*good, (3 * NS, 0.0)) != made_of(*good)
 
 
-def test_what_is_derived_is_made_of_the_readings_of_one_scan() -> None:
+def test_a_derived_reading_uses_the_readings_of_one_scan() -> None:
     def air(tag_id: str, x: float, humidity_at_ns: int) -> TagState:
         dry = tag(tag_id, x, 0.0)
         humidity = Reading("humidity", 60.0, humidity_at_ns)
@@ -118,14 +118,14 @@ def test_what_is_derived_is_made_of_the_readings_of_one_scan() -> None:
     assert (quality["sensor_type"], quality["unit"], quality["sample_count"]) == ("vpd", "kPa", 1)
 
 
-def test_before_there_was_anything_there_is_an_empty_state_and_an_empty_field() -> None:
+def test_before_the_first_observation_state_and_field_are_empty() -> None:
     nothing = Snapshot(1, "map", ())
     assert body(WholeState(None).plan(nothing))["tags"] == []
     found = body(field_of(nothing, asked(), JSON))
     assert (found["sample_count"], set(found["values"])) == (0, {None})
 
 
-def test_a_field_is_clipped_to_the_map_of_now() -> None:
+def test_a_past_field_is_clipped_to_the_current_map() -> None:
     box = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 1, "bbox_max_y": 0.5, "resolution": 0.5}
     found = body(field_of(SITE, asked(RULES, a_map(1), **box), JSON))
     assert [value is None for value in found["values"]] == [False, True]
@@ -148,7 +148,7 @@ def verdict_of(plan: Plan) -> tuple[str, str]:
     return found["house"]["verdict"], found["house"]["day"]["source"]
 
 
-def test_a_moment_is_judged_by_the_light_of_then_else_by_its_clock() -> None:
+def test_a_moment_is_judged_by_the_light_of_its_time_else_by_its_clock() -> None:
     def cool_at(at_s: float, *more: Reading) -> Plan:
         at_ns = int(at_s * NS)
         cool = Reading("temperature", 16.0, at_ns)
@@ -162,14 +162,14 @@ def test_a_moment_is_judged_by_the_light_of_then_else_by_its_clock() -> None:
     assert verdict_of(cool_at(100.0)) == ("stressed", "assumed"), "a simulation has no hours"
 
 
-def test_readings_held_as_long_as_the_scans_up_to_then_say() -> None:
+def test_readings_hold_as_long_as_the_earlier_scans_imply() -> None:
     old = TagState("a", readings=(Reading("temperature", 22.0, NS),))
     assert verdict_of(judged_at(601, old, before_s=[1.0]))[0] == "healthy"
     assert verdict_of(judged_at(602, old, before_s=[1.0]))[0] == "unknown"
     assert verdict_of(judged_at(602, old, before_s=[240.0]))[0] == "healthy"
 
 
-def test_the_etag_of_a_judgement_is_that_of_what_is_said() -> None:
+def test_the_etag_of_a_judgement_identifies_its_content() -> None:
     old = TagState("a", readings=(Reading("temperature", 22.0, NS),))
     first = judged_at(602, old, before_s=[240.0]).etag
     assert judged_at(602, old, before_s=[240.0]).etag == first
@@ -180,12 +180,12 @@ def test_the_etag_of_a_judgement_is_that_of_what_is_said() -> None:
 # --- refusals -------------------------------------------------------------------------------------
 
 
-def test_what_is_too_large_by_the_tags_of_then_is_refused() -> None:
+def test_too_large_a_past_field_is_refused() -> None:
     limit = replace(RULES, max_grid_cells=40 * 30)
     field_of(SITE, asked(limit), JSON)
     with pytest.raises(FieldRefused, match="the limit is 1199"):
         field_of(SITE, asked(replace(RULES, max_grid_cells=1_199), resolution=0.1), JSON)
-    # Who does not say how wide the cells are gets wider ones.
+    # Without a resolution in the query, the cells get wider.
     field_of(SITE, asked(replace(RULES, max_grid_cells=1_199)), JSON)
     field_of(SITE, asked(replace(RULES, max_grid_cells=4_800), scale=2), PNG)
     with pytest.raises(FieldRefused, match="4800 pixels, the limit is 4799"):
@@ -205,7 +205,7 @@ def plans(house: Snapshot, field: Field) -> list[str]:
     ]
 
 
-def test_the_same_content_has_the_same_etags_whoever_made_it() -> None:
+def test_equal_content_has_equal_etags_on_every_replica() -> None:
     again = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
     for one, other in ((asked(), asked()), (asked(RULES, a_map(1)), asked(RULES, a_map(7)))):
         assert plans(again, other) == plans(SITE, one)
@@ -231,7 +231,7 @@ def test_another_field_has_another_etag(other: Field) -> None:
 
 
 @pytest.mark.parametrize("field_format", [JSON, PNG])
-def test_what_takes_long_says_so(field_format: FieldFormat) -> None:
+def test_expensive_answers_declare_their_cost(field_format: FieldFormat) -> None:
     large = replace(RULES, max_grid_cells=1_000_000)
 
     def cost_s(tags: int, field: Field) -> float:

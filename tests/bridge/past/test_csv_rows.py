@@ -1,4 +1,4 @@
-"""Rows as CSV: what a reader gets back, to the last digit, and nothing that a spreadsheet runs."""
+"""Rows as CSV: read back to the last digit, with nothing that a spreadsheet executes."""
 
 import csv
 import io
@@ -21,12 +21,12 @@ FAILED = PastRow(1_795_270_501 * NS, "7", math.nan, math.nan, "", math.nan, 2, "
 
 
 def read(*rows: PastRow) -> list[dict[str, str]]:
-    """What a reader of CSV makes of the header and these rows."""
+    """What a CSV reader makes of the header and these rows."""
     text = (bodies.CSV_HEADER + bodies.csv_lines(rows, SENSORS)).decode()
     return list(csv.DictReader(io.StringIO(text, newline=""), strict=True))
 
 
-def test_a_row_says_when_where_what_and_who() -> None:
+def test_a_row_has_its_time_place_value_and_source() -> None:
     assert read(ROW) == [
         {
             "time_iso": "2026-11-21T14:15:00.000000005Z",
@@ -43,7 +43,7 @@ def test_a_row_says_when_where_what_and_who() -> None:
     ]
 
 
-def test_a_try_without_readings_has_no_sensor_no_unit_and_no_value() -> None:
+def test_an_attempt_without_readings_has_no_sensor_unit_or_value() -> None:
     (row,) = read(FAILED)
     assert (row["x_m"], row["y_m"]) == ("", "")
     assert (row["sensor"], row["unit"], row["value"], row["status"]) == ("", "", "", "2")
@@ -54,7 +54,7 @@ def test_rows_of_one_scan_and_of_the_next_have_their_own_times() -> None:
     assert [row["stamp"][9:12] for row in rows] == ["0.0", "0.0", "1.0", "0.0"]
 
 
-def test_a_line_ends_as_rfc_4180_has_it() -> None:
+def test_a_line_ends_as_in_rfc_4180() -> None:
     text = bodies.CSV_HEADER + bodies.csv_lines([ROW, FAILED], SENSORS)
     assert text.count(b"\r\n") == text.count(b"\n") == 3
     assert text.endswith(b"\r\n")
@@ -75,12 +75,12 @@ def test_a_line_ends_as_rfc_4180_has_it() -> None:
         ("two\r\nlines", '"two\r\'\nlines"'),
     ],
 )
-def test_a_name_is_never_a_formula_and_is_quoted_where_it_must_be(text: str, expected: str) -> None:
+def test_a_name_is_never_a_formula_and_is_quoted_where_necessary(text: str, expected: str) -> None:
     assert bodies.csv_cell(text) == expected
 
 
 @given(st.text(), st.text(), st.text())
-def test_any_names_are_read_back_but_for_what_holds_formulas_down(
+def test_names_are_read_back_apart_from_the_formula_guard(
     tag_id: str, sensor: str, source: str
 ) -> None:
     (row,) = read(PastRow(0, tag_id, 0.0, 0.0, sensor, 1.0, 0, source))
@@ -115,7 +115,7 @@ def test_numbers_are_read_back_to_the_last_bit_and_stay_numbers(value: float) ->
         ),
     ],
 )
-def test_the_file_is_named_by_what_is_in_it(
+def test_the_file_name_describes_the_content(
     asked: OfExport, now_ns: int | None, expected: str
 ) -> None:
     assert bodies.export_file_name(asked, now_ns, "csv") == expected

@@ -1,4 +1,4 @@
-"""The past of what is derived: pairs of one scan, or nothing that could be taken for them."""
+"""The past of derived sensors: only readings of one scan are paired."""
 
 import math
 from dataclasses import replace
@@ -26,7 +26,7 @@ NOW_NS = 1_000 * S
 Known = dict[str, dict[int, float]]
 SITE: Known = {
     "temperature": {10 * S: 20.0, 20 * S: 30.0, 30 * S: 25.0, 40 * S: 26.0},
-    # Of another moment, out of what can be, failed.
+    # From another moment, impossible, failed.
     "humidity": {10 * S: 50.0, 20 * S + 1: 50.0, 30 * S: 120.0, 40 * S: math.nan, 50 * S: 9.0},
 }
 ASKED = SeriesRequest("a", "vpd", 0, 0, 100)
@@ -37,7 +37,7 @@ def is_day(at_ns: int) -> bool:
 
 
 def found_in(need: SeriesRequest, known: Known, now_ns: int = NOW_NS) -> SeriesPast:
-    """What a house that has these readings finds."""
+    """The derived readings of a greenhouse with these readings."""
     end_ns = need.end_ns or now_ns
     of = known.get(need.sensor_type, {})
     of = {at: value for at, value in sorted(of.items()) if need.start_ns <= at < end_ns}
@@ -51,7 +51,7 @@ def found_in(need: SeriesRequest, known: Known, now_ns: int = NOW_NS) -> SeriesP
 
 
 def answer(request: SeriesRequest, known: Known) -> tuple[SeriesPast, list[SeriesRequest]]:
-    """What is made of a house that has these readings, and what was asked for."""
+    """The answer for a greenhouse with these readings, and the queries that it made."""
     asked: list[SeriesRequest] = []
 
     def find(need: SeriesRequest) -> SeriesPast:
@@ -61,7 +61,7 @@ def answer(request: SeriesRequest, known: Known) -> tuple[SeriesPast, list[Serie
     return derived.derived_series(request, own_sensors(), is_day, find), asked
 
 
-def test_only_what_was_read_in_one_scan_and_can_be_is_paired() -> None:
+def test_only_possible_readings_of_one_scan_are_paired() -> None:
     past, asked = answer(ASKED, SITE)
     assert past.stamps_ns == (10 * S,)
     assert past.means == past.minima == past.maxima == (vpd(20.0, 50.0),)
@@ -70,7 +70,7 @@ def test_only_what_was_read_in_one_scan_and_can_be_is_paired() -> None:
     assert {it.end_ns for it in asked[1:]} == {past.end_ns}, "one now for all"
 
 
-def test_a_sensor_of_that_name_goes_first_and_of_a_measured_one_nothing_else_is_asked() -> None:
+def test_a_real_sensor_of_that_name_takes_precedence_and_is_read_alone() -> None:
     for name in ("vpd", "co2"):
         past, asked = answer(replace(ASKED, sensor_type=name), {**SITE, name: {5 * S: 1.0}})
         assert (past.means, len(asked)) == ((1.0,), 1)
@@ -78,24 +78,24 @@ def test_a_sensor_of_that_name_goes_first_and_of_a_measured_one_nothing_else_is_
     assert (past.stamps_ns, len(asked)) == ((), 1)
 
 
-def test_more_than_are_wanted_come_in_buckets_of_what_was_derived() -> None:
+def test_too_many_derived_readings_come_in_buckets() -> None:
     stamps = [n * 60 * S for n in range(60)]
     known: Known = {
         "temperature": {at: 20.0 + n % 10 for n, at in enumerate(stamps)},
         "humidity": {at: 40.0 + n % 10 for n, at in enumerate(stamps)},
     }
-    # Buckets of five minutes begin on whole ones, also before what was asked for.
+    # Buckets of five minutes begin on whole ones, also before the period.
     past, _ = answer(SeriesRequest("a", "vpd", 301 * S, 3_300 * S, 9), known)
     assert past.bucket_ns == 600 * S
     assert past.stamps_ns == tuple(range(300 * S, 3_300 * S, 600 * S))
     first = [vpd(20.0 + n % 10, 40.0 + n % 10) for n in range(5, 15)]
-    # To the twelve digits that every bucket has.
+    # To the twelve digits of every bucket.
     assert (past.minima[0], past.maxima[0]) == pytest.approx((min(first), max(first)), rel=1e-11)
     assert past.counts[0] == 10
     assert past.means[0] == pytest.approx(sum(first) / 10)
 
 
-def test_more_than_a_history_may_have_are_read_all_the_same() -> None:
+def test_more_readings_than_a_history_may_have_are_still_read() -> None:
     count = 3 * MAX_POINTS
     stamps = [n * S // 20 for n in range(1, count)]
     known: Known = {
@@ -109,7 +109,7 @@ def test_more_than_a_history_may_have_are_read_all_the_same() -> None:
     assert (past.minima[0], past.maxima[0]) == pytest.approx((min(every), max(every)), rel=1e-11)
 
 
-def test_too_many_to_be_read_one_by_one_are_refused_by_name_and_limit() -> None:
+def test_too_many_to_read_one_by_one_are_refused_by_name_and_limit() -> None:
     known: Known = {"temperature": dict.fromkeys(range(S, S + MAX_READINGS + 1), 20.0)}
     with pytest.raises(PastRefused) as refused:
         answer(ASKED, known)
@@ -126,7 +126,7 @@ COURSE: Known = {
 }
 
 
-def test_a_quantity_of_a_day_has_a_value_an_hour_of_the_day_up_to_then() -> None:
+def test_a_daily_quantity_has_a_value_for_every_hour_of_the_day_so_far() -> None:
     request = SeriesRequest("a", "daily_light_integral", 30 * HOUR_NS, 60 * HOUR_NS, 100)
     past, asked = answer(request, COURSE)
     assert [(it.sensor_type, it.start_ns // HOUR_NS) for it in asked] == [
@@ -142,14 +142,14 @@ def test_a_quantity_of_a_day_has_a_value_an_hour_of_the_day_up_to_then() -> None
     assert (few.is_bucketed, sum(few.counts)) == (True, 30)
 
 
-def test_of_the_first_hours_there_is_no_quantity_of_a_day() -> None:
+def test_the_first_hours_have_no_daily_quantity() -> None:
     request = SeriesRequest("a", "daily_light_integral", 0, 0, 500)
     past, _ = answer(replace(request, end_ns=80 * HOUR_NS), COURSE)
     assert past.stamps_ns[0] / HOUR_NS == 22.5
 
 
-def test_a_quantity_of_a_day_is_made_of_buckets_where_readings_are_many() -> None:
-    # A peak of one reading, and by night a dip: both count.
+def test_a_daily_quantity_uses_buckets_where_there_are_many_readings() -> None:
+    # A peak in one reading, and a dip at night: both count.
     warm = {n * 10 * S: 20.0 + 5.0 * is_day(n * 10 * S) for n in range(1, 3 * 8_640)}
     warm |= {40 * HOUR_NS + 10 * S: 33.0, 61 * HOUR_NS + 10 * S: 4.0}
     until_ns = 62 * HOUR_NS + 3 * S
@@ -179,7 +179,7 @@ def test_a_quantity_of_a_day_is_made_of_buckets_where_readings_are_many() -> Non
         answer(replace(request, start_ns=S, end_ns=10**17), years)
 
 
-def test_tags_as_of_a_moment_get_the_quantity_of_the_day_up_to_then() -> None:
+def test_tags_as_of_a_moment_get_the_quantity_of_the_day_so_far() -> None:
     at_ns = 60 * HOUR_NS
     lit = TagState("a", readings=(Reading("light", 0.0, at_ns), Reading("co2", 1.0, at_ns)))
     other = TagState("b", readings=(Reading("co2", 1.0, at_ns),))
@@ -202,9 +202,9 @@ def test_tags_as_of_a_moment_get_the_quantity_of_the_day_up_to_then() -> None:
     assert reading == Reading("daily_light_integral", expected, at_ns)
 
 
-def test_a_broken_sensor_is_no_part_of_a_day_and_of_one_moment_the_last_reading_counts() -> None:
+def test_a_broken_sensor_does_not_count_and_of_one_moment_the_last_reading_does() -> None:
     good = [(n * HOUR_NS, 20.0) for n in range(1, 26)]
-    # A DS18B20 that has lost its supply reads -127; and one moment was received twice.
+    # A DS18B20 without supply reads -127; and one moment was received twice.
     bad = [(12 * HOUR_NS + 1, -127.0), (13 * HOUR_NS, 5.0)]
     every = sorted((*good, *bad), key=lambda each: each[0])
     every.remove((13 * HOUR_NS, 5.0))

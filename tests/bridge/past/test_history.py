@@ -1,4 +1,4 @@
-"""One sensor's past: what is sent of it, and the gaps, beside a plainer way to find them."""
+"""One sensor's past: what is sent, and its gaps, compared with the simplest rule."""
 
 import math
 from statistics import median_low
@@ -26,14 +26,14 @@ def readings(*stamps_ns: int, values: list[float] | None = None, end_ns: int = 1
 
 
 def buckets(width_ns: int, counts: dict[int, int], end_ns: int = 100) -> SeriesPast:
-    """So many readings in the buckets of these numbers."""
+    """That many readings in the buckets of these numbers."""
     ones = (1.0,) * len(counts)
     starts = tuple(number * width_ns for number in counts)
     return SeriesPast(0, end_ns, width_ns, starts, tuple(counts.values()), ones, ones, ones)
 
 
 def written(past: SeriesPast, asked: SeriesRequest = ASKED) -> dict[str, Any]:
-    """The body as a client reads it, which has to be what the contract says."""
+    """The body as a client parses it, validated by the contract."""
     text = orjson.dumps(history_body(asked, past, None, SENSORS))
     routes_schema.History.model_validate_json(text)
     found: dict[str, Any] = orjson.loads(text)
@@ -43,7 +43,7 @@ def written(past: SeriesPast, asked: SeriesRequest = ASKED) -> dict[str, Any]:
 # --- the body -------------------------------------------------------------------------------------
 
 
-def test_readings_are_told_one_by_one_and_what_is_not_finite_is_null() -> None:
+def test_readings_are_sent_one_by_one_and_what_is_not_finite_is_null() -> None:
     past = readings(NS + 1, 2 * NS, 3 * NS, values=[1.5, math.nan, math.inf], end_ns=4 * NS)
     assert written(past) == {
         "tag_id": "7",
@@ -66,7 +66,7 @@ def test_readings_are_told_one_by_one_and_what_is_not_finite_is_null() -> None:
     }
 
 
-def test_buckets_are_told_with_their_length() -> None:
+def test_buckets_are_sent_with_their_length() -> None:
     past = SeriesPast(
         0, 9 * NS, 5 * NS // 2, (0, 5 * NS), (3, 1), (2.0, math.inf), (1.0, 4e307), (4.0, 1.6e308)
     )
@@ -74,7 +74,7 @@ def test_buckets_are_told_with_their_length() -> None:
     assert (found["is_bucketed"], found["bucket_s"], found["readings"]) == (True, 2.5, [])
     assert found["buckets"] == [
         {"start": {"sec": 0, "nanosec": 0}, "n": 3, "mean": 2.0, "min": 1.0, "max": 4.0},
-        # The sum of what it is the mean of was past what a float holds.
+        # The sum behind the mean exceeded a float.
         {"start": {"sec": 5, "nanosec": 0}, "n": 1, "mean": 1e308, "min": 4e307, "max": 1.6e308},
     ]
 
@@ -82,11 +82,11 @@ def test_buckets_are_told_with_their_length() -> None:
 @pytest.mark.parametrize(
     ("sensor_type", "unit"), [("co2", "ppm"), ("x", ""), ("~silences", "s"), ("~looks", "")]
 )
-def test_what_is_told_has_its_unit(sensor_type: str, unit: str) -> None:
+def test_each_value_has_its_unit(sensor_type: str, unit: str) -> None:
     assert written(readings(), SeriesRequest("7", sensor_type))["unit"] == unit
 
 
-def test_between_events_there_are_no_gaps() -> None:
+def test_events_have_no_gaps() -> None:
     past = readings(1, 2, 3, 90)
     assert written(past, SeriesRequest("7", "~failures"))["gaps"] == []
     assert len(written(past)["gaps"]) == 2
@@ -95,7 +95,7 @@ def test_between_events_there_are_no_gaps() -> None:
 # --- gaps -----------------------------------------------------------------------------------------
 
 
-def test_no_gap_is_told_of_what_has_not_come() -> None:
+def test_the_future_is_not_a_gap() -> None:
     past = readings(0, 10, 20, 30)
     assert gaps(past, None) == [(30, 100)]
     assert gaps(past, 61) == [(30, 61)]
@@ -103,12 +103,12 @@ def test_no_gap_is_told_of_what_has_not_come() -> None:
     assert gaps(past, 500) == [(30, 100)]
 
 
-def test_a_reading_that_brought_nothing_fills_no_gap() -> None:
+def test_a_reading_without_a_value_fills_no_gap() -> None:
     past = readings(0, 10, 20, 40, 60, 70, 80, 90, values=[1, 1, 1, math.nan, 1, 1, 1, 1])
     assert gaps(past, None) == [(20, 60)]
 
 
-def test_a_period_without_readings_is_one_gap_and_with_one_nobody_knows() -> None:
+def test_a_period_without_readings_is_one_gap_and_with_one_reading_unknown() -> None:
     assert gaps(readings(), None) == [(0, 100)]
     assert gaps(readings(), 40) == [(0, 40)]
     assert gaps(readings(50, values=[math.nan]), None) == [(0, 100)]
@@ -120,19 +120,19 @@ def test_many_readings_in_each_bucket_make_every_absent_one_a_gap() -> None:
     assert gaps(buckets(10, dict.fromkeys((0, 1, 2, 4, 5, 6, 7), 5)), None) == [(30, 40), (80, 100)]
 
 
-def test_where_a_bucket_holds_one_reading_or_none_the_absent_ones_are_usual() -> None:
+def test_with_at_most_one_reading_per_bucket_absent_ones_are_usual() -> None:
     assert gaps(buckets(10, dict.fromkeys((0, 2, 4, 6, 8), 1)), None) == []
     assert gaps(buckets(10, dict.fromkeys((0, 1, 2, 6, 7, 8, 9), 1)), None) == []
     assert gaps(buckets(10, dict.fromkeys((0, 1, 2, 7, 8, 9), 1)), None) == [(30, 70)]
 
 
-def test_one_bucket_tells_what_is_usual_by_what_it_holds() -> None:
+def test_a_single_bucket_shows_the_usual_spacing_by_its_count() -> None:
     assert gaps(buckets(10, {3: 1}), None) == []
     assert gaps(buckets(10, {3: 10}), None) == [(0, 30), (40, 100)]
 
 
 def plain_gaps(stamps: list[int], end: int) -> list[tuple[int, int]]:
-    """The rule as it is said, for readings that all are finite."""
+    """The rule in its simplest form, for readings that are all finite."""
     if not stamps:
         return [(0, end)] if end > 0 else []
     if len(stamps) == 1:
@@ -144,13 +144,13 @@ def plain_gaps(stamps: list[int], end: int) -> list[tuple[int, int]]:
 
 
 @given(st.lists(st.integers(0, 1_000)), st.integers(1_001, 1_500))
-def test_the_gaps_are_those_of_the_plain_rule(unsorted: list[int], end_ns: int) -> None:
+def test_gaps_equal_the_simplest_rule(unsorted: list[int], end_ns: int) -> None:
     stamps = sorted(unsorted)
     assert gaps(readings(*stamps, end_ns=end_ns), None) == plain_gaps(stamps, end_ns)
 
 
 @given(st.lists(st.integers(0, 999)), st.integers(1, 200))
-def test_a_gap_between_buckets_holds_no_reading_and_is_a_bucket_long(
+def test_a_gap_between_buckets_holds_no_reading_and_is_at_least_a_bucket_long(
     stamps: list[int], width_ns: int
 ) -> None:
     counts: dict[int, int] = {}

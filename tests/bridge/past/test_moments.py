@@ -1,4 +1,4 @@
-"""Moments as text: exact to the nanosecond both ways, and nothing that is guessed at."""
+"""Moments as text: exact to the nanosecond both ways, and nothing is guessed."""
 
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta, timezone
@@ -31,7 +31,7 @@ LAST_NS = MAX_SECONDS * NS + NS - 1
         ("1970-01-02T01:02:03.000000004z", (86_400 + 3_723) * NS + 4),
         ("2026-11-21T14:15Z", 1_795_270_500 * NS),
         ("2026-11-21T15:15:00+01:00", 1_795_270_500 * NS),
-        ("2026-11-21T15:15:00 01:00", 1_795_270_500 * NS),  # what a bare + is in a query string
+        ("2026-11-21T15:15:00 01:00", 1_795_270_500 * NS),  # a bare + in a query string
         ("2026-11-21t08:45:00-0530", 1_795_270_500 * NS),
     ],
 )
@@ -44,7 +44,7 @@ def test_seconds_and_iso_8601_are_moments(text: str, expected: int) -> None:
     [
         *("", "now", "nan", "-1", "1e9", "1_0", "٣", "1.", ".5", "9" * 5_000 + "x"),
         "2026-11-21",
-        "2026-11-21T14:15:00",  # of which place?
+        "2026-11-21T14:15:00",  # without an offset
         "2026-11-21 14:15:00Z",
         "26-11-21T14:15:00Z",
         "2026-11-21T14:15:00+01",
@@ -68,12 +68,12 @@ def test_anything_else_is_refused_with_its_name_and_value(text: str) -> None:
         "2026-11-21T00:00:00+00:60",
     ],
 )
-def test_what_no_calendar_and_no_clock_shows_is_refused(text: str) -> None:
+def test_a_date_that_no_calendar_or_clock_shows_is_refused(text: str) -> None:
     with pytest.raises(PastRefused, match=f"at is '{text}'".replace("+", r"\+")):
         moment("at", text)
 
 
-def test_the_ends_of_ros_time_belong_to_it_and_what_is_past_them_does_not() -> None:
+def test_the_ends_of_ros_time_are_included_and_anything_past_them_is_refused() -> None:
     assert moment("at", f"{MAX_SECONDS}.999999999") == LAST_NS
     for text in (str(MAX_SECONDS + 1), "9" * 5_000, "2038-01-19T03:14:08Z", "9999-12-31T00:00:00Z"):
         with pytest.raises(PastRefused, match=f"the limit is {MAX_SECONDS} s of ROS time"):
@@ -85,7 +85,7 @@ def test_the_ends_of_ros_time_belong_to_it_and_what_is_past_them_does_not() -> N
 
 
 @given(st.integers(0, LAST_NS))
-def test_what_is_written_is_read_back_to_the_nanosecond(stamp_ns: int) -> None:
+def test_a_written_moment_is_read_back_to_the_nanosecond(stamp_ns: int) -> None:
     assert moment("at", seconds(stamp_ns)) == moment("at", iso(stamp_ns)) == stamp_ns
     assert Fraction(seconds(stamp_ns)) == Fraction(stamp_ns, NS)
     assert moment("at", compact_as_iso(compact(stamp_ns))) == stamp_ns // NS * NS

@@ -1,4 +1,4 @@
-"""What is asked of the past: it crosses, it says what it costs, who has the answer gets none."""
+"""Queries of the past: they are pickled, state their cost, and honour ETags."""
 
 import json
 import pickle
@@ -44,7 +44,7 @@ QUESTIONS: tuple[Query, ...] = (
 
 
 def answer(question: Query, has: str = "") -> Answered:
-    """What is made of the house, and of series without an entry."""
+    """The answer for this greenhouse, and for series without an entry."""
     return answered(question, has, found, never)
 
 
@@ -55,31 +55,31 @@ def found(need: Any) -> Any:
 
 
 @pytest.mark.parametrize("question", QUESTIONS, ids=lambda q: type(q).__name__)
-def test_it_crosses_and_its_answer_is_the_same_there(question: Query) -> None:
+def test_a_query_can_be_sent_to_another_process_with_the_same_result(question: Query) -> None:
     there: Query = pickle.loads(pickle.dumps(question, 5))
     assert there == question
     assert hash(there) == hash(question)
     told = answer(there)
     assert told == answer(question)
     assert pickle.loads(pickle.dumps(told, 5)) == told
-    # Who has it is told so: the ETag is the same, and nothing is written.
+    # With a matching ETag, no body is written.
     assert answer(there, f'"other", W/{told.etag}') == Answered(told.etag, None)
 
 
-def test_a_tag_that_was_not_known_is_told_with_how_many_were() -> None:
+def test_an_unknown_tag_is_reported_with_the_number_of_known_ones() -> None:
     with pytest.raises(NoSuchTag) as caught:
         answer(OneTag(5 * NS, "c"))
     there = pickle.loads(pickle.dumps(caught.value))
     assert str(there) == "no tag 'c' is known (2 others are)"
 
 
-def test_a_large_house_and_a_large_field_cost_more_than_small_ones() -> None:
+def test_a_large_greenhouse_and_a_large_field_cost_more_than_small_ones() -> None:
     for question in QUESTIONS:
         assert question.cost_s(10_000) >= question.cost_s(30)
     assert QUESTIONS[0].cost_s(30) < SMALL_S < QUESTIONS[0].cost_s(10_000)
     fine = replace(asked(resolution=0.001), at_ns=0, field_format=PNG)
     assert fine.cost_s(30) > SMALL_S, "one that will be refused is no small one"
-    # All that is looked up counts, and not the first of it alone.
+    # Everything that is read counts, not only the first of it.
     history = History(SeriesRequest("a", "co2"), None, CRITERIA, UNKNOWN_JOURNAL)
     assert history.cost_s(30) < SMALL_S
     assert Timeline(0, 0, 1, "a", UNKNOWN_JOURNAL).cost_s(30) > SMALL_S
@@ -87,7 +87,7 @@ def test_a_large_house_and_a_large_field_cost_more_than_small_ones() -> None:
         assert json.dumps(question.cost_s(0))
 
 
-def test_what_the_log_does_not_hold_yet_of_a_tag_is_told_from_its_state() -> None:
+def test_a_tags_data_that_are_not_in_the_log_yet_come_from_its_state() -> None:
     tag = TagState("a", None, (Reading("co2", 7.0, 5 * NS),), 5 * NS, last_try=Attempt(5 * NS))
     for newest, values in ((tag, [7.0]), (None, [])):
         log: dict[Any, Any] = {LatestRequest("a", 3): []}

@@ -1,4 +1,4 @@
-"""What a query string asks of the past: what it says, and nothing that nobody said."""
+"""Query strings for the past: what is given, and the defaults."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ def span(kind: type[query_string.OfPeriod], **given: str) -> tuple[int, int]:
     return start_ns, end_ns
 
 
-def test_what_is_left_out_is_all_that_is_kept() -> None:
+def test_the_default_is_all_that_is_stored() -> None:
     assert query_string.at([], NOW_NS) is None
     for kind in (HISTORY, TIMELINE, EXPORT):
         assert span(kind) == (0, 0)
@@ -34,7 +34,7 @@ def test_what_is_left_out_is_all_that_is_kept() -> None:
 
 
 @pytest.mark.parametrize(("to", "what"), [(None, "missing"), ("100", r"100\.000000000 s")])
-def test_before_the_time_is_known_the_end_of_a_report_is_refused(to: str | None, what: str) -> None:
+def test_without_a_known_time_a_report_needs_an_end(to: str | None, what: str) -> None:
     with pytest.raises(PastRefused, match=f"^to is {what}, and what time it is now is not known"):
         query_string.report(query_string.OfReport(to=to), None)
 
@@ -43,7 +43,7 @@ def test_a_report_of_the_first_hours_begins_at_0() -> None:
     assert query_string.report(query_string.OfReport(), NOW_NS) == (0, NOW_NS)
 
 
-def test_what_is_given_is_what_is_asked() -> None:
+def test_each_given_value_is_used() -> None:
     period = {"from_": "1.5", "to": "1970-01-01T00:00:09Z"}
     assert query_string.at([("at", "8.000000001")], NOW_NS) == 8 * NS + 1
     for kind in (HISTORY, TIMELINE, EXPORT):
@@ -58,7 +58,7 @@ def test_what_is_given_is_what_is_asked() -> None:
 # --- moments and periods --------------------------------------------------------------------------
 
 
-def test_now_can_be_asked_for_and_what_has_not_come_is_refused() -> None:
+def test_now_is_valid_and_the_future_is_refused() -> None:
     assert query_string.at([("at", "1000")], NOW_NS) == NOW_NS
     assert span(HISTORY, from_="1000") == (NOW_NS, 0)
     later = "1000.000000001"
@@ -69,7 +69,7 @@ def test_now_can_be_asked_for_and_what_has_not_come_is_refused() -> None:
         span(HISTORY, from_=later)
 
 
-def test_where_nobody_knows_when_now_is_nothing_is_later() -> None:
+def test_while_now_is_unknown_nothing_is_in_the_future() -> None:
     assert query_string.at([("at", "2000000000")], None) == 2 * 10**9 * NS
 
 
@@ -81,7 +81,7 @@ def test_a_period_may_end_after_now_and_be_empty_but_not_be_inverted() -> None:
 
 
 @pytest.mark.parametrize("kind", [HISTORY, TIMELINE, EXPORT])
-def test_an_end_at_0_is_not_taken_for_now(kind: type[query_string.OfPeriod]) -> None:
+def test_an_end_at_0_is_not_read_as_now(kind: type[query_string.OfPeriod]) -> None:
     with pytest.raises(PastRefused, match=r"^to is 0 s"):
         span(kind, to="0")
 
@@ -90,7 +90,7 @@ def test_an_end_at_0_is_not_taken_for_now(kind: type[query_string.OfPeriod]) -> 
 
 
 @pytest.mark.parametrize("kind", [HISTORY, TIMELINE, EXPORT])
-def test_an_empty_name_is_refused_and_so_is_one_that_nothing_can_have(
+def test_an_empty_or_impossible_name_is_refused(
     kind: type[query_string.OfPeriod],
 ) -> None:
     with pytest.raises(PastRefused, match=r"^tag_id is '': string should have at least 1 char"):
@@ -100,7 +100,7 @@ def test_an_empty_name_is_refused_and_so_is_one_that_nothing_can_have(
         ask(kind, tag_id="x" * (MAX_TEXT_LENGTH + 1))
 
 
-def test_a_history_is_of_one_sensor_or_of_an_event() -> None:
+def test_a_history_is_of_one_sensor_or_of_one_event() -> None:
     with pytest.raises(PastRefused, match="sensor_type: field required"):
         read(HISTORY, [("tag_id", "7")])
     with pytest.raises(PastRefused, match="'~dances' is none of ~scans"):

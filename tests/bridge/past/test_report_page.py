@@ -1,4 +1,4 @@
-"""The shift report on paper: dates, numbers and notes as the page writes them, in any zone."""
+"""The shift report on paper: dates, numbers and notes as on the page, in any zone."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def at(seconds: int) -> dict[str, int]:
 
 
 def body(hours: int) -> dict[str, Any]:
-    """A report with a note, a silence and readings of CO₂, of so many hours."""
+    """A report of that many hours, with a note, a silence and readings of CO₂."""
     counts = dict.fromkeys(("raised", "cleared", "active", "critical", "failed", "inspections"), 0)
     note = {
         "id": "1",
@@ -118,9 +118,9 @@ def test_dates_and_numbers_are_written_as_on_the_page(lang: str, texts: list[str
     assert [text for text in texts if text not in page] == []
 
 
-def test_times_are_of_the_greenhouse_or_of_the_zone_that_the_reader_is_in() -> None:
+def test_times_are_those_of_the_greenhouse_or_of_the_readers_zone() -> None:
     assert "Times: Europe/Amsterdam (UTC+01:00)" in page_of()
-    # Rows have their dates from the second day on.
+    # From the second day on, rows have their dates.
     page = page_of(hours=20, zone=ZoneInfo("Asia/Kathmandu"))
     assert "27 Nov 2026, 10:45 to 28 Nov 2026, 06:45. Times: Asia/Kathmandu (UTC+05:45)" in page
     assert "Greenhouse 10:50 12:08 1 h 18 min" in page
@@ -131,7 +131,7 @@ def test_times_are_of_the_greenhouse_or_of_the_zone_that_the_reader_is_in() -> N
     assert "7 26 Nov 2026, 22:00" in page
 
 
-def test_a_zone_that_this_machine_does_not_know_is_said() -> None:
+def test_a_zone_that_this_machine_does_not_know_is_reported() -> None:
     period_ns = BEGUN_S * 10**9, (BEGUN_S + HOUR_S) * 10**9
     page = ReportPage(*period_ns, GREENHOUSE, UNKNOWN_JOURNAL, "en", UTC, "Mars/<North>")
     told = (
@@ -140,21 +140,21 @@ def test_a_zone_that_this_machine_does_not_know_is_said() -> None:
     assert told in text_of(page, 1)
 
 
-def test_a_note_reads_as_its_kind_and_its_text_and_no_heading_denies_itself() -> None:
+def test_a_note_has_its_kind_and_its_text_and_headings_do_not_contradict_their_content() -> None:
     page = page_of()
     assert "06:01 Anna Comment: Boiler 2 tripped (withdrawn by Ben) Greenhouse" in page
     assert "Gaps without scans Where" in page
     assert "Tags not scanned None." in page
 
 
-def test_no_data_before_is_said_only_where_the_log_begins_after_the_period() -> None:
+def test_missing_earlier_data_are_reported_only_where_the_log_begins_within_the_period() -> None:
     whole, late = (page_of(kept_from=at(seconds)) for seconds in (0, HOUR_S))
     assert "No data before" not in whole
     assert "Complete up to 27 Nov 2026, 14:00." in whole
     assert "No data before 27 Nov 2026, 07:00. Complete up to 27 Nov 2026, 14:00." in late
 
 
-def test_it_says_of_which_greenhouse_it_is_and_that_none_was_there() -> None:
+def test_the_report_names_its_greenhouse_and_says_when_nothing_was_recorded() -> None:
     end_ns = (BEGUN_S + HOUR_S) * 10**9
     page = ReportPage(BEGUN_S * 10**9, end_ns, GREENHOUSE, UNKNOWN_JOURNAL, "de")
     assert "Simuliert" not in text_of(page, 1)
@@ -162,7 +162,7 @@ def test_it_says_of_which_greenhouse_it_is_and_that_none_was_there() -> None:
     assert "Schichtbericht: gh<1> Simuliert. Kein echter Roboter: Gewächshaus" in told
 
 
-def test_who_acknowledged_or_shelved_has_a_column_where_somebody_did() -> None:
+def test_a_column_of_acknowledgements_and_shelves_appears_when_one_is_needed() -> None:
     acknowledged = alarm(acknowledged_by="Anna", acknowledged_at=at(120))
     assert "Acknowledged, shelved" not in page_of(alarms=[alarm()])
     page = page_of(alarms=[alarm(), acknowledged])
@@ -170,13 +170,13 @@ def test_who_acknowledged_or_shelved_has_a_column_where_somebody_did() -> None:
     assert page.count("acknowledged by Anna, 06:02") == 1
 
 
-def test_a_row_of_an_alarm_has_its_tags_name_alone_or_is_the_greenhouses() -> None:
+def test_an_alarm_row_names_its_tag_or_the_greenhouse() -> None:
     page = page_of(alarms=[alarm(), alarm(tag_id="")])
     assert "Pest seen (critical) 7 06:01" in page
     assert "Pest seen (critical) Greenhouse 06:01" in page
 
 
-def test_what_is_handed_over_comes_first_with_its_value_and_both_limits() -> None:
+def test_open_alarms_come_first_with_value_and_both_limits() -> None:
     cold = {
         "verdict": "critical",
         "kind": "range",
@@ -195,10 +195,10 @@ def test_what_is_handed_over_comes_first_with_its_value_and_both_limits() -> Non
     alarms = [
         alarm(tag_id="7", reason=cold, worst=8.0),
         alarm(tag_id="8", reason=orchid, worst=11.0),
-        # Of a night, of before its species was known, and at what the twin computes.
+        # At night, before its species was known, and by the twin's estimate.
         alarm(tag_id="9", reason={**cold, "value": 31.0, "limit": 30.0}, worst=31.0),
         alarm(tag_id="8", reason={**warm, "value": 27.0}, worst=27.0),
-        # Critical since, with the limit that it began at.
+        # Critical since then, with the limit at its start.
         alarm(tag_id="8", reason={**warm, "verdict": "critical", "value": 36.0}, worst=36.0),
         alarm(tag_id="7", reason=dry, worst=1.5),
         alarm(tag_id="9", reason=cold, worst=8.0),
@@ -231,7 +231,7 @@ def test_what_is_handed_over_comes_first_with_its_value_and_both_limits() -> Non
         ("es", "justo por debajo de 350 ppm"),
     ],
 )
-def test_values_of_a_sensor_have_as_many_digits_and_none_reads_like_its_limit(
+def test_values_of_a_sensor_have_equal_digits_and_none_looks_like_its_limit(
     lang: str, numbers: str
 ) -> None:
     low = {"verdict": "stressed", "kind": "range", "sensor": "co2", "value": 349.7, "limit": 350.0}
@@ -242,7 +242,7 @@ def test_values_of_a_sensor_have_as_many_digits_and_none_reads_like_its_limit(
     assert "06:01 350 ppm 350–" in page_of(lang, alarms=[alarm(reason=low, worst=350.0)])
     hot = {**low, "sensor": "temperature", "value": 40.0, "limit": 35.0}
     assert re.search(r" 1[.,]?235 °C", page_of(lang, alarms=[alarm(reason=hot, worst=1234.6)]))
-    # As the page has them: `format.test.ts`.
+    # As on the page: `format.test.ts`.
     sensors = GREENHOUSE.sensors
     names = ("temperature", "vpd", "co2", "humidity", "dew_point", "co2_dose", "spin")
     assert [sensors.digits(name) for name in names] == [1, 2, 0, 1, 1, 0, None]

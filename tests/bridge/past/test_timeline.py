@@ -1,4 +1,4 @@
-"""What happened when, in buckets: the same whichever way a source tells of it."""
+"""Events over time, in buckets: the same from every source."""
 
 from collections import Counter
 from typing import Any
@@ -12,19 +12,19 @@ from lupin_bridge.stream import routes_schema
 from lupin_twin.core.past import HOUR_NS, Event, Grid, SeriesPast, grid
 
 NS = 10**9
-# The runs, the period, what is counted, the silences.
+# The runs, the period, the events, the silences.
 Parts = tuple[SeriesPast, Grid, dict[Event, SeriesPast], SeriesPast]
 
 
 def one_by_one(stamps_ns: list[int], start_ns: int, end_ns: int) -> SeriesPast:
-    """Events as they were."""
+    """The events one by one."""
     ones = (1.0,) * len(stamps_ns)
     stamps = tuple(sorted(stamps_ns))
     return SeriesPast(start_ns, end_ns, None, stamps, (1,) * len(stamps), ones, ones, ones)
 
 
 def in_buckets(stamps_ns: list[int], told: Grid) -> SeriesPast:
-    """The same in buckets, those without any absent."""
+    """The same in buckets, without the empty ones."""
     found = Counter((stamp - told.start_ns) // told.bucket_ns for stamp in stamps_ns)
     starts = tuple(told.start_ns + number * told.bucket_ns for number in sorted(found))
     counts = tuple(found[number] for number in sorted(found))
@@ -40,7 +40,7 @@ def parts(
     points: int = 10,
     **counted: SeriesPast,
 ) -> Parts:
-    """What a source says; nothing of what is not given."""
+    """What a source answers; omitted parts are absent."""
     nothing = SeriesPast(start_ns, end_ns)
     return (
         runs or nothing,
@@ -51,7 +51,7 @@ def parts(
 
 
 def written(given_: Parts) -> dict[str, Any]:
-    """The body as a client reads it, which has to be what the contract says."""
+    """The body as a client parses it, validated by the contract."""
     text = orjson.dumps(timeline_body(*given_))
     routes_schema.Timeline.model_validate_json(text)
     found: dict[str, Any] = orjson.loads(text)
@@ -62,7 +62,7 @@ def at(seconds: int) -> dict[str, int]:
     return {"sec": seconds, "nanosec": 0}
 
 
-def test_every_kind_of_event_is_counted_under_its_name() -> None:
+def test_each_kind_of_event_is_counted_under_its_name() -> None:
     end_ns = 100 * NS
     found = written(
         parts(
@@ -82,13 +82,13 @@ def test_every_kind_of_event_is_counted_under_its_name() -> None:
     ]
 
 
-def test_nothing_at_all_is_told_as_that() -> None:
+def test_an_empty_past_is_a_valid_answer() -> None:
     found = written(parts(5 * NS, 5 * NS))
     assert (found["from"], found["to"], found["reach"]) == (at(5), at(5), None)
     assert (found["buckets"], found["silences"], found["runs"]) == ([], [], [])
 
 
-def test_silences_are_stretches_and_of_too_many_the_longest_of_each_bucket_is_told() -> None:
+def test_silences_are_intervals_and_of_too_many_the_longest_of_each_bucket_is_sent() -> None:
     silences = SeriesPast(0, 100 * NS, None, (NS,), (1,), (2.5,), (2.5,), (2.5,))
     assert written(parts(silences=silences))["silences"] == [
         {"from": at(1), "to": {"sec": 3, "nanosec": 500_000_000}}
@@ -97,7 +97,7 @@ def test_silences_are_stretches_and_of_too_many_the_longest_of_each_bucket_is_to
     assert written(parts(silences=silences))["silences"] == [{"from": at(20), "to": at(24)}]
 
 
-def test_the_runs_that_meet_the_period_are_told_and_how_far_all_of_them_reach() -> None:
+def test_runs_that_overlap_the_period_are_sent_with_the_extent_of_all() -> None:
     runs = SeriesPast(
         2 * NS,
         500 * NS,
@@ -113,12 +113,12 @@ def test_the_runs_that_meet_the_period_are_told_and_how_far_all_of_them_reach() 
     assert found["runs"] == [
         {"from": at(10), "to": at(50), "is_simulated": True},
         {"from": at(80), "to": at(180), "is_simulated": False},
-        # Until now, which is later than the period.
+        # Until now, which is after the period.
         {"from": at(90), "to": at(100), "is_simulated": False},
     ]
 
 
-def test_a_run_of_years_that_goes_on_ends_with_the_period_however_its_length_is_rounded() -> None:
+def test_a_run_of_years_ends_with_the_period_however_its_length_is_rounded() -> None:
     start_ns, now_ns = 1_700_000_000 * NS, 1_795_920_785_417_813_153
     length_s = (now_ns - start_ns) / NS
     assert start_ns + round(length_s * NS) < now_ns
@@ -129,20 +129,20 @@ def test_a_run_of_years_that_goes_on_ends_with_the_period_however_its_length_is_
     ]
 
 
-def test_the_period_is_what_is_asked_for_or_all_that_there_is() -> None:
+def test_the_period_is_the_given_one_or_all_that_is_stored() -> None:
     runs = SeriesPast(7 * NS, 107 * NS)
     assert timeline_period(0, 0, 100, runs) == Grid(7 * NS, 107 * NS, NS)
     assert timeline_period(57 * NS, 0, 100, runs) == Grid(57 * NS, 107 * NS, NS // 2)
     assert timeline_period(0, 57 * NS, 100, runs) == Grid(7 * NS, 57 * NS, NS // 2)
-    # Nobody knew when now is, and it was not later than the beginning.
+    # Now is unknown, and no earlier than the start.
     assert timeline_period(200 * NS, 0, 100, runs).end_ns == 200 * NS
-    # Buckets that were counted before begin on whole slots.
+    # Counted buckets begin on whole slots.
     month = timeline_period(NS, 30 * 86_400 * NS, 500, runs)
     assert (month.start_ns, month.bucket_ns % HOUR_NS) == (0, 0)
 
 
 @given(st.integers(0, 2 * 10**18), st.integers(0, 10**18), st.integers(1, 5_000))
-def test_what_is_asked_over_the_period_comes_in_its_buckets(
+def test_counts_come_in_the_buckets_of_the_period(
     start_ns: int, length_ns: int, points: int
 ) -> None:
     told = grid(start_ns, start_ns + length_ns, points)
@@ -153,7 +153,7 @@ STAMPS = st.lists(st.integers(0, 999), max_size=30)
 
 
 @given(STAMPS, STAMPS, st.integers(1, 50))
-def test_bucketed_or_not_the_counts_are_the_same(
+def test_single_and_bucketed_events_give_the_same_counts(
     scans: list[int], looks: list[int], points: int
 ) -> None:
     runs, period, counted, silences = parts(

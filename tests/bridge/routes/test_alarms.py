@@ -1,4 +1,4 @@
-"""What `/api/alarms` takes and refuses, and what it tells of a journal."""
+"""What `/api/alarms` accepts and refuses, and its answer from a journal."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.support.web import Bridge, bridge
 
 @pytest.fixture(scope="module")
 def live() -> Iterator[Bridge]:
-    """With a journal that goes at the end."""
+    """With a journal that is deleted at the end."""
     with bridge("--ros-args", "-p", "journal:=off") as running:
         running.peer.wait_for_twin()
         running.peer.observe(look("a", anomaly=True, bug_count=2))
@@ -35,7 +35,7 @@ def alarms(live: Bridge, **query: Any) -> list[schema.Alarm]:
     return body.alarms
 
 
-def test_it_tells_of_the_journal_and_says_so(live: Bridge) -> None:
+def test_alarms_come_from_the_journal_and_the_answer_names_it(live: Bridge) -> None:
     body = schema.Alarms.model_validate(live.json("/api/alarms"))
     [pest] = body.alarms
     assert (pest.tag_id, pest.reason.kind, pest.worst, pest.cleared_at) == ("a", "pest", 2.0, None)
@@ -46,7 +46,7 @@ def test_it_tells_of_the_journal_and_says_so(live: Bridge) -> None:
         live.peer.observe(look("a"))
         live.peer.observe(look("a"))
         wait_for(lambda: not alarms(live, active=1), "it to be cleared")
-        # What roslib hears is the ROS message, and no word of alarms.
+        # roslib receives the ROS message without alarms.
         ros.send(op="call_service", service="/rosapi/topics", id="the end")
         while (message := ros.next()).get("id") != "the end":
             assert message["op"] == "publish"
@@ -68,12 +68,12 @@ def test_it_tells_of_the_journal_and_says_so(live: Bridge) -> None:
         ({"tag_id": "a"}, "tag_id"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(live: Bridge, query: dict[str, Any], says: str) -> None:
+def test_an_impossible_query_is_refused(live: Bridge, query: dict[str, Any], says: str) -> None:
     answer = live.get("/api/alarms", **query)
     assert (answer.status_code, says in answer.json()["detail"]) == (400, True)
 
 
-def test_a_period_has_what_was_active_at_any_time_of_it() -> None:
+def test_a_period_has_the_alarms_that_were_active_at_any_time_of_it() -> None:
     reason = Reason(Kind.PEST, Verdict.CRITICAL)
     over, still = Alarm("1", reason, "a", 20, 30), Alarm("2", reason, "a", 40)
 
@@ -86,7 +86,7 @@ def test_a_period_has_what_was_active_at_any_time_of_it() -> None:
     assert found(0, 20) == found(31, 40) == []
 
 
-async def test_of_many_alarms_so_many_are_told(domain: int) -> None:
+async def test_the_number_of_alarms_is_limited(domain: int) -> None:
     async with running() as it:
         many = [alarm(str(number)) for number in range(MAX_ALARMS + 1)]
         it.bridge.alarms.put(board_of(many), Change(tuple(many)), "journal", 0)

@@ -28,13 +28,13 @@ PATHS = (
 )
 
 
-def house(value: float = 400.0) -> Snapshot:
+def greenhouse(value: float = 400.0) -> Snapshot:
     pose = Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     return Snapshot(0, "map", (TagState("a/b", pose, (Reading("co2", value, NS),), NS),))
 
 
 async def test_every_route_answers_as_of_a_moment(domain: int) -> None:
-    past = MadeUp(snapshot=house())
+    past = MadeUp(snapshot=greenhouse())
     async with remembering(past) as it:
         state = schema.TwinState.model_validate_json(
             (await it.http.get("/api/state?at=1970-01-01T00:00:09.5Z")).content
@@ -62,14 +62,14 @@ async def test_every_route_answers_as_of_a_moment(domain: int) -> None:
         assert set(past.asked) == {9 * NS, 19 * NS // 2}
         answer = await it.http.get("/api/tags/c?at=9")
         assert answer.status_code == 404
-        # Of before the log began, nobody knows.
+        # Before the start of the log, nothing is known.
         assert "no tag 'c' is known (1 others are); what was received" in answer.text
 
 
-async def test_what_is_made_of_a_days_readings_is_asked_for_like_a_sensor(domain: int) -> None:
+async def test_a_daily_quantity_is_queried_like_a_sensor(domain: int) -> None:
     hour_ns = 3600 * NS
     points = [(n * hour_ns, 54_000.0) for n in range(1, 40)]
-    state = house()
+    state = greenhouse()
     lit = replace(state.tags[0], readings=(Reading("light", 54_000.0, 39 * hour_ns),))
     past = MadeUp(
         points={("a/b", "light"): points}, snapshot=replace(state, tags=(lit,)), now_ns=40 * hour_ns
@@ -87,10 +87,10 @@ async def test_what_is_made_of_a_days_readings_is_asked_for_like_a_sensor(domain
         assert [it["value"] for it in history["readings"]] == [pytest.approx(86.4)] * 10
 
 
-async def test_who_has_the_answer_is_told_so_and_nothing_is_written_for_him(
+async def test_a_matching_etag_gets_304_and_nothing_is_written(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    past = MadeUp(snapshot=house())
+    past = MadeUp(snapshot=greenhouse())
 
     def none(*_: Any, **__: Any) -> Any:
         raise AssertionError("written")
@@ -110,14 +110,14 @@ async def test_who_has_the_answer_is_told_so_and_nothing_is_written_for_him(
                 answer = await it.http.get(f"{path}&at=9", headers=has)
                 assert (answer.status_code, answer.content) == (304, b"")
                 assert answer.headers["etag"] == tag
-        past.snapshot = house(1600.0)  # observed before, heard late
+        past.snapshot = greenhouse(1600.0)  # observed before, received late
         for path, tag in tags.items():
             answer = await it.http.get(f"{path}&at=9", headers={"If-None-Match": tag})
             assert answer.status_code == 200
             assert answer.headers["etag"] != tag
 
 
-async def test_what_was_written_is_kept(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_written_answer_is_cached(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
     computed = []
     compute = engine.compute_field
 
@@ -126,16 +126,16 @@ async def test_what_was_written_is_kept(domain: int, monkeypatch: pytest.MonkeyP
         return compute(*args)
 
     monkeypatch.setattr(fields, "compute_field", counted)
-    async with remembering(MadeUp(snapshot=house())) as it:
+    async with remembering(MadeUp(snapshot=greenhouse())) as it:
         path = f"/api/field?{FIELD}"
-        # Nothing was scanned in between: it is the same field.
+        # No scan in between: it is the same field.
         bodies = {(await it.http.get(f"{path}&at={at}")).content for at in (9, 9, 9.5, 10)}
         assert (len(bodies), len(computed)) == (1, 1)
         assert (await it.http.get(f"{path}&at=9&resolution=0.5")).status_code == 400
 
 
-async def test_who_asks_the_same_at_once_asks_once(domain: int) -> None:
-    past = MadeUp(snapshot=house())
+async def test_simultaneous_equal_queries_run_once(domain: int) -> None:
+    past = MadeUp(snapshot=greenhouse())
     gate = threading.Event()
 
     def held(at_ns: int) -> Snapshot:
@@ -151,12 +151,12 @@ async def test_who_asks_the_same_at_once_asks_once(domain: int) -> None:
         await until(lambda: in_flight["127.0.0.1"] == 5, "all of them")
         gate.set()
         assert {(await task).status_code for task in asking} == {200}
-        # One more for each state that was told meanwhile: it may have brought something.
+        # One more for each state since: it may have changed the past.
         assert len(past.asked) <= 1 + it.bridge.state_number - number
 
 
-async def test_what_has_not_come_and_what_is_no_moment_is_refused_for_nothing(domain: int) -> None:
-    past = MadeUp(snapshot=house())
+async def test_the_future_and_invalid_moments_are_refused_before_any_work(domain: int) -> None:
+    past = MadeUp(snapshot=greenhouse())
     async with remembering(past) as it:
         for path in PATHS:
             for at, part in (

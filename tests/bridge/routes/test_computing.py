@@ -1,4 +1,4 @@
-"""Computed answers: once for all, only while somebody waits, and the small ones never behind."""
+"""Computed answers: shared, cancelled with their last client, and small ones never wait."""
 
 import asyncio
 import threading
@@ -38,7 +38,7 @@ EAGER = Limits(answers_per_s=10_000.0, concurrency=1_000, answer_timeout_s=60.0)
 
 
 def field(sensor: str = "co2", cells: int = 4, suffix: str = "json") -> str:
-    """The path of a field of so many cells a side, over 4 m."""
+    """The path of a field of that many cells a side, over 4 m."""
     query = {
         "sensor_type": sensor,
         "resolution": 4.0 / cells,
@@ -55,7 +55,7 @@ LARGE = 1_000
 
 
 @asynccontextmanager
-async def house(limits: Limits = EAGER) -> AsyncIterator[Running]:
+async def greenhouse(limits: Limits = EAGER) -> AsyncIterator[Running]:
     """A bridge whose twin knows 20 tags."""
     async with running(limits) as it:
 
@@ -75,7 +75,7 @@ async def house(limits: Limits = EAGER) -> AsyncIterator[Running]:
 
 
 class Held:
-    """Computations of large fields that wait at a gate, or until nobody waits for them."""
+    """Computations of large fields that wait at a gate, or until they are cancelled."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.gate = threading.Event()
@@ -106,15 +106,15 @@ def ask(it: Running, *paths: str) -> list[asyncio.Task[httpx.Response]]:
     return [asyncio.create_task(it.http.get(path)) for path in paths]
 
 
-# --- the small are never behind the large ---------------------------------------------------------
+# --- small requests are never queued behind large ones --------------------------------------------
 
 
-async def test_a_flood_of_the_dearest_fields_does_not_hold_up_a_tiny_one(
+async def test_a_flood_of_the_most_expensive_fields_does_not_delay_a_tiny_one(
     domain: int, held: Held
 ) -> None:
-    async with house() as it:
+    async with greenhouse() as it:
         flood = ask(it, *(field(f"co2 {n}", LARGE) for n in range(40)))
-        # A half of the 24 places for large ones: the other half is for others.
+        # Half of the 24 places are for large ones; the other half is for others.
         await until(lambda: len(held.begun) == LARGE_THREADS, "work")
         await until(lambda: sum(task.done() for task in flood) == 28, "the refusals")
         refused = [task for task in flood if task.done()]
@@ -131,11 +131,11 @@ async def test_a_flood_of_the_dearest_fields_does_not_hold_up_a_tiny_one(
         assert sorted([(await task).status_code for task in flood]) == [200] * 12 + [503] * 28
 
 
-# --- only while somebody waits --------------------------------------------------------------------
+# --- only while a client waits --------------------------------------------------------------------
 
 
-async def test_a_client_that_leaves_takes_its_work_along(domain: int, held: Held) -> None:
-    async with house() as it:
+async def test_a_client_that_disconnects_cancels_its_work(domain: int, held: Held) -> None:
+    async with greenhouse() as it:
         paths = [field(f"co2 {n}", LARGE) for n in range(6)]
         leaving = ask(it, *paths)
         workers = it.bridge.source.workers
@@ -150,14 +150,14 @@ async def test_a_client_that_leaves_takes_its_work_along(domain: int, held: Held
         assert workers.abandoned == 5
         held.gate.set()
         assert (await staying).status_code == 200
-        # A thread that was set free may have begun another before that, too, was given up.
+        # A freed thread may have started another one before that was cancelled too.
         assert held.begun.count(at_work[0]) == 1, "computed once, for who stayed"
 
 
-async def test_a_time_out_ends_the_work_too(domain: int, held: Held) -> None:
-    # Long enough for all four to be at work, or waiting for it, by then.
+async def test_a_time_out_cancels_the_work_too(domain: int, held: Held) -> None:
+    # Long enough for all four to run or wait by then.
     limits = Limits(answers_per_s=10_000.0, answer_timeout_s=3.0)
-    async with house(limits) as it:
+    async with greenhouse(limits) as it:
         answers = await asyncio.gather(*ask(it, *(field(f"co2 {n}", LARGE) for n in range(4))))
         assert [answer.status_code for answer in answers] == [504] * 4
         assert "3 s" in answers[0].json()["detail"]
@@ -167,13 +167,13 @@ async def test_a_time_out_ends_the_work_too(domain: int, held: Held) -> None:
         assert it.bridge.admission.being_computed == 0
 
 
-# --- once for all ---------------------------------------------------------------------------------
+# --- shared work ----------------------------------------------------------------------------------
 
 
 async def test_identical_requests_take_one_place_and_one_computation(
     domain: int, held: Held
 ) -> None:
-    async with house() as it:
+    async with greenhouse() as it:
         asked = ask(it, *[field("co2", LARGE)] * 6, field("co2", LARGE, "npy"))
         await until(lambda: it.bridge.admission.in_flight["127.0.0.1"] == 7, "all of them")
         await until(lambda: it.bridge.admission.being_computed == 2, "a body each")
@@ -186,7 +186,7 @@ async def test_identical_requests_take_one_place_and_one_computation(
 
 
 def count(monkeypatch: pytest.MonkeyPatch, where: Any, name: str) -> list[int]:
-    """The calls of a function, which does what it did before."""
+    """Count the calls of a function, which works as before."""
     calls: list[int] = []
     plain: Callable[..., Any] = getattr(where, name)
 
@@ -198,11 +198,11 @@ def count(monkeypatch: pytest.MonkeyPatch, where: Any, name: str) -> list[int]:
     return calls
 
 
-async def test_the_state_is_written_a_few_times_a_second_and_never_old(
+async def test_the_state_is_serialised_a_few_times_a_second_and_is_never_old(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     written = count(monkeypatch, StateJson, "state")
-    async with house() as it:
+    async with greenhouse() as it:
         loop = asyncio.get_running_loop()
         written.clear()
         began_s, before = loop.time(), it.bridge.state_number
@@ -210,7 +210,7 @@ async def test_the_state_is_written_a_few_times_a_second_and_never_old(
             await asyncio.gather(*ask(it, *["/api/state"] * 10))
         states = it.bridge.state_number - before + 1
         most = states + (loop.time() - began_s) / AGES_HOLD_S + 1
-        # The frames' own of each state beside the answers.
+        # Plus the frames' own writes of each state.
         assert len(written) <= most + states
         pose = Pose(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)
         new = Scan("new", 1, (), pose)
@@ -228,11 +228,11 @@ def large_map() -> OccupancyMap:
     return map_of(cells, resolution=0.05)
 
 
-async def test_a_hundred_readers_of_a_map_that_do_not_read_hold_one_picture_and_two_pieces_each(
+async def test_a_hundred_readers_that_do_not_read_a_map_hold_one_picture_and_two_pieces_each(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn = count(monkeypatch, status, "map_png")
-    async with house() as it:
+    async with greenhouse() as it:
         stack, occupancy = ExitStack(), large_map()
         monkeypatch.setattr(it.twin, "occupancy_map", lambda: occupancy)
         size = len((await it.http.get("/api/map.png")).content)
@@ -252,7 +252,7 @@ async def test_a_hundred_readers_of_a_map_that_do_not_read_hold_one_picture_and_
         stack.close()
 
 
-async def test_over_tls_no_more_waits_for_a_reader_that_does_not_read(
+async def test_over_tls_nothing_more_is_buffered_for_a_reader_that_does_not_read(
     domain: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     ours, occupancy = certificate(tmp_path), large_map()

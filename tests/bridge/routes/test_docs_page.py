@@ -1,4 +1,4 @@
-"""The page for people: everything of the document, nothing from elsewhere, nothing unescaped."""
+"""The API page: everything in the document, nothing external, nothing unescaped."""
 
 import json
 from html.parser import HTMLParser
@@ -43,7 +43,7 @@ class Page(HTMLParser):
         return [attrs[name] or "" for _, attrs in self.tags if name in attrs]
 
 
-def test_every_route_field_and_parameter_is_there_with_a_line_for_curl() -> None:
+def test_every_route_field_and_parameter_is_listed_with_a_line_for_curl() -> None:
     text = Page(PAGE).text
     for path, described in ROUTES.items():
         assert (f"GET {path}" in text) == described
@@ -55,7 +55,7 @@ def test_every_route_field_and_parameter_is_there_with_a_line_for_curl() -> None
         assert parameter["description"] in text
 
 
-def test_every_type_is_there_and_every_link_leads_to_one() -> None:
+def test_every_type_is_listed_and_every_link_leads_to_one() -> None:
     page = Page(PAGE)
     assert set(page.attributes("id")) == set(DOCUMENT["components"]["schemas"])
     links = page.attributes("href")
@@ -64,14 +64,14 @@ def test_every_type_is_there_and_every_link_leads_to_one() -> None:
     assert set(links) - elsewhere <= {f"#{name}" for name in page.attributes("id")}
 
 
-def test_nothing_is_loaded_from_anywhere_and_nothing_is_inline() -> None:
+def test_nothing_is_loaded_from_elsewhere_and_nothing_is_inline() -> None:
     page = Page(PAGE)
     assert not {tag for tag, _ in page.tags} & {"script", "style", "link", "img", "iframe"}
     assert page.attributes("style") == []
 
 
 @pytest.mark.parametrize("kind", ["route", "parameter", "type", "address"])
-def test_what_looks_like_markup_stays_text(kind: str) -> None:
+def test_text_that_looks_like_markup_stays_text(kind: str) -> None:
     markup, address = "<script>alert('x')</script>", "http://twin"
     hostile = json.loads(document())
     if kind == "route":

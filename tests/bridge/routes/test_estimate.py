@@ -1,4 +1,4 @@
-"""The estimate over HTTP, beside the same over the ROS service of the same twin."""
+"""The estimate over HTTP, compared with the ROS service of the same twin."""
 
 import io
 import time
@@ -25,13 +25,13 @@ QUERY: dict[str, Any] = {"sensor_type": "temperature", "resolution": 0.5, **BOX}
 
 @cache
 def now_s() -> int:
-    """When the first test here asks: all files are read long before the last one is run."""
+    """The time of the first test here: test files are imported long before the last one runs."""
     return int(time.time())
 
 
 @pytest.fixture(scope="module")
 def live() -> Iterator[Bridge]:
-    """A bridge whose twin has read three tags for six hours."""
+    """A bridge whose twin has six hours of readings from three tags."""
     with bridge(*limits(answers_per_s=10_000)) as running:
         for hour in range(6, 0, -1):
             for number, (tag_id, at) in enumerate(PLACES.items()):
@@ -57,7 +57,7 @@ def test_the_service_and_the_formats_give_the_same_numbers(live: Bridge) -> None
     npy = live.get("/api/estimate.npy", **QUERY, **at)
     GetEstimateResponse.model_validate(body)
     assert service.ok, service.error_message
-    # The bridge knows how wide the ideal range is, and the twin does not.
+    # The bridge knows the width of the ideal range, and the twin does not.
     sd_known = body.pop("sd_known")
     assert 0.0 < sd_known < service.sd_known
     for name, value in body.items():
@@ -83,7 +83,7 @@ def test_a_picture_has_two_layers(live: Bridge) -> None:
     assert (accepted.headers["content-type"], accepted.headers["vary"]) == ("image/png", "Accept")
 
 
-def test_who_has_the_answer_gets_none_until_something_is_heard(live: Bridge) -> None:
+def test_a_matching_etag_gets_304_until_a_new_scan_arrives(live: Bridge) -> None:
     def same_again() -> Any:
         first = live.get("/api/estimate", **QUERY)
         known = {"If-None-Match": first.headers["etag"]}
@@ -116,7 +116,7 @@ def test_who_has_the_answer_gets_none_until_something_is_heard(live: Bridge) -> 
         ({"lair": "sd"}, "parameter 'lair' is unknown, expected sensor_type, "),
     ],
 )
-def test_a_refusal_is_the_service_s_and_says_why(
+def test_a_refusal_comes_from_the_service_with_its_reason(
     live: Bridge, changes: dict[str, Any], complaint: str
 ) -> None:
     response = live.get("/api/estimate", **{**QUERY, **changes})

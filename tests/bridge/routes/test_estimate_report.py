@@ -1,4 +1,4 @@
-"""What estimates are worth over HTTP, and what becomes of a sensor that has changed."""
+"""How accurate estimates are over HTTP, and how a changed sensor is reported."""
 
 import math
 import time
@@ -22,7 +22,7 @@ SENSOR = {"sensor_type": "temperature"}
 
 @cache
 def now_s() -> int:
-    """When the first test here asks: all files are read long before the last one is run."""
+    """The time of the first test here: test files are imported long before the last one runs."""
     return int(time.time())
 
 
@@ -34,9 +34,9 @@ def temperature(tag_id: str, half_hours_ago: int) -> float:
 
 @pytest.fixture(scope="module")
 def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
-    """A bridge whose twin remembers four tags of ten hours; one reads 9 K too much since two.
+    """A bridge whose twin has ten hours of four tags; one reads 9 K too much in the last two.
 
-    From a journal: a report of what comes scan by scan would serve before the last is there.
+    From a journal: scan by scan, a report would be ready before the last scan arrives.
     """
     journal, begun_ns = tmp_path_factory.mktemp("journal") / "j.sqlite", now_s() * SECOND
     rows: list[Write] = [
@@ -65,9 +65,9 @@ def answered(live: Bridge, path: str, accept: Any, **query: Any) -> Any:
     return wait_for(look, path)
 
 
-def test_a_tag_that_has_changed_is_told_left_out_and_judged(live: Bridge) -> None:
+def test_a_changed_tag_is_reported_left_out_and_judged(live: Bridge) -> None:
     def is_of_the_last(body: Any) -> bool:
-        # What is foretold is made beside what is heard, and may be of the scan before it.
+        # Predictions run beside the ingest, and may be from the scan before.
         told = body["tags"].get("d")
         return bool(told and told["left_out"] and told["measured"] == temperature("d", 1))
 
@@ -81,7 +81,7 @@ def test_a_tag_that_has_changed_is_told_left_out_and_judged(live: Bridge) -> Non
     assert odd["offset"] == pytest.approx(9.0, abs=2.0)
     assert odd["measured"] - odd["expected"] > 6.0
     estimate = live.json("/api/estimate", **SENSOR, resolution=0.5)
-    # All twenty of each tag, but those since the change.
+    # All twenty of each tag, without those since the change.
     assert (estimate["sample_count"], estimate["reading_count"]) == (4, 20 * len(PLACES) - 4)
     reasons = answered(
         live, "/api/health", lambda body: "changed" in str(body["tags"]["d"]["reasons"])
@@ -99,7 +99,7 @@ def test_a_tag_that_has_changed_is_told_left_out_and_judged(live: Bridge) -> Non
     assert 'lupin_estimate_fit_failing{sensor="temperature"} 0.0' in metrics
 
 
-def test_how_often_it_was_right_is_told_of_every_sensor_or_of_one(live: Bridge) -> None:
+def test_the_hit_rate_is_reported_for_all_sensors_or_for_one(live: Bridge) -> None:
     both = live.json("/api/estimate/quality")
     EstimateQualities.model_validate(both)
     assert list(both["sensors"]) == ["temperature"], "co2 has no place"
@@ -114,7 +114,7 @@ def test_how_often_it_was_right_is_told_of_every_sensor_or_of_one(live: Bridge) 
     )
 
 
-def test_where_another_tag_helps_is_told_with_by_how_much(live: Bridge) -> None:
+def test_where_another_tag_would_help_is_reported_with_its_gain(live: Bridge) -> None:
     body = answered(live, "/api/estimate/advice", lambda body: body["places"], **SENSOR, places=3)
     Advice.model_validate(body)
     ratios = [place["error_ratio"] for place in body["places"]]
@@ -140,7 +140,7 @@ def test_where_another_tag_helps_is_told_with_by_how_much(live: Bridge) -> None:
         ("quality", {"sensor_type": ""}, "sensor_type is '': string should have"),
     ],
 )
-def test_a_refusal_names_what_is_wrong(
+def test_a_refusal_names_the_mistake(
     live: Bridge, path: str, query: dict[str, Any], complaint: str
 ) -> None:
     response = live.get(f"/api/estimate/{path}", **query)

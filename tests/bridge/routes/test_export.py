@@ -1,4 +1,4 @@
-"""The export: as fast as its reader takes it, within its limits, and never whole when it is not."""
+"""The export: as fast as its reader, within its limits, and never complete when it is not."""
 
 import asyncio
 import json
@@ -25,10 +25,10 @@ from tests.support.waiting import until, until_answered
 from tests.support.web import deaf_client
 
 PATH = "/api/export.csv"
-# So many that no socket holds them: 25 MB.
+# Too many for a socket's buffers: 25 MB.
 MANY = 300
-# What a reader that does not read may cost: one socket's buffers on both sides, and what waits
-# behind it.
+# The most that a reader that does not read may cost: the buffers of one socket on both sides, and
+# what waits behind it.
 MOST_TAKEN_BYTES = 8_000_000
 
 
@@ -53,7 +53,7 @@ async def test_all_rows_come_under_one_header(domain: int) -> None:
         assert past.asked == [(NS, 9 * NS, "a/b", "co2")]
 
 
-async def test_head_asks_for_no_row(domain: int) -> None:
+async def test_head_reads_no_row(domain: int) -> None:
     past = MadeUp(lots=[rows(1)])
     async with remembering(past) as it:
         answer = await it.http.head(f"{PATH}?to=9")
@@ -63,9 +63,9 @@ async def test_head_asks_for_no_row(domain: int) -> None:
         assert (await it.http.head(f"{PATH}?to=now")).status_code == 400
 
 
-async def test_the_same_rows_come_as_parquet_with_units_and_coordinates(domain: int) -> None:
+async def test_parquet_has_the_same_rows_with_units_and_coordinates(domain: int) -> None:
     failed = PastRow(7 * NS, "8", math.nan, math.nan, "", math.nan, 2, "robot")
-    # More than one group of rows.
+    # More than one row group.
     past = MadeUp(lots=[rows(4_000)] * (GROUP_ROWS // 4_000 + 1) + [[], [failed]])
     async with remembering(past) as it:
         answer = await it.http.get("/api/export.parquet?from=1&to=9&sensor_type=co2")
@@ -95,14 +95,16 @@ async def test_the_same_rows_come_as_parquet_with_units_and_coordinates(domain: 
         assert json.loads(schema.metadata[b"units"])["co2"] == "ppm"
 
 
-async def test_a_period_without_rows_is_a_header_or_a_parquet_file_of_none(domain: int) -> None:
+async def test_without_rows_the_file_is_a_csv_header_or_empty_parquet(
+    domain: int,
+) -> None:
     async with remembering(MadeUp()) as it:
         assert (await it.http.get(PATH)).content == bodies.CSV_HEADER
         answer = await it.http.get("/api/export.parquet")
         assert parquet.read_table(pyarrow.BufferReader(answer.content)).num_rows == 0
 
 
-async def test_parquet_without_its_package_is_refused_with_what_to_install(
+async def test_parquet_without_its_package_is_refused_with_how_to_install_it(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
@@ -110,11 +112,11 @@ async def test_parquet_without_its_package_is_refused_with_what_to_install(
         answer = await it.http.get("/api/export.parquet")
         assert answer.status_code == 501
         assert "pip install 'lupin-twin[science]'" in answer.json()["detail"]
-        # Its place is free again, and CSV needs nothing.
+        # Its place is free again, and CSV needs no package.
         assert (await it.http.get(PATH)).status_code == 200
 
 
-async def test_a_reader_that_does_not_read_stops_it_and_is_cut_off(domain: int) -> None:
+async def test_an_export_to_a_reader_that_does_not_read_stops_and_is_cut_off(domain: int) -> None:
     lot = rows(1_000)
     past = MadeUp(lots=[lot] * MANY)
     async with remembering(past, Limits(client_timeout_s=1.0)) as it:
@@ -132,7 +134,7 @@ async def test_a_reader_that_does_not_read_stops_it_and_is_cut_off(domain: int) 
                 deque(iter(lambda: client.recv(65_536), b""))
 
 
-async def test_a_slow_reader_gets_all_of_it_and_no_more_is_read_than_he_takes(domain: int) -> None:
+async def test_a_slow_reader_gets_everything_and_no_more_is_read_ahead(domain: int) -> None:
     lot = rows(1_000)
     past = MadeUp(lots=[lot] * MANY)
     size = len(bodies.csv_lines(lot, own_sensors()))
@@ -144,7 +146,7 @@ async def test_a_slow_reader_gets_all_of_it_and_no_more_is_read_than_he_takes(do
         assert taken == len(bodies.CSV_HEADER) + MANY * size
 
 
-async def test_a_client_has_one_export_and_who_leaves_frees_its_place(domain: int) -> None:
+async def test_a_client_has_one_export_and_a_disconnect_frees_its_place(domain: int) -> None:
     past = MadeUp(lots=[rows(1_000)] * MANY)
     async with remembering(past) as it:
         async with it.http.stream("GET", PATH) as answer:
@@ -153,16 +155,16 @@ async def test_a_client_has_one_export_and_who_leaves_frees_its_place(domain: in
             assert (refused.status_code, refused.headers["retry-after"]) == (429, "5")
             assert refused.json() == {"detail": "127.0.0.1 has 1 export under way, the limit"}
             assert (await it.http.get("/metrics")).text.count("lupin_exports_running 1.0") == 1
-            # It computes nothing while its reader takes its time.
+            # It computes nothing while its reader is slow.
             assert it.bridge.admission.being_computed == 0
         await until(lambda: it.bridge.admission.exporting == 0, "its place")
         assert past.is_closed
 
 
-async def test_slow_readers_keep_nobody_waiting_for_long(
+async def test_slow_readers_do_not_keep_others_waiting(
     domain: int, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """They take a byte now and then, and so are not cut off as readers that take nothing."""
+    """They take a byte now and then, and so are not cut off like readers that take nothing."""
     past = MadeUp(lots=[rows(1_000)] * MANY)
     async with remembering(past, Limits(client_timeout_s=3_600.0)) as it:
         with ExitStack() as stack:
@@ -191,10 +193,10 @@ async def test_slow_readers_keep_nobody_waiting_for_long(
     assert [record for record in caplog.records if record.levelname == "ERROR"] == []
 
 
-async def test_who_leaves_while_a_lot_is_being_read_ends_the_reading(
+async def test_a_disconnect_while_a_batch_is_read_ends_the_reading(
     domain: int, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """The lots are closed when nobody is at them any more, and not before."""
+    """The batches are closed once no reader uses them, and not before."""
     is_reading, is_closed = asyncio.Event(), asyncio.Event()
 
     async def lots(*_: object) -> AsyncIterator[bytes]:
@@ -203,7 +205,7 @@ async def test_who_leaves_while_a_lot_is_being_read_ends_the_reading(
             is_reading.set()
             await asyncio.Event().wait()
         finally:
-            await asyncio.sleep(0)  # whoever reads has something to give back
+            await asyncio.sleep(0)  # a reader holds resources
             is_closed.set()
 
     async with remembering(MadeUp()) as it:
@@ -215,7 +217,7 @@ async def test_who_leaves_while_a_lot_is_being_read_ends_the_reading(
     assert [record for record in caplog.records if record.levelname == "ERROR"] == []
 
 
-async def test_a_lot_that_does_not_come_in_time_breaks_it_off_and_is_one_line_of_the_log(
+async def test_a_batch_that_does_not_arrive_in_time_ends_the_export_with_one_line_in_the_log(
     domain: int, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def lots(*_: object) -> AsyncIterator[bytes]:
@@ -231,8 +233,8 @@ async def test_a_lot_that_does_not_come_in_time_breaks_it_off_and_is_one_line_of
     assert "Traceback" not in caplog.text
 
 
-async def test_a_bridge_that_ends_breaks_it_off(domain: int) -> None:
-    past = MadeUp(lots=[rows(1_000)] * 1_000 * MANY)  # more than can be read before it is over
+async def test_a_shutdown_ends_the_export(domain: int) -> None:
+    past = MadeUp(lots=[rows(1_000)] * 1_000 * MANY)  # more than can be read before the shutdown
     async with remembering(past) as it, it.http.stream("GET", PATH) as answer:
         it.server.should_exit = True
         await until(lambda: it.bridge.liveness.shutting_down, "the good-bye")
@@ -242,13 +244,13 @@ async def test_a_bridge_that_ends_breaks_it_off(domain: int) -> None:
         await until(lambda: it.bridge.admission.exporting == 0, "its place")
 
 
-async def test_an_error_in_the_middle_is_never_taken_for_the_end(domain: int) -> None:
+async def test_an_error_in_the_middle_never_looks_like_the_end(domain: int) -> None:
     past = MadeUp(lots=[rows(3)], error=OSError("the disk is away"))
     async with remembering(past) as it:
         with pytest.raises(httpx.TransportError):
             await it.http.get(PATH)
         await until(lambda: it.bridge.admission.exporting == 0, "its place")
-        # Nor by who knows no chunks: a connection that is reset is no end.
+        # Also without chunked encoding: a reset connection is no end.
         reader, writer = await asyncio.open_connection(*it.url.removeprefix("http://").split(":"))
         writer.write(f"GET {PATH} HTTP/1.0\r\nHost: localhost\r\n\r\n".encode())
         try:

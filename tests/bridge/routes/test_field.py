@@ -1,4 +1,4 @@
-"""The field over HTTP, beside the same field over the ROS service of the same twin."""
+"""The field over HTTP, compared with the ROS service of the same twin."""
 
 import io
 import json
@@ -19,7 +19,7 @@ from tests.support.processes import limits
 from tests.support.waiting import PATIENCE_S
 from tests.support.web import Bridge, bridge
 
-# These tests ask faster than a person's browser may.
+# These tests send more requests than a browser may.
 EAGER = limits(answers_per_s=10_000)
 SAMPLES = [(1.0, 1.0, 20.0), (2.0, 1.5, 24.0), (3.5, 0.5, 30.0)]
 BOX = {"bbox_min_x": 0.0, "bbox_min_y": -0.5, "bbox_max_x": 6.0, "bbox_max_y": 3.0}
@@ -29,7 +29,7 @@ FORMATS = ["json", "npy", "png"]
 
 @pytest.fixture(scope="module")
 def live() -> Iterator[Bridge]:
-    """A bridge whose twin knows three samples of temperature, for reading alone."""
+    """A bridge whose twin has three samples of temperature, for reading only."""
     with bridge(*EAGER) as running:
         for number, (x, y, value) in enumerate(SAMPLES):
             running.peer.observe(scan(str(number), {"temperature": value}, at=(x, y)))
@@ -40,7 +40,7 @@ def live() -> Iterator[Bridge]:
 
 @pytest.fixture
 def changing() -> Iterator[Bridge]:
-    """A bridge of the test's own."""
+    """A bridge for one test alone."""
     with bridge(*EAGER) as running:
         yield running
 
@@ -54,7 +54,7 @@ def npy(running: Bridge, **query: Any) -> npt.NDArray[np.float32]:
 # --- the same numbers everywhere ----------------------------------------------------------------
 
 
-def test_the_service_and_both_formats_give_the_definitions_numbers(live: Bridge) -> None:
+def test_the_service_and_both_formats_give_the_numbers_of_the_definition(live: Bridge) -> None:
     service = live.peer.get_field(**QUERY)
     body = live.json("/api/field.json", **QUERY)
     array = npy(live, **QUERY)
@@ -73,7 +73,7 @@ def test_the_service_and_both_formats_give_the_definitions_numbers(live: Bridge)
     assert any(map(math.isnan, expected))
     assert any(map(math.isfinite, expected))
     np.testing.assert_allclose(array.ravel(), np.array(expected, np.float32), rtol=1e-6)
-    # From here on to the last bit, and NaN for NaN.
+    # From here on to the last bit, with NaN equal to NaN.
     np.testing.assert_array_equal(array.ravel(), np.array(service.values, np.float32))
     numbers = [math.nan if value is None else value for value in body.pop("values")]
     np.testing.assert_array_equal(array.ravel(), np.array(numbers, np.float32))
@@ -92,7 +92,7 @@ def test_the_service_and_both_formats_give_the_definitions_numbers(live: Bridge)
         ("image/webp,image/png;q=0.9,*/*;q=0.1", "image/png", "png"),
     ],
 )
-def test_accept_decides_the_format_and_caches_are_told(
+def test_accept_chooses_the_format_and_the_answer_varies_by_it(
     live: Bridge, accept: str | None, media_type: str, suffix: str
 ) -> None:
     answer = live.get("/api/field", {} if accept is None else {"Accept": accept}, **QUERY)
@@ -103,7 +103,7 @@ def test_accept_decides_the_format_and_caches_are_told(
     assert "vary" not in by_suffix.headers
 
 
-def test_a_format_that_there_is_none_of_is_406(live: Bridge) -> None:
+def test_an_unknown_format_is_406(live: Bridge) -> None:
     answer = live.get("/api/field", {"Accept": "text/html"}, **QUERY)
     assert (answer.status_code, answer.headers["vary"]) == (406, "Accept")
     message = schema.ErrorMessage.model_validate_json(answer.content)
@@ -111,7 +111,7 @@ def test_a_format_that_there_is_none_of_is_406(live: Bridge) -> None:
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_every_format_says_in_its_headers_what_it_shows(live: Bridge, suffix: str) -> None:
+def test_the_headers_of_every_format_describe_its_content(live: Bridge, suffix: str) -> None:
     headers = live.get(f"/api/field.{suffix}", **QUERY).headers
     values = [v for v in npy(live, **QUERY).ravel().tolist() if math.isfinite(v)]
     assert {name: v for name, v in headers.items() if name.startswith("x-field-")} == {
@@ -148,7 +148,7 @@ def test_every_format_says_in_its_headers_what_it_shows(live: Bridge, suffix: st
         ({"resolution": [0.5, 0.5]}, ["resolution is given more than once"]),
     ],
 )
-def test_a_bad_request_gets_get_fields_failure_body(
+def test_a_bad_request_gets_the_failure_body_of_get_field(
     live: Bridge, change: dict[str, Any], named: list[str]
 ) -> None:
     query = {name: value for name, value in {**QUERY, **change}.items() if value is not None}
@@ -165,7 +165,7 @@ def test_a_bad_request_gets_get_fields_failure_body(
 
 
 @pytest.mark.parametrize(("resolution", "far"), [(1e-45, 3.4e38), (0.001, 1_001.0)])
-def test_a_grid_bomb_is_refused_over_http_as_over_ros(
+def test_an_oversized_grid_is_refused_over_http_as_over_ros(
     live: Bridge, resolution: float, far: float
 ) -> None:
     bomb: dict[str, Any] = {"sensor_type": "co2", "resolution": resolution}
@@ -187,14 +187,14 @@ def etag(running: Bridge, path: str = "/api/field.json", **query: Any) -> str:
 
 
 def work_done(running: Bridge) -> str:
-    """How many fields were computed, looked up or waited for so far, by the metrics."""
+    """How many fields were computed, cached or awaited so far, by the metrics."""
     name = "lupin_field_seconds_count "
     (line,) = (line for line in running.get("/metrics").text.splitlines() if line.startswith(name))
     return line
 
 
 @pytest.mark.parametrize("path", ["/api/field", "/api/field.png", "/api/field/quality"])
-def test_the_same_field_is_not_sent_twice(live: Bridge, path: str) -> None:
+def test_an_unchanged_field_is_not_sent_again(live: Bridge, path: str) -> None:
     tag, before = etag(live, path), work_done(live)
     for known in (tag, f"W/{tag}", f'"other", {tag}', "*"):
         again = live.get(path, {"If-None-Match": known}, **QUERY)
@@ -217,7 +217,7 @@ def test_all_lines_of_a_header_count(live: Bridge) -> None:
     assert two_tags.status_code == 304
 
 
-def test_a_tag_holds_until_the_field_could_have_changed(changing: Bridge) -> None:
+def test_an_etag_holds_until_the_field_could_have_changed(changing: Bridge) -> None:
     def changed_from(old: str) -> str:
         def look() -> str | None:
             answer = changing.get("/api/field", {"If-None-Match": old}, **QUERY)
@@ -233,7 +233,7 @@ def test_a_tag_holds_until_the_field_could_have_changed(changing: Bridge) -> Non
     assert changing.json("/api/field", **QUERY)["sample_count"] == 1
     changing.peer.publish_map(occupancy_grid([[0]]))
     mapped = changed_from(pinned)
-    # A discovery of what is known, and another frame's message, change nothing.
+    # A repeated discovery, and a message from another frame, change nothing.
     changing.peer.discover(discovered({"1": pose(5.0, 5.0)}))
     changing.peer.observe(scan("2", {"temperature": 1.0}, frame_id="odom"))
     with changing.listen() as listener:
@@ -245,7 +245,7 @@ def test_a_tag_holds_until_the_field_could_have_changed(changing: Bridge) -> Non
 # --- quality ------------------------------------------------------------------------------------
 
 
-def test_quality_is_of_the_field_that_is_asked_for(live: Bridge) -> None:
+def test_quality_describes_the_requested_field(live: Bridge) -> None:
     quality = schema.FieldQuality.model_validate(live.json("/api/field/quality", **QUERY))
     values = npy(live, **QUERY)
     assert quality.sensor_type == "temperature"

@@ -1,4 +1,4 @@
-"""`/foxglove` of a real `lupin-twin serve`: Foxglove's own client from npm, and by hand."""
+"""`/foxglove` of a real `lupin-twin serve`: Foxglove's own client from npm, and raw frames."""
 
 import base64
 import json
@@ -25,7 +25,7 @@ LAYERS = ("/twin/field/temperature", "/twin/tags")
 
 
 def play(url: str, scenario: str, *topics: str) -> Any:
-    """What a scenario of `foxglove_client.mjs` has told at its end."""
+    """What a scenario of `foxglove_client.mjs` has printed at its end."""
     node = shutil.which("node")
     assert node is not None, "node is not installed"
     address = url.replace("http", "ws", 1) + "/foxglove"
@@ -37,27 +37,29 @@ def play(url: str, scenario: str, *topics: str) -> Any:
 
 
 @pytest.fixture(scope="module")
-def house() -> Iterator[Bridge]:
+def greenhouse() -> Iterator[Bridge]:
     """A twin with one tag, a map and a layer."""
     with bridge("--ros-args", "-p", "layers:=[temperature]") as running:
         running.peer.wait_for_twin()
         running.peer.observe(messages.scan("1", {"temperature": 20.5}, at=(1.0, 2.0), stamp_s=9.0))
         running.peer.publish_map(messages.occupancy_grid([[0, 100], [-1, 0]]))
-        running.peer.tag("1")  # told over ROS, which is later than over HTTP
+        running.peer.tag("1")  # announced over ROS, which is later than over HTTP
         yield running
 
 
 @pytest.fixture
-def client(house: Bridge) -> Iterator[Viewer]:
-    with viewer(house.url) as opened:
+def client(greenhouse: Bridge) -> Iterator[Viewer]:
+    with viewer(greenhouse.url) as opened:
         yield opened
 
 
 # --- Foxglove's own client ----------------------------------------------------------------------
 
 
-def test_foxgloves_client_finds_the_channels_and_reads_what_was_published(house: Bridge) -> None:
-    told = play(house.url, "look", STATE, INPUT, "/map", DIAGNOSTICS, *LAYERS)
+def test_foxgloves_client_finds_and_decodes_the_channels(
+    greenhouse: Bridge,
+) -> None:
+    told = play(greenhouse.url, "look", STATE, INPUT, "/map", DIAGNOSTICS, *LAYERS)
     assert told["chosen"] == [WEBSOCKET, SDK]
     info = told["info"]
     assert (info["name"], info["capabilities"], info["supportedEncodings"]) == (
@@ -69,13 +71,13 @@ def test_foxgloves_client_finds_the_channels_and_reads_what_was_published(house:
     others = {"/perception/discovered_tags", "/twin/planters"}
     assert set(channels) == {STATE, INPUT, "/map", DIAGNOSTICS, *LAYERS, *others}
     assert {channel["encoding"] for channel in channels.values()} == {"cdr"}
-    # By nothing but the schema that was advertised.
+    # With nothing but the advertised schema.
     read = {
         topic: reader_of(channels[topic])(base64.b64decode(message["data"]))
         for topic, message in told["first"].items()
     }
     [tag] = read[STATE].tags
-    served = house.json("/api/state")["tags"][0]
+    served = greenhouse.json("/api/state")["tags"][0]
     assert (tag.tag_id, tag.pose.position.x, tag.pose.position.y) == ("1", 1.0, 2.0)
     assert [(r.name, r.value) for r in tag.readings] == [("temperature", 20.5)]
     assert tag.tag_id == served["tag_id"]
@@ -92,16 +94,16 @@ def test_foxgloves_client_finds_the_channels_and_reads_what_was_published(house:
     assert all(abs(ns - stamp.sec * 10**9) < 120e9 for ns in stamps)
 
 
-def test_foxgloves_client_hears_the_latched_one_again_and_nothing_after_its_end(
-    house: Bridge,
+def test_foxgloves_client_gets_latched_messages_until_it_unsubscribes(
+    greenhouse: Bridge,
 ) -> None:
-    told = play(house.url, "again", "/map")
+    told = play(greenhouse.url, "again", "/map")
     assert told["before"]["data"] == told["after"]["data"]
     assert (told["late"], told["statuses"]) == (0, [])
 
 
-def test_whatever_foxgloves_client_would_change_is_refused(house: Bridge) -> None:
-    statuses = play(house.url, "write")["statuses"]
+def test_every_change_by_foxgloves_client_is_refused(greenhouse: Bridge) -> None:
+    statuses = play(greenhouse.url, "write")["statuses"]
     assert {status["level"] for status in statuses} == {2}
     assert [status["message"].partition(":")[0] for status in statuses] == [
         "advertise is refused",
@@ -117,17 +119,17 @@ def test_whatever_foxgloves_client_would_change_is_refused(house: Bridge) -> Non
         "fetchAsset is refused",
         "there is no channel 4000000",
     ]
-    assert house.peer.node.count_publishers("/cmd_vel") == 0
+    assert greenhouse.peer.node.count_publishers("/cmd_vel") == 0
 
 
-# --- by hand ------------------------------------------------------------------------------------
+# --- raw frames ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("offered", [(), ("foxglove.sdk.v2",), ("cbor", "ros")])
-def test_who_offers_none_of_the_subprotocols_is_refused(
-    house: Bridge, offered: tuple[str, ...]
+def test_without_a_known_subprotocol_it_is_refused(
+    greenhouse: Bridge, offered: tuple[str, ...]
 ) -> None:
-    with pytest.raises(InvalidStatus) as refused, viewer(house.url, offered):
+    with pytest.raises(InvalidStatus) as refused, viewer(greenhouse.url, offered):
         pass
     assert refused.value.response.status_code == 400
     assert b"must offer one of foxglove.sdk.v1" in (refused.value.response.body or b"")
@@ -137,14 +139,14 @@ def test_who_offers_none_of_the_subprotocols_is_refused(
     ("offered", "chosen"),
     [((SDK,), SDK), ((WEBSOCKET, SDK), WEBSOCKET), (("other", SDK, WEBSOCKET), SDK)],
 )
-def test_the_first_that_is_spoken_is_chosen(
-    house: Bridge, offered: tuple[str, ...], chosen: str
+def test_the_first_known_subprotocol_is_chosen(
+    greenhouse: Bridge, offered: tuple[str, ...], chosen: str
 ) -> None:
-    with viewer(house.url, offered) as client:
+    with viewer(greenhouse.url, offered) as client:
         assert client.connection.subprotocol == chosen
 
 
-def test_nonsense_is_answered_and_the_connection_stays(client: Viewer) -> None:
+def test_invalid_messages_are_answered_and_the_connection_stays(client: Viewer) -> None:
     for message, said in (
         ("{", "the message is not JSON"),
         ("[]", "the message is an array"),
@@ -159,20 +161,20 @@ def test_nonsense_is_answered_and_the_connection_stays(client: Viewer) -> None:
     assert client.data(1)
 
 
-def test_a_flood_ends_its_sender_alone_and_makes_no_subscriptions(
-    house: Bridge, client: Viewer
+def test_a_flood_closes_its_own_connection_and_subscribes_nothing(
+    greenhouse: Bridge, client: Viewer
 ) -> None:
     def topics() -> float:
         [line] = [
             line
-            for line in house.get("/metrics").text.splitlines()
+            for line in greenhouse.get("/metrics").text.splitlines()
             if line.startswith("lupin_topics_relayed ")
         ]
         return float(line.split()[1])
 
-    with viewer(house.url) as loud:
+    with viewer(greenhouse.url) as loud:
         channel = loud.channels["/perception/discovered_tags"]["id"]
-        with suppress(ConnectionClosed):  # it may hear the answer before it has said all
+        with suppress(ConnectionClosed):  # it may receive the answer before it has sent everything
             for _ in range(20 * FRAMES_AT_ONCE):
                 loud.send(op="subscribe", subscriptions=[{"id": 1, "channelId": channel}])
                 loud.send(op="unsubscribe", subscriptionIds=[1])

@@ -1,4 +1,4 @@
-"""`/foxglove` in the test's own process: what a slow client costs and gets, and simulated time."""
+"""`/foxglove` in the test's own process: slow clients and simulated time."""
 
 import asyncio
 import json
@@ -29,8 +29,8 @@ def refuse(_: object) -> NoReturn:
     raise ValueError("no subscription to it")
 
 
-async def topics_are_heard_while_they_are_wanted(here: Any) -> None:
-    """Where nobody is there any more, and topics end at once."""
+async def topics_are_subscribed_while_wanted(here: Any) -> None:
+    """Without clients, and then topics end at once."""
     hub, offer, relay = here.bridge.hub, here.bridge.offer, here.bridge.source.relay
     await until(lambda: len(relay) == 0, "no topic to be heard for who is gone")
     reader, writer = await deaf(here.url, "/foxglove")
@@ -41,7 +41,7 @@ async def topics_are_heard_while_they_are_wanted(here: Any) -> None:
         writer.write(subscribing(offer, "/map"))
         while b"cannot be served now" not in got:
             got += await reader.read(1 << 20)
-    # The id is free: what could not be served is not open.
+    # The id is free: a failed subscription is not open.
     writer.write(subscribing(offer, "/map"))
     await until(lambda: len(relay) == 1, "the map to be heard")
     writer.write(masked(TEXT, b'{"op":"unsubscribe","subscriptionIds":[0]}'))
@@ -50,7 +50,7 @@ async def topics_are_heard_while_they_are_wanted(here: Any) -> None:
     await until(lambda: len(hub) == 0, "nobody again")
 
 
-async def test_a_slow_client_gets_the_newest_and_one_that_never_reads_is_closed(
+async def test_a_slow_client_gets_the_latest_messages_and_one_that_never_reads_is_closed(
     domain: int,
 ) -> None:
     async with inprocess.running() as here:
@@ -83,7 +83,7 @@ async def test_a_slow_client_gets_the_newest_and_one_that_never_reads_is_closed(
             peer.observe(messages.scan("after.", {"co2": 1.0}))
             while b"after." not in got[-100_000:]:
                 got += await slow[0].read(1 << 20)
-            # All together hold less than two maps: one that holds the older goes.
+            # Together they hold less than two maps: one that holds the older one is closed.
             unsent = hub.unsent
             await until(lambda: unsent.bytes == 0, "nothing to wait for")
             unsent.max_bytes = 15_000_000
@@ -101,10 +101,10 @@ async def test_a_slow_client_gets_the_newest_and_one_that_never_reads_is_closed(
             writer.transport.abort()
         await until(lambda: len(hub) == 0, "nobody")
         assert here.bridge.hub.unsent.bytes == 0
-        await topics_are_heard_while_they_are_wanted(here)
+        await topics_are_subscribed_while_wanted(here)
 
 
-async def test_simulated_time_is_told_and_is_that_of_the_messages(domain: int) -> None:
+async def test_simulated_time_is_sent_and_stamps_the_messages(domain: int) -> None:
     async with inprocess.running(ros_args=SIM) as here:
         with Peer(domain) as peer:
 

@@ -1,4 +1,4 @@
-"""`/docs/guide/`: what was built, or how to build it; styles have a rule of their own."""
+"""`/docs/guide/`: the built guide, or how to build it; its styles have their own rule."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ def ask(guide_folder: Path, path: str, method: str = "GET", prefix: str = "") ->
 
 
 @pytest.mark.parametrize("path", ["/docs/guide/", "/docs/guide/how-to/server.html"])
-def test_a_page_may_have_styles_of_its_own_and_no_script(built: Path, path: str) -> None:
+def test_a_page_may_have_its_own_styles_and_no_script(built: Path, path: str) -> None:
     answer = ask(built, path)
     assert (answer.status_code, answer.text) == (200, PAGE)
     policy = answer.headers["content-security-policy"].split("; ")
@@ -38,13 +38,13 @@ def test_a_page_may_have_styles_of_its_own_and_no_script(built: Path, path: str)
     assert answer.headers["x-content-type-options"] == "nosniff"
 
 
-def test_only_the_guide_may_have_styles_of_its_own(built: Path) -> None:
+def test_only_the_guide_may_have_its_own_styles(built: Path) -> None:
     for path in ("/docs", "/", "/docs/nowhere"):
         assert "unsafe-inline" not in ask(built, path).headers["content-security-policy"]
 
 
 @pytest.mark.parametrize("prefix", ["", "/gh1"])
-def test_without_its_slash_it_leads_there(built: Path, prefix: str) -> None:
+def test_without_its_slash_it_redirects(built: Path, prefix: str) -> None:
     answer = ask(built, f"{prefix}/docs/guide", prefix=prefix)
     assert answer.is_redirect
     assert answer.headers["location"] == f"{prefix}/docs/guide/"
@@ -52,7 +52,7 @@ def test_without_its_slash_it_leads_there(built: Path, prefix: str) -> None:
 
 @pytest.mark.parametrize("prefix", ["", "/gh1"])
 @pytest.mark.parametrize("path", ["/docs/guide/nowhere.html", "/docs/guide/..%2fsecret.txt"])
-def test_nothing_else_is_served_and_it_says_where_to_look(
+def test_nothing_else_is_served_and_the_answer_says_where_to_look(
     built: Path, path: str, prefix: str
 ) -> None:
     answer = ask(built, f"{prefix}{path}", prefix=prefix)
@@ -66,7 +66,7 @@ def test_it_can_only_be_read(built: Path) -> None:
 
 
 @pytest.mark.parametrize("path", ["/docs/guide/", "/docs/guide/how-to/server.html"])
-def test_one_that_was_not_built_says_how_to_build_it(tmp_path: Path, path: str) -> None:
+def test_a_guide_that_is_not_built_says_how_to_build_it(tmp_path: Path, path: str) -> None:
     answer = ask(tmp_path, path)
     assert answer.status_code == 404
     assert "make docs" in ErrorMessage.model_validate_json(answer.content).detail

@@ -1,4 +1,4 @@
-"""What a bridge says whose ROS thread has ended."""
+"""A bridge whose ROS thread has ended."""
 
 import asyncio
 import json
@@ -16,20 +16,20 @@ from tests.support.web import ws_url
 
 
 def reads(served: Running, tag_id: str, sensor_type: str) -> bool:
-    """Whether the bridge knows where the tag is, and a reading of it."""
+    """Whether the bridge has the tag's position and a reading of it."""
     latest = served.bridge.latest
     tags = () if latest is None else latest.snapshot.tags
     return bool(samples_of([tag for tag in tags if tag.tag_id == tag_id], sensor_type))
 
 
 async def end_ros_thread(served: Running) -> None:
-    """What no callback should do, and what must not go unseen: end the thread itself."""
+    """End the thread itself, which no callback should do, and which must be noticed."""
     waiting = asyncio.create_task(served.in_ros_thread(lambda _: sys.exit("the end")))
     await until(lambda: not served.twin.thread.is_alive, "the end of the ROS thread")
     waiting.cancel()
 
 
-async def test_when_the_ros_thread_ends_health_says_so_and_every_client_is_told(
+async def test_when_the_ros_thread_ends_health_reports_it_and_every_client_is_notified(
     domain: int,
 ) -> None:
     async with (
@@ -52,8 +52,8 @@ async def test_when_the_ros_thread_ends_health_says_so_and_every_client_is_told(
         assert schema.Health.model_validate_json(answer.content).ok is False
         answer = await served.http.get("/readyz")
         assert (answer.status_code, answer.json()["reason"]) == (503, "thread_dead")
-        # What was known last is still told, and a field that is first asked for now is made of
-        # it; that it is not live, the status says. What would need the thread is refused at
+        # The last state is still served, and a field that is first requested now is computed from
+        # it; the status says that it is not live. What needs the thread is refused at
         # once.
         assert (await served.http.get("/api/state")).status_code == 200
         answer = await served.http.get("/api/field?sensor_type=co2")

@@ -1,4 +1,4 @@
-"""Verdicts over HTTP and WebSocket: the same, and by the file that the operator gave."""
+"""Verdicts over HTTP and WebSocket: equal, and by the operator's file."""
 
 import io
 import json
@@ -19,12 +19,12 @@ def verdicts(live: Bridge) -> dict[str, str]:
     return {tag_id: one.verdict for tag_id, one in health.tags.items()}
 
 
-def test_the_verdict_is_in_the_frames_and_over_http_and_deltas_tell_what_changes() -> None:
+def test_frames_and_http_have_the_verdict_and_deltas_its_changes() -> None:
     def tells(tag_id: str) -> Any:
         return lambda frame: tag_id in frame["health"]["tags"]
 
     with bridge() as live, live.listen(delta=1) as changes, live.listen() as whole:
-        changes.until("state")  # of before
+        changes.until("state")  # from before
         live.peer.observe(scan("tag_1", {"temperature": 22.0}))
         fine = changes.until("delta", tells("tag_1"))["health"]
         assert fine["tags"]["tag_1"] == {"verdict": "healthy"}
@@ -42,7 +42,7 @@ def test_the_verdict_is_in_the_frames_and_over_http_and_deltas_tell_what_changes
         assert verdicts(live) == {"tag_1": "healthy", "tag_2": "critical"}
 
 
-def test_the_operators_own_ranges_hold_and_are_asked_for_once(tmp_path: Path) -> None:
+def test_the_operators_own_ranges_apply_and_are_queried_once(tmp_path: Path) -> None:
     file = tmp_path / "sensors.json"
     text = own_sensors().text.replace('"critical": [10, 35],', '"critical": [-30, 35],')
     text = text.replace('"ideal": [18, 26]', '"ideal": [-20, 26]')

@@ -1,4 +1,4 @@
-"""The map: none before one has come, then where it is and how it looks, pixel by pixel."""
+"""The map: none before the first message, then its place and its picture, pixel by pixel."""
 
 from collections.abc import Iterator
 from itertools import count
@@ -24,7 +24,7 @@ def mapped() -> Iterator[Bridge]:
 def put_map(running: Bridge, rows: list[list[int]], origin: Pose | None = None) -> str:
     """Publish a map and wait until it is served; returns its ETag.
 
-    Without an origin the map lies where none has been: one that is there already is no news.
+    Without an origin, the map gets one never used before: a repeated map is no news.
     """
     before = running.get("/api/map").headers.get("etag")
     origin = origin or Pose(position=Point(x=float(next(NOWHERE_YET))))
@@ -37,7 +37,7 @@ def put_map(running: Bridge, rows: list[list[int]], origin: Pose | None = None) 
     return str(running.peer.until(look, "the new map"))
 
 
-def test_a_map_is_fetched_again_only_when_it_is_a_new_one(mapped: Bridge) -> None:
+def test_a_map_is_fetched_again_only_when_it_has_changed(mapped: Bridge) -> None:
     old = put_map(mapped, [[0]])
     for path in ("/api/map", "/api/map.png"):
         first = mapped.get(path)
@@ -50,16 +50,16 @@ def test_a_map_is_fetched_again_only_when_it_is_a_new_one(mapped: Bridge) -> Non
     assert mapped.get("/api/map", {"If-None-Match": old}).status_code == 200
 
 
-def test_a_listener_learns_of_a_new_map_by_the_revision(mapped: Bridge) -> None:
+def test_a_websocket_client_learns_of_a_new_map_by_the_revision(mapped: Bridge) -> None:
     with mapped.listen() as listener:
-        # Of what is there by now: a frame on its way may be from before another test's map.
+        # From the maps so far: a frame under way may be from before another test's map.
         mapped.peer.observe(scan("by now"))
         before = listener.until_tag("by now")["revision"]
         mapped.peer.publish_map(occupancy_grid([[100, -1]]))
         listener.until("state", lambda frame: frame["revision"] != before)
 
 
-def test_a_restarted_bridge_has_no_map_at_first_and_matches_no_etag_of_its_predecessor(
+def test_a_restarted_bridge_has_no_map_at_first_and_matches_no_earlier_etag(
     domain: int,
 ) -> None:
     paths = ("/api/map", "/api/field.json?sensor_type=temperature")

@@ -21,7 +21,7 @@ def test_the_root_says_how_to_build_the_page(tmp_path: Path, method: str) -> Non
         assert (escape(HOW_TO_BUILD) in answer.text) == (method == "GET")
 
 
-def test_the_font_is_the_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_font_is_that_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pages, "_font", lambda: b"wOF2")
     answer = ask(tmp_path, "GET", "/font.woff2")
     assert (answer.status_code, answer.content) == (200, b"wOF2")

@@ -79,7 +79,7 @@ def rows(folder: Path, tag_id: str) -> list[tuple[Any, ...]]:
     )
 
 
-def test_what_is_posted_is_on_the_state_and_in_the_journal_once(live: Bridge, folder: Path) -> None:
+def test_a_posted_reading_is_in_the_state_and_the_journal_once(live: Bridge, folder: Path) -> None:
     now_s = time.time()
     body = {
         "tag_id": "bench-1",
@@ -97,7 +97,7 @@ def test_what_is_posted_is_on_the_state_and_in_the_journal_once(live: Bridge, fo
         "humidity": 60.0,
     }
     assert (tag["pose"]["position"]["x"], tag["pose"]["position"]["y"]) == (1.5, 2.0)
-    # A retry is the same write: of this tag, at this moment, of this source.
+    # A retry is the same write: of this tag, at this moment, from this source.
     assert post(live.url, body).status_code == 202
     later = {"tag_id": "bench-1", "readings": {"temperature": 22}, "place": [9, 9]}
     assert post(live.url, later).status_code == 202
@@ -109,7 +109,7 @@ def test_what_is_posted_is_on_the_state_and_in_the_journal_once(live: Bridge, fo
     ]
     assert found[0][2] / 1e9 == pytest.approx(now_s - 5.0, abs=1e-6)
     assert abs(found[1][2] / 1e9 - time.time()) < PATIENCE_S
-    assert tag_of(live, "bench-1")["pose"]["position"]["x"] == 1.5  # the first place stays
+    assert tag_of(live, "bench-1")["pose"]["position"]["x"] == 1.5  # the first position stays
 
 
 def test_times_are_iso_or_seconds(live: Bridge, folder: Path) -> None:
@@ -146,7 +146,7 @@ GOOD = {"tag_id": "bad", "readings": {"t": 1.0}}
         ({**GOOD, "observed_at": 0}, "observed_at is 0, which is not a moment"),
     ],
 )
-def test_what_cannot_be_is_refused_by_name_and_reaches_nobody(
+def test_an_invalid_reading_is_refused_by_name_and_published_nowhere(
     live: Bridge, folder: Path, body: Any, complaint: str
 ) -> None:
     def refused() -> httpx.Response | None:
@@ -161,7 +161,7 @@ def test_what_cannot_be_is_refused_by_name_and_reaches_nobody(
     assert rows(folder, "bad") == []
 
 
-def test_who_may_not_is_refused(live: Bridge) -> None:
+def test_a_client_without_the_right_is_refused(live: Bridge) -> None:
     body = {"tag_id": "nobodys", "readings": {"t": 1}}
     assert post(live.url, body, TOKEN).status_code == 403  # an admin
     assert post(live.url, body, "wrong").status_code == 401
@@ -169,7 +169,7 @@ def test_who_may_not_is_refused(live: Bridge) -> None:
     assert plain.status_code == 401
     with signed_in(live.url, "boss") as browser:
         assert browser.post("/api/observations", json=body).status_code == 403
-    # A page of somebody else's has no token; with one, it may not post either.
+    # A foreign page has no token; even with one, it may not post.
     assert post(live.url, body, Origin="http://evil.example").status_code == 403
     assert post(live.url, body, Host="evil.example").status_code == 403
     assert post(live.url, body, Content_Type="text/plain").status_code == 415
@@ -191,7 +191,7 @@ def test_a_writer_posts_and_does_nothing_else(live: Bridge) -> None:
     assert (answer.status_code, answer.headers["allow"]) == (405, "POST")
 
 
-def test_bodies_are_bounded_and_half_of_one_is_not_waited_for(live: Bridge, folder: Path) -> None:
+def test_bodies_are_bounded_and_a_partial_one_times_out(live: Bridge, folder: Path) -> None:
     huge = {"tag_id": "huge", "readings": {f"sensor {n}": 1.0 for n in range(10_000)}}
     assert len(json.dumps(huge)) > MAX_BODY_BYTES
     head = (
@@ -205,7 +205,7 @@ def test_bodies_are_bounded_and_half_of_one_is_not_waited_for(live: Bridge, fold
     assert rows(folder, "huge") == rows(folder, "half") == []
 
 
-def test_one_that_floods_is_slowed_down_alone(live: Bridge) -> None:
+def test_a_flood_slows_only_its_own_client(live: Bridge) -> None:
     """All at once on one connection: a client that waits for answers is slow enough by itself."""
     number = Limits().observation_burst * 8
     body = json.dumps({"tag_id": "flood", "readings": {"t": 1}})
@@ -226,7 +226,7 @@ def test_one_that_floods_is_slowed_down_alone(live: Bridge) -> None:
     tag_of(live, "flood")
 
 
-def test_web_publishes_too_and_only_while_it_hears_a_twin(domain: int, folder: Path) -> None:
+def test_web_publishes_too_but_only_while_it_receives_a_twin(domain: int, folder: Path) -> None:
     options = ("--accounts", str(folder / "accounts.sqlite"), *ON)
     body = {"tag_id": "far", "readings": {"temperature": 20}}
     with lupin_twin(domain, "web", *options) as web:
@@ -247,7 +247,7 @@ def test_web_publishes_too_and_only_while_it_hears_a_twin(domain: int, folder: P
         ("none.sqlite", ON, "lupin-twin token add NAME --role writer"),
     ],
 )
-def test_without_the_setting_and_without_accounts_nobody_writes(
+def test_without_the_setting_or_without_accounts_nothing_can_be_written(
     domain: int, folder: Path, file: str, options: tuple[str, ...], why: str
 ) -> None:
     with lupin_twin(domain, "serve", "--accounts", str(folder / file), *options) as serve:
@@ -255,7 +255,7 @@ def test_without_the_setting_and_without_accounts_nobody_writes(
         assert (answer.status_code, why in answer.json()["detail"]) == (403, True)
 
 
-def test_a_fleet_takes_none(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_fleet_accepts_none(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["fleet", "--archive-url", "postgresql://x@127.0.0.1:1/x", *ON])
     assert "--http-observations is for a twin, not for lupin-twin fleet" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""History and timeline over HTTP, over a past that is made up."""
+"""History and timeline over HTTP, over a made-up past."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -44,7 +44,7 @@ async def remembering(past: MadeUp, limits: Limits | None = None) -> AsyncIterat
         yield it
 
 
-async def test_a_history_is_readings_and_buckets_where_there_are_too_many(domain: int) -> None:
+async def test_a_history_has_readings_or_buckets_where_there_are_too_many(domain: int) -> None:
     points = [(number * NS, float(number)) for number in range(100)]
     async with remembering(MadeUp(points={("7", "co2"): points})) as it:
         answer = await it.http.get(f"{HISTORY}&from=10&to=1970-01-01T00:00:20Z")
@@ -63,7 +63,7 @@ async def test_a_history_is_readings_and_buckets_where_there_are_too_many(domain
         }
 
 
-async def test_nights_by_the_clock_are_no_simulations(
+async def test_nights_by_the_clock_are_not_simulations(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     period = "from=2026-11-27T00:00:00Z&to=2026-11-28T00:00:00Z"
@@ -74,7 +74,7 @@ async def test_nights_by_the_clock_are_no_simulations(
             assert (found["nights"] is None) == (origin == "simulated")
 
 
-async def test_a_timeline_asks_for_every_event_of_one_period(domain: int) -> None:
+async def test_a_timeline_queries_every_event_of_one_period(domain: int) -> None:
     past = MadeUp(points={("*", "~scans"): [(NS, 5.0), (2 * NS, 5.0)], ("*", "~runs"): [(0, 9.0)]})
     past.points["7", "~scans"] = [(NS, 5.0)]
     async with remembering(past) as it:
@@ -85,20 +85,20 @@ async def test_a_timeline_asks_for_every_event_of_one_period(domain: int) -> Non
         asked = [request for request in past.asked if isinstance(request, SeriesRequest)]
         assert {request.sensor_type for request in asked} == set(Event)
         assert {request.tag_id for request in asked} == {"*"}
-        # The first one says when now is; that holds for all others.
+        # The first query reads the time; all others use it.
         assert [request.end_ns for request in asked] == [0, *[past.now_ns] * 6]
         answer = await it.http.get("/api/timeline?points=10&tag_id=7")
         found = routes_schema.Timeline.model_validate_json(answer.content)
         assert [b.scans for b in found.buckets] == [1]
 
 
-async def test_events_that_come_in_five_minutes_share_one_grid_with_those_that_come_one_by_one(
+async def test_events_in_five_minute_buckets_share_a_grid_with_single_events(
     domain: int,
 ) -> None:
     """Scans too many to be read one by one, beside few failures, in buckets of seconds."""
     slot_ns = 300 * NS
     failures = ("*", Event.FAILURES)
-    # One is of the first five minutes, and before what was asked for.
+    # One is in the first five minutes, before the start of the period.
     past = MadeUp(points={failures: [(310 * NS, 1.0), (420 * NS, 1.0), (899 * NS, 1.0)]})
 
     def series(request: SeriesRequest) -> SeriesPast:
@@ -131,7 +131,7 @@ async def test_events_that_come_in_five_minutes_share_one_grid_with_those_that_c
         (TwinUnavailableError("nobody is there"), 503, "3"),
     ],
 )
-async def test_what_the_source_cannot_answer_is_told(
+async def test_an_error_of_the_source_is_reported(
     domain: int, error: Exception, status: int, retry_after: str | None
 ) -> None:
     async with remembering(MadeUp(error=error)) as it:
@@ -147,7 +147,7 @@ async def test_what_the_source_cannot_answer_is_told(
         assert it.bridge.admission.being_computed == it.bridge.admission.exporting == 0
 
 
-async def test_what_cannot_be_asked_is_refused_before_anybody_is_asked(domain: int) -> None:
+async def test_an_invalid_query_is_refused_before_the_source_is_queried(domain: int) -> None:
     past = MadeUp()
     async with remembering(past) as it:
         for path, part in (
@@ -164,7 +164,7 @@ async def test_what_cannot_be_asked_is_refused_before_anybody_is_asked(domain: i
         assert past.asked == []
 
 
-async def test_a_client_that_leaves_takes_its_question_along(domain: int) -> None:
+async def test_a_client_that_disconnects_cancels_its_query(domain: int) -> None:
     ended = asyncio.Event()
 
     async def for_ever(*_: Any) -> Any:
@@ -184,7 +184,7 @@ async def test_a_client_that_leaves_takes_its_question_along(domain: int) -> Non
             await until(lambda: it.bridge.admission.being_computed == 0, "its place")
 
 
-async def test_questions_say_what_they_cost_and_are_timed_by_their_kind(domain: int) -> None:
+async def test_queries_declare_their_cost_and_are_timed_by_their_kind(domain: int) -> None:
     past = MadeUp()
     async with remembering(past) as it:
         for path in (HISTORY, "/api/timeline", "/api/timeline?to=5"):

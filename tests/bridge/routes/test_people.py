@@ -1,4 +1,4 @@
-"""People at a bridge: who may, what they say, who hears of it. A real server, real sockets."""
+"""Accounts at a bridge: rights, notes, and notifications. A real server, real sockets."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ def accounts(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def live(accounts: Path) -> Iterator[Bridge]:
-    """With a pest, a cold tag, and a journal that goes at the end."""
+    """With a pest, a cold tag, and a journal that is deleted at the end."""
     options = ("--accounts", str(accounts), "--ros-args", "-p", "journal:=off")
     with bridge(*options) as running:
         running.peer.wait_for_twin()
@@ -65,7 +65,7 @@ def alarm(live: Bridge, tag_id: str = "a") -> str:
 # --- who may ------------------------------------------------------------------------------------
 
 
-def test_with_accounts_nobody_reads_without_a_name(live: Bridge) -> None:
+def test_with_accounts_every_read_needs_a_name(live: Bridge) -> None:
     for path in ("/api/state", "/api/alarms", "/api/notes", "/metrics", "/api/session"):
         assert live.get(path).status_code == 401
     assert live.get("/healthz").status_code == 200
@@ -77,7 +77,7 @@ def test_with_accounts_nobody_reads_without_a_name(live: Bridge) -> None:
     assert live.get("/api/state", BEARER).status_code == 200
 
 
-def test_a_session_says_who_it_is_and_ends_at_the_sign_out(live: Bridge) -> None:
+def test_a_session_shows_its_name_and_ends_when_it_signs_out(live: Bridge) -> None:
     with signed_in(live.url, "anna") as browser:
         told = routes_schema.Session.model_validate(browser.get("/api/session").json())
         assert (told.name, told.role, told.can_write_notes) == ("anna", "operator", True)
@@ -91,7 +91,7 @@ def test_a_session_says_who_it_is_and_ends_at_the_sign_out(live: Bridge) -> None
         assert browser.get("/api/session").status_code == 401, "it is over"
 
 
-def test_the_cookie_is_strict_and_is_never_the_one_that_a_browser_brought(live: Bridge) -> None:
+def test_the_cookie_is_strict_and_never_one_that_the_browser_sent(live: Bridge) -> None:
     with httpx.Client(base_url=live.url, timeout=PATIENCE_S, trust_env=False) as browser:
         answer = sign_in(browser, "anna")
         name, _, rest = answer.headers["set-cookie"].partition("=")
@@ -118,7 +118,7 @@ def test_the_cookie_is_strict_and_is_never_the_one_that_a_browser_brought(live: 
         ([], 400),
     ],
 )
-def test_who_is_not_there_does_not_get_in(live: Bridge, body: Any, status: int) -> None:
+def test_an_unknown_name_cannot_sign_in(live: Bridge, body: Any, status: int) -> None:
     with live_from(live, "127.0.7.1") as browser:
         answer = browser.post("/api/signin", json=body, headers=OWN)
     assert (answer.status_code, "set-cookie" in answer.headers) == (status, False)
@@ -126,12 +126,12 @@ def test_who_is_not_there_does_not_get_in(live: Bridge, body: Any, status: int) 
 
 
 def live_from(live: Bridge, address: str) -> httpx.Client:
-    """A client at another address of this machine: each has tries of its own."""
+    """A client at another address of this machine: attempts are counted per address."""
     transport = httpx.HTTPTransport(local_address=address)
     return httpx.Client(base_url=live.url, transport=transport, timeout=PATIENCE_S)
 
 
-def test_trying_is_slowed_down_for_the_address_that_tries(live: Bridge) -> None:
+def test_repeated_attempts_slow_down_only_their_own_address(live: Bridge) -> None:
     with live_from(live, "127.0.7.2") as guesser, live_from(live, "127.0.7.3") as other:
 
         def is_slowed() -> bool:
@@ -143,7 +143,7 @@ def test_trying_is_slowed_down_for_the_address_that_tries(live: Bridge) -> None:
         assert sign_in(other, "anna").status_code == 204
 
 
-def test_the_audit_trail_is_the_admins(live: Bridge) -> None:
+def test_only_an_admin_reads_the_audit_trail(live: Bridge) -> None:
     with signed_in(live.url, "anna") as browser:
         assert browser.get("/api/audit").status_code == 403
     assert live.get("/api/audit", BEARER).status_code == 403
@@ -153,10 +153,10 @@ def test_the_audit_trail_is_the_admins(live: Bridge) -> None:
     assert {(row.what, row.subject) for row in found} >= {("add account", "anna operator")}
 
 
-# --- what they say ------------------------------------------------------------------------------
+# --- notes --------------------------------------------------------------------------------------
 
 
-def test_a_word_is_shared_with_every_browser_at_once_and_can_be_taken_back(live: Bridge) -> None:
+def test_a_note_reaches_every_browser_at_once_and_can_be_withdrawn(live: Bridge) -> None:
     ws = f"{live.url.replace('http', 'ws', 1)}/ws/state"
     with (
         signed_in(live.url, "anna") as anna,
@@ -180,7 +180,7 @@ def test_a_word_is_shared_with_every_browser_at_once_and_can_be_taken_back(live:
         assert notes(live)[0].withdrawn_by == "anna"
 
 
-def test_of_two_words_the_later_one_stands_and_both_are_kept(live: Bridge) -> None:
+def test_of_two_notes_the_later_one_holds_and_both_are_stored(live: Bridge) -> None:
     subject = alarm(live, "b")
     with signed_in(live.url, "anna") as anna, signed_in(live.url, "bert") as bert:
         first = write(anna, kind="acknowledge", subject=subject).json()
@@ -195,7 +195,7 @@ def test_of_two_words_the_later_one_stands_and_both_are_kept(live: Bridge) -> No
         assert "acknowledged_by" not in alarms(live)["b"]
 
 
-def test_a_critical_alarm_is_shelved_for_a_reason_and_an_hour_and_anybody_ends_that(
+def test_a_critical_alarm_is_shelved_with_a_reason_for_at_most_an_hour_and_anyone_may_end_it(
     live: Bridge,
 ) -> None:
     subject = alarm(live)
@@ -237,7 +237,7 @@ def test_a_critical_alarm_is_shelved_for_a_reason_and_an_hour_and_anybody_ends_t
         ([1], 400, "the body"),
     ],
 )
-def test_what_cannot_be_a_note_is_refused_in_one_line(
+def test_an_invalid_note_is_refused_in_one_line(
     live: Bridge, note: Any, status: int, says: str
 ) -> None:
     before = notes(live)
@@ -262,7 +262,7 @@ def test_a_comment_on_a_tag_or_the_greenhouse_is_found_by_subject_and_period(liv
 # --- attacks ------------------------------------------------------------------------------------
 
 
-def test_who_only_reads_writes_nothing(live: Bridge) -> None:
+def test_a_reader_cannot_write(live: Bridge) -> None:
     note = {"kind": "comment", "subject": "site", "text": "x"}
     assert live.http.post("/api/notes", json=note, headers={**OWN, **BEARER}).status_code == 403
     assert live.http.post("/api/notes", json=note, headers=OWN).status_code == 401
@@ -283,7 +283,7 @@ def test_who_only_reads_writes_nothing(live: Bridge) -> None:
         ({"X-HTTP-Method-Override": "DELETE"}, 201),
     ],
 )
-def test_another_page_cannot_write_with_somebodys_cookie(
+def test_a_foreign_page_cannot_write_with_a_cookie(
     live: Bridge, headers: dict[str, str], status: int
 ) -> None:
     with signed_in_once(live) as anna:
@@ -321,7 +321,7 @@ def test_one_name_cannot_fill_the_log(live: Bridge, accounts: Path) -> None:
         (b"POST /api/notes HTTP/1.1\r\nContent-Length: -1", b"400"),
     ],
 )
-def test_a_body_that_nobody_wants_is_refused_before_it_comes(
+def test_an_unwanted_body_is_refused_before_it_is_sent(
     live: Bridge, head: bytes, status: bytes
 ) -> None:
     answer = raw_http.answer(live.url, head + b"\r\nHost: localhost\r\n\r\n")
@@ -339,7 +339,7 @@ def test_no_secret_is_logged(live: Bridge) -> None:
         assert secret not in live.process.output
 
 
-def test_without_accounts_everything_is_as_before_and_nobody_writes() -> None:
+def test_without_accounts_everything_works_as_before_and_nothing_can_be_written() -> None:
     with bridge("--ros-args", "-p", "journal:=off") as running:
         running.peer.wait_for_twin()
         running.peer.observe(look("a"))

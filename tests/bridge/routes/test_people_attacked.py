@@ -1,4 +1,4 @@
-"""What people say, and who may, as an attacker tries it. A real server, real sockets."""
+"""Notes and accounts under attack. A real server, real sockets."""
 
 import json
 import signal
@@ -62,7 +62,7 @@ def anna(live: Bridge) -> Iterator[httpx.Client]:
         yield browser
 
 
-def test_a_comment_is_about_a_moment_of_the_past_or_now(live: Bridge, anna: httpx.Client) -> None:
+def test_a_comment_is_about_a_past_moment_or_now(live: Bridge, anna: httpx.Client) -> None:
     then = in_s(live, -86_400)
     made = write(anna, **COMMENT_NOW, until=then)
     assert (made.status_code, made.json()["until"]["sec"]) == (201, int(then)), made.text
@@ -78,7 +78,7 @@ def test_a_comment_is_about_a_moment_of_the_past_or_now(live: Bridge, anna: http
     assert "'withdraw'" in live.get("/api/notes", BEARER, kind="withdraw").text
 
 
-def test_a_revoked_token_opens_nothing_also_where_another_has_its_name(
+def test_a_revoked_token_opens_nothing_even_when_another_has_its_name(
     live: Bridge, accounts: Path
 ) -> None:
     leaked, fresh = (f"{name}-{TOKEN}" for name in ("leaked", "fresh"))
@@ -100,7 +100,7 @@ def test_a_revoked_token_opens_nothing_also_where_another_has_its_name(
     assert live.get("/api/session", ours).json()["name"] == "plc"
 
 
-def test_who_is_removed_while_they_write_writes_nothing(live: Bridge, accounts: Path) -> None:
+def test_an_account_removed_during_a_write_writes_nothing(live: Bridge, accounts: Path) -> None:
     add(accounts, gone="operator")
     with signed_in(live.url, "gone") as browser:
         cookie = "; ".join(f"{name}={value}" for name, value in browser.cookies.items())
@@ -113,7 +113,7 @@ def test_who_is_removed_while_they_write_writes_nothing(live: Bridge, accounts: 
     host, port = live.url.removeprefix("http://").split(":")
     with socket.create_connection((host, int(port)), timeout=PATIENCE_S) as client:
         client.sendall(head.encode())
-        # They have been let in, and their note is waited for.
+        # They have been admitted, and their note is pending.
         assert client.recv(65536).startswith(b"HTTP/1.1 100")
         remove(accounts, "gone")
         client.sendall(body.encode())
@@ -134,7 +134,7 @@ def test_who_is_removed_while_they_write_writes_nothing(live: Bridge, accounts: 
         b"",
     ],
 )
-def test_what_is_no_text_is_refused(anna: httpx.Client, body: bytes) -> None:
+def test_invalid_text_is_refused(anna: httpx.Client, body: bytes) -> None:
     answer = anna.post("/api/notes", content=body, headers={"Content-Type": "application/json"})
     assert answer.status_code == 400, answer.text
     assert len(answer.text) < 300
@@ -144,7 +144,7 @@ def test_what_is_no_text_is_refused(anna: httpx.Client, body: bytes) -> None:
     "text",
     ["<script>alert(1)</script>", "a\u202ecod.exe", "'; DROP TABLE note; --"],
 )
-def test_any_text_comes_back_as_it_was_said_and_as_nothing_but_json(
+def test_any_text_is_returned_unchanged_as_json(
     live: Bridge, anna: httpx.Client, text: str
 ) -> None:
     assert write(anna, **{**COMMENT_NOW, "text": text}).status_code == 201
@@ -154,7 +154,7 @@ def test_any_text_comes_back_as_it_was_said_and_as_nothing_but_json(
     assert headers["x-content-type-options"] == "nosniff"
 
 
-def test_who_leaves_amid_a_body_is_no_error_and_nor_is_a_stop_amid_one(accounts: Path) -> None:
+def test_a_disconnect_or_a_shutdown_during_a_body_is_no_error(accounts: Path) -> None:
     half = b"POST /api/signin HTTP/1.1\r\nHost: %s\r\nX-Lupin-Twin: 1\r\n"
     half += b"Content-Type: application/json\r\nContent-Length: 99\r\n\r\n{"
     with bridge("--accounts", str(accounts)) as running:
@@ -168,9 +168,9 @@ def test_who_leaves_amid_a_body_is_no_error_and_nor_is_a_stop_amid_one(accounts:
         assert "ERROR" not in running.process.output
 
 
-def test_a_stop_amid_a_sign_in_is_no_error(tmp_path: Path) -> None:
+def test_a_shutdown_during_a_sign_in_is_no_error(tmp_path: Path) -> None:
     path = tmp_path / "accounts.sqlite"
-    # What the hash says of itself decides: minutes to look at it.
+    # The parameters in the hash decide the work: minutes for this one.
     add(path, secret=f"$argon2id$v=19$m=65536,t=2000,p=1${'A' * 22}${'A' * 43}", anna="viewer")
     body = json.dumps({"name": "anna", "password": "x" * 12}).encode()
     asks = b"POST /api/signin HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Lupin-Twin: 1\r\n"
@@ -178,7 +178,7 @@ def test_a_stop_amid_a_sign_in_is_no_error(tmp_path: Path) -> None:
     with bridge("--accounts", str(path)) as running, raw_http.connect(running.url) as client:
         client.sendall(asks)
         with raw_http.connect(running.url) as gone:
-            for _ in range(2):  # behind an answer that is awaited no more is read, nor the end
+            for _ in range(2):  # after a response, neither the rest nor the end is read
                 gone.sendall(asks)
                 running.get("/healthz")
         running.get("/healthz")  # and all is read
@@ -187,7 +187,7 @@ def test_a_stop_amid_a_sign_in_is_no_error(tmp_path: Path) -> None:
         assert "ERROR" not in running.process.output
 
 
-def test_what_is_open_ends_with_the_first_account_and_when_the_accounts_have_gone(
+def test_open_connections_end_when_the_first_account_is_created_and_when_the_file_is_gone(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "accounts.sqlite"
@@ -203,7 +203,7 @@ def test_what_is_open_ends_with_the_first_account_and_when_the_accounts_have_gon
             assert "the session has ended" in end_of(stream)
 
 
-def test_ten_thousand_notes_hold_nobody_up(accounts: Path, tmp_path: Path) -> None:
+def test_ten_thousand_notes_delay_nothing(accounts: Path, tmp_path: Path) -> None:
     path, now_ns = tmp_path / "j.sqlite", time.time_ns()
     kept(path, [])
     notes = (

@@ -1,11 +1,11 @@
-"""`/rosbridge` of a real `lupin-twin serve`: its names and limits; the rest is in `test_roslib`."""
+"""`/rosbridge` of a real `lupin-twin serve`: names and limits; the rest is in `test_roslib`."""
 
 from tests.support.processes import limits
 from tests.support.rosbridge import FIELD, FIELD_ARGS, ros_at
 from tests.support.web import bridge
 
 
-def test_names_are_the_ones_that_ros_knows() -> None:
+def test_names_are_those_of_ros() -> None:
     remapping = ("--ros-args", "-r", "/twin/state:=/house/state", "-p", "field_service_name:=field")
     with bridge(*remapping) as house, ros_at(house.url) as ros:
         topics = ros.call("/rosapi/topics")["values"]

@@ -1,4 +1,4 @@
-"""`/rosbridge` in the test's own process, with a twin that can be held up: what bounds a client."""
+"""`/rosbridge` in the test's own process, with a twin that can be blocked: limits of a client."""
 
 import asyncio
 from collections.abc import Callable
@@ -29,7 +29,7 @@ from tests.support.waiting import until
 
 
 def calls(count: int) -> list[Message]:
-    """Calls for as many fields: the same one would be asked of the twin once."""
+    """Calls for different fields: equal ones would share one computation."""
     return [
         {
             "op": "call_service",
@@ -49,7 +49,7 @@ async def in_thread(url: str, talk: Callable[[Ros], Any]) -> Any:
     return await asyncio.to_thread(connected)
 
 
-async def test_open_calls_are_bounded_and_the_rest_is_answered(
+async def test_open_calls_are_limited_and_the_others_get_an_error(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     running_at_once = 0
@@ -96,7 +96,7 @@ async def test_open_calls_are_bounded_and_the_rest_is_answered(
         (None, f"{FIELD} did not answer within 0.1 s"),
     ],
 )
-async def test_an_error_on_the_way_ends_the_call_and_nothing_else(
+async def test_an_error_during_a_call_ends_it_and_nothing_else(
     domain: int, monkeypatch: pytest.MonkeyPatch, error: Exception | None, text: str
 ) -> None:
     async with inprocess.running(Limits(answer_timeout_s=0.1)) as here:
@@ -115,7 +115,7 @@ async def test_an_error_on_the_way_ends_the_call_and_nothing_else(
         await in_thread(here.url, talk)
 
 
-async def test_who_has_not_subscribed_is_sent_nothing_and_counts_as_sent_nothing(
+async def test_a_client_without_subscriptions_is_sent_nothing_and_counted_as_such(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async with inprocess.running() as here:
@@ -138,7 +138,7 @@ async def test_who_has_not_subscribed_is_sent_nothing_and_counts_as_sent_nothing
         writer.transport.abort()
 
 
-async def test_each_subscription_begins_with_the_state_although_it_is_no_new_one(
+async def test_each_subscription_starts_with_the_current_state_even_without_a_change(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async with inprocess.running() as here:
@@ -153,7 +153,7 @@ async def test_each_subscription_begins_with_the_state_although_it_is_no_new_one
         await in_thread(here.url, talk)
 
 
-async def test_many_messages_at_once_do_not_hold_up_the_others(
+async def test_many_messages_at_once_do_not_delay_the_others(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     turns, at_turn = 0, list[int]()
@@ -180,7 +180,7 @@ async def test_many_messages_at_once_do_not_hold_up_the_others(
         other.cancel()
 
 
-async def test_a_client_that_leaves_takes_its_calls_along(
+async def test_a_client_that_disconnects_cancels_its_calls(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     began, ended = 0, 0
@@ -207,18 +207,18 @@ async def test_a_client_that_leaves_takes_its_calls_along(
 
 
 @pytest.mark.parametrize("is_subscribed", [False, True])
-async def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little(
+async def test_a_client_that_reads_no_reply_is_closed_and_meanwhile_holds_little(
     domain: int, monkeypatch: pytest.MonkeyPatch, is_subscribed: bool
 ) -> None:
     async with inprocess.running(Limits(client_timeout_s=1.0)) as here:
-        # A reader that is let go of would be emptied by asyncio.
+        # asyncio would drain a reader that is released.
         _reader, writer = await deaf(here.url, "/rosbridge")
         hub = here.bridge.hub
         await until(lambda: len(hub) == 1, "the client")
         if is_subscribed:
             writer.write(masked({"op": "subscribe", "topic": TOPIC}))
             await until(lambda: hub.frames_sent >= 1, "its first state")
-            # Nor does a state show that it is stuck, where the twin is silent.
+            # With a silent twin, no state shows that it is stuck.
             monkeypatch.setattr(hub, "publish", lambda _frame, _now_s: None)
         writer.write(masked(LARGE_CALL) * 5)
         most_bytes = 0
@@ -236,12 +236,12 @@ async def test_a_client_that_takes_no_reply_is_closed_and_meanwhile_holds_little
         writer.transport.abort()
 
 
-async def test_a_client_that_was_slow_to_take_a_reply_stays(domain: int) -> None:
+async def test_a_client_that_reads_a_reply_slowly_stays(domain: int) -> None:
     async with inprocess.running() as here:
         reader, writer = await deaf(here.url, "/rosbridge")
         writer.write(masked(LARGE_CALL) * 3)
         await until(lambda: here.bridge.hub.blocked == 1, "a full socket")
-        # Each with a reply of its own, to the same question too.
+        # Each with its own reply, also to equal calls.
         unsent = here.bridge.hub.unsent
         await until(lambda: unsent.bytes > 8_000_000, "two replies to count for all clients")
         while here.bridge.hub.blocked:

@@ -1,4 +1,4 @@
-"""Signing in: the page, the exchange, and the cookie's bounds."""
+"""Signing in: the page, the exchange, and the limits of the cookie."""
 
 import json
 import re
@@ -46,14 +46,14 @@ def test_the_page_and_its_parts_need_no_token(closed: Served, path: str, media_t
     assert closed.get(path, method="POST").status_code == 405
 
 
-def test_the_page_has_nothing_inline_and_nothing_from_elsewhere(closed: Served) -> None:
+def test_the_page_has_nothing_inline_and_nothing_external(closed: Served) -> None:
     page = closed.get("/signin").text
     assert not re.search(r"<script(?![^>]*\ssrc=)|<style|\sstyle=|\son\w+=", page)
     assert "//" not in re.sub(r"<!--.*?-->", "", page, flags=re.DOTALL)
 
 
-def test_without_its_script_the_page_sends_the_token_nowhere(closed: Served) -> None:
-    """A field without a name is not part of what a browser submits."""
+def test_without_its_script_the_page_sends_no_token(closed: Served) -> None:
+    """A browser does not submit a field without a name."""
     fields = re.findall(r"<(?:input|button|select|textarea)[^>]*>", closed.get("/signin").text)
     assert fields
     assert not [field for field in fields if re.search(r"\sname=", field)]
@@ -68,7 +68,7 @@ def test_without_its_script_the_page_sends_the_token_nowhere(closed: Served) -> 
         ("?lang=xx", "de", "en", "Access token"),
     ],
 )
-def test_the_page_speaks_the_language_of_who_asks(
+def test_the_page_is_in_the_language_of_the_browser(
     closed: Served, query: str, accepts: str, language: str, says: str
 ) -> None:
     answer = closed.get(f"/signin{query}", {"Accept-Language": accepts})
@@ -78,7 +78,7 @@ def test_the_page_speaks_the_language_of_who_asks(
     assert answer.headers["vary"] == "Accept-Language"
 
 
-def test_all_languages_of_the_page_say_the_same_things() -> None:
+def test_the_page_has_the_same_texts_in_all_languages() -> None:
     text = files("lupin_bridge.routes").joinpath("signin_page/words.json").read_text("utf-8")
     english, *others = json.loads(text).values()
     assert len(others) == 3
@@ -91,7 +91,7 @@ def test_all_languages_of_the_page_say_the_same_things() -> None:
 # --- the exchange -------------------------------------------------------------------------------
 
 
-def test_the_token_is_traded_for_a_strict_cookie(closed: Served) -> None:
+def test_the_token_is_exchanged_for_a_strict_cookie(closed: Served) -> None:
     answer = closed.post("/api/signin", BEARER)
     assert (answer.status_code, answer.content) == (204, b"")
     assert answer.headers["cache-control"] == "no-store"
@@ -128,14 +128,14 @@ def test_no_cookie_without_the_token(closed: Served, header: dict[str, str]) -> 
     assert "set-cookie" not in answer.headers
 
 
-def test_a_good_cookie_does_not_excuse_a_wrong_token(closed: Served) -> None:
+def test_a_valid_cookie_does_not_excuse_a_wrong_token(closed: Served) -> None:
     with closed.client() as browser:
         browser.post("/api/signin", headers={**BEARER, **OWN})
         wrong = browser.get("/api/state", headers={"Authorization": "Bearer wrong"})
         assert wrong.status_code == 401
 
 
-def test_without_a_token_there_is_nothing_to_sign_in_to() -> None:
+def test_without_a_token_there_is_no_sign_in() -> None:
     with served() as live:
         page = live.get("/signin")
         assert (page.status_code, page.headers["location"]) == (303, "./")
@@ -157,7 +157,7 @@ def session(closed: Served) -> dict[str, str]:
 
 
 def ending_in(seconds: float) -> dict[str, str]:
-    """The Cookie header of a session that lasts so much longer."""
+    """The Cookie header of a session that lasts that much longer."""
     ours = Credentials(TOKEN)
     begun_s = time.time() + seconds - SHARED_SESSION_S
     return {"Cookie": f"{ours.cookie_name}={ours.cookie(begun_s)}"}
@@ -205,7 +205,7 @@ def test_signing_out_ends_the_session_here_and_in_the_browser(closed: Served) ->
 
 
 @pytest.mark.parametrize("path", ["/ws/state", "/rosbridge"])
-def test_signing_out_closes_what_the_session_has_open_and_nothing_else(
+def test_signing_out_closes_the_connections_of_that_session_alone(
     closed: Served, path: str
 ) -> None:
     mine, other = session(closed), session(closed)
@@ -222,7 +222,7 @@ def test_signing_out_closes_what_the_session_has_open_and_nothing_else(
             unconcerned.recv(timeout=PATIENCE_S)
 
 
-def test_a_session_that_ends_by_itself_closes_what_it_has_open(closed: Served) -> None:
+def test_an_expired_session_closes_its_connections(closed: Served) -> None:
     start_s, mine = time.time(), ending_in(6.0)
     with (
         listening(closed, mine, "/ws/state") as one,
@@ -237,15 +237,15 @@ def test_a_session_that_ends_by_itself_closes_what_it_has_open(closed: Served) -
     [
         {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors", "Sec-Fetch-Dest": "image"},
         {"Sec-Fetch-Site": "same-site", "Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document"},
-        {"Origin": "http://127.0.0.1:1"},  # the cookie comes along: to a browser, it is one site
+        {"Origin": "http://127.0.0.1:1"},  # the cookie is sent: to a browser, it is one site
         {},
     ],
 )
 @pytest.mark.parametrize("method", ["GET", "POST", "HEAD"])
-def test_no_other_page_signs_anybody_out(
+def test_no_other_page_can_sign_anybody_out(
     closed: Served, headers: dict[str, str], method: str
 ) -> None:
-    """With no header but those that a browser sends by itself; over plain http, they are few."""
+    """With the headers that a browser sends by itself; over plain http, they are few."""
     mine = session(closed)
     answer = closed.get("/api/signout", {**mine, **headers}, method)
     assert answer.status_code in (403, 405)
@@ -253,7 +253,7 @@ def test_no_other_page_signs_anybody_out(
     assert closed.get("/api/state", mine).status_code == 200
 
 
-def test_a_page_is_told_whether_it_can_sign_out(closed: Served) -> None:
+def test_a_page_knows_whether_it_can_sign_out(closed: Served) -> None:
     told = closed.get("/api/session", session(closed)).json()
     assert (told["name"], told["role"], told["can_write_notes"]) == (None, "viewer", False)
     assert told["can_sign_out"]

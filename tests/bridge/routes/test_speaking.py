@@ -20,12 +20,14 @@ SPOKEN = ("en", "de", "nl", "es")
         ("", ";q=1,,de;q=0.1", "de"),
         ("lang=nl", "de", "nl"),
         ("lang=DE-ch", "", "de"),
-        # What is not spoken is not the browser's own language either.
+        # No variant of the browser's language either.
         ("lang=xx", "de", "en"),
         ("lang=", "de", "en"),
     ],
 )
-def test_the_language_of_who_asks(asked: str, accepted: str, language: str) -> None:
+def test_the_language_is_chosen_from_accept_language(
+    asked: str, accepted: str, language: str
+) -> None:
     headers = [(b"accept-language", accepted.encode())]
     request = Request({"type": "http", "query_string": asked.encode(), "headers": headers})
     assert language_of(request, SPOKEN) == language

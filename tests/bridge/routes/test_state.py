@@ -14,14 +14,14 @@ from tests.support.messages import discovered, look, pose, scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge, filled
 
-# The twin itself publishes once in 100 s: what comes earlier was caused by a change, or is the
-# bridge's own heartbeat, which changes no revision.
+# The twin publishes only once in 100 s: anything earlier is due to a change, or is the
+# bridge's own heartbeat, which does not change the revision.
 SILENT = ("--ros-args", "-p", "state_publish_rate_hz:=0.01", "-p", "buffer_len:=3")
 
 
 @pytest.fixture(scope="module")
 def live() -> Iterator[Bridge]:
-    """A bridge for many tests, each with tags of its own."""
+    """A bridge for many tests, each with its own tags."""
     with bridge(*SILENT) as running:
         yield running
 
@@ -29,7 +29,7 @@ def live() -> Iterator[Bridge]:
 # --- WebSocket ----------------------------------------------------------------------------------
 
 
-def test_a_change_is_pushed_without_waiting_for_the_twins_next_publication(live: Bridge) -> None:
+def test_a_change_is_pushed_before_the_twins_next_publication(live: Bridge) -> None:
     with live.listen() as listener, live.listen(max_rate_hz=0.01) as rare:
         listener.until("state")
         rare.until("state")
@@ -42,7 +42,7 @@ def test_a_change_is_pushed_without_waiting_for_the_twins_next_publication(live:
         assert not [frame for frame in rare.rest() if frame["type"] == "state"], "due in 100 s"
 
 
-def test_what_cannot_be_served_is_refused_with_the_reason(live: Bridge) -> None:
+def test_an_invalid_request_is_refused_with_the_reason(live: Bridge) -> None:
     reasons = {
         "rate": "parameter 'rate' is unknown, expected delta, max_rate_hz",
         "max_rate_hz": ("max_rate_hz is '" + r"\U0001f337" * 40)[:MAX_REASON_BYTES],
@@ -70,7 +70,7 @@ def test_a_live_bridge_is_healthy_and_ready(live: Bridge) -> None:
 
 
 @pytest.mark.parametrize("path", ["/api/tags/nobody", "/api/tags/nobody/history"])
-def test_a_tag_that_is_not_there_is_named_with_404(live: Bridge, path: str) -> None:
+def test_an_unknown_tag_is_a_404_with_its_name(live: Bridge, path: str) -> None:
     known = len(live.json("/api/state")["tags"])
     answer = live.get(path)
     assert answer.status_code == 404
@@ -108,7 +108,7 @@ def history(live: Bridge, tag_id: str) -> dict[str, list[Any]]:
     return {sensor["name"]: [v["value"] for v in sensor["values"]] for sensor in sensors}
 
 
-def test_a_history_holds_the_last_scans_and_no_look(live: Bridge) -> None:
+def test_a_history_holds_the_last_scans_and_no_inspection(live: Bridge) -> None:
     for value in range(5):
         live.peer.observe(scan("past", {"co2": value}, stamp_s=100.0 + value))
     live.peer.observe(scan("past", {"light": 900.0}, stamp_s=110.0), look("past"))
@@ -119,8 +119,8 @@ def test_a_history_holds_the_last_scans_and_no_look(live: Bridge) -> None:
     assert values[0]["stamp"] == {"sec": 103, "nanosec": 0}
 
 
-def test_what_was_tried_and_when_what_was_observed_is_told(live: Bridge) -> None:
-    """10 s: a scan; 3610 s: a look; 7210 s: a scan of light alone; 7300 s: a try that failed."""
+def test_attempts_and_their_times_are_reported(live: Bridge) -> None:
+    """10 s: a scan; 3610 s: an inspection; 7210 s: a scan of light; 7300 s: a failed attempt."""
     failed = scan("told", status=Observation.STATUS_SCAN_FAILED, stamp_s=7300.0)
     failed.status_detail = "not decoded"
     live.peer.observe(

@@ -1,4 +1,4 @@
-"""The door of a bridge that may open few files: whoever is stuck in it makes room for others."""
+"""Connections to a bridge with few file descriptors: idle ones are evicted for new ones."""
 
 import asyncio
 import resource
@@ -35,10 +35,10 @@ GET = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n"
 
 @pytest.fixture(scope="module")
 def shared() -> Iterator[tuple[Served, int]]:
-    """`lupin-twin serve` that may open no more than `FILES` files, and how many it has open."""
+    """`lupin-twin serve` with at most `FILES` open files, and how many it has open."""
     shell = ["/bin/sh", "-c", f'ulimit -n {FILES} && exec "$@"', "sh"]
-    # No deadline ends who waits. Without a journal, no process that looks back, which would want
-    # files too.
+    # No deadline ends a waiting client. There is no journal, since the past process needs files
+    # too.
     command = [
         *(sys.executable, "-m", "tests.support.limited", "serve", "--port", "0"),
         *limits(client_timeout_s=3_600),
@@ -54,7 +54,7 @@ def shared() -> Iterator[tuple[Served, int]]:
 
 @pytest.fixture
 def live(shared: tuple[Served, int]) -> Iterator[Served]:
-    """It, with nobody connected any more."""
+    """The same bridge, with no connections left."""
     served, files = shared
     yield served
     wait_for(lambda: open_files(served.process.pid) <= files, "the end of all connections")
@@ -69,7 +69,7 @@ def live(shared: tuple[Served, int]) -> Iterator[Served]:
     ],
     ids=["nothing", "half a request", "a request, and no more"],
 )
-def test_who_asks_for_nothing_makes_room_for_who_does(live: Served, said: bytes) -> None:
+def test_an_idle_connection_is_evicted_for_an_active_one(live: Served, said: bytes) -> None:
     with ExitStack() as stack:
         kept = open_files(live.process.pid)
         for _ in range(STUCK):
@@ -82,7 +82,7 @@ def test_who_asks_for_nothing_makes_room_for_who_does(live: Served, said: bytes)
         live.process.wait_for_output("evicted the ")
 
 
-def test_one_address_crowds_out_none_but_itself(live: Served) -> None:
+def test_one_address_evicts_only_its_own_connections(live: Served) -> None:
     with ExitStack() as stack:
         quiet = stack.enter_context(raw_http.connect(live.url, "127.0.7.1"))
         quiet.sendall(GET[:-2])
@@ -99,8 +99,8 @@ def test_websockets_leave_room_for_requests_and_stay(live: Served) -> None:
         line = live.process.wait_for_output("--max-clients is 5000")
         listeners = [stack.enter_context(deaf_client(live.url)) for _ in range(FILES)]
 
-        # Those for whom there is no place are told so, and stay as long as one takes to read why,
-        # unless others come.
+        # Those without a place get the reason, and stay long enough to read it, unless others
+        # come.
         assert all(raw_http.status(raw_http.answer(live.url, GET)) == 200 for _ in range(20))
         served_clients = int(line.rpartition("serving ")[2].split()[0])
         assert FILES // 8 < served_clients < FILES // 2
@@ -115,10 +115,10 @@ def test_websockets_leave_room_for_requests_and_stay(live: Served) -> None:
         assert len(listeners) == FILES
 
 
-def test_out_of_files_it_waits_says_so_once_and_recovers(live: Served) -> None:
+def test_out_of_files_it_waits_logs_so_once_and_recovers(live: Served) -> None:
     with ExitStack() as stack:
         pid = live.process.pid
-        # All files that it may have are open, as far as it can tell, and no connection among them.
+        # By its count, all of its files are open, and none of them is a connection.
         resource.prlimit(pid, resource.RLIMIT_NOFILE, (open_files(pid) - 1, FILES))
         waiting = [stack.enter_context(raw_http.connect(live.url)) for _ in range(50)]
         for client in waiting:
@@ -129,14 +129,14 @@ def test_out_of_files_it_waits_says_so_once_and_recovers(live: Served) -> None:
         assert live.process.output.count("no new connections") == 1
 
 
-def test_who_goes_before_he_is_let_in_does_no_harm(live: Served) -> None:
+def test_a_disconnect_before_the_accept_does_no_harm(live: Served) -> None:
     for _ in range(200):
         with raw_http.connect(live.url) as client, suppress(OSError):
             client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
     assert raw_http.status(raw_http.answer(live.url, GET)) == 200
 
 
-async def test_nobody_is_turned_out_before_somebody_else_comes() -> None:
+async def test_no_connection_is_evicted_before_another_one_comes() -> None:
     room = 3
 
     class Waiting(asyncio.Protocol):
@@ -170,7 +170,7 @@ async def test_nobody_is_turned_out_before_somebody_else_comes() -> None:
         await until(lambda: not guests, "their end")
 
 
-async def test_an_error_that_room_does_not_mend_evicts_nobody(
+async def test_an_error_that_eviction_cannot_fix_evicts_nothing(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     gone: list[bool] = []
@@ -185,7 +185,9 @@ async def test_an_error_that_room_does_not_mend_evicts_nobody(
     assert "evicted" not in caplog.text
 
 
-async def test_who_never_agrees_on_tls_makes_room_too(tmp_path: Path) -> None:
+async def test_an_unfinished_tls_handshake_is_evicted_too(
+    tmp_path: Path,
+) -> None:
     ours, tls = certificate(tmp_path), ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     tls.load_cert_chain(ours.cert, ours.key)
     with listen("127.0.0.1", 0) as listener, ExitStack() as stack:
@@ -198,7 +200,7 @@ async def test_who_never_agrees_on_tls_makes_room_too(tmp_path: Path) -> None:
         await door.wait_closed()
 
 
-def test_room_is_what_the_limit_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_room_is_what_the_limit_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
     limits = [(10_000, 10_000)]
     monkeypatch.setattr(resource, "getrlimit", lambda _: limits[-1])
     room = room_for_connections()

@@ -1,4 +1,4 @@
-"""Answers that are computed: how many and how often, each client by itself and all together."""
+"""Limits of computed answers: number and rate, for each client and for all together."""
 
 import asyncio
 from collections import Counter
@@ -34,7 +34,7 @@ COMPUTED = ("/api/state", HISTORY, EXPORT, "/metrics", "/docs")
 
 
 def admitted(rate_hz: float, seconds: float) -> int:
-    """How many requests of a client get in that come evenly, by the limits as they are set."""
+    """How many evenly spaced requests of a client are admitted, by the default limits."""
     limits = Limits()
     admission = Admission(limits)
     count = 0
@@ -44,15 +44,15 @@ def admitted(rate_hz: float, seconds: float) -> int:
     return count
 
 
-def test_a_page_that_is_dragged_through_the_past_is_let_in_and_a_flood_is_not() -> None:
+def test_dragging_through_the_past_is_admitted_and_a_flood_is_not() -> None:
     moments_hz, seconds = 10.0, 60.0
-    # A state, a field, and the field that is compared with it.
+    # A state, a field, and the field to compare.
     assert admitted(3 * moments_hz, seconds) == 3 * moments_hz * seconds
     allowed = Limits().answers_per_s * (seconds + BURST_S)
     assert admitted(1_000.0, seconds) == pytest.approx(allowed, abs=1)
 
 
-def test_the_slowest_export_makes_place_and_who_takes_enough_does_not() -> None:
+def test_the_slowest_export_is_evicted_unless_it_is_fast_enough() -> None:
     admission = Admission(Limits(answers_per_s=1000.0, concurrency=9, total_concurrency=9))
     ended: list[str] = []
     with ExitStack() as taken:
@@ -63,7 +63,7 @@ def test_the_slowest_export_makes_place_and_who_takes_enough_does_not() -> None:
             )
 
         running_ = {client: begin(client, 0.0) for client in "abcd"}
-        for now_s in range(1, 100):  # "b" takes half of what is enough
+        for now_s in range(1, 100):  # "b" reads at half of the sufficient rate
             for client, size in (("a", 150_000), ("b", 50_000), ("c", 150_000), ("d", 200_000)):
                 running_[client].take(size, now_s)
         begin("e", 100.0)
@@ -79,7 +79,7 @@ def test_the_slowest_export_makes_place_and_who_takes_enough_does_not() -> None:
     assert admission.exporting == 0
 
 
-def test_an_export_that_was_broken_off_frees_no_place_of_the_next() -> None:
+def test_a_cancelled_export_does_not_free_the_place_of_the_next() -> None:
     admission = Admission(Limits())
     with ExitStack() as taken, ExitStack() as broken_off:
         for client, stack in zip("abcdea", (broken_off, *[taken] * 5), strict=True):
@@ -89,7 +89,7 @@ def test_an_export_that_was_broken_off_frees_no_place_of_the_next() -> None:
         assert admission.exporting == EXPORTS
 
 
-def test_a_client_has_its_rate_and_is_told_when_to_come_back() -> None:
+def test_a_client_has_a_rate_and_is_told_when_to_retry() -> None:
     admission = Admission(Limits(answers_per_s=0.5, concurrency=9, total_concurrency=9))
     with admission.request("a", 0.0):
         pass
@@ -102,7 +102,7 @@ def test_a_client_has_its_rate_and_is_told_when_to_come_back() -> None:
         pass
 
 
-def test_a_request_refused_for_its_number_costs_no_turn() -> None:
+def test_a_request_refused_for_its_number_uses_no_turn() -> None:
     admission = Admission(Limits(answers_per_s=1.0, concurrency=1, total_concurrency=9))
     with admission.request("a", 0.0):
         for _ in range(100):
@@ -113,7 +113,7 @@ def test_a_request_refused_for_its_number_costs_no_turn() -> None:
 
 
 @pytest.mark.parametrize("total", [1, 2, 3])
-def test_few_places_are_for_large_computations_too(total: int) -> None:
+def test_large_computations_have_few_places(total: int) -> None:
     admission = Admission(Limits(answers_per_s=1.0, concurrency=1, total_concurrency=total))
     with ExitStack() as taken:
         for client in range(total):
@@ -121,7 +121,9 @@ def test_few_places_are_for_large_computations_too(total: int) -> None:
 
 
 @pytest.mark.parametrize("is_large", [False, True])
-def test_of_six_clients_that_ask_for_all_they_may_each_has_a_place(is_large: bool) -> None:
+def test_six_clients_at_their_limit_each_get_a_place(
+    is_large: bool,
+) -> None:
     limits = Limits()
     admission = Admission(limits)
     places: Counter[str] = Counter()
@@ -149,7 +151,7 @@ def slow() -> Iterator[Served]:
 
 
 @pytest.mark.parametrize("route", ROUTES)
-def test_every_route_of_a_field_has_the_limit(slow: Served, route: str) -> None:
+def test_every_field_route_has_the_limit(slow: Served, route: str) -> None:
     with slow.client(address=f"127.0.1.{ROUTES.index(route) + 1}") as client:
         query = QUERY.replace("co2", route)
         first = client.get(route + query)
@@ -174,7 +176,7 @@ def assert_slowed(answer: httpx.Response, why: str) -> None:
     assert f"requests more than {RATE_HZ} computed answers a second, the limit" in why
 
 
-def test_what_needs_no_computing_costs_no_turn(slow: Served) -> None:
+def test_routes_without_computation_use_no_turn(slow: Served) -> None:
     with slow.client(address="127.0.2.1") as client:
         for _ in range(5):
             assert client.get("/api/field?sensor_type=co2&resolution=-1").status_code == 400
@@ -186,7 +188,7 @@ def test_what_needs_no_computing_costs_no_turn(slow: Served) -> None:
 
 
 @pytest.mark.parametrize("route", COMPUTED)
-def test_every_other_answer_that_is_computed_has_it_too(slow: Served, route: str) -> None:
+def test_every_other_computed_answer_has_the_limit_too(slow: Served, route: str) -> None:
     address = f"127.0.4.{COMPUTED.index(route) + 1}"
     with slow.client(address=address) as client:
         assert client.get("/api/field.npy" + QUERY.replace("co2", address)).status_code == 200
@@ -196,7 +198,7 @@ def test_every_other_answer_that_is_computed_has_it_too(slow: Served, route: str
         assert_slowed(answer, detail)
 
 
-async def test_with_all_places_taken_it_is_503_until_one_is_free(domain: int) -> None:
+async def test_with_all_places_taken_the_answer_is_503_until_one_is_free(domain: int) -> None:
     async with running(Limits(total_concurrency=2)) as it:
         with ExitStack() as taken:
             for client in "ab":
@@ -206,17 +208,17 @@ async def test_with_all_places_taken_it_is_503_until_one_is_free(domain: int) ->
             assert busy.status_code == 503
             assert (busy.headers["retry-after"], busy.headers["vary"]) == ("1", "Accept")
             assert "the limit is 2" in busy.json()["detail"]
-            # What is live and cheap takes no place.
+            # Live and cheap answers take no place.
             for live in ("/api/state", "/api/health"):
                 assert (await it.http.get(live)).status_code == 200
         free = await asyncio.gather(*(it.http.get("/api/field" + QUERY) for _ in range(2)))
         assert [answer.status_code for answer in free] == [200, 200]
 
 
-async def test_a_place_is_held_until_there_is_an_answer_and_then_given_back(
+async def test_a_place_is_held_until_the_answer_exists_and_is_then_released(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of work that does not end, no more clients wait than the limit allows."""
+    """With work that never ends, no more clients wait than the limit allows."""
 
     time_is_up = asyncio.Event()
 
@@ -237,6 +239,6 @@ async def test_a_place_is_held_until_there_is_an_answer_and_then_given_back(
 
 
 @pytest.mark.parametrize("route", ["/docs", "/openapi.json"])
-def test_what_is_written_once_passes(slow: Served, route: str) -> None:
+def test_a_cached_answer_passes_the_limit(slow: Served, route: str) -> None:
     with slow.client(address=f"127.0.5.{len(route)}") as client:
         assert [client.get(route).status_code for _ in range(5)] == [200] * 5

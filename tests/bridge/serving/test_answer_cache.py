@@ -1,4 +1,4 @@
-"""Answers that are written already: what is kept, what goes, and what readers hold."""
+"""The cache of serialised answers: what is cached, what is evicted, and what readers hold."""
 
 from typing import Any
 
@@ -31,7 +31,7 @@ def holds(kept: AnswerCache, key: object, expected: Answer) -> bool:
     return lent is not None and lent[0] is expected
 
 
-def test_what_is_being_sent_stays_and_counts_until_it_is_given_back() -> None:
+def test_an_answer_being_sent_stays_and_counts_until_it_is_released() -> None:
     kept = kept_for(10, 10)
     kept.put("a", answer(10))
     lent = [kept.lend("a"), kept.lend("a")]
@@ -47,7 +47,7 @@ def test_what_is_being_sent_stays_and_counts_until_it_is_given_back() -> None:
     assert [has(kept, key) for key in "abcd"] == [False, False, False, True]
 
 
-def test_what_replaces_another_takes_its_place() -> None:
+def test_a_replacement_takes_the_place_of_the_old_answer() -> None:
     kept = kept_for(10, 10, 10)
     kept.put("field", answer(10))
     for number in range(100):
@@ -65,7 +65,7 @@ STEPS = st.lists(
 
 
 @given(STEPS)
-def test_the_bound_holds_whatever_happens(steps: list[Step]) -> None:
+def test_the_bound_always_holds(steps: list[Step]) -> None:
     kept = AnswerCache(max_bytes=60 + 3 * ENTRY_BYTES)
     lent: list[Any] = []
     for what, key, size in steps:
@@ -84,7 +84,7 @@ def test_the_bound_holds_whatever_happens(steps: list[Step]) -> None:
     assert (len(kept), kept.bytes) == (1, 60 + 3 * ENTRY_BYTES), "nobody holds anything any more"
 
 
-def test_the_newest_etags_are_told() -> None:
+def test_the_latest_etags_are_reported() -> None:
     kept = AnswerCache()
     for number in range(MAX_NEWEST + 1):
         kept.put(f'"{number}"', Answer(b"", "text/plain"))

@@ -1,4 +1,4 @@
-"""What a WebSocket client may say as JSON, up to the limits and past them."""
+"""JSON messages of a WebSocket client, at the limits and past them."""
 
 import pytest
 
@@ -11,7 +11,7 @@ def refusal(message: str | bytes) -> str:
     return str(caught.value)
 
 
-def test_an_object_is_read_and_nothing_else() -> None:
+def test_only_an_object_is_accepted() -> None:
     assert members_of('{"a": [1]}') == {"a": [1]}
     assert refusal(b"{}") == "a binary frame is refused, expected JSON text"
     assert refusal("[]") == "the message is an array, expected an object"
@@ -20,15 +20,15 @@ def test_an_object_is_read_and_nothing_else() -> None:
     assert refusal('{"a": NaN}').startswith("the message is not JSON: ")
 
 
-def test_a_long_message_is_not_even_read() -> None:
+def test_a_too_long_message_is_not_parsed() -> None:
     longest = '{"x":"' + "x" * (MAX_MESSAGE_LENGTH - 8) + '"}'
     assert len(members_of(longest)["x"]) == MAX_MESSAGE_LENGTH - 8
     assert refusal(longest + " ") == "the message has 16385 characters, the limit is 16384"
 
 
 @pytest.mark.parametrize(("opening", "closing"), [("[", "]"), ('{"a":', "}")])
-def test_what_is_nested_deep_ends_in_a_refusal(opening: str, closing: str) -> None:
-    # orjson has a limit of its own; without, thousands of levels would end the process.
+def test_deep_nesting_is_refused(opening: str, closing: str) -> None:
+    # orjson has its own limit; without it, thousands of levels would crash the process.
     levels = (MAX_MESSAGE_LENGTH - 8) // len(opening + closing)
     for end in ("", f"0{closing * levels}}}"):
         text = refusal(f'{{"x":{opening * levels}{end}')

@@ -1,4 +1,4 @@
-"""Answers go out as their readers take them: in pieces, and not at all to who takes nothing."""
+"""Answers are sent as fast as they are read: in pieces, and not at all to a stuck reader."""
 
 import contextlib
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from tests.support.processes import limits
 from tests.support.waiting import wait_for
 from tests.support.web import deaf_client
 
-# 1,000,000 cells, 5 MB of JSON: more than two sockets hold between them.
+# 1,000,000 cells, 5 MB of JSON: more than two sockets buffer.
 LARGE_FIELD = (
     "/api/field.json?sensor_type=co2&resolution=0.01"
     "&bbox_min_x=0&bbox_min_y=0&bbox_max_x=10&bbox_max_y=10"
@@ -40,10 +40,10 @@ def test_a_large_field_arrives_whole(live: Served) -> None:
     assert "ERROR" not in live.process.output
 
 
-def test_deaf_readers_keep_their_own_places_and_are_cut_off(live: Served) -> None:
+def test_stuck_readers_hold_only_their_own_places_and_are_cut_off(live: Served) -> None:
     refused = f"has {CONCURRENCY} requests for computed answers in flight, the limit"
     with contextlib.ExitStack() as readers:
-        # Of one kept field, as many readers as there are might be deaf.
+        # For one cached field, the number of readers is not limited, and all may be stuck.
         large = [LARGE_FIELD.replace("co2", f"co2_{number}") for number in range(CONCURRENCY)]
         deaf = [readers.enter_context(deaf_client(live.url, field)) for field in large]
         wait_for(lambda: refused in live.get(SMALL_FIELD).text, "the deaf readers' places")

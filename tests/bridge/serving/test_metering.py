@@ -21,7 +21,7 @@ from tests.support.processes import limits
         ("/assets/x.js", "page"),
     ],
 )
-def test_a_path_is_of_one_of_a_few_kinds(path: str, expected: str) -> None:
+def test_each_path_belongs_to_one_of_a_few_kinds(path: str, expected: str) -> None:
     assert route_class(path) == expected
 
 

@@ -1,4 +1,4 @@
-"""Large messages in pieces, by the reader of another library."""
+"""Large messages in pieces, parsed by another library."""
 
 import pytest
 from websockets.frames import Frame, Opcode
@@ -10,7 +10,7 @@ from lupin_bridge.stream.frames import text_frame
 
 
 def read(wire: bytes) -> list[Frame]:
-    """The frames, by a client that refuses what breaks the protocol."""
+    """The frames, parsed by a client that rejects protocol errors."""
     reader = Reader(CLIENT, state=State.OPEN, max_size=None)
     reader.receive_data(wire)
     assert reader.parser_exc is None
@@ -21,7 +21,7 @@ def wire(frame: bytes, rest: bytes = b"") -> bytes:
     return b"".join(bytes(block) for piece in pieces(frame, rest) for block in piece)
 
 
-# RFC 6455, section 5.2: the lengths change at 126 and 65,536.
+# RFC 6455, section 5.2: the length encoding changes at 126 and 65,536.
 @pytest.mark.parametrize(
     "length",
     [
@@ -36,7 +36,7 @@ def wire(frame: bytes, rest: bytes = b"") -> bytes:
         3 * PIECE_BYTES + 1,
     ],
 )
-def test_a_message_stays_the_same_and_no_piece_is_larger_than_the_limit(length: int) -> None:
+def test_a_message_stays_the_same_and_no_piece_exceeds_the_limit(length: int) -> None:
     message = bytes(n % 251 for n in range(length))
     for given, rest, opcode in (
         (text_frame(message), b"", Opcode.TEXT),
@@ -49,7 +49,7 @@ def test_a_message_stays_the_same_and_no_piece_is_larger_than_the_limit(length: 
         assert [frame.fin for frame in frames] == [*[False] * (len(frames) - 1), True]
 
 
-def test_between_two_pieces_there_is_room_for_a_ping() -> None:
+def test_a_ping_fits_between_two_pieces() -> None:
     row = pieces(frame_head(BINARY, 200_000) + bytes(200_000))
     first, *others = (head + bytes(payload) for head, payload in row)
     ping = Frame(Opcode.PING, b"?").serialize(mask=False)

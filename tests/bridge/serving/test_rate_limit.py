@@ -1,4 +1,4 @@
-"""Turns per client: the burst, the long run, the bounded table, and who counts as one client."""
+"""Rate limits per client: burst, average, bounded table, and which addresses are one client."""
 
 import pytest
 
@@ -9,7 +9,7 @@ def taken(limit: RateLimit, client: str, now_s: float, tries: int) -> int:
     return sum(limit.take(client, now_s) == 0.0 for _ in range(tries))
 
 
-def test_a_burst_is_taken_at_once_and_the_next_turn_waits_an_interval() -> None:
+def test_a_burst_passes_at_once_and_the_next_turn_waits_an_interval() -> None:
     limit = RateLimit(rate_hz=20.0, burst=40.0)
     assert taken(limit, "a", 100.0, 60) == 40
     assert limit.take("a", 100.0) == pytest.approx(0.05)
@@ -19,14 +19,14 @@ def test_a_burst_is_taken_at_once_and_the_next_turn_waits_an_interval() -> None:
     assert taken(limit, "a", 3_600.0, 60) == 0, "a long rest saves up one burst and no more"
 
 
-def test_many_turns_are_taken_together_or_not_at_all() -> None:
+def test_several_turns_are_taken_together_or_not_at_all() -> None:
     limit = RateLimit(rate_hz=10.0, burst=5.0)
     assert limit.take("a", 0.0, 6) == pytest.approx(0.1)
     assert limit.take("a", 0.0, 5) == 0.0
     assert limit.take("a", 0.0) == pytest.approx(0.1)
 
 
-def test_the_table_is_bounded_and_the_least_recently_active_leaves_first() -> None:
+def test_the_table_is_bounded_and_drops_the_least_recently_active() -> None:
     limit = RateLimit(rate_hz=0.001, burst=1.0, max_keys=3)
     for client in ("a", "b", "c", "d", "e"):
         assert limit.take(client, 0.0) == 0.0
@@ -52,5 +52,5 @@ def test_the_table_is_bounded_and_the_least_recently_active_leaves_first() -> No
         ("a unix socket", "a unix socket"),
     ],
 )
-def test_an_address_stands_for_its_client(address: str, client: str) -> None:
+def test_an_address_identifies_its_client(address: str, client: str) -> None:
     assert client_key(address) == client

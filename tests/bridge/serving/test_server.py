@@ -1,4 +1,4 @@
-"""The server: its socket, its limits, and its end, with clients connected."""
+"""The server with connected clients: its socket, its limits, and its shutdown."""
 
 import faulthandler
 import resource
@@ -35,9 +35,9 @@ from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Listener, bridge, deaf_client, listener, overfill
 
-# What asks the twin itself, in its ROS thread or through its service.
+# What queries the twin itself, in its ROS thread or through its service.
 REPORT = "/api/estimate/quality?sensor_type=co2"
-# Too much for the event loop: it is computed and written by a worker.
+# Too much for the event loop: a worker computes and writes it.
 MILLION_CELLS = (
     "/api/field?sensor_type=co2&resolution=0.001"
     "&bbox_min_x=0&bbox_min_y=0&bbox_max_x=1&bbox_max_y=1"
@@ -45,14 +45,14 @@ MILLION_CELLS = (
 
 
 def open_files() -> set[str]:
-    """The numbers of this process's descriptors."""
+    """The numbers of this process's file descriptors."""
     return {entry.name for entry in Path("/proc/self/fd").iterdir()}
 
 
 # --- the socket ---------------------------------------------------------------------------------
 
 
-def test_hundreds_who_connect_at_once_need_no_second_try() -> None:
+def test_hundreds_of_simultaneous_connections_need_no_second_attempt() -> None:
     with listen("127.0.0.1", 0) as listener, ExitStack() as stack:
         clients = [stack.enter_context(socket.socket()) for _ in range(400)]
         poll = select.poll()
@@ -60,11 +60,11 @@ def test_hundreds_who_connect_at_once_need_no_second_try() -> None:
             client.setblocking(False)
             client.connect_ex(listener.getsockname())
             poll.register(client, select.POLLOUT)
-        # Nobody accepts them: whom the kernel has no place for, it does not let in later either.
+        # Nothing accepts them: those beyond the kernel's queue get in no later either.
         wait_for(lambda: len(poll.poll(0)) == len(clients), "all to be let in")
 
 
-def test_ipv6_has_brackets_in_its_address() -> None:
+def test_an_ipv6_address_has_brackets() -> None:
     with listen("::1", 0) as listener:
         assert address_of(listener) == f"http://[::1]:{listener.getsockname()[1]}"
 
@@ -81,7 +81,7 @@ def test_ipv6_has_brackets_in_its_address() -> None:
         ((resource.RLIM_INFINITY, resource.RLIM_INFINITY), resource.RLIM_INFINITY, 5_000),
     ],
 )
-def test_it_may_open_as_many_files_as_clients_need_and_says_where_it_may_not(
+def test_it_raises_its_file_limit_for_the_clients_and_reports_where_it_cannot(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
     limits: tuple[int, int],
@@ -106,7 +106,7 @@ def test_an_address_in_use_is_refused_and_nothing_stays_open() -> None:
         assert open_files() == before
 
 
-async def test_a_small_write_leaves_at_once(domain: int) -> None:
+async def test_a_small_write_is_sent_at_once(domain: int) -> None:
     async with running() as served:
         await served.http.get("/healthz")
         (connection,) = served.server.server_state.connections
@@ -117,7 +117,7 @@ async def test_a_small_write_leaves_at_once(domain: int) -> None:
 
 @contextmanager
 def waiting_for(url: str, path: str) -> Iterator[Future[httpx.Response]]:
-    """A client that asks and waits; its answer comes when it comes."""
+    """A client that sends a request and waits for its answer."""
 
     def ask() -> httpx.Response:
         return httpx.get(f"{url}{path}", timeout=PATIENCE_S, trust_env=False)
@@ -127,7 +127,7 @@ def waiting_for(url: str, path: str) -> Iterator[Future[httpx.Response]]:
 
 
 def assert_sent_away(answer: Future[httpx.Response]) -> None:
-    """Whoever waited for an answer at the good-bye knows why it does not come, and what to do."""
+    """A client that waits at the shutdown gets the reason, and when to retry."""
     response = answer.result(PATIENCE_S)
     assert response.status_code == 503
     assert response.json() == {"detail": "the bridge is shutting down"}
@@ -135,8 +135,8 @@ def assert_sent_away(answer: Future[httpx.Response]) -> None:
 
 
 def assert_quiet(process: Process) -> None:
-    # Whether a client that does not read is cut off by us or, on a busy machine, by uvicorn, which
-    # logs it as an error, is all the same.
+    # Whether we cut off a client that does not read or, on a busy machine, uvicorn does, and
+    # logs it as an error, does not matter.
     ours = [line for line in process.output.splitlines() if "graceful shutdown" not in line]
     for word in ("Traceback", "ERROR", "Exception"):
         assert word not in "\n".join(ours)
@@ -163,10 +163,10 @@ def test_frames_are_not_compressed() -> None:
         assert "sec-websocket-extensions" not in listener.connection.response.headers
 
 
-# --- the end ------------------------------------------------------------------------------------
+# --- shutdown -----------------------------------------------------------------------------------
 
 
-def test_a_signal_ends_it_and_all_are_told_whoever_reads_and_however_often_it_comes() -> None:
+def test_a_signal_ends_it_and_all_clients_are_notified_whether_they_read_or_not() -> None:
     with (
         bridge() as running_bridge,
         running_bridge.listen() as one,
@@ -187,8 +187,8 @@ def test_a_signal_ends_it_and_all_are_told_whoever_reads_and_however_often_it_co
         assert_quiet(running_bridge.process)
 
 
-# What never comes back: a worker that computes a field, one that writes it, the ROS thread. Each
-# hangs for a sensor of its own, which is asked for by that path.
+# All of these hang: a worker that computes a field, one that writes it, the ROS thread. Each
+# hangs for its own sensor, which is queried by that path.
 HANGS = (
     ("lupin_bridge.past.fields:compute_field:co2", MILLION_CELLS),
     ("lupin_bridge.field:write:light", MILLION_CELLS),
@@ -196,7 +196,7 @@ HANGS = (
 )
 
 
-def test_fields_that_take_for_ever_do_not_hold_up_the_end(domain: int) -> None:
+def test_fields_that_never_finish_do_not_delay_the_shutdown(domain: int) -> None:
     hangs = faults("--hang", *(hang for hang, _ in HANGS))
     with (
         lupin_twin(domain, "serve", *hangs) as process,
@@ -217,7 +217,7 @@ def test_fields_that_take_for_ever_do_not_hold_up_the_end(domain: int) -> None:
         assert_quiet(process)
 
 
-def test_nor_does_a_twin_elsewhere_that_does_not_answer(domain: int) -> None:
+def test_a_remote_twin_that_does_not_answer_does_not_delay_it_either(domain: int) -> None:
     with (
         twin_node(domain) as twin,
         lupin_twin(domain, "web") as process,
@@ -239,7 +239,7 @@ def test_nor_does_a_twin_elsewhere_that_does_not_answer(domain: int) -> None:
         assert_quiet(process)
 
 
-def test_from_a_signal_on_it_has_to_end_whatever_hangs() -> None:
+def test_after_a_signal_it_stops_whatever_hangs() -> None:
     server = BridgeServer(FastAPI(), Settings(), [])
     server.handle_exit(signal.SIGINT, None)
     server.handle_exit(signal.SIGINT, None)
@@ -250,6 +250,6 @@ def test_from_a_signal_on_it_has_to_end_whatever_hangs() -> None:
     assert END_S <= left_s <= END_S + 1
 
 
-def test_the_times_of_the_end_add_up_to_what_is_promised() -> None:
+def test_the_shutdown_times_add_up_to_the_documented_one() -> None:
     assert CLOSE_AFTER_S < GRACEFUL_SHUTDOWN_S
     assert GRACEFUL_SHUTDOWN_S + max(STOP_TIMEOUT_S, FEEDER_STOP_S) + IDLE_WORKERS_END_S <= 2.0

@@ -17,7 +17,7 @@ from lupin_bridge.serving.connections import UNSENT_BYTES, bound_unsent, reset, 
 from tests.support.tls import Certificate, certificate
 from tests.support.waiting import until
 
-# More than any socket takes by itself.
+# More than any socket buffers.
 MUCH = bytes(64_000_000)
 
 
@@ -25,7 +25,7 @@ MUCH = bytes(64_000_000)
 async def connection(
     ours: Certificate | None = None,
 ) -> AsyncIterator[tuple[asyncio.WriteTransport, socket.socket, list[str]]]:
-    """Our transport, the socket at its other end, which nobody reads, and whether it has ended."""
+    """Our transport, the other end of its socket, which nobody reads, and whether it has ended."""
     made: list[asyncio.WriteTransport] = []
     ended: list[str] = []
 
@@ -57,13 +57,13 @@ async def connection(
 
 
 def held_by_the_kernel(transport: asyncio.WriteTransport) -> int:
-    """Bytes that the socket has taken and the other end has not (tcp(7), SIOCOUTQ)."""
+    """Bytes that the socket has sent and the other end has not received (tcp(7), SIOCOUTQ)."""
     answer = fcntl.ioctl(transport.get_extra_info("socket"), termios.TIOCOUTQ, b"\0" * 4)
     return int(struct.unpack("i", answer)[0])
 
 
 def hoarded(prepare: Callable[[asyncio.BaseTransport], None], at_least: int) -> int:
-    """What the kernel takes of much that nobody reads, once it is so much."""
+    """What the kernel buffers of a large amount that nobody reads, once it is that much."""
 
     async def test() -> int:
         async with connection() as (transport, *_):
@@ -75,19 +75,19 @@ def hoarded(prepare: Callable[[asyncio.BaseTransport], None], at_least: int) -> 
     return asyncio.run(test())
 
 
-def test_the_kernel_hoards_little_for_who_does_not_read() -> None:
+def test_the_kernel_buffers_little_for_a_reader_that_does_not_read() -> None:
     assert hoarded(bound_unsent, 1) <= 2 * UNSENT_BYTES
     assert hoarded(lambda _: None, 4 * UNSENT_BYTES), "otherwise this shows nothing"
 
 
-async def test_who_does_not_read_is_reset() -> None:
+async def test_a_connection_that_is_not_read_is_reset() -> None:
     async with connection() as (transport, theirs, _):
         transport.write(MUCH)
         tear_down(transport)
         await until(lambda: theirs.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR), "a reset")
 
 
-async def test_who_has_read_all_is_closed() -> None:
+async def test_a_connection_that_has_read_everything_is_closed() -> None:
     async with connection() as (transport, theirs, _):
         transport.write(b"the end")
         tear_down(transport)
@@ -98,7 +98,7 @@ async def test_who_has_read_all_is_closed() -> None:
 
 
 @pytest.mark.parametrize("has_tls", [False, True])
-async def test_what_is_being_closed_can_be_ended_and_again(tmp_path: Path, has_tls: bool) -> None:
+async def test_a_closing_transport_can_be_ended_twice(tmp_path: Path, has_tls: bool) -> None:
     async with connection(certificate(tmp_path) if has_tls else None) as (transport, _, ended):
         for _ in range(2):
             transport.close()

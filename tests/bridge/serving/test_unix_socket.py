@@ -1,4 +1,4 @@
-"""A bridge that a reverse proxy of the same machine reaches through a Unix socket."""
+"""A bridge behind a reverse proxy on the same machine, reached through a Unix socket."""
 
 import re
 import socket
@@ -27,7 +27,7 @@ def path(tmp_path: Path) -> Path:
 
 @contextmanager
 def asking(path: Path, *options: str) -> Iterator[httpx.Client]:
-    """Ask a bridge that serves there, as its proxy does."""
+    """Query a bridge that serves there, as its proxy does."""
     options = ("--host", f"unix:{path}", *options)
     with (
         own_domain() as domain,
@@ -42,7 +42,7 @@ def asking(path: Path, *options: str) -> Iterator[httpx.Client]:
         assert not {"warning", "error"} & set(re.findall(r"\w+", process.output.lower()))
 
 
-def test_it_is_its_owners_and_their_groups_and_a_state_comes_through(path: Path) -> None:
+def test_owner_and_group_may_connect_and_a_state_arrives(path: Path) -> None:
     with socket.socket(socket.AF_UNIX) as left:
         left.bind(str(path))  # and its process has ended
     with asking(path) as client:
@@ -59,7 +59,7 @@ def test_it_is_its_owners_and_their_groups_and_a_state_comes_through(path: Path)
         assert refused_start("--host", f"unix:{path}") == in_use
 
 
-def test_who_reaches_it_is_the_proxy_and_names_the_person(path: Path, tmp_path: Path) -> None:
+def test_its_client_is_the_proxy_and_names_the_person(path: Path, tmp_path: Path) -> None:
     add(tmp_path / "accounts.sqlite", anna="operator")
     accounts = ("--accounts", str(tmp_path / "accounts.sqlite"))
     with asking(path, *accounts, "--proxy-user-header", "Remote-User") as client:
@@ -67,8 +67,8 @@ def test_who_reaches_it_is_the_proxy_and_names_the_person(path: Path, tmp_path: 
         assert client.get("/api/session", headers={"Remote-User": "anna"}).json()["name"] == "anna"
 
 
-def test_of_those_that_start_at_once_one_has_it(path: Path) -> None:
-    """A second one must not take the first's new socket for one that was left."""
+def test_of_several_that_start_at_once_one_gets_the_socket(path: Path) -> None:
+    """The second must not take the first's new socket for an old one."""
     together = threading.Barrier(4)
 
     def start(_: int) -> socket.socket | None:
@@ -82,12 +82,12 @@ def test_of_those_that_start_at_once_one_has_it(path: Path) -> None:
         for _ in range(100):
             listeners = [it for it in starting.map(start, range(4)) if it is not None]
             for listener in listeners:
-                listener.close()  # its path is left, as of a process that has ended
+                listener.close()  # its path is left, as after a crash
             assert len(listeners) == 1
 
 
 @pytest.mark.parametrize("name", ["file", "no-such-folder/http.sock", "long" * 40])
-def test_where_no_socket_can_be_is_said_and_no_file_is_lost(name: str, tmp_path: Path) -> None:
+def test_a_path_that_is_no_socket_is_reported_and_no_file_lost(name: str, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("somebody's")
     line = refused_start("--host", f"unix:{tmp_path / name}")
     assert line.startswith(f"lupin-twin: cannot listen on unix:{tmp_path / name}: ")

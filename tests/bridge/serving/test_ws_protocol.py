@@ -1,4 +1,4 @@
-"""The connection under the fan-out: real sockets, some of which are not read."""
+"""The connection below the hub: real sockets, some of which are not read."""
 
 import asyncio
 import socket
@@ -16,14 +16,14 @@ from tests.support.raw_ws import BINARY, CLOSE, PING, TEXT, RawClient, frames_of
 from tests.support.waiting import PATIENCE_S, until
 from tests.support.web import deaf_client
 
-# Silent by itself: every frame is one that the test has caused, or a heartbeat of the bridge.
+# Silent by itself: every frame is caused by the test, or is a heartbeat of the bridge.
 SILENT = ("--ros-args", "-p", "state_publish_rate_hz:=0.01")
 BLOCK = 65_536
 SMALL_FRAME = b"x" * 1_000
 
 
 async def joined(served: Running) -> Connection:
-    """The connection of the only client, once it is one of WebSocket: until then it is HTTP's."""
+    """The connection of the only client, once it is a WebSocket: until then it belongs to HTTP."""
 
     def look() -> Connection | None:
         for connection in served.server.server_state.connections:
@@ -36,7 +36,7 @@ async def joined(served: Running) -> Connection:
     return found
 
 
-async def test_a_socket_that_is_free_again_says_so_by_itself(domain: int) -> None:
+async def test_a_socket_that_is_writable_again_reports_it_by_itself(domain: int) -> None:
     async with running(ros_args=SILENT) as served:
         with deaf_client(served.url) as slow:
             connection = await joined(served)
@@ -51,7 +51,7 @@ async def test_a_socket_that_is_free_again_says_so_by_itself(domain: int) -> Non
             assert (taken, freed[0]) == ([False], True)
 
 
-async def test_behind_an_answer_that_nobody_reads_a_handshake_ends_after_the_timeout(
+async def test_after_an_answer_that_nobody_reads_a_handshake_ends_at_the_timeout(
     domain: int,
 ) -> None:
     async with running(Limits(client_timeout_s=3.0), SILENT) as served:
@@ -71,7 +71,7 @@ async def test_behind_an_answer_that_nobody_reads_a_handshake_ends_after_the_tim
             await until(lambda: not connections, "its end")
 
 
-async def test_who_does_not_read_gets_no_answer_to_his_pings_and_ends_after_his_good_bye(
+async def test_a_client_that_does_not_read_gets_no_pongs_and_ends_after_its_close_frame(
     domain: int,
 ) -> None:
     pings = 100
@@ -98,12 +98,12 @@ async def test_who_does_not_read_gets_no_answer_to_his_pings_and_ends_after_his_
 
 
 def drain(client: socket.socket, freed: list[bool]) -> None:
-    """Read until the server's socket has become free."""
+    """Read until the server's socket is writable again."""
     while not freed:
         client.recv(BLOCK)
 
 
-async def test_who_is_told_to_go_waits_from_then_on_and_a_client_does_not(
+async def test_the_close_timeout_runs_from_the_close_frame_for_both_sides(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ws_protocol, "CLOSE_GRACE_S", PATIENCE_S)
@@ -125,7 +125,7 @@ async def test_who_is_told_to_go_waits_from_then_on_and_a_client_does_not(
             refused_s = refused.waiting_since_s
             assert refused_s is not None
             assert (client.waiting_since_s, refused_s <= now_s) == (None, True)
-            # No longer than any other, however long uvicorn waits for an answer to a close.
+            # No longer than for others, however long uvicorn waits for an answer to a close.
             assert refused.close_timer is not None
             assert refused.close_timer.when() - refused_s > PATIENCE_S / 2
             client.dismiss(CloseCode.POLICY_VIOLATION, "enough")
@@ -147,10 +147,10 @@ async def test_who_is_told_to_go_waits_from_then_on_and_a_client_does_not(
         (masked(TEXT, b"", rsv=1), CloseCode.PROTOCOL_ERROR),
     ],
 )
-async def test_who_is_cut_short_can_read_why(
+async def test_a_refused_client_can_read_the_reason(
     domain: int, monkeypatch: pytest.MonkeyPatch, said: bytes, code: CloseCode
 ) -> None:
-    # However long a busy machine takes to say and to hear it all.
+    # However long a busy machine takes to send and to receive it.
     monkeypatch.setattr(ws_protocol, "CLOSE_GRACE_S", PATIENCE_S)
 
     def say_and_hear(url: str) -> None:
@@ -162,7 +162,7 @@ async def test_who_is_cut_short_can_read_why(
                 assert block, "it ended without a reason"
                 heard += block
             assert int.from_bytes(frames[-1][1][:2]) == code
-            # No reset: the system would throw away what was not read by then.
+            # No reset: the system would drop what was not read by then.
             client.socket.shutdown(socket.SHUT_WR)
             assert client.socket.recv(BLOCK) == b""
 

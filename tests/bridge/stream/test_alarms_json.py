@@ -21,7 +21,7 @@ COLD = Alarm(
 )
 
 
-def test_a_frame_is_of_the_contracts_type_to_the_last_field_and_in_its_order() -> None:
+def test_a_frame_matches_its_contract_type_in_all_fields_and_their_order() -> None:
     wire = alarms_message(
         replace(board_of([COLD]), source="journal", since_ns=NIGHT_NS), None, (), 0
     )
@@ -49,13 +49,13 @@ def test_a_frame_is_of_the_contracts_type_to_the_last_field_and_in_its_order() -
     ]
 
 
-def test_an_answer_without_alarms_says_how_far_it_knows() -> None:
+def test_an_answer_without_alarms_has_its_limit_of_knowledge() -> None:
     body = alarms_body([], "starting", None)
     assert body == {"alarms": [], "source": "starting", "since": None}
     schema.Alarms.model_validate(body)
 
 
-def test_a_frame_has_so_many_alarms_the_active_ones_first_of_all() -> None:
+def test_the_alarms_of_a_frame_are_limited_with_the_active_ones_first() -> None:
     for active in (MAX_IN_FRAME - 1, MAX_IN_FRAME + 1):
         alarms = [alarm(str(number)) for number in range(active)]
         over = [alarm(f"over {number}", cleared_ns=NOW_NS) for number in range(2)]

@@ -1,4 +1,4 @@
-"""Every sensor's report is fetched; tags that have changed are passed on when they are others."""
+"""Every sensor's report is fetched, and changed tags are passed on when they differ."""
 
 import asyncio
 import math
@@ -38,7 +38,7 @@ def snapshot(**newest: int) -> Snapshot:
     return Snapshot(100, "map", tuple(tags))
 
 
-def test_estimates_are_made_of_finite_readings_of_tags_with_a_place() -> None:
+def test_estimates_use_finite_readings_of_tags_with_a_position() -> None:
     tags = (
         TagState("a", pose=HERE, readings=(Reading("co2", 1.0, 5), Reading("light", math.nan, 9))),
         TagState("b", pose=HERE, readings=(Reading("co2", 1.0, 7),)),
@@ -47,13 +47,13 @@ def test_estimates_are_made_of_finite_readings_of_tags_with_a_place() -> None:
     assert sensors_of(Snapshot(100, "map", tags)) == ["co2"]
 
 
-def test_changed_tags_are_told_by_tag_and_sensor() -> None:
+def test_changed_tags_are_listed_by_tag_and_sensor() -> None:
     known = {"co2": report(9, {"a": None, "b": 3}), "light": report(9, {"b": 4, "c": 5})}
     assert changed_of(known) == {"b": {"co2": 3, "light": 4}, "c": {"light": 5}}
 
 
 class Stage:
-    """What a follower asks, and tells."""
+    """The queries of a follower, and its updates."""
 
     def __init__(self) -> None:
         self.asked: list[str] = []
@@ -70,7 +70,7 @@ class Stage:
         return self.answers[request.sensor_type]
 
 
-async def test_what_has_changed_is_passed_on_as_it_is_now() -> None:
+async def test_changes_are_passed_on_in_their_current_form() -> None:
     stage = Stage()
     await stage.follower.update()
     assert stage.asked == [], "there is no state yet"
@@ -88,7 +88,7 @@ async def test_what_has_changed_is_passed_on_as_it_is_now() -> None:
     assert stage.told[-1] == {}, "no tag has that sensor any more"
 
 
-async def test_of_a_sensor_that_cannot_be_reported_just_now_the_last_report_stands() -> None:
+async def test_where_a_report_fails_the_last_one_holds() -> None:
     stage = Stage()
     stage.snapshot, stage.answers = snapshot(co2=5), {"co2": report(9, {"co2": 5})}
     await stage.follower.update()
@@ -97,7 +97,7 @@ async def test_of_a_sensor_that_cannot_be_reported_just_now_the_last_report_stan
     assert stage.told[-1] == {"co2": {"co2": 5}}
 
 
-def test_of_many_sensors_so_many_are_asked_after() -> None:
+def test_the_number_of_queried_sensors_is_limited() -> None:
     stage = Stage()
     names = [f"s{number:02}" for number in range(MAX_SENSORS + 1)]
     stage.snapshot = snapshot(**dict.fromkeys(names, 1))
@@ -106,7 +106,7 @@ def test_of_many_sensors_so_many_are_asked_after() -> None:
     assert stage.asked == names[:-1]
 
 
-async def test_what_cannot_be_answered_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_failed_query_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pollers, "PERIOD_S", 0.0)
     stage = Stage()
     stage.snapshot = snapshot(co2=1)

@@ -17,14 +17,14 @@ from tests.support.seen import BY_LIGHT
 
 
 def received(wire: bytes) -> bytes:
-    """What a client makes of the bytes: the text of one whole frame."""
+    """A client's view of the bytes: the text of one whole frame."""
     [(opcode, data)] = frames_of(wire)
     assert (opcode, wire[0] >> 7) == (TEXT, 1)
     return data
 
 
 def content(wire: bytes) -> dict[str, Any]:
-    """What a frame says."""
+    """The content of a frame."""
     decoded: dict[str, Any] = json.loads(received(wire))
     return decoded
 
@@ -39,7 +39,7 @@ def snapshot(*tags: TagState, stamp_ns: int = 10**10) -> Snapshot:
     return Snapshot(stamp_ns, "map", tags)
 
 
-def test_a_delta_frame_is_the_contracts() -> None:
+def test_a_delta_frame_matches_its_contract_type() -> None:
     writer = FrameWriter()
     same = tag("same")
     writer.state(snapshot(same, tag("gone")), "r1")
@@ -51,10 +51,10 @@ def test_a_delta_frame_is_the_contracts() -> None:
     assert delta.header == schema.Header(stamp=schema.Time(sec=10, nanosec=0), frame_id="map")
 
 
-# --- made once, kept no longer than needed ------------------------------------------------------
+# --- made once, dropped when no longer needed ---------------------------------------------------
 
 
-def test_no_more_than_two_frames_are_kept() -> None:
+def test_no_more_than_two_frames_are_cached() -> None:
     writer = FrameWriter()
     frames: list[StateFrame] = []
     for number in range(4):
@@ -74,25 +74,25 @@ STEPS = st.lists(
 
 
 def apply(state: dict[str, Any], delta: dict[str, Any]) -> dict[str, Any]:
-    """What a client does with a delta, as `schema.DeltaFrame` tells it."""
+    """What a client does with a delta, as `schema.DeltaFrame` describes it."""
     tags = {tag["tag_id"]: tag for tag in state["tags"] if tag["tag_id"] not in delta["removed"]}
     tags.update((tag["tag_id"], tag) for tag in delta["changed"])
     return {"header": delta["header"], "tags": list(tags.values())}
 
 
 def ageless(state: dict[str, Any]) -> dict[str, Any]:
-    """A state without ages: those of unchanged tags are for the client to reckon."""
+    """A state without ages: the client computes those of unchanged tags."""
     tags = sorted(state["tags"], key=lambda tag: str(tag["tag_id"]))
     return {**state, "tags": [{**tag, "stale_seconds": None} for tag in tags]}
 
 
 @given(STEPS)
 @settings(max_examples=100)
-def test_who_applies_the_deltas_has_the_state(steps: list[dict[str, int]]) -> None:
+def test_applying_the_deltas_gives_the_state(steps: list[dict[str, int]]) -> None:
     writer, known = FrameWriter(), dict[str, TagState]()
     mine: dict[str, Any] = {}
     for number, step in enumerate(steps):
-        # As in the store: a tag that did not change is the very same value.
+        # As in the store: an unchanged tag is the same object.
         known = {
             tag_id: known[tag_id]
             if tag_id in known and known[tag_id].readings[0].value == value
@@ -110,14 +110,14 @@ def test_who_applies_the_deltas_has_the_state(steps: list[dict[str, int]]) -> No
         assert ageless(mine) == ageless(whole)
 
 
-# --- weight -------------------------------------------------------------------------------------
+# --- size ---------------------------------------------------------------------------------------
 
-# What every browser gets ten times a second, of a house of thirty tags with five sensors each.
+# What every browser gets ten times a second, for thirty tags with five sensors each.
 MAX_HOUSE_BYTES = 16_000
 
 
-def house() -> Snapshot:
-    """As a patrol leaves it: each tag scanned once, half a minute after the one before."""
+def greenhouse() -> Snapshot:
+    """As after a patrol: each tag scanned once, half a minute after the one before."""
     now_ns = 1_790_000_123_456_789_012
     values = {"temperature": 21.3, "humidity": 64.0, "co2": 612.0, "light": 742.5, "ph": 6.2}
     tags = []
@@ -136,8 +136,8 @@ def house() -> Snapshot:
     return Snapshot(now_ns, "map", tuple(tags))
 
 
-def test_a_frame_of_a_house_is_within_its_budget_of_bytes() -> None:
-    scanned = house()
+def test_a_frame_of_a_greenhouse_is_within_its_budget_of_bytes() -> None:
+    scanned = greenhouse()
     judged = Judge(replace(BY_LIGHT, recent_s=3600.0)).see(scanned)
     verdicts = Counter(health.verdict for health in judged.tags.values())
     assert verdicts == {"healthy": 27, "critical": 3}

@@ -19,7 +19,7 @@ def tag(tag_id: str, value: float, at_ns: int = START) -> TagState:
     return TagState(tag_id, readings=(Reading("temperature", value, at_ns),))
 
 
-def test_it_is_of_the_contracts_type_to_the_last_field() -> None:
+def test_it_matches_its_contract_type_in_all_fields() -> None:
     judged = see(Judge(BY_LIGHT), START, [tag("a", 6.0), tag('"b"', 22.0)])
     text = judgement(judged)
     body = schema.Judgement.model_validate_json(text, strict=True)
@@ -44,7 +44,7 @@ def test_it_is_of_the_contracts_type_to_the_last_field() -> None:
     }
 
 
-def test_what_only_the_deadband_holds_names_its_limit_and_what_ends_it() -> None:
+def test_a_value_held_only_by_the_deadband_has_its_limit_and_what_clears_it() -> None:
     """From 18 to 26 °C the deadband is 0.4."""
     judge = Judge(BY_LIGHT)
     see(judge, START, [tag("a", 17.9)])
@@ -53,19 +53,19 @@ def test_what_only_the_deadband_holds_names_its_limit_and_what_ends_it() -> None
     assert (reason.limit, reason.release) == (18.0, 18.4)
 
 
-def test_of_a_silent_house_it_says_so() -> None:
+def test_a_silent_greenhouse_is_reported_as_silent() -> None:
     judged = silenced(see(Judge(BY_LIGHT), START, [tag("a", 22.0)]))
     body = schema.Judgement.model_validate_json(judgement(judged), strict=True)
     assert (body.house.verdict, body.house.reasons[0].kind) == ("unknown", "silent")
     assert body.tags["a"].verdict == "healthy"
 
 
-def test_nothing_judged_yet_is_said_too() -> None:
+def test_a_greenhouse_not_judged_yet_is_reported_too() -> None:
     body = schema.Judgement.model_validate_json(judgement(NOTHING_JUDGED), strict=True)
     assert (body.house.verdict, body.tags) == ("unknown", {})
 
 
-def test_a_delta_holds_only_what_is_another() -> None:
+def test_a_delta_holds_only_the_differences() -> None:
     judge = Judge(BY_LIGHT)
     calm = tag("a", 22.0)
     before = see(judge, START, [calm, tag("b", 22.0)])

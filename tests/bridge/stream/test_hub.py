@@ -1,4 +1,4 @@
-"""The hub's policy, with connections whose room is the test's to give."""
+"""The hub's rules, with connections whose buffers the test controls."""
 
 import json
 from dataclasses import replace
@@ -38,7 +38,7 @@ class Socket:
 
     @property
     def got(self) -> list[Any]:
-        """What came, in short: a status's reason, a state's number, a delta's two."""
+        """The received frames, in short: a status's reason, a state's number, a delta's two."""
         return [in_short(json.loads(received(wire))) for wire in self.wires]
 
 
@@ -73,7 +73,7 @@ class Stage:
         self.hub.announce(now_s)
 
     def alarms(self, *tag_ids: str, now_s: float = 0.0) -> None:
-        """Tell of active alarms at these tags."""
+        """Publish active alarms at these tags."""
         board = replace(board_of(alarm(tag_id) for tag_id in tag_ids), source="journal", since_ns=0)
         self.hub.publish_alarms(alarms_message(board, None, (), 0), now_s)
 
@@ -91,7 +91,7 @@ def stage() -> Stage:
 # --- everyone -----------------------------------------------------------------------------------
 
 
-def test_who_joins_gets_the_status_and_then_the_newest_state_at_once(stage: Stage) -> None:
+def test_a_new_client_gets_the_status_and_the_latest_state_at_once(stage: Stage) -> None:
     stage.announce("live")
     stage.publish()
     stage.publish(0.1)
@@ -100,7 +100,7 @@ def test_who_joins_gets_the_status_and_then_the_newest_state_at_once(stage: Stag
     assert late.got == ["live", 2]
 
 
-def test_a_status_tells_the_age_of_the_moment_at_which_a_client_gets_it(stage: Stage) -> None:
+def test_the_age_in_a_status_is_that_at_the_time_of_sending(stage: Stage) -> None:
     stage.announce("stale", 3.0)
     sockets = [Socket(), Socket(), Socket(room=0)]
     clients = [stage.join(socket, 3_600.0) for socket in sockets]
@@ -111,7 +111,7 @@ def test_a_status_tells_the_age_of_the_moment_at_which_a_client_gets_it(stage: S
     assert sockets[0].wires[0] is sockets[1].wires[0], "one serialisation serves all"
 
 
-def test_who_is_told_nothing_for_a_second_is_told_the_status_again(stage: Stage) -> None:
+def test_after_a_second_without_a_frame_the_status_is_sent_again(stage: Stage) -> None:
     often, seldom, full, rosbridge = (Socket(), Socket(), Socket(room=1), Socket())
     stage.join(often, 10.0)
     stage.join(seldom, 10.0, min_interval_s=5.0)
@@ -124,7 +124,7 @@ def test_who_is_told_nothing_for_a_second_is_told_the_status_again(stage: Stage)
     assert (full.got, rosbridge.got) == (["live"], [])
 
 
-def test_who_wants_no_status_or_no_state_gets_none(stage: Stage) -> None:
+def test_a_client_that_wants_no_status_or_no_state_gets_none(stage: Stage) -> None:
     no_status, no_state = Socket(), Socket()
     stage.join(no_status, wants_status=False)
     stage.join(no_state, wants_state=False)
@@ -133,7 +133,7 @@ def test_who_wants_no_status_or_no_state_gets_none(stage: Stage) -> None:
     assert (no_status.got, no_state.got) == ([1], ["live", "stale"])
 
 
-def test_the_hub_is_full_at_its_limit_and_has_room_when_somebody_leaves() -> None:
+def test_the_hub_is_full_at_its_limit_and_has_room_after_a_disconnect() -> None:
     stage = Stage(max_clients=2)
     first = stage.join(Socket())
     has_room = [stage.hub.make_place("")]
@@ -144,8 +144,8 @@ def test_the_hub_is_full_at_its_limit_and_has_room_when_somebody_leaves() -> Non
     assert (has_room, len(stage.hub)) == ([True, False, True], 1)
 
 
-def crowd(**parties: int) -> tuple[Stage, dict[str, list[Socket]]]:
-    """A full house of parties by their address, who came one party after the other."""
+def fill(**parties: int) -> tuple[Stage, dict[str, list[Socket]]]:
+    """A full hub, with connections by address, one address after the other."""
     stage = Stage(max_clients=sum(parties.values()))
     sockets = {address: [Socket() for _ in range(size)] for address, size in parties.items()}
     for address, party in sockets.items():
@@ -154,8 +154,8 @@ def crowd(**parties: int) -> tuple[Stage, dict[str, list[Socket]]]:
     return stage, sockets
 
 
-def test_in_a_full_house_the_newest_of_the_largest_party_gives_its_place_to_a_smaller_one() -> None:
-    stage, sockets = crowd(one=1, many=4, two=2)
+def test_a_full_hub_evicts_the_latest_connection_of_the_largest_address() -> None:
+    stage, sockets = fill(one=1, many=4, two=2)
     assert stage.hub.make_place("another")
     assert sockets["many"][-1].dismissed == (
         1013,
@@ -166,14 +166,14 @@ def test_in_a_full_house_the_newest_of_the_largest_party_gives_its_place_to_a_sm
 
 
 @pytest.mark.parametrize(("mine", "gets_a_place"), [(0, True), (1, True), (2, False), (3, False)])
-def test_only_to_who_has_two_fewer(mine: int, gets_a_place: bool) -> None:
-    stage, _ = crowd(mine=mine, many=3)
+def test_eviction_needs_an_address_with_two_fewer(mine: int, gets_a_place: bool) -> None:
+    stage, _ = fill(mine=mine, many=3)
     assert stage.hub.make_place("mine") == gets_a_place
     assert len(stage.hub) == mine + 3 - gets_a_place
 
 
 def test_one_address_may_have_all_places_and_no_more() -> None:
-    stage, sockets = crowd(many=3)
+    stage, sockets = fill(many=3)
     assert not stage.hub.make_place("many")
     assert all(socket.dismissed is None for socket in sockets["many"])
     assert stage.hub.make_place("other")
@@ -184,7 +184,7 @@ def test_one_address_may_have_all_places_and_no_more() -> None:
 # --- slow clients -------------------------------------------------------------------------------
 
 
-def test_a_slow_client_is_never_queued_for_and_gets_the_newest(stage: Stage) -> None:
+def test_a_slow_client_is_never_queued_for_and_gets_the_latest_frame(stage: Stage) -> None:
     slow, quick = Socket(room=1), Socket()
     client = stage.join(slow, wants_status=False)
     stage.join(quick, wants_status=False)
@@ -201,13 +201,13 @@ def test_a_slow_client_is_never_queued_for_and_gets_the_newest(stage: Stage) -> 
     assert (stage.hub.blocked, stage.hub.frames_sent, stage.hub.frames_skipped) == (0, 10, 6)
 
 
-def test_of_large_messages_that_wait_whoever_has_waited_longest_gives_way(stage: Stage) -> None:
+def test_of_waiting_large_messages_the_longest_waiting_client_is_dismissed(stage: Stage) -> None:
     stage.hub.unsent.max_bytes = 2 * LARGE_BYTES
     sockets = [Socket() for _ in range(4)]
     free, slowest, *others = (stage.join(socket) for socket in sockets)
     stage.hub.hold(free, bytes(LARGE_BYTES))
     stage.hub.is_free(free)
-    stage.hub.hold(Client(Socket()), bytes(LARGE_BYTES))  # who has left already
+    stage.hub.hold(Client(Socket()), bytes(LARGE_BYTES))  # which has disconnected already
     assert stage.hub.unsent.bytes == 0
     stage.hub.hold(slowest, bytes(LARGE_BYTES))
     shared = bytes(LARGE_BYTES)
@@ -219,7 +219,7 @@ def test_of_large_messages_that_wait_whoever_has_waited_longest_gives_way(stage:
     assert [socket.dismissed is not None for socket in sockets] == [False, True, False, False]
 
 
-def test_a_client_that_takes_nothing_for_too_long_is_closed_and_forgotten(stage: Stage) -> None:
+def test_a_client_that_takes_nothing_for_too_long_is_closed_and_removed(stage: Stage) -> None:
     stuck, quick = Socket(room=0), Socket()
     stage.join(stuck, wants_status=False)
     stage.join(quick)
@@ -233,10 +233,10 @@ def test_a_client_that_takes_nothing_for_too_long_is_closed_and_forgotten(stage:
     assert stage.hub.clients_dismissed == 1
 
 
-# --- what a client asked for --------------------------------------------------------------------
+# --- options of a client ------------------------------------------------------------------------
 
 
-def test_deltas_go_to_who_asked_and_has_the_frame_before(stage: Stage) -> None:
+def test_deltas_go_to_clients_that_chose_them_and_have_the_frame_before(stage: Stage) -> None:
     socket, whole = Socket(), Socket()
     stage.publish()
     client = stage.join(socket, delta=True, wants_status=False)
@@ -285,7 +285,7 @@ def test_a_late_frame_does_not_delay_those_after_it_unless_the_interval_is_stric
 # --- alarms -------------------------------------------------------------------------------------
 
 
-def test_alarms_go_to_everyone_at_every_change_and_whole(stage: Stage) -> None:
+def test_every_change_of_alarms_goes_to_everyone_and_whole(stage: Stage) -> None:
     sockets = [Socket(), Socket()]
     stage.publish()
     for socket in sockets:
@@ -299,7 +299,7 @@ def test_alarms_go_to_everyone_at_every_change_and_whole(stage: Stage) -> None:
     assert sockets[0].wires[1] is sockets[1].wires[1], "one serialisation serves all"
 
 
-def test_who_joins_gets_the_alarms_behind_the_first_state_and_not_before(stage: Stage) -> None:
+def test_a_new_client_gets_the_alarms_after_the_first_state_and_not_before(stage: Stage) -> None:
     early, late = Socket(), Socket()
     stage.announce("live")
     stage.alarms("a")
@@ -312,7 +312,7 @@ def test_who_joins_gets_the_alarms_behind_the_first_state_and_not_before(stage: 
     assert late.got == ["live", 1, {"b"}]
 
 
-def test_the_robot_comes_behind_a_state_once_and_no_oftener_than_states_are_wanted(
+def test_the_robot_comes_after_a_state_once_and_no_more_often_than_states(
     stage: Stage,
 ) -> None:
     usual, seldom = Socket(), Socket()
@@ -334,11 +334,11 @@ def test_the_robot_comes_behind_a_state_once_and_no_oftener_than_states_are_want
     assert none.robot_due
 
 
-def test_a_pause_is_not_made_up_for_by_a_burst(stage: Stage) -> None:
+def test_a_pause_is_not_followed_by_a_burst(stage: Stage) -> None:
     socket = Socket()
     stage.join(socket, min_interval_s=1.0, wants_status=False)
     stage.publish(0.0)
     for now_s in (100.0, 100.1, 100.85, 100.95, 101.85, 101.95):
         stage.publish(now_s)
-    # One as soon as there is something, and the next a beat later, a tenth of it forgiven.
+    # One as soon as something changes, the next an interval later, with a tenth of tolerance.
     assert socket.got == [1, 2, 5, 7]

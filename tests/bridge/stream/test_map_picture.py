@@ -51,7 +51,7 @@ ROWS = st.tuples(st.integers(1, 5), st.integers(1, 5)).flatmap(
 
 @given(ROWS)
 @settings(max_examples=100)
-def test_every_pixel_is_its_cells_grey(rows: list[list[int]]) -> None:
+def test_every_pixel_is_the_grey_of_its_cell(rows: list[list[int]]) -> None:
     picture = decoded(map_png(map_of(rows)))
     assert picture.shape == (len(rows), len(rows[0]), 4)
     for row, cells in enumerate(rows):
@@ -71,7 +71,7 @@ def test_a_map_without_a_cell_is_one_transparent_pixel(rows: list[list[int]]) ->
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.5, -math.pi / 2, math.pi])
-def test_json_says_where_the_map_is(yaw: float) -> None:
+def test_json_has_the_position_of_the_map(yaw: float) -> None:
     text = map_json(map_of([[0, 0, -1], [0, 100, 0]], yaw))
     grid = schema.OccupancyGrid.model_validate_json(text, strict=True)
     assert grid.header == schema.Header(stamp=schema.Time(sec=12, nanosec=34), frame_id="map")

@@ -1,4 +1,4 @@
-"""What estimates are worth, as the contract has it."""
+"""The accuracy of estimates, in the form of the contract."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ REPORT = Report(
 BARE = Report(S, None, "", Record(None, Tally(), Tally()))
 
 
-def test_how_often_they_were_right() -> None:
+def test_the_hit_rate_of_estimates() -> None:
     body = json.loads(pollers.qualities({"co2": REPORT, "ph": BARE}))
     EstimateQualities.model_validate(body)
     assert body["sensors"]["co2"] == {
@@ -43,7 +43,7 @@ def test_how_often_they_were_right() -> None:
     assert bare["is_trusted"] is None
 
 
-def test_what_was_expected_of_each_tag() -> None:
+def test_the_predictions_of_each_tag() -> None:
     body = json.loads(pollers.tags("co2", REPORT))
     ExpectedTags.model_validate(body)
     assert (body["sensor_type"], body["at"]) == ("co2", {"sec": 5, "nanosec": 0})
@@ -59,7 +59,7 @@ def test_what_was_expected_of_each_tag() -> None:
     assert body["tags"]["a"]["left_out"] is False
 
 
-def test_where_another_tag_helps() -> None:
+def test_where_another_tag_would_help() -> None:
     body = json.loads(pollers.advice("co2", REPORT))
     Advice.model_validate(body)
     assert body == {"sensor_type": "co2", "places": [{"x": 1.0, "y": 2.0, "error_ratio": 0.75}]}

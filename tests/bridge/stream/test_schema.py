@@ -35,10 +35,10 @@ def names(message_type: Any) -> list[str]:
         (GetEstimateResponse, GetEstimate.Response),
     ],
 )
-def test_a_type_has_its_messages_fields_in_their_order(
+def test_a_type_has_the_fields_of_its_message_in_their_order(
     model: type[BaseModel], message_type: Any
 ) -> None:
-    # Of a map, the cells are a picture.
+    # The cells of a map are a picture.
     expected = [
         name for name in names(message_type) if (model, name) != (schema.OccupancyGrid, "data")
     ]
@@ -56,7 +56,7 @@ def test_a_type_has_its_messages_fields_in_their_order(
         (schema.SensorReading, SensorReading, ["observed_at"]),
     ],
 )
-def test_behind_its_messages_fields_a_type_has_the_times(
+def test_after_the_fields_of_its_message_a_type_has_the_times(
     model: type[BaseModel], message_type: Any, times: list[str]
 ) -> None:
     assert list(model.model_fields) == names(message_type) + times
@@ -64,7 +64,7 @@ def test_behind_its_messages_fields_a_type_has_the_times(
     assert set(times) <= told
 
 
-def test_every_type_forbids_what_it_does_not_name() -> None:
+def test_every_type_forbids_unknown_fields() -> None:
     models = [m for m in vars(schema).values() if isinstance(m, type) and issubclass(m, BaseModel)]
     assert len(models) > 15
     assert all(model.model_config.get("extra") == "forbid" for model in models[1:])

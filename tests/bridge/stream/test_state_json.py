@@ -1,4 +1,4 @@
-"""Snapshot to JSON: held against the contract's types and against the plainest writing."""
+"""Snapshot to JSON: checked against the contract's types and against the simplest form."""
 
 import json
 import math
@@ -26,7 +26,7 @@ from tests.support.web import filled
 
 ANY_NUMBER = st.floats(width=64)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
-# A text that looks like the place at which the age goes must not be mistaken for it.
+# A text that looks like the placeholder of the age must not be mistaken for it.
 TEXT = st.one_of(
     st.text(st.characters(codec="utf-8"), max_size=12),
     st.sampled_from(['"stale_seconds":null', "%b", "100 %"]),
@@ -89,7 +89,7 @@ def age(stamp_ns: int | None, now_ns: int) -> Any:
 
 
 def times_of(tag: TagState) -> dict[str, Any]:
-    """What stands beside the message's own fields."""
+    """The times beside the message's own fields."""
     last = tag.last_try
     return {
         "looked_at": None if tag.looked_at_ns is None else stamp(tag.looked_at_ns),
@@ -108,7 +108,7 @@ def reading_of(reading: Reading, has_times: bool) -> dict[str, Any]:
 
 
 def plainly(snapshot: Snapshot, has_times: bool = True) -> dict[str, Any]:
-    """The snapshot as the contract has it, written out once more."""
+    """The snapshot in the form of the contract, written in the simplest way."""
     tags = []
     for tag in snapshot.tags:
         pose, flower = tag.pose or Pose(0, 0, 0, 0, 0, 0, 0), tag.flower
@@ -149,7 +149,7 @@ def plainly(snapshot: Snapshot, has_times: bool = True) -> dict[str, Any]:
 
 @given(SNAPSHOTS)
 @settings(max_examples=100)
-def test_any_snapshot_is_written_as_the_contract_has_it(snapshot: Snapshot) -> None:
+def test_any_snapshot_is_written_as_in_the_contract(snapshot: Snapshot) -> None:
     text = StateJson().state(snapshot, snapshot.now_ns)
     written = json.loads(text, parse_constant=pytest.fail)
     written["tags"] = [filled(tag) for tag in written["tags"]]
@@ -159,21 +159,21 @@ def test_any_snapshot_is_written_as_the_contract_has_it(snapshot: Snapshot) -> N
 
 @given(SNAPSHOTS)
 @settings(max_examples=50)
-def test_without_times_it_is_the_message_and_nothing_else(snapshot: Snapshot) -> None:
+def test_without_times_the_json_is_exactly_the_message(snapshot: Snapshot) -> None:
     text = StateJson(has_times=False).state(snapshot, snapshot.now_ns)
     assert json.loads(text, parse_constant=pytest.fail) == plainly(snapshot, has_times=False)
 
 
 @given(SNAPSHOTS, SNAPSHOTS)
 @settings(max_examples=50)
-def test_what_was_written_before_leaves_no_trace(first: Snapshot, second: Snapshot) -> None:
+def test_earlier_snapshots_leave_no_trace(first: Snapshot, second: Snapshot) -> None:
     writer = StateJson()
     for snapshot in (first, second, first):
         text = writer.state(snapshot, snapshot.now_ns)
         assert text == StateJson().state(snapshot, snapshot.now_ns)
 
 
-def test_a_tag_that_did_not_change_gets_older_all_the_same() -> None:
+def test_an_unchanged_tag_still_ages() -> None:
     writer = StateJson()
     tag = TagState("7", POSE, last_observed_ns=1_000_000_000)
     ages = [
@@ -183,7 +183,7 @@ def test_a_tag_that_did_not_change_gets_older_all_the_same() -> None:
     assert ages == [0.0, 2.5, 0.0]
 
 
-def test_the_time_of_a_reading_is_told_where_it_is_not_that_of_the_one_before() -> None:
+def test_a_reading_has_its_time_where_it_differs_from_the_one_before() -> None:
     times_s = (7210, 10, 10, None, None, 7210)
     readings = tuple(Reading(str(i), 1.0, s and s * S) for i, s in enumerate(times_s))
     tag = TagState("7", POSE, readings, last_observed_ns=7210 * S, looked_at_ns=3610 * S)
@@ -199,7 +199,7 @@ def test_the_time_of_a_reading_is_told_where_it_is_not_that_of_the_one_before() 
     assert written["looked_at"] == {"sec": 3610, "nanosec": 0}
 
 
-def test_the_last_try_is_told_unless_it_was_the_last_observation() -> None:
+def test_the_last_attempt_is_written_unless_it_was_the_last_observation() -> None:
     tag = TagState("7", POSE, last_observed_ns=5 * S, last_try=Attempt(5 * S))
     assert (
         not {"last_try", "last_try_status", "last_try_detail"}
@@ -211,7 +211,7 @@ def test_the_last_try_is_told_unless_it_was_the_last_observation() -> None:
         assert written["last_try_status"] == (tried and tried.status)
 
 
-def test_a_history_is_sorted_by_sensor_and_keeps_its_order() -> None:
+def test_a_history_is_sorted_by_sensor_in_its_own_order() -> None:
     past = TagHistory(
         (
             PastScan(1_500_000_000, (Reading("co2", 400.0), Reading("light", 900.0))),
@@ -255,7 +255,7 @@ def test_a_history_is_sorted_by_sensor_and_keeps_its_order() -> None:
 
 
 @pytest.mark.parametrize("clock", ["none", "stopped"])
-def test_without_a_clock_that_runs_no_age_is_known(clock: ClockState) -> None:
+def test_without_a_running_clock_no_age_is_known(clock: ClockState) -> None:
     tag = TagState("1", readings=(Reading("co2", 1.0, S),), last_observed_ns=2 * S)
     snapshot = Snapshot(9 * S, "map", (tag,), clock=clock)
     [told] = json.loads(StateJson().state(snapshot, snapshot.now_ns))["tags"]

@@ -34,16 +34,16 @@ def test_a_twin_is_live_until_it_was_silent_for_the_limit() -> None:
     assert liveness.status(100.0 + STALE_AFTER_S).reason == "stale"
 
 
-def test_a_silence_is_told_in_the_time_that_is_promised() -> None:
+def test_a_silence_is_reported_within_the_documented_time() -> None:
     # Three missed publications are no accident, and a client knows by 3.5 s.
     assert 3.0 <= STALE_AFTER_S < STALE_AFTER_S + WATCH_PERIOD_S <= 3.5
 
 
-def test_a_twin_that_was_never_heard_has_no_age() -> None:
+def test_a_twin_that_was_never_received_has_no_age() -> None:
     assert Liveness().status(5.0) == Status("never_seen", None)
 
 
-def test_what_is_observed_is_known_by_the_log_before_the_twin_is_heard() -> None:
+def test_the_log_has_observations_before_the_twin_is_received() -> None:
     status = Liveness(lambda: World("simulated", 1_440.0)).status(5.0)
     assert (status.reason, status.update.origin, status.day_length_s) == (
         *("never_seen", "simulated"),
@@ -55,7 +55,7 @@ def test_an_age_is_never_negative() -> None:
     assert heard(10.0).status(9.0).state_age_s == 0.0
 
 
-def test_the_reason_nearest_to_the_cure_comes_first() -> None:
+def test_the_most_specific_reason_comes_first() -> None:
     liveness = heard(0.0)
     liveness.thread_dead = True
     assert liveness.status(0.0).reason == "thread_dead"
@@ -74,14 +74,14 @@ def test_every_status_has_a_frame_of_the_contract(reason: Reason, age_s: float |
     assert frame.state_age_seconds == (None if age_s is None else 1.235)
 
 
-def test_more_than_one_twin_is_said_as_long_as_they_live() -> None:
+def test_more_than_one_twin_is_reported_while_they_live() -> None:
     liveness = heard(0.0, twin_count=2)
     assert liveness.status(0.0).is_live
     assert liveness.status(0.0).message.startswith("2 twins publish on the same topic")
     assert "silent" in liveness.status(10.0).message
 
 
-def test_what_is_news_for_clients_and_what_for_people() -> None:
+def test_which_changes_are_news_for_clients_and_which_for_people() -> None:
     now = live()
     assert now.is_news_after(None)
     assert not live(0.9).is_news_after(now), "an age alone is none"
@@ -112,7 +112,7 @@ def test_what_is_news_for_clients_and_what_for_people() -> None:
         ("doubted", "clock_doubted"),
     ],
 )
-def test_a_clock_that_does_not_run_is_said_unless_the_twin_is_silent(
+def test_a_clock_that_does_not_run_is_reported_unless_the_twin_is_silent(
     clock: ClockState, reason: Reason
 ) -> None:
     liveness = heard(0.0, clock)
@@ -120,7 +120,7 @@ def test_a_clock_that_does_not_run_is_said_unless_the_twin_is_silent(
     assert liveness.status(10.0).reason == "stale"
 
 
-def test_what_was_dropped_is_news_when_it_grows_much_and_when_it_is_long_ago() -> None:
+def test_drops_are_news_when_they_grow_by_much_and_when_they_are_long_ago() -> None:
     def status(count: int) -> Status:
         return live(counts=Counts(recent=(Recent("frame", "dropped a message", count),)))
 
@@ -133,7 +133,7 @@ def test_what_was_dropped_is_news_when_it_grows_much_and_when_it_is_long_ago() -
     assert (drop.reason, drop.message, drop.count) == ("frame", "dropped a message", 5)
 
 
-def test_how_a_channel_does_is_told_when_that_changes() -> None:
+def test_a_change_of_a_channels_state_is_news() -> None:
     def status(detail: str) -> Status:
         return Status("live", 0.1, outward={"mqtt": detail})
 
@@ -147,7 +147,7 @@ def test_how_a_channel_does_is_told_when_that_changes() -> None:
     assert (told.channel, told.is_failing, told.detail) == ("mqtt", True, "refused")
 
 
-def test_how_the_journal_does_is_told_when_that_changes() -> None:
+def test_a_change_of_the_journals_state_is_news() -> None:
     def status(state: JournalState, detail: str = "", **more: Any) -> Status:
         return live(journal=Condition(state, detail, **more))
 
@@ -161,7 +161,7 @@ def test_how_the_journal_does_is_told_when_that_changes() -> None:
     aside = status(JournalState.RECORDING, set_aside="/old")
     assert aside.is_news_after(recording)
     assert schema.StatusFrame.model_validate(aside.frame()).journal.set_aside == "/old"
-    # How far behind it is changes every second.
+    # Its delay changes every second.
     slow = status(JournalState.SLOW, "2 s behind")
     assert not status(JournalState.SLOW, "3 s behind").is_news_after(slow)
     told = schema.StatusFrame.model_validate(slow.frame()).journal

@@ -1,4 +1,4 @@
-"""The channels that there are, of a script of ROS: what is offered, and who is told of news."""
+"""The channels of a scripted ROS: what is offered, and who gets updates."""
 
 import asyncio
 import json
@@ -24,7 +24,7 @@ POINTS, MARKERS = "sensor_msgs/msg/PointCloud2", "visualization_msgs/msg/MarkerA
 
 
 class Source:
-    """A source, and the relay of it, that say what the test makes them say."""
+    """A source and its relay, which say what the test makes them say."""
 
     def __init__(self, published: Mapping[str, str] = {}) -> None:  # never changed
         self.relay = self
@@ -55,7 +55,7 @@ class Source:
 
 @pytest.fixture(autouse=True)
 def schemas(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every type has a text, of however much is installed, but for one."""
+    """The text of every type except one, whatever is installed."""
 
     def text(type_name: str) -> str:
         if type_name == MARKERS:
@@ -74,7 +74,7 @@ def topics(offer: Offer) -> list[str]:
     return [channel.topic.name for channel in offer.channels.values()]
 
 
-async def test_a_twins_topics_are_offered_and_the_layers_that_are_published() -> None:
+async def test_the_topics_of_a_twin_and_the_published_layers_are_offered() -> None:
     source = Source(
         {
             "/n/twin/field/co2": POINTS,
@@ -92,7 +92,7 @@ async def test_a_twins_topics_are_offered_and_the_layers_that_are_published() ->
     assert offer.channels[1].schema == "# lupin_msgs/msg/TwinState"
 
 
-async def test_a_client_that_goes_does_not_end_the_look_of_another() -> None:
+async def test_a_client_that_disconnects_does_not_cancel_the_discovery_of_another() -> None:
     source = Source()
     offer = offer_of(source)
     source.answers.clear()
@@ -105,7 +105,7 @@ async def test_a_client_that_goes_does_not_end_the_look_of_another() -> None:
     assert (topics(offer), source.looks) == (OWN, 1)
 
 
-async def test_looking_goes_on_after_an_error(
+async def test_discovery_goes_on_after_an_error(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(module, "POLL_S", 0.0)
@@ -119,7 +119,7 @@ async def test_looking_goes_on_after_an_error(
         await until(lambda: offer.channels, "the topics")
 
 
-async def test_what_has_no_definition_is_left_out_and_warned_of_once(
+async def test_a_topic_without_a_definition_is_left_out_and_warned_about_once(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     offer = offer_of(Source({"/n/twin/tags": MARKERS, "/n/twin/planters": MARKERS}))
@@ -139,7 +139,7 @@ async def test_layers_are_bounded_and_without_ros_there_are_none() -> None:
     assert topics(offer) == OWN
 
 
-async def test_followers_are_told_of_news_alone_and_an_id_never_comes_back(
+async def test_followers_get_only_changes_and_an_id_is_never_reused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(module, "POLL_S", 0.0)
@@ -182,7 +182,7 @@ async def test_followers_are_told_of_news_alone_and_an_id_never_comes_back(
         await until(lambda: next_one == [8], "the time that still stands")
 
 
-def test_the_layout_shows_what_is_offered_and_each_of_its_panels_has_a_place() -> None:
+def test_the_layout_shows_offered_topics_and_each_of_its_panels_has_a_place() -> None:
     layout = json.loads(LAYOUT.read_text(encoding="utf-8"))
     named: set[str] = set()
     for panel in layout["configById"].values():

@@ -1,4 +1,4 @@
-"""One client of Foxglove's protocol: what it may have, and what it gets where it is slow."""
+"""One client of Foxglove's protocol: what it may have, and what a slow one gets."""
 
 import json
 from typing import Any
@@ -20,7 +20,7 @@ CHANNELS = {n: Channel(n, Topic("a/msg/B", "", f"/topic{n}"), "int32 x\n") for n
 
 
 class Stage:
-    """A session that was told of the channels."""
+    """A session that knows the channels."""
 
     def __init__(self) -> None:
         self.counts = Counts()
@@ -69,7 +69,7 @@ def test_each_channel_is_subscribed_once_and_each_id_used_once(stage: Stage) -> 
     assert stage.subscribe((1, 10)).begun == ((1, CHANNELS[10]),), "free again, both"
 
 
-def test_so_many_subscriptions_and_no_more(stage: Stage) -> None:
+def test_subscriptions_are_limited(stage: Stage) -> None:
     most = [(n, n) for n in range(1, MAX_SUBSCRIPTIONS + 1)]
     assert len(stage.subscribe(*most).begun) == MAX_SUBSCRIPTIONS
     reaction = stage.subscribe((199, 199))
@@ -78,7 +78,7 @@ def test_so_many_subscriptions_and_no_more(stage: Stage) -> None:
     assert stage.subscribe((199, 199)).begun
 
 
-def test_the_newest_of_each_subscription_waits_and_each_has_its_turn(stage: Stage) -> None:
+def test_the_latest_message_of_each_subscription_waits_and_they_take_turns(stage: Stage) -> None:
     stage.subscribe((1, 10), (2, 20))
     for key, payload in ((1, b"a"), (2, b"b"), (1, b"c"), (9, b"nobody")):
         assert stage.session.put(key, Sample(payload, 5)) is None
@@ -89,7 +89,7 @@ def test_the_newest_of_each_subscription_waits_and_each_has_its_turn(stage: Stag
     assert stage.written() == [], "who has unsubscribed hears nothing more"
 
 
-def test_time_goes_before_messages_and_only_the_newest(stage: Stage) -> None:
+def test_time_goes_before_messages_and_only_the_latest(stage: Stage) -> None:
     stage.subscribe((1, 10))
     stage.session.put(1, Sample(b"a", 5))
     stage.session.time_ns = 7
@@ -98,7 +98,7 @@ def test_time_goes_before_messages_and_only_the_newest(stage: Stage) -> None:
     assert stage.written() == [(1, b"a")]
 
 
-def test_a_message_past_the_limit_is_left_out_and_said_once(stage: Stage) -> None:
+def test_a_message_past_the_limit_is_left_out_and_reported_once(stage: Stage) -> None:
     stage.subscribe((1, 10))
     most = bytes(MAX_MESSAGE_BYTES)
     assert stage.session.put(1, Sample(most, 5)) is None
@@ -112,7 +112,7 @@ def test_a_message_past_the_limit_is_left_out_and_said_once(stage: Stage) -> Non
     assert stage.written() == []
 
 
-def test_channels_that_come_and_go_are_told_and_their_subscriptions_end(stage: Stage) -> None:
+def test_channels_that_come_and_go_are_announced_and_their_subscriptions_end(stage: Stage) -> None:
     stage.subscribe((1, 10), (2, 20))
     stage.session.put(1, Sample(b"a", 5))
     now = {n: channel for n, channel in CHANNELS.items() if n != 10}

@@ -1,4 +1,4 @@
-"""Feeds over a script of a relay: what is written once, what gives way, and how one ends."""
+"""Feeds over a scripted relay: shared serialisation, what is dropped, and how one ends."""
 
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
@@ -20,7 +20,7 @@ INPUT = Topic("a/msg/B", "", "/in", depth=3)
 
 
 class Relay:
-    """Hears what the test says, and counts what is read."""
+    """Receives what the test says, and counts reads."""
 
     def __init__(self) -> None:
         self.ears: list[Callable[[Sample], None]] = []
@@ -58,7 +58,7 @@ class SimpleMessage:
 
 
 class Client:
-    """What a client has got; it reads only while its gate is open."""
+    """What a client has received; it reads only while its gate is open."""
 
     def __init__(self, writer: Writer) -> None:
         self.frames: list[bytes] = []
@@ -91,7 +91,7 @@ def writer(relay: Relay) -> Iterator[Writer]:
     workers.close()
 
 
-async def test_a_message_is_written_once_for_all_who_want_it_alike(
+async def test_a_message_is_serialised_once_for_all_clients_with_equal_options(
     relay: Relay, writer: Writer
 ) -> None:
     clients = [Client(writer) for _ in range(3)]
@@ -114,7 +114,7 @@ async def test_a_message_is_written_once_for_all_who_want_it_alike(
         (replace(INPUT, max_bytes=10), ("11111", "22222", "33333"), ("22222", "33333")),
     ],
 )
-async def test_of_what_waits_for_a_slow_client_the_topics_depth_and_bytes_are_kept(
+async def test_what_waits_for_a_slow_client_is_limited_by_the_topics_depth_and_bytes(
     relay: Relay, writer: Writer, topic: Topic, meanwhile: Sequence[str], told: Sequence[str]
 ) -> None:
     slow = Client(writer)
@@ -130,7 +130,7 @@ async def test_of_what_waits_for_a_slow_client_the_topics_depth_and_bytes_are_ke
 
 
 @pytest.mark.parametrize(("size", "is_told"), [(20, True), (21, False)])
-async def test_a_message_that_is_too_large_is_left_out_and_the_client_told(
+async def test_a_too_large_message_is_left_out_and_the_client_gets_an_error(
     relay: Relay, writer: Writer, monkeypatch: pytest.MonkeyPatch, size: int, is_told: bool
 ) -> None:
     monkeypatch.setattr(feeds, "MAX_MESSAGE_BYTES", 20)
@@ -144,7 +144,7 @@ async def test_a_message_that_is_too_large_is_left_out_and_the_client_told(
     assert is_told or b"it has 21 bytes, the limit is 20" in client.frames[0]
 
 
-async def test_who_is_throttled_gets_the_newest_and_not_before_its_time(
+async def test_a_throttled_client_gets_the_latest_message_and_not_before_its_time(
     relay: Relay, writer: Writer
 ) -> None:
     quick, often, rare = (Client(writer) for _ in range(3))
@@ -163,7 +163,7 @@ async def test_who_is_throttled_gets_the_newest_and_not_before_its_time(
     assert rare.frames == [json_frame("0")]
 
 
-async def test_what_cannot_be_told_is_an_error_for_the_client_and_the_log_has_each_kind_once(
+async def test_an_unserialisable_message_is_an_error_for_the_client_and_is_logged_once_per_kind(
     relay: Relay, writer: Writer, caplog: pytest.LogCaptureFixture
 ) -> None:
     client = Client(writer)

@@ -1,4 +1,4 @@
-"""One rosbridge client's state: subscriptions, levels, pace; and what each message leads to."""
+"""One rosbridge client's state: subscriptions, levels, pace; and the result of each message."""
 
 import json
 from dataclasses import replace
@@ -51,7 +51,7 @@ def frame(*tag_ids: str) -> StateFrame:
 
 
 @pytest.mark.parametrize(("message_id", "topic"), [("b", TOPIC), ("a", "/cmd_vel")])
-def test_to_end_what_was_never_begun_is_worth_a_warning(
+def test_ending_an_unknown_subscription_is_worth_a_warning(
     session: Session, message_id: str, topic: str
 ) -> None:
     subscribe(session, "a")
@@ -94,12 +94,12 @@ def test_the_type_may_be_given_in_both_forms(session: Session, type_: object) ->
     assert subscribe(session, type=type_) == Reaction(state_is_due=True, subscribed=TOPIC)
 
 
-def test_a_subscription_with_options_of_rosbridge_stands(session: Session) -> None:
+def test_a_subscription_with_options_of_rosbridge_is_accepted(session: Session) -> None:
     reaction = subscribe(session, "a", queue_length=10, compression="png", fragment_size=9)
     assert reaction == Reaction(state_is_due=True, subscribed=TOPIC)
 
 
-def test_subscriptions_are_bounded(session: Session) -> None:
+def test_subscriptions_are_limited(session: Session) -> None:
     for number in range(MAX_SUBSCRIPTIONS):
         assert not subscribe(session, number).replies
     (status,) = replies(subscribe(session, "one more"))
@@ -109,7 +109,7 @@ def test_subscriptions_are_bounded(session: Session) -> None:
     assert not subscribe(session, "one more").replies
 
 
-def test_other_topics_are_fed_as_their_last_subscription_wants_it(session: Session) -> None:
+def test_a_topic_is_fed_by_the_options_of_its_last_subscription(session: Session) -> None:
     assert subscribe(session, topic="map", throttle_rate=500) == Reaction(subscribed="map")
     assert not session.is_subscribed
     feed = session.feeds["map"]
@@ -126,7 +126,7 @@ def test_other_topics_are_fed_as_their_last_subscription_wants_it(session: Sessi
 # --- the state on the wire --------------------------------------------------------------------
 
 
-def test_a_topic_is_called_what_the_client_calls_it(session: Session) -> None:
+def test_a_topic_has_the_name_that_the_client_used(session: Session) -> None:
     subscribe(session, topic="twin/state")
     subscribe(session, "a", topic="twin/state")
     assert [text["topic"] for text in texts_of(session.wire(frame()))] == ["twin/state"]
@@ -152,7 +152,7 @@ def test_a_topic_is_called_what_the_client_calls_it(session: Session) -> None:
         {"service": "/twin/get_field", "timeout": "soon"},
     ],
 )
-def test_a_refused_call_has_a_response(session: Session, members: dict[str, Any]) -> None:
+def test_a_refused_call_gets_a_response(session: Session, members: dict[str, Any]) -> None:
     (response,) = replies(send(session, op="call_service", id="a", **members))
     assert (response["op"], response["id"]) == ("service_response", "a")
     assert response["result"] is False
@@ -160,7 +160,7 @@ def test_a_refused_call_has_a_response(session: Session, members: dict[str, Any]
 
 
 @pytest.mark.parametrize("message_id", [True, 1.5, 2.0**70, [], {}, "i" * 257])
-def test_an_id_of_another_kind_is_refused_and_not_repeated(
+def test_an_id_of_a_wrong_type_is_refused_and_not_repeated(
     session: Session, message_id: object
 ) -> None:
     [reply] = replies(send(session, op="unsubscribe", topic=TOPIC, id=message_id))

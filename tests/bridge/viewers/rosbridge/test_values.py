@@ -1,4 +1,4 @@
-"""Messages in JSON, held against what rosbridge_suite makes of the same ones."""
+"""Messages in JSON, compared with the output of rosbridge_suite."""
 
 import json
 import math
@@ -20,7 +20,7 @@ class Stamp:
 
 
 class Everything:
-    """A message of every kind of field, as rclpy gives it."""
+    """A message with every kind of field, as rclpy gives it."""
 
     FIELDS: ClassVar[dict[str, tuple[str, Any]]] = {
         "stamp": ("builtin_interfaces/Time", Stamp()),
@@ -45,7 +45,7 @@ class Everything:
         return {name: kind for name, (kind, _) in cls.FIELDS.items()}
 
 
-def test_json_has_lists_base64_for_bytes_and_null_for_what_is_no_number() -> None:
+def test_json_has_lists_base64_for_bytes_and_null_for_what_is_not_finite() -> None:
     assert json.loads(json_of(Everything())) == {
         "stamp": {"sec": 5, "nanosec": 6},
         "text": "é",
@@ -63,13 +63,13 @@ def test_json_has_lists_base64_for_bytes_and_null_for_what_is_no_number() -> Non
 
 
 @pytest.mark.parametrize("length", [0, 1, 65_536, 65_537])
-def test_a_list_of_any_length_is_whole(monkeypatch: pytest.MonkeyPatch, length: int) -> None:
+def test_a_list_of_any_length_is_complete(monkeypatch: pytest.MonkeyPatch, length: int) -> None:
     cells = array("b", [number % 101 - 1 for number in range(length)])
     monkeypatch.setitem(Everything.FIELDS, "cells", ("sequence<int8>", cells))
     assert json.loads(json_of(Everything()))["cells"] == cells.tolist()
 
 
-def test_a_text_that_is_no_unicode_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_text_that_is_not_unicode_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(Everything.FIELDS, "text", ("string", "\udcff"))
     with pytest.raises(ValueError, match="UTF-8"):
         json_of(Everything())

@@ -12,7 +12,7 @@ from tests.support.processes import Process, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 
-# A moment of the start, told from outside by what the process has in its memory by then.
+# A moment of the start, visible from outside by what the process has loaded by then.
 MOMENTS = {
     "signals held back": ("python", signal.SIGINT),
     "rclpy is being imported": ("_rclpy_pybind11", signal.SIGTERM),
@@ -21,7 +21,7 @@ MOMENTS = {
 
 
 def holds_back(process: Process) -> bool:
-    """Whether SIGINT and SIGTERM are blocked, as Linux tells it."""
+    """Whether SIGINT and SIGTERM are blocked, by Linux's account."""
     status = Path(f"/proc/{process.pid}/status").read_text()
     blocked = int(status.split("SigBlk:")[1].split()[0], 16)
     return all(blocked >> (number - 1) & 1 for number in (signal.SIGINT, signal.SIGTERM))
@@ -33,7 +33,7 @@ def has_mapped(process: Process, name: str) -> Callable[[], bool]:
 
 
 def said_beside_its_start(process: Process) -> list[str]:
-    """What a twin has said, without the lines with which it begins, should it have got so far."""
+    """The twin's output without the lines of its start, if it got so far."""
     starts = ("lupin_twin in ROS domain", "[lupin_twin]: journal /")
     return [
         line for line in process.output.splitlines() if not any(start in line for start in starts)
@@ -41,7 +41,7 @@ def said_beside_its_start(process: Process) -> list[str]:
 
 
 @pytest.mark.parametrize("moment", MOMENTS)
-def test_a_signal_during_the_start_ends_it_quietly(domain: int, moment: str) -> None:
+def test_a_signal_during_the_start_ends_it_without_errors(domain: int, moment: str) -> None:
     name, number = MOMENTS[moment]
     with twin_node(domain, afresh=True) as process:
         wait_for(lambda: holds_back(process), "signals to be held back")
@@ -50,7 +50,7 @@ def test_a_signal_during_the_start_ends_it_quietly(domain: int, moment: str) -> 
         assert said_beside_its_start(process) == []
 
 
-def test_a_signal_between_many_callbacks_ends_it_quietly(domain: int) -> None:
+def test_a_signal_between_many_callbacks_ends_it_without_errors(domain: int) -> None:
     fast = ("--ros-args", "-p", "state_publish_rate_hz:=100.0")
     with twin_node(domain, *fast) as process, Peer(domain) as peer:
         peer.state(lambda _: True, "a state")
@@ -62,14 +62,14 @@ def test_it_goes_on_after_it_was_stopped_for_a_while(domain: int) -> None:
     with twin_node(domain) as process, Peer(domain) as peer:
         peer.state(lambda _: True, "a state")
         process.stand_still()
-        # One that ends now may still say a last word.
+        # One that ends now may still print a last line.
         for word in ("a first", "a second", "a third"):
             before = peer.states[-1].header.stamp
             peer.state(lambda state: state.header.stamp != before, f"{word} state")  # noqa: B023
         assert process.exit_code is None
 
 
-def test_it_ends_with_1_when_its_thread_dies(domain: int) -> None:
+def test_it_exits_with_1_when_its_thread_dies(domain: int) -> None:
     program = (
         "import lupin_twin.ros.base_node as spinning, lupin_twin.cli as cli, sys; "
         "spinning.spin_until_shutdown = lambda *_: None; "
@@ -90,7 +90,7 @@ def test_it_ends_with_1_when_its_thread_dies(domain: int) -> None:
         (["-p", "idw_power:=-1.0"], "parameter idw_power is -1.0"),
     ],
 )
-def test_arguments_that_cannot_be_are_refused_in_one_line(
+def test_impossible_arguments_are_refused_in_one_line(
     domain: int, arguments: list[str], said: str
 ) -> None:
     with twin_node(domain, "--ros-args", *arguments) as process:

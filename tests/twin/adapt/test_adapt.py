@@ -1,4 +1,4 @@
-"""`lupin-twin adapt` and a twin, each in a process of its own; standard messages alone come in."""
+"""`lupin-twin adapt` and a twin, each in its own process; only standard messages come in."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -102,16 +102,16 @@ class Robot:
         ]
 
     def said(self, text: str) -> bool:
-        """Whether the adapter has it on `/diagnostics`."""
+        """Whether the adapter reports it on `/diagnostics`."""
         return bool(self._statuses(text))
 
     def dropped(self, text: str) -> int:
-        """How many messages it has dropped of the source of which it says that."""
+        """How many messages were dropped, by the diagnostic of that source."""
         values = self._statuses(text)[-1].values
         return sum(int(each.value) for each in values if each.key.startswith("dropped: "))
 
 
-def test_a_robot_of_standard_messages_alone_is_on_the_twins_state(
+def test_a_robot_with_standard_messages_alone_is_in_the_twins_state(
     domain: int, config: Path
 ) -> None:
     with twin_node(domain), adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
@@ -143,7 +143,7 @@ def test_a_robot_of_standard_messages_alone_is_on_the_twins_state(
         assert process.stop() == 0
 
 
-def test_the_robot_that_the_tutorial_starts_is_on_the_twins_state(
+def test_the_robot_that_the_tutorial_starts_is_in_the_twins_state(
     domain: int, tmp_path: Path
 ) -> None:
     path = tmp_path / "adapt.yaml"
@@ -159,7 +159,7 @@ def has_read(value: float, tag: Any) -> bool:
 
 
 @pytest.mark.parametrize("kind", [PoseStamped, Odometry])
-def test_other_poses_say_where_the_robot_is_too(domain: int, config: Path, kind: Any) -> None:
+def test_other_pose_types_locate_the_robot_too(domain: int, config: Path, kind: Any) -> None:
     package = kind.__module__.partition(".")[0]
     was = "geometry_msgs/msg/PoseWithCovarianceStamped"
     config.write_text(CONFIG.replace(was, f"{package}/msg/{kind.__name__}"))
@@ -192,7 +192,7 @@ WRONG: list[tuple[Callable[[Robot], None], str]] = [
 ]
 
 
-def test_what_is_wrong_is_dropped_counted_and_said(domain: int, config: Path) -> None:
+def test_bad_messages_are_dropped_counted_and_reported(domain: int, config: Path) -> None:
     with config.open("a") as file:
         file.write("  wrong: {topic: /b/co2, type: std_msgs/msg/Float32, field: value, tag: B}\n")
     with adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
@@ -209,9 +209,7 @@ def test_what_is_wrong_is_dropped_counted_and_said(domain: int, config: Path) ->
         assert process.exit_code is None
 
 
-def test_a_name_or_a_type_that_is_wrong_is_named_and_so_is_what_would_be_right(
-    domain: int, config: Path
-) -> None:
+def test_a_wrong_name_or_type_is_reported_with_the_right_one(domain: int, config: Path) -> None:
     text = CONFIG.replace("/temperature,", "/temprature,").replace("Float32", "Float64")
     config.write_text(text)
     soon = constants(**{"lupin_twin.adapt.node:SILENT_S": 2.0})
@@ -227,7 +225,7 @@ def test_a_name_or_a_type_that_is_wrong_is_named_and_so_is_what_would_be_right(
 
 @contextmanager
 def listening(domain: int, make: Callable[[], Any]) -> Iterator[tuple[Any, Callable[[], None]]]:
-    """A node that checks, in this process, and what spins it for a moment."""
+    """A node that checks, in this process, and a function that spins it for a moment."""
     with ros_domain(domain):
         rclpy.init(args=[])
         try:
@@ -239,7 +237,7 @@ def listening(domain: int, make: Callable[[], Any]) -> Iterator[tuple[Any, Calla
             rclpy.try_shutdown()
 
 
-def test_check_says_of_each_topic_whether_it_is_right(domain: int, config: Path) -> None:
+def test_check_reports_for_each_topic_whether_it_is_right(domain: int, config: Path) -> None:
     config.write_text(CONFIG.replace("/humidity", "/humiditi"))
     made = partial(AdaptNode, read_config(config), is_check=True)
     with Peer(domain) as peer, listening(domain, made) as (node, spin):
@@ -254,7 +252,7 @@ def test_check_says_of_each_topic_whether_it_is_right(domain: int, config: Path)
             return "its frame is 'odom', expected 'map'" in lines[0] and "21.5" in lines[1]
 
         peer.until(publish, "enough to be heard")
-        # What came a moment ago is not silent; what never came is.
+        # A topic with a recent message is not silent; one without any is.
         position, temperature, _, co2, made_of = (line for _, line in report(node, 60.0))
         assert position.startswith("WRONG /amcl_pose: dropped a message on /amcl_pose: its frame")
         assert temperature.startswith("ok    /temperature: receiving; received ")
@@ -267,7 +265,7 @@ def test_check_says_of_each_topic_whether_it_is_right(domain: int, config: Path)
         assert robot.observations == robot.reports == []
 
 
-def test_check_without_a_configuration_finds_one_that_works(domain: int) -> None:
+def test_check_without_a_configuration_finds_a_working_one(domain: int) -> None:
     with Peer(domain) as peer, listening(domain, Listener) as (node, spin):
         robot = Robot(peer)
 
@@ -288,7 +286,7 @@ def test_check_without_a_configuration_finds_one_that_works(domain: int) -> None
     ]
 
 
-def test_check_ends_by_itself_and_says_what_is_wrong_by_its_code(domain: int, config: Path) -> None:
+def test_check_ends_by_itself_with_an_exit_code(domain: int, config: Path) -> None:
     with adapt(domain, "--config", str(config), "--check", "--seconds", "0.1") as process:
         assert process.wait() == 1
         assert "WRONG /amcl_pose: nobody publishes it; received 0" in process.output
@@ -302,7 +300,7 @@ def test_check_ends_by_itself_and_says_what_is_wrong_by_its_code(domain: int, co
         (("sensor_msgs/msg/Temperature", "sensor_msgs/msg/Warmth"), "has no message Warmth"),
     ],
 )
-def test_a_configuration_that_cannot_be_is_one_line(
+def test_an_invalid_configuration_is_refused_in_one_line(
     domain: int, config: Path, change: tuple[str, str], complaint: str
 ) -> None:
     config.write_text(config.read_text().replace(*change))

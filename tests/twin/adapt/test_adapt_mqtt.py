@@ -1,4 +1,4 @@
-"""Fixed sensors at a real broker, on the state of a twin that has never heard of MQTT."""
+"""Fixed sensors at a real broker, in the state of a twin that knows no MQTT."""
 
 import json
 import socket
@@ -57,13 +57,13 @@ def device(broker: Broker) -> Iterator[Client]:
 
 
 def readings(peer: Peer, tag_id: str) -> dict[str, float]:
-    """What the newest state has of a tag."""
+    """The latest readings of a tag."""
     tags = {tag.tag_id: tag for tag in peer.states[-1].tags} if peer.states else {}
     tag: Any = tags.get(tag_id)
     return {} if tag is None else {each.name: each.value for each in tag.readings}
 
 
-def test_what_zigbee_sensors_say_is_on_the_state_and_so_is_that_one_is_gone(
+def test_messages_of_zigbee_sensors_are_in_the_state_and_so_is_a_lost_sensor(
     domain: int, tmp_path: Path
 ) -> None:
     broker = Broker(tmp_path)
@@ -87,7 +87,7 @@ def test_what_zigbee_sensors_say_is_on_the_state_and_so_is_that_one_is_gone(
         assert readings(peer, "bench") == {"temperature": 21.5, "humidity": 60.0}
         assert readings(peer, "other") == {"co2": 800.0}
         placed = {tag.tag_id: tag.pose.orientation.w for tag in peer.states[-1].tags}
-        assert placed == {"bench": 1.0, "other": 0.0}  # nobody has said where the other one is
+        assert placed == {"bench": 1.0, "other": 0.0}  # the other one has no configured position
 
         client.publish("zigbee2mqtt/bench/availability", '{"state": "offline"}')
 
@@ -98,7 +98,7 @@ def test_what_zigbee_sensors_say_is_on_the_state_and_so_is_that_one_is_gone(
         assert process.exit_code is None
 
 
-def test_the_last_will_of_a_sensor_that_dies_is_a_failed_scan(domain: int, tmp_path: Path) -> None:
+def test_the_last_will_of_a_dead_sensor_is_a_failed_scan(domain: int, tmp_path: Path) -> None:
     broker = Broker(tmp_path)
     with broker.running(), adapted(domain, broker), Peer(domain) as peer:
         robot = Robot(peer)
@@ -109,7 +109,7 @@ def test_the_last_will_of_a_sensor_that_dies_is_a_failed_scan(domain: int, tmp_p
         wait_for(lambda: sensor.loop() == 0 and sensor.is_connected(), "the sensor to be there")
         connection = sensor.socket()
         assert connection is not None
-        connection.close()  # without a goodbye
+        connection.close()  # without a DISCONNECT
 
         def failed() -> Any:
             return next((it for it in robot.observations if it.status), None)
@@ -120,7 +120,7 @@ def test_the_last_will_of_a_sensor_that_dies_is_a_failed_scan(domain: int, tmp_p
         assert found.tag_pose_in_map.position.x == 1.0
 
 
-def test_what_is_retained_counts_by_its_own_time_or_not_at_all(domain: int, tmp_path: Path) -> None:
+def test_a_retained_message_counts_by_its_own_time_or_not(domain: int, tmp_path: Path) -> None:
     broker = Broker(tmp_path)
     then_s = time.time() - 3600.0
     with broker.running(), device(broker) as client:
@@ -140,7 +140,7 @@ def test_what_is_retained_counts_by_its_own_time_or_not_at_all(domain: int, tmp_
             assert readings(peer, "undated") == readings(peer, "hot") == {}
 
 
-def test_a_flood_a_megabyte_and_a_topic_for_each_message_harm_nothing(
+def test_a_flood_a_megabyte_and_a_topic_for_each_message_do_no_harm(
     domain: int, tmp_path: Path
 ) -> None:
     broker = Broker(tmp_path)
@@ -168,8 +168,8 @@ def test_a_flood_a_megabyte_and_a_topic_for_each_message_harm_nothing(
         assert process.exit_code is None
 
 
-def test_a_topic_that_is_no_utf8_is_told_and_costs_no_other(domain: int, tmp_path: Path) -> None:
-    """Mosquitto would not pass it on; EMQX does."""
+def test_a_topic_that_is_not_utf8_costs_no_other(domain: int, tmp_path: Path) -> None:
+    """Mosquitto would not forward it; EMQX does."""
 
     def serve(listener: socket.socket) -> None:
         client, _ = listener.accept()
@@ -196,7 +196,7 @@ def test_a_topic_that_is_no_utf8_is_told_and_costs_no_other(domain: int, tmp_pat
         serving.result()
 
 
-def test_check_says_what_comes_from_the_broker(domain: int, tmp_path: Path) -> None:
+def test_check_reports_what_comes_from_the_broker(domain: int, tmp_path: Path) -> None:
     broker = Broker(tmp_path)
     config = config_of(yaml.safe_load(CONFIG.format(url=broker.url)))
     with (
@@ -216,7 +216,7 @@ def test_check_says_what_comes_from_the_broker(domain: int, tmp_path: Path) -> N
         node.destroy_node()
 
 
-def test_a_broker_that_comes_late_or_goes_is_told_and_found_again(
+def test_a_broker_that_comes_late_or_goes_is_reported_and_found_again(
     domain: int, tmp_path: Path
 ) -> None:
     broker = Broker(tmp_path)

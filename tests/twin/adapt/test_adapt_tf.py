@@ -1,4 +1,4 @@
-"""`lupin-twin adapt` on a robot that says by TF where it is, and by apriltag_ros what it sees."""
+"""`lupin-twin adapt` with a robot that publishes its pose by TF and tags by apriltag_ros."""
 
 from collections.abc import Callable
 from functools import partial
@@ -61,7 +61,7 @@ class Robot:
         node.create_subscription(
             Observation, "/floranova/observations", self.observations.append, latched(50)
         )
-        # Once, and for ever; the camera looks along the robot's left.
+        # Once, latched; the camera looks along the robot's left.
         self.stand(self.step("base_link", "camera", (0.0, 0.2, 0.5)))
 
     def step(self, parent: str, child: str, at: tuple[float, float, float]) -> TransformStamped:
@@ -87,7 +87,7 @@ class Robot:
     def see(
         self, number: int, ahead_m: float, *, hamming: int = 0, frame: str = "tag36h11:{}"
     ) -> TransformStamped:
-        """As apriltag_ros: first the detection, behind it the transform, of the same moment."""
+        """As apriltag_ros does: first the detection, then the transform, of the same moment."""
         from apriltag_msgs.msg import AprilTagDetection, AprilTagDetectionArray
 
         step = self.step("camera", frame.format(number), (ahead_m, 0.0, 0.0))
@@ -104,9 +104,7 @@ class Robot:
         return any(text in it.message for report in self.reports for it in report.status)
 
 
-def test_a_tag_that_is_seen_is_on_the_map_and_what_is_read_there_is_its_own(
-    domain: int, config: Path
-) -> None:
+def test_a_seen_tag_is_on_the_map_with_the_readings_taken_there(domain: int, config: Path) -> None:
     with twin_node(domain), adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
         robot = Robot(peer)
         peer.listen()
@@ -115,7 +113,7 @@ def test_a_tag_that_is_seen_is_on_the_map_and_what_is_read_there_is_its_own(
             robot.be_at(
                 5.0,
                 robot.see(7, 0.3),
-                robot.see(8, 2.0),  # out of reach: too far to say where it is
+                robot.see(8, 2.0),  # out of reach: too far for a position
                 robot.see(9, 0.3, hamming=1),  # a shadow
                 robot.see(1, 0.3),  # it was surveyed
             )
@@ -132,7 +130,7 @@ def test_a_tag_that_is_seen_is_on_the_map_and_what_is_read_there_is_its_own(
         ]
         assert tags["tag36h11:1"].pose.position.x == 9.0
 
-        # The first place stays, and between tags nothing is read.
+        # The first position stays, and between tags nothing is read.
         robot.observations.clear()
 
         def elsewhere() -> bool:
@@ -156,7 +154,7 @@ WRONG: list[tuple[Callable[[Robot], object], str]] = [
 ]
 
 
-def test_what_is_wrong_with_tf_is_named(domain: int, config: Path) -> None:
+def test_mistakes_in_tf_are_reported_by_name(domain: int, config: Path) -> None:
     with adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
         robot = Robot(peer)
         for do, text in WRONG:
@@ -203,7 +201,7 @@ def test_a_fixed_sensor_is_where_its_frame_is(domain: int, config: Path) -> None
         assert process.exit_code is None
 
 
-def test_check_says_where_tf_has_the_robot_and_which_tags_are_seen(domain: int) -> None:
+def test_check_reports_the_robots_position_in_tf_and_the_seen_tags(domain: int) -> None:
     made = partial(AdaptNode, config_of(yaml.safe_load(CONFIG)), is_check=True)
     with Peer(domain) as peer, listening(domain, made) as (node, spin):
         robot = Robot(peer)
@@ -223,7 +221,7 @@ def test_check_says_where_tf_has_the_robot_and_which_tags_are_seen(domain: int) 
         assert tf.endswith("robot at (5.00, 0.00) m")
 
 
-def test_check_names_transforms_that_are_static_and_not_latched(domain: int) -> None:
+def test_check_names_static_transforms_that_are_not_latched(domain: int) -> None:
     from tf2_msgs.msg import TFMessage
 
     made = partial(AdaptNode, config_of(yaml.safe_load(CONFIG)), is_check=True)
@@ -258,7 +256,7 @@ def test_check_without_a_configuration_finds_tf_and_detections(domain: int) -> N
     assert found.detections.topic == "/detections"
 
 
-def test_what_the_docs_show_of_tf_is_taken() -> None:
+def test_the_tf_examples_of_the_docs_are_valid() -> None:
     config = config_of(yaml.safe_load(block_named("adapt-tf").text))
     assert config.robot is not None
     assert config.robot.tf == "base_link"

@@ -1,4 +1,4 @@
-"""What `adapt` is told: everything that can be wrong is named by its key, its value, the limit."""
+"""The configuration of `adapt`: each mistake is reported with its key, value and limit."""
 
 import math
 from pathlib import Path
@@ -22,7 +22,7 @@ sensors:
 """
 
 
-def test_the_least_that_has_to_work(tmp_path: Path) -> None:
+def test_the_smallest_configuration_works(tmp_path: Path) -> None:
     path = tmp_path / "adapt.yaml"
     path.write_text(LEAST)
     config = read_config(path)
@@ -33,11 +33,11 @@ def test_the_least_that_has_to_work(tmp_path: Path) -> None:
     assert temperature == Sensor(
         "temperature", "/temperature", "sensor_msgs/msg/Temperature", Value("temperature")
     )
-    # A standard message's ratio is our percent, without being told.
+    # A standard message's ratio becomes our percent without configuration.
     assert (humidity.value.path, humidity.value.factor) == ("relative_humidity", 100.0)
 
 
-def test_tags_may_stand_in_a_file_of_their_own(tmp_path: Path) -> None:
+def test_tags_may_be_in_a_file_of_their_own(tmp_path: Path) -> None:
     (tmp_path / "tags.yaml").write_text("A: [1.5, 2.5]")
     (tmp_path / "adapt.yaml").write_text(LEAST.replace("{A: [0.0, 0.0],", "tags.yaml #"))
     assert read_config(tmp_path / "adapt.yaml").tags == {"A": Pose.at(1.5, 2.5)}
@@ -63,7 +63,7 @@ def test_one_quantity_may_have_several_fixed_sensors() -> None:
     assert (second.name, second.tag, second.value.offset) == ("co2", "B", -20.0)
 
 
-def test_what_the_docs_show_is_taken() -> None:
+def test_the_examples_of_the_docs_are_valid() -> None:
     config = config_of(yaml.safe_load(block_named("adapt").text))
     assert (len(config.tags), len(config.sensors)) == (2, 2)
     config = config_of(yaml.safe_load(block_named("adapt-mqtt").text))
@@ -72,7 +72,7 @@ def test_what_the_docs_show_is_taken() -> None:
     assert (len(config.tags), len(config.broker.patterns)) == (2, 4)
 
 
-def test_another_number_of_a_standard_message_is_in_its_own_unit() -> None:
+def test_another_field_of_a_standard_message_has_its_own_unit() -> None:
     content = changed("sensors.humidity.field", "variance")
     assert config_of(content).sensors[1].value.factor == 1.0
 
@@ -89,7 +89,7 @@ def test_detections_need_a_robot_and_no_tags() -> None:
 
 
 def changed(path: str, value: Any) -> dict[str, Any]:
-    """The least configuration with another value; `...` takes the key away."""
+    """The smallest configuration with another value; `...` removes the key."""
     content: dict[str, Any] = yaml.safe_load(LEAST)
     *parents, key = path.split(".")
     table = content
@@ -145,7 +145,7 @@ def changed(path: str, value: Any) -> dict[str, Any]:
         ("colour", 1, "'colour' is not known, expected one of robot, tags"),
     ],
 )
-def test_what_cannot_be_is_named(path: str, value: Any, complaint: str | None) -> None:
+def test_an_invalid_configuration_is_named(path: str, value: Any, complaint: str | None) -> None:
     content = changed(path, value)
     if complaint is None:
         config_of(content)
@@ -174,7 +174,7 @@ def test_what_cannot_be_is_named(path: str, value: Any, complaint: str | None) -
         ("x" * 4_000_001, "has more than 4000000 bytes"),
     ],
 )
-def test_a_file_that_is_none_is_named(tmp_path: Path, text: str, complaint: str) -> None:
+def test_an_invalid_file_is_reported_by_name(tmp_path: Path, text: str, complaint: str) -> None:
     path = tmp_path / "adapt.yaml"
     path.write_text(text)
     with pytest.raises(ConfigError) as refused:

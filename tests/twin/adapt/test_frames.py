@@ -1,4 +1,4 @@
-"""TF: places along a chain of transforms, and everything by which such a chain is none."""
+"""TF: positions along a chain of transforms, and every reason why there is none."""
 
 import math
 import random
@@ -73,13 +73,13 @@ def test_any_chain_is_the_product_of_its_matrices() -> None:
         ({"tag": step("a", 0, 0, 0), "a": step("tag", 0, 0, 0)}, "TF has a loop"),
     ],
 )
-def test_where_no_chain_leads_is_named(steps: dict[str, Transform], complaint: str) -> None:
+def test_a_missing_chain_is_reported_by_name(steps: dict[str, Transform], complaint: str) -> None:
     with pytest.raises(FrameError) as refused:
         frames_of(**steps).place("tag", "map", NOW, 2 * S)
     assert complaint in str(refused.value)
 
 
-def test_the_newest_transform_counts_and_a_static_one_has_no_age() -> None:
+def test_the_latest_transform_counts_and_a_static_one_has_no_age() -> None:
     frames = frames_of(base=step("map", 1, 0, 0), camera=step("base", 0, 1, 0, stamp_ns=None))
     frames.put("base", step("map", 2, 0, 0, stamp_ns=NOW + 9 * S))
     assert frames.place("camera", "map", NOW + 10 * S, 2 * S) == (2, 1, 0)
@@ -98,7 +98,7 @@ def test_the_newest_transform_counts_and_a_static_one_has_no_age() -> None:
         step("m" * 300, 0, 0, 0),
     ],
 )
-def test_what_is_no_transform_is_not_taken(transform: Transform) -> None:
+def test_an_invalid_transform_is_refused(transform: Transform) -> None:
     frames = Frames()
     with pytest.raises(FrameError):
         frames.put("base", transform)
@@ -119,7 +119,7 @@ def test_a_sighting_waits_for_its_transform_and_no_longer() -> None:
     sightings = Sightings()
     frames = frames_of(early=step("map", 0, 0, 0), late=step("map", 0, 0, 0, stamp_ns=NOW - 1))
     sightings.see("early", "1", NOW, NOW)
-    sightings.see("late", "2", NOW, NOW)  # its transform is of an earlier picture
+    sightings.see("late", "2", NOW, NOW)  # its transform is from an earlier picture
     sightings.see("never", "3", NOW, NOW)
     assert sightings.come(frames) == [("1", "early")]
     sightings.end("early")
@@ -128,6 +128,6 @@ def test_a_sighting_waits_for_its_transform_and_no_longer() -> None:
     assert sightings.come(frames) == [("2", "late")]
     sightings.end("late")
     assert sightings.missed(NOW + WAIT_NS) == []
-    sightings.see("never", "3", NOW + S, NOW + S)  # being seen again begins no new wait
+    sightings.see("never", "3", NOW + S, NOW + S)  # a second sighting starts no new wait
     assert sightings.missed(NOW + WAIT_NS + 1) == ["never"]
     assert sightings.missed(NOW + WAIT_NS + 1) == []

@@ -1,4 +1,4 @@
-"""MQTT in: topics and payloads of fixed sensors, and everything that can be wrong with them."""
+"""MQTT in: topics and payloads of fixed sensors, and every mistake that they can contain."""
 
 import json
 from pathlib import Path
@@ -32,7 +32,7 @@ def test_a_plain_number_is_a_reading_of_the_tag_and_sensor_in_its_topic() -> Non
     assert said(configured, "gh/A/co2/more", b"1") == []
 
 
-def test_json_is_read_by_paths_and_says_when_it_was() -> None:
+def test_json_is_read_by_paths_with_its_own_time() -> None:
     configured = broker(
         {
             "topic": "house/+/climate",
@@ -52,7 +52,7 @@ def test_json_is_read_by_paths_and_says_when_it_was() -> None:
         (1_700_000_000.5, 1_700_000_000.5),
         (1_700_000_000_000, 1.7e9),
         ("2024-05-01T12:00:00+02:00", 1_714_557_600.0),
-        ("2024-05-01T10:00:00", 1_714_557_600.0),  # in UTC, wherever this runs
+        ("2024-05-01T10:00:00", 1_714_557_600.0),  # in UTC, in any local zone
     ):
         assert said(configured, "house/x/climate", {"list": [0, 1], "at": at})[0].stamp_s == seconds
 
@@ -106,7 +106,7 @@ def test_home_assistants_entities_are_tag_and_sensor() -> None:
     assert said(configured, "ha/sensor/a_humidity/state", b"unknown") == [Measured("a")]
 
 
-def test_a_preset_gives_way_to_what_is_said_and_a_topic_says_who_is_there() -> None:
+def test_a_preset_yields_to_explicit_settings_and_a_topic_may_carry_availability() -> None:
     configured = broker(
         {
             "topic": "zigbee2mqtt/{tag}",
@@ -120,7 +120,7 @@ def test_a_preset_gives_way_to_what_is_said_and_a_topic_says_who_is_there() -> N
     assert said(configured, "there/A", b"Offline") == [Measured("A", is_away=True)]
 
 
-def test_who_the_broker_is(tmp_path: Path) -> None:
+def test_the_broker_and_its_credentials_are_configurable(tmp_path: Path) -> None:
     (tmp_path / "secret").write_text(" hush \n")
     content = {
         "url": "mqtts://broker.lan",
@@ -161,7 +161,7 @@ def test_who_the_broker_is(tmp_path: Path) -> None:
         ("A/j", b'{"t": 1, "at": "1970-01-01T00:01:00Z"}', "before 2001: was its clock"),
     ],
 )
-def test_what_says_nothing_is_named(topic: str, payload: bytes, complaint: str) -> None:
+def test_a_message_without_a_value_is_named(topic: str, payload: bytes, complaint: str) -> None:
     configured = broker(
         {"topic": "{tag}/t", "sensor": "temperature", "min": 0, "max": 50},
         {"topic": "{tag}/j", "values": {"temperature": "t"}, "time": "at"},
@@ -196,7 +196,7 @@ def test_what_says_nothing_is_named(topic: str, payload: bytes, complaint: str) 
         ({"topic": "{tag}", "sensor": "t"}, {"topics": []}, "mqtt.topics is [], expected a list"),
     ],
 )
-def test_what_cannot_be_configured_is_named(
+def test_an_invalid_topic_configuration_is_reported_by_name(
     topic: dict[str, Any], more: dict[str, Any], complaint: str
 ) -> None:
     with pytest.raises(ConfigError) as refused:

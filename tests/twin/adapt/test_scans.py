@@ -1,4 +1,4 @@
-"""Readings become scans: the tag they belong to, and the mean of a stop."""
+"""Readings become scans: which tag they belong to, and the mean over a stop."""
 
 import statistics
 from types import SimpleNamespace
@@ -35,7 +35,7 @@ def test_a_stop_is_one_scan_of_the_mean_when_the_robot_leaves() -> None:
     scans = scans_of()
     assert move(scans, 1, 0.3) == []
     assert read(scans, 3, 20.0)
-    assert read(scans, 2, 22.0)  # the scan is of the newest, whatever came last
+    assert read(scans, 2, 22.0)  # the scan has the latest stamp, whatever arrived last
     (scan,) = move(scans, 4, 1.5)
     assert scan == Scan(
         "A",
@@ -48,7 +48,7 @@ def test_a_stop_is_one_scan_of_the_mean_when_the_robot_leaves() -> None:
     assert scans.tag is None
 
 
-def test_a_long_stop_is_a_scan_each_window() -> None:
+def test_a_long_stop_is_one_scan_per_window() -> None:
     scans = scans_of()
     move(scans, 0, 0.0)
     read(scans, 1)
@@ -59,7 +59,7 @@ def test_a_long_stop_is_a_scan_each_window() -> None:
     assert scan.readings == (Reading("temperature", 30.0),)
 
 
-def test_who_stops_and_reads_nothing_has_failed_and_who_passes_by_has_not() -> None:
+def test_a_stop_without_readings_is_a_failed_scan_and_passing_by_is_none() -> None:
     scans = scans_of()
     move(scans, 0, 0.0)
     assert move(scans, 1, 1.5) == []
@@ -99,7 +99,7 @@ def test_a_pose_holds_no_longer_than_its_age() -> None:
     assert not read(scans, 31)
 
 
-def test_a_clock_that_goes_back_begins_anew() -> None:
+def test_a_clock_that_goes_back_starts_anew() -> None:
     scans = scans_of()
     move(scans, 100, 0.0)
     read(scans, 101)
@@ -118,7 +118,7 @@ def test_a_fixed_sensor_needs_no_robot() -> None:
     assert list(scans.due(30 * S)) == []
 
 
-def test_where_no_tag_is_in_reach_a_cell_may_be_one() -> None:
+def test_where_no_tag_is_in_reach_a_grid_cell_may_become_one() -> None:
     scans = scans_of(cell_m=2.0)
     move(scans, 0, 7.0, -0.5)
     read(scans, 1)
@@ -127,7 +127,7 @@ def test_where_no_tag_is_in_reach_a_cell_may_be_one() -> None:
     assert scans.tag == "A"
 
 
-def test_tags_are_bounded_fixed_and_found_ones() -> None:
+def test_tags_are_limited_both_fixed_and_found_ones() -> None:
     scans = scans_of(tags={})
     taken = [scans.take("co2", f"T{n}", 1.0, 0, 0) for n in range(MAX_TAGS + 1)]
     assert taken == [True] * MAX_TAGS + [False]
@@ -137,7 +137,7 @@ def test_tags_are_bounded_fixed_and_found_ones() -> None:
     assert found == [True] * MAX_TAGS + [False]
 
 
-def test_a_found_tag_is_in_reach_new_and_then_as_a_surveyed_one() -> None:
+def test_a_found_tag_counts_as_new_and_then_like_a_surveyed_one() -> None:
     scans = scans_of()
     move(scans, 0, 5.0)
     assert not scans.discover("A", Pose.at(5, 0), 5.0, 0.0)
@@ -152,7 +152,7 @@ def test_a_found_tag_is_in_reach_new_and_then_as_a_surveyed_one() -> None:
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=50))
-def test_mean_and_spread_are_the_definitions(values: list[float]) -> None:
+def test_mean_and_spread_match_their_definitions(values: list[float]) -> None:
     scans = scans_of()
     move(scans, 0, 0.0)
     for value in values:
@@ -173,7 +173,7 @@ def test_a_number_is_found_by_its_path(path: str, number: float) -> None:
 
 
 @pytest.mark.parametrize("path", ["none", "axes[0]", "list[3]", "text", "data.x"])
-def test_what_is_no_number_is_an_error(path: str) -> None:
+def test_a_value_that_is_no_number_is_an_error(path: str) -> None:
     message = SimpleNamespace(data=1.5, axes=[SimpleNamespace()], list=[4], text="8")
     with pytest.raises(Rejected, match="field "):
         number_of(message, path)

@@ -15,13 +15,13 @@ def look(watch: ClockWatch, ros_s: float, now_s: float) -> ClockState:
     return watch.update(int(ros_s * S), now_s, is_simulated=True)
 
 
-def test_a_simulated_clock_that_was_never_set_is_none_however_long() -> None:
+def test_a_simulated_clock_that_was_never_set_is_never_running() -> None:
     watch = ClockWatch()
     assert [look(watch, 0, now_s) for now_s in (0.0, 1.0, 1000.0)] == ["none"] * 3
     assert not watch.should_subscribe
 
 
-def test_one_that_stands_and_is_still_told_is_paused() -> None:
+def test_a_clock_that_stands_but_is_still_published_is_paused() -> None:
     watch = ClockWatch()
     look(watch, 5, 10.0)
     look(watch, 5, 12.0)
@@ -34,7 +34,7 @@ def test_one_that_stands_and_is_still_told_is_paused() -> None:
     assert look(watch, 5.1, 17.0) == "running"
 
 
-def test_it_listens_only_while_the_clock_stands() -> None:
+def test_it_subscribes_only_while_the_clock_stands() -> None:
     watch = ClockWatch()
     look(watch, 5, 10.0)
     wants = [watch.should_subscribe]
@@ -55,7 +55,7 @@ def test_a_clock_that_goes_back_runs() -> None:
     assert look(watch, 1, 14.5) == "running"
 
 
-def test_by_its_states_alone_a_clock_runs_has_stopped_or_was_never_set() -> None:
+def test_by_its_states_alone_a_clock_runs_or_has_stopped_or_was_never_set() -> None:
     def look(stamp: int, now_s: float, known: bool = True) -> ClockState:
         return watch.update(stamp * S, now_s, ages_are_known=known)
 
@@ -69,7 +69,7 @@ def test_by_its_states_alone_a_clock_runs_has_stopped_or_was_never_set() -> None
     assert look(6, 16.1, known=False) == "stopped"
 
 
-def test_a_twin_that_says_how_its_clock_does_is_believed_as_long_as_its_states_allow_it() -> None:
+def test_a_twins_report_of_its_clock_is_trusted_while_its_states_agree() -> None:
     def look(
         stamp: int, now_s: float, reported: ClockState | None, known: bool = True
     ) -> ClockState:

@@ -42,7 +42,7 @@ def found(name: str, **changes: Any) -> Finding:
     return finding
 
 
-def test_a_twin_that_is_well_is_ok_in_all() -> None:
+def test_a_healthy_twin_is_ok_in_every_check() -> None:
     levels = {finding.name: finding.level for finding in findings(WELL)}
     names = "clock origin inputs drops queues stamps fields journal twins"
     assert levels == dict.fromkeys(names.split(), OK)
@@ -72,7 +72,7 @@ def test_a_twin_that_is_well_is_ok_in_all() -> None:
         ("twins", {"twins": 2}, ERROR, "2 twins"),
     ],
 )
-def test_what_is_not_well_has_its_level(
+def test_each_fault_has_its_level(
     name: str, changes: dict[str, Any], level: int, words: str
 ) -> None:
     finding = found(name, **changes)
@@ -95,7 +95,7 @@ def test_the_numbers_are_there() -> None:
 
 
 @pytest.mark.parametrize("clock", ["running", "paused", "stopped", "none"])
-def test_what_is_said_is_read_again(clock: ClockState) -> None:
+def test_a_reported_finding_is_parsed_back(clock: ClockState) -> None:
     recent = (FRAME, Recent("lost", "lost messages", 2), Recent("late_stamp", "late", 1))
     counts = Counts({"frame": 40, "lost": 5, "late_stamp": 1}, 3, recent)
     assert self_report(findings(replace(WELL, clock=clock, counts=counts))) == SelfReport(
@@ -104,13 +104,13 @@ def test_what_is_said_is_read_again(clock: ClockState) -> None:
 
 
 @pytest.mark.parametrize("origin", ["unknown", "robot", "simulated", "recorded", "sim_time"])
-def test_where_observations_come_from_is_read_again(origin: Origin) -> None:
+def test_the_source_of_observations_is_parsed_back(origin: Origin) -> None:
     assert self_report(findings(replace(WELL, origin=origin))).origin == origin
     assert self_report([found("origin", origin=origin)]).origin == origin
     assert self_report([Finding("origin", OK, "", {"origin": "elsewhere"})]).origin == "unknown"
 
 
-def test_what_is_said_of_the_journal_is_read_again() -> None:
+def test_the_journals_report_is_parsed_back() -> None:
     told = Condition(
         JournalState.FAILING,
         "the disk is full",
@@ -139,23 +139,23 @@ def test_what_is_said_of_the_journal_is_read_again() -> None:
 
 
 @pytest.mark.parametrize("own", ["../accounts", "/etc/passwd", "a/b", "..", "j\u00fc", "x" * 600])
-def test_a_journal_whose_name_could_lead_to_another_file_has_none(own: str) -> None:
+def test_a_journal_name_that_could_lead_to_another_file_is_dropped(own: str) -> None:
     values = {"state": "recording", "id": own}
     assert self_report([Finding("journal", OK, "", values)]).journal.journal_id == ""
 
 
-def test_who_says_nothing_is_not_said_to_have_dropped_nothing() -> None:
+def test_a_missing_report_is_not_read_as_no_drops() -> None:
     assert self_report(()) == SelfReport(None, None)
     assert self_report([Finding("clock", OK, "", {"state": "well"})]) == SelfReport(None, None)
 
 
 @pytest.mark.parametrize("text", ["", "-1", "1.5", "many", "²", "9" * 16])
-def test_a_number_that_is_none_counts_nothing(text: str) -> None:
+def test_an_invalid_number_counts_nothing(text: str) -> None:
     values = {"frame": text, "lately: frame": text, "callback errors": text, "spoons": "7"}
     assert self_report([Finding("drops", OK, "", values)]).counts == Counts()
 
 
-def test_a_long_word_is_told_up_to_a_limit() -> None:
+def test_a_long_text_is_cut_at_the_limit() -> None:
     for length in (MAX_SHOWN, MAX_SHOWN + 1):
         word = "x" * length
         said = found("drops", counts=Counts({"frame": 1}, 0, (Recent("frame", word, 1),)))

@@ -1,4 +1,4 @@
-"""Which tags are far off. The page is held to the same cases by `domain/twin.test.ts`."""
+"""Which tags are far off. `domain/twin.test.ts` checks the page with the same table."""
 
 import json
 import math
@@ -17,7 +17,7 @@ CASES: dict[str, Any] = json.loads(
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_cases_that_the_page_knows_too(case: str) -> None:
+def test_the_cases_that_are_shared_with_the_page(case: str) -> None:
     at = [(float(x), float(y)) for x, y in CASES[case]["at"]]
     reach = reach_of(at)
     assert [index for index, place in enumerate(at) if not reach.holds(*place)] == (
@@ -25,7 +25,7 @@ def test_the_cases_that_the_page_knows_too(case: str) -> None:
     )
 
 
-def test_without_tags_every_point_that_a_pose_may_have_is_on_the_map() -> None:
+def test_without_tags_every_valid_pose_is_on_the_map() -> None:
     reach = reach_of([])
     assert reach.holds(FARTHEST_M, -FARTHEST_M)
     assert not reach.holds(math.nextafter(FARTHEST_M, math.inf), 0.0)

@@ -1,4 +1,4 @@
-"""What was received before is nothing new; and what was observed at a tag, in its order."""
+"""Repeated observations are no news; and the order of a tag's observations."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from lupin_twin.core.state import Inspection, Reading, Scan, TwinStore
 from tests.support.store import S, look, scan
 
 
-def test_what_was_received_is_known_by_kind_stamp_and_source() -> None:
+def test_a_received_observation_is_known_by_kind_stamp_and_source() -> None:
     repeats = Repeats()
     repeats.add(scan("1", at_s=5.0, source="a", co2=1.0))
     assert repeats.news(scan("1", at_s=5.0, source="a", co2=9.0)) is None
@@ -25,7 +25,7 @@ def test_what_was_received_is_known_by_kind_stamp_and_source() -> None:
         assert repeats.news(other) == other
 
 
-def test_of_a_tag_so_many_are_known_and_the_oldest_make_room() -> None:
+def test_the_number_of_known_observations_per_tag_is_limited_and_the_oldest_go() -> None:
     repeats = Repeats()
     every = [scan("1", at_s=float(n), co2=1.0) for n in range(1, KNOWN_PER_TAG + 2)]
     for one in every:
@@ -34,7 +34,7 @@ def test_of_a_tag_so_many_are_known_and_the_oldest_make_room() -> None:
 
 
 @pytest.mark.parametrize("retains_keys", [False, True])
-def test_after_a_clock_that_went_back_what_was_later_is_news_in_a_simulation(
+def test_in_a_simulation_what_was_later_than_a_reset_clock_is_news(
     retains_keys: bool,
 ) -> None:
     repeats = Repeats()
@@ -64,8 +64,8 @@ WRITES = st.lists(
 
 
 @given(WRITES, st.integers(1, 6))
-def test_against_the_plainest_history(writes: list[Scan | Inspection], count: int) -> None:
-    """All of it, sorted by stamp, each once, and of that the newest."""
+def test_the_history_equals_the_simplest_one(writes: list[Scan | Inspection], count: int) -> None:
+    """All observations, sorted by stamp, each once, and of these the latest."""
     scans: dict[tuple[int, str], dict[str, float]] = {}
     tries: dict[tuple[int, int, str], None] = {}
     for write in writes:
@@ -88,10 +88,10 @@ def test_against_the_plainest_history(writes: list[Scan | Inspection], count: in
         max_size=12,
     )
 )
-def test_of_a_log_that_lacks_the_last_write_nothing_is_missing(
+def test_with_a_log_that_lacks_the_last_write_nothing_is_missing(
     steps: list[tuple[int, set[str], bool]],
 ) -> None:
-    """The newest state shows it."""
+    """The latest state contains it."""
     store, repeats, every = TwinStore(), Repeats(), list[Scan | Inspection]()
     at_s = 0
     for number, (wait_s, sensors, is_look) in enumerate(steps, 1):

@@ -40,26 +40,26 @@ def reason_of(heard: Received) -> Reason | None:
 
 
 @pytest.mark.parametrize(("own_s", "at_s"), [(0, 3), (101, 100)])
-def test_a_scan_without_a_stamp_was_made_when_its_sensors_were_read(own_s: int, at_s: int) -> None:
+def test_a_scan_without_a_stamp_has_the_time_of_its_sensors(own_s: int, at_s: int) -> None:
     write = ingest.observation(heard_reading(own_stamp_ns=own_s * S), "map", NOW_NS)
     assert isinstance(write, Scan)
     assert (write.stamp_ns, write.own_stamp_ns) == (at_s * S, (own_s or 3) * S)
 
 
-def test_a_scan_that_is_not_ok_keeps_its_readings_and_why_and_loses_its_pose() -> None:
+def test_a_failed_scan_keeps_its_readings_and_reason_and_loses_its_pose() -> None:
     heard = heard_reading(status=SKIPPED, status_detail="no time")
     assert ingest.observation(heard, "map", NOW_NS) == Scan(
         "1", 4 * S, READINGS, None, SKIPPED, "no time", "robot", 4 * S
     )
 
 
-def test_a_look_is_what_the_camera_made_of_it() -> None:
+def test_an_inspection_has_the_result_of_the_camera() -> None:
     assert ingest.observation(heard_look(), "map", NOW_NS) == Inspection(
         "1", 4 * S, Flower("rose", 0.9), at(1.0, 2.0), source="robot", own_stamp_ns=4 * S
     )
 
 
-def test_a_look_that_is_not_ok_is_a_failed_try_and_its_payload_nothing() -> None:
+def test_a_failed_inspection_is_a_failed_attempt_without_its_payload() -> None:
     heard = heard_look(status=SKIPPED, status_detail="dark")
     assert ingest.observation(heard, "map", NOW_NS) == Inspection(
         "1", 4 * S, None, None, SKIPPED, "dark", "robot", 4 * S
@@ -67,9 +67,7 @@ def test_a_look_that_is_not_ok_is_a_failed_try_and_its_payload_nothing() -> None
 
 
 @pytest.mark.parametrize(("length", "kept"), [(256, 256), (257, 256), (10_000, 256)])
-def test_a_long_word_of_a_producer_is_cut_and_nothing_is_dropped_for_it(
-    length: int, kept: int
-) -> None:
+def test_a_long_text_of_a_producer_is_cut_and_drops_nothing(length: int, kept: int) -> None:
     heard = heard_reading(source="s" * length, status_detail="d" * length)
     write = ingest.observation(heard, "map", NOW_NS)
     assert isinstance(write, Scan)
@@ -78,7 +76,7 @@ def test_a_long_word_of_a_producer_is_cut_and_nothing_is_dropped_for_it(
 
 
 @pytest.mark.parametrize(("kind", "name"), [(2, "KIND_ANOMALY"), (77, "an unknown kind")])
-def test_other_kinds_are_dropped_by_their_name(kind: int, name: str) -> None:
+def test_other_kinds_are_dropped_with_their_name(kind: int, name: str) -> None:
     drop = ingest.observation(Received(kind, "map", None), "map", NOW_NS)
     assert isinstance(drop, Drop)
     assert drop.reason is Reason.KIND
@@ -93,22 +91,22 @@ def test_a_frame_is_the_expected_one_or_empty() -> None:
 @pytest.mark.parametrize(
     ("stamp_s", "now_s", "expected_s"),
     [
-        (60.0, 100.0, 60.0),  # latched earlier: as old as it says
+        (60.0, 100.0, 60.0),  # latched earlier: as old as its stamp
         (100.0, 100.0, 100.0),
         (130.0, 100.0, 100.0),  # from the future: no younger than now
         (0.0, 100.0, 100.0),  # no stamp: now
         (60.0, 0.0, 60.0),  # simulated time has not started
-        (0.0, 0.0, 1e-9),  # of neither: not 0, which stands for never
+        (0.0, 0.0, 1e-9),  # neither is known: not 0, which stands for never
     ],
 )
-def test_when_an_observation_was_made(stamp_s: float, now_s: float, expected_s: float) -> None:
+def test_the_time_of_an_observation(stamp_s: float, now_s: float, expected_s: float) -> None:
     assert ingest.observed_at(round(stamp_s * S), round(now_s * S)) == round(expected_s * S)
 
 
 # --- poses --------------------------------------------------------------------------------------
 
 
-def test_a_scans_pose_with_w_zero_or_a_broken_number_is_none() -> None:
+def test_a_scans_pose_with_w_zero_or_a_broken_number_is_ignored() -> None:
     assert ingest.scanned_pose(replace(at(0.0), qw=0.0)) is None
     assert ingest.scanned_pose(replace(at(0.0), qw=-0.0)) is None
     for broken in (math.nan, math.inf):
@@ -118,7 +116,7 @@ def test_a_scans_pose_with_w_zero_or_a_broken_number_is_none() -> None:
         assert ingest.discovered_pose(replace(at(0.0), qw=broken)) is None
 
 
-def test_a_discoverys_w_zero_is_taken_as_one() -> None:
+def test_a_discoverys_w_zero_is_read_as_one() -> None:
     for w, expected in ((0.0, 1.0), (-0.0, 1.0), (0.5, 0.5)):
         pose = ingest.discovered_pose(replace(at(0.0), qw=w))
         assert pose is not None
@@ -126,7 +124,7 @@ def test_a_discoverys_w_zero_is_taken_as_one() -> None:
 
 
 @pytest.mark.parametrize("length", [1.0, 2.5])
-def test_a_discoverys_half_turn_stays_one_and_is_told_from_no_pose(length: float) -> None:
+def test_a_discoverys_half_turn_is_preserved_and_is_not_an_absent_pose(length: float) -> None:
     pose = ingest.discovered_pose(replace(at(1.0), qx=0.6 * length, qz=-0.8 * length, qw=0.0))
     assert pose is not None
     assert (pose.qx, pose.qy, pose.qz) == pytest.approx((0.6, 0.0, -0.8), abs=1e-15)
@@ -137,7 +135,7 @@ def test_a_discoverys_half_turn_stays_one_and_is_told_from_no_pose(length: float
 # --- discovered tags ----------------------------------------------------------------------------
 
 
-def test_a_discovery_pins_what_has_no_pose_yet_and_makes_no_other_pose() -> None:
+def test_a_discovery_pins_a_tag_without_a_pose_and_changes_no_other() -> None:
     asked = []
 
     def pose(index: int) -> Pose:
@@ -164,7 +162,7 @@ def test_a_discovery_in_another_frame_is_dropped_once_whatever_it_holds() -> Non
 # --- writing ------------------------------------------------------------------------------------
 
 
-def test_what_is_written_is_stored_and_known_and_what_is_refused_is_neither() -> None:
+def test_an_accepted_write_is_stored_and_known_and_a_refused_one_is_neither() -> None:
     store, repeats = TwinStore(), Repeats()
     assert ingest.apply(Scan("1", S, READINGS), store, repeats) is None
     assert ingest.apply(Inspection("1", 2 * S, Flower("rose")), store, repeats) is None
@@ -183,8 +181,8 @@ def test_what_is_written_is_stored_and_known_and_what_is_refused_is_neither() ->
 
 
 @pytest.mark.parametrize("own_s", [160, 10_000])
-def test_a_message_from_the_future_stays_as_old_as_when_it_was_heard_first(own_s: int) -> None:
-    """Heard again, latched, it must not make what it said look fresh: its own time come or not."""
+def test_a_message_from_the_future_keeps_the_age_of_its_first_receipt(own_s: int) -> None:
+    """When it is received again, latched, its content must not look fresh, even after its time."""
     store, repeats = TwinStore(), Repeats()
     for now_s in (100, 130, 200):
         heard = heard_reading(own_stamp_ns=own_s * S)

@@ -1,4 +1,4 @@
-"""The table of topics and services is what nodes have in the graph of ROS, QoS included."""
+"""The table of topics and services matches the ROS graph of the nodes, with QoS."""
 
 import runpy
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ Node = TwinNode | WebNode
 
 @pytest.fixture(scope="module")
 def nodes() -> Iterator[dict[str, Node]]:
-    """A twin with layers, and a `web`, as each is started by itself."""
+    """A twin with layers, and a `web`, as each one starts."""
     made: dict[str, Node] = {}
     contexts = []
     arguments = ["--ros-args", "-p", f"layers:=[{','.join(LAYERS)}]", "-p", "journal:='off'"]
@@ -43,7 +43,7 @@ def nodes() -> Iterator[dict[str, Node]]:
 
 
 def own(found: list[tuple[str, list[str]]]) -> dict[str, str]:
-    """Names and types, without what every node has."""
+    """Names and types, without those of every node."""
     return {
         name: kind
         for name, [kind] in found
@@ -70,13 +70,13 @@ def test_a_twin_has_the_topics_and_services_of_the_table_and_no_others(
 ) -> None:
     twin = nodes["lupin_twin"]
     assert by(twin, "publisher") == told(interfaces.PUBLISHED)
-    # The clock is listened to where time is simulated.
+    # Only with simulated time is there a clock subscription.
     expected = [it for it in interfaces.SUBSCRIBED if it is not interfaces.CLOCK]
     assert by(twin, "subscriber") == told(expected)
     assert by(twin, "service") == told(interfaces.SERVICES)
 
 
-def test_their_qos_is_that_of_the_table(nodes: dict[str, Node]) -> None:
+def test_qos_is_that_of_the_table(nodes: dict[str, Node]) -> None:
     twin = nodes["lupin_twin"]
     for those, look in (
         (interfaces.PUBLISHED, twin.get_publishers_info_by_topic),
@@ -96,7 +96,7 @@ def test_every_service_of_every_node_is_in_the_table(nodes: dict[str, Node]) -> 
         assert below == set(interfaces.OF_EVERY_NODE)
 
 
-def test_the_policy_allows_all_that_the_nodes_have(nodes: dict[str, Node]) -> None:
+def test_the_policy_allows_everything_that_the_nodes_have(nodes: dict[str, Node]) -> None:
     root = ElementTree.fromstring(runpy.run_path(str(DOCS / "generate.py"))["policy"]())
     for node in nodes.values():
         [profile] = [it for it in root.iter("profile") if it.get("node") == node.get_name()]

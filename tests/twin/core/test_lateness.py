@@ -1,4 +1,4 @@
-"""A producer whose clock has gone back is found, and none whose messages come as messages do."""
+"""A producer whose clock has gone back is detected, and normal delays are not."""
 
 import pytest
 
@@ -8,14 +8,14 @@ S = 1_000_000_000
 
 
 class Robot:
-    """Messages of one source, a second apart as they are heard."""
+    """Messages of one source, received a second apart."""
 
     def __init__(self, lateness: Lateness, source: str = "robot", kind: int = 0) -> None:
         self.lateness, self.source, self.kind = lateness, source, kind
         self.now_s = 1000.0
 
     def says(self, *stamps_s: float, was_latched: bool = False, every_s: float = 1.0) -> list[Late]:
-        """Whatever is said of messages with these stamps."""
+        """The findings for messages with these stamps."""
         found = []
         for stamp_s in stamps_s:
             self.now_s += every_s
@@ -35,7 +35,9 @@ def robot() -> Robot:
     return Robot(Lateness())
 
 
-def test_a_clock_that_stepped_back_is_told_after_a_few_and_counted_with_them(robot: Robot) -> None:
+def test_a_clock_that_stepped_back_is_reported_after_a_few_messages(
+    robot: Robot,
+) -> None:
     robot.says(1000.0, 1001.0)
     assert robot.says(*(400.0 + i for i in range(FEW))) == []
     assert robot.lateness.counts == {}
@@ -49,15 +51,15 @@ def test_a_clock_that_stepped_back_is_told_after_a_few_and_counted_with_them(rob
     assert robot.lateness.counts == {"robot": FEW + 3}
 
 
-def test_kinds_have_an_order_each(robot: Robot) -> None:
+def test_each_kind_has_its_own_order(robot: Robot) -> None:
     looks = Robot(robot.lateness, kind=1)
     for at_s in range(1000, 1040):
         assert robot.says(at_s) == []
         assert looks.says(at_s - 60.0) == []
 
 
-def test_what_a_second_robot_of_the_same_name_has_latched_is_no_matter(robot: Robot) -> None:
-    """Fifty each, of the same hour, one after the other at once."""
+def test_latched_messages_of_a_second_robot_with_the_same_name_do_no_harm(robot: Robot) -> None:
+    """Fifty each, of the same hour, one after the other."""
     stamps = [1000.0 + i for i in range(50)]
     assert robot.says(*stamps, was_latched=True, every_s=0.001) == []
     assert robot.says(*stamps, was_latched=True, every_s=0.001) == []
@@ -67,20 +69,20 @@ def test_what_a_second_robot_of_the_same_name_has_latched_is_no_matter(robot: Ro
         assert robot.says(at_s, at_s - 0.5) == []
 
 
-def test_a_clock_that_is_wrong_in_every_way_is_found_too(robot: Robot) -> None:
-    """Its messages seem to come out of a latch: DDS stamps them by the same clock."""
+def test_a_clock_that_is_entirely_wrong_is_detected_too(robot: Robot) -> None:
+    """Its messages look latched: DDS stamps them with the same clock."""
     robot.says(1000.0)
     assert robot.says(*(400.0 + i for i in range(FEW)), was_latched=True, every_s=APART_S) == []
     assert len(robot.says(410.0, was_latched=True, every_s=APART_S)) == 1
 
 
-def test_a_clock_that_goes_back_for_all_makes_nobody_late(robot: Robot) -> None:
+def test_a_clock_that_goes_back_for_everyone_makes_nobody_late(robot: Robot) -> None:
     robot.says(1000.0)
     robot.lateness.clamp_to(50 * S)
     assert robot.says(*(51.0 + i for i in range(20))) == []
 
 
-def test_names_are_bounded_and_the_rest_is_counted_together() -> None:
+def test_names_are_limited_and_the_others_are_counted_together() -> None:
     lateness = Lateness()
     for number in range(3 * MAX_SOURCES):
         Robot(lateness, f"robot {number}").says(1000.0, *[400.0] * (FEW + 1))

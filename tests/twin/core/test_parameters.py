@@ -1,4 +1,4 @@
-"""Parameters: the contract's names and defaults, and a clear word for each bad value."""
+"""Parameters: the contract's names and defaults, and a clear error for each bad value."""
 
 import math
 from dataclasses import asdict, fields
@@ -35,10 +35,10 @@ def parameters(name: str, value: Any) -> TwinParameters:
     return TwinParameters(**{name: value})
 
 
-def test_the_shipped_file_holds_every_parameter_at_its_default() -> None:
+def test_the_shipped_file_has_every_parameter_at_its_default() -> None:
     file = Path("ros_node/lupin_twin/config/twin.yaml")
     # For every node: a twin of another name or namespace, and `web`, read it too.
-    # Of an empty list, ROS does not know what it is one of.
+    # ROS cannot infer the type of an empty list.
     assert yaml.safe_load(file.read_text()) == {
         "/**": {"ros__parameters": {**DEFAULTS, "layers": [""], "use_sim_time": False}}
     }
@@ -77,7 +77,7 @@ def test_a_bad_value_is_refused_by_name_with_the_value(name: str, value: Any) ->
 
 
 @pytest.mark.parametrize("name", [f.name for f in fields(TwinParameters) if describe(f.name).low])
-def test_the_ends_of_a_range_are_in_it_and_what_lies_beyond_is_not(name: str) -> None:
+def test_both_ends_of_a_range_are_included_and_a_value_beyond_is_refused(name: str) -> None:
     low, high = describe(name).low, describe(name).high
     assert low is not None
     for end in (low, high):
@@ -92,7 +92,7 @@ def test_the_ends_of_a_range_are_in_it_and_what_lies_beyond_is_not(name: str) ->
     ("given", "names"),
     [([], ()), (None, ()), ([""], ()), ("co2", ("co2",)), (["co2", "", "light"], ("co2", "light"))],
 )
-def test_of_a_list_empty_names_do_not_count(given: Any, names: tuple[str, ...]) -> None:
+def test_empty_names_in_a_list_do_not_count(given: Any, names: tuple[str, ...]) -> None:
     assert parameters("layers", given).layers == names
 
 
@@ -105,7 +105,7 @@ CHANGEABLE = {
 }
 
 
-def test_what_may_change_while_the_twin_runs_changes_and_the_rest_stays() -> None:
+def test_a_dynamic_parameter_changes_at_runtime_and_the_others_stay() -> None:
     before = TwinParameters(buffer_len=5)
     after = changed(before, CHANGEABLE)
     assert asdict(after) == asdict(before) | CHANGEABLE
@@ -113,7 +113,7 @@ def test_what_may_change_while_the_twin_runs_changes_and_the_rest_stays() -> Non
 
 
 @pytest.mark.parametrize("name", sorted(set(DEFAULTS) - set(CHANGEABLE)))
-def test_what_is_fixed_cannot_and_says_why(name: str) -> None:
+def test_a_read_only_parameter_cannot_change_and_the_refusal_says_why(name: str) -> None:
     with pytest.raises(ParameterError) as caught:
         changed(TwinParameters(), {"idw_power": 3.0, name: "other"})
     text = str(caught.value)
@@ -123,7 +123,7 @@ def test_what_is_fixed_cannot_and_says_why(name: str) -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"idw_power": "x" * 10**6}, {"layers": {"x": "y" * 10**6}}])
-def test_a_complaint_repeats_no_more_than_the_beginning_of_what_is_long(wrong: Any) -> None:
+def test_an_error_repeats_only_the_beginning_of_a_long_value(wrong: Any) -> None:
     with pytest.raises(ParameterError) as caught:
         TwinParameters(**wrong)
     assert len(str(caught.value)) < 200
@@ -132,7 +132,7 @@ def test_a_complaint_repeats_no_more_than_the_beginning_of_what_is_long(wrong: A
     assert len(str(caught.value)) < 400
 
 
-def test_a_plain_off_which_yaml_reads_as_false_is_the_journals_off() -> None:
+def test_off_without_quotes_which_yaml_reads_as_false_turns_the_journal_off() -> None:
     assert TwinParameters(journal=False).journal == "off"  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match="parameter journal is True"):
         TwinParameters(journal=True)  # type: ignore[arg-type]

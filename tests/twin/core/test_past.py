@@ -25,7 +25,7 @@ ASKED: dict[str, Any] = {"tag_id": "tag_7", "sensor_type": "temperature"}
 
 
 def request(given: dict[str, Any]) -> SeriesRequest | WritesRequest:
-    """Of a series, or of what was written where it has a name of those."""
+    """A query of a series, or of one of the kinds of write."""
     if given.keys() & {"reach_s", "after", "max_count"}:
         return WritesRequest(**given)
     return SeriesRequest(**(ASKED | given))
@@ -60,7 +60,7 @@ def request(given: dict[str, Any]) -> SeriesRequest | WritesRequest:
         ({"max_count": MAX_WRITES + 1}, f"max_count is {MAX_WRITES + 1}"),
     ],
 )
-def test_a_question_that_cannot_be_answered_is_refused(wrong: dict[str, Any], says: str) -> None:
+def test_an_invalid_query_is_refused(wrong: dict[str, Any], says: str) -> None:
     with pytest.raises(PastRefused, match=re.escape(says)):
         request(wrong)
 
@@ -89,7 +89,7 @@ def test_the_limits_themselves_are_allowed(right: dict[str, Any]) -> None:
         (-1, "at is -0.000000001 s, before 0"),
     ],
 )
-def test_a_moment_has_to_have_passed(at_ns: int, says: str) -> None:
+def test_a_moment_has_to_be_in_the_past(at_ns: int, says: str) -> None:
     with pytest.raises(PastRefused, match=re.escape(says)):
         check_moment(at_ns, 5_000_000_001)
 
@@ -102,7 +102,7 @@ def test_a_moment_has_to_have_passed(at_ns: int, says: str) -> None:
         (NotRemembered("32 wait: ask again later"), "32 wait: ask again later"),
     ],
 )
-def test_why_there_is_no_answer_is_told_in_words_and_read_again(
+def test_the_reason_for_a_missing_answer_is_text_and_is_parsed_back(
     error: PastRefused | NotRemembered, message: str
 ) -> None:
     assert message_of(error) == message
@@ -125,7 +125,7 @@ def test_why_there_is_no_answer_is_told_in_words_and_read_again(
         ((0, 110 * SLOT_NS, 10), Grid(0, 110 * SLOT_NS, 11 * SLOT_NS)),
         ((1, 110 * SLOT_NS + 1, 10), Grid(0, 10 * HOUR_NS, HOUR_NS)),
         ((HOUR_NS + 1, 21 * HOUR_NS, 10), Grid(HOUR_NS, 21 * HOUR_NS, 2 * HOUR_NS)),
-        # Coarser than they need be.
+        # Coarser than necessary.
         ((7, 107, 10, SLOT_NS), Grid(0, SLOT_NS, SLOT_NS)),
         ((7, 107, 10, HOUR_NS), Grid(0, HOUR_NS, HOUR_NS)),
     ],
@@ -136,6 +136,6 @@ def test_buckets_cover_a_period_and_long_ones_begin_on_the_full_hour(
     assert grid(*asked) == expected
 
 
-def test_what_is_not_remembered_can_be_told_by_another_process() -> None:
+def test_data_missing_here_may_exist_in_another_process() -> None:
     told = pickle.loads(pickle.dumps(NotRemembered("gone", damage="a page")))
     assert (str(told), told.damage) == ("gone", "a page")

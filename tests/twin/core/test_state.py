@@ -1,4 +1,4 @@
-"""The store, rule by rule; no ROS here."""
+"""The store, rule by rule, without ROS."""
 
 import dataclasses
 import math
@@ -23,7 +23,7 @@ def tag(store: TwinStore, tag_id: str) -> state.TagState:
     return next(t for t in store.snapshot(0, "map").tags if t.tag_id == tag_id)
 
 
-def test_first_pose_wins_whoever_brings_it() -> None:
+def test_the_first_pose_wins_whoever_sends_it() -> None:
     for first, second, third in (
         ("scan", "pin", "look"),
         ("pin", "scan", "look"),
@@ -40,7 +40,7 @@ def test_first_pose_wins_whoever_brings_it() -> None:
         assert tag(store, "1").pose == at(0.0), (first, second, third)
 
 
-def test_a_write_that_changes_nothing_that_is_shown_does_not_count() -> None:
+def test_a_write_that_changes_nothing_visible_is_no_new_revision() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=20.0, co2=1.0, light=math.nan))
     store.record_inspection(look("1", at_s=20.0, species="rose", confidence=math.nan))
@@ -56,7 +56,7 @@ def test_a_write_that_changes_nothing_that_is_shown_does_not_count() -> None:
     assert store.observation_count == 3, "it pins the tag"
 
 
-def test_a_late_scan_with_the_same_value_counts_for_what_is_derived_may_be_gone() -> None:
+def test_a_late_scan_with_the_same_value_is_a_new_revision_as_derived_values_may_go() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=10.0, temperature=20.0, humidity=50.0))
     store.record_inspection(look("1", at_s=30.0, species="rose"))
@@ -64,7 +64,7 @@ def test_a_late_scan_with_the_same_value_counts_for_what_is_derived_may_be_gone(
     assert store.observation_count == 3
 
 
-def test_age_is_since_the_last_observation_and_never_negative() -> None:
+def test_age_runs_from_the_last_observation_and_is_never_negative() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=100.0, co2=1.0))
     assert tag(store, "1").stale_seconds(130 * S) == 30.0
@@ -88,7 +88,7 @@ def test_samples_need_a_pose_and_a_finite_reading_and_keep_the_first_mention_ord
 
 
 BLOOM = Bloom(0.0, 0.0, 0.0, 0.1, "rose", 0.9, anomaly=False)
-# What makes a write of a size, and the size that it may have.
+# What gives a write its size, and the largest size allowed.
 BOUNDED: dict[str, tuple[Callable[[int], Scan | Inspection], int]] = {
     "readings": (
         lambda n: Scan("1", S, tuple(Reading(f"s{i}", 0.0) for i in range(n))),
@@ -111,7 +111,7 @@ BOUNDED: dict[str, tuple[Callable[[int], Scan | Inspection], int]] = {
 
 
 @pytest.mark.parametrize("what", BOUNDED)
-def test_a_bound_belongs_to_what_is_allowed_and_one_more_is_refused_by_both_numbers(
+def test_exactly_the_limit_is_allowed_and_one_more_is_refused_with_both_numbers(
     what: str,
 ) -> None:
     make, limit = BOUNDED[what]
@@ -140,7 +140,7 @@ def test_one_tag_too_many_is_refused_and_the_known_ones_go_on(
     assert tag(store, "1").readings[0].value == 2.0
 
 
-def test_what_all_tags_hold_is_bounded_and_what_is_known_goes_on(
+def test_the_total_of_all_tags_is_limited_and_known_ones_go_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(state, "MAX_ITEMS", 4)
@@ -154,7 +154,7 @@ def test_what_all_tags_hold_is_bounded_and_what_is_known_goes_on(
     store.record(scan("1", co2=2.0))
     assert tag(store, "1").readings[0].value == 2.0
     store.pin("3", at(1.0))
-    # A look with one flower less makes room for one reading more.
+    # An inspection with one flower less makes room for one more reading.
     store.record_inspection(look("2", blooms=(BLOOM,), footprint=((0.0, 0.0, 0.0),)))
     store.record(scan("3", co2=3.0))
     assert tag(store, "3").readings[0].value == 3.0

@@ -1,4 +1,4 @@
-"""What counts as the latest, in whatever order it comes, and when the clock goes back."""
+"""Which value is the latest, in any order of arrival, and when the clock goes back."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def tag(store: TwinStore, tag_id: str) -> TagState:
     return next(t for t in store.snapshot(0, "map").tags if t.tag_id == tag_id)
 
 
-def test_after_a_clock_that_went_back_all_ages_from_there_and_news_is_news() -> None:
+def test_after_a_clock_went_back_ages_count_from_there_and_news_is_news() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=40.0, co2=1.0))
     store.record(scan("1", at_s=3600.0, co2=2.0))
@@ -59,9 +59,9 @@ def test_after_a_clock_that_went_back_all_ages_from_there_and_news_is_news() -> 
 
 
 def plainest(writes: list[Write]) -> dict[str, TagState]:
-    """The state of each tag, from the list of all that was ever written: no rule but the order.
+    """The state of each tag, from the list of all writes: the only rule is their order.
 
-    What has a time goes by it (of equal times, by arrival); poses and names go by arrival alone.
+    What has a time is ordered by it (equal times by arrival); poses and names by arrival alone.
     """
     tags: dict[str, TagState] = {}
     for tag_id in dict.fromkeys(write.tag_id for write in writes):
@@ -117,7 +117,7 @@ STEPS = st.lists(SCANS | INSPECTIONS | st.integers(1, 30), max_size=25)
 
 
 def numbered(write: Write, number: int) -> Write:
-    """The write with a value of its own, so that it can be told from all others."""
+    """The write with a value of its own, so that it differs from all others."""
     if isinstance(write, Scan):
         readings = tuple(replace(reading, value=float(number)) for reading in write.readings)
         return replace(write, readings=readings, status_detail=str(number))
@@ -126,14 +126,14 @@ def numbered(write: Write, number: int) -> Write:
 
 
 @given(STEPS)
-def test_against_the_plainest_store(steps: list[Write | int]) -> None:
+def test_the_store_equals_the_simplest_one(steps: list[Write | int]) -> None:
     """Any sequence of writes in any order of time, and of clocks that go back (the numbers)."""
     store = TwinStore()
     written: list[Write] = []
     for number, step in enumerate(steps):
         if isinstance(step, int):
             store.clamp_to(step * S)
-            # By time first: of what is equal from now on, the last in the list is the latest.
+            # By time first: among equal ones, the last in the list is the latest.
             written = [
                 replace(it, stamp_ns=min(it.stamp_ns, step * S))
                 for it in sorted(written, key=lambda it: it.stamp_ns)
@@ -159,7 +159,7 @@ def by_name(state_of_tag: TagState) -> TagState:
 
 
 def as_shown(state_of_tag: TagState | None) -> object:
-    """What the state's message says of a tag."""
+    """The tag as it is in the state message."""
     if state_of_tag is None:
         return None
     readings = tuple(replace(reading, observed_at_ns=None) for reading in state_of_tag.readings)

@@ -1,4 +1,4 @@
-"""Where another tag helps most: the same as trying each, by the textbook."""
+"""Where another tag helps most: the same as trying each candidate with the textbook formula."""
 
 from math import sqrt
 
@@ -26,7 +26,7 @@ def error_by_the_textbook(readings: Readings, h: Hyper, more: list[int]) -> floa
 
 @settings(max_examples=40)
 @given(some_readings(), hypers)
-def test_each_place_is_the_best_of_those_left_and_its_error_the_textbook_s(
+def test_each_position_is_the_best_one_left_and_its_error_is_the_textbooks(
     readings: Readings, h: Hyper
 ) -> None:
     model = Model(Scale(20.0, 2.0), DAY_S, h)
@@ -45,7 +45,7 @@ def test_each_place_is_the_best_of_those_left_and_its_error_the_textbook_s(
         assert place.error_ratio == pytest.approx(error / at_first, rel=1e-6)
 
 
-def test_who_asks_for_none_gets_none() -> None:
+def test_no_candidates_give_no_advice() -> None:
     day = a_day(tags=3, passes=2)
     posterior = fit(day).posterior(day, DAY_S)
     assert posterior.advice(TARGETS, 0, over=TARGETS) == []

@@ -1,4 +1,4 @@
-"""Readings held against all others: as the textbook leaves them out; which sensor has changed."""
+"""Readings compared with all others: leave-one-out as in the textbook, and changed sensors."""
 
 from math import sqrt
 
@@ -16,7 +16,7 @@ from tests.support.estimates import DAY_S, a_day, hypers, some_readings, spots_o
 
 
 def by_the_textbook(readings: Readings, block: list[int], h: Hyper) -> tuple[float, float]:
-    """Mean and sd of the last of a block of readings, given all others; the unit is a sensor's."""
+    """Mean and sd of a block's last reading, given all other blocks; in the sensor's unit."""
     y = (readings.value - 20.0) / 2.0
     mean, covariance = textbook_gp.left_out(spots_of(readings), y, block, h)
     noise = h.tau**2 + 0.02**2
@@ -25,7 +25,7 @@ def by_the_textbook(readings: Readings, block: list[int], h: Hyper) -> tuple[flo
 
 
 @given(some_readings(), hypers)
-def test_what_is_expected_is_what_the_textbook_says_without_the_last_four(
+def test_the_prediction_is_the_textbooks_without_the_last_four_readings(
     readings: Readings, h: Hyper
 ) -> None:
     model = Model(Scale(20.0, 2.0), DAY_S, h)
@@ -60,7 +60,7 @@ def test_a_tag_is_left_out_with_all_that_are_nearer_than_tags_are_to_gaps() -> N
 
 
 def with_offset(day: Readings, tag: int, scans: int, offset: float) -> tuple[Readings, FloatArray]:
-    """The last scans of a tag are off; and when they were."""
+    """The last scans of a tag are off; and the time of these."""
     own = np.flatnonzero(day.tag == tag)
     late = own[np.argsort(day.time_s[own])[-scans:]]
     value = day.value.copy()
@@ -83,7 +83,7 @@ def test_a_sensor_that_reads_three_degrees_more_has_changed_since_then(scans: in
     assert off.value[off.time_s == since[-1]][0] - change.expected == pytest.approx(3.0, abs=0.5)
 
 
-def test_one_odd_reading_is_no_change_nor_is_a_place_that_was_always_different() -> None:
+def test_one_odd_reading_is_no_change_nor_is_a_position_that_was_always_different() -> None:
     day = a_day(passes=24)
     model = fit(day)
     for scans in (1, 24):
@@ -92,7 +92,7 @@ def test_one_odd_reading_is_no_change_nor_is_a_place_that_was_always_different()
         assert not any(one.since_s is not None for one in found if one)
 
 
-def test_of_many_tags_each_is_judged_by_those_near_it() -> None:
+def test_with_many_tags_each_is_judged_by_those_near_it() -> None:
     day = a_day(tags=200, passes=6)
     assert len(day) > MAX_EXACT
     model = fit(day)

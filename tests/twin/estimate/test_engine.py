@@ -1,4 +1,4 @@
-"""Which readings count, and what an estimate is made of."""
+"""Which readings count, and what an estimate uses."""
 
 import pytest
 
@@ -17,7 +17,7 @@ def tag_past(index: int, *hours: float) -> TagPast:
     return TagPast(f"tag-{index}", float(index), 0.0, readings)
 
 
-def test_readings_are_told_by_seconds_before_the_moment() -> None:
+def test_readings_have_their_seconds_before_the_moment() -> None:
     readings = readings_of(
         [tag_past(0, 1.0, 2.0), tag_past(1), tag_past(2, 2.5)], int(3600e9 * 3), DAY_S
     )
@@ -25,7 +25,7 @@ def test_readings_are_told_by_seconds_before_the_moment() -> None:
     assert readings.tag.tolist() == [0, 0, 2], "numbers are those of the tags asked about"
 
 
-def test_many_tags_share_what_can_be_solved_at_once() -> None:
+def test_many_tags_share_the_limit_of_solvable_readings() -> None:
     hours = [index / 2.0 for index in range(40)]
     at_ns = int(24 * 3600 * S)
     few = readings_of([tag_past(index, *hours) for index in range(3)], at_ns, DAY_S)
@@ -40,7 +40,7 @@ def test_many_tags_share_what_can_be_solved_at_once() -> None:
         readings_of([tag_past(index, 1.0) for index in range(MAX_TAGS + 1)], at_ns, DAY_S)
 
 
-def test_an_estimate_of_now_is_one_of_the_last_minute_or_of_the_newest_reading() -> None:
+def test_an_estimate_of_now_is_from_the_last_minute_or_the_latest_reading() -> None:
     hour_ns = 3600 * S
     tags = [tag_past(0, 0.5, 1.0), tag_past(1, 2.0)]
     assert moment_of(tags, hour_ns + 59 * S, DAY_S) == hour_ns

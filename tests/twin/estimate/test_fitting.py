@@ -1,4 +1,4 @@
-"""The most probable parameters: the density and its gradient, and what is found."""
+"""The most probable parameters: the density, its gradient, and its maximum."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ def objective_of(readings: Readings) -> Any:
 
 
 @given(some_readings())
-def test_the_surprise_is_minus_the_log_of_likelihood_and_prior(readings: Readings) -> None:
+def test_the_objective_is_minus_the_log_of_likelihood_and_prior(readings: Readings) -> None:
     y = scale_of(readings.value).standardised(readings.value)
     there = np.linspace(-0.5, 0.5, len(START))
 
@@ -36,7 +36,7 @@ def test_the_surprise_is_minus_the_log_of_likelihood_and_prior(readings: Reading
 
 @settings(max_examples=30)
 @given(some_readings())
-def test_its_gradient_is_that_of_finite_differences(readings: Readings) -> None:
+def test_its_gradient_equals_finite_differences(readings: Readings) -> None:
     objective = objective_of(readings)
     there = np.linspace(0.4, -0.4, len(START))
     step = 1e-5
@@ -49,14 +49,14 @@ def test_its_gradient_is_that_of_finite_differences(readings: Readings) -> None:
 
 
 @given(some_readings(), hypers)
-def test_the_covariance_is_the_formula_pair_by_pair(readings: Readings, h: Hyper) -> None:
+def test_the_covariance_equals_the_formula_for_each_pair(readings: Readings, h: Hyper) -> None:
     expected = textbook_gp.of_readings(spots_of(readings), h)
     assert Pairs(readings, DAY_S).covariance(h) == pytest.approx(expected, rel=1e-12)
     fast = Readings(readings.time_s / 60.0, readings.tag, readings.value, readings.xy)
     assert Pairs(fast, DAY_S / 60.0).covariance(h) == pytest.approx(expected, rel=1e-12)
 
 
-def test_what_cannot_be_factorised_has_no_density_and_ends_no_search() -> None:
+def test_a_matrix_that_cannot_be_factorised_has_no_density_and_ends_no_search() -> None:
     def steep(at: Any) -> tuple[float, Any]:
         if at[0] > 0.5:
             return np.inf, at

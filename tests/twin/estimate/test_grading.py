@@ -1,4 +1,4 @@
-"""Whether an estimate keeps its word, counted by the hour."""
+"""Whether an estimate's intervals hold, counted by the hour."""
 
 from lupin_twin.estimate.engine import LEAST_SCANS, Grades, Record, Tally
 from tests.bench.bench_estimate_checks import AT_S, ROUNDS, trust
@@ -7,7 +7,7 @@ from tests.bench.other_worlds import restless, world_of
 HOUR_NS = 3_600 * 1_000_000_000
 
 
-def test_counts_are_of_the_last_day_and_week() -> None:
+def test_counts_cover_the_last_day_and_week() -> None:
     grades = Grades(86_400.0)
     assert grades.record(0) == Record(None, Tally(), Tally())
     grades.add(Tally(), 5)
@@ -21,7 +21,7 @@ def test_counts_are_of_the_last_day_and_week() -> None:
     assert grades.record(8 * 24 * HOUR_NS) == Record(5, Tally(1, 1), Tally(1, 1))
 
 
-def test_a_clock_that_goes_back_leaves_nothing_that_is_to_come() -> None:
+def test_a_clock_that_goes_back_drops_the_future() -> None:
     grades = Grades(86_400.0)
     grades.add(Tally(5, 5), 10 * HOUR_NS)
     grades.add(Tally(1, 0), 2 * HOUR_NS)
@@ -29,7 +29,7 @@ def test_a_clock_that_goes_back_leaves_nothing_that_is_to_come() -> None:
     assert grades.record(10 * HOUR_NS).day == Tally(1, 0)
 
 
-def test_a_model_is_trusted_by_its_day_and_week_and_by_few_scans_neither_way() -> None:
+def test_a_model_is_trusted_by_its_day_and_week_and_few_scans_change_nothing() -> None:
     good, bad, few = Tally(100, 80), Tally(100, 79), Tally(LEAST_SCANS - 1, 0)
     assert Record(1, good, good).is_trusted is True
     assert Record(1, bad, good).is_trusted is False
@@ -40,13 +40,13 @@ def test_a_model_is_trusted_by_its_day_and_week_and_by_few_scans_neither_way() -
     assert Record(1, Tally(LEAST_SCANS, LEAST_SCANS), good).is_trusted is True
 
 
-def test_an_estimate_that_covers_badly_is_not_trusted_and_one_that_covers_well_is() -> None:
+def test_an_estimate_with_poor_coverage_is_distrusted_and_one_with_good_coverage_trusted() -> None:
     calm = world_of("wall", 0)
     read = calm.read(AT_S + (ROUNDS + 1) * calm.round_s, 0)
     is_trusted, covers = trust(calm, read)
     assert is_trusted is True
     assert covers > 0.8
-    # What was learnt of a calm day is wrong once its air swings.
+    # Parameters from a calm day are wrong once its air swings.
     windy = restless(calm, AT_S, 0)
     is_trusted, covers = trust(windy, windy.read(read.time_s[-1], 0))
     assert is_trusted is False

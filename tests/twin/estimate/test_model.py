@@ -40,7 +40,7 @@ def test_the_estimate_is_the_textbook_s(readings: Readings, h: Hyper, later_h: f
         [(hour / 2.0, hour % 2, 22.0) for hour in range(20)],
     ],
 )
-def test_one_reading_duplicates_and_equal_values_make_a_model(
+def test_one_reading_or_duplicates_or_equal_values_make_a_model(
     rows: list[tuple[float, int, float]],
 ) -> None:
     readings = readings_of(rows, [(0.0, 0.0), (1.0, 1.0)])
@@ -50,14 +50,14 @@ def test_one_reading_duplicates_and_equal_values_make_a_model(
     assert (sd > 0.0).all()
 
 
-def test_what_is_known_has_a_limit_in_how_places_and_readings_differ() -> None:
+def test_certainty_is_limited_by_the_variation_of_positions_and_readings() -> None:
     h = Hyper(1.0, 5.0, 1.0, 0.3, 0.0001, 8.0, 0.4, 2.5, 0.15, 1e-6)
     assert model_of(h).sd_known == pytest.approx(0.6 * INFLATION * 0.5 * 2.0, rel=1e-6)
     wild = h._replace(sa=100.0)
     assert model_of(wild).sd_known == 2.0
 
 
-def test_the_day_s_course_bridges_an_outage_only_where_the_day_is_as_long_as_told() -> None:
+def test_the_daily_course_bridges_an_outage_only_with_the_right_length_of_the_day() -> None:
     day = a_day(passes=24)
     true = 21.0 + 4.0 * np.sin(2.0 * np.pi * 1.25) + 0.4 * day.xy[:, 1]
     told = fit(day).posterior(day, 1.25 * DAY_S).points(day.xy)
@@ -69,9 +69,7 @@ def test_the_day_s_course_bridges_an_outage_only_where_the_day_is_as_long_as_tol
 
 @pytest.mark.parametrize("value", [3e38, -3e38, 1e-300])
 @pytest.mark.parametrize("metres", [0.0, 1e300])
-def test_numbers_at_the_end_of_what_there_is_make_an_estimate_or_say_so(
-    value: float, metres: float
-) -> None:
+def test_extreme_numbers_give_an_estimate_or_an_error(value: float, metres: float) -> None:
     rows = [(hour / 2.0, hour % 2, value * (1 + hour % 3)) for hour in range(12)]
     readings = readings_of(rows, [(metres, -metres), (-metres, metres)])
     try:
@@ -82,8 +80,8 @@ def test_numbers_at_the_end_of_what_there_is_make_an_estimate_or_say_so(
     assert np.isfinite(sd).all()
 
 
-def test_a_model_is_learnt_from_few_readings_of_tags_and_hours_all_over() -> None:
-    """Of a hundred tags its length is that of the truth: some of those chosen are neighbours."""
+def test_a_model_learns_from_few_readings_of_tags_and_hours_all_over() -> None:
+    """With a hundred tags it finds the true length: some of the chosen ones are neighbours."""
     chance = np.random.default_rng(1)
     xy = chance.uniform(0.0, 30.0, (100, 2))
     time_s = np.sort(chance.uniform(0.0, DAY_S, 2_000))

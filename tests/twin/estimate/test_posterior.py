@@ -1,4 +1,4 @@
-"""The estimate as of a moment: on points and grids, of few readings and of many."""
+"""The estimate as of a moment: at points and on grids, from few readings and from many."""
 
 from dataclasses import replace
 from typing import Any
@@ -20,7 +20,7 @@ BOX = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": 4.0, "bbox_max_y": 8.
 
 
 @pytest.mark.parametrize(("resolution", "tags"), [(0.5, 8), (0.5, 30)])
-def test_a_grid_is_its_cells_centres(resolution: float, tags: int) -> None:
+def test_a_grid_holds_the_centres_of_its_cells(resolution: float, tags: int) -> None:
     day = a_day(tags=tags, passes=4)
     posterior = fit(day).posterior(day, DAY_S)
     grid = posterior.grid(**BOX, resolution=resolution)
@@ -32,8 +32,8 @@ def test_a_grid_is_its_cells_centres(resolution: float, tags: int) -> None:
 
 
 @pytest.mark.parametrize("length", [0.4, 1.0, 3.0])
-def test_a_fine_grid_is_interpolated_and_off_by_little(length: float) -> None:
-    """However short the length over which the truth changes: the lattice is made for it."""
+def test_a_fine_grid_is_interpolated_with_a_small_error(length: float) -> None:
+    """However short the true length is: the lattice adapts to it."""
     day = a_day(tags=30, passes=6)
     model = fit(day)
     model = replace(model, hyper=model.hyper._replace(l=length))
@@ -55,7 +55,7 @@ def test_a_lattice_is_never_coarser_than_a_fifth_of_the_length(
 
 
 def beside(posterior: Posterior, grid: EstimateGrid) -> tuple[FloatArray, FloatArray, Any, Any]:
-    """Mean and sd at the centres of some cells, and which."""
+    """Mean and sd at the centres of some cells, and these cells."""
     chosen = np.random.default_rng(1).integers((grid.width, grid.height), size=(300, 2))
     centres = (chosen.astype(np.float64) + 0.5) * grid.resolution
     centres += (grid.origin_x, grid.origin_y)
@@ -63,7 +63,7 @@ def beside(posterior: Posterior, grid: EstimateGrid) -> tuple[FloatArray, FloatA
     return (*posterior.points(centres), x, y)
 
 
-def test_of_more_readings_than_can_be_solved_at_once_the_nearest_say_nearly_the_same() -> None:
+def test_beyond_the_limit_of_readings_the_nearest_ones_give_nearly_the_same() -> None:
     chance = np.random.default_rng(3)
     xy = chance.uniform(0.0, 12.0, (200, 2))
     tag = np.concatenate([chance.permutation(200) for _ in range(6)])
@@ -95,7 +95,7 @@ def test_of_more_readings_than_can_be_solved_at_once_the_nearest_say_nearly_the_
 
 
 @pytest.mark.parametrize("tags", [8, MAX_EXACT])
-def test_who_is_not_waited_for_ends_soon(tags: int) -> None:
+def test_a_cancelled_estimate_ends_soon(tags: int) -> None:
     day = a_day(tags=tags, passes=2)
     is_over = False
     posterior = fit(day).posterior(day, DAY_S, lambda: is_over)

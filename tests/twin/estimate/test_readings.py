@@ -1,4 +1,4 @@
-"""What an estimate is made of: which readings count, how they are scaled."""
+"""What an estimate uses: which readings count, and how they are scaled."""
 
 import math
 
@@ -21,7 +21,7 @@ def test_the_readings_of_a_day_count(readings: Readings, at_hour: float) -> None
 
 
 @given(st.integers(1, 200), st.integers(1, 40))
-def test_of_more_the_newest_quarter_and_others_from_all_over_the_day(
+def test_of_more_readings_the_latest_quarter_and_a_sample_of_the_day_count(
     count: int, per_tag: int
 ) -> None:
     hours = np.linspace(0.0, 23.0, count)
@@ -39,7 +39,7 @@ def test_of_more_the_newest_quarter_and_others_from_all_over_the_day(
             assert gaps_h.max() <= 2.0 * 24.0 / parts + 1.0 + 23.0 / max(count - 1, 1)
 
 
-def test_the_spread_lies_between_a_tenth_of_the_median_and_the_readings_own() -> None:
+def test_the_spread_lies_between_a_tenth_of_the_median_and_that_of_the_readings() -> None:
     values = np.array([20.0, 22.0, 24.0, 30.0])
     scale = scale_of(values)
     assert scale.centre == 23.0
@@ -53,12 +53,12 @@ def test_the_spread_lies_between_a_tenth_of_the_median_and_the_readings_own() ->
 
 
 @pytest.mark.parametrize("value", [50.0, -50.0, 0.0, 1e-300, -3e38, 1e308])
-def test_readings_that_do_not_differ_have_a_spread_all_the_same(value: float) -> None:
+def test_equal_readings_still_have_a_spread(value: float) -> None:
     expected = abs(value) / 10.0 * math.sqrt(4.0 / 7.0) or 1.0
     assert scale_of(np.full(3, value)).spread == pytest.approx(expected)
 
 
-def test_tags_without_any_are_left_out_and_the_rest_is_in_order() -> None:
+def test_tags_without_readings_are_left_out_and_the_others_are_in_order() -> None:
     readings = readings_of(
         [(3.0, 2, 22.0), (1.0, 0, 20.0), (2.0, 2, 21.0)], [(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)]
     )

@@ -1,4 +1,4 @@
-"""GetField without ROS: what is refused, what is remembered, what an explored map clips."""
+"""GetField without ROS: refusals, the cache, and clipping to explored space."""
 
 import itertools
 import math
@@ -101,7 +101,7 @@ def answer(store: TwinStore, occupancy: OccupancyMap | None = None, **rules: flo
         ({"resolution": 0.002}, r"0\.002 m makes 2000 x 1000 cells, the limit is 1000000 in all"),
     ],
 )
-def test_bad_request_is_refused(changes: dict[str, Any], message: str) -> None:
+def test_a_bad_request_is_refused(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(FieldRefused, match=message):
         check_request(request_of(**changes), MAX_CELLS)
 
@@ -118,7 +118,7 @@ def test_bad_request_is_refused(changes: dict[str, Any], message: str) -> None:
         {"resolution": 1e-45, "bbox_max_x": 3.4e38, "bbox_max_y": 3.4e38},
     ],
 )
-def test_grid_bomb_is_refused_without_an_allocation(changes: dict[str, Any]) -> None:
+def test_a_grid_bomb_is_refused_without_an_allocation(changes: dict[str, Any]) -> None:
     request = request_of(**changes)
     tracemalloc.start()
     try:
@@ -133,7 +133,7 @@ def test_grid_bomb_is_refused_without_an_allocation(changes: dict[str, Any]) -> 
 # --- the field ------------------------------------------------------------------------------
 
 
-def test_field_is_of_the_stores_samples_by_the_rules(store: TwinStore) -> None:
+def test_the_field_uses_the_samples_of_the_store_and_the_rules(store: TwinStore) -> None:
     grid = answer(store)
     assert (grid.width, grid.height, grid.sample_count) == (4, 2, 2)
     rows = grid.values.reshape(2, 4)
@@ -144,13 +144,13 @@ def test_field_is_of_the_stores_samples_by_the_rules(store: TwinStore) -> None:
     store.record(scan("c", 1.5, 0.5, 30.0))
     by_power = [answer(store, idw_power=power).values.reshape(2, 4)[1, 0] for power in (1.0, 2.0)]
     assert by_power[0] != by_power[1]
-    # With no tag within the falloff, the nearest is taken: "a", 1 m away.
+    # With no tag within the falloff, the nearest is used: "a", 1 m away.
     nearest = answer(store, falloff_radius_m=0.5)
     assert nearest.values.reshape(2, 4)[1, 0] == 10.0
 
 
-def test_a_job_that_nobody_waits_for_ends_between_two_parts(store: TwinStore) -> None:
-    """Asked so often that no two questions are more than some milliseconds apart."""
+def test_a_cancelled_job_ends_between_two_parts(store: TwinStore) -> None:
+    """It checks so often that no two checks are more than some milliseconds apart."""
     for number in range(100):
         store.record(scan(f"far {number}", number * 1.0, 0.0, 1.0))
     rules = {"falloff_radius_m": 200.0, "max_distance_m": 200.0}
@@ -185,7 +185,7 @@ def test_cost_follows_cells_and_the_windows_of_the_samples(
 # --- explored --------------------------------------------------------------------------------
 
 
-def test_a_map_clips_to_what_it_knows(store: TwinStore) -> None:
+def test_a_map_clips_to_known_cells(store: TwinStore) -> None:
     occupancy = map_of([[0, -1, 0, 0], [0, 0, 0, -1]])
     unclipped = answer(store)
     clipped = answer(store, occupancy)
@@ -196,7 +196,7 @@ def test_a_map_clips_to_what_it_knows(store: TwinStore) -> None:
     assert not np.isnan(unclipped.values[1])
 
 
-def test_before_a_map_came_nothing_is_clipped_and_its_first_one_makes_fields_anew(
+def test_without_a_map_nothing_is_clipped_and_the_first_map_recomputes_fields(
     store: TwinStore,
 ) -> None:
     grid = answer(store)
@@ -209,7 +209,7 @@ def test_before_a_map_came_nothing_is_clipped_and_its_first_one_makes_fields_ane
 # --- the default box -------------------------------------------------------------------------
 
 
-def test_default_box_is_that_of_the_tags_and_their_reach() -> None:
+def test_the_default_box_covers_the_tags_and_their_reach() -> None:
     positions = ((x, y) for x, y in [(1.0, 5.0), (-2.0, 3.0), (0.0, 8.5)])
     assert default_box(positions, 1.5) == (-3.5, 1.5, 2.5, 10.0)
 

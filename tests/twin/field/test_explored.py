@@ -1,4 +1,4 @@
-"""Which cells of a field lie on ground that the map knows."""
+"""Which cells of a field are on explored ground."""
 
 import math
 from typing import Any
@@ -42,10 +42,10 @@ def test_known_cells_are_explored_and_unknown_ones_are_not() -> None:
     )
 
 
-def test_centre_on_an_edge_belongs_to_the_upper_cell_whatever_the_rounding() -> None:
+def test_a_centre_on_an_edge_belongs_to_the_upper_cell_whatever_the_rounding() -> None:
     """Cells of 0.1 m over a map of 0.05 m: every centre lies on an edge of the map's cells.
 
-    As they come over the wire, the two resolutions are float32, and neither is exact.
+    On the wire, both resolutions are float32, and neither is exact.
     """
     columns = 400
     rows = np.full((1, columns), -1)
@@ -67,10 +67,10 @@ def test_centre_on_an_edge_belongs_to_the_upper_cell_whatever_the_rounding() -> 
     map_resolution=st.sampled_from([0.05, 0.3, 1.0]),
     resolution=st.sampled_from([0.1, 0.25, 0.7]),
 )
-def test_mask_is_the_map_cell_under_each_centre(
+def test_the_mask_is_the_map_cell_under_each_centre(
     seed: int, yaw: float, origin: tuple[float, float], map_resolution: float, resolution: float
 ) -> None:
-    """By a plain loop: each centre, turned back into the map's own frame."""
+    """By a plain loop: each centre, transformed into the map's own frame."""
     rows = np.random.default_rng(seed).choice([-1, 0, 100], size=(9, 13))
     occupancy = map_of(
         rows, resolution=map_resolution, origin_x=origin[0], origin_y=origin[1], origin_yaw=yaw
@@ -112,7 +112,7 @@ def test_cells_are_a_read_only_copy_by_rows() -> None:
         {"cells": [0, 99]},
     ],
 )
-def test_a_map_that_differs_in_anything_does_not_show_the_same(changes: dict[str, Any]) -> None:
+def test_a_map_that_differs_in_anything_has_another_mask(changes: dict[str, Any]) -> None:
     assert map_of([[0, 100]]).shows_the_same_as(map_of([[0, 100]], stamp_ns=9, revision=8))
     assert not map_of([[0, 100]]).shows_the_same_as(map_of([[0, 100]], **changes))
 
@@ -131,6 +131,6 @@ def test_a_map_that_differs_in_anything_does_not_show_the_same(changes: dict[str
         ({"width": 10**6, "height": 10**6}, "map is 1000000 x 1000000 = 1000000000000 cells, the"),
     ],
 )
-def test_malformed_map_is_refused(changes: dict[str, Any], message: str) -> None:
+def test_a_malformed_map_is_refused(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         map_of([[0, 0]], **changes)

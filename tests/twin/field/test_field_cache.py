@@ -1,4 +1,4 @@
-"""The memo of fields: what it keeps, what it drops, what it counts."""
+"""The cache of fields: what it stores, what it evicts, what it counts."""
 
 import pytest
 
@@ -30,7 +30,7 @@ def grid(cells: int) -> FieldGrid:
     )
 
 
-def test_64_fields_are_kept_and_the_least_recently_used_goes_first() -> None:
+def test_64_fields_are_cached_and_the_least_recently_used_goes_first() -> None:
     cache = FieldCache()
     for number in range(MAX_ENTRIES):
         cache.put(key(number), grid(1))
@@ -43,7 +43,7 @@ def test_64_fields_are_kept_and_the_least_recently_used_goes_first() -> None:
     assert cache.get(key(2)) is not None
 
 
-def test_bytes_are_bounded_whatever_the_number(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_total_bytes_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lupin_twin.field.engine.MAX_BYTES", 100)
     cache = FieldCache()
     for number in range(5):
@@ -55,7 +55,7 @@ def test_bytes_are_bounded_whatever_the_number(monkeypatch: pytest.MonkeyPatch) 
     assert (cache.bytes, len(cache)) == (100, 1)
 
 
-def test_field_larger_than_the_whole_bound_is_not_kept_and_drops_nothing(
+def test_a_field_larger_than_the_cache_is_not_cached_and_evicts_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("lupin_twin.field.engine.MAX_BYTES", 100)

@@ -1,4 +1,4 @@
-"""The newest map in the log: as it was, no larger than a row may be."""
+"""The latest map in the log: unchanged, no larger than a row may be."""
 
 import base64
 import json
@@ -19,7 +19,7 @@ OTHER = maps.map_of([[0, 0]])
 TOO_LARGE = maps.map_of(np.zeros((4_001, 4_000), np.int8))
 
 
-def test_a_map_is_read_as_it_was() -> None:
+def test_a_map_is_read_back_unchanged() -> None:
     found = map_of(text_of(FLOOR), revision=7)
     assert found.shows_the_same_as(FLOOR)
     assert (found.stamp_ns, found.revision) == (FLOOR.stamp_ns, 7)
@@ -32,7 +32,7 @@ def test_a_floor_of_two_hectares_is_a_tenth_of_a_megabyte() -> None:
     assert 0 < len(text_of(maps.map_of(rows))) < 100_000
 
 
-def test_what_is_too_large_for_a_row_is_none() -> None:
+def test_a_map_that_is_too_large_for_a_row_is_not_stored() -> None:
     noise = np.random.default_rng(1).integers(0, 100, (1_200, 1_200))
     assert text_of(maps.map_of(noise)) == ""
     assert text_of(TOO_LARGE) == ""
@@ -67,7 +67,7 @@ def kept_map(path: Path) -> list[tuple[object, ...]]:
     return select(path, "SELECT value FROM meta WHERE key = 'map'")
 
 
-def test_the_journal_has_the_newest_map_and_none_where_that_is_too_large(tmp_path: Path) -> None:
+def test_the_journal_has_the_latest_map_and_none_where_that_is_too_large(tmp_path: Path) -> None:
     path = tmp_path / "journal.sqlite"
     for floor in (FLOOR, OTHER, TOO_LARGE):
         journal = Journal(path, "test", LIMITS)

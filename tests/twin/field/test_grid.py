@@ -1,4 +1,4 @@
-"""The grid's cells: how many, where their centres lie, and how float noise adds none."""
+"""The grid's cells: how many, where their centres lie, and that float noise adds none."""
 
 import math
 from fractions import Fraction
@@ -80,7 +80,7 @@ def test_part_of_a_cell_is_a_cell(tenths: int, cells: int, part: float, through:
 @pytest.mark.parametrize(
     ("extent", "resolution"), [(1000.0, 1e-9), (3.4e38, 1e-45), (1e308, 5e-324), (1.7e308, 1e-3)]
 )
-def test_bombs_have_exact_dimensions(extent: float, resolution: float) -> None:
+def test_grid_bombs_have_exact_dimensions(extent: float, resolution: float) -> None:
     dimensions = grid_dimensions(0.0, -extent, extent, extent, resolution)
     assert [type(number) for number in dimensions] == [int, int]
     cells = Fraction(extent) / Fraction(resolution)

@@ -1,4 +1,4 @@
-"""The field rule by rule, its grid, and what is refused; see also `test_idw_definition`."""
+"""The field rule by rule, its grid, and its refusals; see also `test_idw_definition`."""
 
 import math
 from collections.abc import Sequence
@@ -50,7 +50,7 @@ def field_over(width: int, height: int, samples: Sequence[Sample], **changes: An
 
 @pytest.mark.parametrize("power", [2.0, 3.0])
 @pytest.mark.parametrize("falloff", [0.5, 1.5, 3.0])
-def test_gate_lets_through_at_its_distance_and_not_beyond(falloff: float, power: float) -> None:
+def test_the_gate_includes_its_own_distance(falloff: float, power: float) -> None:
     rules = {"falloff_radius_m": falloff, "max_distance_m": 1.5, "power": power}
     assert field_at_origin([(0.9, 1.2, 7.0)], **rules) == 7.0
     assert field_at_origin([(1.5, 0.0, 7.0)], **rules) == 7.0
@@ -59,14 +59,14 @@ def test_gate_lets_through_at_its_distance_and_not_beyond(falloff: float, power:
 
 @pytest.mark.parametrize("power", [2.0, 3.0])
 @pytest.mark.parametrize("falloff", [0.0, 1.0, 1.5, 3.0])
-def test_coincident_sample_is_taken_exactly(power: float, falloff: float) -> None:
+def test_a_coincident_sample_is_taken_exactly(power: float, falloff: float) -> None:
     closer = math.nextafter(COINCIDENT_EPS_M, 0.0)
     samples = [(0.002, 0.0, 1e6), (closer, 0.0, 7.0)]
     assert field_at_origin(samples, falloff_radius_m=falloff, power=power) == 7.0
 
 
-def test_equal_distances_tie_although_their_squares_are_a_rounding_apart() -> None:
-    """The tie is one of distances. These two are the same float64, and their squares are not."""
+def test_equal_distances_tie_although_their_squares_differ_by_a_rounding() -> None:
+    """The tie is between distances. These two are the same float64, and their squares are not."""
     first, second = (0.3, 1.1), (1.0, 0.55)
     scale = math.dist(first, (0, 0)) / math.dist(second, (0, 0))
     candidates = (
@@ -85,8 +85,8 @@ def test_equal_distances_tie_although_their_squares_are_a_rounding_apart() -> No
 
 
 @pytest.mark.parametrize("power", [2.0, 3.0])
-def test_distance_at_a_radius_is_within_although_its_square_is_not(power: float) -> None:
-    """0.8 and 1.5 are the legs of a triangle whose long side, 1.7, is met exactly by rounding."""
+def test_a_distance_equal_to_the_radius_is_within_although_its_square_is_not(power: float) -> None:
+    """0.8 and 1.5 are the legs of a right triangle whose hypotenuse rounds to exactly 1.7."""
     assert 0.8 * 0.8 + 1.5 * 1.5 > 1.7 * 1.7
     assert math.sqrt(0.8 * 0.8 + 1.5 * 1.5) == 1.7
     gate = {"falloff_radius_m": 0.0, "max_distance_m": 1.7, "power": power}
@@ -119,7 +119,7 @@ def test_rows_run_up_from_the_lower_edge_and_cells_are_centred() -> None:
     np.testing.assert_array_equal(cell_centres(10.0, 3, 0.5), [10.25, 10.75, 11.25])
 
 
-def test_range_leaves_out_what_float32_cannot_hold() -> None:
+def test_the_range_leaves_out_what_float32_cannot_hold() -> None:
     samples = [(0.5, 0.5, 1e39), (3.5, 0.5, 8.0), (6.5, 0.5, -1e39)]
     grid = field_over(7, 1, samples, max_distance_m=0.5, falloff_radius_m=0.5)
     assert (grid.values[0], grid.values[6]) == (math.inf, -math.inf)
@@ -159,6 +159,6 @@ def test_rules_out_of_range_are_refused(changes: dict[str, Any], message: str) -
         ([(0.0, 0.0)], "samples hold 2 numbers, must be 3 each of 1"),
     ],
 )
-def test_samples_that_are_no_samples_are_refused(samples: Any, message: str) -> None:
+def test_invalid_samples_are_refused(samples: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         field_over(3, 2, samples)

@@ -24,7 +24,7 @@ def assert_same_values(
     wanted = np.array(expected, dtype=np.float64)
     np.testing.assert_array_equal(np.isnan(actual), np.isnan(wanted))
     known = ~np.isnan(wanted)
-    # Values of both signs cancel: what is left is as exact as the largest of them.
+    # Values of both signs cancel: the rest is only as exact as the largest of them.
     largest = max((abs(value) for _, _, value in samples), default=0.0)
     rounding = np.spacing(np.abs(wanted[known]).astype(np.float32)) + 1e-11 * largest
     assert (np.abs(actual[known] - wanted[known]) <= rounding).all()
@@ -35,7 +35,7 @@ def assert_same_values(
 
 @dataclass(frozen=True)
 class Case:
-    """A field to be made twice."""
+    """A field to be computed twice."""
 
     samples: tuple[Sample, ...]
     width: int
@@ -84,7 +84,7 @@ def positions(cells: int) -> st.SearchStrategy[float]:
     return st.one_of(exact, anywhere, exact.map(lambda position: position + 1e-4))
 
 
-# In cells; 2.5 and 5 are the long sides of right triangles with legs on the grid.
+# In cells; 2.5 and 5 are hypotenuses of right triangles with legs on the grid.
 RADII = st.one_of(st.sampled_from([0.0, 0.5, 1.0, 1.5, 2.5, 5.0, 100.0]), st.floats(0.0, 6.0))
 VALUES = st.one_of(st.integers(-5, 40).map(float), st.floats(-1e6, 1e6))
 
@@ -97,7 +97,7 @@ def cases(draw: st.DrawFn) -> Case:
     min_y = draw(st.sampled_from([0.0, 12.3, -1000.25, 1e6]))
     spots = draw(st.lists(st.tuples(positions(width), positions(height), VALUES), max_size=12))
     again = draw(st.booleans())
-    if spots and again:  # a second tag at the same spot
+    if spots and again:  # a second tag at the same position
         x, y, _ = draw(st.sampled_from(spots))
         spots.append((x, y, draw(VALUES)))
     falloff = draw(RADII)
@@ -130,7 +130,7 @@ def small_parts() -> Iterator[None]:
 
 @settings(max_examples=250)
 @given(cases())
-def test_field_is_the_definitions(case: Case) -> None:
+def test_the_field_matches_its_definition(case: Case) -> None:
     grid = case.by_twin()
     assert (grid.width, grid.height) == (case.width, case.height)
     assert_same_values(grid.values, case.by_loop(), case.samples)
@@ -138,7 +138,7 @@ def test_field_is_the_definitions(case: Case) -> None:
 
 @settings(max_examples=150)
 @given(cases())
-def test_field_is_the_definitions_however_it_is_split(case: Case) -> None:
+def test_the_field_matches_its_definition_however_it_is_split(case: Case) -> None:
     with small_parts():
         grid = case.by_twin()
     assert_same_values(grid.values, case.by_loop(), case.samples)
@@ -146,10 +146,10 @@ def test_field_is_the_definitions_however_it_is_split(case: Case) -> None:
 
 @pytest.mark.parametrize("resolution", [0.001, 10.0])
 @pytest.mark.parametrize(("falloff", "max_distance"), [(1.5, 1.5), (0.7, 1.5), (2.5, 1.5)])
-def test_field_of_many_parts_is_the_definitions(
+def test_a_field_of_many_parts_matches_its_definition(
     resolution: float, falloff: float, max_distance: float
 ) -> None:
-    """Large enough to be split by the engine's own measure, with a hundred tags in one cell."""
+    """Large enough to be split by the engine's own limit, with a hundred tags in one cell."""
     rng = np.random.default_rng(7)
     spots = np.vstack([rng.uniform(-2, 70, (60, 2)), rng.uniform(10.0, 11.0, (100, 2))])
     case = Case(

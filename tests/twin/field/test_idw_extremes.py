@@ -1,4 +1,4 @@
-"""The field at the extremes: numbers that overflow, and what it costs in memory and time."""
+"""The field at the extremes: overflowing numbers, and its cost in memory and time."""
 
 import math
 import tracemalloc
@@ -30,7 +30,7 @@ def test_enormous_distances_still_weigh() -> None:
     # v/d² vanishes here, and the mean must not.
     tiny = [(1e149, 0.0, 1e-28), (0.0, 1e149, 3e-28)]
     assert field_at_origin(tiny, **far) == pytest.approx(2e-28, rel=1e-6, abs=0.0)
-    # A reach whose square overflows takes in whatever has a finite distance.
+    # A reach whose square overflows includes every finite distance.
     assert field_at_origin(samples, falloff_radius_m=1e300, max_distance_m=1e300) > 0.0
 
 
@@ -44,7 +44,7 @@ def test_enormous_readings_do_not_poison_their_neighbours() -> None:
     # Their sums would overflow, and inf - inf is NaN. The nearer of the two decides.
     assert field_at_origin([(0.01, 0.0, 1.7e308), (-0.02, 0.0, -1.7e308), usual]) == math.inf
     assert field_at_origin([(0.02, 0.0, 1.7e308), (-0.01, 0.0, -1.7e308), usual]) == -math.inf
-    # Here neither does: what is left is the rounding of the one less that of the other.
+    # Here neither decides: the rest is the difference of their roundings.
     assert not math.isnan(field_at_origin([(0.01, 0.0, 1.7e308), (-0.01, 0.0, -1.7e308), usual]))
 
 
@@ -86,7 +86,7 @@ def test_memory_stays_within_ten_times_the_grid(
 
 @pytest.fixture
 def evaluated_pairs(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """The numbers of cell-sample pairs that are looked at from here on."""
+    """The number of cell-sample pairs that are evaluated from here on."""
     pairs: list[int] = []
     evaluate = idw.PairwiseIdw.evaluate
 
@@ -99,7 +99,7 @@ def evaluated_pairs(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def test_cost_follows_the_painted_cells(evaluated_pairs: list[int]) -> None:
-    """One tag paints 2,800 of a million cells: no more pairs than of its own part of the grid."""
+    """One tag paints 2,800 of a million cells: no more pairs than in its own part of the grid."""
     grid = field_over(1000, 1000, [(25.0, 25.0, 20.0)], resolution=0.05)
     assert np.count_nonzero(~np.isnan(grid.values)) < 3000
     assert sum(evaluated_pairs) < 300_000

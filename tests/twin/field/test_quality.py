@@ -1,4 +1,4 @@
-"""How far off a field is, by leaving each tag out once, and how much of it is known."""
+"""The error of a field, by leaving out each tag once, and how much of it is known."""
 
 import math
 import tracemalloc
@@ -37,7 +37,7 @@ def quality_of(spots: Sequence[Spot], **changes: Any) -> FieldQuality:
     return leave_one_out(tags_at(spots), "temperature", **{**RULES, **changes})
 
 
-def test_nothing_can_be_said_about_lonely_tags() -> None:
+def test_lonely_tags_give_no_error() -> None:
     for spots in ([], [(0.0, 0.0, 10.0)], [(0.0, 0.0, 10.0), (9.0, 0.0, 10.0)]):
         assert quality_of(spots) == FieldQuality(0, len(spots), None, None)
 
@@ -67,7 +67,7 @@ def test_only_pinned_tags_with_a_finite_reading_of_the_sensor_take_part() -> Non
     max_distance=st.sampled_from([0.5, 1.5, 3.0]),
     power=st.sampled_from([2.0, 3.0]),
 )
-def test_error_is_the_definitions(
+def test_the_error_matches_its_definition(
     spots: list[Spot], falloff: float, max_distance: float, power: float
 ) -> None:
     rules = {"falloff_radius_m": falloff, "max_distance_m": max_distance, "power": power}
@@ -106,7 +106,7 @@ def test_memory_does_not_grow_with_the_square_of_the_tags() -> None:
     assert peak < 4_000_000  # the square of the tags is 128 MB of distances
 
 
-def test_painted_share_is_that_of_the_known_cells() -> None:
+def test_the_painted_share_is_that_of_the_known_cells() -> None:
     samples = [(0.5, 0.5, 1.0), (1.5, 0.5, 1e39)]
     grid = compute_idw_field(
         samples,
@@ -122,7 +122,7 @@ def test_painted_share_is_that_of_the_known_cells() -> None:
     assert painted_share(grid) == 0.25
 
 
-def test_a_judgement_that_nobody_waits_for_ends_between_two_parts() -> None:
+def test_a_cancelled_judgement_ends_between_two_parts() -> None:
     answers = iter([False, False, True])
     spots = [(x * 0.5, y * 0.5, 1.0) for x in range(40) for y in range(40)]
     with pytest.raises(Abandoned):

@@ -14,7 +14,7 @@ from lupin_twin.journal.schema import POSTGRESQL_TABLES, SiteLog
 from tests.support.log_life import Life, lived
 from tests.support.postgres import Postgres
 
-# As the same log in SQLite, and where its rows are in PostgreSQL.
+# The same log in SQLite, and its rows in PostgreSQL.
 Copied = Callable[[sqlite3.Connection], SiteLog]
 Engines = Callable[[sqlite3.Connection], tuple[sqlite3.Connection, SiteLog]]
 Living = Callable[[Iterable[tuple[str, Any]]], AbstractContextManager[Life]]
@@ -56,13 +56,13 @@ def engines(copied: Copied) -> Engines:
 
 @pytest.fixture(scope="session")
 def living(tmp_path_factory: pytest.TempPathFactory) -> Living:
-    """A log that has lived through steps, in a file of its own."""
+    """A log that has gone through these steps, in its own file."""
     folder, numbers = tmp_path_factory.mktemp("lives"), count()
     return lambda told: lived(folder / f"{next(numbers)}.sqlite", told)
 
 
 def fail_on_a_full_disk(code: str, path: Path, most: int) -> None:
-    """Run code in a process none of whose files may grow past `most` bytes, as on a full disk."""
+    """Run code in a process none of whose files may exceed `most` bytes, as on a full disk."""
     program = (
         "import resource, sys; from pathlib import Path; path = Path(sys.argv[1]);"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most})); {code}"

@@ -1,4 +1,4 @@
-"""Whatever a log has lived through, it answers as the plainest list of all its rows would."""
+"""After any history, a log gives the same answers as a plain list of all its rows."""
 
 import json
 import math
@@ -40,7 +40,7 @@ _points = st.integers(1, 40)
 
 @given(steps, periods, _points, st.sampled_from([EVERY_TAG, "7"]), st.randoms())
 @settings(deadline=None, max_examples=50)
-def test_its_answers_are_those_of_a_plain_list_on_either_engine(  # noqa: PLR0917
+def test_the_answers_are_those_of_a_plain_list_on_either_engine(  # noqa: PLR0917
     living: Living,
     engines: Engines,
     lives: list[tuple[str, Any]],
@@ -62,7 +62,7 @@ def test_its_answers_are_those_of_a_plain_list_on_either_engine(  # noqa: PLR091
 
 @given(one_run, periods, _points, st.integers(0, LATEST))
 @settings(deadline=None, max_examples=30)
-def test_of_rows_that_were_deleted_what_was_counted_stays(  # noqa: PLR0917
+def test_counts_of_deleted_rows_stay(  # noqa: PLR0917
     living: Living,
     engines: Engines,
     lives: list[tuple[str, Any]],
@@ -78,7 +78,7 @@ def test_of_rows_that_were_deleted_what_was_counted_stays(  # noqa: PLR0917
                 request = SeriesRequest(EVERY_TAG, event, *period, points)
                 answer = series(connection, request, END)
                 check(answer, request, life.events(EVERY_TAG, event), now_ns=END)
-            # A reading that is no number has left no trace in an hour, and so no beginning of all.
+            # A reading that is no number leaves no trace in an hour, and so no start of the data.
             if period[0] or all(math.isfinite(value) for *_, value in readings):
                 request = SeriesRequest("7", "temperature", *period, points)
                 check(series(connection, request, END), request, readings, now_ns=END)
@@ -115,7 +115,7 @@ def check_readings(life: Life, connection: Any, request: SeriesRequest) -> None:
 def check_export(life: Life, connection: Any, period: Period, tag: str | None) -> None:
     start_ns, end_ns = period[0], period[1] or END
     expected = [
-        # What is no number is null in the log.
+        # A value that is no number is null in the log.
         row if math.isfinite(row.value) else replace(row, value=math.nan)
         for row in life.export(start_ns, end_ns, tag)
     ]
@@ -129,7 +129,7 @@ def check_export(life: Life, connection: Any, period: Period, tag: str | None) -
 
 
 def check_writes(local: Any, archive: SiteLog, start_ns: int, random: Any) -> None:
-    """Both engines give the same; what is asked of a period is that part of all writes."""
+    """Both engines give the same; a query of a period gives that part of all writes."""
     whole = WritesRequest(max_count=MAX_WRITES)
     every = writes(local, whole).writes
     end_ns = random.choice([END, *(write.stamp_ns for write in every)])  # at the very end
@@ -145,7 +145,7 @@ def check_writes(local: Any, archive: SiteLog, start_ns: int, random: Any) -> No
         ]
 
     here, there = found(local), found(archive)
-    assert repr(there) == repr(here)  # in which no number is itself
+    assert repr(there) == repr(here)  # in which no number equals itself
     axis = runs(local.execute)
     by_stamp = sorted(every, key=lambda write: (write.stamp_ns, write.number))
     held = [(write, span_at(axis, write.stamp_ns)) for write in by_stamp]
@@ -168,7 +168,7 @@ def check_writes(local: Any, archive: SiteLog, start_ns: int, random: Any) -> No
 
 
 def check_counts(life: Life, archive: SiteLog, random: Any) -> None:
-    """What is counted of rows is the same in whatever order they come."""
+    """The counts of rows are the same in any order of arrival."""
     *here, here_sums = derived(SiteLog(life.connection))
     for table in ("hour", "tally", "event"):
         archive.execute(f"DELETE FROM {table} WHERE site = :site")
@@ -183,7 +183,7 @@ def check_counts(life: Life, archive: SiteLog, random: Any) -> None:
 
 
 def derived(log: SiteLog) -> list[list[tuple[Any, ...]]]:
-    """The three tables, without sums, and the sums."""
+    """The three tables without sums, and the sums."""
     found = [
         sorted(log.execute(f"SELECT {columns} WHERE site = :site").fetchall())
         for columns in (

@@ -29,12 +29,12 @@ def changed(path: Path, sql: str) -> None:
         connection.execute(sql)
 
 
-def test_a_whole_file_is_whole(path: Path) -> None:
+def test_a_sound_file_passes(path: Path) -> None:
     assert damage(path) == []
 
 
 @pytest.mark.parametrize("where", ["structure", "scan"])
-def test_to_be_interrupted_is_no_damage(where: str, path: Path) -> None:
+def test_an_interruption_is_no_damage(where: str, path: Path) -> None:
     with closing(open_reader(path)) as connection:
 
         def tell(what: str, share: float) -> None:
@@ -63,12 +63,12 @@ def test_to_be_interrupted_is_no_damage(where: str, path: Path) -> None:
         ("UPDATE run SET joins = 3", "run 1 joins run 3, which is missing"),
     ],
 )
-def test_what_is_not_what_was_written_is_named(path: Path, sql: str, said: str) -> None:
+def test_damage_is_reported_by_row(path: Path, sql: str, said: str) -> None:
     changed(path, sql)
     assert any(found.startswith(said) for found in damage(path))
 
 
-def test_all_of_them_are_found_and_how_far_it_is_is_told(path: Path) -> None:
+def test_all_damage_is_found_and_progress_is_reported(path: Path) -> None:
     changed(path, "UPDATE scan SET readings = '[]' WHERE seq % 2")
     told: list[tuple[str, float]] = []
 
@@ -85,7 +85,7 @@ def test_all_of_them_are_found_and_how_far_it_is_is_told(path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["[1,", "[1],[2]", "7", '["x",1]', "", "[[1]]"])
-def test_a_question_that_meets_what_is_no_list_of_numbers_says_that_it_is_damage(
+def test_a_query_that_meets_an_invalid_list_of_numbers_reports_damage(
     path: Path, text: str
 ) -> None:
     changed(path, f"UPDATE scan SET readings = '{text}'")

@@ -28,7 +28,7 @@ def told(answer: SeriesPast) -> list[tuple[int, float]]:
     return list(zip(answer.stamps_ns, answer.means, strict=True))
 
 
-def test_of_looks_that_were_deleted_it_is_known_whether_there_was_a_pest(tmp_path: Path) -> None:
+def test_of_deleted_inspections_the_presence_of_a_pest_is_known(tmp_path: Path) -> None:
     with lived(tmp_path / "j.sqlite") as life:
         life.write([look(at_ns=BEGUN, anomaly=True)])
         life.delete(BEGUN + HOUR)
@@ -37,7 +37,7 @@ def test_of_looks_that_were_deleted_it_is_known_whether_there_was_a_pest(tmp_pat
         assert told(ask(life.connection, Event.PESTS_CLEARED)) == [(BEGUN + 3 * HOUR, 0.0)]
 
 
-def test_runs_are_told_as_spans_of_the_period(tmp_path: Path) -> None:
+def test_runs_are_intervals_of_the_period(tmp_path: Path) -> None:
     with lived(tmp_path / "j.sqlite", [("back", 30)]) as life:
         life.write([scan(at_ns=BEGUN + 100 * MINUTE)])
         log = life.connection
@@ -64,7 +64,7 @@ def test_a_silence_is_longer_than_ten_minutes_and_than_three_usual_intervals(
         last = BEGUN + stamps[-1] * SECOND
         expected = [(BEGUN + 1203 * SECOND, 601.0)]
         assert told(ask(log, Event.SILENCES, now=last + SILENCE_NS)) == expected
-        # One that goes on lasts until now.
+        # One that continues lasts until now.
         assert told(ask(log, Event.SILENCES, now=last + 700 * SECOND))[-1] == (last, 700.0)
         cut = ask(log, Event.SILENCES, end=last + 9 * SECOND, now=last + 9000 * SECOND)
         assert told(cut)[-1] == (last, 9.0)
@@ -79,7 +79,7 @@ def test_a_silence_is_longer_than_ten_minutes_and_than_three_usual_intervals(
         assert silences == [(BEGUN + 7 * HOUR, 3 * 3600 + 1.0)]
 
 
-def test_of_years_that_were_deleted_silences_are_still_told(tmp_path: Path) -> None:
+def test_silences_in_deleted_years_are_still_reported(tmp_path: Path) -> None:
     stamps = [BEGUN + minute * MINUTE for minute in (*range(30), *range(90, 120))]
     with lived(tmp_path / "j.sqlite") as life:
         life.write(scan(at_ns=stamp_ns) for stamp_ns in stamps)

@@ -12,7 +12,7 @@ from tests.support.log_life import BEGUN, LATEST, MINUTE, lived
 END = BEGUN + (LATEST + 200) * MINUTE
 
 
-def test_lots_come_as_they_are_taken_and_nothing_is_held_open_between(tmp_path: Path) -> None:
+def test_batches_come_on_demand_and_nothing_stays_open_between_them(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     with lived(path) as life, closing(open_reader(path)) as reader:
         life.write(scan(at_ns=BEGUN + n * SECOND) for n in range(3 * LOT))
@@ -21,13 +21,13 @@ def test_lots_come_as_they_are_taken_and_nothing_is_held_open_between(tmp_path: 
         assert 0 < taken <= LOT
         assert not reader.in_transaction
         life.write([scan("8", BEGUN - SECOND)])
-        # All of the log can be put into the file while an export waits for its reader.
+        # The whole WAL can be checkpointed while an export waits for its reader.
         checkpoint = life.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
         assert checkpoint == (0, 0, 0)
         assert sum(map(len, lots)) == 3 * LOT - taken
 
 
-def test_what_is_deleted_meanwhile_breaks_it_off_and_only_if_it_was_to_come(
+def test_a_deletion_of_rows_still_to_come_ends_the_export(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("lupin_twin.journal.writes._STRETCH", 400)
@@ -46,13 +46,13 @@ def test_what_is_deleted_meanwhile_breaks_it_off_and_only_if_it_was_to_come(
         taken(late, 1)
         told = taken(whole, 2_000)
         life.delete(BEGUN + 1_000 * SECOND)
-        # Whoever is past it already gets all of it.
+        # An export past these rows gets the rest.
         while (found := whole.step(life.connection)) is not None:
             told += len(found)
         assert told == total - 100
         with pytest.raises(NotRemembered, match="deleted while"):
             taken(late, total)
-        # And whoever has not begun begins later.
+        # And one that has not started begins later.
         left = 0
         while (found := early.step(life.connection)) is not None:
             left += len(found)

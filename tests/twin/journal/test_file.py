@@ -28,14 +28,14 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "j.sqlite"
 
 
-def test_a_row_that_cannot_be_written_costs_itself_alone(path: Path) -> None:
+def test_a_row_that_cannot_be_written_is_lost_alone(path: Path) -> None:
     too_late = scan(at_ns=2**63)
     no_number = replace(scan("8"), readings=(Reading("t", "x"),))  # type: ignore[arg-type]
     assert kept(path, [scan("1"), too_late, no_number, scan("2")]) == (2, 2)
     assert known(path) == {scan("1"), scan("2")}
 
 
-def test_runs_are_kept_in_a_file_that_takes_anothers_place(path: Path) -> None:
+def test_runs_are_written_to_a_replaced_file(path: Path) -> None:
     with opened(path) as file:
         run = file.start(CLOCK, is_believed=False).run
     path.unlink()
@@ -46,7 +46,7 @@ def test_runs_are_kept_in_a_file_that_takes_anothers_place(path: Path) -> None:
     assert known(path) == {scan()}
 
 
-def test_upkeep_purges_shrinks_and_checkpoints(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_maintenance_purges_and_checkpoints(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lupin_twin.journal.file._LOG_BYTES", 10_000)
     monkeypatch.setattr("lupin_twin.journal.file._PURGE_EVERY_S", 0.0)
     with opened(path, Limits(days=36_500, max_bytes=60_000)) as file:
@@ -63,7 +63,7 @@ def test_upkeep_purges_shrinks_and_checkpoints(path: Path, monkeypatch: pytest.M
     assert is_whole(path)
 
 
-def test_it_is_said_where_hours_leave_no_room_for_scans(
+def test_a_lack_of_room_for_scans_beside_the_hours_is_reported(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("lupin_twin.journal.file._PURGE_EVERY_S", 0.0)
@@ -76,12 +76,12 @@ def test_it_is_said_where_hours_leave_no_room_for_scans(
 
 
 @pytest.mark.parametrize("is_there", [True, False])
-def test_what_was_killed_while_it_saved_begins_again(path: Path, *, is_there: bool) -> None:
+def test_a_salvage_that_was_killed_starts_again(path: Path, *, is_there: bool) -> None:
     kept(path, [scan(at_ns=NOW + n) for n in range(300)])
     aside = quarantine(path, "20261121T141500Z")
     with closing(open_writer(path)) as connection:
         set_meta(connection, "salvage", aside.name)
-    if not is_there:  # somebody has taken it away
+    if not is_there:  # the file was removed
         aside.unlink()
     with opened(path):
         pass

@@ -1,4 +1,4 @@
-"""Forgetting a tag, by the command line, and what a twin knows that is started after it."""
+"""Forgetting a tag on the command line, and the state of the next twin."""
 
 import getpass
 from collections.abc import Callable
@@ -19,7 +19,7 @@ LOST = "lost"
 
 
 class Ended(NamedTuple):
-    """How a command has ended, and what it said."""
+    """The exit code of a command, and its output."""
 
     returncode: int
     stdout: str
@@ -31,7 +31,7 @@ Journal = Callable[..., Ended]
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """The journal of a twin that has ended, with three tags at home and a lost one, the newest."""
+    """The journal of a stopped twin, with three tags at home and a lost one, the latest."""
     path = tmp_path / "j.sqlite"
     rows: list[Write] = [scan(tag_id, co2=400.0) for tag_id in HOME]
     rows += [pin(tag_id, x=x) for tag_id, x in HOME.items()]
@@ -53,7 +53,7 @@ def journal(path: Path, capsys: pytest.CaptureFixture[str]) -> Journal:
 
 
 def exported(journal: Journal) -> list[str]:
-    """The tags of all rows, in their order."""
+    """The tags of all rows, in order."""
     rows = journal("export").stdout.splitlines()
     column = rows[0].split(",").index("tag_id")
     return [row.split(",")[column] for row in rows[1:]]
@@ -65,7 +65,7 @@ def test_a_pose_is_forgotten_and_the_next_twin_pins_the_tag_anew(
     said = journal("forget", LOST, "--pose")
     assert (said.returncode, said.stderr) == (0, "")
     assert "the pose of tag 'lost' is forgotten" in said.stdout
-    # In a domain of its own, where nothing that is latched comes from before.
+    # In a domain of its own, without latched messages from before.
     with bridge("--ros-args", "-p", f"journal:={path}") as running:
         assert not running.tag(LOST)["pose"]["orientation"]["w"]
         assert running.tag(LOST)["readings"][0]["value"] == 500.0
@@ -85,9 +85,7 @@ def test_a_pose_is_forgotten_and_the_next_twin_pins_the_tag_anew(
     assert journal("check").returncode == 0
 
 
-def test_all_of_a_tag_is_forgotten_and_what_comes_later_is_kept(
-    path: Path, journal: Journal
-) -> None:
+def test_all_of_a_tag_is_forgotten_and_later_rows_are_stored(path: Path, journal: Journal) -> None:
     assert exported(journal) == [*HOME, LOST]
     said = journal("forget", LOST)
     assert (said.returncode, said.stderr) == (0, "")
@@ -100,7 +98,7 @@ def test_all_of_a_tag_is_forgotten_and_what_comes_later_is_kept(
     assert journal("check").returncode == 0
 
 
-def test_it_is_on_record_what_was_forgotten_by_whom_and_when(path: Path, journal: Journal) -> None:
+def test_what_was_forgotten_is_recorded_with_person_and_time(path: Path, journal: Journal) -> None:
     assert journal("forget", LOST, "--pose").returncode == 0
     again = journal("forget", LOST, "--pose")
     assert (again.returncode, again.stdout) == (1, "")

@@ -1,4 +1,4 @@
-"""Notes in the log: numbered as every write, followed, and what of them stands."""
+"""Notes in the log: numbered like every write, followed, and which of them hold."""
 
 from concurrent.futures import Future
 from contextlib import closing
@@ -39,7 +39,7 @@ def read(path: Path, request: NotesRequest = ALL) -> PastNotes:
         return notes(connection, request)
 
 
-def test_notes_and_scans_have_numbers_of_one_sequence_over_restarts(tmp_path: Path) -> None:
+def test_notes_and_scans_share_one_sequence_of_numbers_over_restarts(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     for text in ("first", "second"):
         with recording(path) as journal:
@@ -56,7 +56,7 @@ def test_notes_and_scans_have_numbers_of_one_sequence_over_restarts(tmp_path: Pa
     assert numbers + scans == [1, 3, 2, 4]
 
 
-def test_whoever_has_all_of_them_gets_none_again(tmp_path: Path) -> None:
+def test_a_reader_that_has_all_of_them_gets_none_again(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     with opened(path) as file:
         file.put_note(note("one"))
@@ -70,7 +70,7 @@ def test_whoever_has_all_of_them_gets_none_again(tmp_path: Path) -> None:
         assert read(path, NotesRequest("another", 2)).notes == after.notes
 
 
-def test_of_too_many_the_newest_are_known(tmp_path: Path) -> None:
+def test_of_too_many_notes_the_latest_are_known(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     with opened(path) as file:
         for number in range(MAX_NOTES + 1):
@@ -100,7 +100,7 @@ def test_a_copy_gets_each_once_and_in_its_place_among_the_scans(tmp_path: Path, 
     assert select(target, "SELECT count(*) FROM scan") == [(3,)]
 
 
-def test_an_id_of_somebody_elses_keeps_nobody_from_writing(tmp_path: Path) -> None:
+def test_a_foreign_id_keeps_nobody_from_writing(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     with opened(path) as file:
         file.put_note(note("ours"))
@@ -115,7 +115,7 @@ def test_an_id_of_somebody_elses_keeps_nobody_from_writing(tmp_path: Path) -> No
         assert follow.read(connection, 0).last == 2
 
 
-def test_a_note_is_refused_where_nothing_can_be_written_and_nobody_waits(tmp_path: Path) -> None:
+def test_a_note_is_refused_without_delay_where_nothing_can_be_written(tmp_path: Path) -> None:
     folder = tmp_path / "not a folder"
     folder.write_text("")
     journal = Journal(folder / "j.sqlite", "/twin", LIMITS)
@@ -127,7 +127,7 @@ def test_a_note_is_refused_where_nothing_can_be_written_and_nobody_waits(tmp_pat
         journal.write_note(note()).result(PATIENCE_S)
 
 
-def test_a_disk_that_is_full_is_said_and_the_next_note_is_written(tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_and_the_next_note_is_written(tmp_path: Path) -> None:
     waiting = NoteQueue()
     first, given_up = waiting.put(note("first")), waiting.put(note("given up"))
     assert given_up.cancel()
@@ -145,7 +145,7 @@ def test_a_disk_that_is_full_is_said_and_the_next_note_is_written(tmp_path: Path
     assert given_up.cancelled()
 
 
-def test_no_more_wait_than_a_few(tmp_path: Path) -> None:
+def test_the_number_of_waiting_notes_is_limited(tmp_path: Path) -> None:
     waiting = NoteQueue()
     held: list[Future[Note]] = [waiting.put(note()) for _ in range(101)]
     assert [it.done() for it in held].count(True) == 1
@@ -153,7 +153,7 @@ def test_no_more_wait_than_a_few(tmp_path: Path) -> None:
         held[-1].result(0)
 
 
-def test_the_later_word_stands_until_it_is_withdrawn() -> None:
+def test_the_later_note_holds_until_it_is_withdrawn() -> None:
     first, second = (Note(name, NOW, name, ACKNOWLEDGE, "alarm:a") for name in ("a1", "b2"))
     back = Note("c3", NOW, "b2", WITHDRAW, "note:b2")
     key = ("alarm:a", ACKNOWLEDGE)
@@ -163,5 +163,5 @@ def test_the_later_word_stands_until_it_is_withdrawn() -> None:
     assert withdrawals([first, second, back, again]) == {"b2": back}
 
 
-def test_what_a_clock_that_went_back_has_not_come_to_does_not_stand() -> None:
+def test_notes_after_a_reset_clocks_time_do_not_hold() -> None:
     assert standing([Note("a1", NOW + 1, "anna", ACKNOWLEDGE, "alarm:a")], NOW) == {}

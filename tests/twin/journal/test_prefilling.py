@@ -43,7 +43,7 @@ def mark(path: Path) -> tuple[int, int] | None:
         return simulated(connection)
 
 
-def test_a_journal_that_is_not_there_gets_a_past_that_goes_on(tmp_path: Path) -> None:
+def test_a_missing_journal_gets_a_past_that_continues(tmp_path: Path) -> None:
     path = tmp_path / "state" / "j.sqlite"
     assert filled(path)
     assert is_whole(path)
@@ -55,7 +55,7 @@ def test_a_journal_that_is_not_there_gets_a_past_that_goes_on(tmp_path: Path) ->
     assert restored(path).last_seq == 5
 
 
-def test_a_twin_that_heard_nothing_leaves_it_empty(tmp_path: Path) -> None:
+def test_a_twin_that_received_nothing_leaves_it_empty(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     kept(path, [], CLOCK)
     assert filled(path)
@@ -63,14 +63,14 @@ def test_a_twin_that_heard_nothing_leaves_it_empty(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("row", [scan(), look(), pin()])
-def test_into_what_anybody_has_recorded_nothing_is_written(tmp_path: Path, row: Write) -> None:
+def test_a_journal_with_recorded_rows_is_not_filled(tmp_path: Path, row: Write) -> None:
     path = tmp_path / "j.sqlite"
     kept(path, [row], CLOCK)
     assert not filled(path)
     assert mark(path) is None
 
 
-def test_a_journal_at_work_says_what_of_it_is_simulated(tmp_path: Path) -> None:
+def test_a_running_journal_knows_which_part_is_simulated(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     filled(path)
     for at_ns, is_simulated in ((NOW + SECOND, False), (5 * SECOND, True)):

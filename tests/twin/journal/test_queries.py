@@ -14,7 +14,9 @@ def temperature(start_ns: int = 0, end_ns: int = 0, points: int = 500) -> Series
     return SeriesRequest("7", "temperature", start_ns, end_ns, points)
 
 
-def test_as_many_readings_as_points_are_told_and_one_more_are_buckets(tmp_path: Path) -> None:
+def test_as_many_readings_as_points_come_singly_and_more_in_buckets(
+    tmp_path: Path,
+) -> None:
     with lived(tmp_path / "j.sqlite") as life:
         life.write(scan(at_ns=BEGUN + n * SECOND, temperature=float(n)) for n in range(10))
         exact = series(life.connection, temperature(BEGUN, BEGUN + 10 * SECOND, 10), END)
@@ -35,9 +37,7 @@ def test_as_many_readings_as_points_are_told_and_one_more_are_buckets(tmp_path: 
         )
 
 
-def test_too_many_scans_are_told_by_the_hour(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_too_many_scans_come_by_the_hour(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with lived(tmp_path / "j.sqlite") as life:
         life.write(scan(at_ns=BEGUN + n * MINUTE) for n in range(300))
         request = temperature(BEGUN, BEGUN + 300 * MINUTE, 299)

@@ -1,4 +1,4 @@
-"""A shift report says what the plainest reading of all rows says, on either engine."""
+"""A shift report equals that of a plain list of all rows, on either engine."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def report(log: Any, start_ns: int, end_ns: int, journal: Condition = JOURNAL) -
 
 @given(steps, st.tuples(_stamps, _stamps).filter(lambda two: two[0] != two[1]).map(sorted))
 @settings(deadline=None, max_examples=60)
-def test_a_report_is_that_of_a_plain_list_on_either_engine(
+def test_the_report_is_that_of_a_plain_list_on_either_engine(
     living: Living, engines: Engines, lives: list[tuple[str, Any]], period: tuple[int, int]
 ) -> None:
     with living(lives) as life:
@@ -52,7 +52,7 @@ def test_a_report_is_that_of_a_plain_list_on_either_engine(
         check(found[0], life, *period)
 
 
-def test_readings_of_an_attempt_that_failed_are_in_it_as_in_charts_and_alarms(
+def test_readings_of_a_failed_attempt_count_as_in_charts_and_alarms(
     living: Living,
 ) -> None:
     failed = replace(scan(at_ns=BEGUN + MINUTE, temperature=40.0), status=2)
@@ -64,7 +64,7 @@ def test_readings_of_an_attempt_that_failed_are_in_it_as_in_charts_and_alarms(
     assert (found["counts"]["scans"], found["counts"]["failed"]) == (1, 1)
 
 
-def test_that_nothing_was_scanned_is_said_only_as_far_as_the_log_is_complete(
+def test_no_scans_is_reported_only_as_far_as_the_log_is_complete(
     living: Living,
 ) -> None:
     scans = [scan(at_ns=BEGUN + at * MINUTE, temperature=21.0) for at in range(10)]
@@ -80,7 +80,7 @@ def test_that_nothing_was_scanned_is_said_only_as_far_as_the_log_is_complete(
             assert [it["reason"]["kind"] for it in found["alarms"]] == stops
 
 
-def test_alarms_of_a_tag_that_has_had_hundreds_are_all_counted(living: Living) -> None:
+def test_hundreds_of_alarms_of_one_tag_are_all_counted(living: Living) -> None:
     values = [40.0, 40.0, 21.0, 21.0] * 150
     scans = [scan(at_ns=BEGUN + at * MINUTE, temperature=it) for at, it in enumerate(values)]
     with living([("rows", scans)]) as life:
@@ -88,7 +88,7 @@ def test_alarms_of_a_tag_that_has_had_hundreds_are_all_counted(living: Living) -
     assert (counts["raised"], counts["cleared"]) == (150, 150)
 
 
-def test_nothing_of_what_came_later_is_in_it(living: Living) -> None:
+def test_later_rows_are_not_in_it(living: Living) -> None:
     chance = st.tuples(steps, _stamps)
 
     @given(chance, st.integers(1, LATEST))

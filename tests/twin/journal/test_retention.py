@@ -46,7 +46,7 @@ def scans(file: sqlite3.Connection) -> list[int]:
     return [stamp for (stamp,) in file.execute("SELECT stamp_ns FROM scan ORDER BY seq")]
 
 
-def test_what_is_past_its_age_goes_and_nothing_else(file: sqlite3.Connection) -> None:
+def test_rows_past_their_age_are_deleted_and_nothing_else(file: sqlite3.Connection) -> None:
     now = NOW + 2 * DAY
     purge(file, Limits(1.5, ENOUGH), now)
     horizon = now - DAY * 3 // 2
@@ -58,7 +58,7 @@ def test_what_is_past_its_age_goes_and_nothing_else(file: sqlite3.Connection) ->
     assert file.execute("SELECT count(*) FROM place").fetchone() == (1,)
 
 
-def test_what_is_too_large_loses_its_oldest(file: sqlite3.Connection) -> None:
+def test_a_file_that_is_too_large_loses_its_oldest_rows(file: sqlite3.Connection) -> None:
     limit = used_bytes(file) * 2 // 3
     steps = purge(file, Limits(ENOUGH, limit), NOW)
     assert 0.8 * limit < used_bytes(file) <= limit
@@ -67,7 +67,7 @@ def test_what_is_too_large_loses_its_oldest(file: sqlite3.Connection) -> None:
     assert left == [NOW + n * 60 * SECOND for n in range(ROWS - len(left), ROWS)]
 
 
-def test_numbers_go_on_when_everything_is_gone(path: Path, file: sqlite3.Connection) -> None:
+def test_numbers_continue_when_everything_is_deleted(path: Path, file: sqlite3.Connection) -> None:
     file.execute("DELETE FROM place")
     purge(file, Limits(0.0, ENOUGH), NOW + 99 * DAY)
     file.close()
@@ -75,7 +75,7 @@ def test_numbers_go_on_when_everything_is_gone(path: Path, file: sqlite3.Connect
     assert restored(path).last_seq == ROWS + 3
 
 
-def test_what_is_kept_begins_with_the_log_and_behind_what_was_deleted_or_lost(
+def test_data_start_with_the_log_and_after_deleted_or_lost_rows(
     path: Path, file: sqlite3.Connection
 ) -> None:
     assert retention.kept(file) == ((NOW, FOREVER_NS),)
@@ -85,7 +85,7 @@ def test_what_is_kept_begins_with_the_log_and_behind_what_was_deleted_or_lost(
     assert retention.kept(file) == ((NOW + 6, FOREVER_NS),)
     purge(file, Limits(1.0, ENOUGH), NOW + 2 * DAY)
     assert retention.kept(file) == ((deleted_ns(SiteLog(file), 1) + 1, FOREVER_NS),)
-    # Another run holds what lies before the end of the first, and has lost nothing.
+    # Another run has data from before the end of the first, and has lost nothing.
     file.close()
     with opened(path) as again:
         first = again.start(CLOCK, is_believed=True).run
@@ -94,7 +94,7 @@ def test_what_is_kept_begins_with_the_log_and_behind_what_was_deleted_or_lost(
         assert again.kept() == ((NOW - 9, FOREVER_NS),)
 
 
-def test_what_is_of_before_the_log_is_kept_from_there(path: Path) -> None:
+def test_rows_from_before_the_log_start_the_data(path: Path) -> None:
     with opened(path) as file:
         run = file.start(CLOCK, is_believed=True).run
         assert file.kept()[0][0] == NOW
@@ -102,10 +102,10 @@ def test_what_is_of_before_the_log_is_kept_from_there(path: Path) -> None:
         assert file.kept()[0][0] == NOW - HOUR_NS
 
 
-def test_a_clock_that_is_a_year_ahead_gives_nothing_up_at_once(file: sqlite3.Connection) -> None:
+def test_a_clock_that_is_a_year_ahead_deletes_nothing_at_once(file: sqlite3.Connection) -> None:
     limits, last = Limits(90.0, ENOUGH), NOW + (ROWS - 1) * 60 * SECOND + 1000
-    # Nothing is received by that clock yet: what is there is as old as it was.
+    # Nothing has been received by that clock yet: all ages are unchanged.
     assert horizon_ns(file, limits, NOW + 365 * DAY) == last - 90 * DAY
-    # And by then no more than an hour of it goes in one round.
+    # After that, one round deletes at most an hour of it.
     file.execute("UPDATE scan SET arrival_ns = ? WHERE seq = ?", (NOW + 365 * DAY, ROWS + 2))
     assert horizon_ns(file, limits, NOW + 365 * DAY) == NOW + 1000 + HOUR_NS

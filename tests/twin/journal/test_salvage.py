@@ -47,16 +47,16 @@ def scans(path: Path) -> set[tuple[object, ...]]:
     return set(select(path, SCANS))
 
 
-def test_a_whole_file_comes_back_whole(whole: Path, damaged: Path) -> None:
+def test_a_sound_file_is_salvaged_completely(whole: Path, damaged: Path) -> None:
     new = salvaged(damaged)
     assert known(new) == known(whole)
     for table in ("run", "series", "scan", "look", "place", "hour", "tally", "event"):
         every = f"SELECT * FROM {table}"
-        if table != "run":  # looking at what is known has a run go on
+        if table != "run":  # reading the latest state starts a run
             assert set(select(new, every)) == set(select(whole, every)), table
 
 
-def test_what_is_in_the_log_beside_it_comes_too(whole: Path, tmp_path: Path) -> None:
+def test_rows_in_the_wal_beside_it_are_salvaged_too(whole: Path, tmp_path: Path) -> None:
     path = Path(shutil.copy(whole, tmp_path / "j.sqlite"))
     with closing(open_writer(path)) as writer:
         writer.execute("INSERT INTO meta VALUES ('local', 'last', 'word')")
@@ -68,7 +68,7 @@ def test_what_is_in_the_log_beside_it_comes_too(whole: Path, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("share", [0.9, 0.5, 0.3])
-def test_of_a_truncated_file_what_is_left_is_read(whole: Path, damaged: Path, share: float) -> None:
+def test_the_rest_of_a_truncated_file_is_read(whole: Path, damaged: Path, share: float) -> None:
     size = damaged.stat().st_size
     with damaged.open("rb+") as file:
         file.truncate(int(size * share))
@@ -77,13 +77,13 @@ def test_of_a_truncated_file_what_is_left_is_read(whole: Path, damaged: Path, sh
     assert len(found) > (share - 0.2) * 2000
 
 
-def test_what_was_given_up_does_not_come_back_but_its_hours(tmp_path: Path) -> None:
+def test_deleted_rows_do_not_come_back_but_their_hours_do(tmp_path: Path) -> None:
     path = tmp_path / "damaged.sqlite"
     kept(path, [scan("7", NOW + n * 60 * SECOND, a=float(n)) for n in range(500)])
     hours = set(select(path, "SELECT * FROM hour"))
     with closing(open_writer(path)) as connection:
         connection.execute("DELETE FROM scan WHERE seq <= 190")
-        until = NOW + 189 * 60 * SECOND  # amid an hour
+        until = NOW + 189 * 60 * SECOND  # in the middle of an hour
         connection.execute(f"INSERT INTO meta VALUES ('local', 'purged_ns:1', '{until}')")
         connection.execute("INSERT INTO meta VALUES ('local', 'purged_seq', '190')")
     new = salvaged(path)
@@ -91,7 +91,7 @@ def test_what_was_given_up_does_not_come_back_but_its_hours(tmp_path: Path) -> N
     assert set(select(new, "SELECT * FROM hour")) == hours
 
 
-def test_of_overwritten_pages_what_lies_beside_them_is_read(whole: Path, damaged: Path) -> None:
+def test_of_overwritten_pages_the_others_are_read(whole: Path, damaged: Path) -> None:
     with damaged.open("rb+") as file:
         for at in range(20, damaged.stat().st_size // 1024, 20):
             file.seek(at * 1024)
@@ -102,7 +102,7 @@ def test_of_overwritten_pages_what_lies_beside_them_is_read(whole: Path, damaged
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_flipped_byte_costs_its_own_page_at_most(whole: Path, damaged: Path, seed: int) -> None:
+def test_a_flipped_byte_costs_at_most_its_own_page(whole: Path, damaged: Path, seed: int) -> None:
     at = random.Random(seed).randrange(100, damaged.stat().st_size)
     with damaged.open("rb+") as file:
         file.seek(at)
@@ -110,14 +110,14 @@ def test_a_flipped_byte_costs_its_own_page_at_most(whole: Path, damaged: Path, s
         file.seek(at)
         file.write(bytes([byte ^ 0x21]))
     new = salvaged(damaged)
-    # A series that is lost takes its scans along: a hundred of them.
+    # A lost series loses its scans too: a hundred of them.
     lost = scans(whole) - scans(new)
     assert len(lost) < 130
     assert len(scans(new) - scans(whole)) <= 1
 
 
 @pytest.mark.parametrize("text", [b"local", b"[7.0]"])
-def test_a_row_that_is_no_row_any_more_is_left_out(whole: Path, damaged: Path, text: bytes) -> None:
+def test_an_invalid_row_is_left_out(whole: Path, damaged: Path, text: bytes) -> None:
     content = bytearray(damaged.read_bytes())
     at = content.index(b"robotm1[7.0]")
     content[content.rindex(text, 0, at + 12)] ^= 0x20
@@ -125,7 +125,7 @@ def test_a_row_that_is_no_row_any_more_is_left_out(whole: Path, damaged: Path, t
     assert len(scans(whole) - scans(salvaged(damaged))) == 1
 
 
-def test_new_numbers_are_past_all_that_may_be_lost(damaged: Path) -> None:
+def test_new_numbers_are_beyond_all_that_may_be_lost(damaged: Path) -> None:
     new = salvaged(damaged)
     kept(new, [scan("new", NOW + 999 * SECOND)])
     ((number,),) = select(
@@ -135,14 +135,14 @@ def test_new_numbers_are_past_all_that_may_be_lost(damaged: Path) -> None:
     assert number > len(ROWS) + 1_000_000
 
 
-def test_what_is_no_database_gives_nothing(tmp_path: Path) -> None:
+def test_a_file_that_is_no_database_yields_nothing(tmp_path: Path) -> None:
     text = tmp_path / "damaged.sqlite"
     text.write_text("no such thing" * 1000)
     assert scans(salvaged(text)) == set()
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_whatever_stands_on_the_pages_it_ends(whole: Path, damaged: Path, seed: int) -> None:
+def test_salvage_ends_whatever_is_on_the_pages(whole: Path, damaged: Path, seed: int) -> None:
     chance = random.Random(seed)
     content = bytearray(damaged.read_bytes())
     for _ in range(len(content) // 20):
@@ -152,7 +152,7 @@ def test_whatever_stands_on_the_pages_it_ends(whole: Path, damaged: Path, seed: 
 
 
 @pytest.mark.parametrize("size", [100, 1024])
-def test_without_header_or_first_page_all_is_read(whole: Path, damaged: Path, size: int) -> None:
+def test_without_its_first_page_all_is_read(whole: Path, damaged: Path, size: int) -> None:
     content = damaged.read_bytes()
     damaged.write_bytes(bytes(size) + content[size:])
     assert scans(salvaged(damaged)) == scans(whole)
@@ -161,7 +161,7 @@ def test_without_header_or_first_page_all_is_read(whole: Path, damaged: Path, si
     }
 
 
-def test_a_damaged_file_is_quarantined_with_its_log_and_never_overwritten(tmp_path: Path) -> None:
+def test_a_damaged_file_is_quarantined_with_its_wal_and_never_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     names = []
     for text in ("first", "second"):

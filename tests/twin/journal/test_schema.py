@@ -30,7 +30,9 @@ def path(tmp_path: Path) -> Path:
     return made
 
 
-def test_an_index_that_an_earlier_release_did_not_make_is_made_and_no_damage(path: Path) -> None:
+def test_an_index_missing_in_earlier_releases_is_created(
+    path: Path,
+) -> None:
     indexes = "SELECT name FROM sqlite_schema WHERE type = 'index' AND sql != '' ORDER BY name"
     with closing(open_writer(path)) as connection:
         whole = connection.execute(indexes).fetchall()
@@ -42,7 +44,7 @@ def test_an_index_that_an_earlier_release_did_not_make_is_made_and_no_damage(pat
         assert connection.execute(indexes).fetchall() == whole
 
 
-def test_a_database_of_somebody_else_is_told_and_left(tmp_path: Path) -> None:
+def test_a_foreign_database_is_reported_and_left_alone(tmp_path: Path) -> None:
     foreign = tmp_path / "theirs.sqlite"
     connection = sqlite3.connect(foreign)
     connection.execute("CREATE TABLE theirs (x)")
@@ -56,10 +58,10 @@ def test_a_database_of_somebody_else_is_told_and_left(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("after", range(6))
-def test_a_file_that_is_being_made_is_empty_or_whole_but_never_another(
+def test_a_file_being_created_is_empty_or_complete_but_never_foreign(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, after: int
 ) -> None:
-    """Its tables come when the reader has asked so often."""
+    """Its tables appear after the reader's fifth query."""
     path = tmp_path / "j.sqlite"
     maker = sqlite3.connect(path, isolation_level=None, timeout=0.0)
     make = (
@@ -83,7 +85,7 @@ def test_a_file_that_is_being_made_is_empty_or_whole_but_never_another(
         open_reader(path).close()
 
 
-def test_a_file_that_is_being_made_is_called_empty_and_is_not_damaged(tmp_path: Path) -> None:
+def test_a_file_being_created_is_called_empty_and_not_damaged(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     with closing(sqlite3.connect(path, isolation_level=None)) as maker:
         maker.execute("BEGIN IMMEDIATE")
@@ -94,7 +96,7 @@ def test_a_file_that_is_being_made_is_called_empty_and_is_not_damaged(tmp_path: 
 
 
 @pytest.mark.parametrize("version", [1, 2, 3, VERSION + 1])
-def test_another_version_is_left_and_the_message_says_what_becomes_of_it(
+def test_another_version_is_left_alone_and_the_message_says_what_happens_to_it(
     path: Path, version: int
 ) -> None:
     with closing(sqlite3.connect(path)) as connection:
@@ -114,20 +116,20 @@ def test_a_file_that_is_no_database_is_damaged(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [b"x", b"\x89MCAP0\r\n" * 1000])
-def test_a_named_file_that_is_no_database_is_somebody_elses(content: bytes, path: Path) -> None:
+def test_a_named_file_that_is_no_database_is_foreign(content: bytes, path: Path) -> None:
     path.write_bytes(content)
     with pytest.raises(Foreign, match="is not a journal: it does not begin as an SQLite file"):
         open_named(path)
 
 
-def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
+def test_a_path_that_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "fifo")
     for path in (tmp_path / "fifo", tmp_path, Path("/dev/zero")):
         with pytest.raises(Foreign, match="is not a journal: it is not a regular file"):
             open_reader(path)
 
 
-def test_a_journal_with_a_damaged_header_is_damaged_and_not_somebody_elses(path: Path) -> None:
+def test_a_journal_with_a_damaged_header_is_damaged_and_not_foreign(path: Path) -> None:
     whole = bytearray(path.read_bytes())
     whole[70] ^= 0x10  # the application id
     path.write_bytes(whole)
@@ -136,7 +138,7 @@ def test_a_journal_with_a_damaged_header_is_damaged_and_not_somebody_elses(path:
     assert is_damage_error(caught.value)
 
 
-def test_a_flipped_letter_in_a_table_s_definition_is_damage(path: Path) -> None:
+def test_a_flipped_letter_in_a_table_definition_is_damage(path: Path) -> None:
     whole = path.read_bytes()
     for letter in ("scan_at", "stamp_ns BIGINT", "readings TEXT"):
         at = whole.index(letter.encode())

@@ -8,7 +8,7 @@ from lupin_twin.journal.schema import open_writer
 from tests.support.waiting import wait_for
 
 
-def test_what_is_written_is_synced_once_and_nothing_else(
+def test_each_write_is_synced_once_and_nothing_else_is(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     synced: list[str] = []
@@ -33,7 +33,7 @@ def test_what_is_written_is_synced_once_and_nothing_else(
     assert set(synced) == {f"{path}-wal"}
 
 
-def test_a_failed_sync_is_told_with_the_next_write(
+def test_a_failed_sync_is_reported_with_the_next_write(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(descriptor: int) -> None:

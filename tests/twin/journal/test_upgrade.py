@@ -1,4 +1,4 @@
-"""A journal of version 3 is upgraded: what is answered is what was, whatever happens meanwhile."""
+"""A journal of version 3 is upgraded: all answers stay the same, whatever happens meanwhile."""
 
 import errno
 import shutil
@@ -36,7 +36,7 @@ def started(path: Path) -> Iterator[Journal]:
 
 
 def check_states(path: Path, name: str) -> None:
-    """The upgraded file knows at every moment what the old one did."""
+    """The upgraded file gives the same state at every moment as the old one."""
     with closing(open_reader(path)) as connection:
         for question, right in answers(name):
             if question[0] == "state":
@@ -47,10 +47,10 @@ def names_in(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-# --- what comes along -----------------------------------------------------------------------------
+# --- content --------------------------------------------------------------------------------------
 
 
-def test_the_old_file_stays_beside_the_new_one_as_it_was(tmp_path: Path) -> None:
+def test_the_old_file_stays_unchanged_beside_the_new_one(tmp_path: Path) -> None:
     path = old("day", tmp_path)
     path.chmod(0o640)
     content = path.read_bytes()
@@ -67,7 +67,7 @@ def test_the_old_file_stays_beside_the_new_one_as_it_was(tmp_path: Path) -> None
     assert names_in(tmp_path) == {"j.sqlite", "j.sqlite.v3", "j.sqlite.v3-1"}
 
 
-def test_the_log_of_a_killed_twin_comes_along(tmp_path: Path) -> None:
+def test_the_wal_of_a_killed_twin_is_upgraded_too(tmp_path: Path) -> None:
     (tmp_path / "killed").mkdir()
     first = old("day", tmp_path)
     with closing(sqlite3.connect(first, isolation_level=None)) as writer:
@@ -83,7 +83,7 @@ def test_the_log_of_a_killed_twin_comes_along(tmp_path: Path) -> None:
         assert connection.execute("SELECT count(*) > 300 FROM scan").fetchone() == (1,)
 
 
-def test_what_is_damaged_is_left_out_and_said(tmp_path: Path) -> None:
+def test_damaged_rows_are_left_out_and_reported(tmp_path: Path) -> None:
     path = old("flipped", tmp_path)
     with started(path) as journal:
         assert journal.take_restored(30.0) is not None
@@ -106,20 +106,20 @@ def test_the_answers_are_those_of_the_old_file(name: str, tmp_path: Path) -> Non
 
 
 def is_another(name: str, question: list[Any]) -> bool:
-    """Whether another answer is right, and not that of the old build."""
+    """Whether a different answer is right, where the old build's was not."""
     if question[0] != "series":
         return False
     _, tag_id, sensor, *_ = question
     if name == "purged":
-        # Of attempts that are deleted the old build kept counts by five minutes, now by the hour; a
+        # For deleted attempts the old build had counts by five minutes, now there are hours; a
         # pause is then longer than the usual interval of hours, not of five minutes.
         return tag_id == "*" and sensor in ("~scans", "~failures", "~looks", "~silences")
-    # The old build had counted rows that are not what was written: what was in an hour, in five
-    # minutes, and how many there were by an index. Now such a row is nowhere.
+    # The old build had counted damaged rows: in an hour, in five minutes, and in the total of
+    # an index. Now such a row is nowhere.
     return name in ("flipped", "damaged")
 
 
-# --- what may happen meanwhile --------------------------------------------------------------------
+# --- interruptions --------------------------------------------------------------------------------
 
 
 def child(path: Path, number: int) -> subprocess.CompletedProcess[str]:
@@ -127,7 +127,7 @@ def child(path: Path, number: int) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, check=False, capture_output=True, text=True)
 
 
-def test_killed_at_any_moment_it_is_done_at_the_next_start(tmp_path: Path) -> None:
+def test_killed_at_any_moment_it_is_completed_at_the_next_start(tmp_path: Path) -> None:
     whole = old("late", tmp_path)
     content = whole.read_bytes()
     moments, _ = map(int, child(whole, 0).stdout.split())
@@ -146,7 +146,7 @@ def test_killed_at_any_moment_it_is_done_at_the_next_start(tmp_path: Path) -> No
         check_states(path, "late")
 
 
-def test_a_disk_that_fills_meanwhile_leaves_the_old_file_as_it_was(tmp_path: Path) -> None:
+def test_a_disk_that_fills_leaves_the_old_file_unchanged(tmp_path: Path) -> None:
     path = old("day", tmp_path)
     content = path.read_bytes()
     code = "from lupin_twin.journal.rebuild import upgrade; upgrade(path, print)"
@@ -155,7 +155,7 @@ def test_a_disk_that_fills_meanwhile_leaves_the_old_file_as_it_was(tmp_path: Pat
     assert names_in(tmp_path) == {"j.sqlite"}
 
 
-def test_where_no_links_are_and_no_room_for_a_copy_nothing_is_left_behind(
+def test_without_links_and_room_for_a_copy_nothing_is_left_behind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refused(*_: object) -> None:
@@ -178,7 +178,7 @@ def test_where_no_links_are_and_no_room_for_a_copy_nothing_is_left_behind(
     assert names_in(tmp_path) == {"j.sqlite", "j.sqlite.v3"}
 
 
-def test_while_somebody_reads_it_waits(tmp_path: Path) -> None:
+def test_it_waits_for_readers_of_the_file(tmp_path: Path) -> None:
     path = old("day", tmp_path)
     with (
         closing(sqlite3.connect(path, isolation_level=None)) as writer,
@@ -190,7 +190,7 @@ def test_while_somebody_reads_it_waits(tmp_path: Path) -> None:
         with pytest.raises(sqlite3.OperationalError, match="another process reads"):
             upgrade(path, lambda share: None)
         reader.execute("ROLLBACK")
-        # To have it open is no hindrance, and it goes on with what it has, whatever is written.
+        # A reader may go on with its open file, whatever is written.
         upgrade(path, lambda share: None)
         with started(path) as journal:
             assert journal.take_restored(30.0) is not None

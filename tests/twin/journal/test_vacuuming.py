@@ -16,7 +16,7 @@ def path(tmp_path: Path) -> Path:
     kept(made, [pin(), *(scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(5000))])
     with closing(open_writer(made)) as connection:
         connection.execute("DELETE FROM scan WHERE seq < 4500")
-        # As what deletes them notes it.
+        # As the deletion of rows records it.
         until_ns = NOW + 4500 * SECOND
         connection.execute(f"INSERT INTO meta VALUES ('local', 'purged_ns:1', '{until_ns}')")
     return made
@@ -26,7 +26,7 @@ def small(path: Path) -> tuple[int, int]:
     return vacuum(path, "a test", lambda what, share: None)
 
 
-def test_the_file_shrinks_and_holds_what_it_held(path: Path) -> None:
+def test_the_file_shrinks_and_its_content_stays(path: Path) -> None:
     size, rows = path.stat().st_size, known(path)
     path.chmod(0o640)
     before, after = small(path)
@@ -36,14 +36,14 @@ def test_the_file_shrinks_and_holds_what_it_held(path: Path) -> None:
     assert known(path) == rows
     assert is_whole(path)
     assert small(path) == (after, after)
-    # And it can be written as before, numbers going on.
+    # It can be written as before, with consecutive numbers.
     assert kept(path, [scan("new")]) == (1, 0)
 
 
 @pytest.mark.parametrize(
     ("content", "refusal"), [(b"", Empty), (b"x", Foreign), (b"\x89MCAP0\r\n" * 1000, Foreign)]
 )
-def test_a_file_that_is_no_journal_is_left_and_nothing_made_beside_it(
+def test_a_file_that_is_no_journal_is_left_alone_and_nothing_is_created_beside_it(
     content: bytes, refusal: type[Exception], tmp_path: Path
 ) -> None:
     theirs = tmp_path / "theirs"
@@ -54,7 +54,7 @@ def test_a_file_that_is_no_journal_is_left_and_nothing_made_beside_it(
     assert list(tmp_path.iterdir()) == [theirs]
 
 
-def test_while_somebody_reads_it_it_is_refused(path: Path) -> None:
+def test_it_is_refused_while_the_file_is_read(path: Path) -> None:
     with closing(open_reader(path)) as reader:
         reader.execute("BEGIN")
         reader.execute("SELECT count(*) FROM scan").fetchone()
@@ -63,7 +63,7 @@ def test_while_somebody_reads_it_it_is_refused(path: Path) -> None:
     assert small(path)[1] < path.stat().st_size * 5
 
 
-def test_a_disk_that_fills_meanwhile_leaves_the_file_as_it_was(path: Path) -> None:
+def test_a_disk_that_fills_leaves_the_file_unchanged(path: Path) -> None:
     kept(path, [scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(5000, 9000)])
     rows = known(path)
     code = "from lupin_twin.journal.rebuild import vacuum; vacuum(path, 'a test', print)"

@@ -38,7 +38,7 @@ def count(path: Path) -> int:
     return rows
 
 
-def test_what_is_handed_over_is_written_and_known_after_a_restart(path: Path) -> None:
+def test_a_write_is_stored_and_known_after_a_restart(path: Path) -> None:
     rows: set[Write] = {pin(), *(scan(str(n)) for n in range(1000))}
     with recording(path) as journal:
         assert journal.take_restored(30.0) is not None
@@ -57,7 +57,7 @@ def test_what_is_handed_over_is_written_and_known_after_a_restart(path: Path) ->
         wait_for(lambda: journal.condition.repeated == 1, "a row that is there already")
 
 
-def test_before_the_clock_begins_nothing_is_written_and_nothing_lost(path: Path) -> None:
+def test_before_the_clock_starts_nothing_is_written_and_nothing_lost(path: Path) -> None:
     journal = Journal(path, "/twin", LIMITS)
     wait_state(journal, JournalState.RECORDING)
     journal.write(scan("early"))
@@ -70,7 +70,7 @@ def test_before_the_clock_begins_nothing_is_written_and_nothing_lost(path: Path)
     assert known(path) == {scan("early")}
 
 
-def test_rows_belong_to_the_clock_by_which_they_were_heard(path: Path) -> None:
+def test_rows_belong_to_the_clock_by_which_they_were_received(path: Path) -> None:
     with recording(path, Clock(5 * SECOND, NOW, is_simulated=True)) as journal:
         journal.write(scan("a", 9 * SECOND))
         after = Clock(2 * SECOND, NOW + 9 * SECOND, is_simulated=True)
@@ -111,7 +111,7 @@ def test_a_damaged_file_is_quarantined_and_the_twin_goes_on(path: Path) -> None:
     assert known(path) == {scan()}
 
 
-def test_damage_that_is_met_while_it_records_has_the_file_quarantined_too(
+def test_damage_found_while_recording_quarantines_the_file_too(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     append = JournalFile.append
@@ -131,11 +131,11 @@ def test_damage_that_is_met_while_it_records_has_the_file_quarantined_too(
     assert known(path) == {scan("1"), scan("2")}
 
 
-def test_a_file_that_is_removed_is_made_anew(path: Path) -> None:
+def test_a_removed_file_is_created_anew(path: Path) -> None:
     with recording(path) as journal:
         journal.write(scan("1"))
         wait_for(lambda: journal.condition.written == 1, "the row")
-        # The file itself last: once it is gone it is made anew, with others beside it.
+        # The file itself last: once it is gone it is created anew, with others beside it.
         for name in ("j.sqlite-wal", "j.sqlite-shm", "j.sqlite"):
             path.with_name(name).unlink()
         wait_for(path.exists, "a new file")
@@ -144,7 +144,7 @@ def test_a_file_that_is_removed_is_made_anew(path: Path) -> None:
     assert known(path) == {scan("2")}
 
 
-def test_what_is_too_much_is_lost_oldest_first_and_told(
+def test_beyond_the_limit_the_oldest_writes_are_lost_and_counted(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("lupin_twin.journal.writer.MAX_WEIGHT", 20)
@@ -161,7 +161,7 @@ def test_what_is_too_much_is_lost_oldest_first_and_told(
     assert known(path) == {scan(str(n)) for n in range(5, 15)}
 
 
-def test_age_and_size_are_kept_to(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_age_and_size_limits_are_applied(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lupin_twin.journal.file._PURGE_EVERY_S", 0.0)
     now = time.time_ns()
     old = now - 3 * 86_400 * SECOND

@@ -17,9 +17,7 @@ def asked(connection: Any, **query: Any) -> PastWrites:
     return writes(connection, WritesRequest(**query))
 
 
-def test_all_is_told_in_the_order_of_receiving_and_only_once(
-    tmp_path: Path, copied: Copied
-) -> None:
+def test_writes_come_in_the_order_of_receipt_and_once_each(tmp_path: Path, copied: Copied) -> None:
     with lived(tmp_path / "j.sqlite") as life:
         life.write([scan("7", BEGUN + 5), pin("7"), look("7", BEGUN + 4, anomaly=True)])
         life.write([failure("8", BEGUN + 3)])
@@ -53,7 +51,7 @@ def test_all_is_told_in_the_order_of_receiving_and_only_once(
         assert late.journal == whole.journal
 
 
-def test_copies_of_what_was_known_are_no_writes(tmp_path: Path) -> None:
+def test_copies_of_known_rows_are_no_writes(tmp_path: Path) -> None:
     with lived(tmp_path / "j.sqlite") as life:
         life.write([scan(), look()])
         life.begin(BEGUN - SECOND)
@@ -63,7 +61,7 @@ def test_copies_of_what_was_known_are_no_writes(tmp_path: Path) -> None:
         )
 
 
-def test_from_the_beginning_only_so_far_back(tmp_path: Path) -> None:
+def test_reading_from_the_beginning_is_limited(tmp_path: Path) -> None:
     now = time.time_ns()
 
     def count(life: Life, **query: Any) -> int:
@@ -80,7 +78,7 @@ def test_from_the_beginning_only_so_far_back(tmp_path: Path) -> None:
         assert (empty.writes, empty.is_all) == ((), True)
 
 
-def test_what_was_recent_are_the_last_nine_scans_and_looks_of_each_tag(
+def test_the_recent_window_has_the_last_nine_scans_and_inspections_of_each_tag(
     tmp_path: Path, copied: Copied
 ) -> None:
     with lived(tmp_path / "j.sqlite") as life:
@@ -108,7 +106,7 @@ def test_what_was_recent_are_the_last_nine_scans_and_looks_of_each_tag(
         assert recent(life.connection, RecentRequest(BEGUN - 9 * DAY)) == ()
 
 
-def test_a_species_that_the_camera_was_not_sure_of_is_left_out(tmp_path: Path) -> None:
+def test_an_uncertain_species_is_left_out(tmp_path: Path) -> None:
     with lived(tmp_path / "j.sqlite") as life:
         for number, confidence in enumerate((0.05, 0.49, 0.5, 1.0)):
             one = look("7", BEGUN + number)

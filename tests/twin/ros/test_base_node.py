@@ -1,4 +1,4 @@
-"""What every node does alike, by a node of its own in this process."""
+"""What all nodes have in common, with a node in this process."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -30,7 +30,7 @@ SHAPE = MessageShape(Observation, max_bytes=1_000)
 
 
 class Logged:
-    """Stands in for a node's logger and for the clock that throttles it."""
+    """Stands in for a node's logger and for the clock of its rate limit."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -60,7 +60,7 @@ def utilities(domain: int, logged: Logged) -> Iterator[NodeUtilities]:
     rclpy.try_shutdown(context=context)
 
 
-def test_a_message_is_read_up_to_its_limit_and_dropped_past_it() -> None:
+def test_a_message_is_read_up_to_its_limit_and_dropped_beyond_it() -> None:
     data = serialize_message(scan("1", {"co2": 1.0}))
     read: Any = read_message(data, MessageShape(Observation, max_bytes=len(data)))
     assert read.tag_reading.tag_id == "1"
@@ -68,7 +68,7 @@ def test_a_message_is_read_up_to_its_limit_and_dropped_past_it() -> None:
     assert drop == Drop(Reason.SIZE, f"{len(data)} bytes, the limit is {len(data) - 1}")
 
 
-def test_a_subscription_hands_on_messages_and_tells_of_the_others(
+def test_a_subscription_passes_on_messages_and_counts_the_others(
     utilities: NodeUtilities, logged: Logged
 ) -> None:
     taken: list[Any] = []
@@ -86,7 +86,7 @@ def test_a_subscription_hands_on_messages_and_tells_of_the_others(
     ]
 
 
-def test_who_wakes_a_node_that_is_gone_wakes_nobody(utilities: NodeUtilities) -> None:
+def test_waking_a_destroyed_node_does_nothing(utilities: NodeUtilities) -> None:
     node = utilities.node
     condition = node.create_guard_condition(lambda: None)
     wake = waker(condition)
@@ -95,9 +95,7 @@ def test_who_wakes_a_node_that_is_gone_wakes_nobody(utilities: NodeUtilities) ->
     wake()
 
 
-def test_warnings_are_throttled_by_their_key_and_counted(
-    utilities: NodeUtilities, logged: Logged
-) -> None:
+def test_warnings_are_limited_per_key_and_counted(utilities: NodeUtilities, logged: Logged) -> None:
     for _ in range(3):
         utilities.drop(Drop(Reason.FRAME, "no"), "/t")
     utilities.drop(Drop(Reason.KIND, "no", case="2"), "/t")
@@ -108,7 +106,7 @@ def test_warnings_are_throttled_by_their_key_and_counted(
     assert logged.lines == [said, said, said, f"{said} (2 more since the last warning)"]
 
 
-def test_an_error_of_a_callback_is_counted_and_told_with_its_trace(
+def test_an_error_in_a_callback_is_counted_and_logged_with_its_traceback(
     utilities: NodeUtilities, logged: Logged
 ) -> None:
     def fail() -> None:
@@ -123,7 +121,7 @@ def test_an_error_of_a_callback_is_counted_and_told_with_its_trace(
     assert "ValueError: broken" in line
 
 
-def test_of_a_shared_topic_only_what_is_wanted_is_read_and_nothing_else_counted(
+def test_on_a_shared_topic_only_wanted_messages_are_read_and_the_others_not_counted(
     utilities: NodeUtilities,
 ) -> None:
     taken: list[str] = []
@@ -148,10 +146,10 @@ def test_of_a_shared_topic_only_what_is_wanted_is_read_and_nothing_else_counted(
     assert utilities.counts().dropped == {"size": 1}
 
 
-def test_messages_that_wait_are_taken_one_right_behind_the_other(
+def test_waiting_messages_are_taken_one_right_after_the_other(
     utilities: NodeUtilities, domain: int
 ) -> None:
-    """In one round of the executor, whatever else is due in it; and before what takes its time."""
+    """In one round of the executor, whatever else is due; and before any slow work."""
     heard: list[float] = []
     large = MessageShape(Observation, max_bytes=10_000)
     group = utilities.node.default_callback_group
@@ -172,7 +170,7 @@ def test_messages_that_wait_are_taken_one_right_behind_the_other(
         def publish(values: range) -> None:
             for value in values:
                 publisher.publish(scan("1", {"co2": float(value)}))
-            # The reader's queue has them then.
+            # By then they are in the reader's queue.
             assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE_S))
 
         publish(range(1))
@@ -187,7 +185,7 @@ def test_messages_that_wait_are_taken_one_right_behind_the_other(
     executor.shutdown()
 
 
-def test_a_message_that_waited_long_tells_that_the_thread_is_behind_for_a_while(
+def test_a_message_that_waited_long_marks_the_thread_as_behind_for_a_while(
     utilities: NodeUtilities, logged: Logged, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     group = utilities.node.default_callback_group

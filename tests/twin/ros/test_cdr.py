@@ -38,7 +38,7 @@ LITTLE, BIG = b"\x00\x01\x00\x00", b"\x00\x00\x00\x00"
 
 
 def anything(message_type: Any, chance: random.Random) -> Any:
-    """A message of any type, filled with anything that its types allow."""
+    """A message of any type, with any content that its types allow."""
     message = message_type()
     for name, kind in message_type.get_fields_and_field_types().items():
         setattr(message, name, any_value(kind, chance))
@@ -62,13 +62,13 @@ def any_value(kind: str, chance: random.Random) -> Any:
 
 
 @given(st.sampled_from((*OURS, *OTHERS)), st.randoms(use_true_random=False))
-def test_every_message_that_ros_writes_is_taken_to_its_last_byte(
+def test_every_message_that_ros_writes_is_accepted_to_its_last_byte(
     message_type: Any, chance: random.Random
 ) -> None:
     message = anything(message_type, chance)
     data = serialize_message(message)
     end = SHAPES[message_type].check(data)
-    # ROS reads as far, and not a byte less; behind it, it leaves a few bytes with no meaning.
+    # ROS reads exactly as far; after it, it leaves a few bytes with no meaning.
     assert deserialize_message(data[:end], message_type) == message
     with pytest.raises(rclpy_implementation.RMWError):
         deserialize_message(data[: end - 1], message_type)
@@ -77,7 +77,7 @@ def test_every_message_that_ros_writes_is_taken_to_its_last_byte(
 
 @settings(max_examples=12)  # each with hundreds of lies
 @given(st.sampled_from(OURS), st.randoms(use_true_random=False))
-def test_what_is_taken_ros_can_read_and_what_ros_cannot_read_is_refused(
+def test_accepted_bytes_can_be_read_by_ros_and_unreadable_ones_are_refused(
     message_type: Any, chance: random.Random
 ) -> None:
     data = serialize_message(anything(message_type, chance))

@@ -57,7 +57,7 @@ def test_a_state_survives_the_wire_and_back() -> None:
     assert convert.snapshot_of(state, None, times) == snapshot
 
 
-def test_without_times_nothing_is_known_but_the_last_observation() -> None:
+def test_without_times_only_the_last_observation_is_known() -> None:
     snapshot = Snapshot(stamp_ns=9 * S, frame_id="map", tags=(PINNED, UNPINNED))
     heard = convert.snapshot_of(over_the_wire(convert.StateMessages().build(snapshot)))
     [pinned, unpinned] = heard.tags
@@ -70,7 +70,7 @@ def test_without_times_nothing_is_known_but_the_last_observation() -> None:
     assert unpinned == UNPINNED
 
 
-def test_a_state_and_its_times_of_the_same_tags_keep_the_very_same_values() -> None:
+def test_a_state_and_its_times_of_the_same_tags_reuse_the_same_objects() -> None:
     snapshot = Snapshot(stamp_ns=9 * S, frame_id="map", tags=(PINNED, UNPINNED))
     state = over_the_wire(convert.StateMessages().build(snapshot))
     times = over_the_wire(convert.StateMessages().times(snapshot))
@@ -99,7 +99,7 @@ def test_only_a_changed_tag_is_built_anew_and_every_age_is_current() -> None:
     assert [r.value for r in second.tags[1].readings] == [1.0]
 
 
-def test_a_tag_reading_is_heard_field_by_field() -> None:
+def test_a_tag_reading_is_received_field_by_field() -> None:
     msg = messages.scan(
         "1", {"co2": 1.0}, at=(1.0, 2.0), status=ObservationMsg.STATUS_SKIPPED, stamp_s=4.0
     )
@@ -112,12 +112,12 @@ def test_a_tag_reading_is_heard_field_by_field() -> None:
 
 
 @pytest.mark.parametrize(("own", "counts"), [("", "odom"), ("camera", "camera")])
-def test_of_flowers_the_frame_of_their_own_pose_comes_first(own: str, counts: str) -> None:
+def test_the_frame_of_a_flowers_own_pose_takes_precedence(own: str, counts: str) -> None:
     msg = messages.look("1", at=(1.0, 2.0), frame_id="odom", pose_frame_id=own)
     assert convert.received(msg).frame_id == counts
 
 
-def test_the_kinds_and_the_status_are_the_messages() -> None:
+def test_kinds_and_status_are_those_of_the_message() -> None:
     assert history.KIND_TAG_READING == ObservationMsg.KIND_TAG_READING
     assert history.KIND_FLOWER == ObservationMsg.KIND_FLOWER
     assert ingest.KIND_ANOMALY == ObservationMsg.KIND_ANOMALY

@@ -31,7 +31,7 @@ def test_a_report_comes_back_as_it_was(report: Report) -> None:
     assert convert_services.report_of(convert_services.report_response(report)) == report
 
 
-def test_a_question_for_a_report_comes_back_as_it_was() -> None:
+def test_a_report_query_comes_back_as_it_was() -> None:
     asked = ReportRequest("co2", 7)
     message = convert_services.report_request_message(asked)
     assert convert_services.report_request_of(message) == asked
@@ -42,7 +42,7 @@ def test_a_question_for_a_report_comes_back_as_it_was() -> None:
         convert_services.report_request_of(message)
 
 
-def test_a_report_with_lists_of_several_lengths_is_not_believed() -> None:
+def test_a_report_with_lists_of_unequal_length_is_refused() -> None:
     response = convert_services.report_response(REPORT)
     response.z = array("d", [1.0])
     with pytest.raises(ValueError, match=r"lists of tags are \[1, 2\] long"):

@@ -1,4 +1,4 @@
-"""What was written crosses as values for robots, and as rows for who copies the log."""
+"""Writes on the wire: as values for robots, and as rows for copies of the log."""
 
 from typing import Any
 
@@ -31,6 +31,6 @@ def test_rows_survive_the_wire() -> None:
         LOT._replace(rows=("[]",) * 500_001),
     ],
 )
-def test_what_leads_nowhere_or_names_no_journal_is_no_lot(lot: Lot) -> None:
+def test_a_batch_without_a_next_number_or_a_journal_is_invalid(lot: Lot) -> None:
     with pytest.raises(NotALotError):
         lot_of(rows_response(lot), 8)

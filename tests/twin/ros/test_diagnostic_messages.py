@@ -20,7 +20,7 @@ def test_findings_become_statuses_of_their_node_and_back() -> None:
     assert list(findings_of(msg, "/gh1/twin/state")) == SAID
 
 
-def test_a_twin_is_known_by_the_state_that_it_publishes() -> None:
+def test_a_twin_is_identified_by_the_state_that_it_publishes() -> None:
     msg = diagnostics(SAID, "/gh1/lupin_twin", 7 * S)
     others = diagnostics(SAID[:2], "/gh2/lupin_twin", 7 * S).status
     msg.status = [*others, *msg.status, *others]

@@ -1,4 +1,4 @@
-"""GetEstimate over DDS: what is refused, and a flood; `routes/test_estimate` has the answers."""
+"""GetEstimate over DDS: refusals, and a flood; `routes/test_estimate` has the answers."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -68,7 +68,7 @@ def ask(peer: Peer, **changes: Any) -> Any:
         ({"at": Time(sec=2**31 - 1)}, "at is 2147483647.000000000 s, later than now"),
     ],
 )
-def test_what_cannot_be_estimated_is_refused_by_name(
+def test_an_impossible_estimate_is_refused_by_name(
     peer: Peer, changes: dict[str, Any], complaint: str
 ) -> None:
     answer = ask(peer, **changes)
@@ -76,7 +76,9 @@ def test_what_cannot_be_estimated_is_refused_by_name(
     assert answer == GetEstimate.Response(error_message=answer.error_message)
 
 
-def test_a_flood_of_the_dearest_holds_up_no_observation_and_no_field(peer: Peer) -> None:
+def test_a_flood_of_expensive_requests_delays_no_observation_and_no_field(
+    peer: Peer,
+) -> None:
     dearest = {**BOX, "resolution": 0.003}
     clients = [
         peer.node.create_client(kind, name)
@@ -102,8 +104,8 @@ def test_a_flood_of_the_dearest_holds_up_no_observation_and_no_field(peer: Peer)
         return [one.result() for one in asked if one.done() and one.result().ok is ok]
 
     def are_there() -> bool:
-        # A service holds ten requests: of such a flood, DDS loses some, and all but twenty to a
-        # twin that stood still meanwhile, which are too few to be refused.
+        # A service queues ten requests: DDS loses some of such a flood, and all but twenty for a
+        # twin that stands still meanwhile, which are too few to be refused.
         if not answers(False):
             ask_both()
         return bool(answers(True) and answers(False))
@@ -114,7 +116,7 @@ def test_a_flood_of_the_dearest_holds_up_no_observation_and_no_field(peer: Peer)
         peer.node.destroy_client(client)
 
 
-def test_a_report_serves_for_a_while_and_what_is_wrong_is_said_once(
+def test_a_report_is_reused_for_a_while_and_a_mistake_is_reported_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     pasts: list[TagPast] = []

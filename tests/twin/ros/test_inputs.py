@@ -1,4 +1,4 @@
-"""Publishers of an input: each message once, what is lost, and a second twin on the same topic."""
+"""Publishers of an input: each message once, lost ones, and a second twin on the same topic."""
 
 import os
 from collections.abc import Iterable
@@ -19,23 +19,23 @@ def test_other_users_are_those_who_own_ports_of_the_domain(tmp_path: Path) -> No
     assert other_users(1, tmp_path / "none", own + 1) == []
 
 
-def test_who_has_said_nothing_for_long_begins_with_1() -> None:
+def test_a_long_silent_publisher_begins_with_1() -> None:
     gaps = Gaps()
     assert gaps.see(7, lambda: 3) == 0
     gaps.settle(3)
     gaps.settle(3)
-    # Whose 951 is, is not told: the rest is counted as the other's number comes.
+    # Whose 951 is missing is unknown: the rest is counted when the other's number arrives.
     assert [gaps.see(number, lambda: 3) for number in (951, 8, 1, 952)] == [943, 7, 0, 0]
 
 
-def test_who_comes_behind_those_who_have_said_nothing_may_begin_anywhere() -> None:
+def test_a_publisher_that_comes_after_silent_ones_may_begin_anywhere() -> None:
     gaps = Gaps()
     gaps.settle(1)
     gaps.unsettle()
     assert gaps.see(951, lambda: 1) == 0
 
 
-def test_what_two_subscriptions_receive_is_taken_once() -> None:
+def test_a_message_received_by_two_subscriptions_is_taken_once() -> None:
     source = Input(depth=50)
     source.subscriptions = 2
     one = {"source_timestamp": 5, "publication_sequence_number": 1}
@@ -51,7 +51,7 @@ def lost(numbers: Iterable[int], writers: int = 1) -> list[int]:
     return [gaps.see(number, lambda: writers) for number in numbers]
 
 
-def test_two_writers_are_told_apart_by_where_each_left_off() -> None:
+def test_two_writers_are_distinguished_by_their_last_numbers() -> None:
     assert lost([1, 100, 2, 101, 3, 105, 6], writers=2) == [0, 0, 0, 0, 0, 3, 2]
 
 
@@ -60,7 +60,7 @@ def test_a_number_that_may_be_a_new_writers_first_is_no_gap() -> None:
 
 
 @given(st.lists(st.integers(0, 3), min_size=1), st.integers(1, 10**6))
-def test_of_one_writer_every_lost_message_is_counted(skips: list[int], start: int) -> None:
+def test_with_one_writer_every_lost_message_is_counted(skips: list[int], start: int) -> None:
     gaps, number = Gaps(), start
     gaps.see(number, lambda: 1)
     for skip in skips:
@@ -68,7 +68,7 @@ def test_of_one_writer_every_lost_message_is_counted(skips: list[int], start: in
         assert gaps.see(number, lambda: 1) == skip
 
 
-def test_two_are_two_once_a_dead_one_would_have_left_the_graph() -> None:
+def test_two_writers_are_two_once_a_dead_one_would_have_left_the_graph() -> None:
     count = TwinCount()
     assert not count.see(2, 100.0)
     assert not count.see(2, 100.0 + LEFT_OVER_S - 0.1)

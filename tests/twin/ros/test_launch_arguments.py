@@ -15,11 +15,11 @@ SHARE = Path("ros_node/lupin_twin")
 NOT_GIVEN = {argument.name: argument.default for argument in ARGUMENTS}
 
 
-def test_what_is_not_given_overrides_nothing() -> None:
+def test_an_omitted_argument_overrides_nothing() -> None:
     assert overrides(NOT_GIVEN) == {}
 
 
-def test_what_is_given_overrides_the_file_with_its_type() -> None:
+def test_a_given_argument_overrides_the_file_with_its_type() -> None:
     given = {"use_sim_time": "false", "journal": "off", "layers": "temperature, co2,"}
     assert overrides(NOT_GIVEN | given) == {
         "use_sim_time": False,
@@ -29,7 +29,7 @@ def test_what_is_given_overrides_the_file_with_its_type() -> None:
     assert overrides(NOT_GIVEN | {"use_sim_time": "true"}) == {"use_sim_time": True}
 
 
-def test_a_file_that_is_not_there_is_refused_by_name() -> None:
+def test_a_missing_file_is_refused_by_name() -> None:
     given = NOT_GIVEN | {"params_file": "/no.yaml"}
     with pytest.raises(LaunchError, match=r"params_file is '/no\.yaml', expected an existing file"):
         params_file(given, "twin.yaml", lambda path: path == "twin.yaml")
@@ -37,7 +37,7 @@ def test_a_file_that_is_not_there_is_refused_by_name() -> None:
 
 
 def described(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """What the launch file describes, told plainly: PyPI has no `launch`, which reads it."""
+    """The launch file's content, by a stand-in: PyPI has no `launch`, which reads it."""
 
     def stand_in(name: str, **contents: Any) -> None:
         module = ModuleType(name)
@@ -69,7 +69,7 @@ def described(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     return found
 
 
-def test_the_launch_file_starts_the_twin_with_what_is_given(
+def test_the_launch_file_starts_the_twin_with_the_given_arguments(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     *declared, twin = described(monkeypatch)

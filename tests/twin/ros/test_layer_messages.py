@@ -1,4 +1,4 @@
-"""Layers and marks as messages: what a viewer reads of them again."""
+"""Layers and marks as messages, and as a viewer reads them."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ def arrays_of(frame_id: str, make: Any = tag_markers) -> Any:
 
 
 @given(st.lists(TAGS, max_size=6, unique_by=lambda mark: mark.number), st.text("abc", max_size=9))
-def test_an_array_has_the_markers_of_all_behind_one_that_deletes(
+def test_an_array_starts_with_a_deletion_followed_by_all_markers(
     marks: list[TagMark], frame: str
 ) -> None:
     arrays = arrays_of(frame)
@@ -39,7 +39,7 @@ def test_an_array_has_the_markers_of_all_behind_one_that_deletes(
     assert msg.markers[1:] == expected.markers
 
 
-def test_only_marks_that_changed_are_made_anew_and_those_that_are_gone_are_forgotten() -> None:
+def test_only_changed_marks_are_rebuilt_and_removed_ones_are_dropped() -> None:
     made: list[int] = []
 
     def make(mark: TagMark, frame_id: str) -> list[Any]:

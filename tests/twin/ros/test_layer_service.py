@@ -1,4 +1,4 @@
-"""Layers and markers over real DDS, of a twin below a namespace, in a process of its own."""
+"""Layers and markers over real DDS, of a twin in a namespace, in its own process."""
 
 import json
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ BOX = ((0.0, 0.0), (1.0, 0.0), (1.0, 0.5))
 
 
 class Viewer(Peer):
-    """A peer that looks at what is drawn, and keeps all that comes."""
+    """A peer that subscribes to what is drawn, and stores all of it."""
 
     def __init__(self, domain: int, name: str) -> None:
         super().__init__(domain, name)
@@ -73,7 +73,7 @@ class Viewer(Peer):
         self.node.create_subscription(DiagnosticArray, "/diagnostics", receive, 10)
 
     def says(self, topic: str, count: int) -> None:
-        """Wait until the twin says so; that it says more is found here too."""
+        """Wait until the twin's diagnostics contain it; any unexpected change is found here too."""
         self.until(lambda: self.said.get(topic) == str(count), f"{count} on {topic}")
 
 
@@ -110,7 +110,7 @@ def box_of(low: tuple[float, float], high: tuple[float, float]) -> dict[str, Any
     }
 
 
-def test_a_layer_is_the_field_and_is_made_only_for_who_looks(
+def test_a_layer_is_the_field_and_is_computed_only_for_subscribers(
     house: tuple[int, Process, Viewer],
 ) -> None:
     domain, _, robot = house
@@ -123,7 +123,7 @@ def test_a_layer_is_the_field_and_is_made_only_for_who_looks(
         lambda: (f := robot.ask(GetField, "/gh1/twin/get_field", **ask)).sample_count == 2 and f,
         "both tags",
     )
-    # Something is known, nobody looks: nothing was made.
+    # Something is known, without subscribers: nothing was computed.
     robot.says(CO2, 0)
     robot.says(TAGS, 0)
     assert robot.said["message"] == "0 of 8 topics have subscribers"
@@ -138,7 +138,7 @@ def test_a_layer_is_the_field_and_is_made_only_for_who_looks(
         np.testing.assert_array_equal(found[:, 3], values[rows, columns].astype(np.float32))
         np.testing.assert_allclose(found[:, 0], -1.5 + (columns + 0.5) * 0.1, atol=1e-6)
         np.testing.assert_allclose(found[:, 1], -1.5 + (rows + 0.5) * 0.1, atol=1e-6)
-        # Two readings make no model yet: nothing is known of the error.
+        # Two readings make no model yet: the error is unknown.
         assert (found[:, 2] == 0.0).all()
         assert (found[:, 4] == -1.0).all()
         assert (msg.header.frame_id, msg.is_dense) == ("map", True)
@@ -146,14 +146,14 @@ def test_a_layer_is_the_field_and_is_made_only_for_who_looks(
 
         with Viewer(domain, "late") as late:
             late.watch(CO2)
-            assert late.newest(CO2).header.stamp == msg.header.stamp  # out of the latch
+            assert late.newest(CO2).header.stamp == msg.header.stamp  # from the latch
         robot.says(CO2, 1)
         robot.says(SOIL, 0)
 
         observe(robot, scan("t0", {"co2": 900.0}))
         changed = viewer.newest(CO2, lambda m: cells(m)[:, 3].max() == 900.0)
         assert cells(changed).shape == found.shape
-        # A sensor whose name is none in ROS.
+        # A sensor whose name is not valid in ROS.
         viewer.watch(SOIL)
         assert (cells(viewer.newest(SOIL))[:, 3] == 30.0).all()
         viewer.unwatch(CO2)
@@ -201,7 +201,7 @@ def test_the_error_is_that_of_the_value_by_the_estimate(house: tuple[int, Proces
         viewer.until(is_as_foretold, "errors as those of the estimate")
 
 
-def test_tags_and_planters_are_marked_as_they_are(house: tuple[int, Process, Viewer]) -> None:
+def test_tags_and_planters_are_marked_by_their_state(house: tuple[int, Process, Viewer]) -> None:
     domain, _, robot = house
     observe(
         robot,
@@ -224,7 +224,7 @@ def test_tags_and_planters_are_marked_as_they_are(house: tuple[int, Process, Vie
         assert failed.color.r > failed.color.g
         outlines = viewer.newest(PLANTERS, lambda m: len(m.markers) > 1).markers[1:]
         assert [(o.ns, o.id, len(o.points)) for o in outlines] == [("planters", fresh.id, 4)]
-        # What it is stays what it is called by.
+        # Its type stays, and so does its name.
         observe(robot, scan("m2", {"light": 2.0}))
         msg = viewer.newest(TAGS, lambda m: any(x.text == "m2" for x in m.markers))
         assert next(x.id for x in msg.markers if x.text == "m2") == failed.id
@@ -234,7 +234,7 @@ def test_rviz_shows_what_the_twin_publishes(house: tuple[int, Process, Viewer]) 
     _, _, robot = house
     manager = yaml.safe_load(RVIZ.read_text(encoding="utf-8"))["Visualization Manager"]
     shown = {each["Name"]: each for each in manager["Displays"] if "Topic" in each}
-    # Relative, so that a namespace moves them; latched, or the last one would not come.
+    # Relative, so that a namespace moves them; latched, or the last one would not arrive.
     reads = {f"/gh1/{each['Topic']['Value']}": [READS[each["Class"]]] for each in shown.values()}
     robot.until(
         lambda: reads.items() <= dict(robot.node.get_topic_names_and_types()).items(),
@@ -250,7 +250,7 @@ def test_rviz_shows_what_the_twin_publishes(house: tuple[int, Process, Viewer]) 
     known = json.loads(SENSORS.read_text(encoding="utf-8"))["sensors"]
     layers = {name: each for name, each in shown.items() if "PointCloud2" in each["Class"]}
     assert list(layers) == [name for name, told in known.items() if "derived" not in told]
-    # A layer that is shown costs the twin something.
+    # A displayed layer costs the twin something.
     assert [name for name, each in layers.items() if each["Enabled"]] == ["temperature"]
     assert {each["Channel Name"] for each in layers.values()} == {"value"}
     assert {each["Size (m)"] for each in layers.values()} == {DEFAULT_RESOLUTION_M}
@@ -259,7 +259,7 @@ def test_rviz_shows_what_the_twin_publishes(house: tuple[int, Process, Viewer]) 
     assert manager["Global Options"]["Fixed Frame"] == TwinParameters().frame_id
 
 
-def test_a_tag_that_is_far_off_makes_no_layer_wider_and_has_its_marker(
+def test_a_tag_far_off_widens_no_layer_and_has_its_marker(
     house: tuple[int, Process, Viewer],
 ) -> None:
     domain, _, robot = house

@@ -1,4 +1,4 @@
-"""Fields as points: each known cell once, where it lies, and how far off it is."""
+"""Fields as points: each known cell once, with its position and its error."""
 
 import math
 
@@ -61,19 +61,19 @@ def test_the_points_are_those_of_a_plain_loop(data: st.DataObject, width: int, h
         ("_hidden", "sensor__hidden"),
     ],
 )
-def test_a_name_that_ros_does_not_take_is_written_otherwise(sensor: str, token: str) -> None:
+def test_a_name_that_ros_does_not_accept_is_escaped(sensor: str, token: str) -> None:
     assert topic_of(sensor) == f"twin/field/{token}"
 
 
 @given(st.text(min_size=1, max_size=20))
-def test_every_sensor_has_a_topic_that_ros_takes_and_shows(sensor: str) -> None:
+def test_every_sensor_has_a_valid_and_visible_topic(sensor: str) -> None:
     topic = topic_of(sensor)
     assert validate_topic_name(topic)
     assert topic.rpartition("/")[2][0].isalpha()
 
 
 @pytest.mark.parametrize("sensors", [["a b", "co2", "a_x20_b"], ["co2", "co2"]])
-def test_sensors_that_come_to_one_topic_are_refused_by_name(sensors: list[str]) -> None:
+def test_two_sensors_with_one_topic_are_refused_by_name(sensors: list[str]) -> None:
     message = f"parameter layers has '{sensors[0]}' and '{sensors[-1]}'"
     with pytest.raises(ParameterError, match=message):
         topics_of(sensors)

@@ -1,4 +1,4 @@
-"""What is marked of tags and planters: where, once each, and how old it looks."""
+"""The marks of tags and planters: position, once each, and the colour of their age."""
 
 import pytest
 
@@ -25,11 +25,11 @@ def tag(name: str, x: float | None = 0.0, age_s: float = 0.0, **more: object) ->
         (OLD_S, "old"),
     ],
 )
-def test_a_tag_looks_as_old_as_it_is(age_s: float, look: str) -> None:
+def test_a_tags_mark_shows_its_age(age_s: float, look: str) -> None:
     assert appearance_of(tag("a", age_s=age_s), NOW_NS) == look
 
 
-def test_planters_are_told_once_by_the_number_of_their_first_tag() -> None:
+def test_a_planter_is_marked_once_with_the_number_of_its_first_tag() -> None:
     seen = Flower(footprint=BOX)
     others = Flower(footprint=((5.0, 0.0, 0.0), *BOX[1:]))
     marks = planter_marks(

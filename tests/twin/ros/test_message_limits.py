@@ -1,4 +1,4 @@
-"""What is taken of each topic: each limit, and one past it."""
+"""The limits of each topic's messages, at the limit and one past it."""
 
 from collections.abc import Callable
 from typing import Any
@@ -80,7 +80,7 @@ def corners(count: int) -> Any:
         ),
     ],
 )
-def test_as_many_as_can_be_kept_are_taken_and_not_one_more(
+def test_as_many_as_can_be_stored_are_accepted_and_not_one_more(
     shape: MessageShape, message: Callable[[int], Any], limit: int, name: str
 ) -> None:
     assert shape.check(serialize_message(message(limit)))
@@ -88,8 +88,8 @@ def test_as_many_as_can_be_kept_are_taken_and_not_one_more(
         shape.check(serialize_message(message(limit + 1)))
 
 
-def test_a_state_holds_as_many_items_as_a_twin_keeps_and_not_one_more() -> None:
-    # One tag with all of them: of what kind they are, and whose, is all the same.
+def test_a_state_holds_as_many_items_as_a_twin_stores_and_not_one_more() -> None:
+    # One tag with all of them: their kind and their tag do not matter.
     empty = serialize_message(TwinState(tags=[TwinTagState()]))
     for count, is_taken in ((MAX_ITEMS + MAX_TAGS - 1, True), (MAX_ITEMS + MAX_TAGS, False)):
         # The last sequence of the message: points of three float32.

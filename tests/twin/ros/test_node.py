@@ -1,4 +1,4 @@
-"""The node over real DDS: every test talks to a twin in a process of its own."""
+"""The node over real DDS: every test has a twin in its own process."""
 
 import math
 from collections.abc import Iterator
@@ -11,13 +11,13 @@ from tests.support.ros import Peer, clock_at
 
 
 class Twin:
-    """A twin in a process, and a peer that knows it is heard."""
+    """A twin in a process, and a peer that is connected to it."""
 
     def __init__(self, process: Process, peer: Peer) -> None:
         self.process, self.peer = process, peer
 
     def warning(self, *words: str) -> str:
-        """Wait for a warning that holds all of the words."""
+        """Wait for a warning that contains all of the words."""
 
         def look_for() -> str | None:
             lines = self.process.output.splitlines()
@@ -26,7 +26,7 @@ class Twin:
         return str(self.peer.until(look_for, f"a warning with {words}"))
 
     def settled(self, tag_id: str = "marker") -> Any:
-        """Send one good observation and wait for it: all that was sent before is handled then."""
+        """Send one good observation and wait for it: all earlier messages are handled then."""
         self.peer.observe(scan(tag_id, {"temperature": 1.0}))
         return self.peer.tag(tag_id)
 
@@ -51,11 +51,11 @@ def test_a_twin_alone_publishes_an_empty_state_at_once(domain: int) -> None:
     assert state.header.stamp.sec > 0
 
 
-def test_fifty_observations_latched_before_the_twin_started_are_all_heard(domain: int) -> None:
+def test_fifty_observations_latched_before_the_twin_started_are_all_received(domain: int) -> None:
     with Peer(domain) as producer:
         producer.observe(*(scan(f"t{i}", {"co2": 400.0 + i}, at=(i, 0)) for i in range(50)))
         with twin_node(domain, *OFTEN):
-            # First the twin, which a busy machine may take its time to start, then its tags.
+            # First the twin, which may take its time to start on a busy machine, then its tags.
             producer.state(lambda _: True, "a state")
             state = producer.state(lambda s: len(s.tags) >= 50, "all 50 tags")
     assert [tag.tag_id for tag in state.tags] == [f"t{i}" for i in range(50)]
@@ -70,8 +70,8 @@ def test_stamps_and_staleness_follow_the_simulated_clock(domain: int) -> None:
     with twin_node(domain, *clock) as process, Peer(domain) as peer:
         peer.wait_for_twin()
         now_s = 100.0
-        # After 3 s without it the clock counts as stopped, and no age is known: of a busy machine
-        # a state from in between may come, which is not looked at.
+        # After 3 s without it the clock counts as stopped, and no age is known: on a busy machine a
+        # state from in between may arrive, which is skipped.
         peer.node.create_timer(0.1, lambda: peer.publish("/clock", clock_at(now_s), depth=1))
 
         def ages(accept: Any = lambda _: True) -> dict[str, float]:
@@ -91,7 +91,7 @@ def test_stamps_and_staleness_follow_the_simulated_clock(domain: int) -> None:
         now_s = 50.0
         assert ages() == {"before": 0.0, "now": 0.0}
         process.wait_for_output("ROS time has gone back")
-        # Both age from the jump on, and what is observed now is the latest.
+        # Both age from the jump on, and a new observation is the latest.
         now_s = 60.0
         assert ages() == {"before": 10.0, "now": 10.0}
         peer.observe(scan("now", {"co2": 2.0}, stamp_s=55.0))
@@ -102,7 +102,7 @@ def test_stamps_and_staleness_follow_the_simulated_clock(domain: int) -> None:
 # --- parameters ---------------------------------------------------------------------------------
 
 
-def test_a_parameter_that_does_not_exist_is_warned_of_by_name(domain: int) -> None:
+def test_a_parameter_that_does_not_exist_causes_a_warning_with_its_name(domain: int) -> None:
     with twin_node(domain, "--ros-args", "-p", "idw_pwoer:=3.0") as process:
         line = process.wait_for_output("idw_pwoer")
     assert "WARN" in line

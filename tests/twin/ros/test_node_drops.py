@@ -1,4 +1,4 @@
-"""What a node drops, and how loudly; over real DDS, each with a twin of its own."""
+"""What a node drops, and how it is logged; over real DDS, each with its own twin."""
 
 from collections.abc import Iterator
 
@@ -18,7 +18,7 @@ def twin() -> Iterator[Twin]:
     yield from running_twin(*OFTEN)
 
 
-def test_a_wrong_frame_is_dropped_on_each_path_and_names_both_frames(twin: Twin) -> None:
+def test_a_wrong_frame_is_dropped_on_each_path_with_both_frames_named(twin: Twin) -> None:
     twin.peer.observe(
         scan("scan", {"co2": 1.0}, at=(1, 1), frame_id="odom"),
         look("flower-own", frame_id="map", pose_frame_id="camera"),
@@ -55,12 +55,12 @@ def test_a_pose_too_far_off_is_dropped_on_each_path_and_the_readings_stay(twin: 
     }
     assert [reading.value for reading in tags["lost"].readings] == [21.0]
     assert tags["flower"].species == "lupin"
-    # The first pose that is possible is the tag's.
+    # The first possible pose is the tag's.
     peer.observe(scan("lost", {"temperature": 22.0}, at=(3.0, 5.0)))
     peer.tag("lost", lambda tag: tag.pose.position.y == 5.0)
 
 
-def test_the_limit_of_a_pose_may_be_changed_while_the_twin_runs(twin: Twin) -> None:
+def test_the_limit_of_a_pose_can_be_changed_while_the_twin_runs(twin: Twin) -> None:
     twin.peer.observe(scan("far", {"co2": 1.0}, at=(1500.0, 0.0)))
     twin.warning("'far'", "its x is 1500 m")
     limit = Parameter("max_pose_m", value=2000.0).to_parameter_msg()

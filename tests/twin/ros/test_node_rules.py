@@ -1,4 +1,4 @@
-"""The node looked at from inside: what no message over DDS would show. In this process."""
+"""The node from inside: what no message over DDS would show. In this process."""
 
 import math
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ from tests.support.ros import Peer
 
 
 class Stage:
-    """A node that nobody spins, and what it warns of."""
+    """A node that nobody spins, and its warnings."""
 
     def __init__(self, node: TwinNode) -> None:
         self.node = node
@@ -51,7 +51,7 @@ def stage(domain: int) -> Iterator[Stage]:
 # --- the contract -------------------------------------------------------------------------------
 
 
-def test_a_rule_that_is_changed_takes_effect_at_once(stage: Stage) -> None:
+def test_a_changed_rule_takes_effect_at_once(stage: Stage) -> None:
     node = stage.node
     told: list[Any] = []
     node.listen(told.append, heartbeat_s=60.0)
@@ -66,7 +66,7 @@ def test_a_rule_that_is_changed_takes_effect_at_once(stage: Stage) -> None:
 # --- the map ------------------------------------------------------------------------------------
 
 
-def test_the_maps_revision_grows_with_a_map_that_is_accepted_and_new(stage: Stage) -> None:
+def test_the_maps_revision_grows_with_each_accepted_new_map(stage: Stage) -> None:
     node = stage.node
     told: list[Any] = []
     node.listen(told.append, heartbeat_s=1000.0)
@@ -92,7 +92,7 @@ def test_the_maps_revision_grows_with_a_map_that_is_accepted_and_new(stage: Stag
 # --- names --------------------------------------------------------------------------------------
 
 
-def test_a_second_twin_is_counted_by_the_name_that_the_topic_really_has(domain: int) -> None:
+def test_a_second_twin_is_counted_by_the_real_name_of_the_topic(domain: int) -> None:
     remapped = [
         *("-r", "/twin/state:=/r1/state"),
         *("-r", "/floranova/observations:=/r1/observations"),

@@ -1,4 +1,4 @@
-"""The node over real DDS while somebody strains it: the state keeps its beat, nothing is lost."""
+"""The node over real DDS under load: the state keeps its rate, nothing is lost."""
 
 import signal
 import time
@@ -29,7 +29,7 @@ class Strained:
         self.process, self.peer = process, peer
 
     def longest_pause_s(self, done: Callable[[], object], what: str) -> float:
-        """The longest time without a state until `done` gives something true."""
+        """The longest time without a state until `done` returns something true."""
         last_s, longest_s, seen = time.monotonic(), 0.0, len(self.peer.states)
 
         def look() -> object:
@@ -90,13 +90,13 @@ def wide() -> Iterator[Strained]:
 
 
 def ask(strained: Strained, **request: float) -> Any:
-    """Begin a call of the service; the future of its response."""
+    """Start a call of the service; returns the future of its response."""
     client = strained.peer.node.create_client(GetField, "/twin/get_field")
     strained.peer.until(client.service_is_ready, "the service")
     return client.call_async(GetField.Request(sensor_type="co2", **{**HEAVY, **request}))
 
 
-def test_a_heavy_field_holds_up_no_observation_no_state_and_not_the_end(wide: Strained) -> None:
+def test_a_heavy_field_delays_no_observation_no_state_and_not_the_shutdown(wide: Strained) -> None:
     peer = wide.peer
     heavy = [ask(wide), ask(wide)]
     start_s = time.monotonic()
@@ -114,7 +114,7 @@ def test_a_heavy_field_holds_up_no_observation_no_state_and_not_the_end(wide: St
     took_s = time.monotonic() - start_s
     peer.tag("counted", lambda tag: readings(tag) == {f"s{n}": 150.0 + n for n in range(50)})
     assert "lost" not in wide.process.output
-    # Of a machine with other work to do, a share; of a thread that computes, all of it.
+    # On a busy machine, a share; of a thread that computes, all of it.
     assert pause_s < max(1.0, took_s / 2)
     first, second = (future.result() for future in heavy)
     assert first.ok
@@ -132,12 +132,12 @@ def test_a_heavy_field_holds_up_no_observation_no_state_and_not_the_end(wide: St
     wide.process.send(signal.SIGTERM)
 
     def has_ended() -> bool:
-        with suppress(FileNotFoundError):  # gone between two looks
+        with suppress(FileNotFoundError):  # gone between two checks
             waited.append(waited_s(pid))
         return wide.process.exit_code is not None
 
     wait_for(has_ended, "its end")
-    # What the machine withholds from it is no delay of its own.
+    # Time that the machine withholds is no delay of its own.
     assert time.monotonic() - start_s - (max(waited) - before_s) < 2.0
     assert wide.process.exit_code == 0
 
@@ -146,7 +146,7 @@ def readings(tag: Any) -> dict[str, float]:
     return {reading.name: reading.value for reading in tag.readings}
 
 
-def test_all_are_answered_that_ask_while_the_twin_stands_still(strained: Strained) -> None:
+def test_all_requests_made_while_the_twin_stands_still_are_answered(strained: Strained) -> None:
     node = strained.peer.node
     clients = [
         node.create_client(kind, name, qos_profile=SERVICE_QOS)
@@ -165,7 +165,7 @@ def test_all_are_answered_that_ask_while_the_twin_stands_still(strained: Straine
     strained.peer.until(lambda: all(future.done() for future in asked), "all answers")
 
 
-def test_the_twin_says_on_diagnostics_how_it_is(strained: Strained) -> None:
+def test_the_twin_reports_its_health_on_diagnostics(strained: Strained) -> None:
     peer = strained.peer
     heard: list[Any] = []
     peer.node.create_subscription(DiagnosticArray, "/diagnostics", heard.append, 10)

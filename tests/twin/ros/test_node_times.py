@@ -1,4 +1,4 @@
-"""`/twin/times` over real DDS: what was observed when, beside the state that it belongs to."""
+"""`/twin/times` over real DDS: the times of observations, beside the state that they belong to."""
 
 import time
 from typing import Any
@@ -21,8 +21,8 @@ def paired(states: list[Any], times: list[Any]) -> tuple[Any, Any] | None:
     return next(((s, by_stamp[stamp_of(s)]) for s in states if stamp_of(s) in by_stamp), None)
 
 
-def test_a_robot_whose_clock_stepped_back_is_warned_of_by_name(domain: int) -> None:
-    """It is not ignored in silence, and what it says is in the history where it belongs."""
+def test_a_robot_whose_clock_stepped_back_causes_a_warning_with_its_name(domain: int) -> None:
+    """It is not ignored silently, and its messages are in the history at their time."""
     with twin_node(domain, *OFTEN) as twin, Peer(domain) as robot:
         robot.wait_for_twin()
         robot.observe(
@@ -43,8 +43,8 @@ def test_a_robot_whose_clock_stepped_back_is_warned_of_by_name(domain: int) -> N
     assert kept.readings[0].value == 1.0
 
 
-def test_what_two_robots_of_one_name_have_latched_is_warned_of_by_none(domain: int) -> None:
-    """Each has latched the same hour; to the twin that starts, the second goes through it again."""
+def test_latched_messages_of_two_robots_with_one_name_cause_no_warning(domain: int) -> None:
+    """Both have latched the same hour; to the starting twin, the second repeats that time."""
     with Peer(domain, "one") as one, Peer(domain, "two") as two:
         for robot, tag_id in ((one, "a"), (two, "b")):
             robot.observe(*(scan(tag_id, {"co2": 1.0}, stamp_s=1000.0 + i) for i in range(40)))

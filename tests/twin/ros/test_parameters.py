@@ -1,4 +1,4 @@
-"""Parameters as ROS hands them over; real nodes, in this process."""
+"""Parameters as ROS passes them on; real nodes, in this process."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -28,12 +28,12 @@ def node_with(domain: int, *overrides: str, made: Any = Node) -> Iterator[Any]:
         rclpy.try_shutdown(context=context)
 
 
-def test_all_are_declared_and_what_is_set_is_read(domain: int) -> None:
+def test_all_are_declared_and_set_values_are_read(domain: int) -> None:
     with node_with(domain, "idw_power:=3", "state_topic:=/s") as node:
         assert declare(node) == TwinParameters(idw_power=3.0, state_topic="/s")
 
 
-def test_descriptors_tell_meaning_range_and_why_it_is_read_only(domain: int) -> None:
+def test_descriptors_have_meaning_range_and_why_a_parameter_is_read_only(domain: int) -> None:
     with node_with(domain) as node:
         declare(node)
         power, length, journal = node.describe_parameters(["idw_power", "buffer_len", "journal"])
@@ -46,7 +46,7 @@ def test_descriptors_tell_meaning_range_and_why_it_is_read_only(domain: int) -> 
     assert journal.additional_constraints.startswith("read only: memory and files were set up")
 
 
-def test_a_change_is_told_once_with_all_parameters(domain: int) -> None:
+def test_a_change_is_reported_once_with_all_parameters(domain: int) -> None:
     told: list[TwinParameters] = []
     with node_with(domain, made=AdjustableNode) as node:
         node.parameters = declare(node)
@@ -55,7 +55,7 @@ def test_a_change_is_told_once_with_all_parameters(domain: int) -> None:
         assert node.set_parameters_atomically(wanted).successful
         assert node.set_parameters_atomically(wanted).successful, "and nothing is new"
         assert node.get_parameter("idw_power").value == 3
-        # ROS's own, and those of whoever else.
+        # ROS's own, and those of any other node.
         [result] = node.set_parameters([Parameter("use_sim_time", value=False)])
         assert result.successful
     assert told == [TwinParameters(idw_power=3.0, idw_max_distance_m=2.5)]
@@ -89,7 +89,7 @@ def test_a_refused_change_changes_nothing_and_names_parameter_value_and_limit(
             assert node.get_parameter(one).value == getattr(TwinParameters(), one)
 
 
-def test_what_another_node_of_the_twins_reads_has_to_be_right_too(domain: int) -> None:
+def test_parameters_that_a_second_node_reads_are_validated_too(domain: int) -> None:
     with (
         node_with(domain, "idw_power:=abc") as node,
         pytest.raises(ParameterError, match="parameter idw_power is 'abc'"),
@@ -97,7 +97,7 @@ def test_what_another_node_of_the_twins_reads_has_to_be_right_too(domain: int) -
         declare(node, ["buffer_len"])
 
 
-def test_complaints_name_the_parameter(domain: int) -> None:
+def test_errors_name_the_parameter(domain: int) -> None:
     with (
         node_with(domain) as node,
         pytest.raises(ParameterError, match="parameter map_topic is 'a b': Invalid topic name"),

@@ -1,4 +1,4 @@
-"""Answers that DDS cannot deliver yet: over a stand-in, and of a real twin to a real client."""
+"""Answers that DDS cannot deliver yet: with a stand-in, and from a real twin to a real client."""
 
 import warnings
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ from tests.support.ros import Peer
 
 
 class Stage:
-    """A service whose answers reach those whom DDS has found, in place of rclpy's; and a clock."""
+    """A service whose answers reach clients once DDS has found them, for rclpy's; and a clock."""
 
     service_name = "/ask"
 
@@ -57,7 +57,7 @@ class Stage:
             warnings.warn(f"{UNSENT}: client will not receive", RuntimeWarning, stacklevel=1)
 
     def go_on(self) -> list[Any]:
-        """Who was tried."""
+        """Continue; returns the clients that were attempted."""
         del self.tried[:]
         self.now_s += RETRY_S
         self.responses.go_on()
@@ -66,14 +66,14 @@ class Stage:
 
 @pytest.fixture
 def stage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
-    with warnings.catch_warnings():  # as they are without pytest's own rule: none is an error
+    with warnings.catch_warnings():  # without pytest's own rule, none is an error
         warnings.resetwarnings()
         made = Stage()
         monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: made.now_s))
         yield made
 
 
-def test_an_answer_is_sent_as_soon_as_its_reader_is_found_and_once(stage: Stage) -> None:
+def test_an_answer_is_sent_once_as_soon_as_its_reader_is_found(stage: Stage) -> None:
     stage.send_response("response", "a")
     assert stage.drained == 1, "what came meanwhile"
     assert stage.go_on() == ["a"]
@@ -85,7 +85,7 @@ def test_an_answer_is_sent_as_soon_as_its_reader_is_found_and_once(stage: Stage)
     assert stage.warned == []
 
 
-def test_one_that_can_be_sent_does_not_wait_behind_many_that_never_will_be(stage: Stage) -> None:
+def test_an_answer_that_can_be_sent_does_not_wait_for_those_that_never_can(stage: Stage) -> None:
     for who in range(MAX_UNSENT - 1):
         stage.send_response("response", who)
     for _ in range(3):
@@ -97,14 +97,14 @@ def test_one_that_can_be_sent_does_not_wait_behind_many_that_never_will_be(stage
     assert stage.warned == []
 
 
-def test_what_is_too_large_is_not_retained(stage: Stage) -> None:
+def test_a_too_large_answer_is_not_retained(stage: Stage) -> None:
     stage.takes_s = MAX_ATTEMPT_S + 0.125
     stage.send_response("response", "a")
     assert stage.go_on() == []
     assert "gave up a response of /ask: it is too large to be retained" in stage.warned[0]
 
 
-def test_it_is_given_up_aloud_where_nobody_reads(stage: Stage) -> None:
+def test_an_answer_without_a_reader_is_dropped_with_a_warning(stage: Stage) -> None:
     stage.send_response("response", "a")
     stage.now_s += PATIENCE_S - 2 * RETRY_S
     assert stage.go_on() == ["a"]
@@ -117,7 +117,7 @@ def test_it_is_given_up_aloud_where_nobody_reads(stage: Stage) -> None:
 
 
 class Service:
-    """What rclpy's executor does with one: it sends what the callback gave."""
+    """What rclpy's executor does with a service: it sends the callback's result."""
 
     service_name = "/ask"
 
@@ -131,7 +131,7 @@ class Service:
 UTILITIES: Any = SimpleNamespace(guarded=lambda _, callback: callback)
 
 
-def test_a_response_that_comes_later_goes_to_who_asked() -> None:
+def test_a_later_response_goes_to_its_client() -> None:
     service = Service()
     Responses(UTILITIES).watch(service)
     first, second = Future[int](), Future[int]()
@@ -143,7 +143,7 @@ def test_a_response_that_comes_later_goes_to_who_asked() -> None:
     assert service.sent == [(2, "second"), (1, "first")]
 
 
-def test_a_response_may_be_there_before_rclpy_tells_whom_to() -> None:
+def test_a_response_may_exist_before_rclpy_reports_its_client() -> None:
     service = Service()
     Responses(UTILITIES).watch(service)
     later = Future[int]()
@@ -152,9 +152,9 @@ def test_a_response_may_be_there_before_rclpy_tells_whom_to() -> None:
     assert service.sent == [(1, "header")]
 
 
-def test_a_client_that_dds_never_finds_is_told_of_and_holds_nobody_up() -> None:
-    # Its reader wants what the service's writer does not offer: they never match, and rclpy meets
-    # what it meets with a reader that is found too late.
+def test_a_client_that_dds_never_finds_is_reported_and_delays_nobody() -> None:
+    # Its reader needs QoS that the service's writer does not offer: they never match, and rclpy
+    # behaves as with a reader that is found too late.
     never = QoSProfile(depth=50, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     ask, parameters = "/twin/get_field", "/lupin_twin/get_parameters"
     with own_domain() as domain, twin_node(domain) as twin, Peer(domain, "robot") as robot:
@@ -164,7 +164,7 @@ def test_a_client_that_dds_never_finds_is_told_of_and_holds_nobody_up() -> None:
             said = f"gave up a response of {name}: too much else waits to be sent again"
 
             def is_said(client: Any = client, kind: Any = kind, said: str = said) -> bool:
-                # A service holds ten requests: more would be lost where they came at once.
+                # A service queues ten requests: more at once would be lost.
                 futures.append(client.call_async(kind.Request()))
                 return said in twin.output
 

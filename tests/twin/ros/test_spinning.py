@@ -43,7 +43,7 @@ def spinning(domain: int) -> Iterator[Spinning]:
     rclpy.try_shutdown(context=it.context)
 
 
-def test_a_callback_that_raises_is_reported_and_the_next_one_runs(spinning: Spinning) -> None:
+def test_a_callback_that_raises_is_logged_and_the_next_one_runs(spinning: Spinning) -> None:
     calls: list[int] = []
 
     def work() -> None:
@@ -56,7 +56,7 @@ def test_a_callback_that_raises_is_reported_and_the_next_one_runs(spinning: Spin
     assert [str(error) for _, error in spinning.errors[:3]] == ["call 1", "call 2", "call 3"]
 
 
-def test_the_end_breaks_no_spin_that_is_about_to_wait(
+def test_the_shutdown_breaks_no_spin_that_is_about_to_wait(
     spinning: Spinning, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """rclpy's own shutdown, called from here at that moment, breaks the spin."""

@@ -1,4 +1,4 @@
-"""What estimates are worth: scans held against other tags, changed sensors, where a tag helps."""
+"""The accuracy of estimates: scans against other tags, changed sensors, where a tag helps."""
 
 import math
 from contextlib import closing
@@ -37,7 +37,7 @@ PRODUCERS = (("one", 25.0), ("other", 20.0))
 
 
 def house(until_s: int, *, tags: int = 12, every_s: int = 150) -> list[TagPast]:
-    """What was read of a warm and of a cool end until then, one tag after the other."""
+    """Readings of a warm and of a cool end until then, one tag after the other."""
     chance = np.random.default_rng(1)
     places = chance.uniform((0.0, 0.0), (4.0, 8.0), (tags, 2))
     read: list[list[tuple[int, float]]] = [[] for _ in range(tags)]
@@ -60,7 +60,7 @@ def with_reading(pasts: list[TagPast], tag: int, at_ns: int, value: float) -> li
     return [*pasts[:tag], more, *pasts[tag + 1 :]]
 
 
-def test_of_equal_stamps_it_is_made_of_what_the_state_shows(tmp_path: Path) -> None:
+def test_among_equal_stamps_it_uses_the_reading_that_the_state_shows(tmp_path: Path) -> None:
     path = tmp_path / "twin.sqlite"
     kept(path, [pin(), *(scan(source=name, temperature=value) for name, value in PRODUCERS)])
     with closing(open_reader(path)) as log:
@@ -70,7 +70,7 @@ def test_of_equal_stamps_it_is_made_of_what_the_state_shows(tmp_path: Path) -> N
     assert tag.readings == (Reading("temperature", 20.0, NOW),)
 
 
-def test_a_report_holds_each_tag_against_all_the_others() -> None:
+def test_a_report_compares_each_tag_with_all_the_others() -> None:
     pasts = house(6 * 3600)
     known = found(pasts, 6)
     report = known.report
@@ -82,7 +82,7 @@ def test_a_report_holds_each_tag_against_all_the_others() -> None:
     assert report.record.week == Tally(), "there was no prediction before"
 
 
-def test_nine_of_ten_scans_lie_where_other_tags_put_them() -> None:
+def test_nine_of_ten_scans_are_where_other_tags_predict_them() -> None:
     known = None
     for hour in range(23, 30):
         known = found(house(hour * 3600), hour, known)
@@ -92,7 +92,7 @@ def test_nine_of_ten_scans_lie_where_other_tags_put_them() -> None:
     assert 0.8 <= (week.share or 0.0) <= 1.0
 
 
-def test_only_what_is_new_is_graded_and_a_reading_that_is_off_is_not_inside() -> None:
+def test_only_new_scans_are_graded_and_a_reading_that_is_off_is_outside() -> None:
     pasts = house(26 * 3600)
     before = found(pasts, 26)
     assert found(pasts, 26.1, before).report.record.week == Tally()
@@ -106,7 +106,7 @@ def test_only_what_is_new_is_graded_and_a_reading_that_is_off_is_not_inside() ->
     assert found(later, 6.1, found(few, 6)).report.record.week == Tally(), "of so few tags none is"
 
 
-def test_what_a_changed_sensor_reads_is_left_out_since_then_and_not_graded() -> None:
+def test_readings_since_a_sensor_changed_are_left_out_and_not_graded() -> None:
     before = found(house(29 * 3600), 29)
     pasts = house(30 * 3600)
     odd = pasts[2]
@@ -128,7 +128,7 @@ def test_what_a_changed_sensor_reads_is_left_out_since_then_and_not_graded() -> 
     assert again.loaded.changed == known.loaded.changed, "to the nanosecond"
 
 
-def test_a_changed_sensor_makes_the_estimate_of_the_others_no_less_sure() -> None:
+def test_a_changed_sensor_does_not_make_other_estimates_less_certain() -> None:
     pasts = house(30 * 3600)
     odd, places = pasts[2], np.array([(2.0, 4.0), (1.0, 1.0)])
     broken = tuple((ns, -127.0 if ns > 26 * HOUR_NS else value) for ns, value in odd.readings)
@@ -148,7 +148,7 @@ def test_with_too_few_readings_there_is_no_model_and_grades_stay() -> None:
     assert known.report.record.week == Tally(90, 10)
 
 
-def test_a_fit_that_fails_keeps_what_was_found_and_says_why() -> None:
+def test_a_failed_fit_leaves_earlier_results_and_says_why() -> None:
     before = found(house(6 * 3600), 6)
     crowd = [TagPast(str(n), n / 10.0, 0.0, ((6 * HOUR_NS, 20.0),)) for n in range(10_001)]
     known = found(crowd, 6, before)
@@ -158,7 +158,7 @@ def test_a_fit_that_fails_keeps_what_was_found_and_says_why() -> None:
     assert (again.report.fit_problem, again.failed) == ("", 1)
 
 
-def test_what_nobody_waits_for_ends_between_two_steps() -> None:
+def test_cancelled_work_ends_between_two_steps() -> None:
     box = FieldRequest("temperature", 0.5, 0.0, 0.0, 4.0, 8.0)
     with pytest.raises(Abandoned):
         estimate_at(EstimateRequest(box, 3 * HOUR_NS), house(3 * 3600), DAY_S, lambda: True)
@@ -173,13 +173,13 @@ def test_what_nobody_waits_for_ends_between_two_steps() -> None:
         ("co2", MAX_PLACES + 1, "max_places is 21, the limits are 1 and 20"),
     ],
 )
-def test_a_bad_question_is_refused_by_name(sensor_type: str, places: int, complaint: str) -> None:
+def test_a_bad_query_is_refused_by_name(sensor_type: str, places: int, complaint: str) -> None:
     with pytest.raises(FieldRefused, match=complaint):
         ReportRequest(sensor_type, places)
     ReportRequest("co2", MAX_PLACES)
 
 
-def test_advice_is_for_free_floor_and_the_best_first() -> None:
+def test_advice_is_for_free_floor_with_the_best_first() -> None:
     loaded = found(house(24 * 3600, tags=5, every_s=2160), 24).loaded
     assert loaded is not None
     places = advice(loaded, None, 3)

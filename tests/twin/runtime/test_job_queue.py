@@ -46,7 +46,7 @@ class Stage:
         return search
 
     def delivered(self) -> Any:
-        """The next answer; a wake-up brings one at most, and may find nothing left to bring."""
+        """The next answer; a wake-up brings one at most, and may find none."""
         before = len(self.answers)
         while len(self.answers) == before:
             wait_for(lambda: self.woken.acquire(blocking=False), "the owner to be woken")
@@ -62,7 +62,7 @@ def made() -> Iterator[Stage]:
     stage.workers.close()
 
 
-def test_what_cannot_be_looked_up_is_answered_and_holds_up_nobody(made: Stage) -> None:
+def test_a_failing_query_is_answered_and_delays_nobody(made: Stage) -> None:
     error = NotRemembered("no journal")
 
     def look_up() -> Future[int]:
@@ -75,7 +75,7 @@ def test_what_cannot_be_looked_up_is_answered_and_holds_up_nobody(made: Stage) -
     assert made.queue.waiting == 0
 
 
-def test_what_nobody_waits_for_any_more_is_not_begun_and_takes_no_place(made: Stage) -> None:
+def test_a_cancelled_query_is_not_started_and_takes_no_place(made: Stage) -> None:
     are_there = True
     first = made.ask(cost_s=LARGE_S)
     for _ in range(MAX_QUERIES - 1):
@@ -91,7 +91,7 @@ def test_what_nobody_waits_for_any_more_is_not_begun_and_takes_no_place(made: St
     assert made.begun == [first, after]
 
 
-def test_an_answer_that_cannot_be_sent_holds_up_nobody(made: Stage) -> None:
+def test_an_answer_that_cannot_be_sent_delays_nobody(made: Stage) -> None:
     def reply(answer: str) -> None:
         raise RuntimeError(answer)
 
@@ -106,7 +106,7 @@ def test_an_answer_that_cannot_be_sent_holds_up_nobody(made: Stage) -> None:
     assert made.delivered() == "2"
 
 
-def test_large_ones_are_taken_one_by_one_when_the_last_is_out_and_small_ones_do_not_wait(
+def test_large_queries_run_one_at_a_time_and_small_ones_do_not_wait(
     made: Stage,
 ) -> None:
     large = [made.ask(cost_s=LARGE_S) for _ in range(LARGE_AT_ONCE + 2)]
@@ -123,9 +123,7 @@ def test_large_ones_are_taken_one_by_one_when_the_last_is_out_and_small_ones_do_
 
 
 @pytest.mark.parametrize("cost_s", [SMALL_S, LARGE_S])
-def test_who_asks_waits_while_observations_do_but_for_one_a_second(
-    made: Stage, cost_s: float
-) -> None:
+def test_queries_wait_for_observations_except_one_a_second(made: Stage, cost_s: float) -> None:
     made.is_behind = True
     asked = [made.ask(cost_s=cost_s) for _ in range(4)]
     assert made.begun == asked[:1]
@@ -145,7 +143,7 @@ def test_who_asks_waits_while_observations_do_but_for_one_a_second(
 
 
 @pytest.mark.parametrize("cost_s", [SMALL_S, LARGE_S])
-def test_so_many_queries_wait_and_one_more_is_told_to_come_again(
+def test_the_number_of_waiting_queries_is_limited_and_one_more_has_to_retry(
     made: Stage, cost_s: float
 ) -> None:
     searches = [made.ask(cost_s=cost_s) for _ in range(MAX_QUERIES)]

@@ -1,4 +1,4 @@
-"""Questions to a journal: order, end, and what is said where there is no answer."""
+"""Queries of a journal: order, end, and the reason for a missing answer."""
 
 import sqlite3
 import threading
@@ -57,7 +57,7 @@ def why_not(recall: Recall) -> str:
     return str(caught.value)
 
 
-def test_a_question_is_answered_while_another_writes(path: Path) -> None:
+def test_a_query_runs_while_another_process_writes(path: Path) -> None:
     with recording(path) as journal, recalling(path) as recall:
         wait_state(journal, JournalState.RECORDING)
         for number in range(3):
@@ -65,7 +65,7 @@ def test_a_question_is_answered_while_another_writes(path: Path) -> None:
             wait_for(partial(is_answer, recall, number + 1), "the row")
 
 
-def test_a_question_sees_one_moment(path: Path) -> None:
+def test_a_query_sees_one_moment(path: Path) -> None:
     kept(path, [scan(at_ns=1)])
 
     def twice(connection: sqlite3.Connection, should_stop: ShouldStop) -> tuple[int, int]:
@@ -88,7 +88,7 @@ def test_the_journal_of_another_twin_is_not_read(path: Path) -> None:
     recall.close()
 
 
-def test_a_file_that_is_not_there_yet_is_told_and_found_when_it_comes(path: Path) -> None:
+def test_a_missing_file_is_reported_and_found_when_it_appears(path: Path) -> None:
     with recalling(path) as recall:
         assert f"{path} is not there" in why_not(recall)
         path.touch()
@@ -97,7 +97,7 @@ def test_a_file_that_is_not_there_yet_is_told_and_found_when_it_comes(path: Path
         assert answer(recall) == 1
 
 
-def test_a_file_in_the_place_of_another_is_read_from_then_on(path: Path) -> None:
+def test_a_replaced_file_is_read_from_then_on(path: Path) -> None:
     kept(path, [scan()])
     with recalling(path) as recall:
         assert answer(recall) == 1
@@ -108,7 +108,7 @@ def test_a_file_in_the_place_of_another_is_read_from_then_on(path: Path) -> None
 
 
 @pytest.mark.parametrize("where", [0, 3 * 1024 + 100])
-def test_a_damaged_file_is_told_with_what_to_do_and_read_again_when_it_is_mended(
+def test_a_damaged_file_is_reported_with_a_remedy_and_read_again_when_it_is_repaired(
     path: Path, where: int
 ) -> None:
     kept(path, [scan(at_ns=number) for number in range(1, 200)])
@@ -120,7 +120,7 @@ def test_a_damaged_file_is_told_with_what_to_do_and_read_again_when_it_is_mended
         assert answer(recall) == 199
 
 
-def test_an_error_of_the_questions_own_is_its_askers(path: Path) -> None:
+def test_an_error_of_a_query_reaches_its_caller(path: Path) -> None:
     kept(path, [scan()])
     with recalling(path) as recall:
         wrong = recall.query(lambda connection, _: connection.execute("SELECT x FROM scan"))
@@ -129,7 +129,7 @@ def test_an_error_of_the_questions_own_is_its_askers(path: Path) -> None:
         assert answer(recall) == 1
 
 
-def test_a_question_that_nobody_waits_for_ends(path: Path) -> None:
+def test_a_cancelled_query_ends(path: Path) -> None:
     kept(path, [scan()])
     with recalling(path) as recall:
         begun = threading.Event()
@@ -146,7 +146,7 @@ def test_a_question_that_nobody_waits_for_ends(path: Path) -> None:
         assert answer(recall) == 1
 
 
-def test_a_question_that_takes_too_long_ends(path: Path) -> None:
+def test_a_query_that_takes_too_long_ends(path: Path) -> None:
     kept(path, [scan()])
     with recalling(path, 0.05) as recall:
         future = recall.query(lambda connection, _: connection.execute(ENDLESS).fetchone())
@@ -154,7 +154,7 @@ def test_a_question_that_takes_too_long_ends(path: Path) -> None:
             future.result(PATIENCE_S)
 
 
-def test_the_end_ends_what_runs_and_leaves_nothing_open(path: Path) -> None:
+def test_the_shutdown_ends_running_queries_and_leaves_nothing_open(path: Path) -> None:
     kept(path, [scan()])
     with recalling(path) as recall:
         assert answer(recall) == 1

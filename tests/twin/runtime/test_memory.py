@@ -36,7 +36,7 @@ def sim(at_s: float, wall_s: float) -> Clock:
 
 @contextmanager
 def twin(path: Path | None, clock: Clock) -> Iterator[tuple[Memory, TwinStore]]:
-    """A life of a twin."""
+    """One run of a twin."""
     store = TwinStore()
     memory = Memory(store, open_journal(path, "/twin", 1e4, 1e4))
     memory.follow(clock)
@@ -46,7 +46,7 @@ def twin(path: Path | None, clock: Clock) -> Iterator[tuple[Memory, TwinStore]]:
         memory.close()
 
 
-def test_a_file_that_takes_the_place_of_the_journal_is_read_once_the_twin_has_opened_it(
+def test_a_file_that_replaces_the_journal_is_read_once_the_twin_has_opened_it(
     tmp_path: Path,
 ) -> None:
     path, other = tmp_path / "j.sqlite", tmp_path / "other.sqlite"
@@ -79,7 +79,7 @@ def test_a_file_that_takes_the_place_of_the_journal_is_read_once_the_twin_has_op
     assert f"the journal {path} {why}" in refusals
 
 
-def test_damage_that_somebody_meets_has_the_file_set_aside_while_the_twin_records(
+def test_damage_found_by_a_reader_quarantines_the_file_while_the_twin_records(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "j.sqlite"
@@ -93,9 +93,9 @@ def test_damage_that_somebody_meets_has_the_file_set_aside_while_the_twin_record
         return memory.recall.query(ask).result(30.0)
 
     with twin(path, wall(5)) as (memory, _):
-        # What is met before is for the check at the start.
+        # Damage found earlier is handled by the check at the start.
         wait_for(lambda: memory.condition.state is JournalState.RECORDING, "the journal")
-        # Not through the memory: what that has read it keeps, and would not see the damage.
+        # Not through the memory: its cached pages would hide the damage.
         assert select(path, "SELECT count(readings) FROM scan") == [(count,)]
         with path.open("r+b") as file:
             file.seek(path.stat().st_size // 2)
@@ -106,9 +106,9 @@ def test_damage_that_somebody_meets_has_the_file_set_aside_while_the_twin_record
         wait_for(lambda: memory.condition.set_aside, "the damaged file to be set aside")
         wait_for(lambda: memory.condition.written == 2, "what came meanwhile, and its place")
         assert Path(memory.condition.set_aside).exists()
-        # A few pages are lost, and what can be read is being read.
+        # A few pages are lost, and the rest is salvaged.
         wait_for(lambda: count * 0.9 < how_many(memory) <= count, "what can be read")
-        # Were it somebody's error and no damage, the disk would be filled with copies.
+        # If this were an error of a query and no damage, copies would fill the disk.
         before = memory.condition.set_aside
         memory.journal.heal("again, the same day")
         memory.apply(replace(SCAN, stamp_ns=NOW + 9, own_stamp_ns=NOW + 9), NOW)
@@ -118,7 +118,7 @@ def test_damage_that_somebody_meets_has_the_file_set_aside_while_the_twin_record
     assert is_whole(path)
 
 
-def test_what_is_known_again_is_told_in_one_line(tmp_path: Path) -> None:
+def test_the_restored_state_is_logged_in_one_line(tmp_path: Path) -> None:
     def told(path: Path, *clocks: Clock, writes: Sequence[Write] = ()) -> list[str | None]:
         memory = Memory(TwinStore(), open_journal(path, "/twin", 1e4, 1e4))
         said = [memory.follow(clock) for clock in clocks]
@@ -156,7 +156,7 @@ BLIND = Inspection("8", NOW + 2 * S, None, None, 1, "dark", "a", NOW + 2 * S)
 WRITES = (SCAN, PART, FAILED, LOOK, BLIND, Pin("8", HERE), Pin("9", HERE))
 
 
-def test_a_twin_that_starts_again_knows_all_that_it_knew(tmp_path: Path) -> None:
+def test_a_restarted_twin_has_the_state_from_before(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     with twin(path, wall(5)) as (memory, before):
         for write in WRITES:
@@ -171,7 +171,7 @@ def test_a_twin_that_starts_again_knows_all_that_it_knew(tmp_path: Path) -> None
         assert after.observation_count >= before.observation_count
 
 
-def test_what_is_heard_again_changes_nothing_and_is_not_written(tmp_path: Path) -> None:
+def test_repeated_messages_change_nothing_and_are_not_written(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     with twin(path, wall(5)) as (memory, _):
         for write in WRITES:
@@ -219,7 +219,7 @@ def test_a_clock_that_goes_back_all_the_time_begins_few_runs(tmp_path: Path) -> 
     assert select(path, "SELECT count(*) FROM run") == [(1 + MAX_NEW_RUNS,)]
 
 
-def test_off_is_a_temporary_file_that_answers_and_is_gone_at_the_end(
+def test_off_is_a_temporary_file_that_answers_and_is_removed_at_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))

@@ -1,4 +1,4 @@
-"""What is known live, what the log says of the same moment, and what the next start knows: one."""
+"""The live state, the log's state at that moment, and the state after a restart are the same."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def count(path: Path) -> int:
 # --- 1: latest, and what is received again --------------------------------------------------------
 
 
-def test_of_one_write_that_is_received_twice_the_first_value_stays(path: Path) -> None:
+def test_of_one_write_received_twice_the_first_value_stays(path: Path) -> None:
     with twin(path) as life:
         life.receive(-5, t=20.0)
         life.receive(-5, t=25.0)
@@ -36,7 +36,7 @@ def test_of_one_write_that_is_received_twice_the_first_value_stays(path: Path) -
         assert count(path) == 1
 
 
-def test_sensors_that_are_new_are_a_further_part_of_the_same_scan(path: Path) -> None:
+def test_new_sensors_extend_the_same_scan(path: Path) -> None:
     with twin(path) as life:
         life.receive(-5, t=20.0)
         life.receive(-5, t=25.0, h=60.0)
@@ -48,7 +48,7 @@ def test_sensors_that_are_new_are_a_further_part_of_the_same_scan(path: Path) ->
     ]
 
 
-def test_of_two_sources_with_one_stamp_the_later_received_counts_and_repeats_flip_nothing(
+def test_of_two_sources_with_one_stamp_the_later_received_counts_and_repeats_change_nothing(
     path: Path,
 ) -> None:
     with twin(path) as life:
@@ -64,7 +64,7 @@ def test_of_two_sources_with_one_stamp_the_later_received_counts_and_repeats_fli
     assert count(path) == 2
 
 
-def test_a_try_that_failed_makes_nothing_younger(path: Path) -> None:
+def test_a_failed_attempt_makes_nothing_younger(path: Path) -> None:
     with twin(path) as life:
         life.receive(-9, status=2)
         life.receive(-8, status=1)
@@ -83,7 +83,7 @@ def test_a_try_that_failed_makes_nothing_younger(path: Path) -> None:
 # --- 2: stamps from the future --------------------------------------------------------------------
 
 
-def test_a_stamp_from_the_future_is_held_to_when_it_was_first_received(path: Path) -> None:
+def test_a_stamp_from_the_future_counts_as_its_first_receipt(path: Path) -> None:
     with twin(path) as life:
         life.receive(60, t=20.0)
         life.at(30, passed_s=30)
@@ -97,7 +97,7 @@ def test_a_stamp_from_the_future_is_held_to_when_it_was_first_received(path: Pat
     assert select(path, "SELECT stamp_ns, own_stamp_ns FROM scan") == [(NOW, NOW + 60 * S)]
 
 
-def test_it_stays_known_however_much_else_was_tried_meanwhile(path: Path) -> None:
+def test_it_stays_known_however_many_attempts_follow(path: Path) -> None:
     with twin(path) as life:
         life.receive(60, t=20.0)
         for second in range(1, 12):  # more than a tag's history has
@@ -129,7 +129,7 @@ def test_a_wall_clock_that_goes_on_is_one_run_however_far_it_jumps(
     assert runs(path) == [(1, None)]
 
 
-def test_after_a_step_back_what_comes_then_counts_everywhere(path: Path) -> None:
+def test_after_a_step_back_later_writes_count_everywhere(path: Path) -> None:
     with twin(path) as life:
         life.receive(-5, t=1.0)
         life.receive(-5, tag="8", t=3.0, pose=HERE)
@@ -140,7 +140,7 @@ def test_after_a_step_back_what_comes_then_counts_everywhere(path: Path) -> None
         assert life.says() == (2.0, 1.0)
         assert life.says(tag="8") == (3.0, 10.0)
         assert life.live["8"].pose == HERE
-        # Before it began the step holds nothing: that is answered by what was then.
+        # Before its start the step has no data: the earlier state is used.
         assert life.past(-41) == {}
         life.at(30, passed_s=60)
         assert life.says() == (2.0, 61.0)
@@ -150,7 +150,7 @@ def test_after_a_step_back_what_comes_then_counts_everywhere(path: Path) -> None
     assert runs(path) == [(1, None), (2, 1)]
 
 
-def test_a_step_back_while_the_twin_is_away_is_one_too(path: Path) -> None:
+def test_a_step_back_while_the_twin_is_off_counts_too(path: Path) -> None:
     with twin(path) as life:
         life.receive(-5, t=1.0)
     with twin(path, -40) as life:
@@ -163,7 +163,7 @@ def test_a_step_back_while_the_twin_is_away_is_one_too(path: Path) -> None:
     assert runs(path) == [(1, None), (2, 1)]
 
 
-def test_what_is_received_again_after_a_step_is_the_same_still(path: Path) -> None:
+def test_repeats_after_a_step_are_still_the_same(path: Path) -> None:
     with twin(path) as life:
         life.receive(-5, t=1.0)
         life.at(-40)
@@ -174,7 +174,7 @@ def test_what_is_received_again_after_a_step_is_the_same_still(path: Path) -> No
     assert count(path) == 1
 
 
-def test_a_wall_clock_set_back_by_hours_begins_a_run_that_knows_all(path: Path) -> None:
+def test_a_wall_clock_set_back_by_hours_begins_a_run_with_all_that_is_known(path: Path) -> None:
     with twin(path) as life:
         life.receive(-5, t=1.0, pose=HERE)
         life.receive(-5, tag="8", status=2)
@@ -209,7 +209,7 @@ def test_a_jump_ahead_joins_the_run_from_before_the_clock_went_back(path: Path) 
     assert runs(path) == [(1, None), (2, None), (3, 1)]
 
 
-def test_a_step_to_before_the_beginning_of_its_run_has_the_moment(path: Path) -> None:
+def test_a_step_to_before_the_start_of_its_run_has_the_moment(path: Path) -> None:
     with twin(path, -9000) as life:
         life.at(0, passed_s=9000)
         life.receive(-5, t=1.0)
@@ -219,7 +219,7 @@ def test_a_step_to_before_the_beginning_of_its_run_has_the_moment(path: Path) ->
         assert life.says() == (2.0, 0.0)
 
 
-def test_a_simulation_that_goes_on_after_a_wall_clock_is_the_run_that_goes_on(path: Path) -> None:
+def test_a_simulation_that_continues_after_a_wall_clock_is_the_run_that_goes_on(path: Path) -> None:
     with twin(path, 10, is_simulated=True) as life:
         life.receive(10, t=1.0)
         life.at(500, passed_s=490)
@@ -231,7 +231,7 @@ def test_a_simulation_that_goes_on_after_a_wall_clock_is_the_run_that_goes_on(pa
     assert select(path, "SELECT run FROM run WHERE ended_stamp_ns IS NULL") == [(1,)]
 
 
-def test_a_simulation_that_is_played_again_says_all_of_it_anew(path: Path) -> None:
+def test_a_simulation_that_is_played_again_writes_everything_anew(path: Path) -> None:
     with twin(path, 10, is_simulated=True) as life:
         life.receive(10, t=1.0)
         life.receive(20, t=1.5)
@@ -254,7 +254,7 @@ def filled(path: Path) -> None:
         life.receive(-9, tag="8", t=4.0)
 
 
-def test_a_clock_that_contradicts_the_log_begins_nothing_and_is_told(path: Path) -> None:
+def test_a_clock_that_contradicts_the_log_begins_nothing_and_is_reported(path: Path) -> None:
     filled(path)
     before = path.read_bytes()
     with twin(path, BOOT) as life:
@@ -274,7 +274,7 @@ def test_a_clock_that_contradicts_the_log_begins_nothing_and_is_told(path: Path)
     assert path.read_bytes() == before
 
 
-def test_once_it_agrees_the_run_goes_on_and_what_waited_is_written_as_of_then(path: Path) -> None:
+def test_once_it_agrees_the_run_goes_on_and_waiting_writes_have_their_own_times(path: Path) -> None:
     filled(path)
     with twin(path, BOOT) as life:
         life.at(BOOT + 100, passed_s=100)
@@ -291,7 +291,7 @@ def test_once_it_agrees_the_run_goes_on_and_what_waited_is_written_as_of_then(pa
     assert runs(path) == [(1, None)]
 
 
-def test_a_clock_that_does_not_agree_within_ten_minutes_is_believed(path: Path) -> None:
+def test_a_clock_that_does_not_agree_within_ten_minutes_is_accepted(path: Path) -> None:
     filled(path)
     with twin(path, BOOT) as life:
         life.receive(BOOT, t=2.0, tag="9")
@@ -303,7 +303,7 @@ def test_a_clock_that_does_not_agree_within_ten_minutes_is_believed(path: Path) 
         assert life.live["7"].pose == HERE, "tags do not move"
         assert life.live["7"].readings == (), "how old its readings are is not known"
         assert runs(path) == [(1, None), (2, None)]
-        # And then it is set right.
+        # And then it is corrected.
         life.at(50, passed_s=10)
         life.receive(50, t=3.0)
         assert life.says(tag="9")[0] == 2.0
@@ -311,10 +311,10 @@ def test_a_clock_that_does_not_agree_within_ten_minutes_is_believed(path: Path) 
     assert runs(path) == [(1, None), (2, None), (3, 1)]
 
 
-# --- 6: places ------------------------------------------------------------------------------------
+# --- 6: positions ---------------------------------------------------------------------------------
 
 
-def test_a_place_counts_from_the_earliest_stamp_that_came_with_one(path: Path) -> None:
+def test_a_position_counts_from_the_earliest_stamp_that_had_one(path: Path) -> None:
     with twin(path) as life:
         life.receive(-5, t=1.0, pose=HERE)
         life.receive(-60, t=2.0, pose=THERE)

@@ -1,4 +1,4 @@
-"""What a killed process left unfinished of Fast DDS's memory, and that nothing hangs on it."""
+"""Stale Fast DDS shared memory of a killed process, and that nothing hangs on it."""
 
 import logging
 import os
@@ -28,7 +28,7 @@ def leave(folder: Path, content: bytes, port: int = PORT, old_s: float = 60.0) -
 
 
 @pytest.mark.parametrize("content", [b"", b"\0\0", bytes(52_400), BEING_MADE])
-def test_what_is_half_made_is_removed_and_told(
+def test_stale_segments_are_removed_and_logged(
     tmp_path: Path, content: bytes, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = leave(tmp_path, content)
@@ -37,7 +37,7 @@ def test_what_is_half_made_is_removed_and_told(
     assert caplog.messages == [f"removed {path}, left unfinished by a killed process"]
 
 
-def test_what_is_made_or_just_being_made_or_of_another_domain_or_no_file_stays(
+def test_complete_new_foreign_and_other_files_stay(
     tmp_path: Path,
 ) -> None:
     kept = [
@@ -59,7 +59,7 @@ def test_what_is_made_or_just_being_made_or_of_another_domain_or_no_file_stays(
     assert remove_stale_shared_memory(DOMAIN, tmp_path / "none") == []
 
 
-def test_what_cannot_be_removed_is_an_error_that_says_what_to_do(
+def test_a_segment_that_cannot_be_removed_is_an_error_with_a_remedy(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = leave(tmp_path, BEING_MADE)
@@ -77,7 +77,7 @@ def test_what_cannot_be_removed_is_an_error_that_says_what_to_do(
 
 @pytest.fixture
 def strewn() -> Iterator[int]:
-    """A domain in which the ports that a first process takes were left unfinished."""
+    """A domain in which the first process's ports are left incomplete."""
     with own_domain() as domain:
         left = [leave(FOLDER, BEING_MADE, port) for port in ports(domain)[10:16]]
         try:
@@ -87,7 +87,7 @@ def strewn() -> Iterator[int]:
                 path.unlink(missing_ok=True)
 
 
-def test_a_twin_starts_where_one_was_killed_as_it_started(strewn: int) -> None:
+def test_a_twin_starts_where_one_was_killed_during_its_start(strewn: int) -> None:
     with twin_node(strewn) as twin:
         twin.wait_for_output("left unfinished by a killed process")
         twin.wait_for_output(f"in ROS domain {strewn} subscribes")

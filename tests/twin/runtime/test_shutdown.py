@@ -1,4 +1,4 @@
-"""How a command begins and ends; in a process of its own."""
+"""How a command starts and ends; in its own process."""
 
 import os
 import subprocess
@@ -53,7 +53,7 @@ def test_the_process_ends_with_its_code_whatever_a_thread_does(how: str, end: st
 
 
 def left(how: str, end: str, shell: str) -> subprocess.CompletedProcess[str]:
-    """It has ended, with its standard files as they are in a shell's words; Python keeps lines."""
+    """The ended process. Its standard streams are as the shell words say; Python buffers lines."""
     return subprocess.run(
         ["sh", "-c", f'exec "$@" {shell}', "sh", sys.executable, "-c", LEAVE, how, end],
         check=False,
@@ -65,13 +65,13 @@ def left(how: str, end: str, shell: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("how", ["idle", "busy"])
-def test_ctrl_c_ends_it_quietly(how: str) -> None:
+def test_ctrl_c_ends_it_without_a_traceback(how: str) -> None:
     ended = left(how, "is interrupted", "")
     assert (ended.returncode, ended.stdout, ended.stderr) == (INTERRUPTED, "said\n", "")
 
 
 @pytest.mark.parametrize("how", ["idle", "busy"])
-def test_what_cannot_be_said_does_not_change_how_it_ends(how: str) -> None:
+def test_output_that_cannot_be_written_does_not_change_the_exit_code(how: str) -> None:
     for end, code in (("explains", 1), ("raises", 1), ("returns", 3), ("is content", 0)):
         ended = left(how, end, "2>/dev/full")
         assert (ended.returncode, ended.stdout) == (code, "said\n"), end

@@ -1,4 +1,4 @@
-"""Stop signals wait until they are asked for; in a process of its own."""
+"""Stop signals wait until they are handled; in a process of its own."""
 
 import os
 import signal
@@ -20,7 +20,7 @@ print("asked", flush=True)
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_waits_until_it_is_asked_for(stop: signal.Signals) -> None:
+def test_a_signal_waits_until_it_is_handled(stop: signal.Signals) -> None:
     with subprocess.Popen(
         [sys.executable, "-c", SCRIPT], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
@@ -34,7 +34,7 @@ def test_a_signal_waits_until_it_is_asked_for(stop: signal.Signals) -> None:
         assert process.wait(PATIENCE_S) == 0
 
 
-# Before the process ends: one keeps Python's lock, the other comes behind Python.
+# Before the process ends: one holds Python's lock, the other runs after Python.
 HANGS = {
     "a call that keeps the interpreter": "ctypes.PyDLL(None).sleep(60)",
     "what runs after Python": "ctypes.CDLL(None).on_exit(ctypes.CDLL(None).pause, None)",
@@ -48,7 +48,7 @@ process.wait(1)
 """
 
 
-def test_whatever_hangs_at_the_end_the_process_ends() -> None:
+def test_the_process_ends_whatever_hangs_at_the_end() -> None:
     processes = {
         what: subprocess.Popen(
             [sys.executable, "-c", HANG + call],
@@ -68,5 +68,5 @@ def test_whatever_hangs_at_the_end_the_process_ends() -> None:
             _, said[what] = process.communicate(timeout=PATIENCE_S)
             codes[what] = process.returncode
     assert codes == dict(zip(HANGS, (1, -signal.SIGALRM), strict=True))
-    # Where it hung is told while there is an interpreter that knows.
+    # The hanging place is logged while the interpreter still runs.
     assert "Timeout (0:00:01)!" in said["a call that keeps the interpreter"]

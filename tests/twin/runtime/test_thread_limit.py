@@ -1,4 +1,4 @@
-"""numpy is told to take one core before it is imported, by all programs that import it."""
+"""All programs that use numpy limit it to one thread before it is imported."""
 
 import os
 import subprocess
@@ -9,7 +9,7 @@ import pytest
 from lupin_twin.runtime.process import limit_blas_threads
 
 
-def test_whoever_says_otherwise_has_it_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_explicit_setting_takes_precedence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("OPENBLAS_NUM_THREADS")
     limit_blas_threads()
     assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
@@ -25,7 +25,7 @@ def test_whoever_says_otherwise_has_it_otherwise(monkeypatch: pytest.MonkeyPatch
         ("lupin_twin.cli", ["--ros-args", "-p"]),
     ],
 )
-def test_the_programs_say_so_before_numpy_is_there(module: str, arguments: list[str]) -> None:
+def test_programs_set_the_limit_before_they_import_numpy(module: str, arguments: list[str]) -> None:
     code = f"""
 import os, sys
 from importlib import import_module

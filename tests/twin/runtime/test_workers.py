@@ -1,4 +1,4 @@
-"""Two lanes of work: the order of service, and the end of what nobody waits for."""
+"""Two lanes of work: the order of service, and the end of cancelled work."""
 
 import gc
 import threading
@@ -30,7 +30,7 @@ T = TypeVar("T")
 
 
 class Clock:
-    """A clock that goes when it is told to."""
+    """A clock that the test advances."""
 
     now_s = 0.0
 
@@ -49,7 +49,7 @@ def workers(**threads: int) -> Iterator[tuple[Workers, Clock]]:
 
 
 def occupy(running: Workers, cost_s: float, jobs: int) -> Callable[[], None]:
-    """Keep so many threads busy; returns what sets them free."""
+    """Keep that many threads busy; returns a function that frees them."""
     is_free = threading.Event()
     busy = running.running + jobs
     for _ in range(jobs):
@@ -66,7 +66,7 @@ def result(future: Future[T]) -> T:
     return future.result(PATIENCE_S)
 
 
-def test_a_small_job_does_not_wait_for_large_ones_at_work_or_in_the_queue() -> None:
+def test_a_small_job_does_not_wait_for_large_ones_running_or_queued() -> None:
     with workers() as (running, _):
         set_free = occupy(running, LARGE_S, LARGE_THREADS)
         queue = [running.submit(lambda _: None, LARGE_S) for _ in range(20)]
@@ -77,10 +77,10 @@ def test_a_small_job_does_not_wait_for_large_ones_at_work_or_in_the_queue() -> N
 
 @settings(max_examples=50)
 @given(st.lists(st.tuples(st.floats(0.0, 5.0), st.floats(0.0, 20.0)), min_size=2, max_size=15))
-def test_a_job_is_passed_by_no_more_than_its_own_cost_allows(
+def test_a_job_is_overtaken_by_no_more_than_its_own_cost_allows(
     jobs: list[tuple[float, float]],
 ) -> None:
-    """None starves: what comes later than PATIENCE times a job's cost is served after it."""
+    """None starves: jobs later than PATIENCE times its cost are served after it."""
     order: list[int] = []
 
     def note(number: int, _: ShouldStop) -> None:
@@ -102,12 +102,12 @@ def test_a_job_is_passed_by_no_more_than_its_own_cost_allows(
         cost_s = jobs[number][1]
         for later in passed_by:
             assert arrivals[later] <= arrivals[number] + PATIENCE * cost_s
-    # And the cheaper of two that came together goes first.
+    # And the cheaper of two simultaneous ones goes first.
     due = [arrival + PATIENCE * cost for arrival, (_, cost) in zip(arrivals, jobs, strict=True)]
     assert order == sorted(range(len(jobs)), key=lambda number: due[number])
 
 
-def test_what_is_cancelled_in_the_queue_never_runs() -> None:
+def test_a_job_cancelled_in_the_queue_never_runs() -> None:
     ran = []
     with workers() as (running, _):
         set_free = occupy(running, LARGE_S, LARGE_THREADS)
@@ -122,7 +122,7 @@ def test_what_is_cancelled_in_the_queue_never_runs() -> None:
         result(job)
 
 
-def test_what_is_cancelled_at_work_is_asked_to_stop() -> None:
+def test_a_running_job_that_is_cancelled_has_to_stop() -> None:
     started = threading.Event()
 
     def work(should_stop: ShouldStop) -> None:
@@ -143,7 +143,7 @@ def test_what_is_cancelled_at_work_is_asked_to_stop() -> None:
         assert result(running.submit(lambda stop: stop())) is False, "that is another job"
 
 
-def test_closing_drops_what_waits_stops_what_runs_and_ends_the_threads() -> None:
+def test_closing_drops_waiting_jobs_stops_running_ones_and_ends_the_threads() -> None:
     running = Workers("to be closed")
     assert threads_of("to be closed") == [], "none before there is work"
     stopped = threading.Event()
@@ -165,7 +165,7 @@ def test_closing_drops_what_waits_stops_what_runs_and_ends_the_threads() -> None
         running.submit(lambda _: None)
 
 
-def test_what_a_job_was_made_of_and_its_result_are_not_kept() -> None:
+def test_a_jobs_input_and_result_are_not_retained() -> None:
     class Thing:
         pass
 
@@ -185,7 +185,7 @@ def test_what_a_job_was_made_of_and_its_result_are_not_kept() -> None:
         wait_for(lambda: gc.collect() is not None and result_seen() is None, "the result's end")
 
 
-def test_who_makes_many_things_rests_after_each_turn() -> None:
+def test_a_loop_over_many_items_pauses_after_each_turn() -> None:
     clock, made = Clock(), list[int]()
     rests = list[tuple[int, float]]()
     for item in in_turns(range(10), clock, lambda seconds: rests.append((len(made), seconds))):

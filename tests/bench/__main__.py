@@ -6,7 +6,7 @@ import sys
 
 from tests.support.state_home import use_own
 
-# In the order of the way through the system: field, truth, journal, past, bridge, page.
+# In the order of the data flow: field, truth, journal, past, bridge, page.
 BENCHES = (
     "bench_field",
     "bench_estimate",

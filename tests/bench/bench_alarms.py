@@ -1,8 +1,8 @@
-"""Alarms of a large house: the start over its past, one change, nothing new.
+"""Alarms of a large greenhouse: the start over its past, one change, nothing new.
 
-What runs on the event loop is marked so; the rest is a worker's.
+What runs on the event loop is marked so; a worker does the rest.
 
-Processor time, so that what else runs does not count. Beside that, what the simulator's ordinary
+Processor time, so that other load does not count. Beside that, what the simulator's ordinary
 days raise.
 """
 

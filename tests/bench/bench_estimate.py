@@ -1,4 +1,4 @@
-"""How sure the estimate may be, by sorts of greenhouses that share nothing with the simulator.
+"""How certain the estimate may be, by sorts of greenhouses that share nothing with the simulator.
 
 Of each field: the error (RMSE) as a ratio to that of IDW over the cells that IDW paints; the share
 of all cells of the floor whose truth lies in the 90 % interval; the CRPS as a ratio to IDW's error.
@@ -29,7 +29,7 @@ PHASES = {"after one round": (None, 0.0), "steady": (20.0, 0.0), "silent for 6 h
 
 
 class Field(NamedTuple):
-    """What one estimate came to; error and CRPS as ratios to IDW's error."""
+    """The result of one estimate; error and CRPS as ratios to IDW's error."""
 
     error: float
     covers: float
@@ -37,7 +37,7 @@ class Field(NamedTuple):
 
 
 class Case(NamedTuple):
-    """A greenhouse at a moment: the readings that count, the cells' places, what is true there."""
+    """A greenhouse at a moment: the readings that count, the cells' positions, the truth there."""
 
     world: World
     readings: Readings
@@ -70,7 +70,7 @@ def case_of(world: World, phase: str, seed: int) -> Case:
 
 
 def idw_of(read: Readings, width_m: float, height_m: float, cell_m: float) -> Floats:
-    """The plain field of the newest readings over a floor, cell by cell."""
+    """The plain field of the latest readings over a floor, cell by cell."""
     newest = {int(tag): row for row, tag in enumerate(read.tag)}
     return compute_idw_field(
         [(*read.xy[tag].tolist(), float(read.value[row])) for tag, row in newest.items()],
@@ -86,7 +86,7 @@ def idw_of(read: Readings, width_m: float, height_m: float, cell_m: float) -> Fl
 
 
 def as_received(read: Readings, at_s: float) -> Readings:
-    """What a twin makes an estimate of, by seconds from `at_s` on."""
+    """A twin's input of an estimate, by seconds from `at_s` on."""
     tags = []
     for tag, (x, y) in enumerate(read.xy):
         rows = np.flatnonzero(read.tag == tag)
@@ -101,7 +101,7 @@ def judged(case: Case, model: Model | None = None) -> Field:
 
 
 def compared(case: Case, mean: Floats, sd: Floats) -> Field:
-    """An estimate of the case's places, held against IDW's and the truth."""
+    """An estimate of the case's positions, compared with IDW's and the truth."""
     painted = np.isfinite(case.idw)
     of_idw = rmse(case.idw[painted] - case.truth[painted])
     off = case.truth - mean

@@ -1,10 +1,10 @@
-"""What the estimate says of itself: sensors that have changed, and whether it is to be trusted.
+"""The estimate's own checks: sensors that have changed, and whether it can be trusted.
 
 On the greenhouses of `other_worlds`, at a moment of the second day. A sensor that has changed reads
 3 more from one scan on; all tags but that one are false alarms, and all in greenhouses where none
-has. Trusted is an estimate by the scans of ten rounds, each held against what all but the tags
-beside it say; what it is worth is the mean coverage of all cells in these rounds. In half of the
-greenhouses the air becomes restless as they begin: what was learnt of a calm day is wrong then.
+has. An estimate is trusted by the scans of ten rounds, each compared with all tags but those
+beside it; its real accuracy is the mean coverage of all cells in these rounds. In half of the
+greenhouses the air becomes restless as they begin: parameters of a calm day are wrong then.
 """
 
 from collections import Counter
@@ -45,7 +45,7 @@ def changed(all_read: Readings, at_s: float) -> list[int]:
 
 
 def found_after(all_read: Readings, tag: int) -> tuple[dict[int, bool], int]:
-    """Whether it was found after so many scans; false alarms at the last of these."""
+    """Whether it was found after that many scans; false alarms at the last of these."""
     own = np.flatnonzero((all_read.tag == tag) & (all_read.time_s > AT_S))
     value = all_read.value.copy()
     value[own] += OFFSET
@@ -58,7 +58,7 @@ def found_after(all_read: Readings, tag: int) -> tuple[dict[int, bool], int]:
 
 
 def trust(world: World, all_read: Readings) -> tuple[bool | None, float]:
-    """What ten rounds say, and the mean coverage of all cells in them."""
+    """The verdict of ten rounds, and the mean coverage of all cells in them."""
     scans = inside = 0
     covers = []
     places = case_of(world, "after one round", 0).places

@@ -1,7 +1,7 @@
 """The estimate of many tags, by the nearest ones: against the truth, beside IDW.
 
-Greenhouses that nothing was chosen on: places differ by waves of 3 to 20 m, in how warm they are
-and in how their day goes, under clouds that pass. Of each field as in `bench_estimate`, by the
+Greenhouses that nothing was tuned on: positions differ by waves of 3 to 20 m, in their warmth
+and in the course of their day, under passing clouds. Of each field as in `bench_estimate`, by the
 readings that the node would choose: of a day, and of the first six hours.
 """
 
@@ -19,7 +19,7 @@ from tests.bench.other_worlds import DAY_S, HOUR_S, Floats
 HOUSES = ((200, 20.0), (1_000, 20.0), (1_000, 50.0), (10_000, 100.0))
 CELLS = 200
 PASS_S = 45 * 60.0
-# How many rounds were heard, and how long it has been silent since, s.
+# How many rounds were received, and how long it has been silent since, s.
 PHASES = {
     "steady": (32, 0.0),
     "silent for 6 h": (32, 6 * HOUR_S),
@@ -37,7 +37,7 @@ Truth = Callable[[Floats, Floats], Floats]
 
 
 def waves(chance: np.random.Generator) -> Callable[[Floats], Floats]:
-    """Something of variance 1 over places (k, 2)."""
+    """A quantity of variance 1 over positions (k, 2)."""
     length, angle = chance.uniform(3.0, 20.0, _WAVES), chance.uniform(0.0, 2 * np.pi, _WAVES)
     numbers = 2 * np.pi / length * np.array([np.cos(angle), np.sin(angle)])
     phase = chance.uniform(0.0, 2 * np.pi, _WAVES)
@@ -45,7 +45,7 @@ def waves(chance: np.random.Generator) -> Callable[[Floats], Floats]:
 
 
 def truth_of(chance: np.random.Generator) -> Truth:
-    """At places (k, 2) and times (k,), °C."""
+    """At positions (k, 2) and times (k,), °C."""
     warm, swing, phase = waves(chance), waves(chance), chance.uniform(0.0, 2 * np.pi)
     at_s = np.arange(-DAY_S, DAY_S, 1_800.0)
     keeps = float(np.exp(-0.5 / _CLOUD_HOURS))
@@ -62,7 +62,7 @@ def truth_of(chance: np.random.Generator) -> Truth:
 
 
 def house(tags: int, metres: float, seed: int, passes: int) -> tuple[Truth, Readings]:
-    """What was read of each tag in so many rounds until 0 s."""
+    """The readings of each tag in that many rounds until 0 s."""
     chance = np.random.default_rng([seed, tags, int(metres)])
     truth, xy = truth_of(chance), chance.uniform(0.0, metres, (tags, 2))
     time_s = np.sort(chance.uniform(-passes * PASS_S, 0.0, passes * tags))

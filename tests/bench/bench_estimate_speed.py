@@ -12,7 +12,7 @@ from lupin_twin.field.idw import FieldSample, compute_idw_field
 from tests.support.estimates import DAY_S, many_tags
 
 Made = TypeVar("Made")
-# Tags, readings of each, m of the house's side, cells of a side.
+# Tags, readings of each, m of the greenhouse's side, cells of a side.
 HOUSES = (
     (10, 32, 8.0, 200),
     (30, 20, 8.0, 200),
@@ -23,7 +23,7 @@ HOUSES = (
 
 
 def best(make: Callable[[], Made], times: int = 7) -> tuple[float, Made]:
-    """Milliseconds of processor time, and what was made."""
+    """Milliseconds of processor time, and the result."""
     spent = []
     for _ in range(times):
         began = time.process_time()
@@ -33,7 +33,7 @@ def best(make: Callable[[], Made], times: int = 7) -> tuple[float, Made]:
 
 
 def costs(tags: int, each: int, metres: float, side: int) -> list[float]:
-    """IDW; a fit; a posterior, until it tells something; a grid; all tags checked."""
+    """IDW; a fit; a posterior, until its first value; a grid; all tags checked."""
     readings = many_tags(tags, each, metres)
     at_s = float(readings.time_s.max())
     readings = thinned(readings, at_s, DAY_S)
@@ -57,7 +57,7 @@ def costs(tags: int, each: int, metres: float, side: int) -> list[float]:
 
     def load() -> Posterior:
         posterior = model.posterior(readings, at_s)
-        posterior.points(readings.xy[:1])  # of many tags, the work begins when it is asked
+        posterior.points(readings.xy[:1])  # with many tags, the work starts with the first query
         return posterior
 
     load_ms, posterior = best(load, 3)

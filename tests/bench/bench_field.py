@@ -1,6 +1,6 @@
-"""How fast fields are made, each beside the plain loop of the same run.
+"""How fast fields are computed, each beside the plain loop of the same run.
 
-The loop is `tests/oracle_idw.py`, the definition written down. Where it would take minutes it runs
+The loop is `tests/oracle_idw.py`, the written definition. Where it would take minutes it runs
 over a sample of the cells, and the table says so. Times are the best of several runs.
 """
 

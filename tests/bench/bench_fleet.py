@@ -36,7 +36,7 @@ from tests.support.postgres import server
 
 TAGS, PROCESSES = 30, 2
 SENSORS = ("temperature", "humidity", "co2", "light", "moisture")
-# What comes before is not counted: 200 connections, and journals that are just begun.
+# What comes before does not count: 200 connections, and journals that have just started.
 WARM_S, MEASURED_S = 15.0, 20.0
 HOUR = 3_600 * SECOND
 DAY = House(tags=TAGS, days=1.0, every_s=120.0, look_days=0.0, failing=0)
@@ -46,7 +46,7 @@ DAY = House(tags=TAGS, days=1.0, every_s=120.0, look_days=0.0, failing=0)
 
 
 class _TimedSink(Sink):
-    """The sink, which notes for each scan how long after its arrival it is committed."""
+    """The sink, which records for each scan how long after its arrival it is committed."""
 
     lags: list[tuple[float, float]] = []  # noqa: RUF012  # one for all
 
@@ -73,7 +73,7 @@ def forward(folder: Path, urls: Sequence[str]) -> None:
 
 
 class _Twin:
-    """A journal that receives a scan of each tag at once, with less work than a twin has of it.
+    """A journal that receives a scan of each tag at once, with less work than in a twin.
 
     Its hours stay as the first scans left them; they are forwarded with each scan nevertheless.
     """
@@ -107,7 +107,7 @@ class _Twin:
 
 
 def record(twins: Sequence[_Twin], seconds: float) -> float:
-    """Have each record once a second, one after the other; returns how late the last was, s."""
+    """Let each record once a second, one after the other; returns how late the last was, s."""
     begun_s, number = time.time(), 0
     while (at_s := number / len(twins)) < seconds:
         time.sleep(max(0.0, begun_s + at_s - time.time()))
@@ -152,7 +152,7 @@ def lag(sites: int) -> None:
 
 
 def measure(archive: Archive, sites: int, days: int) -> None:
-    """Print rows, bytes, and what questions take."""
+    """Print rows, bytes, and how long queries take."""
     chance, end_ns = random.Random(7), replace(DAY, days=float(days)).end_ns
     with psycopg.connect(archive.owner, autocommit=True) as connection:
         connection.execute("VACUUM ANALYZE")
@@ -181,7 +181,7 @@ def measure(archive: Archive, sites: int, days: int) -> None:
 
 
 def growth() -> None:
-    """Print how the archive grows with days and with sites; of a sensor the least time too, ms."""
+    """Print how the archive grows with days and with sites; for a sensor the least time too, ms."""
     print(
         "sites  days       scans       MB  B/scan  state ms: least, median  a sensor, all days",
         flush=True,

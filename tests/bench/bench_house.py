@@ -1,6 +1,6 @@
-"""The page with a large house: what it costs the main thread when nothing, or little, happens.
+"""The page with a large greenhouse: its cost on the main thread when nothing, or little, happens.
 
-But for the heartbeat it is thread time of all tasks, so what else runs there does not count.
+Except for the heartbeat it is thread time of all tasks, so that other load does not count.
 """
 
 import time
@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def measure(page: Page, session: CDPSession, count: int) -> dict[str, float]:
-    """Main thread time, ms, of each kind of thing that happens."""
+    """Main thread time, ms, of each kind of event."""
 
     def cost(action: Callable[[], object], times: int) -> float:
         before = busy_s(session)
@@ -72,7 +72,7 @@ def measure(page: Page, session: CDPSession, count: int) -> dict[str, float]:
     def frame(script: str) -> Callable[[], None]:
         def send() -> None:
             page.evaluate(script)
-            time.sleep(1.05)  # a large house is shown once a second: one frame at a time
+            time.sleep(1.05)  # a large greenhouse is shown once a second: one frame at a time
 
         return send
 
@@ -94,7 +94,7 @@ def measure(page: Page, session: CDPSession, count: int) -> dict[str, float]:
         page.get_by_role("searchbox").fill("tomato" if step % 2 else "basil")
         page.evaluate(SETTLED)
 
-    # Ages tick by themselves, and a look at the page costs something too.
+    # Ages tick by themselves, and reading the page costs something too.
     idle = cost(frame("house.idle()"), BEATS)
     return {
         "a heartbeat that changes nothing": page.evaluate(HEARTBEAT, BEATS),

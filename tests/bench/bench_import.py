@@ -1,4 +1,4 @@
-"""A CSV of a million rows of two readings, by `lupin-twin import`: a look, then into a journal.
+"""A CSV of a million rows of two readings, by `lupin-twin import`: a dry run, then into a journal.
 
 Rows a second of CPU time, the command's start included, beside what Python's own csv reader takes
 for the same file.

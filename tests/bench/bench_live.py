@@ -4,7 +4,7 @@ A real `lupin-twin serve`, a robot in a process of its own that changes one tag 
 over DDS, and clients in further processes. All share this machine, so the clients' own work weighs
 on the figures too. Rows of the same twin and rate share a server.
 
-What the columns say:
+The columns:
 
 - delay: from the robot's `publish()` until the client's process has read the frame that carries
   the change. In it are DDS, the twin, the bridge's pacing, serialisation, the fan-out, the kernel
@@ -24,13 +24,13 @@ from dataclasses import dataclass
 from tests.bench.live_parts import Clients, Server, serving
 from tests.support.proc_stat import cpu_s, resident_mb
 
-# Between joining, which is not measured, and what is: the load goes on meanwhile.
+# Between joining, which is not measured, and the measurement: the load goes on meanwhile.
 SETTLE_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """One row: so many clients of a twin with so many tags that changes so often."""
+    """One row: that many clients of a twin with that many tags and that rate of changes."""
 
     clients: int
     rate_hz: float = 10.0
@@ -40,7 +40,7 @@ class Load:
 
     @property
     def server(self) -> tuple[int, float]:
-        """What the server and the robot are started with: tags and rate."""
+        """How the server and the robot are started: tags and rate."""
         return self.tags, self.rate_hz
 
 
@@ -49,7 +49,7 @@ def measure_load(server: Server, load: Load) -> list[str]:
     with Clients(server.port, load.clients, load.path) as clients:
         joined_s = clients.joined_s()
         start_s = time.monotonic() + SETTLE_S
-        time.sleep(SETTLE_S)  # for every load as long: joining is not measured
+        time.sleep(SETTLE_S)  # for every load the same time: joining is not measured
         before_s = cpu_s(server.process.pid)
         # The clients answer when it is over and drained; the processor time ends with them.
         seen = clients.measure(start_s, start_s + load.measure_s)

@@ -1,4 +1,4 @@
-"""The log: what it takes to write it, how large it is, and how fast it answers.
+"""The log: the cost of writing it, its size, and the time of its answers.
 
 Times are those of one core; the first call over a connection of its own, and the median of more.
 A greenhouse of 30 tags with five sensors is scanned for a year, every 48 minutes; one of 10,000
@@ -41,7 +41,7 @@ TIMELINE: Final = (
 
 
 def main() -> None:
-    """Print the figures beside those that are asked for."""
+    """Print the selected figures."""
     with tempfile.TemporaryDirectory(prefix="lupin-twin-log-") as folder:
         write(Path(folder))
     ask(filled(YEAR), filled(MANY))
@@ -54,7 +54,7 @@ def report(what: str, figure: str, asked: str) -> None:
 
 def write(folder: Path) -> None:
     heard = DAY.rows()
-    # The first scan of each tag makes its series; it is made once.
+    # The first scan of each tag creates its series, once.
     before = list(islice(heard, DAY.tags * 2))
     told = list(islice(heard, SCANS))
     paced = list(islice(heard, 2_000))
@@ -97,7 +97,7 @@ def readings(rows: Sequence[Write]) -> int:
 
 
 def handed_to_disk() -> int:
-    """What this process has given the system to write (`wchar`)."""
+    """What this process has written by system calls (`wchar`)."""
     lines = Path("/proc/self/io").read_text(encoding="ascii").splitlines()
     return int(dict(line.split(": ") for line in lines)["wchar"])
 

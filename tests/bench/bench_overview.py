@@ -1,4 +1,4 @@
-"""The overview of a thousand sites of 30 tags: made on the server, painted, scrolled, changed.
+"""The overview of a thousand sites of 30 tags: built on the server, painted, scrolled, changed.
 
 A real page over a real archive, and a real browser; all share this machine.
 """
@@ -19,7 +19,7 @@ from tests.support.postgres import server
 from tests.support.waiting import wait_for
 
 SITES, TAGS, SCANS = 1_000, 30, 3
-# Frames of a browser that took longer than so many ms.
+# Frames of a browser that took longer than that many ms.
 LATE_MS = 50
 _SCROLL = """async () => {
   const gaps = []; let before = performance.now();
@@ -33,14 +33,14 @@ _SCROLL = """async () => {
 
 
 def rows() -> list[Write]:
-    """Tags in a row, of which one is too warm."""
+    """Tags in a row, one of them too warm."""
     now_ns = time.time_ns()
     hot = [scan("3", now_ns - ago * SECOND, temperature=45.0) for ago in (2, 1)]
     return [*scans_lately(tags=TAGS, scans=SCANS), *hot]
 
 
 def serve(page: Page) -> None:
-    """Print what the server takes."""
+    """Print the times of the server."""
     begun_s = time.monotonic()
     wait_for(
         lambda: sum(it["active_alarms"] is not None for it in page.sites().values()) == SITES,
@@ -59,7 +59,7 @@ def serve(page: Page) -> None:
 
 
 def paint(page: BrowserPage, url: str) -> None:
-    """Print what a browser takes."""
+    """Print the times of a browser."""
     page.goto(url, wait_until="commit")
     page.locator(".fleet-site").nth(SITES - 1).wait_for(state="attached")
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => setTimeout(done)))")

@@ -1,4 +1,4 @@
-"""The page: its first paint, and panning a large house.
+"""The page: its first paint, and panning a large greenhouse.
 
 Chromium draws without a GPU, one pixel a CSS pixel, on this machine beside the server.
 """
@@ -20,7 +20,7 @@ NAVIGATIONS = 7
 PAN_S = 5
 PATIENCE_MS = 120_000
 
-# Told to the page before its own scripts run: when the first row and the first heat map were there.
+# Runs before the page's own scripts: the times of the first row and of the first heat map.
 WATCH_FIRST = """
 window.first = {};
 new MutationObserver(() => {
@@ -68,7 +68,7 @@ def main() -> None:
 
 @contextmanager
 def chromium() -> Iterator[Browser]:
-    """The browser that the tests have."""
+    """The browser of the tests."""
     with (
         sync_playwright() as playwright,
         playwright.chromium.launch(
@@ -89,7 +89,7 @@ def page_of(browser: Browser, width: int = 1440, height: int = 900) -> Iterator[
 
 
 def fill(running: Bridge, tags: int, side_m: float, blooms: int) -> None:
-    """Spread tags evenly over a square house; each in a box with so many blooms."""
+    """Spread tags evenly over a square greenhouse; each in a box with that many blooms."""
     running.peer.wait_for_twin()
     cells = round(side_m / 0.05)
     running.peer.publish_map(occupancy_grid([[0] * cells] * cells, resolution=0.05))
@@ -111,7 +111,7 @@ def fill(running: Bridge, tags: int, side_m: float, blooms: int) -> None:
 
 
 def wait_until_known(running: Bridge, count: int) -> None:
-    """Wait until the twin knows so many tags, with their flowers."""
+    """Wait until the twin knows that many tags, with their flowers."""
 
     def known() -> bool:
         tags = running.json("/api/state")["tags"]
@@ -153,7 +153,7 @@ def print_panning(browser: Browser) -> None:
                 for what, zoom in (("all in sight", 0), ("zoomed in", 3)):
                     for _ in range(zoom):
                         page.get_by_role("button", name="Zoom in").click()
-                    page.evaluate(PAN, 1)  # the sprites are made, the page has come to rest
+                    page.evaluate(PAN, 1)  # the sprites are drawn, the page is idle
                     before_s = processor_s(browser)
                     times = page.evaluate(PAN, PAN_S)
                     each_ms = 1000 * (processor_s(browser) - before_s) / len(times)
@@ -172,7 +172,7 @@ def frames_text(times: Sequence[float]) -> str:
 
 
 def processor_s(browser: Browser) -> float:
-    """Processor time that Chromium has taken so far, all of its processes."""
+    """Processor time of all Chromium processes so far."""
     session = browser.new_browser_cdp_session()
     processes = session.send("SystemInfo.getProcessInfo")["processInfo"]
     session.detach()

@@ -1,4 +1,4 @@
-"""How many browsers three replicas of the fleet's page carry, at a scan a second of one site.
+"""How many browsers three replicas of the fleet's page serve, at a scan a second of one site.
 
 All is real: a journal that a plain program writes, its forwarder, PostgreSQL, three `lupin-twin
 fleet`, and browsers in further processes, which share this machine. They follow the site's page, a
@@ -36,7 +36,7 @@ def record(journal: Path, ending: threading.Event) -> None:
 
 
 def measure(ports: Sequence[int], pids: Sequence[int], count: int) -> None:
-    """Print what so many browsers are like."""
+    """Print the figures of that many browsers."""
     share = count // REPLICAS
     with ExitStack() as stack:
         groups = [

@@ -1,9 +1,9 @@
-"""A bridge inside the page for a house of any size, whose frames are sent by hand."""
+"""A bridge inside the page for a greenhouse of any size, whose frames are sent by hand."""
 
 from typing import Final
 
-# So many tags in a square, a metre apart, each with two readings, species and two blooms.
-# `house.beat()`: a frame that changes nothing; `house.change(n)`: n tags were scanned anew;
+# That many tags in a square, a metre apart, each with two readings, species and two blooms.
+# `house.beat()`: a frame that changes nothing; `house.change(n)`: n tags were scanned again;
 # `house.idle()`: no state, but the connection lives; `house.unpin(id)`: a tag without a pose.
 _SCRIPT: Final = """
 window.house = {};
@@ -89,5 +89,5 @@ window.house = {};
 
 
 def house_of(count: int) -> str:
-    """The script for a page that shows so many tags."""
+    """The script for a page with that many tags."""
     return _SCRIPT.replace("COUNT", str(count))

@@ -1,7 +1,7 @@
-"""Journals of a long time, made fast: as a twin would write them.
+"""Journals of a long time, written fast: the same rows as a twin's.
 
 Each tag is scanned in its turn, every `every_s`, so that all tags have been by then. Every
-tag has its place.
+tag has its position.
 """
 
 import atexit
@@ -31,10 +31,10 @@ _BATCH: Final = 20_000
 
 @dataclass(frozen=True)
 class House:
-    """What is heard of a house.
+    """The received observations of a greenhouse.
 
-    `look_days` is how often somebody looks at a tag's flowers, 0 for never; `failing` every so many
-    tries fail, 0: none.
+    `look_days` is how often a tag's flowers are inspected, 0 for never; `failing` every that many
+    attempts fail, 0: none.
     """
 
     tags: int
@@ -50,11 +50,11 @@ class House:
 
     @property
     def scans(self) -> int:
-        """How often a tag is tried."""
+        """How often a tag is scanned."""
         return int(self.days * DAY_S / self.every_s)
 
     def rows(self) -> Iterator[Write]:
-        """All that is heard, by time."""
+        """All observations, by time."""
         step_ns = int(self.every_s * SECOND / self.tags)
         ids = [str(number + 1) for number in range(self.tags)]
         looks_every = max(1, int(self.look_days * DAY_S / self.every_s))
@@ -98,7 +98,7 @@ def _look(tag: int, at_ns: int, *, has_pest: bool) -> Inspection:
 
 @dataclass(frozen=True)
 class Filled:
-    """A journal, and what is in it."""
+    """A journal, and its content."""
 
     path: Path
     house: House
@@ -107,7 +107,7 @@ class Filled:
 
 @cache
 def filled(house: House) -> Filled:
-    """The journal of a house, made once a process; it goes with the process."""
+    """The journal of a greenhouse, written once per process; it is deleted with the process."""
     return fill(_folder() / f"{house.tags}-{house.days:g}-{house.every_s:g}.sqlite", house)
 
 
@@ -119,7 +119,7 @@ def _folder() -> Path:
 
 
 def fill(path: Path, house: House) -> Filled:
-    """Write all that is heard of a house, as a twin would that lived through it."""
+    """Write all observations of a greenhouse, as its twin would."""
     readings = 0
     file = JournalFile(path, LIMITS, is_sound=True)
     with closing(file):

@@ -1,4 +1,4 @@
-"""Many WebSocket clients in one process that is not the server's, at as little cost as can be.
+"""Many WebSocket clients in one process apart from the server, at the least cost.
 
 No asyncio and no JSON parser: one epoll loop reads each socket, finds the ends of frames by their
 headers, and in a frame looks for two numbers, `seq` and the robot's beat, as bytes.
@@ -23,7 +23,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 READ_BYTES = 1 << 18
-# After the end of the measurement, for what is still under way.
+# After the end of the measurement, for frames still under way.
 DRAIN_S = 1.5
 _SEQ = b'"seq":'
 _BEAT = b'"name":"beat","value":'
@@ -31,7 +31,7 @@ _BEAT = b'"name":"beat","value":'
 
 @dataclass(slots=True, eq=False)
 class Stream:
-    """One client: its socket, the bytes of an unfinished frame, and the newest beat it saw."""
+    """One client: its socket, the bytes of an unfinished frame, and the latest beat it received."""
 
     socket: socket.socket
     missing: int = 0
@@ -41,7 +41,7 @@ class Stream:
 
 
 class Clients:
-    """All clients of this process and what they saw."""
+    """All clients of this process and what they received."""
 
     def __init__(self, path: str, port: int) -> None:
         self._path, self._port = path, port
@@ -153,7 +153,7 @@ class Clients:
                 break
             if data[start] == 0x81:  # a text frame, whole
                 self._frame(stream, data, start + header, start + header + length)
-            elif data[start] == 0x89:  # a ping: who does not answer is taken for gone after 40 s
+            elif data[start] == 0x89:  # a ping: without an answer the server closes after 40 s
                 payload = data[start + header : start + header + length]
                 stream.socket.send(bytes((0x8A, 0x80 | length, 0, 0, 0, 0)) + payload)
             start += header + length
@@ -201,7 +201,7 @@ def main() -> None:
     hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
     clients = Clients(options.path, options.port)
-    # All processes have one moment: who waited for the others would come after them.
+    # All processes start at one moment: waiting for each other would shift them.
     time.sleep(max(0.0, options.connect_at - time.monotonic()))
     clients.connect(options.clients)
     clients.run(options.clients)

@@ -1,4 +1,4 @@
-"""The parts of a bench with live clients: a server with its robot, clients, and what they saw."""
+"""The parts of a bench with live clients: a server with its robot, clients, and their results."""
 
 import json
 import subprocess
@@ -20,16 +20,16 @@ CLIENTS_A_PROCESS = 1_250
 HEAD_START_S = 1.5
 # 20,000 messages, one batch after the other.
 FILL_PATIENCE_S = 300.0
-# The bridge may send a little more often than the robot causes it to: at exactly the robot's rate,
-# a change would wait up to a period for its turn, and that is what one would measure.
+# The bridge may send slightly more often than the robot changes it: at exactly the robot's rate,
+# a change would wait up to a period for its turn, and that would be measured.
 HEADROOM = 1.2
-# The tests let ROS check every field of every message, which costs time; nobody else does.
+# The tests let ROS check every field of every message, which costs time; production does not.
 AS_IN_USE = {"ROS_PYTHON_CHECK_FIELDS": "0"}
 
 
 @dataclass(slots=True)
 class Seen:
-    """What the clients saw in one measurement; `delays_s` is sorted."""
+    """The results of all clients in one measurement; `delays_s` is sorted."""
 
     delays_s: list[float]
     received: Counter[int]
@@ -104,7 +104,7 @@ class Clients:
 
 @dataclass(slots=True)
 class Server:
-    """A `lupin-twin serve` with a robot that keeps it changing."""
+    """A `lupin-twin serve` with a robot that keeps changing it."""
 
     process: Process
     port: int

@@ -3,7 +3,7 @@
 Run as `python -m tests.bench.live_robot --domain D --url U --tags N --rate-hz R`, with the address
 of the twin's bridge. It prints `filled` when the twin knows all tags, and goes on until it is
 killed. Every change is an observation of the tag `beat`, whose reading `beat` is this machine's
-CLOCK_MONOTONIC at the moment of its publication: whoever sees it knows how long it was on its way.
+CLOCK_MONOTONIC at the moment of its publication: a receiver can compute its delay.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 
 BEAT = "beat"
-# Two messages a tag, and the topic holds 50: a batch that was waited for has lost none.
+# Two messages a tag, and the topic holds 50: a confirmed batch has lost none.
 BATCH = 20
 
 
@@ -52,7 +52,7 @@ def fill(peer: Peer, http: httpx.Client, tag_ids: Sequence[str]) -> None:
 
 
 def tag_messages(tag_id: str, number: int) -> tuple[Any, Any]:
-    """A tag with three sensors, an outline and two blooms: as in the demo's house, on average."""
+    """A tag with three sensors, an outline and two blooms: as in the demo, on average."""
     x, y = 0.5 * (number % 100), 0.5 * (number // 100)
     readings = {"temperature": 21.3, "humidity": 64.0, "co2": 612.0}
     corners = [(x - 0.1, y - 0.1), (x + 0.1, y - 0.1), (x + 0.1, y + 0.1), (x - 0.1, y + 0.1)]

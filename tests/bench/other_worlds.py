@@ -17,14 +17,14 @@ from lupin_twin.estimate.kernel import Readings
 
 HOUR_S: Final = 3_600.0
 DAY_S: Final = 86_400.0
-# What is published is of these; constants were chosen on 0 to 3.
+# Published figures are of these; constants were chosen on 0 to 3.
 JUDGING: Final = range(1_000, 1_004)
 _UNTIL_S: Final = 3 * DAY_S
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Chance = np.random.Generator
-# The truth at places (k, 2), m, and times (k,), s; what is read of true values by tag and time.
+# The truth at positions (k, 2), m, and times (k,), s; readings of true values by tag and time.
 Truth = Callable[[Floats, Floats], Floats]
 Sensor = Callable[[Floats, Ints, Floats, Chance], Floats]
 
@@ -33,7 +33,7 @@ Sensor = Callable[[Floats, Ints, Floats, Chance], Floats]
 class World:
     """One sensor of one greenhouse: `size_m` of the floor, tags `xy`, s of a round, sd of noise.
 
-    `swing` is half of what the day makes of the whole house, `uneven` how far places differ.
+    `swing` is half of the whole greenhouse's daily change, `uneven` how far positions differ.
     """
 
     size_m: tuple[float, float]
@@ -94,7 +94,7 @@ def _waves(chance: Chance, stretch: tuple[float, float] = (1.0, 1.0)) -> Callabl
 
 
 def _course(chance: Chance, memory_h: float) -> Callable[[Floats], Floats]:
-    """A stationary course of variance 1 that forgets within so many hours."""
+    """A stationary course of variance 1 that forgets within that many hours."""
     at_s = np.arange(0.0, _UNTIL_S, 1_800.0)
     keeps = np.exp(-0.5 / memory_h)
     course = chance.normal(size=len(at_s))
@@ -148,7 +148,7 @@ def _front(chance: Chance, world: World) -> World:
     drops = chance.choice((-1.5, 1.5), len(begins_s)) * world.swing
 
     def more(xy: Floats, at_s: Floats) -> Floats:
-        # It crosses the house in an hour.
+        # It crosses the greenhouse in an hour.
         late_s = at_s - HOUR_S * xy[:, 1] / world.size_m[1]
         steps = 0.5 * (1.0 + np.tanh((late_s[:, None] - begins_s) / 900.0))
         result: Floats = steps @ drops
@@ -206,7 +206,7 @@ def _wall(chance: Chance, world: World) -> World:
 
 
 def _lag(chance: Chance, world: World) -> World:
-    """The robot's own sensor follows slowly what it drives through."""
+    """The robot's own sensor follows its surroundings slowly."""
     slow_s = world.round_s / len(world.xy) * chance.uniform(0.5, 1.5)
 
     def read(values: Floats, _: Ints, at_s: Floats, __: Chance) -> Floats:

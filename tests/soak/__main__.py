@@ -1,4 +1,4 @@
-"""`make soak`: what takes too long for every test run: many kills, and eight hours of writing."""
+"""`make soak`: too slow for every test run: many kills, and eight hours of writing."""
 
 import importlib
 import sys
@@ -10,7 +10,7 @@ SOAKS = ("kills", "archive_kills", "hours")
 
 
 def main() -> int:
-    """Run the soaks named on the command line, or all; 1 if one did not hold."""
+    """Run the soaks named on the command line, or all; 1 if one failed."""
     use_own()
     code = 0
     for name in sys.argv[1:] or SOAKS:

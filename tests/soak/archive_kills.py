@@ -1,4 +1,4 @@
-"""kill -9 of PostgreSQL, forwarders, twins and pages at 50 random moments; the suite keeps six."""
+"""kill -9 of PostgreSQL, forwarders, twins and pages at 50 random moments; the suite makes six."""
 
 import random
 import tempfile
@@ -12,7 +12,7 @@ MOMENTS = 50
 
 
 def main() -> bool:
-    """Kill; whether the archive and the journals of two sites have the same rows afterwards."""
+    """Kill; returns whether archive and journals of two sites have the same rows afterwards."""
     seed = random.randrange(10**6)
     print(f"{MOMENTS} moments, seed {seed}, {RATE} scans a second at each of two sites", flush=True)
     begun_s = time.monotonic()

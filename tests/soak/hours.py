@@ -1,7 +1,7 @@
-"""Eight hours of a large house in a minute or two: does memory stay, is the file as computed?
+"""Eight hours of a large greenhouse in a minute or two: memory stays, and the file is as computed.
 
 10,000 tags of five sensors, each scanned every ten minutes, through what a twin does without ROS:
-store, history, journal and its upkeep. Time is the rows' own, as fast as the disk takes them.
+store, history, journal and its maintenance. Time is the rows' own, as fast as the disk is.
 """
 
 import gc
@@ -24,7 +24,7 @@ from tests.support.waiting import wait_for
 TAGS, EVERY_S, HOURS = 10_000, 600, 8
 SENSORS = ("temperature", "humidity", "co2", "light", "soil_moisture")
 LIMITS = Limits(days=36_500, max_bytes=10**11)
-# What waits at most: observations must not be lost to a clock that runs 500 times too fast.
+# The longest queue: observations must not be lost to a clock that runs 500 times too fast.
 MOST_WAITING = 2_000
 
 # Bytes of a scan: record (header 9, series 3, stamp 8, lag 1, mission 1, five float64, check 2),
@@ -51,10 +51,10 @@ def scans(hour: int, chance: random.Random) -> Iterator[Scan]:
 
 
 def main(hours: int = HOURS) -> bool:
-    """Write; whether memory stays within a twentieth, and the file is as computed.
+    """Write; returns whether memory stays within a twentieth, and the file is as computed.
 
-    Counted from the third hour on: by then all is full that is bounded, of which SQLite's cache of
-    16 MB are filled last.
+    Counted from the third hour on: by then everything bounded is full, with SQLite's cache of
+    16 MB filled last.
     """
     chance, begun_s = random.Random(1), time.monotonic()
     resident: list[float] = []
@@ -78,7 +78,7 @@ def main(hours: int = HOURS) -> bool:
                 f" {time.monotonic() - begun_s:.0f} s",
                 flush=True,
             )
-        journal.close(60.0)  # the last fold of its upkeep may take longer than a twin would wait
+        journal.close(60.0)  # the last fold may take longer than a twin would wait
         memory.close()
         size, whole = path.stat().st_size, is_whole(path)
         ((kept,),) = select(path, "SELECT count(*) FROM scan")

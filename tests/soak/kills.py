@@ -1,4 +1,4 @@
-"""kill -9 at 50 random moments under 200 observations a second; the suite keeps four of them."""
+"""kill -9 at 50 random moments under 200 observations a second; the suite makes four of them."""
 
 import random
 import tempfile
@@ -13,7 +13,7 @@ ROUNDS = 50
 
 
 def main() -> bool:
-    """Kill and look; whether everything was there each time, once, in a file that is whole."""
+    """Kill; returns whether everything was there each time, once, in a sound file."""
     seed = random.randrange(10**6)
     chance, number, lost = random.Random(seed), 0, 0
     print(f"{ROUNDS} rounds, seed {seed}, {RATE} observations a second", flush=True)

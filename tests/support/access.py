@@ -1,4 +1,4 @@
-"""A bridge alone, asked by all sorts of clients: no robot, no answer taken for granted."""
+"""A bridge without a robot, and the different clients that query it."""
 
 import ssl
 from collections.abc import Iterator
@@ -46,7 +46,7 @@ class Served:
         return self.get(path, {**OWN, **(headers or {})}, "POST")
 
     def handshake(self, path: str = "/ws/state", headers: dict[str, str] | None = None) -> int:
-        """The status of a WebSocket handshake; 101 once a first frame has come."""
+        """The status of a WebSocket handshake; 101 once a first frame has arrived."""
         url = self.url.replace("http", "ws", 1) + path
         context = self.trust if isinstance(self.trust, ssl.SSLContext) else None
         try:
@@ -63,7 +63,7 @@ def served(
 ) -> Iterator[Served]:
     """`lupin-twin serve` with these options and environment, in a ROS domain of its own.
 
-    It keeps no journal, and so needs no process that looks back.
+    It has no journal, and so needs no past process.
     """
     options = (*options, "--ros-args", "-p", "journal:=off")
     with (

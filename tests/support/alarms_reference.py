@@ -1,4 +1,4 @@
-"""The alarms of what was heard, in the plainest way: all of it is read again for every question."""
+"""The alarms of all writes, by the simplest rule: everything is read again for each query."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -14,7 +14,7 @@ SHORTEST, LONGEST = 600 * S, 86_400 * S
 FLOWER = 1
 # Dawn and dusk are over by then.
 DIM = 2 * 3600 * S
-# A light that its tag's scans have left out for longer says nothing.
+# A light sensor that has been missing from its tag's scans for longer does not count.
 LEFT_OUT = 2 * 3600 * S
 
 
@@ -36,7 +36,7 @@ class Plain:
 
 @dataclass(frozen=True)
 class _Said:
-    """What one occasion says of one matter."""
+    """What one write implies for one cause."""
 
     at_ns: int
     is_so: bool
@@ -44,9 +44,9 @@ class _Said:
     verdict: str = ""
     value: float | None = None
     limit: float | None = None
-    # Of a try: the tag's scans up to then.
+    # Of an attempt: the tag's scans up to then.
     scans: tuple[int, ...] = ()
-    # Where that is not the occasion itself: what says so.
+    # Where that is not the write itself: its source.
     since_ns: int | None = None
 
 
@@ -212,7 +212,7 @@ def _of_tries(occasion: list[PastWrite], scans: list[int]) -> Iterator[tuple[_Ke
 
 
 def _episodes(key: _Key, said: list[_Said], ended_ns: int | None) -> Iterator[Plain]:
-    """Walk from episode to episode: where does one begin, where does it end, what lies between."""
+    """Walk from episode to episode: where each one begins and ends, and what lies between."""
     kind, sensor, which = key
     hold = 1 if kind == "pest" else 2
     at = 0
@@ -283,7 +283,7 @@ def _overdue(tag_id: str, of_run: list[PastWrite], *, is_on: bool) -> Iterator[P
     for index, start in enumerate(scans):
         end = scans[index + 1] if index + 1 < len(scans) else None
         holds = _holds(scans[: index + 1])
-        # So long as anybody is at work, time passes; in a pause it stands.
+        # While the robot works, time passes; in a pause it stands.
         due = start + holds
         for first, last in _pauses(of_run):
             if last > start and first <= due:

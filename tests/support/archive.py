@@ -1,4 +1,4 @@
-"""Archives, forwarders, and whether an archive has what a journal has."""
+"""Archives, forwarders, and whether an archive equals its journal."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from tests.support.postgres import Postgres
 from tests.support.processes import Process
 from tests.support.waiting import wait_for
 
-# What has to be equal; of the rest the archive has its own.
+# What has to be equal; the archive has its own values of the rest.
 TABLES = ("run", "series", "scan", "look", "place", "hour", "tally", "event", "note")
 _NUMBERS = count()
 
 
 class Archive:
-    """A database of its own on a server, with the user of a site."""
+    """A database of its own on a server, with the user of one site."""
 
     def __init__(self, server: Postgres, site: str = "gh1") -> None:
         self.server = server
@@ -44,7 +44,7 @@ class Archive:
         self.add_user(site)
 
     def drop(self) -> None:
-        """Away with it, whoever is still connected."""
+        """Drop the database, whoever is still connected."""
         with psycopg.connect(self.server.url, autocommit=True) as connection:
             connection.execute(f'DROP DATABASE "{self.name}" WITH (FORCE)')
 
@@ -54,7 +54,7 @@ class Archive:
         return self.server.url_of(self.name)
 
     def add_user(self, name: str, role: str = "lupin_forwarder") -> None:
-        """A user, unless another archive of the server made it."""
+        """A user, unless another archive of the server has created it."""
         with psycopg.connect(self.owner, autocommit=True) as connection:
             if not connection.execute(
                 "SELECT 1 FROM pg_roles WHERE rolname = %s", (name,)
@@ -62,7 +62,7 @@ class Archive:
                 connection.execute(f'CREATE ROLE "{name}" LOGIN IN ROLE {role}')
 
     def url(self, user: str | None = None) -> str:
-        """Its address for a user, the site's own if none is named."""
+        """Its address for a user, by default the site's own."""
         hosts = ",".join(map(str, self.hosts))
         return f"postgresql://{user or self.site}@/{self.name}?host={hosts}"
 
@@ -90,16 +90,16 @@ class Archive:
                 )
 
     def keep_live(self) -> None:
-        """Have its sites count as live for an hour, although nobody forwards them."""
+        """Make its sites count as live for an hour, although nothing is forwarded."""
         self.do("UPDATE forwarder SET heard_at = now() + INTERVAL '1 hour'")
 
     def select(self, sql: str) -> list[tuple[Any, ...]]:
-        """What its owner sees."""
+        """A query by its owner."""
         with psycopg.connect(self.owner) as connection:
             return connection.execute(sql).fetchall()
 
     def do(self, sql: str) -> None:
-        """What its owner does."""
+        """A change by its owner."""
         with psycopg.connect(self.owner) as connection:
             connection.execute(sql)
 
@@ -147,7 +147,7 @@ def run(*args: str, **env: str) -> subprocess.CompletedProcess[str]:
 
 
 def forward_once(archive: Archive, journal: Path) -> None:
-    """Forward what is in a journal."""
+    """Forward the rows of a journal."""
     done = run(
         "forward", "--site", archive.site, "--archive-url", archive.url(), "--journal",
         str(journal), "--once",
@@ -156,7 +156,7 @@ def forward_once(archive: Archive, journal: Path) -> None:
 
 
 def forwarder(archive: Archive, journal: Path, **env: str) -> Process:
-    """`lupin-twin forward`, which goes on until it is ended."""
+    """`lupin-twin forward`, which runs until it is stopped."""
     command = [
         sys.executable, "-m", "lupin_bridge.cli.command", "forward", "--site", archive.site,
         "--archive-url", archive.url(), "--journal", str(journal),
@@ -165,7 +165,7 @@ def forwarder(archive: Archive, journal: Path, **env: str) -> Process:
 
 
 def wait_until_equal(archive: Archive, journal: Path) -> None:
-    """Wait until the archive has what the journal has, row for row."""
+    """Wait until the archive equals the journal, row for row."""
     wait_for(lambda: archive.rows() == rows_of(journal), "an archive with the journal's rows")
 
 

@@ -1,6 +1,6 @@
 """PostgreSQL, forwarders, twins and replicas of the page, killed one after the other at random.
 
-The suite keeps a few kills, `make soak` has fifty.
+The suite makes a few kills, `make soak` makes fifty.
 """
 
 import csv
@@ -60,19 +60,19 @@ class Site:
         self.forwarder: Process = stack.enter_context(forwarder(archive, self.journal))
 
     def wait_for_more(self, rows: int) -> None:
-        """Wait until the twin has recorded so many more."""
+        """Wait until the twin has recorded that many more."""
         enough = count(self.journal) + rows
         wait_for(lambda: count(self.journal) >= enough, "the moment")
 
     def kill_twin(self) -> None:
-        """Kill it, and start another; its scans are others."""
+        """Kill it, and start another one with other scans."""
         self._twin.kill()
         self._twin.wait()
         self._lives += 1
         self._twin = self._stack.enter_context(twin(self.journal, self._lives * _LIVES))
 
     def kill_forwarder(self) -> None:
-        """Kill it, and start another."""
+        """Kill it, and start another one."""
         self.forwarder.kill()
         self.forwarder = self._stack.enter_context(forwarder(self.archive, self.journal))
 
@@ -93,12 +93,12 @@ class Replica:
         self._page = stack.enter_context(fleet(archive))
 
     def kill(self) -> None:
-        """Kill it, and start another."""
+        """Kill it, and start another one."""
         self._page.process.kill()
         self._page = self._stack.enter_context(fleet(self._archive))
 
     def wait_for_scans(self, site: str, count: int) -> None:
-        """Wait until its export has so many scans of a site."""
+        """Wait until its export has that many scans of a site."""
 
         def exported() -> bool:
             answer = self._page.http.get("/api/export.csv", params={"sites": site})
@@ -110,10 +110,10 @@ class Replica:
 
 
 def kill_and_compare(postgresql: Postgres, folder: Path, moments: int, seed: int) -> int:
-    """Kill at so many moments; returns how many scans archive and journals have, which are equal.
+    """Kill that many times; returns the number of scans, equal in archive and journals.
 
     Raises:
-        AssertionError: they have not the same rows, or the archive's rows do not fit each other.
+        AssertionError: their rows differ, or the archive's rows are inconsistent.
 
     """
     chance = random.Random(seed)

@@ -8,13 +8,13 @@ from pathlib import Path
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
-# What is written need not be a message for who only carries it.
+# A relay need not parse what it writes.
 Entry = tuple[str, int, int, bytes]
 
 
 @contextlib.contextmanager
 def no_file_above(size: int) -> Iterator[None]:
-    """A disk without room, to this process: the write fails with EFBIG."""
+    """A disk without room, for this process: the write fails with EFBIG."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
@@ -24,9 +24,9 @@ def no_file_above(size: int) -> Iterator[None]:
 
 
 def is_open(path: Path) -> bool:
-    """Whether this process has the file open, be it removed."""
+    """Whether this process has the file open, even if it is removed."""
     path = path.resolve()
-    named = {path, path.with_name(f"{path.name} (deleted)")}  # as Linux says it
+    named = {path, path.with_name(f"{path.name} (deleted)")}  # by Linux's account
     return not named.isdisjoint(file.resolve() for file in Path("/proc/self/fd").iterdir())
 
 

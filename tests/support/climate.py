@@ -1,4 +1,4 @@
-"""What is true in the simulated greenhouse, and what is known of its floor."""
+"""The truth in the simulated greenhouse, and the known part of its floor."""
 
 from copy import deepcopy
 from typing import Any

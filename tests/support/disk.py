@@ -1,4 +1,4 @@
-"""A disk of a test's own: full, read-only, slow, or cut off from power at any moment."""
+"""A disk for one test: full, read-only, slow, or cut off from power at any moment."""
 
 import struct
 import subprocess
@@ -12,7 +12,7 @@ Weather = Literal["well", "full", "readonly", "slow-sync", "slow-write"]
 
 
 def build(folder: Path) -> Path:
-    """Compile the library that stands between a process and its disk."""
+    """Compile the library between a process and its disk."""
     library = folder / "disk.so"
     source = Path(__file__).with_name("disk.c")
     subprocess.run(
@@ -23,7 +23,7 @@ def build(folder: Path) -> Path:
 
 @dataclass
 class Disk:
-    """A folder as a child process sees it that has these variables (`env`) too."""
+    """A folder for a child process that has these variables (`env`) too."""
 
     folder: Path
     library: Path
@@ -40,7 +40,7 @@ class Disk:
         }
 
     def be(self, weather: Weather) -> None:
-        """From the next operation on, the disk is so."""
+        """From the next operation on, the disk behaves like this."""
         new = self.control.with_suffix(".new")
         new.write_text("" if weather == "well" else weather)
         new.rename(self.control)
@@ -57,7 +57,7 @@ class Note(NamedTuple):
 
 
 def notes(log: Path) -> list[Note]:
-    """What was done, in order."""
+    """The operations so far, in order."""
     whole, at, found = log.read_bytes(), 0, []
     while at < len(whole):
         kind, ns, name_length, offset, length = _NOTE.unpack_from(whole, at)
@@ -77,10 +77,10 @@ class _File:
 
 
 def after_power_cut(done: list[Note], into: Path) -> None:
-    """Write what lasts of these operations, the last moment being that of the cut.
+    """Write what survives of these operations after a power cut at their end.
 
-    Of a file, what was written before a sync began that has ended; of a name, what the folder was
-    synced with. Nothing else: a disk may have kept more, this one is as bad as it may be.
+    Of a file: the writes before a completed sync began. Of a name: the folder's last sync.
+    A real disk may hold more; this one is as bad as it may be.
     """
     kept = _Kept()
     for note in done:

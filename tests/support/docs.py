@@ -1,6 +1,6 @@
-"""The pages that people write: README.md and `docs/`; their links, words and blocks of code.
+"""The hand-written pages: README.md and `docs/`; their links, words and blocks of code.
 
-How a block is marked is told in docs/contribute/docs.md.
+docs/contribute/docs.md describes how blocks are marked.
 """
 
 import re
@@ -24,13 +24,13 @@ def pages() -> list[Path]:
 
 
 def name_of(page: Path) -> str:
-    """A page's path from the root on: for the ids of tests."""
+    """A page's path from the root: for the ids of tests."""
     return page.relative_to(ROOT).as_posix()
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A block of code: where it stands, its language, its marks (`run`, `name=…`) and its text."""
+    """A block of code: its place, its language, its marks (`run`, `name=…`) and its text."""
 
     page: Path
     line: int
@@ -53,7 +53,7 @@ def blocks(page: Path) -> Iterator[Block]:
 
 
 def block_named(name: str) -> Block:
-    """The one block of all pages with this name."""
+    """The only block of all pages with this name."""
     [block] = [it for page in pages() for it in blocks(page) if f"name={name}" in it.marks]
     return block
 

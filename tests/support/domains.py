@@ -1,4 +1,4 @@
-"""One ROS domain a test, also when several test runs share the machine."""
+"""One ROS domain per test, also when several test runs share the machine."""
 
 import fcntl
 import os
@@ -9,16 +9,16 @@ from pathlib import Path
 
 from tests.support.shared_memory import SHARED_MEMORY
 
-# 0 is everybody's default; above 101 the ports of DDS run into those of outgoing connections.
+# 0 is the common default; above 101 the ports of DDS overlap those of outgoing connections.
 DOMAINS = range(1, 102)
 
 
 @contextmanager
 def own_domain() -> Iterator[int]:
-    """Lease a ROS_DOMAIN_ID that no other test on this machine has now, nor anybody else."""
+    """Lease a ROS_DOMAIN_ID that nothing else on this machine uses."""
     folder = Path(tempfile.gettempdir()) / "lupin-twin-test-domains"
     folder.mkdir(exist_ok=True)
-    # Where to begin differs by process, so that a domain is not reused right after its last user.
+    # Processes start at different numbers, so that a domain is not reused right after its last use.
     offset = os.getpid() * 7 + _leases_so_far()
     for step in range(len(DOMAINS)):
         domain = DOMAINS[(offset + step) % len(DOMAINS)]
@@ -36,21 +36,21 @@ def own_domain() -> Iterator[int]:
 
 
 def _is_lived_in(domain: int, table: Path = Path("/proc/net/udp")) -> bool:
-    """Whether a process is there that no test has started, a twin at work, say.
+    """Whether a process that no test has started uses the domain, such as a twin at work.
 
-    It would hear what tests publish, and they what it does. By the ports on which DDS listens.
+    It would receive what tests publish, and vice versa. Found by the ports of DDS.
     """
     addresses = (line.split()[1] for line in table.read_text(encoding="ascii").splitlines()[1:])
     return any(int(address.rpartition(":")[2], 16) in _ports_of(domain) for address in addresses)
 
 
 def _ports_of(domain: int) -> range:
-    """Those that RTPS 2.3, section 9.6.2.3, gives a domain."""
+    """The ports that RTPS 2.3, section 9.6.2.3, gives a domain."""
     return range(7400 + 250 * domain, 7400 + 250 * (domain + 1))
 
 
 def _remove_ports_of(domain: int, folder: Path = SHARED_MEMORY) -> None:
-    """Remove what killed processes left of a domain's ports, which would stop others."""
+    """Remove the ports of killed processes in a domain, which would block others."""
     for port in _ports_of(domain):
         for name in (f"fastrtps_port{port}", f"fastrtps_port{port}_el"):
             (folder / name).unlink(missing_ok=True)

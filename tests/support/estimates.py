@@ -15,13 +15,13 @@ DAY_S = 86_400.0
 def readings_of(
     rows: list[tuple[float, int, float]], places: list[tuple[float, float]]
 ) -> Readings:
-    """Of (hour, tag, value) at places (m)."""
+    """Readings from (hour, tag, value) at positions (m)."""
     columns = np.array(rows, dtype=np.float64).reshape(-1, 3).T
     return Readings(columns[0] * 3600.0, columns[1].astype(np.int64), columns[2], np.array(places))
 
 
 def spots_of(readings: Readings) -> list[Spot]:
-    """Where and when each was taken."""
+    """The position and time of each."""
     return [
         Spot(float(readings.xy[tag, 0]), float(readings.xy[tag, 1]), time_s / 3600.0)
         for time_s, tag in zip(readings.time_s, readings.tag, strict=True)
@@ -29,12 +29,12 @@ def spots_of(readings: Readings) -> list[Spot]:
 
 
 def spot_at(place: FloatArray, hour: float) -> Spot:
-    """A place (2,), m, at an hour."""
+    """A position (2,), m, at an hour."""
     return Spot(float(place[0]), float(place[1]), hour)
 
 
 def a_day(tags: int = 8, passes: int = 12, seed: int = 0) -> Readings:
-    """A house with a warm end, read in passes over a day, °C."""
+    """A greenhouse with a warm end, scanned in rounds over a day, °C."""
     chance = np.random.default_rng(seed)
     xy = chance.uniform((0.0, 0.0), (4.0, 8.0), (tags, 2))
     time_s = np.sort(chance.uniform(0.0, DAY_S, tags * passes))
@@ -52,7 +52,7 @@ def an_estimate(width: int, height: int, sd_known: float = 2.25) -> Estimate:
 
 
 def many_tags(tags: int, passes: int, metres: float, seed: int = 0) -> Readings:
-    """A large house, warmer here and colder there, standardised, read in passes of 45 minutes."""
+    """A large greenhouse, warm here and cold there, standardised, in rounds of 45 minutes."""
     chance = np.random.default_rng(seed)
     xy = chance.uniform(0.0, metres, (tags, 2))
     time_s = np.sort(chance.uniform(0.0, passes * 2_700.0, tags * passes))
@@ -68,7 +68,7 @@ _VALUES = st.floats(-50.0, 50.0).map(lambda value: round(value, 1))
 
 @st.composite
 def some_readings(draw: st.DrawFn, most: int = 10) -> Readings:
-    """One tag or several, perhaps at one place; a reading alone, or twice; one time, one value."""
+    """One tag or several, perhaps at one position; one reading or two; one time, one value."""
     places = draw(st.lists(st.tuples(_METRES, _METRES), min_size=1, max_size=4))
     tags = st.integers(0, len(places) - 1)
     hours = draw(st.sampled_from((_HOURS, st.just(7.0))))

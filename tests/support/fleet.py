@@ -19,13 +19,13 @@ from tests.support.ws_client import open_websocket
 
 
 def wall() -> Clock:
-    """The wall's clock now, as a robot has it."""
+    """The wall clock now, as on a robot."""
     now_ns = time.time_ns()
     return Clock(now_ns, now_ns, is_simulated=False)
 
 
 def scans_lately(temperature: float = 22.0, tags: int = 5, scans: int = 6) -> list[Write]:
-    """Tags with their places, each scanned once a minute until now."""
+    """Tags with their positions, each scanned once a minute until now."""
     now_ns = time.time_ns()
     pins: list[Write] = [pin(str(tag), now_ns - 600 * SECOND, float(tag)) for tag in range(tags)]
     return pins + [
@@ -36,12 +36,12 @@ def scans_lately(temperature: float = 22.0, tags: int = 5, scans: int = 6) -> li
 
 
 def write(journal: Path, rows: list[Write]) -> None:
-    """As a twin does that is started for it."""
+    """As its twin writes them."""
     kept(journal, rows, wall())
 
 
 def forward(archive: Archive, journal: Path, rows: list[Write]) -> None:
-    """Write a journal, and have it in the archive."""
+    """Write a journal, and forward it to the archive."""
     write(journal, rows)
     forward_once(archive, journal)
 
@@ -61,12 +61,12 @@ class Page:
         return {site["site"]: site for site in answer.json()["sites"]}
 
     def metric(self, name: str, below: str = "") -> float:
-        """A number of `/metrics`, or of those below a site's path."""
+        """A metric, of the fleet or of one site."""
         lines = self.http.get(f"{below}/metrics").text.splitlines()
         return next(float(line.split()[1]) for line in lines if line.startswith(f"{name} "))
 
     def site(self, name: str = "gh1", **said: Any) -> dict[str, Any]:
-        """A site's entry once it says this."""
+        """A site's entry once it has these values."""
 
         def look() -> dict[str, Any] | None:
             found = self.sites().get(name, {})
@@ -79,7 +79,7 @@ class Page:
 
 @contextmanager
 def fleet(archive: Archive, *args: str, user: str = "page") -> Iterator[Page]:
-    """One that serves; it ends with the block."""
+    """A fleet that serves; it ends with the block."""
     with lupin_twin(0, "fleet", "--archive-url", archive.url(user), *args) as process:
         page = Page(process)
         with page.http:
@@ -88,7 +88,7 @@ def fleet(archive: Archive, *args: str, user: str = "page") -> Iterator[Page]:
 
 @contextmanager
 def frames(page: Page) -> Iterator[Iterator[dict[str, Any]]]:
-    """What a browser of the overview gets."""
+    """The frames of the overview in a browser."""
     with open_websocket(page.url.replace("http", "ws", 1) + "/ws/sites") as connection:
 
         def each() -> Iterator[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""A client of Foxglove's protocol that hides nothing, and how its messages are read by others."""
+"""A client of Foxglove's protocol that sees everything, and other decoders of its messages."""
 
 import json
 import struct
@@ -67,7 +67,7 @@ class Viewer:
 
 @contextmanager
 def viewer(url: str, subprotocols: Sequence[str] = (SDK,), **options: Any) -> Iterator[Viewer]:
-    """A client that has been told who serves, and what."""
+    """A client that knows the server and its channels."""
     address = f"{url.replace('http', 'ws', 1)}/foxglove"
     with open_websocket(address, subprotocols, **options) as connection:
         client = Viewer(connection)
@@ -76,7 +76,7 @@ def viewer(url: str, subprotocols: Sequence[str] = (SDK,), **options: Any) -> It
 
 
 def reader_of(channel: TwinUpdate) -> Callable[[bytes], Any]:
-    """What makes a message of a channel's payload, by the schema that was advertised alone."""
+    """A decoder of a channel's payload, from the advertised schema alone."""
     schema = Schema(1, channel["schema"].encode(), channel["schemaEncoding"], channel["schemaName"])
     decode = DecoderFactory().decoder_for(channel["encoding"], schema)
     assert decode is not None

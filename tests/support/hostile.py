@@ -53,7 +53,7 @@ NANOSECONDS: Final = (0, 999_999_999, 1_000_000_000, 2**32 - 1)
 
 
 def any_pose(chance: random.Random) -> Any:
-    """A pose of any numbers."""
+    """A pose with any numbers."""
     return Pose(
         position=Point(**{axis: chance.choice(DOUBLES) for axis in "xyz"}),
         orientation=Quaternion(**{axis: chance.choice(DOUBLES) for axis in "xyzw"}),
@@ -66,14 +66,14 @@ def any_stamp(stamp: Any, chance: random.Random) -> None:
 
 
 def any_readings(chance: random.Random, count: int) -> list[Any]:
-    """Readings of any names, the same ones often."""
+    """Readings with any names, often the same ones."""
     return [
         SensorReading(name=chance.choice(TEXTS), value=chance.choice(DOUBLES)) for _ in range(count)
     ]
 
 
 def fill_flower(flower: Any, chance: random.Random) -> None:
-    """Fill what a FlowerObservation and a TwinTagState share."""
+    """Fill the fields that a FlowerObservation and a TwinTagState share."""
     flower.species = chance.choice(TEXTS)
     flower.anomaly = chance.random() < 0.5
     flower.flower_count = flower.bug_count = 65_535
@@ -93,7 +93,7 @@ def fill_flower(flower: Any, chance: random.Random) -> None:
 
 
 def any_observation(chance: random.Random) -> Any:
-    """An observation of any kind, with anything in it."""
+    """An observation of any kind, with any content."""
     msg = Observation(
         kind=chance.choice((0, 0, 1, 1, 2, 255)),
         status=chance.choice((0, 0, 0, 1, 3, 255)),
@@ -115,7 +115,7 @@ def any_observation(chance: random.Random) -> Any:
 
 
 def any_discovery(chance: random.Random) -> Any:
-    """Discovered tags at any places."""
+    """Discovered tags at any positions."""
     msg = DiscoveredTags(
         tags=[
             DiscoveredTag(
@@ -133,7 +133,7 @@ def any_discovery(chance: random.Random) -> Any:
 
 
 def any_map(chance: random.Random) -> Any:
-    """A map whose size, place and cells need not go together."""
+    """A map whose size, position and cells need not agree."""
     msg = OccupancyGrid()
     msg.header.frame_id = chance.choice(("map", "", "odom"))
     any_stamp(msg.header.stamp, chance)
@@ -147,7 +147,7 @@ def any_map(chance: random.Random) -> Any:
 
 
 def any_state(chance: random.Random) -> Any:
-    """A TwinState that no twin publishes: the same tag twice, numbers that are none."""
+    """A TwinState that no twin publishes: the same tag twice, NaN and infinity."""
     msg = TwinState(tags=[any_tag_state(chance) for _ in range(chance.randrange(20))])
     msg.header.frame_id = chance.choice(TEXTS)
     any_stamp(msg.header.stamp, chance)
@@ -184,7 +184,7 @@ def damaged(message: Any, chance: random.Random) -> bytes:
     elif kind == 1:
         data += chance.randbytes(chance.randrange(100))
     else:
-        # Four bytes at once are a length that leads far beyond the end, or into the middle.
+        # Four bytes at once are a length far beyond the end, or into the middle.
         for _ in range(chance.randrange(1, 6)):
             at = chance.randrange(0, len(data), 4)
             data[at : at + 4] = chance.choice(
@@ -194,9 +194,9 @@ def damaged(message: Any, chance: random.Random) -> bytes:
 
 
 def lies(data: bytes, within: int | None = None) -> Iterator[bytes]:
-    """A message (CDR) with each of its words replaced by a length that its bytes do not hold.
+    """A message (CDR) with each of its words replaced by a length that its bytes do not contain.
 
-    `within`: each word of the first so many bytes.
+    `within`: each word of that many first bytes.
     """
     for at in range(4, len(data) - 3 if within is None else within - 3, 4):
         for claim in claims(data, at):
@@ -204,22 +204,22 @@ def lies(data: bytes, within: int | None = None) -> Iterator[bytes]:
 
 
 def long_lies(message_type: Any) -> list[bytes]:
-    """A message with half a million bytes behind it, each of its words a claim to them all."""
+    """A message with half a million bytes after it, with each word claiming all of them."""
     whole = serialize_message(message_type())
     long = whole + bytes(500_000)
     return [lie_at(long, at, claims(long, at)[0]) for at in range(4, len(whole) - 3, 4)]
 
 
 def claims(data: bytes, at: int) -> tuple[int, ...]:
-    """Lengths that the bytes behind the word at `at` do not hold.
+    """Lengths that the bytes after the word at `at` do not contain.
 
-    As many elements as there are bytes is the worst: a deserialiser that asks for one byte an
-    element makes room for them all.
+    As many elements as there are bytes is the worst: a deserialiser that needs one byte per
+    element allocates all of them.
     """
     left = len(data) - at - 4
     return (left, left // 2, left + 1, 2**31 - 1, 2**32 - 1)
 
 
 def lie_at(data: bytes, at: int, claim: int) -> bytes:
-    """A message (CDR, little-endian) whose word at `at` says `claim`."""
+    """A message (CDR, little-endian) whose word at `at` is `claim`."""
     return data[:at] + claim.to_bytes(4, "little") + data[at + 4 :]

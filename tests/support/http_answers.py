@@ -1,6 +1,6 @@
-"""What a bridge answers over HTTP about a journal from elsewhere, as it can be compared.
+"""The HTTP answers of a bridge about a journal from elsewhere, in a form to compare.
 
-Answers that go by this moment's clock have that taken out.
+Parts that depend on the current time are removed.
 """
 
 import base64
@@ -22,9 +22,9 @@ from tests.support.web import Bridge
 
 T0 = 1_763_683_200
 HOUR = 3_600
-# The journals are of a day long ago: nothing of them is to be given up at the start.
+# The journals are of a day long ago: nothing in them may be deleted at the start.
 _KEPT = ("-p", "journal_days:=36500")
-# What goes by this moment: ages, and moments long after the journals' own.
+# Parts that depend on the current time: ages, and moments long after the journals' own.
 _NOW = re.compile(r'\{"sec":1(?:7[89]|[89]\d)\d{7},"nanosec":\d+\}|later than now, [0-9.]+ s')
 _AGE = re.compile(r'"(stale_seconds|age_s|since_s)":[-+.0-9e]+')
 
@@ -59,7 +59,7 @@ def _remembers(bridge: Bridge) -> bool:
 
 
 def ask(http: httpx.Client, path: str) -> list[Any]:
-    """[status, media type, body] of an answer, of any but texts the body in base64."""
+    """[status, media type, body] of an answer; a body that is not text in base64."""
     response = http.get(path)
     kind = response.headers.get("content-type", "")
     if not kind.startswith(("text/", "application/json")):

@@ -1,4 +1,4 @@
-"""Twin, bridge and server in the test's own process and event loop, to look inside."""
+"""Twin, bridge and server in the test's own process and event loop, to inspect them."""
 
 import asyncio
 import gc
@@ -27,7 +27,7 @@ SourceT = TypeVar("SourceT", LocalTwin, WebTwin)
 
 @contextmanager
 def ros_domain(domain: int) -> Iterator[None]:
-    """Nodes that this process makes meanwhile are in that ROS domain."""
+    """Nodes created meanwhile in this process are in that ROS domain."""
     before = os.environ.get("ROS_DOMAIN_ID")
     os.environ["ROS_DOMAIN_ID"] = str(domain)
     try:
@@ -52,7 +52,7 @@ def run(domain: int, test: Coroutine[Any, Any, T]) -> T:
 
     with ros_domain(domain):
         result = asyncio.run(watched())
-    gc.collect()  # a task complains of an error that nobody looked at when it is collected
+    gc.collect()  # a task reports an unhandled error when it is collected
     assert errors == []
     return result
 
@@ -61,7 +61,7 @@ def run(domain: int, test: Coroutine[Any, Any, T]) -> T:
 async def started(
     make: Callable[..., SourceT], *ros_args: str, timeout_s: float = 20.0
 ) -> AsyncIterator[tuple[SourceT, list[TwinUpdate]]]:
-    """A source from its start to its stop, and what it has told; it does not die meanwhile."""
+    """A source from its start to its stop, and its updates; it must not die meanwhile."""
     source = make(ros_args=ros_args, timeout_s=timeout_s)
     told, deaths = list[TwinUpdate](), list[None]()
     await source.start(told.append, lambda: deaths.append(None))
@@ -91,7 +91,7 @@ class Running:
 async def running(
     limits: Limits | None = None, ros_args: Sequence[str] = (), settings: Settings | None = None
 ) -> AsyncIterator[Running]:
-    """Serve on a free port, as `lupin-twin serve` does; no machine is too busy for an answer."""
+    """Serve on a free port, as `lupin-twin serve` does; no answer times out on a busy machine."""
     settings = settings or Settings()
     limits = limits or Limits(answer_timeout_s=PATIENCE_S)
     twin = LocalTwin(ros_args=ros_args, timeout_s=limits.answer_timeout_s)

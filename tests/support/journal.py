@@ -23,7 +23,7 @@ CLOCK = Clock(NOW, NOW, is_simulated=False)
 
 
 def scan(tag_id: str = "7", at_ns: int = NOW, *, source: str = "robot", **readings: float) -> Scan:
-    """A scan that worked."""
+    """A successful scan."""
     return Scan(
         tag_id,
         at_ns,
@@ -36,7 +36,7 @@ def scan(tag_id: str = "7", at_ns: int = NOW, *, source: str = "robot", **readin
 
 
 def look(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) -> Inspection:
-    """A look at two flowers."""
+    """An inspection of two flowers."""
     flower = Flower(
         species="lupin",
         confidence=0.9,
@@ -53,7 +53,7 @@ def look(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) -> Inspe
 
 
 def pin(tag_id: str = "7", at_ns: int = NOW, x: float = 1.5) -> Pin:
-    """A place."""
+    """A position."""
     return Pin(tag_id, Pose(x, 2.5, 0.0, 0.0, 0.0, 0.0, 1.0), at_ns, at_ns + 1000)
 
 
@@ -79,7 +79,7 @@ _LAST = (
 
 
 def _now(path: Path) -> Clock:
-    """When the last was heard in the last run; `NOW` where there is none."""
+    """The last arrival in the last run; `NOW` where there is none."""
     with closing(open_reader(path)) as connection:
         for run, is_simulated, begun_ns, arrival_ns in connection.execute(_LAST_RUN):
             newest = connection.execute(_LAST.format(run)).fetchone() or (0, 0)
@@ -89,20 +89,20 @@ def _now(path: Path) -> Clock:
 
 
 def kept(path: Path, rows: Iterable[Write], now: Clock | None = None) -> tuple[int, int]:
-    """Write rows, in one life of a twin; returns what `JournalFile.append` does."""
+    """Write rows, in one run of a twin; returns the result of `JournalFile.append`."""
     with opened(path) as file:
         run = file.start(now or _now(path), is_believed=True).run
         return file.append([(run, row) for row in rows])
 
 
 def restored(path: Path, now: Clock | None = None) -> Restored:
-    """What a twin that starts now gets to know."""
+    """What a twin that starts now restores."""
     with opened(path) as file:
         return file.start(now or _now(path), is_believed=False)
 
 
 def known(path: Path, now: Clock | None = None) -> set[Write]:
-    """That as the rows that it may be of."""
+    """The same as the rows that it may come from."""
     found = restored(path, now)
     rows: set[Write] = set(found.rows)
     for tag in found.known.tags:
@@ -113,7 +113,7 @@ def known(path: Path, now: Clock | None = None) -> set[Write]:
 
 
 def select(path: Path, sql: str) -> list[tuple[object, ...]]:
-    """What a reader sees; nothing while the file is still to be made."""
+    """A query of a reader; nothing while the file does not exist yet."""
     if not path.exists():
         return []
     try:
@@ -127,7 +127,7 @@ def select(path: Path, sql: str) -> list[tuple[object, ...]]:
 
 
 def is_whole(path: Path) -> bool:
-    """Whether SQLite finds nothing wrong with a file."""
+    """Whether SQLite finds no error in a file."""
     connection = sqlite3.connect(path)
     try:
         return connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
@@ -139,7 +139,7 @@ def is_whole(path: Path) -> bool:
 def recording(
     path: Path, now: Clock = CLOCK, *, limits: Limits = LIMITS, world: World = World()
 ) -> Iterator[Journal]:
-    """A journal at work, its clock begun."""
+    """A running journal whose clock has started."""
     journal = Journal(path, "/test/lupin_twin", limits, world=world)
     try:
         journal.begin(now)
@@ -149,7 +149,7 @@ def recording(
 
 
 def wait_state(journal: Journal, state: JournalState, part: str = "") -> Condition:
-    """Wait until the journal is in a state, and says a part of a sentence."""
+    """Wait until the journal is in a state, with a part of its message."""
 
     def look_at() -> Condition | None:
         condition = journal.condition

@@ -1,6 +1,6 @@
-"""What a journal answers, as plain JSON: to compare one file's answers with those of another.
+"""A journal's answers as plain JSON, to compare those of one file with those of another.
 
-A question is a list: the name of what is asked, and its arguments.
+A query is a list: its name, and its arguments.
 """
 
 import gzip
@@ -28,15 +28,15 @@ def old(name: str, folder: Path) -> Path:
 
 
 def answers(name: str) -> list[tuple[list[Any], Any]]:
-    """Questions, and what the old build said; an estimate takes other readings of a day now."""
+    """Queries, with the answers of the old build; an estimate now uses other readings of a day."""
     text = gzip.decompress((JOURNALS / f"{name}.answers.json.gz").read_bytes())
-    # What is infinite is kept as no number now.
+    # Infinite values are stored as null now.
     found: list[tuple[list[Any], Any]] = json.loads(text, parse_constant=lambda _: math.nan)
     return [(question, right) for question, right in found if question[0] in _ANSWERS]
 
 
 def answer(connection: sqlite3.Connection, question: list[Any]) -> Any:
-    """What the journal says, as JSON reads it back."""
+    """The journal's answer, as JSON reads it back."""
     kind, *arguments = question
     return json.loads(json.dumps(_ANSWERS[kind](connection, *arguments)))
 
@@ -60,7 +60,7 @@ _ANSWERS: dict[str, Callable[..., Any]] = {"state": _state, "series": _series, "
 
 
 def same(one: Any, other: Any) -> bool:
-    """Whether two answers are the same, but for the last digits of a mean."""
+    """Whether two answers are equal, apart from the last digits of a mean."""
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other) and all(map(same, one, other))
     if isinstance(one, dict) and isinstance(other, dict):

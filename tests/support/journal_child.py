@@ -1,7 +1,7 @@
-"""A process that does nothing but hand rows to a journal, until its input ends.
+"""A process that does nothing but pass rows to a journal, until its input ends.
 
-Each row's number is in its stamp, and is noted in the file `marks` beside the journal once it was
-handed over. What the journal says of itself goes to the standard output.
+Each row's number is in its stamp, and is written to the file `marks` beside the journal once it
+was passed on. Reports of the journal go to the standard output.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""A twin that is killed at a random moment under 200 observations a second, and started again."""
+"""A twin that is killed at a random moment under 200 observations a second, and restarted."""
 
 import random
 import signal
@@ -11,19 +11,19 @@ from tests.support.proc_stat import waited_s
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
 
-# What a journal must not have.
+# Forbidden in a journal.
 TWICE = "SELECT 1 FROM scan WHERE is_copy = 0 GROUP BY series, stamp_ns, source HAVING count(*) > 1"
 TAGS = 30
 RATE = 200
-# What a client was shown so long before is safe.
+# What a client has received so long before is durable.
 SAFE_S = 0.1
 
 
 def kill_and_look(domain: int, journal: Path, chance: random.Random, first: int) -> int:
-    """One round: observe, kill, start again, compare. Values count from `first`; returns the next.
+    """One round: observe, kill, restart, compare. Values count from `first`; returns the next one.
 
     Raises:
-        AssertionError: something that was shown is not known any more.
+        AssertionError: something that was sent to clients is lost.
 
     """
     ros_args = (*OFTEN, "-p", f"journal:={journal}")
@@ -51,10 +51,10 @@ def kill_and_look(domain: int, journal: Path, chance: random.Random, first: int)
                 shown.append((time.monotonic(), waited_s(twin.pid), newest))
         killed, waited = time.monotonic(), waited_s(twin.pid)
         twin.send(signal.SIGKILL)
-    # Nobody is there who would tell it again.
+    # Nothing runs that could publish it again.
     safe: dict[str, float] = {}
     for at, waited_by_then, state in shown:
-        # The time in which its threads waited for a core is the machine's.
+        # Time in which its threads waited for a core is not its own.
         if killed - at - (waited - waited_by_then) >= SAFE_S:
             safe = state
     with twin_node(domain, *ros_args), Peer(domain, "client") as client:

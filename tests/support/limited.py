@@ -1,10 +1,10 @@
-"""`lupin-twin` with other limits than it has, of another world, or with faults: for tests alone.
+"""`lupin-twin` with other limits, another world, or faults: for tests only.
 
 `python -m tests.support.limited [--limit NAME=VALUE] [--world NAME=VALUE]
 [--constant MODULE:NAME=VALUE] [--raise MODULE:NAME:MARKER[:TIMES]] [--hang MODULE:NAME:MARKER]
-ROLE ...`, each as often as wanted, is the command `lupin-twin ROLE ...`, whose `Limits`, `World`
+ROLE ...`, each as often as needed, is the command `lupin-twin ROLE ...`, whose `Limits`, `World`
 and modules have these values. `--raise` lets a function or method fail when the marker occurs in
-its arguments' text, TIMES times (1 without it); with `--hang` it says "hangs" and never comes back.
+its arguments' text, TIMES times (1 without it); with `--hang` it prints "hangs" and never returns.
 """
 
 import argparse
@@ -37,7 +37,7 @@ def _never_come_back(path: str) -> None:
 
 
 def _sabotage(fault: str, do: Callable[[str], None]) -> None:
-    """Let a function `do(path)` first, the first times that the marker is in its arguments."""
+    """Call `do(path)` before a function, the first times that the marker is in its arguments."""
     module, path, marker, *times = fault.split(":")
     *owners, name = path.split(".")
     owner = functools.reduce(getattr, owners, import_module(module))
@@ -62,7 +62,7 @@ def command() -> None:
     options, rest = parser.parse_known_args()
     sys.argv[1:] = rest
     limit_blas_threads()
-    # Before anybody else has imported what fails.
+    # Before anything else has imported the failing function.
     for fault in vars(options)["raise"]:
         _sabotage(fault, _fail)
     for hang in options.hang:

@@ -1,4 +1,4 @@
-"""`lupin-twin web` processes, attached to twins in processes of their own."""
+"""`lupin-twin web` processes, attached to twins in their own processes."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,20 +14,20 @@ from tests.support.web import Bridge
 
 @contextmanager
 def attached(process: Process, peer: Peer) -> Iterator[Bridge]:
-    """A bridge's process with an HTTP client of it; whether it has a twin is another matter."""
+    """A bridge's process with an HTTP client; a twin need not exist."""
     with httpx.Client(base_url=url_of(process), timeout=PATIENCE_S, trust_env=False) as http:
         yield Bridge(process, str(http.base_url).rstrip("/"), peer, http)
 
 
 def wait_until_ready(live: Bridge) -> None:
-    """Wait until the bridge has heard a twin."""
+    """Wait until the bridge has received a twin."""
     wait_for(lambda: live.get("/readyz").status_code == 200, f"a live twin behind {live.url}")
 
 
 def field_of(live: Bridge, **request: Any) -> httpx.Response:
     """The answer with a field, once the bridge has found the twin's service.
 
-    It hears a twin's states before that, and who has just died may still seem to offer its own.
+    It receives a twin's states before that, and a dead twin may still seem to offer its service.
     """
 
     def look() -> httpx.Response | None:

@@ -1,4 +1,4 @@
-"""A log that lives through something, and the plainest account of it: every row, in a list."""
+"""A log with any history, and its simplest model: every row, in a list."""
 
 import math
 import sqlite3
@@ -45,7 +45,7 @@ def _seen(row: Write) -> Flower | None:
 
 @dataclass
 class Life:
-    """Writes rows into a log and remembers each that is new, with its run."""
+    """Writes rows into a log and records each new one, with its run."""
 
     connection: sqlite3.Connection
     rows: list[tuple[int, Write]] = field(default_factory=list)
@@ -57,7 +57,7 @@ class Life:
         self._appender = Appender(self.connection)
 
     def write(self, rows: Iterable[Write]) -> None:
-        """Rows that come together."""
+        """Rows that arrive together."""
         rows = list(rows)
         with transaction(self.connection):
             self._appender.append(self.run, rows)
@@ -67,7 +67,7 @@ class Life:
                 self.rows.append((self.run, new))
 
     def _new(self, row: Write) -> Write | None:
-        """What is new of it: of a write that is known already, other sensors."""
+        """The new part of it: of a known write, other sensors."""
         if isinstance(row, Pin):
             return row
         key = (self.run, row.tag_id, kind_of(row), row.stamp_ns, row.source)
@@ -106,7 +106,7 @@ class Life:
             self._appender.flush()
 
     def delete(self, before_ns: int) -> None:
-        """Have retention delete what arrived before."""
+        """Let retention delete what arrived before."""
         with transaction(self.connection):
             while purge_step(self.connection, Limits(0.0, 10**12), before_ns):
                 pass
@@ -122,7 +122,7 @@ class Life:
     def _of(self, tag_id: str) -> list[tuple[int, Write]]:
         return [(n, row) for n, row in self._holds() if tag_id in (EVERY_TAG, row.tag_id)]
 
-    # --- what there was -----------------------------------------------------------------------
+    # --- the expected rows --------------------------------------------------------------------
 
     def readings(self, tag_id: str, sensor: str) -> list[Entry]:
         return sorted(
@@ -185,7 +185,7 @@ class Life:
         ]
 
     def export(self, start_ns: int, end_ns: int, tag_id: str | None) -> list[PastRow]:
-        # Each run carries what the one before it knew; it knows nothing of those behind it.
+        # Each run carries the state of the one before it; it knows nothing of later ones.
         places: dict[tuple[int, str], tuple[float, float]] = {}
         for since, row in self.rows:
             if isinstance(row, Pin):
@@ -213,13 +213,13 @@ class Life:
 
 
 def check(answer: SeriesPast, request: SeriesRequest, entries: list[Entry], *, now_ns: int) -> None:
-    """An answer holds all entries that there were: each, or each bucket's count and values."""
+    """An answer contains all expected entries: each, or each bucket's count and values."""
     end_ns = request.end_ns or now_ns + 1
     asked = [entry for entry in entries if request.start_ns <= entry[0] < end_ns]
     if not answer.is_bucketed:
         assert len(asked) <= request.max_points
         assert list(answer.stamps_ns) == [stamp_ns for stamp_ns, *_ in asked]
-        # What is no number is null in the log.
+        # A value that is no number is null in the log.
         values = [value if math.isfinite(value) else math.nan for *_, value in asked]
         assert repr(answer.means) == repr(tuple(values))
         assert repr(answer.minima) == repr(answer.maxima) == repr(answer.means)
@@ -290,7 +290,7 @@ periods = st.one_of(
 
 @contextmanager
 def lived(path: Path, told: Iterable[tuple[str, Any]] = ()) -> Iterator[Life]:
-    """A log that has lived through the steps."""
+    """A log that has gone through the steps."""
     connection = open_writer(path)
     connection.execute("PRAGMA synchronous = OFF")
     try:

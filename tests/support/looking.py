@@ -1,4 +1,4 @@
-"""Questions that a test asks of the process that looks back: they cross to it by their names."""
+"""Queries that a test sends to the past process: they are pickled by name."""
 
 import os
 import sys
@@ -18,7 +18,7 @@ from lupin_twin.runtime.workers import ShouldStop
 
 @dataclass(frozen=True, slots=True)
 class Count:
-    """How many tags there were."""
+    """The number of tags."""
 
     at_ns: int
 
@@ -30,7 +30,7 @@ class Count:
 
 @dataclass(frozen=True, slots=True)
 class Endless:
-    """Work that ends when nobody waits for it any more, and not before."""
+    """Work that ends when it is cancelled, and not before."""
 
     def __call__(self, find: Find, should_stop: ShouldStop) -> None:
         """See `PastQuery`."""
@@ -44,7 +44,7 @@ def _until_told(should_stop: ShouldStop) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Running:
-    """How many are at work for `Endless` in that process, and how nice it is."""
+    """How many `Endless` run in that process, and its nice value."""
 
     def __call__(self, find: Find, should_stop: ShouldStop) -> tuple[int, int]:
         """See `PastQuery`."""
@@ -58,7 +58,7 @@ def _endless() -> int:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """An answer with so many bytes."""
+    """An answer with that many bytes."""
 
     count: int
 
@@ -69,7 +69,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class MapCells:
-    """How many cells the map has that comes with it, and which map it is over there."""
+    """The number of cells of the map that is sent with it, and the map's identity over there."""
 
     occupancy: OccupancyMap
 
@@ -80,7 +80,7 @@ class MapCells:
 
 @dataclass(frozen=True, slots=True)
 class Failing:
-    """One that meets an error: refused, of its own fault, or one that cannot cross."""
+    """A query that fails: refused, by its own fault, or with an error that cannot be pickled."""
 
     how: str
 

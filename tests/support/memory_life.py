@@ -1,4 +1,4 @@
-"""A twin over a file, without ROS: its clocks are set by hand, its observations made by hand."""
+"""A twin over a file, without ROS, with clocks and observations by hand."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,7 +32,7 @@ NOWHERE = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Twin:
-    """A life of a twin over a file, without ROS; its clocks are set by hand."""
+    """One run of a twin over a file, without ROS; the test sets its clocks."""
 
     def __init__(self, path: Path, at_s: float, *, is_simulated: bool = False) -> None:
         self.store = TwinStore()
@@ -44,7 +44,7 @@ class Twin:
         self.at(at_s)
 
     def at(self, at_s: float, *, passed_s: float = 0.0) -> None:
-        """The clock says `at_s`, s after `NOW`; `passed_s` by the steady clock."""
+        """Set the clock to `at_s`, s after `NOW`; `passed_s` by the steady clock."""
         self.steady_s += passed_s
         self.now_ns = int(at_s * S) + (0 if self.is_simulated else NOW)
         self.wall_ns = NOW + int(at_s * S)
@@ -63,7 +63,7 @@ class Twin:
         flower: Flower | None = None,
         **readings: float,
     ) -> None:
-        """An observation comes, now, with this stamp; with a flower it is a look."""
+        """Receive an observation now, with this stamp; with a flower it is an inspection."""
         stamp_ns = 0 if stamp_s is None else int(stamp_s * S)
         stamp_ns += 0 if self.is_simulated or stamp_s is None else NOW
         of: dict[str, Any] = {
@@ -88,11 +88,11 @@ class Twin:
 
     @property
     def live(self) -> dict[str, TagState]:
-        """What is known now."""
+        """The current state."""
         return by_id(self.store.snapshot(self.now_ns, "map"))
 
     def past(self, at_s: float | None = None) -> dict[str, TagState]:
-        """What the log says of a moment; of now without one."""
+        """The log's state at a moment, by default now."""
         wait_for(lambda: self.memory.condition.waiting == 0, "all to be written")
         offset_ns = 0 if self.is_simulated else NOW
         at_ns = self.now_ns if at_s is None else int(at_s * S) + offset_ns
@@ -101,7 +101,7 @@ class Twin:
 
     def says(self, name: str = "t", tag: str = "7") -> tuple[float, float | None]:
         """A sensor's value and age, the same live and in the log."""
-        # A clock that has just turned may not have its run in the log yet.
+        # A clock that has just gone back may not have its run in the log yet.
         wait_for(lambda: self.live == self.past(), "the log to say what is known live")
         [reading] = [r for r in self.live[tag].readings if r.name == name]
         assert reading.observed_at_ns is not None

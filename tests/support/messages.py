@@ -1,4 +1,4 @@
-"""Messages as a robot would send them, with the least to write in a test."""
+"""Messages as a robot sends them, with short calls."""
 
 from array import array
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ def pose(x: float = 0.0, y: float = 0.0, z: float = 0.0, w: float = 1.0) -> Any:
 
 NO_POSE = pose(w=0.0)
 
-# What ROS tells with a message, here of one that came at once.
+# ROS's information about a message, here of one that arrived at once.
 INFO = {"source_timestamp": 0, "received_timestamp": 0, "publication_sequence_number": None}
 
 
@@ -31,7 +31,7 @@ def scan(
     frame_id: str = "map",
     stamp_s: float = 0.0,
 ) -> Any:
-    """An observation of a tag's sensors; `at` is the tag's place, none without."""
+    """An observation of a tag's sensors; `at` is the tag's position, none by default."""
     msg = Observation(kind=Observation.KIND_TAG_READING, status=status, source="test")
     msg.header.frame_id = frame_id
     set_stamp(msg.header, stamp_s)

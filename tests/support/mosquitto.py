@@ -1,4 +1,4 @@
-"""A real mosquitto on a port of the test's own, and what it has been told."""
+"""A real mosquitto on a port of the test's own, and the messages that it received."""
 
 import json
 import os
@@ -36,7 +36,7 @@ class Broker:
 
     @contextmanager
     def running(self) -> Iterator[Process]:
-        """The broker's process; it remembers nothing from one start to the next."""
+        """The broker's process; it stores nothing from one start to the next."""
         lines = [f"listener {self.port} 127.0.0.1", "persistence false", "user root"]
         if self.certificate is not None:
             lines += [f"certfile {self.certificate.cert}", f"keyfile {self.certificate.key}"]
@@ -55,7 +55,7 @@ class Broker:
 
 
 class Subscriber:
-    """Hears all that is published at a broker, in a thread of its own."""
+    """Receives all that is published at a broker, in a thread of its own."""
 
     def __init__(self, broker: Broker, topics: str = "#") -> None:
         self.heard: list[MQTTMessage] = []
@@ -89,6 +89,6 @@ class Subscriber:
         return [bytes(message.payload) for message in self.heard if message.topic == topic]
 
     def last(self, topic: str) -> Any:
-        """The newest payload of a topic as JSON; None: there is none."""
+        """The latest payload of a topic as JSON; None: there is none."""
         found = self.of(topic)
         return json.loads(found[-1]) if found else None

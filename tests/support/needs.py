@@ -1,6 +1,6 @@
 """What `pytest --quick` leaves out: files that need ROS, a browser, or processes of the product.
 
-Nobody keeps a list: a file is skipped as it is collected, once it imports something of that.
+There is no list: a file is skipped during collection when it imports one of these.
 """
 
 import importlib.abc
@@ -12,7 +12,7 @@ import pytest
 
 from tests.support.structure import ROS
 
-# A browser's driver; what starts processes of the product, which import ROS, or other programs.
+# A browser's driver; modules that start processes of the product, which import ROS, or programs.
 OUTSIDE = ROS | {"playwright", "tests.support.processes", "tests.support.programs"}
 
 
@@ -26,5 +26,5 @@ class _NothingFromOutside(importlib.abc.MetaPathFinder):
 
 
 def let_nothing_in() -> None:
-    """From now on, who imports anything of that is skipped."""
+    """From now on, a test file that imports any of that is skipped."""
     sys.meta_path.insert(0, _NothingFromOutside())

@@ -1,7 +1,7 @@
-"""The simulator's ordinary days, as the judge hears them.
+"""The simulator's ordinary days, as the judge receives them.
 
-The demo's past is made for whoever watches: a day takes 24 minutes, a round of the patrol 48 s.
-Here its times are those of the house, in which a day takes 24 hours: a round takes 48 minutes.
+The demo's past has its own pace: a day takes 24 minutes, a round of the patrol 48 s.
+Here the times are those of the greenhouse, in which a day takes 24 hours and a round 48 minutes.
 """
 
 from typing import Final
@@ -20,7 +20,7 @@ _DAY_SPEED: Final = 60.0
 
 
 def ordinary_days(seed: int = 0) -> list[PastWrite]:
-    """Scans and looks of three days, from 0 ns on, as a journal tells them."""
+    """Scans and inspections of three days, from 0 ns on, as a journal returns them."""
     rows = past(GreenhouseSimulator(), seed, _DAY_SPEED, 1.0, 0)
     told = (row for row in rows if not isinstance(row, Pin))
     return [

@@ -1,4 +1,4 @@
-"""A past that a test makes up, for routes over any source: plain lists, searched plainly."""
+"""A made-up past, for routes over any source: plain lists, searched linearly."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ ResultT = TypeVar("ResultT")
 
 
 async def look_up(question: PastQuery[ResultT], past: MadeUp, workers: Workers) -> ResultT:
-    """Answer a question on a worker here."""
+    """Answer a query in a worker here."""
     return await asyncio.wrap_future(workers.submit(lambda stop: question(past.find, stop), 0.0))
 
 
 @dataclass
 class MadeUp:
-    """The three questions that a source answers about the past, and what was asked of it.
+    """The three queries of the past that a source answers, and the calls that it received.
 
     `points` are (stamp, value) by (tag, sensor or event); `lots` are the rows of an export.
     """
@@ -53,7 +53,7 @@ class MadeUp:
     is_closed: bool = False
 
     def find(self, need: Any) -> Any:
-        """What is needed of the past."""
+        """The part of the past that a query needs."""
         if isinstance(need, SeriesRequest):
             return self.series(need)
         if isinstance(need, RecentRequest):
@@ -61,23 +61,23 @@ class MadeUp:
         if isinstance(need, ScansRequest):
             return ()
         if isinstance(need, NotesRequest):
-            return PastNotes("", 0, ())  # nobody has said anything
+            return PastNotes("", 0, ())  # no notes
         if isinstance(need, WritesRequest):
             raise NotRemembered("what was heard is asked of the journal")
         return self.state_at(need)
 
     def state_at(self, at_ns: int) -> Snapshot:
-        """The one state, as if it were of any moment."""
+        """The one state, for any moment."""
         self._note(at_ns)
         return replace(self.snapshot, stamp_ns=at_ns)
 
     def recent(self, request: RecentRequest) -> tuple[PastWrite, ...]:
-        """Nothing: what the state has is all there is."""
+        """Nothing: the state has everything."""
         self._note(request.at_ns)
         return ()
 
     def series(self, request: SeriesRequest) -> SeriesPast:
-        """The points of a period, or as many buckets as are asked for."""
+        """The points of a period, or the requested number of buckets."""
         self._note(request)
         end_ns = request.end_ns or self.now_ns
         all_points = self.points.get((request.tag_id, request.sensor_type), [])
@@ -111,11 +111,11 @@ class MadeUp:
         sensor_type: str | None,
         write: Callable[[Sequence[PastRow]], Any],
     ) -> AsyncGenerator[Any]:
-        """The lots, one by one; the error, if there is one, behind the last."""
+        """The batches, one by one; the error, if there is one, after the last."""
         self.asked.append((start_ns, end_ns, tag_id, sensor_type))
         try:
             for lot in self.lots:
-                await asyncio.sleep(0)  # as it is wherever lots come from
+                await asyncio.sleep(0)  # as it is for every source of batches
                 self.lots_taken += 1
                 yield write(lot)
             if self.error is not None:
@@ -130,7 +130,7 @@ class MadeUp:
 
 
 def answered_by(log: Any, query: Query, now_ns: int = 2**62) -> bytes:
-    """The body of a query's answer over a log, as the process that looks back makes it."""
+    """The body of a query's answer over a log, as the past process makes it."""
     now = Now(now_ns, "map", UNKNOWN_JOURNAL)
     answer = answered(query, "", lambda need: _found(need, now, log), lambda: False).answer
     assert answer is not None

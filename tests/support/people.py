@@ -26,13 +26,13 @@ OWN = {"X-Lupin-Twin": "1"}
 PASSWORD = "correct horse battery staple"
 TOKEN = "a-token-of-43-characters-0123456789-abcdefg"
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
-# As cheap as argon2id can be: what a hash costs to verify is written in it.
+# As cheap as argon2id can be: the hash contains its own cost.
 _HASH = PasswordHasher(time_cost=1, memory_cost=8, parallelism=1).hash(PASSWORD)
 
 
 @contextmanager
 def changing(path: Path) -> Iterator[Accounts]:
-    """The file of accounts, made where there is none, as the command changes it."""
+    """The accounts file, created if missing, opened as the command does."""
     make_file(path)
     with closing(Accounts(path, is_writer=True)) as accounts:
         yield accounts
@@ -59,7 +59,7 @@ def sign_in(client: httpx.Client, name: str, password: str = PASSWORD) -> httpx.
 
 @contextmanager
 def signed_in(url: str, name: str) -> Iterator[httpx.Client]:
-    """A browser of somebody who has signed in; it sends the bridge's own header."""
+    """A browser that is signed in; it sends the bridge's own header."""
     with httpx.Client(base_url=url, timeout=PATIENCE_S, trust_env=False, headers=OWN) as browser:
         answer = sign_in(browser, name)
         assert answer.status_code == 204, answer.text
@@ -86,7 +86,7 @@ def write(browser: httpx.Client, **note: Any) -> httpx.Response:
 
 
 def notes(live: Bridge, **query: str) -> list[Note]:
-    """What people have said, the newest first."""
+    """All notes, the latest first."""
     answer = live.get("/api/notes", BEARER, **query)
     return Notes.model_validate_json(answer.content).notes
 
@@ -98,7 +98,7 @@ def in_s(live: Bridge, seconds: float) -> str:
 
 
 def end_of(connection: ClientConnection) -> str:
-    """Why a WebSocket ended."""
+    """The reason with which a WebSocket was closed."""
     try:
         while True:
             connection.recv(timeout=PATIENCE_S)

@@ -1,4 +1,4 @@
-"""A PostgreSQL of the test session's own, in a temporary folder, reached through a socket there."""
+"""A PostgreSQL for one test session, in a temporary folder with its socket."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _BIN = Path("/usr/lib/postgresql/15/bin")
 
 
 def _run(*command: str) -> None:
-    # It refuses to be root's.
+    # PostgreSQL refuses to run as root.
     user = _USER if os.geteuid() == 0 else None
     done = subprocess.run(
         command, user=user, group=user, cwd="/", capture_output=True, text=True, check=False
@@ -68,7 +68,7 @@ class Postgres:
         _run(self._pg_ctl, "-D", str(self._data), "-o", options, "-l", log, "-w", "start")
 
     def listen_with_tls(self, address: str, cert: Path, key: Path) -> None:
-        """Start it again, on an address of this machine's own, with a certificate."""
+        """Restart it with a certificate, on an address of this machine's own."""
         files = []
         for given in (cert, key):
             file = Path(shutil.copy(given, self.folder))
@@ -84,39 +84,39 @@ class Postgres:
         self.start()
 
     def promote(self) -> None:
-        """Make a primary of a standby; returns when it takes writes."""
+        """Promote a standby to primary; returns when it takes writes."""
         _run(self._pg_ctl, "-D", str(self._data), "-w", "promote")
 
     def stop(self) -> None:
-        """End it without a word to its clients, if it runs."""
+        """Kill it without a message to its clients, if it runs."""
         if not (self._data / "postmaster.pid").exists():
             return
         _run(self._pg_ctl, "-D", str(self._data), "-m", "immediate", "-w", "stop")
 
     def freeze(self) -> None:
-        """Stop it and each of its processes, as a disk does that answers no more."""
+        """Stop it and all of its processes, as a hanging disk does."""
         self._signal(signal.SIGSTOP)
 
     def thaw(self) -> None:
-        """Let a frozen one go on."""
+        """Let a frozen server go on."""
         self._signal(signal.SIGCONT)
 
     def _signal(self, number: signal.Signals) -> None:
         pid = int((self._data / "postmaster.pid").read_text().split()[0])
-        # First of all itself: then there is no other one.
+        # The postmaster first: then no new process can start.
         os.kill(pid, number)
         for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-            with suppress(ProcessLookupError):  # one that has ended meanwhile
+            with suppress(ProcessLookupError):  # it has ended meanwhile
                 os.kill(int(child), number)
 
     def kill(self) -> None:
-        """Kill it; its other processes end by themselves when they see that."""
+        """Kill it; its other processes end by themselves when they notice."""
         pid = int((self._data / "postmaster.pid").read_text().split()[0])
         children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
         os.kill(pid, signal.SIGKILL)
-        # They are nobody's children here: adopted, and waited for, elsewhere.
+        # They are not our children here: other processes adopt them and wait for them.
         wait_for(lambda: not any(map(is_running, [str(pid), *children])), "the end of all of it")
-        # Where nobody buries the dead, their number counts as one that lives.
+        # Where zombies are not reaped, their pid counts as alive.
         (self._data / "postmaster.pid").unlink()
         (self.folder / ".s.PGSQL.5432.lock").unlink()
 
@@ -125,11 +125,11 @@ class Postgres:
 def server(
     *, fsync: bool = False, connections: int = 100, primary: Postgres | None = None
 ) -> Iterator[Postgres]:
-    """One that runs; it ends, and is gone, with the block.
+    """A running server; it is stopped and deleted with the block.
 
-    `primary`: it is the standby of that one, which from now on waits for it at each commit.
+    `primary`: this one is its standby, and the primary now waits for it at each commit.
     """
-    # Short: the path of a socket has 107 bytes at most.
+    # Short: the path of a socket has at most 107 bytes.
     folder = Path(tempfile.mkdtemp(prefix="pg", dir="/tmp"))
     try:
         made = Postgres(folder, fsync=fsync, connections=connections, primary=primary)

@@ -1,4 +1,4 @@
-"""What a process costs, from /proc (proc_pid_stat(5), proc_pid_status(5))."""
+"""The cost of a process, from /proc (proc_pid_stat(5), proc_pid_status(5))."""
 
 import os
 from contextlib import suppress
@@ -10,13 +10,13 @@ _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 def cpu_s(pid: int) -> float:
     """Processor time of all its threads so far, user and system, s."""
-    # The name stands in brackets and may hold blanks and brackets of its own.
+    # The name is in brackets and may contain blanks and brackets of its own.
     fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / _TICKS_PER_S
 
 
 def waited_s(pid: int) -> float:
-    """How long its threads that are there have waited for a core so far, s (schedstats, Linux)."""
+    """How long its current threads have waited for a core so far, s (schedstats, Linux)."""
     waited_ns = 0
     for task in Path(f"/proc/{pid}/task").iterdir():
         with suppress(FileNotFoundError, ProcessLookupError):  # it has just ended
@@ -31,9 +31,9 @@ def resident_mb(pid: int) -> float:
 
 
 def open_files(pid: int) -> int:
-    """How many descriptors it has open, without the journal's and those to processes of its own.
+    """How many descriptors it has open, without the journal's and those to its child processes.
 
-    Those are there from the first question about the past on, or from some seconds on.
+    Those are open from the first query of the past on, or after some seconds.
     """
     own = {line.split()[6] for line in Path("/proc/net/unix").read_text("ascii").splitlines()[1:]}
     files = (_target(path) for path in Path(f"/proc/{pid}/fd").iterdir())
@@ -46,7 +46,7 @@ def open_files(pid: int) -> int:
 
 
 def _target(descriptor: Path) -> str:
-    """What it stands for (proc_pid_fd(5)); nothing in particular once it is closed."""
+    """The descriptor's target (proc_pid_fd(5)); empty once it is closed."""
     try:
         return str(descriptor.readlink())
     except FileNotFoundError:
@@ -54,7 +54,7 @@ def _target(descriptor: Path) -> str:
 
 
 def reset_peak(pid: int) -> None:
-    """Let `peak_mb` start anew (proc_pid_clear_refs(5))."""
+    """Restart `peak_mb` (proc_pid_clear_refs(5))."""
     Path(f"/proc/{pid}/clear_refs").write_text("5", encoding="ascii")
 
 

@@ -1,4 +1,4 @@
-"""Real processes: started, watched, and ended without a trace."""
+"""Real processes: started, watched, and removed without a trace."""
 
 import contextlib
 import io
@@ -19,12 +19,12 @@ from tests.support.domains import ros_env
 from tests.support.template import Forked, Template
 from tests.support.waiting import PATIENCE_S, wait_for
 
-# ROS arguments, last on a command line: a state so often that none has to be waited for, and that
-# a busy machine makes no silence.
+# ROS arguments, last on a command line: states so often that no test waits for one, and that a
+# busy machine causes no silence.
 OFTEN = ("--ros-args", "-p", "state_publish_rate_hz:=20.0")
 
-# A shell that runs the tests in its background has them ignore SIGINT, and with them all that they
-# start, until that asks for it: a signal before would be lost.
+# A shell that runs the tests in the background makes them ignore SIGINT, with all child processes
+# until they set a handler: an earlier signal would be lost.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -32,9 +32,9 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 class Process:
     """A process with its output in a file; killed with all its children at the end of `with`.
 
-    Within pytest, and unless it is to be started `afresh`, one of our programs is forked from a
-    process that has imported it already (`Template`). What a test measures of a process (memory,
-    the time of its start, a signal amid it) is that of one afresh.
+    Within pytest, and unless `afresh`, one of our programs is forked from a process that has
+    imported it already (`Template`). A test that measures a process (memory, the time of its
+    start, a signal during it) starts it afresh.
     """
 
     def __init__(
@@ -76,9 +76,9 @@ class Process:
 
     @property
     def output(self) -> str:
-        """All that it has printed so far, both streams; what Fast DDS says of its ports is not its.
+        """All that it has printed so far, both streams, without Fast DDS's messages about ports.
 
-        Two processes that open one port of shared memory at once make it complain, and try again.
+        When two processes open one port of shared memory at once, it logs that and tries again.
         """
         text = Path(self._output.name).read_text(encoding="utf-8", errors="replace")
         return "".join(line for line in text.splitlines(True) if "RTPS_TRANSPORT_SHM" not in line)
@@ -88,7 +88,7 @@ class Process:
         return self._process.poll()
 
     def wait_for_output(self, text: str, timeout_s: float = PATIENCE_S) -> str:
-        """Wait until it has printed `text`; returns the line that holds it."""
+        """Wait until it has printed `text`; returns the line that contains it."""
 
         def look() -> str | None:
             for line in self.output.splitlines():
@@ -101,7 +101,7 @@ class Process:
         return str(wait_for(look, f"{text!r} in the output", timeout_s))
 
     def wait_until_listening(self, port: int) -> None:
-        """Wait until it takes connections at a port of loopback."""
+        """Wait until it accepts connections at a port of loopback."""
 
         def listens() -> bool:
             assert self.exit_code is None, self.output
@@ -115,7 +115,7 @@ class Process:
         self._process.send_signal(number)
 
     def stand_still(self, seconds: float = 1.5) -> None:
-        """Stop the process for so long, as Ctrl-Z does, and let it go on."""
+        """Stop the process for that long, as Ctrl-Z does, and let it go on."""
         until = time.monotonic() + seconds
         self.freeze()
         wait_for(lambda: time.monotonic() > until, "the time to pass")
@@ -132,7 +132,7 @@ class Process:
 
     def _stands_still(self) -> bool:
         stats = [path.read_text() for path in Path(f"/proc/{self.pid}/task").glob("*/stat")]
-        # proc(5): the state comes after the name, which may hold anything.
+        # proc(5): the state comes after the name, which may contain anything.
         return all(stat.rpartition(") ")[2].startswith("T") for stat in stats)
 
     def wait(self, timeout_s: float = PATIENCE_S) -> int:
@@ -152,7 +152,7 @@ class Process:
 
 
 def run(command: Sequence[str], env: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
-    """What a command says and ends with; one of our programs is forked, as a `Process` is."""
+    """A command's output and exit code; one of our programs is forked, as a `Process` is."""
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
         if _can_be_forked(command, env):
             code = _template().start(command, env, out, err).wait(PATIENCE_S)
@@ -164,7 +164,7 @@ def run(command: Sequence[str], env: Mapping[str, str]) -> subprocess.CompletedP
 
 
 def said(*words: object) -> subprocess.CompletedProcess[str]:
-    """What a command that needs no ROS says and ends with; it runs in this process."""
+    """Output and exit code of a command that needs no ROS; it runs in this process."""
     from lupin_bridge.cli.command import main
 
     own = [str(word) for word in words]
@@ -186,12 +186,12 @@ def twin_node(domain: int, *ros_args: str, afresh: bool = False, **env: str) -> 
 
 
 def lupin_twin(domain: int, role: str, *args: str, afresh: bool = False, **env: str) -> Process:
-    """`lupin-twin ROLE` on a free port; ask `url_of` for its address."""
+    """`lupin-twin ROLE` on a free port; `url_of` gives its address."""
     has_faults = bool({"--raise", "--hang"} & {*args})
     is_other = has_faults or {"--limit", "--world", "--constant"} & {*args}
     module = "tests.support.limited" if is_other else "lupin_bridge.cli.command"
     command = [sys.executable, "-m", module, role, "--port", "0", *args]
-    # What fails has to do so before anybody has imported it.
+    # A failing function has to be replaced before anything imports it.
     return Process(command, ros_env(domain, **env), afresh=afresh or has_faults)
 
 
@@ -213,19 +213,19 @@ def faults(kind: Literal["--raise", "--hang"], *places: str) -> tuple[str, ...]:
 
 
 def free_port() -> int:
-    """A port of loopback that nobody listens on."""
+    """A free port of loopback."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         return int(free.getsockname()[1])
 
 
 def patrols_of(pid: int) -> list[int]:
-    """The patrol that a demo has started, and not what makes its past (`--fill-past`)."""
+    """The patrol that a demo has started, without the process for its past (`--fill-past`)."""
     return children_of(pid, b"lupin_patrol\0")
 
 
 def children_of(pid: int, word: bytes) -> list[int]:
-    """Those processes that a process has started with this word on their command line."""
+    """The child processes with this word on their command line."""
     tasks = Path(f"/proc/{pid}/task")
     children = [
         int(child)
@@ -236,10 +236,10 @@ def children_of(pid: int, word: bytes) -> list[int]:
 
 
 def is_running(pid: int | str) -> bool:
-    """Whether a process is there, and no zombie (proc_pid_stat(5))."""
+    """Whether a process exists and is no zombie (proc_pid_stat(5))."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii")
-    except (FileNotFoundError, ProcessLookupError):  # gone before or while it is read
+    except (FileNotFoundError, ProcessLookupError):  # gone before or during the read
         return False
     return stat.rpartition(") ")[2][0] != "Z"
 
@@ -259,7 +259,7 @@ def _template() -> Template:
 
 
 def _command(pid: int) -> bytes:
-    """What it was started with (proc_pid_cmdline(5)); nothing once it is gone."""
+    """Its command line (proc_pid_cmdline(5)); empty once it is gone."""
     try:
         return Path(f"/proc/{pid}/cmdline").read_bytes()
     except (FileNotFoundError, ProcessLookupError):
@@ -267,7 +267,7 @@ def _command(pid: int) -> bytes:
 
 
 def _state_of_its_own(env: Mapping[str, str]) -> dict[str, str]:
-    """A folder for what a process keeps, unless it was given one: it begins with no memory."""
+    """A state folder for a process, unless it was given one: it starts without a past."""
     state = os.environ["XDG_STATE_HOME"]
     if env.get("XDG_STATE_HOME", state) != state:
         return {}

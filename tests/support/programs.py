@@ -1,4 +1,4 @@
-"""Programs that no package registry of Python's or Node's has: `.ci/tools` installs them."""
+"""Programs that neither Python's nor Node's registry has: `.ci/tools` installs them."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""An HTTP client that can say what no proper client would: bytes in, bytes out."""
+"""An HTTP client that can send what no proper client would: bytes in, bytes out."""
 
 import socket
 import ssl
@@ -14,7 +14,7 @@ UPGRADE = (
 
 
 def handshake(path: str) -> bytes:
-    """The request for a WebSocket; of the protocol's name, only Foxglove's route takes notice."""
+    """The request for a WebSocket; only Foxglove's route reads the subprotocol."""
     return b"GET %b HTTP/1.1\r\n%bSec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n" % (
         path.encode(),
         UPGRADE,
@@ -22,7 +22,7 @@ def handshake(path: str) -> bytes:
 
 
 def connect(url: str, source: str = "", *, room: int | None = None) -> socket.socket:
-    """A connection to a bridge; `source` is our own address, `room` what it takes unread, bytes."""
+    """A connection to a bridge; `source` is our own address, `room` its receive buffer, bytes."""
     address = urlsplit(url)
     client = socket.socket()
     try:
@@ -38,7 +38,7 @@ def connect(url: str, source: str = "", *, room: int | None = None) -> socket.so
 
 
 def heard(client: socket.socket) -> bytes:
-    """All that comes until the connection ends."""
+    """All bytes until the connection ends."""
     blocks = []
     with suppress(ConnectionError):
         while block := client.recv(65_536):
@@ -47,7 +47,7 @@ def heard(client: socket.socket) -> bytes:
 
 
 def answer(url: str, said: bytes, trust: ssl.SSLContext | None = None) -> bytes:
-    """All that comes after this was said, until the other side ends the connection."""
+    """All bytes after this request, until the other side ends the connection."""
     with connect(url) as plain:
         if trust is None:
             plain.sendall(said)

@@ -1,4 +1,4 @@
-"""A WebSocket client that can say what no proper client would: bytes in, bytes out."""
+"""A WebSocket client that can send what no proper client would: bytes in, bytes out."""
 
 import asyncio
 import random
@@ -59,9 +59,9 @@ class RawClient:
         self.socket.close()
 
     def say(self, data: bytes) -> list[tuple[int, bytes]]:
-        """Say this and no more, and return all frames up to the end of the connection."""
+        """Send only this, and return all frames up to the end of the connection."""
         blocks = [self.received]
-        # An error: the server had enough, and reset the connection before it had read all.
+        # An error: the server reset the connection before it had read everything.
         with suppress(OSError):
             self.socket.sendall(data)
             self.socket.shutdown(socket.SHUT_WR)

@@ -1,4 +1,4 @@
-"""A real HTTP server that takes what a webhook posts, and answers as a test wants."""
+"""A real HTTP server that accepts a webhook's posts, and answers as a test needs."""
 
 import json
 import socket
@@ -11,7 +11,7 @@ from typing import Any
 
 from tests.support.waiting import PATIENCE_S
 
-# What is said to a request: bytes, and None: nothing more, for as long as the test goes on.
+# The answer to a request: bytes, and None: nothing more until the test ends.
 Answer = Callable[["Posted"], Iterator[bytes | None]]
 
 
@@ -41,7 +41,7 @@ def silence(_: Posted) -> Iterator[bytes | None]:
 
 @dataclass
 class Receiver:
-    """What came, and what is said to the next; the last of `answers` is said again and again."""
+    """The received posts, and the answers to come; the last of `answers` is repeated."""
 
     port: int
     answers: list[Answer]
@@ -67,7 +67,7 @@ class Receiver:
                         return
                     client.sendall(piece)
             except OSError:
-                return  # it did not want to hear all of it
+                return  # it stopped before the end
 
 
 def _read(client: socket.socket) -> Posted | None:
@@ -108,7 +108,7 @@ def receiver(
                         return
                     if tls is not None:
                         client = tls.wrap_socket(client, server_side=True)
-                except OSError:  # nobody that can be served: no TLS, or gone already
+                except OSError:  # a failed TLS handshake, or a closed connection
                     if running.is_over.is_set():
                         return
                     continue

@@ -1,4 +1,4 @@
-"""Recordings as somebody else would write them."""
+"""Recordings as other programs write them."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -20,7 +20,7 @@ class Sent(NamedTuple):
 
 
 def type_of(message: Any) -> str:
-    """What a message's type is called in recordings."""
+    """The name of a message type in recordings."""
     kind = type(message)
     return f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
 

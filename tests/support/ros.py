@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 def latched(depth: int) -> QoSProfile:
-    """Written out here once more: the tests hold the node to the contract, not to its own code."""
+    """Written out again: the tests compare the node with the contract, not with its own code."""
     return QoSProfile(
         depth=depth,
         reliability=ReliabilityPolicy.RELIABLE,
@@ -34,12 +34,12 @@ def clock_at(seconds: float) -> Clock:
 
 
 class Peer:
-    """A node that publishes what a robot would and listens to the twin."""
+    """A node that publishes what a robot would and subscribes to the twin."""
 
     def __init__(self, domain: int, name: str = "peer") -> None:
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain)
-        # Neither is asked for here, and each takes endpoints that all others have to discover.
+        # Neither is needed here, and each adds endpoints that all others have to discover.
         self.node = rclpy.create_node(
             name, context=self._context, enable_rosout=False, start_parameter_services=False
         )
@@ -59,13 +59,13 @@ class Peer:
     # --- publishing -------------------------------------------------------------------------
 
     def publish(self, topic: str, message: Any, depth: int = 50) -> Any:
-        """Publish latched, without waiting for anybody; returns the publisher."""
+        """Publish latched, without waiting for subscribers; returns the publisher."""
         publisher = self.publisher(topic, type(message), depth)
         publisher.publish(message)
         return publisher
 
     def publisher(self, topic: str, message_type: Any, depth: int = 50) -> Any:
-        """The latched publisher on a topic, made at the first call."""
+        """The latched publisher on a topic, created at the first call."""
         if topic not in self._publishers:
             self._publishers[topic] = self.node.create_publisher(
                 message_type, topic, latched(depth)
@@ -86,7 +86,7 @@ class Peer:
         self.publish("/map", message, depth=1)
 
     def set_clock(self, seconds: float) -> None:
-        """Publish simulated time until a state carries it: `/clock` is not latched."""
+        """Publish simulated time until a state has it: `/clock` is not latched."""
         clock = clock_at(seconds)
 
         def tick() -> Any:
@@ -100,12 +100,12 @@ class Peer:
     # --- listening --------------------------------------------------------------------------
 
     def listen(self, durability: DurabilityPolicy = DurabilityPolicy.TRANSIENT_LOCAL) -> None:
-        """Subscribe to `/twin/state`; what comes is appended to `states`."""
+        """Subscribe to `/twin/state`; states are appended to `states`."""
         qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
         self.node.create_subscription(TwinState, "/twin/state", self.states.append, qos)
 
     def until(self, look: Callable[[], T], what: str, timeout_s: float = PATIENCE_S) -> T:
-        """Spin until `look` gives something true, and return that."""
+        """Spin until `look` returns something true, and return that."""
         return wait_for(look, what, timeout_s, meanwhile=self.spin_briefly)
 
     def spin_briefly(self, timeout_s: float = 0.05) -> None:
@@ -113,12 +113,12 @@ class Peer:
         self._executor.spin_once(timeout_sec=timeout_s)
 
     def wait_for_twin(self) -> None:
-        """Wait until a twin listens to the three topics, so that a volatile message is not lost."""
+        """Wait until a twin subscribes to the three topics, so that no volatile message is lost."""
         for topic in ("/floranova/observations", "/perception/discovered_tags", "/map"):
             self.until(lambda topic=topic: self.node.count_subscribers(topic), f"a twin on {topic}")  # type: ignore[misc]
 
     def state(self, accept: Callable[[Any], bool], what: str) -> Any:
-        """The first state that `accept` takes, from now on (the newest one included)."""
+        """The first state that `accept` takes, from now on (the latest one included)."""
         if not self.states:
             self.listen()
         return self.until(lambda: self._newest(accept), what)
@@ -127,7 +127,7 @@ class Peer:
         return self.states[-1] if self.states and accept(self.states[-1]) else None
 
     def tag(self, tag_id: str, accept: Callable[[Any], bool] = lambda _: True) -> Any:
-        """The tag in the first state in which it is there and `accept` takes it."""
+        """The tag in the first state that has it and that `accept` takes."""
         state = self.state(
             lambda state: any(t.tag_id == tag_id and accept(t) for t in state.tags),
             f"tag {tag_id} as expected",
@@ -144,7 +144,7 @@ class Peer:
         return answer
 
     def ask_all(self, kind: Any, service: str, requests: Sequence[Any]) -> list[Any]:
-        """Call a service with all of these at once, and return the responses in their order."""
+        """Call a service with all of these at once, and return the responses in order."""
         client = self.node.create_client(kind, service)
         self.until(client.service_is_ready, f"the service {service}")
         futures = [client.call_async(request) for request in requests]

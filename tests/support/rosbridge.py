@@ -1,4 +1,4 @@
-"""A rosbridge client that hides nothing."""
+"""A rosbridge client that sees everything."""
 
 import json
 from collections.abc import Iterator
@@ -55,7 +55,7 @@ class Ros:
         return self.next()
 
     def is_quiet(self) -> bool:
-        """Whether nothing came before the answer to a question asked now."""
+        """Whether nothing came before the answer to a call made now."""
         return self.call("/rosapi/topics", "quiet?").get("id") == "quiet?"
 
     def first(self, op: str) -> Message:

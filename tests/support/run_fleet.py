@@ -15,7 +15,7 @@ from tests.support.domains import own_domain, ros_env
 from tests.support.postgres import server
 from tests.support.state_home import use_own
 
-# Of each a patrol of its own: another seed, another pace.
+# A patrol for each: another seed, another pace.
 SITES = {"gh1": ("--seed", "1"), "gh2": ("--seed", "2", "--speed", "3"), "north": ("--seed", "7")}
 _COMMAND = (sys.executable, "-P", "-m", "lupin_bridge.cli.command")
 

@@ -1,4 +1,4 @@
-"""A house as the channels see it, made by a test."""
+"""The state of a greenhouse for the channels, made by a test."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -32,7 +32,7 @@ BY_LIGHT = ByLight(SENSORS, None, ClockDay(None))
 
 
 def tag(tag_id: str, at_ns: int = NOW_NS, **values: float) -> TagState:
-    """A tag whose readings are of one scan."""
+    """A tag whose readings are from one scan."""
     readings = tuple(Reading(name, value, at_ns) for name, value in values.items())
     return TagState(tag_id, readings=readings, last_observed_ns=at_ns)
 
@@ -45,7 +45,7 @@ def seen(
     holds_ns: Mapping[str, int] | None = None,
     origin: Origin = "robot",
 ) -> GreenhouseState:
-    """What a bridge would say of these tags."""
+    """A bridge's snapshot of these tags."""
     snapshot = Snapshot(
         now_ns or NOW_NS, "map", tags, clock="running" if now_ns is not None else "stopped"
     )
@@ -65,14 +65,14 @@ def alarm(
     raised_ns: int = NOW_NS,
     cleared_ns: int | None = None,
 ) -> Alarm:
-    """That a tag's temperature is, or was, too low."""
+    """An alarm that a tag's temperature is, or was, too low."""
     reason = Reason(Kind.RANGE, verdict, "temperature", 6.6, 10.0, raised_ns)
     name = alarm_id(tag_id, "range", "temperature", 0, raised_ns)
     return Alarm(name, reason, tag_id, raised_ns, cleared_ns, 6.6)
 
 
 class Alarms(AlarmBoard):
-    """A board that a test writes on: all alarms at once, as a feed would find them."""
+    """A board that a test writes: all alarms at once, as a feed finds them."""
 
     def show(
         self,
@@ -82,7 +82,7 @@ class Alarms(AlarmBoard):
         *,
         is_past: bool = False,
     ) -> None:
-        """Take these for the alarms as they stand."""
+        """Replace the alarms by these."""
         before, found = self.now, board_of(alarms)
         change = change_between(before, found)
         found = before if found.alarms == before.alarms else found

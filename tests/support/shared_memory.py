@@ -1,4 +1,4 @@
-"""What killed processes leave of Fast DDS in the machine's memory, and its removal."""
+"""Fast DDS's shared memory of killed processes, and its removal."""
 
 import fcntl
 import time
@@ -7,16 +7,16 @@ from pathlib import Path
 
 SHARED_MEMORY = Path("/dev/shm")
 LOCK = "_el"
-# A process that is just starting has made its files and not yet locked them.
+# A process that is just starting has created its files and not yet locked them.
 YOUNG_S = 10.0
 
 
 def remove_what_the_dead_left(folder: Path = SHARED_MEMORY) -> int:
-    """Remove the segments of processes that are no more; returns how many.
+    """Remove the segments of dead processes; returns how many.
 
-    A participant's segment, half a megabyte, has a file beside it that its process keeps locked.
-    Nobody else may be using what is not locked; of ports, which several processes share, that is
-    not so, and they are small.
+    A participant's segment, half a megabyte, has a file beside it that its process locks.
+    An unlocked one is unused. This does not hold for ports, which several processes share,
+    and which are small.
     """
     removed = 0
     for lock in folder.glob(f"fastrtps_*{LOCK}"):

@@ -1,6 +1,6 @@
-"""A robot that knows ROS's standard messages and nothing of the twin: a program by itself.
+"""A robot that knows ROS's standard messages and nothing of the twin: a separate program.
 
-It stands at one place, then at another, three seconds each, and again. At the second it is warmer.
+It stands at one place, then at another, three seconds each, and repeats. The second is warmer.
 While it drives, for a second, it reads nothing.
 """
 

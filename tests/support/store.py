@@ -1,4 +1,4 @@
-"""What is written into a store, with the least to write in a test."""
+"""Writes for a store, with short calls."""
 
 from lupin_twin.core.state import (
     NANOSECONDS_PER_SECOND,
@@ -34,5 +34,5 @@ def scan(
 
 
 def look(tag_id: str, at_s: float = 1.0, pose: Pose | None = None, **flower: object) -> Inspection:
-    """A look at the flowers; keyword arguments are what was seen."""
+    """An inspection of the flowers; keyword arguments are its results."""
     return Inspection(tag_id, round(at_s * S), Flower(**flower), pose)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Where the packages are. Who may import whom stands in pyproject.toml (import-linter)."""
+"""Where the packages are. pyproject.toml has the import rules (import-linter)."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ PACKAGES = {
     "lupin_patrol": ROOT / "ros_node" / "lupin_patrol" / "lupin_patrol",
     "lupin_bridge": ROOT / "backend" / "lupin_bridge",
 }
-# The bridge's rooms: its folders, and the modules at its top.
+# The bridge's packages: its folders, and its top-level modules.
 ROOMS = {
     path.stem
     for path in PACKAGES["lupin_bridge"].iterdir()

@@ -1,10 +1,10 @@
-"""A process that has imported the programs already, and forks for each start that a test asks for.
+"""A process that has imported the programs already, and forks for each start in a test.
 
 Starting `serve` takes 1.2 s of a core, of which all but 0.1 s is importing and loading: the same
 modules, hundreds of times. Each pytest worker has one template, from the first start on. It has
-imported and done nothing else: no thread of ours, no ROS context. Who asks gets a process as by
-`Popen`: a session, an environment, arguments and an output of its own, and a pid that is its own
-until it was waited for. It ends with the template, and that with the worker, however they end.
+imported and done nothing else: no thread of ours, no ROS context. A fork is a process as from
+`Popen`: a session, an environment, arguments and an output of its own, and a pid that stays its
+own until it was waited for. It ends with the template, and that with the worker, however they end.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import IO, Any, Final
 
-# The programs that it can be, by the module that `python -m` would run.
+# The programs that it can become, by the module for `python -m`.
 PROGRAMS: Final = (
     "lupin_bridge.cli.command",
     "lupin_twin.cli",
     "lupin_patrol",
     "tests.support.limited",
 )
-# What they import once they run.
+# What they import while they run.
 IMPORTED: Final = (
     "lupin_bridge.cli.roles",
     "lupin_twin.ros.node",
@@ -51,8 +51,8 @@ IMPORTED: Final = (
     "rosidl_generator_py",
     "uvicorn.lifespan.on",
 )
-# Variables that are read where a program runs, by us or by rcl. Of all others some are read as
-# something is imported: with one that differs a process has to start anew.
+# Variables that a running program reads, in our code or in rcl. Others may be read during imports:
+# when one of them differs, a process has to start anew.
 _READ_LATE: Final = (
     "FASTDDS_",
     "LUPIN_",
@@ -64,12 +64,12 @@ _READ_LATE: Final = (
     "TMPDIR",
     "XDG_STATE_HOME",
 )
-_MOST_BYTES: Final = 200_000  # what one message on a socket may hold, Linux's wmem_default
+_MOST_BYTES: Final = 200_000  # the largest message on a socket, Linux's wmem_default
 _PR_SET_PDEATHSIG: Final = 1
 
 
 class Template:
-    """The worker's end: starts processes, and tells how they ended."""
+    """The worker's end: starts processes, and returns their exit codes."""
 
     def __init__(self, imported: Sequence[str] = IMPORTED) -> None:
         self._env = dict(os.environ)
@@ -89,7 +89,7 @@ class Template:
         atexit.register(self.end)
 
     def can_be(self, command: Sequence[str], env: Mapping[str, str]) -> bool:
-        """Whether a process of it is what this command would be in this environment."""
+        """Whether a fork can replace this command in this environment."""
         if list(command[:2]) != [sys.executable, "-m"] or command[2] not in PROGRAMS:
             return False
         differing = {name for name, _ in self._env.items() ^ env.items()}
@@ -97,7 +97,7 @@ class Template:
         return late and Path.cwd() == self._folder
 
     def start(self, command: Sequence[str], env: Mapping[str, str], *outputs: IO[str]) -> Forked:
-        """A process that runs this command; its outputs are one file, or one for each stream."""
+        """A process that runs this command; its outputs are one file, or one per stream."""
         program, *arguments = command[2:]
         request = {"program": program, "arguments": arguments, "env": dict(env)}
         return Forked(
@@ -109,7 +109,7 @@ class Template:
         return self._process.pid
 
     def end(self) -> None:
-        """End it, and all that it has started."""
+        """Kill it, and all that it has started."""
         self._link.close()
         self._process.wait()
         self._said.close()
@@ -130,16 +130,16 @@ class Template:
 
 
 class Forked:
-    """What `subprocess.Popen` is of a process that was started, as far as tests need it."""
+    """The part of `subprocess.Popen` that tests need."""
 
     def __init__(self, args: Sequence[str], pid: int, ask: Callable[[Mapping[str, Any]], int]):
         self.args, self.pid, self._ask = args, pid, ask
         self._lock = threading.Lock()
         self._ended: int | None = None
-        self._handle = os.pidfd_open(pid)  # it is there until `_ask` was asked for its end
+        self._handle = os.pidfd_open(pid)  # it exists until `_ask` has fetched its end
 
     def poll(self) -> int | None:
-        """Its exit code, as `Popen` tells it, once it has ended."""
+        """Its exit code, as from `Popen`, once it has ended."""
         return self._look(0.0)
 
     def wait(self, timeout_s: float | None = None) -> int:
@@ -159,7 +159,7 @@ class Forked:
             poll = select.poll()
             poll.register(self._handle, select.POLLIN)
             if poll.poll(None if timeout_s is None else timeout_s * 1_000):
-                with self._lock:  # who asks twice for one end would end the template
+                with self._lock:  # a second request for one end would end the template
                     if self._ended is None:
                         self._ended = self._ask({"ended": self.pid})
                         os.close(self._handle)
@@ -167,7 +167,7 @@ class Forked:
 
 
 def _serve(link: socket.socket) -> Mapping[str, Any] | None:
-    """Answer the worker until it has gone; in a process that was forked: what that has to be."""
+    """Answer the worker until it has gone; in a forked process: what that has to become."""
     while True:
         message, files, _, _ = socket.recv_fds(link, _MOST_BYTES, 2)
         if not message:
@@ -193,7 +193,7 @@ def _close(files: Sequence[int]) -> None:
 
 
 def _know_of_forks() -> None:
-    """Tell LTTng, whose threads trace ROS: without them in a child it would crash at its end.
+    """Register forks with LTTng, whose threads trace ROS: otherwise a child crashes at its end.
 
     As its own liblttng-ust-fork does; the names are those up to LTTng 2.12, and from 2.13 on.
     """
@@ -224,11 +224,11 @@ def _know_messages() -> None:
 
 
 def main() -> None:
-    """Import all there is to import, and fork."""
+    """Import everything, and fork."""
     for name in (*PROGRAMS, *sys.argv[2:]):
         import_module(name)
     _know_messages()
-    inspect.getmodule(inspect.currentframe())  # where rclpy's log looks up who writes a line
+    inspect.getmodule(inspect.currentframe())  # where rclpy's logger finds its caller
     _know_of_forks()
     gc.collect()
     gc.freeze()

@@ -1,7 +1,7 @@
-"""A Gaussian process as the textbook has it, in the plainest code: what the estimate is held to.
+"""A Gaussian process by the textbook, in the simplest code: the reference of the estimate.
 
 Rasmussen and Williams, "Gaussian Processes for Machine Learning", 2006, 2.25 and 2.26; the kernel
-is that of `lupin_twin.estimate.kernel`, written out once more, pair by pair.
+is that of `lupin_twin.estimate.kernel`, written out again, pair by pair.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from lupin_twin.field.grid import FloatArray
 
 
 class Spot(NamedTuple):
-    """Where (m) and when (h of a day of 24)."""
+    """Position (m) and time (h of a day of 24)."""
 
     x: float
     y: float
@@ -28,7 +28,7 @@ def matern(distance: float, length: float) -> float:
 
 
 def common(a: Spot, b: Spot, h: Hyper) -> float:
-    """The covariance of what is true at two spots."""
+    """The covariance of the true values at two spots."""
     apart = a.hour - b.hour
     day = cos(2.0 * pi * apart / 24.0) + h.half**2 * cos(4.0 * pi * apart / 24.0)
     near = matern(a.x - b.x, h.l) * matern(a.y - b.y, h.l)
@@ -37,7 +37,7 @@ def common(a: Spot, b: Spot, h: Hyper) -> float:
 
 
 def of_readings(spots: Sequence[Spot], h: Hyper) -> FloatArray:
-    """The covariance of readings at spots, each with noise of its own."""
+    """The covariance of readings at spots, each with its own noise."""
     return np.array(
         [
             [common(a, b, h) + (h.tau**2 + 0.02**2 if i == j else 0.0) for j, b in enumerate(spots)]
@@ -47,7 +47,7 @@ def of_readings(spots: Sequence[Spot], h: Hyper) -> FloatArray:
 
 
 def predicted(spots: Sequence[Spot], y: FloatArray, spot: Spot, h: Hyper) -> tuple[float, float]:
-    """Mean and variance of what is true at a spot, given standardised readings `y` at others."""
+    """Mean and variance of the true value at a spot, given standardised readings `y` at others."""
     covariance = of_readings(spots, h)
     shared = np.array([common(spot, other, h) for other in spots])
     weights = np.linalg.solve(covariance, shared)
@@ -69,14 +69,14 @@ def left_out(
 
 
 def log_likelihood(spots: Sequence[Spot], y: FloatArray, h: Hyper) -> float:
-    """Of the readings, but for a constant."""
+    """Of the readings, up to a constant."""
     covariance = of_readings(spots, h)
     _, determinant = np.linalg.slogdet(covariance)
     return float(-0.5 * y @ np.linalg.solve(covariance, y) - 0.5 * determinant)
 
 
 def log_prior(h: Hyper, medians: Hyper, sds: Hyper) -> float:
-    """Log-normal, in the logarithms, but for a constant."""
+    """Log-normal, in the logarithms, up to a constant."""
     return -0.5 * sum(
         (log(value / median) / sd) ** 2 for value, median, sd in zip(h, medians, sds, strict=True)
     )

@@ -1,7 +1,7 @@
-"""A process that has a journal upgraded and dies, by SIGKILL, amid that.
+"""A process that upgrades a journal and kills itself during that, with SIGKILL.
 
-`python -m tests.support.upgrade_child PATH NUMBER`: before the file operation, or behind the step
-of the upgrade, that has the number; 0: nowhere. It prints how many there were.
+`python -m tests.support.upgrade_child PATH NUMBER`: before the file operation, or after the step
+of the upgrade, with that number; 0: nowhere. It prints how many there were.
 """
 
 import os
@@ -21,7 +21,7 @@ LIMITS = Limits(days=36_500, max_bytes=4_000_000_000)
 
 
 def main(path: Path, kill_at: int) -> None:
-    """Start as a twin does, and be told what was known."""
+    """Start as a twin does, and restore its state."""
     rebuild._ROWS = 50  # type: ignore[misc]
     seen = 0
 

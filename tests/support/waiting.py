@@ -1,4 +1,4 @@
-"""Waiting on conditions; the only place in the tests that passes time."""
+"""Waiting on conditions; the only place in the tests that waits."""
 
 import asyncio
 import time
@@ -7,10 +7,10 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
-# Discovery takes up to 3 s on an idle machine; a busy one takes far longer over everything.
+# Discovery takes up to 3 s on an idle machine; a busy one takes far longer for everything.
 PATIENCE_S = 60.0
-# What a look costs, the process that is waited for has to do without: a request that is computed, a
-# picture of a page. So who has waited for long looks less often, and is a tenth late at most.
+# A check takes time from the process that is waited for: a request to compute, a picture of a page.
+# So checks become rarer with time, and are a tenth late at most.
 _SHORTEST_PAUSE_S, _LONGEST_PAUSE_S = 0.02, 0.25
 
 
@@ -20,9 +20,9 @@ def wait_for(
     timeout_s: float = PATIENCE_S,
     meanwhile: Callable[[float], object] = time.sleep,
 ) -> T:
-    """Call `look` until it gives something true, and return that.
+    """Call `look` until it returns something true, and return that.
 
-    `meanwhile` passes the time between two looks, as many seconds as it is given or fewer (spins a
+    `meanwhile` passes the time between two calls, for the given seconds or fewer (spins a
     node, say).
 
     Raises:
@@ -47,7 +47,7 @@ async def until_answered(
     what: str,
     is_it: Callable[[T], object] = bool,
 ) -> T:
-    """`until` where the answer has to be awaited: asked again until `is_it` says so."""
+    """`until` for an answer that has to be awaited: repeated until `is_it` accepts it."""
     begun_s = time.monotonic()
     last: T | None = None
     try:
@@ -61,7 +61,7 @@ async def until_answered(
 
 
 def _pause(begun_s: float, timeout_s: float, what: str, last: object) -> float:
-    """How long not to look, s; raises where the time is up."""
+    """The pause before the next check, s; raises when the time is up."""
     waited_s = time.monotonic() - begun_s
     if waited_s > timeout_s:
         raise AssertionError(_complaint(timeout_s, what, last))

@@ -20,7 +20,7 @@ from tests.support.ws_client import open_websocket
 
 Frame = dict[str, Any]
 
-# Every HTTP route, and whether OpenAPI describes it (a page and the document itself need none).
+# Every HTTP route, and whether OpenAPI describes it (a page and the document itself are not).
 ROUTES = {
     "/api/state": True,
     "/api/tags/{tag_id}": True,
@@ -97,7 +97,7 @@ class Listener:
         return found
 
     def until_text(self, text: str) -> None:
-        """Read on past the first frame that holds a text; frames are not decoded."""
+        """Read on past the first frame that contains a text; frames are not decoded."""
         wait_for(
             lambda: text in str(self.connection.recv(timeout=PATIENCE_S)),
             f"a frame with {text}",
@@ -110,12 +110,12 @@ class Listener:
 
 
 def tag_ids(state: dict[str, Any]) -> list[str]:
-    """The tags of a state (`schema.TwinState` as JSON), in its order."""
+    """The tags of a state (`schema.TwinState` as JSON), in order."""
     return [tag["tag_id"] for tag in state["tags"]]
 
 
 def filled(tag: dict[str, Any]) -> dict[str, Any]:
-    """A tag (`schema.TwinTagState` as JSON) with what is left out of it."""
+    """A tag (`schema.TwinTagState` as JSON) with its omitted fields."""
     usual, readings = tag["last_observed"], []
     for reading in tag["readings"]:
         usual = reading.get("observed_at", usual)
@@ -125,7 +125,7 @@ def filled(tag: dict[str, Any]) -> dict[str, Any]:
 
 
 def without_ages(state: dict[str, Any]) -> list[dict[str, Any]]:
-    """The tags of a state as they stay while nothing is observed."""
+    """The tags of a state, without what changes by itself."""
     return [{**tag, "stale_seconds": 0} for tag in state["tags"]]
 
 
@@ -137,7 +137,7 @@ def listener(url: str, **query: Any) -> Iterator[Listener]:
 
 
 class Bridge:
-    """A bridge in a process of its own, and the two sides of it: a ROS peer and an HTTP client."""
+    """A bridge in its own process, and its two sides: a ROS peer and an HTTP client."""
 
     def __init__(self, process: Process, url: str, peer: Peer, http: httpx.Client) -> None:
         self.process, self.url, self.peer, self.http = process, url, peer, http
@@ -147,7 +147,7 @@ class Bridge:
         return self.http.get(path, headers=headers, params=query or None)
 
     def json(self, path: str, **query: Any) -> Any:
-        """The JSON at a path, which has to be there."""
+        """The JSON at a path, which has to exist."""
         response = self.get(path, **query)
         assert response.status_code == 200, response.text
         return response.json()
@@ -170,7 +170,7 @@ class Bridge:
 def bridge(
     *options: str, domain: int | None = None, afresh: bool = False, **env: str
 ) -> Iterator[Bridge]:
-    """`lupin-twin serve` with these options, in a ROS domain of its own unless one is given."""
+    """`lupin-twin serve` with these options, in its own ROS domain unless one is given."""
     if domain is None:
         with own_domain() as own, bridge(*options, domain=own, afresh=afresh, **env) as running:
             yield running
@@ -188,9 +188,9 @@ def bridge(
 
 @contextmanager
 def deaf_client(url: str, *paths: str) -> Iterator[socket.socket]:
-    """A client that asks for all of the paths at once, and reads nothing; it has little room.
+    """A client that requests all of the paths at once, and reads nothing; its buffers are small.
 
-    Without a path it is a WebSocket client that asks for frames.
+    Without a path it is a WebSocket client that requests frames.
     """
     asked = [f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode() for path in paths]
     with raw_http.connect(url, room=4_096) as client:
@@ -200,7 +200,7 @@ def deaf_client(url: str, *paths: str) -> Iterator[socket.socket]:
 
 
 def overfill(running: Bridge, reader: Listener) -> None:
-    """Let the twin send states until no socket can hold those that a deaf client leaves unread.
+    """Let the twin send states until no socket can buffer those that a deaf client does not read.
 
     A socket takes 4 MB (Linux's tcp_wmem); these are eight states of 0.3 MB to 2.5 MB, 10 MB in
     all. Returns when `reader` has the last one.

@@ -1,4 +1,4 @@
-"""A WebSocket client as tests want it."""
+"""A WebSocket client for tests."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -12,10 +12,10 @@ from tests.support.waiting import PATIENCE_S
 def open_websocket(
     address: str, subprotocols: Sequence[str] = (), **options: Any
 ) -> ClientConnection:
-    """A connection to this address, to be closed by `with`.
+    """A connection to this address, closed by `with`.
 
-    It sends no pings of its own, and there is no end to what it takes: a test that is busy
-    elsewhere reads nothing.
+    It sends no pings of its own, and its buffer has no limit: a test that is busy elsewhere
+    reads nothing.
     """
     connection: ClientConnection = connect(
         address,

@@ -1,7 +1,7 @@
 """A WebSocket, also over TLS, in a loop of its own.
 
-websockets' threaded client reads in one thread and writes in another, and OpenSSL allows no two
-threads at one connection: one request for a handshake in some hundred never left the client.
+websockets' threaded client reads in one thread and writes in another, and OpenSSL allows only
+one thread per connection: one in some hundred handshake requests was never sent.
 """
 
 import asyncio
@@ -17,7 +17,7 @@ from tests.support.waiting import PATIENCE_S
 
 
 class Socket:
-    """A connection that hears, and answers pings, while somebody reads from it."""
+    """A connection that receives, and answers pings, while the test reads from it."""
 
     def __init__(self, runner: asyncio.Runner, connection: ClientConnection) -> None:
         self._runner = runner

@@ -1,4 +1,4 @@
-"""Fixtures that every test may use."""
+"""Fixtures for all tests."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ if TYPE_CHECKING:
     from tests.support.archive import Archive
     from tests.support.postgres import Postgres
 
-# What twins keep in a user's folder, the tests' keep in one of their own, in every process.
+# Twins store files in a user's folder; those of the tests use another, in every process.
 STATE = use_own()
 
-# Whatever the hour is: of servers that measure no light, by their clock.
+# At any hour: for servers without light sensors, which go by their clock.
 os.environ["LUPIN_DAY_HOURS"] = "00:00-00:00"
-# Before anything imports rclpy: ROS would swallow a field of the wrong type, and leave the machine.
+# Before anything imports rclpy: otherwise ROS ignores a field of the wrong type, and may crash.
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
-# Before numpy: threads of its own that wait for a busy core take ten times the time.
+# Before numpy: its own threads waiting for a busy core take ten times the time.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-# Fast DDS 2.14 may crash in `destroy_node`, over the mutex of a port of shared memory that is gone.
-# The tests' own nodes have no such port; what they start does (`domains.ros_env`).
+# Fast DDS 2.14 may crash in `destroy_node`, over the mutex of a removed port of shared memory.
+# The tests' own nodes have no such port; the processes that they start do (`domains.ros_env`).
 os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"
 
-# A client reads the certificates of the whole world, 24 ms each time; on loopback nobody asks.
+# A client reads all root certificates, 24 ms each time; on loopback none is needed.
 _NOBODY = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
 for client in (httpx.Client, httpx.AsyncClient):
     client.__init__ = partialmethod(client.__init__, verify=_NOBODY)  # type: ignore[assignment,method-assign]
 
-# How long an example takes is the machine's business.
+# How long an example takes depends on the machine.
 settings.register_profile("here", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("here")
 
@@ -62,19 +62,19 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """What thousands of tests were collected into stays: no `gc.collect()` has to look at it."""
+    """Freeze the objects of collection: no `gc.collect()` has to traverse them."""
     gc.freeze()
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Leave the machine's memory as it was: many tests kill processes."""
+    """Clean the machine's memory: many tests kill processes."""
     if not hasattr(session.config, "workerinput"):  # once, not by each worker
         remove_what_the_dead_left()
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
-    """Run a coroutine in a loop of its own; with `domain`, its nodes are in that ROS domain."""
+    """Run a coroutine in its own loop; with `domain`, its nodes are in that ROS domain."""
     if not inspect.iscoroutinefunction(pyfuncitem.obj):
         return None
     names = inspect.signature(pyfuncitem.obj).parameters
@@ -90,7 +90,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
 
 @pytest.fixture(autouse=True)
 def state(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a test's own twins keep, the next test's must not know."""
+    """A state folder per test: no test sees the state of another."""
     monkeypatch.setenv("XDG_STATE_HOME", tempfile.mkdtemp(dir=STATE))
 
 
@@ -121,7 +121,7 @@ def _archive(postgresql: Postgres) -> Iterator[Archive]:
 
 @pytest.fixture
 def archive(postgresql: Postgres) -> Iterator[Archive]:
-    """A new archive, with the user of the site gh1, and one that may read all."""
+    """A new archive, with the user of the site gh1, and one that may read everything."""
     yield from _archive(postgresql)
 
 
@@ -133,7 +133,7 @@ def shared_archive(postgresql: Postgres) -> Iterator[Archive]:
 
 @pytest.fixture
 def children_know_the_tests() -> Iterator[None]:
-    """Our Python children look for modules neither here nor in their folder (`-P`)."""
+    """Our Python children do not look for modules in their folder (`-P`), nor here."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", str(Path(__file__).parents[1]), prepend=os.pathsep)
         yield

@@ -1,4 +1,4 @@
-"""The field by DESIGN.md's definition, as the plainest double loop: what the tests compare to.
+"""The field by DESIGN.md's definition, as the simplest double loop: the reference of the tests.
 
 Nothing here is fast and nothing is shared with `lupin_twin.field.idw`.
 """
@@ -71,7 +71,7 @@ def value_at(
     weight_sum = 0.0
     for distance, (_, _, value) in zip(distances, samples, strict=True):
         if distance <= falloff_radius_m:
-            # 1/dᵖ times a constant of the cell: the quotient is the same, and it cannot overflow.
+            # 1/dᵖ times a constant of the cell: the quotient is the same, and cannot overflow.
             weight = (nearest_distance / distance) ** power
             weighted_sum += weight * value
             weight_sum += weight

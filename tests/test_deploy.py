@@ -1,4 +1,4 @@
-"""The examples in `backend/deploy/`: what they promise holds, as far as it can be held here."""
+"""The examples in `backend/deploy/`: they work, as far as it can be tested here."""
 
 import json
 import os
@@ -28,7 +28,7 @@ UNIT = DEPLOY / "lupin-twin.service"
 
 
 def unit() -> dict[str, list[str]]:
-    """The unit's directives by name, in their order; continued lines are one."""
+    """The unit's directives by name, in order; continued lines are one."""
     found: dict[str, list[str]] = {}
     for line in UNIT.read_text(encoding="utf-8").replace("\\\n", " ").splitlines():
         if line and not line.startswith(("#", "[")):
@@ -48,7 +48,7 @@ def test_systemd_finds_nothing_wrong_with_the_unit(tmp_path: Path) -> None:
     result = subprocess.run(
         [program("systemd-analyze"), "verify", checked], capture_output=True, text=True, check=False
     )
-    # What it does not know it tells of, and goes on.
+    # An unknown directive is reported and ignored.
     assert (result.returncode, result.stderr) == (0, "")
 
 
@@ -71,7 +71,7 @@ def test_the_unit_has_what_the_service_needs(environment: dict[str, str]) -> Non
     assert unit()["StateDirectory"] == unit()["LogsDirectory"] == unit()["User"]
 
 
-def test_the_command_line_is_one_that_the_bridge_takes() -> None:
+def test_the_command_line_is_valid_for_the_bridge() -> None:
     own, ros = split_ros_args(shlex.split(script().rpartition("lupin-twin serve")[2]))
     options = parser().parse_args(["serve", *own])
     assert Path(options.config).name == "bridge.toml"
@@ -79,7 +79,7 @@ def test_the_command_line_is_one_that_the_bridge_takes() -> None:
 
 
 def script() -> str:
-    """What the unit's shell runs."""
+    """The script of the unit's shell."""
     (start,) = unit()["ExecStart"]
     return shlex.split(start)[2].replace("$$", "$")
 
@@ -91,7 +91,7 @@ def test_the_service_serves_and_the_journal_command_finds_its_file(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """All of it but systemd: its folders are elsewhere."""
+    """All of it except systemd: its folders are elsewhere."""
     settings = tmp_path / "etc" / "lupin-twin"
     settings.mkdir(parents=True)
     bare = (DEPLOY / "bridge.toml").read_text(encoding="utf-8").replace("8000", "0")
@@ -132,7 +132,7 @@ def test_the_service_serves_and_the_journal_command_finds_its_file(
 
 
 @pytest.mark.parametrize("is_bare", [True, False])
-def test_the_settings_are_settings_those_that_are_commented_out_too(
+def test_the_settings_are_valid_including_those_that_are_commented_out(
     is_bare: bool, tmp_path: Path
 ) -> None:
     text = (DEPLOY / "bridge.toml").read_text(encoding="utf-8")
@@ -147,7 +147,7 @@ def test_the_settings_are_settings_those_that_are_commented_out_too(
 
 
 def image() -> dict[str, str]:
-    """The last of each instruction of the image's last stage; ENV is there by its variables."""
+    """The last of each instruction in the image's last stage; ENV by its variables."""
     text = (DEPLOY / "Containerfile").read_text(encoding="utf-8").replace("\\\n", " ")
     stage = re.split(r"^FROM .*$", text, flags=re.MULTILINE)[-1]
     lines = [line for line in stage.splitlines() if line and not line.startswith("#")]
@@ -155,7 +155,7 @@ def image() -> dict[str, str]:
     return found | dict(pair.split("=", 1) for pair in found["ENV"].split())
 
 
-def test_the_image_keeps_its_journal_in_the_volume_as_a_user_without_rights() -> None:
+def test_the_image_has_its_journal_in_the_volume_as_a_user_without_rights() -> None:
     path = journal_path("", {"XDG_STATE_HOME": image()["XDG_STATE_HOME"]}, 0, "")
     assert path is not None
     assert image()["VOLUME"] == str(path.parent)
@@ -164,13 +164,13 @@ def test_the_image_keeps_its_journal_in_the_volume_as_a_user_without_rights() ->
     assert int(uid) > 0
 
 
-def test_the_image_needs_no_memory_of_the_host_and_starts_a_role() -> None:
+def test_the_image_needs_no_shared_memory_of_the_host_and_starts_a_role() -> None:
     assert image()["FASTDDS_BUILTIN_TRANSPORTS"] == "UDPv4"
     assert json.loads(image()["ENTRYPOINT"]) == ["lupin-twin"]
     assert parser().parse_args(json.loads(image()["CMD"])).role == "serve"
 
 
-def test_the_health_check_says_whether_the_bridge_lives(domain: int) -> None:
+def test_the_health_check_reports_whether_the_bridge_lives(domain: int) -> None:
     python, *arguments = json.loads(image()["HEALTHCHECK"].partition(" CMD ")[2])
     assert python == "python"
 
@@ -189,7 +189,7 @@ def test_the_health_check_says_whether_the_bridge_lives(domain: int) -> None:
         assert check(port) != 0
 
 
-def test_compose_runs_what_the_image_has_as_nginx_expects_it() -> None:
+def test_compose_runs_the_image_as_nginx_expects_it() -> None:
     compose = yaml.safe_load((DEPLOY / "compose.yaml").read_text(encoding="utf-8"))
     services = compose["services"]
     nginx = (DEPLOY / "nginx.conf").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""What the docs have to name, and that what they name is there."""
+"""The docs name everything that they must, and everything that they name exists."""
 
 import argparse
 import re
@@ -59,7 +59,7 @@ def reference() -> dict[str, str]:
 
 
 def listed(page: str) -> set[str]:
-    """What stands in the first cells of a generated page's tables."""
+    """The first cells of a generated page's tables."""
     return set(re.findall(r"^\| `([^`]+)`", reference()[page], re.MULTILINE))
 
 
@@ -72,7 +72,7 @@ def commands(of: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
     return dict(below.choices)
 
 
-# --- the reference names all that there is --------------------------------------------------------
+# --- the reference is complete --------------------------------------------------------------------
 
 
 def test_every_option_of_the_bridge_is_a_setting_of_the_reference() -> None:
@@ -97,7 +97,7 @@ def test_every_command_is_in_the_reference_with_all_of_its_options() -> None:
     assert "twin_node" in reference()["commands"]
 
 
-def test_every_route_is_in_the_reference_and_none_that_is_not_there() -> None:
+def test_every_route_is_in_the_reference_and_only_existing_ones() -> None:
     routes = [route for module in ROUTED for route in module.router.routes]
     routed = {
         (method, route.path_format)
@@ -136,8 +136,8 @@ def test_every_metric_is_in_the_reference() -> None:
     assert listed("metrics") == names | {*metrics.HISTOGRAMS}
 
 
-def test_a_text_of_the_code_is_read_as_it_stands() -> None:
-    """No character of it means anything to Markdown, but backticks."""
+def test_the_reference_shows_a_text_of_the_code_unchanged() -> None:
+    """No character of it means anything to Markdown, except backticks."""
     prose = GENERATOR["prose"]
     assert prose("a_b *c* <d> [e] `f_g`") == r"a\_b \*c\* \<d\> \[e\] `f_g`"
     assert GENERATOR["grid"](("a",), [("`x|y`",)]).splitlines()[-1] == r"| `x\|y` |"
@@ -148,11 +148,11 @@ def test_the_policy_beside_the_systemd_unit_is_that_of_the_table() -> None:
     assert file.read_text(encoding="utf-8") == GENERATOR["policy"](), "python docs/generate.py"
 
 
-# --- the pages name nothing that is not there -----------------------------------------------------
+# --- all names on the pages exist -----------------------------------------------------------------
 
 
 @EVERY_PAGE
-def test_every_option_that_a_page_names_is_one(page: Path) -> None:
+def test_every_option_on_a_page_exists(page: Path) -> None:
     known = set(re.findall(r"--[a-z][a-z-]*", reference()["commands"])) | FOREIGN_OPTIONS
     shown = re.findall(r"`(--[a-z][a-z-]*)", without_blocks(page))
     for block in blocks(page):
@@ -163,7 +163,7 @@ def test_every_option_that_a_page_names_is_one(page: Path) -> None:
 
 
 @EVERY_PAGE
-def test_every_parameter_and_variable_that_a_page_names_is_one(page: Path) -> None:
+def test_every_parameter_and_variable_on_a_page_exists(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     named = set(re.findall(r"-p (\w+):=", text))
     assert named <= {spec.name for spec in fields(TwinParameters)} | {"use_sim_time"}
@@ -172,10 +172,10 @@ def test_every_parameter_and_variable_that_a_page_names_is_one(page: Path) -> No
 
 
 @EVERY_PAGE
-def test_every_route_topic_and_metric_that_a_page_names_is_one(page: Path) -> None:
+def test_every_route_topic_and_metric_on_a_page_exists(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     routes = set(re.findall(r"`(?:GET |POST )?(/[^`\s]*)`", reference()["http"])) | FLEET_ROUTES
-    # A name that goes on in another route, such as `/api/tags`, is a good enough name.
+    # A name that continues in another route, such as `/api/tags`, is good enough.
     known = [re.sub(r"\\\{.*?\\\}", "[^/]+", re.escape(route)) for route in routes]
     for named in re.findall(r"(?:`|:8000|\.example)(/(?:api|ws)/[\w{}/.-]*)", text):
         found = [one for one in routes if one.startswith(f"{named}/")]
@@ -188,7 +188,7 @@ def test_every_route_topic_and_metric_that_a_page_names_is_one(page: Path) -> No
 
 
 @EVERY_PAGE
-def test_every_make_target_that_a_page_names_is_there(page: Path) -> None:
+def test_every_make_target_on_a_page_exists(page: Path) -> None:
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     named = re.findall(r"(?:`|^)make ([a-z-]+)", page.read_text(encoding="utf-8"), re.MULTILINE)
     assert set(named) <= targets
@@ -203,7 +203,7 @@ def test_every_make_target_that_a_page_names_is_there(page: Path) -> None:
     ],
     ids=name_of,
 )
-def test_every_file_that_a_page_names_is_there(page: Path) -> None:
+def test_every_file_on_a_page_exists(page: Path) -> None:
     text = without_blocks(page)
     for name in re.findall(r"\]\(([^)#: ]+)(?:#[^)]*)?\)|src=\"([^\":]+)\"", text):
         target = (page.parent / "".join(name)).resolve()
@@ -218,7 +218,7 @@ def test_every_file_that_a_page_names_is_there(page: Path) -> None:
 # --- the maps of the folders ----------------------------------------------------------------------
 
 
-def test_the_bridges_page_names_every_room_and_no_file_that_is_not_there() -> None:
+def test_the_bridges_page_names_every_package_and_only_existing_files() -> None:
     text = (ROOT / "backend" / "README.md").read_text(encoding="utf-8")
     bridge = PACKAGES["lupin_bridge"]
     named = {name for cell in re.findall(r"`([^`]+)`", text) for name in cell.split()}
@@ -229,7 +229,7 @@ def test_the_bridges_page_names_every_room_and_no_file_that_is_not_there() -> No
     assert rooms - named == set()
 
 
-def test_the_ros_packages_page_names_every_module_of_the_twin_and_none_that_is_not_there() -> None:
+def test_the_ros_packages_page_names_every_module_of_the_twin_and_only_existing_ones() -> None:
     text = (ROOT / "ros_node" / "README.md").read_text(encoding="utf-8")
     twin = PACKAGES["lupin_twin"]
     modules = {
@@ -242,7 +242,7 @@ def test_the_ros_packages_page_names_every_module_of_the_twin_and_none_that_is_n
     assert {name for name in named if not name.startswith("estimate/")} == modules
 
 
-def test_the_tests_page_names_every_folder_and_no_file_that_is_not_there() -> None:
+def test_the_tests_page_names_every_folder_and_only_existing_files() -> None:
     text = (ROOT / "tests" / "README.md").read_text(encoding="utf-8")
     named = set(re.findall(r"`([\w/*]+(?:\.py|/))`", text))
     folders = {f"{path.parent.name}/" for path in (ROOT / "tests").glob("*/__init__.py")}

@@ -1,4 +1,4 @@
-"""The blocks of code that the docs mark with `run` do run, against a demo."""
+"""The blocks of code with the mark `run` in the docs do run, against a demo."""
 
 import os
 import re
@@ -18,7 +18,7 @@ from tests.support.waiting import PATIENCE_S, wait_for
 
 BLOCKS = [block for page in pages() for block in blocks(page)]
 RUN = [block for block in BLOCKS if "run" in block.marks]
-# By language: the file that it is written to, and what runs that.
+# By language: the file for it, and the command that runs it.
 PROGRAMS = {
     "bash": ("block.sh", ("bash", "-euo", "pipefail")),
     "sh": ("block.sh", ("bash", "-euo", "pipefail")),
@@ -45,16 +45,16 @@ def demo() -> Iterator[tuple[int, str]]:
 
 
 @pytest.mark.parametrize("block", RUN, ids=str)
-def test_a_block_that_is_marked_runs(block: Block, demo: tuple[int, str], tmp_path: Path) -> None:
+def test_a_marked_block_runs(block: Block, demo: tuple[int, str], tmp_path: Path) -> None:
     domain, url = demo
     name, program = PROGRAMS[block.language]
     file = tmp_path / name
     text = re.sub(r"(?:127\.0\.0\.1|localhost):8000", urlsplit(url).netloc, block.text)
     file.write_text(text, encoding="utf-8")
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
-    # Otherwise curl is content with any answer.
+    # Otherwise curl accepts any status.
     (tmp_path / ".curlrc").write_text("fail\nsilent\nshow-error\n", encoding="utf-8")
-    # Packages of Node are looked for above the file.
+    # Node looks for packages above the file.
     (tmp_path / "node_modules").symlink_to(ROOT / "node_modules")
     done = subprocess.run(
         [*program, name],
@@ -64,14 +64,14 @@ def test_a_block_that_is_marked_runs(block: Block, demo: tuple[int, str], tmp_pa
     assert done.returncode == 0, done.stdout[-1000:] + done.stderr[-1000:]
 
 
-def test_marks_are_those_that_the_page_about_docs_explains() -> None:
+def test_the_marks_are_those_that_the_page_about_docs_explains() -> None:
     for block in BLOCKS:
         for mark in block.marks - {"run"}:
             assert re.fullmatch(r"name=[a-z][a-z-]*", mark), block
         assert "run" not in block.marks or block.language in PROGRAMS, block
 
 
-def test_every_block_with_a_name_is_taken_by_a_test() -> None:
+def test_every_named_block_has_a_test() -> None:
     names = [mark[5:] for block in BLOCKS for mark in block.marks if mark.startswith("name=")]
     assert len(names) == len(set(names))
     tests = "".join(file.read_text(encoding="utf-8") for file in (ROOT / "tests").rglob("*.py"))

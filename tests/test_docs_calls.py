@@ -1,4 +1,4 @@
-"""What the docs show of service calls over ROS: each is one that the service takes."""
+"""The service calls in the docs are valid: each one fits its service."""
 
 import re
 from typing import Any
@@ -12,7 +12,7 @@ from tests.support.docs import pages
 TYPES = {f"/{service.name}": service.type_name for service in SERVICES}
 
 
-def test_every_service_call_that_is_shown_is_one_that_the_service_takes() -> None:
+def test_every_service_call_in_the_docs_fits_its_service() -> None:
     text = "\n".join(page.read_text(encoding="utf-8") for page in pages())
     calls = re.findall(
         r'^ *ros2 service call (/\S+) (lupin_msgs/srv/\w+) (?:\\\n +)?"(.*)"$', text, re.MULTILINE

@@ -1,4 +1,4 @@
-"""docs/log.md says what is so: its queries run, and it names every table and column."""
+"""docs/log.md is right: its queries run, and it names every table and column."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""How the docs are written: short sentences, the words of the glossary, pages of a size."""
+"""The style of the docs: short sentences, the words of the glossary, pages of limited length."""
 
 import re
 from collections.abc import Iterator
@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.docs import DOCS, ROOT, name_of, pages, without_blocks
 
-# Beside those of the guide: what stands at the root, and the maps of the folders.
+# Beside those of the guide: the files at the root, and the maps of the folders.
 MORE = (
     "SECURITY.md",
     "CONTRIBUTING.md",
@@ -23,7 +23,7 @@ EVERY_PAGE = pytest.mark.parametrize(
 MAX_WORDS = 25
 # By folder of `docs/`, and the README.
 MAX_LINES = {"how-to": 100, "explanation": 150, "README.md": 150}
-# What is never right in these pages, and the word that is. In code all of it may stand.
+# Words that are never right in these pages, with the right ones. Code may contain any of them.
 INSTEAD = {
     r"houses?": "greenhouse",
     r"foretold|foretells?|foretelling": "predict, forecast",
@@ -59,7 +59,7 @@ def texts(page: Path) -> Iterator[tuple[int, str]]:
 
 
 def plain(text: str) -> str:
-    """What is read of it: no markup, a piece of code or an address as one word."""
+    """The text that is read: no markup, a piece of code or an address as one word."""
     text = re.sub(r"!\[[^\]]*\]\([^)]*\)|<[^>]*>", " ", text)
     text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
     text = re.sub(r"`[^`]*`|https?://\S+", "code", text)
@@ -89,13 +89,13 @@ def test_the_words_are_those_of_the_field(page: Path) -> None:
 
 
 @EVERY_PAGE
-def test_a_page_is_no_longer_than_can_be_read_at_once(page: Path) -> None:
+def test_a_page_has_a_limited_length(page: Path) -> None:
     inside = page.relative_to(DOCS if page.is_relative_to(DOCS) else ROOT)
     limit = MAX_LINES.get(inside.parts[0], 400)
     assert len(page.read_text(encoding="utf-8").splitlines()) <= limit
 
 
-def test_the_rules_find_what_they_are_for(tmp_path: Path) -> None:
+def test_the_rules_find_their_violations(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(
         "# A page\n\n- An item\n  of two lines. And `one two` more.\n\n"

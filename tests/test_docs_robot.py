@@ -1,4 +1,4 @@
-"""The programs of the tutorial about one's own robot: a real twin takes what they publish."""
+"""The programs of the tutorial for one's own robot: a real twin accepts their messages."""
 
 import subprocess
 import sys
@@ -10,7 +10,7 @@ from tests.support.processes import OFTEN, Process, twin_node
 from tests.support.ros import Peer
 
 
-def test_a_robot_and_its_camera_as_the_tutorial_has_them(domain: int, tmp_path: Path) -> None:
+def test_the_tutorials_robot_and_camera_work(domain: int, tmp_path: Path) -> None:
     robot, camera = tmp_path / "robot.py", tmp_path / "camera.py"
     robot.write_text(block_named("robot").text, encoding="utf-8")
     camera.write_text(block_named("inspection").text, encoding="utf-8")

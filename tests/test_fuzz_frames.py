@@ -1,7 +1,7 @@
-"""30,000 WebSocket frames that nobody asked for, to `/ws/state`, `/rosbridge` and `/foxglove`.
+"""30,000 unexpected WebSocket frames, to `/ws/state`, `/rosbridge` and `/foxglove`.
 
-Two kinds: frames as they should be, with anything in them, which are ignored or answered with a
-refusal; and frames that break the protocol, each of which ends its connection. Meanwhile a healthy
+Two kinds: valid frames with any content, which are ignored or refused; and frames that break the
+protocol, each of which ends its connection. Meanwhile a healthy
 client gets its states, and afterwards nothing is left of the others.
 """
 
@@ -31,10 +31,10 @@ from tests.support.web import Bridge, bridge
 
 FRAMES = 14_000
 BROKEN_CONNECTIONS = 500
-# In all; what one connection may make the server keep is a message of 64 kB.
+# In all; one connection may make the server buffer a message of 64 kB.
 MEMORY_MB = 10.0
 
-# Strangers must not be able to fill a disk.
+# Clients must not be able to fill a disk.
 LOG_LINES = 50
 
 # RFC 6455, section 7.4.1; 1011, an internal error, is not among them.
@@ -127,7 +127,7 @@ def closing_code(frames: list[tuple[int, bytes]]) -> int | None:
         ("/foxglove", FRAMES_AT_ONCE // 2, FRAMES // 7),
     ],
 )
-def test_frames_that_nobody_asked_for_change_nothing(
+def test_unexpected_frames_change_nothing(
     live: Bridge, path: str, at_once: int, frames: int
 ) -> None:
     chance = random.Random(path)
@@ -142,7 +142,7 @@ def test_frames_that_nobody_asked_for_change_nothing(
             with RawClient(live.url, path) as client:
                 said = b"".join(anything(chance) for _ in range(at_once))
                 heard = client.say(said + masked(CLOSE, struct.pack("!H", NORMAL)))
-                # A message in pieces has more frames than one: some connections say too much.
+                # A message in pieces has more than one frame: some connections send too much.
                 assert closing_code(heard) in (NORMAL, POLICY)
             healthy.rest()
         for _ in range(BROKEN_CONNECTIONS):

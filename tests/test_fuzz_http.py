@@ -1,6 +1,6 @@
 """Requests of every kind: schemathesis over the whole OpenAPI document, and bytes that are no HTTP.
 
-One check of schemathesis is left out: that what the document allows is not refused. It cannot say
+One check of schemathesis is left out: that valid values are not refused. The document cannot say
 which values go together, and a box may be inverted or have too many cells.
 """
 
@@ -50,12 +50,12 @@ schema = schemathesis.openapi.from_dict(json.loads(document()))
 
 @schema.parametrize()
 @settings(max_examples=10, derandomize=True, suppress_health_check=list(HealthCheck))
-def test_every_answer_is_one_that_the_document_describes(case: Any, live: Bridge) -> None:
+def test_every_answer_is_described_by_the_document(case: Any, live: Bridge) -> None:
     answer = case.call(base_url=live.url)
-    if answer.status_code == 414:  # the door's answer, whatever the route
+    if answer.status_code == 414:  # the acceptor's answer, whatever the route
         assert len(answer.request.url) - len(live.url) > MAX_TARGET_BYTES
         return
-    if answer.status_code == 413 and answer.request.method != "POST":  # no body is wanted there
+    if answer.status_code == 413 and answer.request.method != "POST":  # no body is expected there
         assert answer.request.body
         return
     case.validate_response(answer, excluded_checks=[positive_data_acceptance])
@@ -97,7 +97,7 @@ def broken_request(chance: random.Random) -> bytes:
 
 
 def answer_to(address: tuple[str, int], request: bytes) -> bytes:
-    """What the server answers before it closes; the client says nothing after its request."""
+    """The server's answer until it closes; the client sends nothing after its request."""
     with socket.create_connection(address, timeout=PATIENCE_S) as client:
         try:
             client.sendall(request)
@@ -124,5 +124,5 @@ def test_bytes_that_are_no_http_are_refused_and_leave_nothing_behind(live: Bridg
         assert not answer.startswith(b"HTTP/1.1 5")
     assert peak_mb(pid) - before_mb < MEMORY_MB
     wait_for(lambda: open_files(pid) <= files, "the end of all connections")
-    # Not by `answer_to`: who ends its half of the connection is taken to have gone (nginx's habit).
+    # Not by `answer_to`: a client that half-closes its connection counts as gone, as in nginx.
     assert live.get("/api/state").status_code == 200

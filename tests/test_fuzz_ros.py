@@ -1,7 +1,7 @@
 """Hostile ROS messages over DDS: a twin with its bridge, and a bridge apart, go on as before.
 
-After each lot both bridges tell what comes next, and after some of them all that they serve is
-valid: states, fields, the map.
+After each batch both bridges serve the next state, and after some of them everything that they
+serve is valid: states, fields, the map.
 """
 
 import json
@@ -26,25 +26,25 @@ from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
 
-# Of the process with the twin: for one lot at any time, and kept of all that is sent here (which is
-# bounded tag by tag, and there are some 30), caches of fields included. In one arena: what the C
-# library keeps of more of them grows with the threads, not with what is sent.
+# Of the process with the twin: for one batch at any time, and stored of everything sent here (which
+# is bounded tag by tag, and there are some 30), with the cache of fields. In one arena: what the C
+# library retains of more of them grows with the threads, not with what is sent.
 MEMORY_MB = 40.0
 KEPT_MB = 150.0
 ONE_ARENA = {"MALLOC_ARENA_MAX": "1"}
 NO_LIMITS = limits(answers_per_s=10_000)
-# Often enough that a lot has not to wait for a state, which is large here, and is told twice over.
+# Often enough that no batch waits for a state, which is large here, and is published twice.
 RATE = ("--ros-args", "-p", "state_publish_rate_hz:=10.0")
-# A topic holds 50 messages; a lot that was waited for has lost none.
+# A topic holds 50 messages; a batch that was waited for has lost none.
 LOT = 40
 LOTS = 5
-# All that is served is looked at after so many of them.
+# Everything that is served is checked after this number of them.
 FULLY = 5
 
 
 @pytest.fixture(scope="module")
 def both() -> Iterator[tuple[Bridge, Bridge]]:
-    """`serve` with the twin, and a `web` that hears of it all over `/twin/state`."""
+    """`serve` with the twin, and a `web` that receives everything over `/twin/state`."""
     with (
         own_domain() as domain,
         bridge(*NO_LIMITS, *RATE, domain=domain, afresh=True, **ONE_ARENA) as twin,
@@ -69,7 +69,7 @@ def survive(
 ) -> None:
     """Both bridges have the next observation after what `hostile` publishes.
 
-    With `fully`, all else that they serve is valid too: states, fields, the map.
+    With `fully`, everything else that they serve is valid too: states, fields, the map.
     """
     twin, _ = both
     memory = resident_mb(twin.process.pid)
@@ -85,7 +85,7 @@ def survive(
 
 
 def check(live: Bridge) -> None:
-    """All that the bridge serves is of the contract's types."""
+    """Everything that the bridge serves is of the contract's types."""
     answer = live.get("/api/state")
     assert answer.status_code == 200
     state = schema.TwinState.model_validate(json.loads(answer.content, parse_constant=refuse))
@@ -94,7 +94,7 @@ def check(live: Bridge) -> None:
         assert len(tag.flowers) <= MAX_BLOOMS_PER_TAG
         assert 0 < len(tag.tag_id) <= MAX_TEXT_LENGTH
     for sensor in ("co2", "nan", TEXTS[5]):
-        # Where the tags are 1e300 m apart there is no grid, and it is said; else there is one.
+        # Where the tags are 1e300 m apart there is no grid, which is an error; else there is.
         assert live.get("/api/field", sensor_type=sensor).status_code in (200, 400)
         box: dict[str, Any] = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 2, "bbox_max_y": 2}
         assert live.get("/api/field", sensor_type=sensor, **box).status_code == 200
@@ -135,10 +135,10 @@ def test_observations_past_every_bound_are_survived(both: tuple[Bridge, Bridge])
     survive(both, lambda _: None)
 
 
-def test_a_discovery_of_more_tags_than_there_can_be_is_survived(
+def test_a_discovery_of_more_tags_than_allowed_is_survived(
     both: tuple[Bridge, Bridge],
 ) -> None:
-    # As a lot, and as one message that is too large: 30,000 tags of long names have 11 MB.
+    # As a batch, and as one message that is too large: 30,000 tags of long names have 11 MB.
     survive(both, lambda peer: peer.discover(discovered({"": pose(), "twice": pose(NAN)})))
     before = len(both[0].json("/api/state")["tags"])
     too_large = {f"{number}-{'x' * 250}": pose() for number in range(MAX_TAGS + 10_000)}
@@ -147,7 +147,7 @@ def test_a_discovery_of_more_tags_than_there_can_be_is_survived(
 
 
 @pytest.mark.parametrize("topic", ANY)
-def test_anything_at_all_is_survived(both: tuple[Bridge, Bridge], topic: str) -> None:
+def test_any_content_is_survived(both: tuple[Bridge, Bridge], topic: str) -> None:
     chance = random.Random(topic)
     for number in range(1, LOTS + 1):
         lot = [ANY[topic](chance) for _ in range(LOT)]
@@ -190,7 +190,7 @@ def test_requests_for_fields_of_any_numbers_are_answered(both: tuple[Bridge, Bri
     survive(both, ask)
 
 
-def test_a_bridge_apart_survives_a_twin_that_is_none() -> None:
+def test_a_bridge_apart_survives_an_invalid_twin() -> None:
     chance = random.Random(11)
     with (
         own_domain() as domain,
@@ -237,7 +237,7 @@ def has_stamp(live: Bridge, seconds: int) -> bool:
     return bool(state["header"]["stamp"]["sec"] == seconds)
 
 
-def test_the_log_of_it_all_is_short(both: tuple[Bridge, Bridge]) -> None:
+def test_the_log_of_all_that_is_short(both: tuple[Bridge, Bridge]) -> None:
     for live in both:
         assert "Traceback" not in live.process.output
         assert live.process.output.count("\n") < 500

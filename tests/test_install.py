@@ -1,4 +1,4 @@
-"""`pip install .` from a clone whose page was not built; `test_install_dist` has the page."""
+"""`pip install .` from a clone without a built page; `test_install_dist` has the page."""
 
 import os
 import shutil
@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What git has of the project, as it is in the work tree."""
+    """The files of the project in git, as in the work tree."""
     folder = tmp_path_factory.mktemp("clone")
     listed = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
@@ -28,7 +28,7 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
         if name.startswith(("backend/", "pyproject.toml", "README.md", ".gitignore")):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, folder / name)
-    # hatchling looks for what git ignores.
+    # hatchling reads what git ignores.
     subprocess.run(["git", "init", "-q", folder], check=True)
     return folder
 
@@ -61,6 +61,6 @@ def test_without_the_page_the_start_and_the_address_say_how_to_build_it(
             assert answer.headers["content-type"].startswith("text/html")
             assert "npm ci &amp;&amp; npm run build" in answer.text or method == "HEAD"
         assert "WARNING" in process.wait_for_output("npm ci && npm run build")
-        # The rest is there, what the package brings beside its modules included.
+        # The rest is there, with the package's data files.
         for path in ("/healthz", "/docs", "/signin.css"):
             assert httpx.get(url + path, trust_env=False, timeout=PATIENCE_S).status_code == 200

@@ -1,4 +1,4 @@
-"""What `make dist` makes: a demo from its wheels alone, and the context of the container image."""
+"""The output of `make dist`: a demo from its wheels, and the context of the container image."""
 
 import os
 import re
@@ -31,7 +31,7 @@ def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_wheel_has_the_three_packages_the_page_and_what_an_operator_adapts(dist: Path) -> None:
+def test_the_wheel_has_the_three_packages_the_page_and_the_operators_files(dist: Path) -> None:
     (wheel,) = dist.glob("lupin_twin-*-py3-none-any.whl")
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
@@ -55,7 +55,7 @@ def test_the_wheel_has_the_three_packages_the_page_and_what_an_operator_adapts(d
 
 
 def copy_libraries(of: str, venv: Path) -> None:
-    """What a package asks for, as the tests have it: pip would take as long as ten other tests."""
+    """A package's dependencies, from the tests' own: pip takes as long as ten other tests."""
     (site,) = venv.glob("lib/python3*/site-packages")
     (found,) = distributions(path=[str(site)], name=Requirement(of).name)
     waiting, known = [(found, Requirement(of))], set[str]()
@@ -76,7 +76,7 @@ def copy_libraries(of: str, venv: Path) -> None:
                 shutil.copy(source, target)
 
 
-def test_from_the_wheels_a_demo_runs_where_there_is_neither_compiler_nor_node(
+def test_a_demo_runs_from_the_wheels_without_compiler_and_node(
     dist: Path, domain: int, tmp_path: Path
 ) -> None:
     venv = tmp_path / "venv"
@@ -108,7 +108,7 @@ def test_from_the_wheels_a_demo_runs_where_there_is_neither_compiler_nor_node(
         assert field.content.startswith(b"\x89PNG")
 
 
-def test_the_image_copies_what_is_in_its_context_and_builds_what_is_in_the_sdist(
+def test_the_image_copies_from_its_context_and_builds_from_the_sdist(
     dist: Path,
 ) -> None:
     text = (dist / "Containerfile").read_text(encoding="utf-8").replace("\\\n", " ")
@@ -127,7 +127,7 @@ def test_the_image_copies_what_is_in_its_context_and_builds_what_is_in_the_sdist
     assert [name for name in names if fnmatch(name, "*node_modules*") or ".venv" in name] == []
 
 
-def test_what_compose_mounts_and_builds_lies_beside_it(dist: Path) -> None:
+def test_the_files_that_compose_mounts_and_builds_lie_beside_it(dist: Path) -> None:
     compose = yaml.safe_load((dist / "compose.yaml").read_text(encoding="utf-8"))
     mounts = [v for service in compose["services"].values() for v in service.get("volumes", [])]
     files = [mount.split(":")[0] for mount in mounts if mount.startswith(".")]

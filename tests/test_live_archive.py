@@ -21,20 +21,18 @@ from tests.support.waiting import wait_for
 MOMENTS = 6
 
 
-def test_kills_at_any_moment_lose_nothing_and_double_nothing(
-    postgresql: Postgres, tmp_path: Path
-) -> None:
+def test_kills_at_any_moment_lose_and_double_nothing(postgresql: Postgres, tmp_path: Path) -> None:
     assert kill_and_compare(postgresql, tmp_path, MOMENTS, seed=23) > MOMENTS * 20
 
 
-def test_a_standby_that_is_promoted_is_gone_on_with_and_has_what_was_acknowledged(
+def test_a_promoted_standby_is_used_and_has_what_was_acknowledged(
     tmp_path: Path,
 ) -> None:
     journal = tmp_path / "journal.sqlite"
     with server() as primary:
         archive = Archive(primary)
         with server(primary=primary) as standby, ExitStack() as stack:
-            # The first that is asked is not the one that takes writes.
+            # The first address is not the one that takes writes.
             archive.hosts.insert(0, standby.folder)
             recording = stack.enter_context(twin(journal))
             wait_for(lambda: count(journal) > 0, "a journal")
@@ -66,7 +64,7 @@ def test_a_standby_that_is_promoted_is_gone_on_with_and_has_what_was_acknowledge
             assert took_s < 10.0, took_s
 
 
-def test_serve_forwards_and_lives_through_the_end_of_archive_and_forwarder(
+def test_serve_forwards_and_survives_the_end_of_archive_and_forwarder(
     postgresql: Postgres, tmp_path: Path, domain: int
 ) -> None:
     archive, journal = Archive(postgresql), tmp_path / "journal.sqlite"

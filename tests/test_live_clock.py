@@ -1,4 +1,4 @@
-"""A twin whose clock does not run, or is wrong, says so: over DDS, in `serve` and in `web`.
+"""A twin whose clock does not run, or is wrong, reports it: over DDS, in `serve` and in `web`.
 
 `web` knows it from `/diagnostics`.
 """
@@ -21,7 +21,7 @@ from tests.support.processes import limits, lupin_twin
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
 
-# No machine is too busy for an answer: the process that looks back gives way to all others.
+# No machine is too busy for an answer: the past process yields to all others.
 PATIENT = limits(answer_timeout_s=PATIENCE_S)
 SIM_TIME = ("--ros-args", "-p", "use_sim_time:=true", "-p", "state_publish_rate_hz:=10.0")
 
@@ -55,9 +55,9 @@ def age(live: Bridge) -> float | None:
 
 
 def ages(live: Bridge, is_so: str) -> list[float]:
-    """Two ages, one after the other; none if the clock was not so before, between and after.
+    """Two ages, one after the other; none if the clock's state differed before, between or after.
 
-    On a busy machine 3 s pass between two questions, and without a tick it counts as stopped.
+    On a busy machine 3 s pass between two queries, and without a tick it counts as stopped.
     """
     if reason(live) != (200, is_so):
         return []
@@ -99,7 +99,7 @@ def check_clock(both: tuple[Bridge, Bridge]) -> None:
         assert first == second >= 3_600.0
 
     for live in both:
-        # Observations go on; the newest of them is no younger for that.
+        # Observations go on; the latest of them is no younger for that.
         twin.peer.observe(scan("1", {"co2": 2.0}, stamp_s=float(seconds)))
         until(lambda live=live: reason(live) == (503, "clock_stopped"), "a clock that stopped")  # type: ignore[misc]
         until(lambda live=live: age(live) is None, "no age")  # type: ignore[misc]
@@ -109,7 +109,7 @@ def check_clock(both: tuple[Bridge, Bridge]) -> None:
         until(lambda live=live: runs(live), "a clock that runs again")  # type: ignore[misc]
         until(lambda live=live: runs(live) and not is_called_silent(live), "its end")  # type: ignore[misc]
     for live in both:
-        goes_back_while_the_past_is_asked(twin, live, seconds - 100 * (1 + both.index(live)))
+        goes_back_during_a_query_of_the_past(twin, live, seconds - 100 * (1 + both.index(live)))
     assert "nothing comes on /clock" in twin.process.output
     assert twin.json("/healthz")["callback_errors"] == 0
 
@@ -119,8 +119,8 @@ def is_called_silent(live: Bridge) -> bool:
     return "silent" in [alarm["reason"]["kind"] for alarm in active]
 
 
-def goes_back_while_the_past_is_asked(twin: Bridge, live: Bridge, seconds: int) -> None:
-    """No answer of either time is an error, and who listens hears of the time that is now."""
+def goes_back_during_a_query_of_the_past(twin: Bridge, live: Bridge, seconds: int) -> None:
+    """No answer of either time is an error, and connected clients get the new time."""
     asked = ("/api/state?at=1000", "/api/history?tag_id=1&sensor_type=co2", "/api/timeline")
     statuses: set[int] = set()
 
@@ -137,14 +137,16 @@ def goes_back_while_the_past_is_asked(twin: Bridge, live: Bridge, seconds: int) 
     assert (later.status_code, "later than now" in later.text) == (400, True)
     for path in asked[1:]:
         assert live.json(path)["to"]["sec"] == seconds
-    # What it knew it knows still.
+    # What it knew it still knows.
     found = wait_for(lambda: live.json("/api/state", at=seconds)["tags"], "the new run in the log")
     [tag] = found
     assert [reading["value"] for reading in tag["readings"]] == [2.0]
 
 
-def test_a_clock_that_contradicts_the_journal_is_told_beside_what_was_known(tmp_path: Path) -> None:
-    """As of a board that starts years ago; what a twin does then is in `test_memory_one_truth`."""
+def test_a_clock_that_contradicts_the_journal_is_reported(
+    tmp_path: Path,
+) -> None:
+    """As on a board that starts years ago; `test_memory_one_truth` has what a twin does then."""
     journal = tmp_path / "journal.sqlite"
     kept(journal, [row("1", time.time_ns() + 86_400 * SECOND, co2=5.0)])
     with both("--ros-args", "-p", f"journal:={journal}") as lives:

@@ -1,4 +1,4 @@
-"""What the journal does not hold yet is marked in every answer, and not denied."""
+"""Data missing in the journal are marked in every answer, and not denied."""
 
 import sys
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ ROUTES = ("/api/state", "/api/tags/a", "/api/health", "/api/field.json", "/api/f
 def both(
     journal: Path, *options: str, env: dict[str, Any] | None = None
 ) -> Iterator[tuple[Bridge, Bridge]]:
-    """`serve` with a journal, and a `web` of it that has heard of that."""
+    """`serve` with a journal, and a `web` of it that has received that."""
     arguments = (*PATIENT, *OFTEN, "-p", f"journal:={journal}", *options)
     with (
         own_domain() as domain,
@@ -60,7 +60,7 @@ def now_s(live: Bridge) -> float:
     return seconds(live.json("/api/state")["header"]["stamp"])
 
 
-def test_with_a_full_disk_answers_say_up_to_when_they_are_complete(tmp_path: Path) -> None:
+def test_with_a_full_disk_answers_have_their_limit_of_completeness(tmp_path: Path) -> None:
     folder = tmp_path / "disk"
     folder.mkdir()
     disk = Disk(folder, build(tmp_path), tmp_path / "control")
@@ -75,14 +75,14 @@ def test_with_a_full_disk_answers_say_up_to_when_they_are_complete(tmp_path: Pat
         for live in lives:
             wait_for(lambda live=live: journal_of(live) == "failing", "the full disk")  # type: ignore[misc]
             assert "\nlupin_journal_recording 0.0" in live.get("/metrics").text
-            # What is observed now is shown whatever the journal does.
+            # New observations are shown whatever the journal does.
             live.tag("a", lambda tag: tag["readings"][0]["value"] == 999.0)
         at_s = wait_for(lambda: at if (at := now_s(serve)) > before_s + 3.0 else None, "3 s later")
         assert at_s is not None
         for live in lives:
             told = wait_for(lambda live=live: as_of(live, "/api/state", at_s - 0.5), "an answer")  # type: ignore[misc]
             assert told is not None
-            # The value from before is no news, and is not sold as one.
+            # The value from before is old, and is not shown as new.
             [reading] = told.json()["tags"][0]["readings"]
             assert reading["value"] == 400.0
             etag = {"If-None-Match": told.headers["etag"]}
@@ -97,7 +97,7 @@ def test_with_a_full_disk_answers_say_up_to_when_they_are_complete(tmp_path: Pat
                 headers = as_of(live, path, at_s - 0.5).headers
                 assert before_s - 1.5 <= float(headers[TO]) <= before_s + 1.0, path
                 assert float(headers[FROM]) < before_s
-                # Of before nothing is missing.
+                # Of the time before, nothing is missing.
                 assert float(as_of(live, path, before_s - 1.5).headers[TO]) == pytest.approx(
                     before_s - 1.5, abs=0.001
                 )
@@ -129,7 +129,7 @@ MODULES = ("lupin_twin", "lupin_bridge", "lupin_patrol", "greenhouse_sim", "nump
 
 
 def test_no_process_imports_a_module_of_the_working_folder(tmp_path: Path) -> None:
-    """That which looks back, that which fills a demo's journal, and the patrol."""
+    """The past process, the one that fills a demo's journal, and the patrol."""
     imported = tmp_path / "imported.txt"
     noted = f"open({str(imported)!r}, 'a').write(__name__ + repr(sys.argv))"
     for name in (*MODULES, "json", "pickle", "sqlite3"):

@@ -1,4 +1,4 @@
-"""Connections that never come to anything: each is answered, or ended, and none stays."""
+"""Connections that come to nothing: each is answered, or ended, and none stays."""
 
 import socket
 import ssl
@@ -20,7 +20,7 @@ from tests.support.waiting import wait_for
 
 TIMEOUT_S = 2
 HOST = b"Host: 127.0.0.1\r\n\r\n"
-# What a few thousand refusals may cost, however few of them are read.
+# The cost of a few thousand refusals, however few of them are read.
 MEMORY_MB = 15.0
 
 
@@ -74,7 +74,7 @@ NO_HANDSHAKES = {
 
 
 @pytest.mark.parametrize("name", NO_HANDSHAKES)
-def test_what_is_no_handshake_is_answered_and_ended(plain: Served, name: str) -> None:
+def test_an_invalid_handshake_is_answered_and_ended(plain: Served, name: str) -> None:
     said, expected = NO_HANDSHAKES[name]
     heard = raw_http.answer(plain.url, said)
     assert status(heard) == expected, heard
@@ -88,7 +88,7 @@ def test_over_tls_and_with_a_token_too(secret: Served, name: str) -> None:
     assert status(raw_http.answer(secret.url, said, secret.trust)) == expected
 
 
-def test_a_refusal_says_why(plain: Served) -> None:
+def test_a_refusal_has_its_reason(plain: Served) -> None:
     said = {
         "this is no request for a WebSocket: ": asked(b"Cookie: " + b"x" * 9_000),
         "the request has a body (content-length: 1), and none": asked(b"Content-Length: 1"),
@@ -100,8 +100,8 @@ def test_a_refusal_says_why(plain: Served) -> None:
         assert orjson.loads(body)["detail"].startswith(why)
 
 
-def test_who_never_agrees_on_tls_is_gone_after_the_timeout(secret: Served) -> None:
-    """And costs little until then: a stranger needs no token for that."""
+def test_an_unfinished_tls_handshake_ends_after_the_timeout(secret: Served) -> None:
+    """And costs little until then: it needs no token."""
     begun = (b"", b"\x16\x03\x01", b"\x16\x03\x01\x02\x00\x01\x00", b"GET")
     files = open_files(secret.process.pid)
     reset_peak(secret.process.pid)
@@ -119,7 +119,7 @@ def test_who_never_agrees_on_tls_is_gone_after_the_timeout(secret: Served) -> No
 
 
 def head_of(length: int, line: int) -> bytes:
-    """A whole request of so many bytes, with header lines of `line` bytes each."""
+    """A whole request of that many bytes, with header lines of `line` bytes each."""
     head = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n"
     room = length - len(head) - 2
     head += b"".join(b"X: %b\r\n" % (b"y" * (line - 5)) for _ in range(room // line - 1))
@@ -129,7 +129,7 @@ def head_of(length: int, line: int) -> bytes:
 
 @pytest.mark.parametrize("line", [300, 10_000])
 @pytest.mark.parametrize("first", [b"", b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"])
-def test_a_head_has_a_limit_however_it_comes(plain: Served, line: int, first: bytes) -> None:
+def test_a_head_has_a_size_limit_however_it_arrives(plain: Served, line: int, first: bytes) -> None:
     answers = 2 if first else 1
     for extra, expected in ((0, b" 200 "), (1, b" 431 "), (200_000, b" 431 ")):
         said = head_of(MAX_HEAD_BYTES + extra, line)
@@ -140,7 +140,7 @@ def test_a_head_has_a_limit_however_it_comes(plain: Served, line: int, first: by
 
 
 @pytest.mark.parametrize("first", [b"", b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"])
-def test_a_head_has_a_limit_of_headers(plain: Served, first: bytes) -> None:
+def test_the_number_of_headers_is_limited(plain: Served, first: bytes) -> None:
     for end in (b"Connection: close\r\n\r\n", b"Connection: close\n\n"):
         for more, expected in ((MAX_HEADERS - 2, b" 200 "), (MAX_HEADERS - 1, b" 431 ")):
             head = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"a:\r\n" * more + end
@@ -148,12 +148,12 @@ def test_a_head_has_a_limit_of_headers(plain: Served, first: bytes) -> None:
             assert heard.split(b"HTTP/1.1")[-1].startswith(expected)
 
 
-def test_lines_without_an_end_are_not_waited_for(plain: Served) -> None:
+def test_endless_lines_are_not_waited_for(plain: Served) -> None:
     head = b"GET /healthz HTTP/1.1\r\n" + b"a:\r\n" * (MAX_HEADERS + 2)
     assert status(raw_http.answer(plain.url, head)) == 431
 
 
-def test_requests_one_behind_the_other_are_all_answered(plain: Served) -> None:
+def test_pipelined_requests_are_all_answered(plain: Served) -> None:
     one = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nX: " + bytes(b"x" * 20_000) + b"\r\n\r\n"
     last = b"GET /nowhere HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\nGET / and more"
     heard = raw_http.answer(plain.url, one * 20 + last)
@@ -171,7 +171,7 @@ def test_requests_one_behind_the_other_are_all_answered(plain: Served) -> None:
     ],
 )
 def test_a_target_is_a_path(plain: Served, target: bytes) -> None:
-    """Else there would be two names of a host, and one of them would go unchecked."""
+    """Otherwise a host would have two names, and one of them would go unchecked."""
     said = b"GET " + target + b" HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
     heard = raw_http.answer(plain.url, said)
     assert (status(heard), heard.count(b"HTTP/1.1")) == (400, 1)
@@ -180,9 +180,9 @@ def test_a_target_is_a_path(plain: Served, target: bytes) -> None:
     assert status(raw_http.answer(plain.url, upgrade)) == 400
 
 
-# --- floods before anybody is known -------------------------------------------------------------
+# --- floods before authentication ---------------------------------------------------------------
 
-# Read and parsed, so much would take seconds.
+# Read and parsed, this would take seconds.
 FLOOD_BYTES = 16_000_000
 FLOOD_CPU_S = 0.5
 
@@ -233,7 +233,7 @@ def test_heads_of_many_lines_cost_next_to_nothing(plain: Served) -> None:
     assert cpu_s(plain.process.pid) - before_s < FLOOD_CPU_S
 
 
-# --- refusals that nobody reads -----------------------------------------------------------------
+# --- refusals that are not read -----------------------------------------------------------------
 
 REFUSED = {
     "401": b"GET /api/state HTTP/1.1\r\n" + HOST,
@@ -250,7 +250,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("over", ["tcp", "tls and a token"])
-def test_who_reads_no_refusal_is_gone_after_the_timeout(
+def test_a_client_that_reads_no_refusal_is_gone_after_the_timeout(
     plain: Served, secret: Served, over: str
 ) -> None:
     live = plain if over == "tcp" else secret
@@ -265,7 +265,7 @@ def test_who_reads_no_refusal_is_gone_after_the_timeout(
                     live.trust.wrap_socket(client, server_hostname="127.0.0.1")
                 )
             client.settimeout(0.2)
-            with suppress(OSError):  # it may not be listened to any more
+            with suppress(OSError):  # it may no longer be listening
                 client.sendall(refused * 3_000)
         wait_for(lambda: open_files(pid) <= files, "their end")
         assert peak_mb(pid) - memory < MEMORY_MB
@@ -279,12 +279,12 @@ LARGE_FIELD = (
 )
 
 
-def test_a_websocket_behind_an_answer_that_nobody_reads_keeps_nothing(plain: Served) -> None:
+def test_a_websocket_after_an_unread_answer_stores_nothing(plain: Served) -> None:
     pid = plain.process.pid
     files, memory = open_files(pid), resident_mb(pid)
     reset_peak(pid)
     with ExitStack() as stack:
-        # As many large answers as one address may have made at once; each is longer than a socket.
+        # As many large answers as one address may get at once; each exceeds a socket's buffer.
         clients = [stack.enter_context(raw_http.connect(plain.url, room=4_096)) for _ in range(4)]
         for width, client in enumerate(clients, 16):
             client.sendall(LARGE_FIELD % width + asked())
@@ -293,7 +293,7 @@ def test_a_websocket_behind_an_answer_that_nobody_reads_keeps_nothing(plain: Ser
         assert peak_mb(pid) - memory < 2 * MEMORY_MB
 
 
-def test_behind_an_answer_that_nobody_reads_no_more_is_read(plain: Served) -> None:
+def test_after_an_unread_answer_nothing_more_is_read(plain: Served) -> None:
     with raw_http.connect(plain.url, room=4_096) as client:
         client.sendall(LARGE_FIELD % 16)
         assert pour(client, (b"GET /healthz HTTP/1.1\r\n" + HOST) * 1_000) < FLOOD_BYTES
@@ -303,7 +303,7 @@ def test_a_websocket_after_an_answer_stays(plain: Served) -> None:
     with raw_http.connect(plain.url) as client:
         client.sendall(b"GET /healthz HTTP/1.1\r\n" + HOST + asked())
         seen = b""
-        # Heartbeats: longer than a request may take.
+        # Heartbeats: for longer than a request may take.
         while seen.count(b'"type":"state"') < 2 * TIMEOUT_S + 1:
             block = client.recv(65_536)
             assert block, seen

@@ -1,4 +1,4 @@
-"""What a disk can do to the journal: run full, turn read-only, be slow, lose power."""
+"""Disk faults and the journal: full, read-only, slow, without power."""
 
 import os
 import random
@@ -33,7 +33,7 @@ def disk(tmp_path: Path, library: Path) -> Disk:
 
 
 class TwinUpdate:
-    """What the child has said of its journal."""
+    """The child's reports of its journal."""
 
     def __init__(self, child: subprocess.Popen[str]) -> None:
         self.last = ("", 0, 0, "")
@@ -59,7 +59,7 @@ class TwinUpdate:
 
 @contextmanager
 def feeding(disk: Disk, log_bytes: int = 8_000_000) -> Iterator[TwinUpdate]:
-    """A child that hands rows over; ends it by ending its input."""
+    """A child that passes rows to its journal, ended by the end of its input."""
     command = [sys.executable, "-m", "tests.support.journal_child"]
     child = subprocess.Popen(
         [*command, str(disk.folder / "j.sqlite"), str(RATE), str(log_bytes)],
@@ -96,7 +96,9 @@ def assert_whole(disk: Disk) -> None:
 
 
 @pytest.mark.parametrize(("fault", "said"), [("full", ""), ("readonly", "Read-only file system")])
-def test_a_fault_from_the_start_is_told_and_heals(disk: Disk, fault: Weather, said: str) -> None:
+def test_a_fault_from_the_start_is_reported_and_heals(
+    disk: Disk, fault: Weather, said: str
+) -> None:
     disk.be(fault)
     with feeding(disk) as told:
         told.wait("failing", said)
@@ -134,7 +136,7 @@ def test_a_slow_sync_delays_no_commit(disk: Disk) -> None:
         disk.be("well")
 
 
-def test_a_slow_disk_is_told_and_nothing_is_lost(disk: Disk) -> None:
+def test_a_slow_disk_is_reported_and_nothing_is_lost(disk: Disk) -> None:
     with feeding(disk) as told:
         told.wait("recording", written=50)
         disk.be("slow-write")
@@ -148,11 +150,11 @@ def test_a_slow_disk_is_told_and_nothing_is_lost(disk: Disk) -> None:
 def test_a_power_cut_costs_at_most_the_last_second(
     disk: Disk, tmp_path: Path, log_bytes: int
 ) -> None:
-    """At any moment, what was handed over a second before is on the disk.
+    """At any moment, rows passed on a second before are on the disk.
 
-    The disk notes every write and every sync in their order; the files are rebuilt as of a moment
-    from what was synced by then, and from nothing else. A short log is put into the file, and begun
-    anew, many times.
+    The disk records every write and every sync in order; the files are rebuilt as of a moment
+    from what was synced by then, and from nothing else. A short WAL is checkpointed, and restarted,
+    many times.
     """
     disk.log = tmp_path / "log"
     with feeding(disk, log_bytes=log_bytes) as told:

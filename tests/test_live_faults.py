@@ -1,4 +1,4 @@
-"""Faults over real processes: clients are told the truth, and everything recovers by itself."""
+"""Faults over real processes: clients get the truth, and everything recovers by itself."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -27,7 +27,7 @@ def reason(client: Listener, expected: str) -> Frame:
 
 
 def apply(known: list[str], frame: Frame) -> list[str]:
-    """The tags that a client of deltas knows after a frame."""
+    """The tags of a client of deltas after a frame."""
     if frame["type"] == "state":
         return tag_ids(frame["state"])
     if frame["type"] == "delta":
@@ -37,7 +37,7 @@ def apply(known: list[str], frame: Frame) -> list[str]:
     return known
 
 
-def test_a_twin_is_killed_and_its_successor_knows_fewer_tags(domain: int) -> None:
+def test_a_twin_is_killed_and_its_successor_has_fewer_tags(domain: int) -> None:
     with (
         lupin_twin(domain, "web") as process,
         Peer(domain, "robot") as robot,
@@ -97,7 +97,7 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
             field_of(live, **FIELD)
             return bool(told_s <= 3.5)
 
-        # As the client is told; a busy machine may be late once.
+        # As the client receives it; a busy machine may be late once.
         assert any(told_in_time() for _ in range(5))
 
         twin.freeze()
@@ -121,7 +121,7 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
         )
 
 
-def test_a_second_twin_is_said_loudly_and_its_end_too(domain: int) -> None:
+def test_a_second_twin_is_reported_and_its_end_too(domain: int) -> None:
     soon = constants(**{"lupin_twin.ros.inputs:LEFT_OVER_S": 2.0})
     with (
         lupin_twin(domain, "web", *soon) as process,
@@ -156,7 +156,7 @@ def sabotaged_serve() -> Iterator[Bridge]:
         "lupin_twin.ros.convert:map_of:width=13",
         "lupin_twin.ros.convert_services:field_request_of:boom-field",
         "lupin_twin.ros.convert:StateMessages.build:boom-state:2",
-        # Called for listeners, by the heartbeat and by the state's timer.
+        # Called for subscriptions, by the heartbeat and by the state's timer.
         "lupin_twin.core.state:TwinStore.snapshot:boom-snapshot:3",
     )
     with (
@@ -191,12 +191,12 @@ def sabotaged_web() -> Iterator[Bridge]:
 
 
 def errors(live: Bridge) -> int:
-    """How many errors of callbacks the bridge has counted."""
+    """The number of callback errors that the bridge has counted."""
     return int(live.json("/healthz")["callback_errors"])
 
 
 def goes_on_after(live: Bridge, fault: Callable[[], object], counted: int) -> None:
-    """The fault is counted, and clients get what comes after it without having seen a break."""
+    """The fault is counted, and clients get what comes after it without a break."""
     before = errors(live)
     with live.listen() as client:
         client.until("state")

@@ -1,4 +1,4 @@
-"""What DDS does not deliver, or not at once: the twin and `web` know it, say it, and recover."""
+"""Messages that DDS delivers late or never: the twin and `web` notice, report, and recover."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SETTLED_S = 1.0
 SETTLES_SOON = constants(**{"lupin_twin.ros.inputs:SETTLED_S": SETTLED_S})
 
 
-# --- publishers that the contract's QoS does not match --------------------------------------------
+# --- publishers whose QoS does not match the contract ---------------------------------------------
 
 
 @pytest.fixture
@@ -48,7 +48,7 @@ def running() -> Iterator[Bridge]:
     ],
     ids=["default", "best effort"],
 )
-def test_a_publisher_of_another_qos_is_heard_and_told_of(
+def test_a_publisher_with_other_qos_is_received_and_reported(
     running: Bridge, qos: QoSProfile, remedy: str
 ) -> None:
     peer = running.peer
@@ -64,7 +64,7 @@ def test_a_publisher_of_another_qos_is_heard_and_told_of(
     assert said.endswith(remedy)
     assert running.process.output.count(said) == 1
     assert diagnosed(peer, lambda values: said in values.get("inputs", {}).values())
-    # Who keeps to the contract is heard by both subscriptions, and counts once; it gives no stamp.
+    # A matching publisher reaches both subscriptions, and counts once; it gives no stamp.
     for value in range(20):
         peer.observe(scan("ours", {"co2": float(value)}))
     running.tag("ours", lambda tag: tag["readings"][0]["value"] == 19.0)
@@ -78,15 +78,15 @@ def test_a_publisher_of_another_qos_is_heard_and_told_of(
     wait_for(lambda: not running.json("/readyz")["input_problems"], "nothing to be wrong")
 
 
-# --- what is lost ---------------------------------------------------------------------------------
+# --- losses ---------------------------------------------------------------------------------------
 
 
-def test_of_a_publisher_that_had_said_nothing_each_loss_is_counted(domain: int) -> None:
+def test_every_loss_of_a_new_publisher_is_counted(domain: int) -> None:
     count = 1_000
     with lupin_twin(domain, "serve", *SETTLES_SOON) as twin, Peer(domain) as peer:
         publisher = peer.publisher(TOPIC, Observation)
         peer.until(publisher.get_subscription_count, "the twin")
-        # It looks each second, and a look that is a hair early is a second late.
+        # It checks each second, and a check that is a hair early is a second late.
         settled_s = time.monotonic() + SETTLED_S + 4.0
         peer.until(lambda: time.monotonic() > settled_s, "the twin to have seen its silence")
         twin.freeze()
@@ -132,9 +132,9 @@ def home_for_all() -> Iterator[str]:
         yield home
 
 
-if os.geteuid() == 0:  # nobody else can run a process as another user; see test_inputs too
+if os.geteuid() == 0:  # only root can run a process as another user; see test_inputs too
 
-    def test_a_publisher_of_another_user_from_whom_nothing_comes_is_hinted_at(domain: int) -> None:
+    def test_a_silent_publisher_of_another_user_is_reported(domain: int) -> None:
         with (
             home_for_all() as home,
             bridge(*SETTLES_SOON, *OFTEN, domain=domain) as live,
@@ -149,7 +149,7 @@ if os.geteuid() == 0:  # nobody else can run a process as another user; see test
 
 
 def diagnosed(peer: Peer, accept: Callable[[dict[str, dict[str, str]]], bool]) -> bool:
-    """Wait until what the twin says on `/diagnostics`, by finding and key, is as expected."""
+    """Wait until the twin's `/diagnostics`, by finding and key, are as expected."""
     said: list[Any] = []
     subscription = peer.node.create_subscription(DiagnosticArray, "/diagnostics", said.append, 10)
 

@@ -1,4 +1,4 @@
-"""What a twin still knows after it was killed, started again, or started twice."""
+"""What a twin still knows after it was killed, restarted, or started twice."""
 
 import random
 from pathlib import Path
@@ -9,7 +9,7 @@ from tests.support.killing import TWICE, kill_and_look
 ROUNDS = 3
 
 
-def test_a_killed_twin_knows_all_that_was_shown_100_ms_before(domain: int, tmp_path: Path) -> None:
+def test_a_killed_twin_knows_everything_shown_100_ms_before(domain: int, tmp_path: Path) -> None:
     chance, number, journal = random.Random(7), 0, tmp_path / "j.sqlite"
     for _ in range(ROUNDS):
         number = kill_and_look(domain, journal, chance, number)

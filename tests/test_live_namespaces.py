@@ -1,4 +1,4 @@
-"""Two greenhouses in one ROS domain, each below its namespace: nothing of one in the other."""
+"""Two greenhouses in one ROS domain, each in its namespace: nothing of one in the other."""
 
 import base64
 
@@ -21,7 +21,7 @@ def below(namespace: str) -> tuple[str, ...]:
 
 
 def fill(robot: Peer, namespace: str, tag_id: str, co2: float) -> None:
-    """What one house's robot tells, on its own topics."""
+    """What one greenhouse's robot publishes, on its own topics."""
     robot.publish(f"{namespace}/floranova/observations", scan(tag_id, {"co2": co2}, (0, 0)))
     robot.publish(f"{namespace}/floranova/observations", look(tag_id, "lupin"))
     robot.publish(f"{namespace}/map", occupancy_grid([[0, 0], [0, 0]]), depth=1)
@@ -49,7 +49,7 @@ def answers(process: Process, tag_id: str) -> tuple[list[str], dict[str, object]
 
 
 def viewed(process: Process, namespace: str) -> tuple[str, list[int]]:
-    """What Foxglove's own client sees of a house: the tag last observed, and the map."""
+    """A greenhouse in Foxglove's own client: the tag last observed, and the map."""
     topics = [f"{namespace}/{name}" for name in ("floranova/observations", "map", "twin/state")]
     told = play(url_of(process), "look", *topics)
     channels = {channel["topic"]: channel for channel in told["channels"]}
@@ -60,7 +60,7 @@ def viewed(process: Process, namespace: str) -> tuple[str, list[int]]:
     return observation.tag_reading.tag_id or observation.flower.tag_id, list(grid.data)
 
 
-def test_two_houses_in_one_domain_do_not_mix(domain: int) -> None:
+def test_two_greenhouses_in_one_domain_do_not_mix(domain: int) -> None:
     with (
         twin_node(domain, *below("/gh1")) as first,
         lupin_twin(domain, "serve", *below("/gh2")) as second,
@@ -75,7 +75,7 @@ def test_two_houses_in_one_domain_do_not_mix(domain: int) -> None:
         theirs, field = answers(second, "two")
         assert (theirs, field["value_max"]) == (["two"], 900.0)
         assert viewed(web, "/gh1") == ("one", [0, 0, 0, 0])
-        # What a twin dropped its own `web` knows, from `/diagnostics`.
+        # The drops of a twin reach its own `web`, from `/diagnostics`.
         robot.publish("/gh1/floranova/observations", scan("nowhere", frame_id="odom"))
         with httpx.Client(base_url=url_of(web), timeout=PATIENCE_S) as http:
             drops = wait_for(lambda: http.get("/readyz").json()["drops"], "what was dropped")
@@ -83,12 +83,12 @@ def test_two_houses_in_one_domain_do_not_mix(domain: int) -> None:
             metrics = http.get("/metrics").text
         assert '\nlupin_dropped_total{reason="frame"} 1.0' in metrics
         assert '\nlupin_web_dropped_total{reason="frame"} 0.0' in metrics
-        # What it hears and tells is the first that a twin says.
+        # A twin's first line names what it receives and publishes.
         first.wait_for_output("/gh1/lupin_twin in ROS domain")
         for name in ("/gh1/floranova/observations", "/gh1/perception/discovered_tags", "/gh1/map"):
             assert name in first.output
         assert "nodes publish" not in first.output + second.output + web.output
-        # Of the root's names, nothing is heard and nothing told.
+        # The root's names are neither received nor published.
         graph = dict(robot.node.get_topic_names_and_types())
         assert {"/gh1/twin/state", "/gh1/twin/times", "/gh2/twin/state"} <= graph.keys()
         assert "/twin/state" not in graph
@@ -96,9 +96,9 @@ def test_two_houses_in_one_domain_do_not_mix(domain: int) -> None:
         assert {f"/gh1/{service.name}" for service in SERVICES} <= services.keys()
 
 
-def test_the_demo_below_a_namespace_takes_its_patrol_along(domain: int) -> None:
+def test_the_demo_in_a_namespace_includes_its_patrol(domain: int) -> None:
     with (
-        # Without the past that it begins with: what is shown comes from the patrol.
+        # Without the past that it begins with: the data come from the patrol.
         lupin_twin(domain, "demo", "--speed", "20", *below("/gh1"), "-p", "journal:=off") as demo,
         listener(url_of(demo)) as screen,
     ):

@@ -25,7 +25,7 @@ from tests.support.rosbridge import Ros
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge
 
-# What a client may be without news of the twin (docs/how-to/clients-javascript.md).
+# How long a client may be without news of the twin (docs/how-to/clients-javascript.md).
 BACK_WITHIN_S = 3.5
 CLIENTS = 12
 PAUSE_S = 0.5
@@ -72,10 +72,10 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[House]:
 # --- everything below the prefix ------------------------------------------------------------------
 
 
-def test_the_page_and_all_that_it_asks_for_are_below_the_prefix(house: House) -> None:
+def test_the_page_and_all_its_requests_are_below_the_prefix(house: House) -> None:
     with httpx.Client(base_url=house.url, trust_env=False, timeout=PATIENCE_S) as browser:
         page = {"Accept": "text/html", "Host": "twin.example"}
-        # Led to the sign-in page, and in with its cookie.
+        # Redirected to the sign-in page, and in with its cookie.
         asked = browser.get("/gh1/", headers=page)
         assert (asked.status_code, asked.headers["location"]) == (303, "signin")
         assert browser.get("/gh1/signin", headers=page).status_code == 200
@@ -84,7 +84,7 @@ def test_the_page_and_all_that_it_asks_for_are_below_the_prefix(house: House) ->
         assert "Path=/gh1/" in cookie
         assert "Secure" not in cookie, "nginx serves http here, and says so"
         assert browser.get("/gh1", headers=page).headers["location"].endswith("/gh1/")
-        # Every replica takes the cookie; nothing outside the prefix gets it.
+        # Every replica accepts the cookie; it is not sent outside the prefix.
         for _ in range(6):
             home = browser.get("/gh1/", headers=page)
             assert "Lupin twin" in home.text
@@ -128,12 +128,12 @@ def test_limits_and_logs_go_by_the_client_and_not_by_nginx(house: House) -> None
     assert httpx.get(url, headers=BEARER, trust_env=False, timeout=PATIENCE_S).is_success
 
 
-# --- a replica goes -------------------------------------------------------------------------------
+# --- a replica stops ------------------------------------------------------------------------------
 
 
 @dataclass
 class Screen:
-    """A client that does as the docs say: back after half a second, later where that fails."""
+    """A client that follows the docs: back after half a second, later where that fails."""
 
     url: str
     gaps_s: list[float] = field(default_factory=list)
@@ -171,7 +171,7 @@ class Screen:
 
 
 def longest_gap_s(house: House, screens: list[Screen], replica: Bridge, number: int) -> float:
-    """How long a client was without a frame, at most, since a replica was told to end."""
+    """How long a client was without a frame, at most, since a replica was stopped."""
     returns = sum(screen.returns for screen in screens)
     before = [len(screen.gaps_s) for screen in screens]
     replica.process.send(signal.Signals(number))
@@ -229,7 +229,7 @@ def stop_under_load(house: House, number: signal.Signals) -> None:
 
 @dataclass
 class Load:
-    """Somebody who asks for fields all the time."""
+    """A client that requests fields all the time."""
 
     url: str
     answers: int = 0
@@ -242,8 +242,8 @@ class Load:
                 try:
                     status = client.get(self.url).status_code
                 except (httpx.RemoteProtocolError, httpx.ReadError):
-                    continue  # amid its answer: nginx cannot begin that anew
-                # 429: the limit for one client; 503: the good-bye of a replica that is told to end.
+                    continue  # in the middle of its answer: nginx cannot repeat that
+                # 429: the limit for one client; 503: a replica that is being stopped.
                 if status not in (200, 429, 503):
                     self.refused.append(status)
                 self.answers += 1

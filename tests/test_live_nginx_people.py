@@ -1,4 +1,4 @@
-"""nginx that signs people in with `auth_request`, by the block that the guide shows."""
+"""nginx that signs people in with `auth_request`, by the block in the guide."""
 
 import threading
 from collections.abc import Iterator
@@ -23,10 +23,10 @@ NOTE = {"kind": "comment", "subject": "site", "text": "by the proxy"}
 
 
 class SignInService(BaseHTTPRequestHandler):
-    """Knows one cookie; a request with a body is no question of nginx's."""
+    """Knows one cookie; a request with a body does not come from nginx."""
 
     def do_GET(self) -> None:
-        """200 and who it is, or 401."""
+        """200 with the name, or 401."""
         is_known = self.headers.get("Cookie") == COOKIE["Cookie"]
         assert self.headers.get("Content-Length") is None
         self.send_response(200 if is_known else 401)
@@ -72,7 +72,7 @@ def url(tmp_path: Path) -> Iterator[str]:
             yield f"{address}/gh1"
 
 
-def test_whom_the_service_knows_is_in_by_name_and_nobody_else(url: str) -> None:
+def test_only_people_whom_the_service_knows_are_in_by_name(url: str) -> None:
     with httpx.Client(trust_env=False, timeout=PATIENCE_S) as client:
 
         def write(headers: dict[str, str]) -> httpx.Response:

@@ -1,4 +1,4 @@
-"""Notes are where the log is: at `web` they come over ROS, and are written at `serve` alone."""
+"""Notes are where the log is: `web` gets them over ROS, and only `serve` writes them."""
 
 import sys
 from pathlib import Path

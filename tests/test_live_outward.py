@@ -1,4 +1,4 @@
-"""`lupin-twin serve` and a real broker: what it is told, its will, and an end in time."""
+"""`lupin-twin serve` and a real broker: its messages, its will, and a shutdown in time."""
 
 import signal
 from pathlib import Path
@@ -17,7 +17,7 @@ from tests.support.web import bridge, filled
 READING = "farm/gh1/tags/a_2Fb/readings/temperature"
 
 
-def test_an_observation_comes_out_at_the_broker_and_a_killed_bridge_is_offline(
+def test_an_observation_reaches_the_broker_and_a_killed_bridge_is_offline(
     tmp_path: Path,
 ) -> None:
     broker = Broker(tmp_path, wants_password=True)
@@ -58,7 +58,7 @@ def test_an_observation_comes_out_at_the_broker_and_a_killed_bridge_is_offline(
         wait_for(lambda: heard.of("farm/gh1/status")[-1:] == [b"offline"], "the will")
 
 
-def test_whoever_publishes_too_much_at_home_assistants_topic_costs_no_memory(
+def test_a_flood_at_home_assistants_topic_costs_no_memory(
     tmp_path: Path,
 ) -> None:
     broker = Broker(tmp_path)
@@ -78,14 +78,14 @@ def test_whoever_publishes_too_much_at_home_assistants_topic_costs_no_memory(
         wait_for(lambda: heard.last(reading)["value"] == 500.0, "the next one")
         assert peak_mb(live.process.pid) - before_mb < 32
         assert 'lupin_outward_failed_total{channel="mqtt"} 0.0' in live.get("/metrics").text
-        # One that fails is told to clients.
+        # A failing channel is reported to clients.
         with live.listen() as page:
             process.kill()
             page.until("status", lambda told: bool(told["outward"][0]["is_failing"]))
 
 
-def test_a_webhook_of_web_says_at_once_that_it_is_a_robot(tmp_path: Path) -> None:
-    """A twin elsewhere says so on a topic of its own, once a second."""
+def test_the_first_webhook_of_web_names_the_source(tmp_path: Path) -> None:
+    """A twin elsewhere publishes its source on a topic of its own, once a second."""
     secrets: Any = {"LUPIN_WEBHOOK_SECRET": "s" * 16}
     with (
         own_domain() as domain,

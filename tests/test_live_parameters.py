@@ -1,4 +1,4 @@
-"""One parameter file for a twin and its `web`, whatever the twin is called and wherever it is."""
+"""One parameter file for a twin and its `web`, for any name and namespace of the twin."""
 
 from pathlib import Path
 from typing import Any

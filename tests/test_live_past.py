@@ -1,4 +1,4 @@
-"""The past of a twin with a journal, over ROS: states of then, series and events, and no delay."""
+"""The past of a twin with a journal, over ROS: past states, series and events, without delay."""
 
 import time
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ T = 1_700_000_000
 
 @pytest.fixture(scope="module")
 def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
-    """A twin that has heard all this."""
+    """A twin that has received all this."""
     path = tmp_path_factory.mktemp("journal") / "j.sqlite"
     with (
         own_domain() as domain,
@@ -83,7 +83,7 @@ def told(response: Any) -> list[tuple[float, float]]:
     ]
 
 
-def test_a_state_is_what_was_known_then_with_the_ages_of_then(peer: Peer) -> None:
+def test_a_past_state_has_the_data_and_the_ages_of_its_moment(peer: Peer) -> None:
     response = state_at(peer, T + 50.0)
     tags = {tag.tag_id: tag for tag in response.state.tags}
     assert "b" not in tags
@@ -96,8 +96,8 @@ def test_a_state_is_what_was_known_then_with_the_ages_of_then(peer: Peer) -> Non
     assert times.looked_at == times.last_try == stamp(T + 10.0)
 
 
-def test_a_later_moment_has_the_later_readings_the_failed_try_and_the_pest_gone(peer: Peer) -> None:
-    response = state_at(peer, T + 300.0)  # a moment holds what was observed at it
+def test_a_later_moment_has_later_readings_the_failed_attempt_and_no_pest(peer: Peer) -> None:
+    response = state_at(peer, T + 300.0)  # a moment includes observations exactly at it
     a = next(tag for tag in response.state.tags if tag.tag_id == "a")
     assert {r.name: r.value for r in a.readings} == {"co2": 500.0, "light": 9.0}
     assert (a.anomaly, a.stale_seconds) == (False, 0.0)
@@ -107,7 +107,7 @@ def test_a_later_moment_has_the_later_readings_the_failed_try_and_the_pest_gone(
     assert next(tag for tag in before.state.tags if tag.tag_id == "a").anomaly
 
 
-def test_as_of_now_it_is_the_state_of_now(peer: Peer) -> None:
+def test_as_of_now_it_is_the_current_state(peer: Peer) -> None:
     newest = peer.state(lambda _: True, "a state")
     response = peer.ask(GetStateAt, STATE_AT, at=newest.header.stamp)
     for tag in [*response.state.tags, *newest.tags]:
@@ -118,7 +118,7 @@ def test_as_of_now_it_is_the_state_of_now(peer: Peer) -> None:
     assert by_id["pinned"].pose.orientation.w == 1.0
 
 
-def test_what_cannot_be_answered_is_refused_by_name_and_empty(peer: Peer) -> None:
+def test_an_impossible_query_is_refused_by_name_without_data(peer: Peer) -> None:
     later = peer.ask(GetStateAt, STATE_AT, at=Time(sec=2**31 - 1))
     assert "at is 2147483647.000000000 s, later than now, 1" in later.error_message
     assert later == GetStateAt.Response(error_message=later.error_message)
@@ -128,7 +128,7 @@ def test_what_cannot_be_answered_is_refused_by_name_and_empty(peer: Peer) -> Non
     assert many.error_message == "max_points is 5001, the limits are 1 and 5000"
 
 
-def test_readings_are_told_one_by_one_or_in_buckets(peer: Peer) -> None:
+def test_readings_come_one_by_one_or_in_buckets(peer: Peer) -> None:
     assert told(series(peer, "a", "co2")) == [(0.0, 400.0), (100.5, 500.0)]
     half = series(peer, "a", "co2", start=stamp(T + 0.0), end=stamp(T + 100.5))
     assert told(half) == [(0.0, 400.0)]
@@ -148,7 +148,7 @@ def pieces(pid: int) -> Iterator[range]:
     """The numbers of `OBSERVED` observations, when they are due.
 
     `RATE` a second of what the machine leaves to a process: of the time in which its threads wait
-    for a core, a tenth. And what is late comes in pieces that a topic has room for twice.
+    for a core, a tenth. Late ones come in pieces that fit into a topic twice.
     """
     sent, due, before_s, waited_before_s = 0, 0.0, time.monotonic(), waited_s(pid)
     while sent < OBSERVED:
@@ -161,8 +161,8 @@ def pieces(pid: int) -> Iterator[range]:
         yield piece
 
 
-def test_a_flood_of_the_dearest_question_loses_no_observation(domain: int, tmp_path: Path) -> None:
-    """A topic holds 50, so that one quarter of a second without a look at it would lose some."""
+def test_a_flood_of_expensive_queries_loses_no_observation(domain: int, tmp_path: Path) -> None:
+    """A topic holds 50: a quarter of a second without a read would lose some."""
     journal = tmp_path / "j.sqlite"
     with (
         twin_node(domain, "--ros-args", "-p", f"journal:={journal}") as twin,

@@ -1,4 +1,4 @@
-"""`web` reads its twin's file, or one that follows it: the same answers, also without a twin."""
+"""`web` reads its twin's file, or a copy that follows it: the same answers, also without a twin."""
 
 import sqlite3
 import sys
@@ -54,7 +54,7 @@ QUESTIONS = (
 
 
 def still(answer: httpx.Response) -> tuple[int, bytes]:
-    """An answer that is one."""
+    """A successful answer."""
     assert answer.status_code < 500, answer.text
     return answer.status_code, answer.content
 
@@ -95,7 +95,7 @@ class Apart:
             look("a", anomaly=True, bug_count=2, blooms=[(1.0, 2.0)], stamp_s=at_s),
             scan("b", status=2, stamp_s=at_s + 5.0),
         )
-        # The last of them is the one that failed.
+        # The last of them is the failed one.
         rows = "SELECT count(*) FROM scan WHERE is_copy = 0 AND status != 0"
         expected = [(1 + first // OBSERVED,)]
         wait_for(lambda: select(self.folder / "j.sqlite", rows) == expected, "all in the journal")
@@ -104,7 +104,7 @@ class Apart:
         return sorted(self.state.glob("lupin-twin/*.followed/*.sqlite"))
 
     def are_same(self, one: Bridge, other: Bridge) -> None:
-        """Every question has the same answer, to the last byte, as soon as all has come."""
+        """Every query has the same answer, to the last byte, as soon as all has arrived."""
         for path in QUESTIONS:
 
             def same(path: str = path) -> bool:
@@ -112,7 +112,7 @@ class Apart:
                 etags = {answer.headers.get("etag") for answer in (here, there)}
                 return still(here) == still(there) and len(etags) == 1
 
-            if "at=2147" in path:  # it says when now is
+            if "at=2147" in path:  # it contains the current time
                 assert other.http.get(path).status_code == 400
             else:
                 wait_for(same, f"the same answer to {path}")
@@ -154,7 +154,7 @@ def asked(live: Bridge, path: str, **query: Any) -> Any:
     return wait_for(look_for, f"{path} {query}").json()
 
 
-def test_without_its_twin_web_answers_all_the_same_and_goes_on_with_the_next(own: Apart) -> None:
+def test_without_its_twin_web_still_answers_and_goes_on_with_the_next(own: Apart) -> None:
     before = {path: own.beside.http.get(path) for path in QUESTIONS[:-2]}
     own.twin.kill()
     for replica in (own.beside, own.following):
@@ -170,7 +170,7 @@ def test_without_its_twin_web_answers_all_the_same_and_goes_on_with_the_next(own
     # Another journal is followed into another file.
     for file in own.folder.glob("j.sqlite*"):
         file.rename(file.with_name(f"old-{file.name}"))
-    # What is latched for the next twin is of later than that afternoon, whatever ran before.
+    # Latched messages for the next twin are from after that afternoon, whatever ran before.
     own.peer.observe(*(scan("a", {"co2": 1.0}, stamp_s=T + 9_000 + n) for n in range(50)))
     own.twin = own.start_twin()
     own.peer.wait_for_twin()
@@ -181,16 +181,16 @@ def test_without_its_twin_web_answers_all_the_same_and_goes_on_with_the_next(own
 
 
 def tags(live: Bridge) -> list[str]:
-    """Those of that afternoon, as soon as there is a file."""
+    """The tags of that afternoon, as soon as there is a file."""
     answer = live.get("/api/state", at=T + 1)
     found = answer.json()["tags"] if answer.status_code == 200 else []
     return [tag["tag_id"] for tag in found]
 
 
-def test_what_is_followed_answers_as_the_file_itself_does(apart: Apart) -> None:
+def test_the_copy_gives_the_same_answers_as_the_file_itself(apart: Apart) -> None:
     assert len(apart.followed()) == 1
     apart.are_same(apart.beside, apart.following)
-    # And goes on so.
+    # And continues to.
     apart.observe(OBSERVED)
     history = {"tag_id": "a", "sensor_type": "co2", "from": T, "to": T + 1e5}
     for replica in (apart.beside, apart.following):
@@ -203,7 +203,7 @@ def test_what_is_followed_answers_as_the_file_itself_does(apart: Apart) -> None:
     apart.are_same(apart.beside, apart.following)
 
 
-def test_alarms_are_the_same_where_the_copy_comes_late(apart: Apart) -> None:
+def test_alarms_are_the_same_when_the_copy_comes_late(apart: Apart) -> None:
     """As on a busy machine: no news of the twin comes after the copy."""
     path = QUESTIONS[-3]
     assert "/api/alarms" in path
@@ -213,7 +213,7 @@ def test_alarms_are_the_same_where_the_copy_comes_late(apart: Apart) -> None:
         here, there = (live.http.get(path) for live in (apart.following, apart.beside))
         return b'"tag_id":"early"' in here.content and here.content == there.content
 
-    # The last of what was there: with its alarm, all before it has been gone through.
+    # The last of what was there: with its alarm, all before it has been read.
     hot = {"temperature": 60.0}
     apart.peer.observe(*(scan("early", hot, stamp_s=T + 2_497.0 + n) for n in range(2)))
     wait_for(are_same, "the alarms of what was there")
@@ -222,7 +222,7 @@ def test_alarms_are_the_same_where_the_copy_comes_late(apart: Apart) -> None:
         before = apart.following.http.get(path).content
         apart.peer.observe(*(scan("late", hot, stamp_s=T + 2_500.0 + n) for n in range(3)))
         wait_for(lambda: apart.beside.http.get(path).content != before, "the alarm")
-        until_s = time.monotonic() + 4.0  # longer than alarms are looked for by themselves
+        until_s = time.monotonic() + 4.0  # longer than the interval at which alarms are read anyway
         wait_for(lambda: time.monotonic() > until_s, "the time to pass")
         assert apart.following.http.get(path).content == before
         copy.execute("ROLLBACK")
@@ -230,7 +230,7 @@ def test_alarms_are_the_same_where_the_copy_comes_late(apart: Apart) -> None:
 
 
 @pytest.mark.parametrize("harm", ["damaged", "deleted", "emptied", "foreign", "folder"])
-def test_a_followed_file_that_is_harmed_is_copied_anew(apart: Apart, harm: str) -> None:
+def test_a_damaged_copy_is_made_anew(apart: Apart, harm: str) -> None:
     (file,) = apart.followed()
     if harm == "damaged":
         with file.open("r+b") as content:

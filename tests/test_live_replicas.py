@@ -22,7 +22,7 @@ CACHED = ("/api/field.json", "/api/field.npy", "/api/field.png")
 
 @pytest.fixture
 def replicas() -> Iterator[tuple[Bridge, Bridge]]:
-    """Two `lupin-twin web` processes; the second comes when the twin has already seen something."""
+    """Two `lupin-twin web` processes; the second starts after the twin's first observations."""
     with ExitStack() as stack:
         domain = stack.enter_context(own_domain())
         stack.enter_context(twin_node(domain, *OFTEN))
@@ -35,7 +35,7 @@ def replicas() -> Iterator[tuple[Bridge, Bridge]]:
             return running
 
         first = replica()
-        # The second will never hear of the first of these maps, nor of the first reading of "a".
+        # The second never receives the first of these maps, nor the first reading of "a".
         peer.publish_map(occupancy_grid([[0, 0], [0, 100]]))
         peer.observe(scan("a", {"co2": 400.0}, (0, 0)))
         first.tag("a")
@@ -55,7 +55,7 @@ def replicas() -> Iterator[tuple[Bridge, Bridge]]:
 
 
 def pictures_agree(first: Bridge, second: Bridge) -> bool:
-    """Whether both have the same map, which the second can only have from the newest."""
+    """Whether both have the same map, which the second can only have from the latest one."""
     ours, theirs = first.get("/api/map.png"), second.get("/api/map.png")
     return theirs.status_code == 200 and ours.content == theirs.content
 
@@ -69,10 +69,10 @@ def test_both_serve_the_same(
 ) -> None:
     first, second = replicas
     for running in replicas:
-        # The twin says how its journal does once a second, in /diagnostics.
+        # The twin reports its journal's state once a second, in /diagnostics.
         wait_for(partial(is_recording, running), "the journal's state")
         field_of(running, **FIELD)
-    # A state's times come behind it.
+    # A state's times come after it.
     wait_for(
         lambda: without_ages(first.json("/api/state")) == without_ages(second.json("/api/state")),
         "the same state of both",
@@ -84,7 +84,7 @@ def test_both_serve_the_same(
         assert ours.content == theirs.content
     assert first.json("/api/field", **FIELD)["sample_count"] == 2
 
-    # Behind a load balancer, what one replica has given holds at the other.
+    # Behind a load balancer, an ETag of one replica holds at the other.
     for path, query in [
         *((path, FIELD) for path in CACHED),
         ("/api/map", {}),
@@ -95,7 +95,7 @@ def test_both_serve_the_same(
         assert (again.status_code, again.headers["etag"]) == (304, etag)
 
 
-def test_a_twin_that_tells_no_times_has_no_history_and_no_times_of_readings(domain: int) -> None:
+def test_a_twin_without_times_has_no_history_and_no_times_of_readings(domain: int) -> None:
     """One of another build, which publishes its state alone."""
     message = TwinState(tags=[TwinTagState(tag_id="1")])
     message.header.frame_id = "map"

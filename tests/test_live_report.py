@@ -1,4 +1,4 @@
-"""Shift reports of real processes: bounded, and for nobody's work."""
+"""Shift reports of real processes: bounded, and without needless work."""
 
 import re
 import shutil
@@ -17,8 +17,8 @@ DAY = f"from={T0 - HOUR}&to={T0 + 15 * HOUR}"
 KEPT = ("--ros-args", "-p", "journal_days:=36500")
 
 
-def test_a_report_is_of_its_period_and_what_is_none_is_refused(tmp_path: Path) -> None:
-    """That `serve`, `web` and a fleet say the same is held in `test_live_same_answers`."""
+def test_a_report_covers_its_period_and_an_invalid_one_is_refused(tmp_path: Path) -> None:
+    """`test_live_same_answers` compares `serve`, `web` and a fleet."""
     journal = Path(shutil.copy(JOURNALS / "day.sqlite", tmp_path / "j.sqlite"))
     with bridge(*OPTIONS, *KEPT, "-p", f"journal:={journal}") as live:
         wait_for(lambda: live.json("/api/alarms")["source"] == "journal", "the alarms")
@@ -35,7 +35,7 @@ def check(live: Bridge) -> None:
         assert counted == getattr(report.counts, mine) > 0
     assert report.complete_to == report.to
     assert answer.headers["x-complete-to"] == f"{report.to.sec}.000000000"
-    # As of then; the alarms of now have gone on since.
+    # As of then; the current alarms have gone on since.
     then = {it["id"]: it for it in live.json(f"/api/alarms?{DAY}")["alarms"]}
     reported = {it.id: it for it in report.alarms}
     assert reported.keys() == then.keys()
@@ -81,7 +81,7 @@ def check_refusals(live: Bridge) -> None:
     for zone in ("Mars", "Europe", "../zone.tab", "/etc/localtime", "a" * 300, "%00"):
         answer = live.http.get(f"/api/report.html?to={T0}&time_zone={zone}")
         assert (answer.status_code, "times are in UTC" in answer.text) == (200, True), zone
-    # What is to come is left out, and a shift is eight hours.
+    # The future is left out, and a shift is eight hours.
     report = live.json(f"/api/report?to={2**31 - 1}")
     assert report["to"]["sec"] - report["from"]["sec"] == 8 * HOUR
     assert report["to"]["sec"] < 2**31 - 1

@@ -78,7 +78,7 @@ def robot(live: Bridge) -> Json:
 
 
 def at(live: Bridge, x: float) -> Json | None:
-    """What is told once the robot is there."""
+    """The robot in the state, once it is at this position."""
     told = robot(live)
     return told if told["position"] and told["position"]["x"] == x else None
 
@@ -90,7 +90,7 @@ def until_at(live: Bridge, x: float) -> Json:
     return told
 
 
-def assert_says_nothing_of_a_robot(client: Listener) -> None:
+def assert_no_robot(client: Listener) -> None:
     """With none of the next states, and not between them."""
     kinds = [client.next()["type"] for _ in range(4)]
     assert "state" in kinds
@@ -106,14 +106,14 @@ def dropped(live: Bridge, name: str, reason: str) -> float:
     return float(line.rpartition(" ")[2])
 
 
-def test_pose_plan_and_battery_of_standard_messages_are_told_by_serve_and_web(
+def test_serve_and_web_show_pose_plan_and_battery_from_standard_messages(
     both: tuple[Bridge, Bridge],
 ) -> None:
     twin, _ = both
     way = Path(poses=[PoseStamped(pose=on_floor(0.05 * i, 1.0)) for i in range(200)])
     twin.peer.publish("/plan", stamped(way, twin))
     battery = BatteryState(percentage=0.64)
-    # As drivers do: neither latched nor with a frame of the map.
+    # As drivers do: neither latched nor in the map's frame.
     volatile = twin.peer.node.create_publisher(BatteryState, "/battery_state", 10)
     pose = stamped(amcl(2.1, 3.4, math.pi / 2), twin, ago_s=30.0)
     twin.peer.publish("/amcl_pose", pose, depth=1)
@@ -142,7 +142,7 @@ def test_pose_plan_and_battery_of_standard_messages_are_told_by_serve_and_web(
         assert (last["x"], last["y"]) == (2.1, 3.4)
 
 
-def test_a_frame_of_the_robot_comes_behind_the_first_state_and_then_on_change_alone(
+def test_a_robot_frame_comes_after_the_first_state_and_then_on_change_alone(
     both: tuple[Bridge, Bridge],
 ) -> None:
     twin, _ = both
@@ -156,10 +156,10 @@ def test_a_frame_of_the_robot_comes_behind_the_first_state_and_then_on_change_al
             routes_schema.RobotFrame.model_validate(frame)
             assert frame["position"]["x"] == 1.0
             assert "trail" not in frame
-            assert_says_nothing_of_a_robot(client)
+            assert_no_robot(client)
 
 
-def test_another_frame_and_what_is_no_place_are_dropped_named_and_counted(
+def test_another_frame_and_an_invalid_position_are_dropped_named_and_counted(
     both: tuple[Bridge, Bridge],
 ) -> None:
     twin, apart = both
@@ -194,12 +194,12 @@ def test_another_frame_and_what_is_no_place_are_dropped_named_and_counted(
         )
 
 
-def test_before_a_robot_has_said_anything_nothing_is_known_and_odometry_is_taken_by_its_type(
+def test_before_the_first_message_nothing_is_known_and_odometry_is_recognised_by_its_type(
     alone: Bridge,
 ) -> None:
     assert robot(alone) == {"position": None, "plan": None, "battery": None, "trail": []}
     with alone.listen() as client:
-        assert_says_nothing_of_a_robot(client)
+        assert_no_robot(client)
     message = Odometry()
     message.pose.pose = on_floor(7.0, 8.0)
     best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -212,7 +212,7 @@ def test_before_a_robot_has_said_anything_nothing_is_known_and_odometry_is_taken
     alone.peer.until(told, "the odometry")
 
 
-def test_a_topic_of_another_type_is_named_and_harms_nothing(alone: Bridge) -> None:
+def test_a_topic_of_another_type_is_named_and_does_no_harm(alone: Bridge) -> None:
     alone.peer.publish("/amcl_pose", Clock())
     alone.process.wait_for_output("amcl_pose is published as rosgraph_msgs/msg/Clock, and not used")
     alone.peer.publish("/plan", stamped(Path(poses=[PoseStamped()]), alone))

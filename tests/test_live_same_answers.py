@@ -1,4 +1,4 @@
-"""The same questions, the same answers: of a fleet as of `serve`, and as of a moment wherever."""
+"""The same queries, the same answers: from a fleet as from `serve`, and for any moment."""
 
 import gzip
 import json
@@ -25,7 +25,7 @@ OF_A_MOMENT = (
 )
 
 
-def test_a_fleet_answers_of_a_site_byte_for_byte_as_its_serve(
+def test_a_fleet_answers_for_a_site_byte_for_byte_as_its_serve(
     tmp_path: Path, archive: Archive
 ) -> None:
     journal = Path(shutil.copy(JOURNALS / "day.sqlite", tmp_path / "j.sqlite"))
@@ -44,7 +44,7 @@ def test_a_fleet_answers_of_a_site_byte_for_byte_as_its_serve(
     assert different == [], different
 
 
-def test_a_moment_is_told_by_the_log_up_to_then_in_serve_in_web_and_after_a_restart(
+def test_a_past_moment_depends_only_on_the_log_up_to_then_on_every_server(
     tmp_path: Path,
 ) -> None:
     """Judged by no interval, day or plants of later; and with the same ETags."""

@@ -1,8 +1,8 @@
-"""Clients that do not read, are gone without a word, trickle, flood or are too many.
+"""Clients that do not read, vanish, trickle, flood or are too many.
 
 Over real sockets and a real bridge with a robot that changes it at 50 Hz. Each time those clients
 are gone in the end, memory stays within a bound, and a healthy client gets every kind of frame as
-if nothing were.
+usual.
 """
 
 import ctypes
@@ -33,8 +33,8 @@ from tests.support.web import Listener, bridge, deaf_client, listener
 CLIENTS = 20
 TIMEOUT_S = 2
 SELDOM_HZ = 10.0
-# For all of them together; a state of the robot's 30 tags has 23 kB, 1.1 MB a second for each. What
-# the twin itself does meanwhile, fitting models, takes some 15 MB of it.
+# For all of them together; a state of the robot's 30 tags has 23 kB, 1.1 MB a second for each. The
+# twin itself takes some 15 MB of it meanwhile, fitting models.
 MEMORY_MB = 25.0
 
 PATIENT: dict[str, Any] = {"timeout": PATIENCE_S, "trust_env": False}
@@ -50,7 +50,7 @@ def server() -> Iterator[Server]:
 
 @pytest.fixture
 def healthy(server: Server) -> Iterator[Listener]:
-    """On a busy machine, whoever wants all of it may be as slow as those that are to go."""
+    """On a busy machine, a client of everything may be as slow as those that are to go."""
     with listener(url(server), max_rate_hz=SELDOM_HZ) as client:
         client.until("state")
         yield client
@@ -71,7 +71,7 @@ def metric(server: Server, name: str) -> float:
 
 
 def vanish(client: socket.socket) -> None:
-    """Let a client's machine be gone: no packet gets in any more, so none is ever answered.
+    """Let a client's machine vanish: no packet gets in any more, so none is ever answered.
 
     socket(7), SO_ATTACH_FILTER with the one instruction "return 0", which drops every packet.
     """
@@ -98,14 +98,14 @@ def wait_reading(healthy: Listener, look: Callable[[], bool], what: str) -> None
 
 
 def newest(client: Listener) -> int:
-    """The number of the newest frame that is there."""
+    """The number of the latest frame that is there."""
     client.rest()
     return int(client.until("state")["seq"])
 
 
 @contextmanager
 def gone_in_the_end(server: Server, healthy: Listener) -> Iterator[ExitStack]:
-    """What is connected inside is gone at the end, and has cost little meanwhile."""
+    """Connections opened inside are gone at the end, and have cost little meanwhile."""
     clients, files = metric(server, "lupin_clients"), open_files(server.process.pid)
     memory = resident_mb(server.process.pid)
     reset_peak(server.process.pid)
@@ -120,10 +120,10 @@ def gone_in_the_end(server: Server, healthy: Listener) -> Iterator[ExitStack]:
         assert newest(healthy) > seq
 
 
-def test_gone_after_the_timeout_are_clients_that_do_not_read(
+def test_clients_that_do_not_read_are_gone_after_the_timeout(
     server: Server, healthy: Listener
 ) -> None:
-    """Never, without a word, or a byte now and then: of each a third."""
+    """A third each: without a read, vanished, or with a byte now and then."""
     dismissed = metric(server, "lupin_clients_dismissed_total")
     with gone_in_the_end(server, healthy) as stack:
         stuck = [stack.enter_context(deaf_client(url(server))) for _ in range(CLIENTS)]
@@ -161,7 +161,7 @@ def half_body(client: socket.socket) -> None:
     client.sendall(b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9999\r\n\r\n")
 
 
-def test_gone_after_the_timeout_is_a_request_that_comes_byte_by_byte(
+def test_a_request_that_arrives_byte_by_byte_is_gone_after_the_timeout(
     server: Server, healthy: Listener
 ) -> None:
     with gone_in_the_end(server, healthy) as stack:
@@ -197,7 +197,7 @@ def test_a_flood_ends_its_sender_alone(server: Server, healthy: Listener, frame:
         deaf = stack.enter_context(deaf_client(url(server)))
         wait_for_the_answer(deaf)
         for sender in (reads.connection.socket, deaf):
-            # As many as it is for a server that needs seconds for them.
+            # As many as take a server seconds.
             sender.sendall(frame * 20 * FRAMES_AT_ONCE)
         with pytest.raises(ConnectionClosed) as closed:
             reads.until("never", lambda _: False)
@@ -210,7 +210,7 @@ def test_a_flood_ends_its_sender_alone(server: Server, healthy: Listener, frame:
 def test_a_message_past_the_limit_is_one_in_pieces_too(server: Server, healthy: Listener) -> None:
     with gone_in_the_end(server, healthy), listener(url(server), max_rate_hz=SELDOM_HZ) as loud:
         pieces = MAX_INBOUND_BYTES // 10_000 + 1
-        with suppress(ConnectionClosed):  # it may hear the answer before it has said all
+        with suppress(ConnectionClosed):  # it may receive the answer before it has sent everything
             loud.connection.send("x" * 10_000 for _ in range(pieces))
         with pytest.raises(ConnectionClosed) as closed:
             loud.until("never", lambda _: False)
@@ -230,7 +230,7 @@ def test_a_message_has_a_limit_of_pieces_however_small(server: Server, path: str
         assert said[-1] == (CLOSE, b"\x03\xf0sent a message in more than %d pieces" % MAX_PIECES)
 
 
-def test_one_client_too_many_is_told_so_and_may_come_when_another_has_gone() -> None:
+def test_one_client_too_many_gets_the_reason_and_may_come_when_another_has_gone() -> None:
     with bridge("--max-clients", "3") as live, ExitStack() as stack:
         inside = [stack.enter_context(live.listen()) for _ in range(3)]
         for client in inside:
@@ -242,7 +242,7 @@ def test_one_client_too_many_is_told_so_and_may_come_when_another_has_gone() -> 
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 1013
             assert closed.value.rcvd.reason == "3 clients are connected, the limit"
-        # One address does not keep the places from the others.
+        # One address does not take all places from the others.
         other = stack.enter_context(connect_from(live.url, "127.0.9.1"))
         other.sendall(handshake("/foxglove"))
         with pytest.raises(ConnectionClosed) as closed:

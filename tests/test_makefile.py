@@ -1,4 +1,4 @@
-"""What the two commands of a newcomer's run, as `make` itself would tell."""
+"""The commands behind a newcomer's two targets, as `make` itself lists them."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ def told(*target: str) -> str:
     return result.stdout
 
 
-def test_every_check_is_among_those_of_make_test_and_two_are_run_at_a_time() -> None:
+def test_every_check_is_part_of_make_test_and_two_run_at_a_time() -> None:
     lines = told("test")
     for command in (
         "ruff check",
@@ -41,7 +41,7 @@ def test_a_warning_ends_the_build_of_the_guide() -> None:
     assert "sphinx-build --quiet -n -W " in told("--what-if=docs/conf.py", "docs")
 
 
-def test_what_the_tests_start_compiles_no_module_again() -> None:
+def test_processes_of_the_tests_compile_no_module_again() -> None:
     lines = [line for line in told("test", "quick").splitlines() if "/pytest " in line]
     assert len(lines) == 3
     assert all(line.startswith("PYTHONDONTWRITEBYTECODE= ") for line in lines)

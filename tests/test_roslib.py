@@ -26,7 +26,7 @@ def roslib(url: str, scenario: str) -> Process:
 
 
 def told_by(process: Process) -> Any:
-    """What a scenario has told at its end."""
+    """A scenario's result, printed at its end."""
     assert process.wait() == 0, process.output
     return json.loads(process.output.splitlines()[-1])
 
@@ -54,7 +54,7 @@ def test_a_subscriber_gets_the_state(house: Bridge) -> None:
     assert state["header"]["frame_id"] == "map"
 
 
-def test_fields_come_with_null_and_a_refused_one_and_a_failed_call_are_two_things(
+def test_fields_have_null_and_a_refused_field_differs_from_a_failed_call(
     house: Bridge,
 ) -> None:
     told = play(house.url, "field")
@@ -82,7 +82,7 @@ def test_fields_come_with_null_and_a_refused_one_and_a_failed_call_are_two_thing
     }
 
 
-def test_roslibs_questions_about_names_are_answered(house: Bridge) -> None:
+def test_roslibs_queries_about_names_are_answered(house: Bridge) -> None:
     told = play(house.url, "names")
     assert dict(zip(*told["topics"].values(), strict=True)) == {
         "/twin/state": "lupin_msgs/msg/TwinState",
@@ -97,7 +97,7 @@ def test_roslibs_questions_about_names_are_answered(house: Bridge) -> None:
     assert told["nodes"]["failed"].startswith("service 'rosapi/nodes' is not served")
 
 
-def test_map_and_inputs_come_as_they_were_published(house: Bridge) -> None:
+def test_map_and_inputs_arrive_as_they_were_published(house: Bridge) -> None:
     house.peer.publish_map(messages.occupancy_grid([[0, 100], [-1, 50]]))
     house.peer.discover(messages.discovered({"1": messages.pose(1.0, 2.0)}))
     told = play(house.url, "inputs")
@@ -105,12 +105,12 @@ def test_map_and_inputs_come_as_they_were_published(house: Bridge) -> None:
     assert told["map"]["data"] == [0, 100, -1, 50]
     assert told["observation"]["tag_reading"]["tag_id"] == "1"
     assert told["tags"]["tags"][0]["tag_id"] == "1"
-    # Asked for in CBOR, in which they do not come: roslib reads them all the same.
+    # Requested in CBOR, which is not sent: roslib reads them all the same.
     assert told["compressed"] == {"cbor": "map", "cbor-raw": "map", "png": "map"}
     assert told["statuses"] == []
 
 
-def test_what_writes_is_refused(house: Bridge) -> None:
+def test_a_client_cannot_write(house: Bridge) -> None:
     told = play(house.url, "write")
     assert [status["msg"].partition(":")[0] for status in told["told"]] == [
         f"op '{name}' is refused"
@@ -129,7 +129,7 @@ def test_two_components_of_a_page_share_a_topic(house: Bridge) -> None:
     assert told["afterTheEnd"] == 0
 
 
-def test_a_subscription_outlives_the_bridge() -> None:
+def test_a_subscription_survives_a_restart_of_the_bridge() -> None:
     with own_domain() as domain, lupin_twin(domain, "serve") as first, Peer(domain) as peer:
         url = url_of(first)
         peer.wait_for_twin()

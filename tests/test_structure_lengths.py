@@ -1,4 +1,4 @@
-"""No file that is written by hand grows past a sitting."""
+"""Hand-written files have a limited length."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ NOT_BY_HAND = (
 )
 
 
-def test_no_file_written_by_hand_is_too_long_to_read_at_one_sitting() -> None:
+def test_no_hand_written_file_is_too_long() -> None:
     long = {}
     for folder, patterns in HAND_WRITTEN.items():
         for file in (file for pattern in patterns for file in (ROOT / folder).rglob(pattern)):

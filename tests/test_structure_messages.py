@@ -7,7 +7,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "ros_node" / "lupin_msgs"
 
-# Written from the contract, not from the files. `---` parts request and response.
+# Written from the contract, not from the files. `---` separates request and response.
 WIRE_FORMAT = {
     "msg/SensorReading.msg": "string name · float64 value",
     "msg/TagReading.msg": (
@@ -105,7 +105,7 @@ def lines_of(name: str) -> list[str]:
     return (PACKAGE / name).read_text(encoding="utf-8").splitlines()
 
 
-def test_there_are_these_interfaces_and_no_others_and_all_are_built() -> None:
+def test_exactly_these_interfaces_exist_and_all_are_built() -> None:
     files = {p.relative_to(PACKAGE).as_posix() for p in PACKAGE.glob("*/*") if p.suffix in _KINDS}
     assert files == set(WIRE_FORMAT)
     cmake = (PACKAGE / "CMakeLists.txt").read_text(encoding="utf-8")
@@ -114,13 +114,13 @@ def test_there_are_these_interfaces_and_no_others_and_all_are_built() -> None:
 
 
 @pytest.mark.parametrize("name", WIRE_FORMAT)
-def test_names_types_order_and_constants_are_the_contracts(name: str) -> None:
+def test_names_types_order_and_constants_are_those_of_the_contract(name: str) -> None:
     declared = [" ".join(line.partition("#")[0].split()) for line in lines_of(name)]
     assert [line for line in declared if line] == WIRE_FORMAT[name].split(" · ")
 
 
 @pytest.mark.parametrize("name", WIRE_FORMAT)
-def test_every_field_has_a_comment_and_so_has_the_whole(name: str) -> None:
+def test_every_field_and_every_interface_has_a_comment(name: str) -> None:
     lines = lines_of(name)
     assert lines[0].startswith("# ")
     bare = [

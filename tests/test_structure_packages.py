@@ -1,4 +1,4 @@
-"""What a robot's tools read: dependencies that are really used, files that are really there."""
+"""Package metadata for a robot's tools: dependencies that are really used, files that exist."""
 
 import ast
 import json
@@ -23,7 +23,7 @@ from tests.support.structure import ROOT, ROS
 
 ROS_NODE = ROOT / "ros_node"
 PACKAGES = ("lupin_twin", "lupin_patrol")
-# How rosdep calls what Python calls otherwise; None: it does not know it, or not its version.
+# rosdep's names where Python's differ; None: rosdep does not know it, or not its version.
 ROSDEP_KEYS = {
     "numpy": "python3-numpy",
     "pytest": "python3-pytest",
@@ -38,7 +38,7 @@ OF_CMAKE = {"ament_cmake", "ament_cmake_pytest", "rosidl_default_generators"}
 
 
 def imported_names(files: Iterable[Path], package: str) -> set[str]:
-    """The packages that these files of a package import from, but itself and Python's own."""
+    """The packages that these files of a package import, except itself and Python's own."""
     found = set()
     for file in files:
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
@@ -50,21 +50,21 @@ def imported_names(files: Iterable[Path], package: str) -> set[str]:
 
 
 def imported(files: Iterable[Path], package: str) -> set[str]:
-    """The rosdep keys of the packages that these files of a ROS package import from."""
+    """The rosdep keys of the packages that these files of a ROS package import."""
     names = imported_names(files, package)
     return {key for name in names if (key := ROSDEP_KEYS.get(name, name)) is not None}
 
 
 def told(package: str, *kinds: str) -> set[str]:
-    """The dependencies of these kinds that package.xml names."""
+    """The dependencies of these kinds in package.xml."""
     document = ElementTree.parse(ROS_NODE / package / "package.xml")
     return {str(element.text) for kind in kinds for element in document.iter(kind)}
 
 
 def test_pyproject_lists_what_its_packages_import() -> None:
-    """FastAPI brings starlette along, say; which one, is ours to know as well."""
+    """FastAPI installs starlette, for example; our direct imports are listed as well."""
     extras = project()["optional-dependencies"]
-    # And what an extra of the bridge is there for.
+    # And the packages of each extra.
     lines = [*project()["dependencies"], *extras["fleet"], *extras["science"]]
     listed = {re.split("[<>=[]", text)[0].lower() for text in lines}
     foreign = set()
@@ -76,13 +76,13 @@ def test_pyproject_lists_what_its_packages_import() -> None:
 
 
 def project() -> dict[str, Any]:
-    """What pip reads of the whole."""
+    """The metadata that pip reads."""
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     told: dict[str, Any] = tomllib.loads(text)["project"]
     return told
 
 
-def test_one_version_is_that_of_every_part() -> None:
+def test_every_part_has_the_same_version() -> None:
     lock = json.loads((ROOT / "package-lock.json").read_text(encoding="utf-8"))
     messages = ROS_NODE / "lupin_msgs"
     of_pip = tomllib.loads((messages / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -106,7 +106,7 @@ def test_one_version_is_that_of_every_part() -> None:
     assert {name: it for name, it in versions.items() if it != __version__} == {}
 
 
-def test_the_oldest_node_is_the_same_wherever_it_is_named() -> None:
+def test_the_oldest_node_is_the_same_everywhere() -> None:
     manifest = json.loads((ROOT / "package.json").read_text(encoding="utf-8"))
     lock = json.loads((ROOT / "package-lock.json").read_text(encoding="utf-8"))
     floor = manifest["engines"]["node"].removeprefix(">=")
@@ -118,8 +118,8 @@ def test_the_oldest_node_is_the_same_wherever_it_is_named() -> None:
 
 
 @pytest.mark.parametrize(("version", "is_taken"), [("20.18.3", False), ("20.19.0", True)])
-def test_set_up_begins_with_no_older_node(version: str, is_taken: bool, tmp_path: Path) -> None:
-    """The preflight's own question, put to a Node of another version."""
+def test_set_up_refuses_an_older_node(version: str, is_taken: bool, tmp_path: Path) -> None:
+    """The preflight's own check, with a Node of another version."""
     text = (ROOT / ".ci" / "preflight").read_text(encoding="utf-8")
     asked = re.search(r"node -e '(.*?)'", text, re.DOTALL)[1]  # type: ignore[index]
     made = f"Object.defineProperty(process, 'versions', {{value: {{node: '{version}'}}}});"
@@ -128,7 +128,7 @@ def test_set_up_begins_with_no_older_node(version: str, is_taken: bool, tmp_path
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_package_xml_lists_what_is_imported_and_nothing_else(package: str) -> None:
+def test_package_xml_lists_exactly_what_is_imported(package: str) -> None:
     folder = ROS_NODE / package
     tests = set((folder / "test").rglob("*.py"))
     files = set(folder.rglob("*.py")) - tests - {folder / "setup.py"}
@@ -172,7 +172,7 @@ def test_each_package_has_tests_of_its_own_that_need_nothing_of_the_repository(
 
 @pytest.fixture
 def set_up(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """What a package's setup.py hands to setuptools."""
+    """The arguments of a package's setup.py to setuptools."""
 
     def run(package: str) -> dict[str, Any]:
         told: dict[str, Any] = {}
@@ -188,9 +188,7 @@ def set_up(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_every_file_of_a_package_is_there_and_every_one_is_installed(
-    package: str, set_up: Any
-) -> None:
+def test_every_file_of_a_package_exists_and_is_installed(package: str, set_up: Any) -> None:
     installed = {file: to for to, files in set_up(package)["data_files"] for file in files}
     assert [file for file in installed if not Path(file).is_file()] == []
     assert installed.pop(f"resource/{package}") == "share/ament_index/resource_index/packages"

@@ -1,4 +1,4 @@
-"""What the tests stand on, where it would only be slow if it were broken."""
+"""Test support whose failure would only show as slowness."""
 
 import sys
 
@@ -6,7 +6,7 @@ from tests.support.domains import ros_env
 from tests.support.template import PROGRAMS, Template
 
 
-def test_the_programs_that_tests_start_are_forked_and_not_imported_anew(domain: int) -> None:
+def test_the_programs_of_the_tests_are_forked_and_not_imported_anew(domain: int) -> None:
     template = Template(imported=())
     try:
         for program in PROGRAMS:

@@ -1,4 +1,4 @@
-"""What the dead have left is removed, and nothing of the living."""
+"""Memory of dead processes is removed, and nothing of living ones."""
 
 import fcntl
 import os
@@ -26,7 +26,7 @@ def segment(folder: Path, name: str, age_s: float = 2 * YOUNG_S) -> Path:
     return lock
 
 
-def test_only_what_is_old_and_locked_by_nobody_goes(tmp_path: Path) -> None:
+def test_only_old_unlocked_segments_are_removed(tmp_path: Path) -> None:
     segment(tmp_path, "fastrtps_dead")
     segment(tmp_path, "fastrtps_young", age_s=0.0)
     segment(tmp_path, "fastrtps_port7400")
@@ -39,7 +39,7 @@ def test_only_what_is_old_and_locked_by_nobody_goes(tmp_path: Path) -> None:
     assert {path.name for path in gone} == {"fastrtps_dead", f"fastrtps_dead{LOCK}"}
 
 
-def test_a_participant_locks_what_is_its_own_as_long_as_it_lives(domain: int) -> None:
+def test_a_participant_locks_its_segment_as_long_as_it_lives(domain: int) -> None:
     with Process([sys.executable, "-c", PARTICIPANT], ros_env(domain)) as process:
         process.wait_for_output("there")
         files = {path.readlink() for path in Path(f"/proc/{process.pid}/fd").iterdir()}

@@ -19,8 +19,8 @@ from tests.support.waiting import PATIENCE_S
 from tests.support.web import Bridge, bridge
 
 CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
-# Two pages of Chromium's own for the address bar, which nobody sees here, are a sixth of the time.
-# The last of such switches counts: with them those of Playwright that matter on loopback.
+# Two pages of Chromium's own for the address bar, unused here, take a sixth of the time.
+# The last of such switches counts: it repeats those of Playwright that matter on loopback.
 NOT_WANTED = (
     "WebUIOmniboxPopup",
     "WebUIOmniboxAimPopup",
@@ -37,7 +37,7 @@ NOT_WANTED = (
     "AimEnabled",
     "PreconnectToSearch",
 )
-# No GPU anywhere, and no word to anybody outside.
+# No GPU, and no connection to the outside.
 CHROMIUM_ARGS = (
     "--no-sandbox",
     "--disable-gpu",
@@ -46,7 +46,7 @@ CHROMIUM_ARGS = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
-    # Each page begins in a process that is there already, which is a tenth of what it costs.
+    # Each page starts in a process that exists already, a tenth of the cost.
     "--renderer-process-limit=1",
     f"--disable-features={','.join(NOT_WANTED)}",
 )
@@ -71,7 +71,7 @@ TICK_S = 0.5
 
 @contextmanager
 def ticking(peer: Peer, started_s: float) -> Iterator[None]:
-    """Simulated time that goes on by a millisecond a tick."""
+    """Simulated time that advances by a millisecond a tick."""
     has_ended = threading.Event()
 
     def tick() -> None:
@@ -91,9 +91,9 @@ def ticking(peer: Peer, started_s: float) -> Iterator[None]:
 
 @contextmanager
 def bridge_of_a_moment() -> Iterator[tuple[Bridge, float]]:
-    """A server whose clock all but stands still, and what it says, s.
+    """A server whose clock almost stands still, and its time, s.
 
-    It goes on by a millisecond a tick, or it would be told as paused.
+    It advances by a millisecond a tick, since otherwise it would count as paused.
     """
     simulated = ("--ros-args", "-p", "use_sim_time:=true")
     with own_domain() as domain, bridge(*simulated, domain=domain) as running:
@@ -105,7 +105,7 @@ def bridge_of_a_moment() -> Iterator[tuple[Bridge, float]]:
 
 @pytest.fixture(scope="package")
 def house() -> Iterator[Bridge]:
-    """A server with the greenhouse of `house.py`, for tests that change nothing in it.
+    """A server with the greenhouse of `greenhouse.py`, for tests that change nothing in it.
 
     No pin fades between two pictures.
     """
@@ -127,7 +127,7 @@ def open_page(browser: Browser) -> Iterator[OpenPage]:
 
 @pytest.fixture
 def hmi(house: Bridge, open_page: OpenPage) -> Hmi:
-    """A page that shows the whole house."""
+    """A page that shows the whole greenhouse."""
     page = open_page(house.url)
     page.expect_rows(*TAGS)
     page.expect_samples(3)

@@ -1,9 +1,9 @@
 """The estimate in pictures, for the docs: early, with the robot dead, one sensor changed.
 
-The journal is the demo's simulated past, of which six hours of the house's day are left out: two
-of the pictures look back at it. Its last minutes are not in the journal: they come to pass while
-the pictures are taken, scan by scan, so that what was foretold is graded by readings that the house
-really had then. For the last picture a tag is scanned whose sensor has gone wrong.
+The journal is the demo's simulated past without its last six hours: two
+of the pictures look back at it. Its last minutes are not in the journal: they happen while
+the pictures are taken, scan by scan, so that predictions are graded by readings that the
+greenhouse really had then. For the last picture, a tag with a faulty sensor is scanned.
 """
 
 import io
@@ -30,12 +30,12 @@ from tests.support.web import Bridge, bridge, filled
 
 # The patrol's day, s; its past is three of them.
 DAY_S: Final = 1_440
-# As many scans at once as the twin's queue surely holds.
+# As many simultaneous scans as the twin's queue surely holds.
 LOT: Final = 25
-# So much before now the journal ends: time for some fifty scans of temperature to be graded.
+# The journal ends this long before now: time for some fifty scans of temperature to be graded.
 GRADED_S: Final = 180
 HOUR_S: Final = DAY_S / 24
-# So much of the past is to come: longer than the pictures take.
+# How much of the past is still to come: longer than the pictures take.
 AHEAD_S: Final = 600
 # Seconds before now: the patrol begins, stands still in the afternoon, goes on at night.
 BEGUN_S: Final = 3 * DAY_S - AHEAD_S
@@ -43,11 +43,11 @@ STOPPED_S: Final = 42 * HOUR_S - AHEAD_S
 RESUMED_S: Final = STOPPED_S - 6 * HOUR_S
 CHANGED_TAG: Final = "5"
 CHANGED_BY: Final = 6.0
-# How often it is scanned then, s apart.
+# Its scan interval then, s.
 CHANGED_SCANS: Final = 5
 APART_S: Final = 2
 READY_S: Final = 120.0
-# Of each picture how long before now, s.
+# How long before now each picture is, s.
 PAST: Final = {"estimate-early": BEGUN_S - 16, "estimate-dead": RESUMED_S + 1}
 
 
@@ -75,13 +75,13 @@ def taken(browser: Browser, folder: Path) -> None:
 
 
 class Robot:
-    """It scans what the simulated past says that it does, when its time has come."""
+    """Publishes the scans of the simulated past when their time has come."""
 
     def __init__(self, scans: Iterable[Scan]) -> None:
         self._scans = sorted(scans, key=lambda each: each.stamp_ns)
 
     def go_on(self, running: Bridge) -> None:
-        """Tell the twin of every scan that is due."""
+        """Publish every scan that is due."""
         now_ns = time.time_ns()
         due = [each for each in self._scans if each.stamp_ns <= now_ns]
         self._scans = self._scans[len(due) :]
@@ -92,7 +92,7 @@ class Robot:
 
 
 def message_of(row: Scan) -> Any:
-    """The observation that the robot tells."""
+    """The robot's observation."""
     readings = {each.name: each.value for each in row.readings}
     return scan(row.tag_id, readings, status=row.status, stamp_s=row.stamp_ns / SECOND)
 
@@ -104,7 +104,7 @@ def is_told(row: Scan, tag: dict[str, Any]) -> bool:
 
 
 def remembered(now_ns: int) -> list[Write]:
-    """What the twin is to remember, and what is to come until `AHEAD_S` from now."""
+    """What the twin restores, and what is to come until `AHEAD_S` from now."""
     return [
         row
         for row in past(GreenhouseSimulator(), 0, 60.0, 1.0, now_ns + AHEAD_S * SECOND)
@@ -113,7 +113,7 @@ def remembered(now_ns: int) -> list[Write]:
 
 
 def scan_wrongly(running: Bridge) -> None:
-    """Let the robot scan the tag whose sensor has gone wrong, again and again."""
+    """Let the robot scan the tag with the faulty sensor, again and again."""
     now_s = time.time()
     tags = {each["tag_id"]: each for each in running.json("/api/state")["tags"]}
     readings = {each["name"]: each["value"] for each in tags[CHANGED_TAG]["readings"]}
@@ -123,7 +123,7 @@ def scan_wrongly(running: Bridge) -> None:
 
 
 def house_map() -> object:
-    """The house's floor within its walls."""
+    """The greenhouse's floor within its walls."""
     inside = read_greenhouse(GreenhouseSimulator()).interior
     columns, lines = (
         2 + round(extent / RESOLUTION_M)
@@ -136,7 +136,7 @@ def house_map() -> object:
 
 
 def is_fitted(running: Bridge) -> bool:
-    """Whether there are the map and a model."""
+    """Whether there are a map and a model."""
     if running.get("/api/map").status_code != 200:
         return False
     sensors = running.json("/api/estimate/quality")["sensors"]
@@ -144,7 +144,7 @@ def is_fitted(running: Bridge) -> bool:
 
 
 def has_changed(running: Bridge) -> bool:
-    """Whether the estimate leaves the tag out, and everybody is told."""
+    """Whether the estimate leaves the tag out, and the page shows it."""
     tags = running.json("/api/estimate/tags", sensor_type="temperature")["tags"]
     told = running.json("/api/health")["tags"][CHANGED_TAG].get("reasons", ())
     return tags[CHANGED_TAG]["left_out"] and any(each["kind"] == "changed" for each in told)
@@ -173,6 +173,6 @@ def picture(browser: Browser, url: str, path: Path, link: str) -> None:
 
 
 def save(png: bytes, path: Path) -> None:
-    """Write a screenshot as the docs have it: 256 colours, a third of the bytes."""
+    """Write a screenshot for the docs: 256 colours, a third of the bytes."""
     picture = Image.open(io.BytesIO(png)).convert("RGB")
     picture.quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)

@@ -1,4 +1,4 @@
-"""The HMI as an operator uses it, and as a surveyor of pixels looks at it."""
+"""The HMI as an operator uses it, and its pixels."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Pixel = tuple[int, int, int]
 FONTS = "document.fonts.ready.then((all) => [...all].map(({ status }) => status))"
 WIDE: Final = {"width": 1440, "height": 900}
 PHONE: Final = {"width": 360, "height": 740}
-# What the console says of a server that has ended, wherever it was in an answer.
+# The console's message when a server has ended, at any point of an answer.
 SERVER_GONE: Final = (
     r"net::ERR_(CONNECTION_|EMPTY_RESPONSE|INCOMPLETE_CHUNKED|CONTENT_LENGTH_MISMATCH)|WebSocket"
 )
@@ -36,31 +36,31 @@ AXE: Final = Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
 
 @dataclass(frozen=True)
 class View:
-    """Where the map lies: its origin at (x, y) pixels of the map view, `scale` pixels a metre."""
+    """The map's position: its origin at (x, y) pixels of the map view, `scale` pixels a metre."""
 
     x: float
     y: float
     scale: float
 
     def pixel(self, x: float, y: float) -> tuple[int, int]:
-        """The pixel of the map view that holds a point of the map frame, m."""
+        """The pixel of the map view at a point of the map frame, m."""
         return int(self.x + x * self.scale), int(self.y - y * self.scale)
 
 
 @dataclass
 class Hmi:
-    """A page of the HMI, with all that it did beside what is to be seen."""
+    """A page of the HMI, with its console, dialogs and requests."""
 
     page: Page
     url: str
-    # Regular expressions of what the console may say: a server that is killed is no secret.
+    # Regular expressions of allowed console messages: a killed server may be logged.
     # On a busy machine, answers take so long that two pages have more under way than one address
-    # may. They ask again; what they show in the end is what counts.
+    # may. They retry; the final result is what counts.
     allowed_noise: list[str] = field(default_factory=lambda: [r"429 \(Too Many Requests\)"])
     console: list[str] = field(default_factory=list)
     dialogs: list[str] = field(default_factory=list)
     requests: list[str] = field(default_factory=list)
-    # All that came over its WebSockets, parsed.
+    # All frames from its WebSockets, parsed.
     frames: list[dict[str, Any]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -82,42 +82,42 @@ class Hmi:
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.on("websocket", on_websocket)
 
-    # --- going there ------------------------------------------------------------------------
+    # --- navigation -------------------------------------------------------------------------
 
     def go(self, fragment: str = "", query: str = "") -> None:
-        """Load the page anew; a permalink's fragment goes without its `#`."""
+        """Load the page anew; a permalink's fragment comes without its `#`."""
         if self.page.url.partition("#")[0] == f"{self.url}/{query}":
-            self.page.goto("about:blank")  # else only the fragment changes, and nothing is loaded
+            self.page.goto("about:blank")  # else only the fragment changes, nothing is loaded
         self.page.goto(f"{self.url}/{query}{'#' if fragment else ''}{fragment}")
 
     def turn(self, fragment: str) -> None:
-        """Another permalink of the page that is there: nothing is loaded anew."""
+        """Open another permalink in the same page: nothing is loaded anew."""
         self.page.goto(f"{self.url}/#{fragment}")
         self.view()  # which is that of a frame painted since
 
     def resize(self, width: int, height: int) -> None:
-        """Give the window another size; returns when the page has laid itself out in it."""
+        """Resize the window; returns when the layout is finished."""
         self.page.set_viewport_size({"width": width, "height": height})
         self.page.wait_for_function(
             "size => innerWidth === size[0] && innerHeight === size[1]", arg=[width, height]
         )
-        # What watches sizes asks for another one in its turn.
+        # A size observer may cause another layout.
         self.page.evaluate(
             "async () => { for (const _ of '12') await new Promise(requestAnimationFrame); }"
         )
 
     def address(self) -> str:
-        """What is in the address bar now."""
+        """The current address."""
         address = self.page.evaluate("location.href")
         assert isinstance(address, str)
         return address
 
     def allow_noise(self, pattern: str) -> None:
-        """Let the console say something that matches, from now on and before."""
+        """Allow console messages that match, from now on and before."""
         self.allowed_noise.append(pattern)
 
     def check_manners(self) -> None:
-        """Hold the page to a silent console, no dialog, and no request to another origin."""
+        """Require a silent console, no dialog, and no request to another origin."""
         noise = [
             line for line in self.console if not any(re.search(p, line) for p in self.allowed_noise)
         ]
@@ -130,19 +130,19 @@ class Hmi:
             if urlsplit(url).netloc != own and not url.startswith(("blob:", "data:", "about:"))
         ] == []
 
-    # --- what it says -----------------------------------------------------------------------
+    # --- content ----------------------------------------------------------------------------
 
     @property
     def app(self) -> Locator:
         return self.page.get_by_test_id("app")
 
     def expect_phase(self, phase: str, timeout_s: float = PATIENCE_S) -> None:
-        """Wait until the page says that its connection is in that phase."""
+        """Wait until the page shows its connection in that phase."""
         expect(self.app).to_have_attribute("data-connection-state", phase, timeout=timeout_s * 1000)
 
     def expect(self, look: Callable[[], bool], what: str) -> None:
-        """Wait until something holds that no locator can tell."""
-        # Not asleep: Playwright hands over what happened in the page only while it is called.
+        """Wait for a condition that no locator can express."""
+        # No sleep: Playwright delivers the page's events only during its calls.
         wait_for(look, what, meanwhile=lambda pause_s: self.page.wait_for_timeout(1000 * pause_s))
 
     def test_id(self, name: str) -> Locator:
@@ -172,18 +172,18 @@ class Hmi:
         wait_for(lambda: self.rows() == list(tag_ids), f"the rows {tag_ids}")
 
     def expect_samples(self, count: int | None = None) -> None:
-        """Wait for a field that so many tags contribute to; None: any number of them."""
+        """Wait for a field with that many contributing tags; None: any number."""
         number = r"\d+" if count is None else count
         expect(self.test_id("sample-count")).to_have_text(re.compile(rf"^{number} tags? contribut"))
 
     def expect_map(self) -> None:
-        """Wait for the SLAM map, which is part of what a view of everything shows."""
+        """Wait for the SLAM map, which is part of the whole view."""
         expect(self.page.locator(".map-panel")).to_have_attribute("data-map-state", "ready")
 
     def expect_parts(self) -> None:
-        """Wait for what comes behind the first view, and takes room from it."""
+        """Wait for the parts after the first view, which take room from it."""
         expect(self.page.locator("#help-dialog")).to_be_attached()
-        # Higher or lower once it is known whether anything is remembered.
+        # Its height changes once it is known whether there is a past.
         expect(self.page.locator(".timebar[data-state=waiting]")).to_have_count(0)
 
     def expect_layout(self) -> None:
@@ -196,7 +196,7 @@ class Hmi:
         self.page.locator(".sensors label", has_text=label).click()
 
     def colour_by_value(self) -> None:
-        """The page opens in the colours that tell what is ideal."""
+        """The page opens in the colours of the ideal range."""
         self.page.get_by_role("radio", name="Value").check()
 
     # --- the map, pixel by pixel ------------------------------------------------------------
@@ -206,7 +206,7 @@ class Hmi:
         return self.page.get_by_test_id("map")
 
     def view(self) -> View:
-        """Where the map lies now, in a layout that has its font and so its final size."""
+        """The map's position, in a layout that has its font and so its final size."""
         text = self.page.get_by_test_id("map-canvas").evaluate(
             """async (canvas) => {
               await document.fonts.ready;
@@ -219,7 +219,7 @@ class Hmi:
         return View(*(float(part) for part in text.split(",")))
 
     def picture(self, width: int | None = None) -> Image.Image:
-        """The map view as it is on the screen, buttons and all; one pixel a CSS pixel.
+        """The map view as on the screen, with its buttons; one pixel a CSS pixel.
 
         With `width` only its left part.
         """
@@ -248,7 +248,7 @@ class Hmi:
         looks: list[tuple[Image.Image, str | None]] = []
 
         def look() -> bool:
-            # While nothing comes from a busy server, what is shown is dimmed.
+            # While a busy server sends nothing, the view is dimmed.
             looks.append((self.picture(width), self.app.get_attribute("data-connection-state")))
             return len(looks) > 2 and all(each == (looks[-1][0], "live") for each in looks[-3:])
 
@@ -256,14 +256,14 @@ class Hmi:
         return looks[-1][0]
 
     def expect_change(self, before: Image.Image) -> None:
-        """Wait until the map view looks otherwise, if only on its way to something."""
+        """Wait until the map view changes, if only on its way to something."""
         wait_for(
             lambda: changed_box(before, self.picture(before.width)) is not None,
             "a change of the map",
         )
 
     def lasting_change(self, before: Image.Image) -> Box:
-        """Wait until the map view looks otherwise and stays so; the box of what is not the same."""
+        """Wait until the map view changes and settles; the box of the difference."""
         self.expect_change(before)
         box = wait_for(
             lambda: changed_box(before, self.settled_picture(before.width)), "a lasting change"
@@ -272,7 +272,7 @@ class Hmi:
         return box
 
     def expect_picture(self, wanted: Image.Image) -> None:
-        """Wait until the map view looks exactly like that."""
+        """Wait until the map view equals that picture."""
         wait_for(
             lambda: changed_box(wanted, self.picture(wanted.width)) is None, "that very picture"
         )
@@ -290,7 +290,7 @@ class Hmi:
     def expect_pixels(
         self, wanted: Callable[[Pixel], bool], *points: tuple[float, float], what: str
     ) -> None:
-        """Wait until all points of the map frame look as wanted."""
+        """Wait until all points of the map frame have the wanted colours."""
         wait_for(lambda: all(wanted(pixel) for pixel in self.pixels(points)), f"{what} at {points}")
 
     def click_map(self, x: float, y: float) -> None:
@@ -346,7 +346,7 @@ LATE_ANSWERS: Final = """const ask = fetch; fetch = async (...question) => {
 
 
 def slow_down(page: Page) -> None:
-    """Let the page's scripts take `SLOW_PAGES` times as long, and its answers come late."""
+    """Slow down the page's scripts by `SLOW_PAGES`, and delay its answers."""
     if times := os.environ.get("SLOW_PAGES"):
         throttled = {"rate": float(times)}
         page.context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", throttled)
@@ -363,7 +363,7 @@ def open_hmi(
     go: bool = True,
     **context: Any,
 ) -> Iterator[Hmi]:
-    """A page in a browser context of its own; its manners are checked at the end.
+    """A page in its own browser context; its console and requests are checked at the end.
 
     `context` are options of `Browser.new_context`; `go=False` leaves the page blank.
     """
@@ -380,17 +380,17 @@ def open_hmi(
 
 
 def slider(hmi: Hmi) -> Locator:
-    """The time bar's."""
+    """The slider of the time bar."""
     return hmi.page.get_by_role("slider", name="Time shown")
 
 
 def point(hmi: Hmi, share: float) -> tuple[float, float]:
-    """The point of the page where so much of the time bar is to its left."""
+    """The point of the page that far along the time bar."""
     box = slider(hmi).bounding_box()
     assert box is not None
     return box["x"] + share * box["width"], box["y"] + box["height"] / 2
 
 
 def press_at(hmi: Hmi, share: float) -> None:
-    """Go to the moment there."""
+    """Go to the moment at that point."""
     hmi.page.mouse.click(*point(hmi, share))

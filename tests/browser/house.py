@@ -1,4 +1,4 @@
-"""A small greenhouse with one of everything, for tests that only look at it."""
+"""A small greenhouse with one of everything, for tests that change nothing in it."""
 
 from typing import Any
 
@@ -8,12 +8,12 @@ from tests.support.messages import discovered, look, occupancy_grid, pose, scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge
 
-# As the table has them: the worst first, of equals numbers in their order, then names.
+# In the order of the table: the worst first, equals by number, then by name.
 TAGS = ("10", "3", "failed", "seen", "1", "2", "9")
 
 
 def observations() -> list[Any]:
-    """What the robot told: tag 9 has no pose, tag 10 a pest, and one scan failed."""
+    """The robot's observations: tag 9 has no pose, tag 10 a pest, and one scan failed."""
     box = [(0.5, 0.8), (3.5, 0.8), (3.5, 1.2), (0.5, 1.2)]
     return [
         scan("10", {"temperature": 31.0, "humidity": 40.0}, at=(1, 3)),
@@ -29,7 +29,7 @@ def observations() -> list[Any]:
 
 
 def furnish(bridge: Bridge) -> None:
-    """Let a bridge's twin know all of it."""
+    """Publish all of it to a bridge's twin."""
     bridge.peer.publish_map(occupancy_grid([[100] * 6, *([[100, 0, 0, 0, 0, 100]] * 4), [100] * 6]))
     bridge.peer.discover(discovered({"seen": pose(4, 2)}))
     bridge.peer.observe(*observations())

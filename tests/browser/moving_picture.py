@@ -1,4 +1,4 @@
-"""The README's moving picture of the page, from a demo: live, a tag, the estimate, the past.
+"""The README's animation of the page, from a demo: live, a tag, the estimate, the past.
 
 `python -m tests.browser.screenshots` makes it with the others.
 """
@@ -13,11 +13,11 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, ViewportSize, expect
 
 SIZE: Final[ViewportSize] = {"width": 1600, "height": 1000}
-# As it stands in the README, pixels; and how well its colours are kept, of 100.
+# Its size in the README, pixels; and the quality of its colours, of 100.
 WIDTH: Final = 1000
 QUALITY: Final = 55
 MAX_BYTES: Final = 1_500_000
-# How long a frame is shown, ms: of what moves by itself, and of what is to be read.
+# How long a frame is shown, ms: one that moves by itself, and one to read.
 MOVING: Final = 250
 READ: Final = 2_000
 
@@ -54,7 +54,7 @@ def shrunk(png: bytes) -> Image.Image:
 
 
 def scenes(page: Page) -> Iterator[int]:
-    """Bring the page from scene to scene; yields how long what is seen then is shown, ms."""
+    """Go from scene to scene; yields how long each view is shown, ms."""
     yield READ
     for _ in range(6):
         page.wait_for_timeout(1_000)

@@ -1,4 +1,4 @@
-"""Where things are in the window, and whether somebody can hit them."""
+"""Where elements are in the window, and whether they can be clicked."""
 
 from contextlib import suppress
 
@@ -6,7 +6,7 @@ from playwright.sync_api import Locator, expect
 
 from tests.browser.hmi import Box, Hmi
 
-# What somebody could not hit of all that matches: it lies below something else, or out of sight.
+# Matching elements that cannot be clicked: covered by another, or out of sight.
 _OUT_OF_REACH = """(selector) => [...document.querySelectorAll(selector)]
   .filter((e) => e.checkVisibility())
   .filter((e) => {
@@ -49,7 +49,7 @@ LINES = """(e) => {
 
 
 def place(thing: Locator) -> Box:
-    """Where it is in the window, pixels."""
+    """Its position in the window, pixels."""
     box = thing.bounding_box()
     assert box is not None
     left, top = round(box["x"]), round(box["y"])
@@ -57,7 +57,7 @@ def place(thing: Locator) -> Box:
 
 
 def places(hmi: Hmi, *selectors: str) -> list[Box]:
-    """Where the first of each is in the window, pixels; all of one moment."""
+    """The position of each one's first match in the window, pixels; all of one moment."""
     found = hmi.page.evaluate(_PLACES, selectors)
     return [Box(*(round(each) for each in box)) for box in found]
 
@@ -75,7 +75,7 @@ def out_of_reach(hmi: Hmi, selector: str) -> list[str]:
 
 
 def expect_in_reach(hmi: Hmi, selector: str) -> None:
-    """Wait until all that matches can be hit: the page lays itself out anew in more than one go."""
+    """Wait until every match can be clicked: a layout takes more than one step."""
     expect(hmi.page.locator(selector).first).to_be_attached()
     missed: list[str] = []
 

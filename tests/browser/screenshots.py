@@ -16,7 +16,7 @@ from tests.support.state_home import use_own
 from tests.support.waiting import wait_for
 
 IMAGES = Path(__file__).parents[2] / "docs/images"
-# The second pass of the patrol brings pests, failed scans and ages that differ.
+# The second round of the patrol brings pests, failed scans and different ages.
 PATROL_SPEED = 3
 PATIENCE_MS = 120_000
 
@@ -41,7 +41,7 @@ def main() -> int:
 
 
 def wait_for_second_pass(browser: Browser, url: str) -> None:
-    """Wait until the robot has been everywhere, which it maps thereby, and a pest is to be seen."""
+    """Wait until the robot has been everywhere, and so mapped it, and a pest is visible."""
     began_s = time.monotonic()
 
     def has_been_everywhere() -> bool:
@@ -78,7 +78,7 @@ def opened(browser: Browser, url: str, size: tuple[int, int], scheme: str, path:
 
 
 def past(url: str) -> str:
-    """A link to the first day that the demo remembers, with a tag's chart."""
+    """A link to the first day of the demo's past, with a tag's chart."""
     with urlopen(f"{url}/api/timeline") as answer:
         reach = json.load(answer)["reach"]
     begun_s, ended_s = reach["from"]["sec"], reach["to"]["sec"]
@@ -87,7 +87,7 @@ def past(url: str) -> str:
 
 
 def of_the_page(browser: Browser, url: str) -> None:
-    """Those of the page of the demo, and the README's moving one."""
+    """The pictures of the demo's page, and the README's animation."""
     for name, size, scheme, path, part in (
         ("page", (1440, 900), "light", "/", "body"),
         ("past", (1280, 800), "dark", past(url), "body"),
@@ -102,7 +102,7 @@ def of_the_page(browser: Browser, url: str) -> None:
             expect(page.get_by_test_id("plot").last.locator("canvas")).to_be_visible()
         if name == "alarms":
             expect(page.locator("[data-alarm]").first).to_be_visible()
-        # The time bar and the charts have what they asked for.
+        # The time bar and the charts have their data.
         page.wait_for_load_state("networkidle")
         picture = page.locator(part).screenshot(scale="css")
         estimate_pictures.save(picture, IMAGES / f"{name}.png")

@@ -1,6 +1,6 @@
-"""axe-core finds nothing to object to: light, dark, kiosk, phone, frozen, and with all panels open.
+"""axe-core reports nothing: light, dark, kiosk, phone, frozen, and with all panels open.
 
-Only here the page's own policy is bypassed, to get axe into the page.
+Only this file bypasses the page's own policy, to get axe into the page.
 """
 
 from typing import Any
@@ -16,12 +16,12 @@ from tests.support.web import Bridge, bridge
 RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
 
 
-# In the dark, colours alone are others.
+# The dark theme differs in colours alone.
 OF_COLOURS = ["color-contrast", "link-in-text-block"]
 
 
 def violations(hmi: Hmi) -> list[str]:
-    """What axe objects to, in the light and in the dark, each with the elements that it means."""
+    """The violations that axe reports, in light and dark, each with its elements."""
     if not hmi.page.evaluate("'axe' in window"):
         hmi.page.evaluate(AXE.read_text(encoding="utf-8"))
     found = []
@@ -81,7 +81,7 @@ def test_what_opens_on_demand(house: Bridge, open_page: OpenPage) -> None:
 
 
 def test_table_alarms_and_charts(house: Bridge, open_page: OpenPage) -> None:
-    """In the other colouring than the one that the page opens in."""
+    """In the colouring that is not the default."""
     hmi = open_page(house.url, "colour=value&chart.tag=10&tag=10", bypass_csp=True)
     hmi.expect_rows(*TAGS)
     hmi.page.get_by_role("button", name="Show as table").first.click()
@@ -92,7 +92,7 @@ def test_table_alarms_and_charts(house: Bridge, open_page: OpenPage) -> None:
     assert violations(hmi) == []
 
 
-def test_an_empty_house_and_a_frozen_one(domain: int, open_page: OpenPage) -> None:
+def test_an_empty_greenhouse_and_a_frozen_one(domain: int, open_page: OpenPage) -> None:
     with bridge(domain=domain) as running:
         hmi = open_page(running.url, bypass_csp=True)
         expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-tags")

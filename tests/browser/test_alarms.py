@@ -1,4 +1,4 @@
-"""Alarms in the page: they come by themselves, as they are now."""
+"""Alarms in the page: they appear by themselves, in their current state."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ def rows(hmi: Hmi, group: str) -> Locator:
 
 
 def act(hmi: Hmi, tag: str, what: str) -> None:
-    """Choose what to do from the menu of a tag's row."""
+    """Choose an action from the menu of a tag's row."""
     hmi.page.get_by_role("button", name=f"Actions: Tag {tag}").click()
     hmi.page.locator(".row-actions").get_by_role("button", name=what, exact=True).click()
 
 
 def active(running: Bridge, count: int) -> list[dict[str, Any]]:
-    """The bridge's active alarms, once there are so many."""
+    """The bridge's active alarms, once there are that many."""
 
     def look() -> list[dict[str, Any]] | None:
         alarms: list[dict[str, Any]] = running.json("/api/alarms", active=1)["alarms"]
@@ -41,18 +41,18 @@ def active(running: Bridge, count: int) -> list[dict[str, Any]]:
 
 
 def warm(tag_id: str, temperature: float, **options: Any) -> Any:
-    """A scan by day: at night other ranges hold."""
+    """A scan by day: at night other ranges apply."""
     return scan(tag_id, {"temperature": temperature, "light": 900.0}, **options)
 
 
 def open_resolved(hmi: Hmi, count: int) -> None:
-    """Show what is resolved, once there are so many."""
+    """Show the resolved alarms, once there are that many."""
     name = f"Resolved in the last 24 h ({count})"
     hmi.page.get_by_role("button", name=name).click()
 
 
 def leave(hmi: Hmi) -> None:
-    """Move the pointer off the list: what was held while it was there applies."""
+    """Move the pointer off the list: changes held back under it are applied."""
     hmi.page.mouse.move(0, 0)
 
 
@@ -61,7 +61,7 @@ def fact(row: Locator, name: str) -> Locator:
     return row.locator(f"[data-fact={name}]")
 
 
-def test_an_alarm_comes_is_acknowledged_and_resolved(domain: int, open_page: OpenPage) -> None:
+def test_an_alarm_appears_is_acknowledged_and_resolved(domain: int, open_page: OpenPage) -> None:
     with bridge(domain=domain) as running:
         robot = running.peer
         robot.observe(warm("a", 22.0, at=(1, 1)))
@@ -80,7 +80,7 @@ def test_an_alarm_comes_is_acknowledged_and_resolved(domain: int, open_page: Ope
 
         hmi.page.get_by_role("button", name="Acknowledge: Tag a").click()
         expect(row).to_have_attribute("data-acknowledged", "true")
-        # On a phone below no heading, not even that of an open menu, and over no row's words.
+        # On a phone it covers no heading, not even that of an open menu, and no row's words.
         hmi.resize(**PHONE)
         hmi.page.get_by_role("button", name="Actions: Tag a").click()
         assert out_of_reach(hmi, "[data-line=done] button") == []
@@ -91,12 +91,12 @@ def test_an_alarm_comes_is_acknowledged_and_resolved(domain: int, open_page: Ope
         act(hmi, "a", "Unacknowledge")
         expect(row).to_have_attribute("data-acknowledged", "false")
 
-        # Resolved it stays listed, behind a button of its own, with its end.
+        # Once resolved it stays listed, behind a button, with its end.
         leave(hmi)
         robot.observe(*[warm("a", 22.0)] * 2)
         open_resolved(hmi, 1)
         expect(rows(hmi, "resolved")).to_contain_text(re.compile(r"resolved \d\d:\d\d"))
-        # On paper as well, without what can be done to it.
+        # On paper as well, without its actions.
         hmi.page.emulate_media(media="print")
         expect(rows(hmi, "resolved")).to_be_visible()
         expect(hmi.page.get_by_role("button", name="Acknowledge")).to_have_count(0)
@@ -105,7 +105,7 @@ def test_an_alarm_comes_is_acknowledged_and_resolved(domain: int, open_page: Ope
         expect(hmi.page).to_have_title("Lupin twin")
 
 
-def test_a_double_click_shelves_nothing_and_a_critical_alarm_takes_a_reason(
+def test_a_double_click_shelves_nothing_and_a_critical_alarm_needs_a_reason(
     domain: int, open_page: OpenPage
 ) -> None:
     with bridge(domain=domain) as running:
@@ -125,7 +125,7 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_takes_a_reason(
             hmi.resize(**viewport)
             for row in rows(hmi, "active").all():
                 expect(row).to_be_in_viewport(ratio=1)
-                # Two lines; on a phone four, and what can be done beside them (test_layout).
+                # Two lines; on a phone four, with the actions beside them (test_layout).
                 high = place(row).bottom - place(row).top
                 assert high <= (64 if viewport == WIDE else 96)
                 if viewport == WIDE:
@@ -137,23 +137,23 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_takes_a_reason(
             button.dblclick()
             panel.get_by_role("button", name="Shelve").dblclick()
             expect(times.first).to_be_visible()
-            # In a list that need not scroll for it, no row moves.
+            # In a list that need not scroll, no row moves.
             assert viewport == PHONE or tops() == before
             expect(panel).to_be_in_viewport(ratio=1)
             assert apart(button, panel)
-            # Nor does the heading of the next section lie over it.
+            # Nor does the heading of the next section cover it.
             panel.get_by_role("textbox").click()
             expect(hmi.page.get_by_role("button", name="Unshelve")).to_have_count(0)
         # A small laptop has no more lines.
         hmi.resize(1280, 720)
         assert all(place(row).bottom - place(row).top <= 64 for row in rows(hmi, "active").all())
         hmi.resize(**WIDE)
-        # Of the critical one.
+        # The critical one.
         expect(times).to_have_text(["For 15 min", "For 1 h"])
         for each in times.all():
             expect(each).to_be_disabled()
         hmi.page.get_by_label("Reason").fill("fan is being mended")
-        # What the second press of two meets, where the panel was: nothing.
+        # The second click of two, where the panel was, hits nothing.
         times.last.dblclick()
         leave(hmi)
         shelved = rows(hmi, "shelved")
@@ -162,7 +162,7 @@ def test_a_double_click_shelves_nothing_and_a_critical_alarm_takes_a_reason(
         hmi.page.get_by_role("button", name="Undo").click()
         expect(shelved).to_have_count(0)
         expect(rows(hmi, "active")).to_have_count(2)
-        # One that is not critical: for longer, and without a word. It can be taken back later.
+        # One that is not critical: for longer, and without a reason. It can be withdrawn later.
         act(hmi, "b", "Shelve")
         times.get_by_text("For 8 h").click()
         hmi.page.reload()
@@ -193,7 +193,7 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
         robot = running.peer
         robot.observe(*[warm("a", value, at=(1, 1)) for value in (41.0, 43.5)])
         [alarm] = active(running, 1)
-        # Not in the millisecond of the alarm, which is as fine as a link tells its moment.
+        # Not in the millisecond of the alarm, which is the resolution of a link.
         robot.observe(warm("a", 42.0))
         running.tag("a", lambda tag: 42.0 in [each["value"] for each in tag["readings"]])
         hmi = open_page(running.url)
@@ -208,14 +208,14 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
         expect(hmi.app).to_have_attribute("data-moment", shown)
         expect(hmi.card("a")).to_contain_text("43.5")
         expect(hmi.test_id("card-chart")).to_have_attribute("data-state", "ready")
-        # The list is still that of now.
+        # The list is still the current one.
         expect(fact(row, "now")).to_contain_text("now 42.0")
         hmi.page.locator(".alarm-go").click()
         expect(hmi.app).to_have_attribute("data-moment", "now")
 
 
 def test_nothing_moves_while_a_finger_rests_on_the_list(domain: int, open_page: OpenPage) -> None:
-    """For the mouse `AlarmPanel.test.tsx` holds that."""
+    """`AlarmPanel.test.tsx` has the same for the mouse."""
     with bridge(domain=domain) as running:
         robot = running.peer
         robot.observe(*[warm(tag, 27.0, at=(1, 1)) for tag in ("a", "b") * 2])
@@ -227,7 +227,7 @@ def test_nothing_moves_while_a_finger_rests_on_the_list(domain: int, open_page: 
         box = button.bounding_box()
         assert box is not None
         with resting(hmi, box["x"] + 9, box["y"] + 9):
-            # Worse than both, so it would stand before them; one of them is resolved.
+            # Worse than both, so it would come before them; one of them is resolved.
             robot.observe(*[warm("c", 43.5, at=(2, 1))] * 2, *[warm(order[0], 22.0)] * 2)
             expect(hmi.page).to_have_title("(2) Lupin twin")
             expect(hmi.test_id("alarm-line")).to_have_text("1 new")
@@ -247,7 +247,7 @@ def test_nothing_moves_while_a_finger_rests_on_the_list(domain: int, open_page: 
         values = fact(hmi.page.locator("[data-group=active]"), "now")
         expect(values).to_have_count(6)
         assert len({place(each).left for each in values.all()}) == 1
-        # No line breaks in the name of a tag: half a number is another tag.
+        # No line break within a tag's name: half a number is another tag.
         hmi.go("list=alarms", "?lang=de")
         worst = fact(hmi.page.locator("[data-group=active] .alarm-cause"), "now")
         expect(worst).to_have_text("jetzt 45,0\u00a0°C (Messpunkt\u00a042)")
@@ -263,7 +263,7 @@ def where(hmi: Hmi) -> list[str]:
 
 @contextmanager
 def resting(hmi: Hmi, x: float, y: float) -> Iterator[None]:
-    """A finger rests on a point of the page, pixels; at the end it is taken off."""
+    """A finger rests on a point of the page, pixels; at the end it is lifted."""
     session = hmi.page.context.new_cdp_session(hmi.page)
     touch = "Input.dispatchTouchEvent"
     session.send(touch, {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})

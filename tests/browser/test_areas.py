@@ -16,14 +16,14 @@ def with_areas(route: Route) -> None:
     route.fulfill(response=answer, json={**answer.json(), "areas": AREAS})
 
 
-def test_the_table_by_area_the_worst_first(house: Bridge, open_page: OpenPage) -> None:
+def test_the_table_by_area_has_the_worst_first(house: Bridge, open_page: OpenPage) -> None:
     hmi = open_page(house.url, go=False, bypass_csp=True)
     hmi.page.route("**/api/sensors", with_areas)
     hmi.go("tag=10")
     hmi.expect_rows(*TAGS)
     expect(hmi.card("10").locator(".card-facts")).to_contain_text("AreaSouth bay")
     hmi.page.get_by_role("button", name="Columns and rows").click()
-    # Where columns give way, a head brings none of them back.
+    # Where columns are dropped, a head brings none of them back.
     hmi.resize(1100, 800)
     columns = [place(each) for each in hmi.page.locator("thead th:visible").all()]
     hmi.page.get_by_role("checkbox", name="Group by area").check()
@@ -39,9 +39,9 @@ def test_the_table_by_area_the_worst_first(house: Bridge, open_page: OpenPage) -
         ["Critical South bay 2 tags", "Healthy North bay 2 tags", "Unknown No area 3 tags"]
     )
     expect(hmi.page.get_by_role("table").get_by_role("heading", level=3)).to_have_count(3)
-    # A row does not say again what its head says.
+    # A row does not repeat its head.
     expect(hmi.row("1").get_by_role("rowheader")).to_have_text("1")
-    # Heads are rows, to be counted, and nothing to be chosen.
+    # Heads are rows for counting, and cannot be chosen.
     expect(hmi.page.get_by_role("table")).to_have_attribute("aria-rowcount", str(len(TAGS) + 4))
     expect(heads.nth(1)).to_have_attribute("aria-rowindex", "5")
     expect(hmi.row("1")).to_have_attribute("aria-rowindex", "6")
@@ -50,15 +50,15 @@ def test_the_table_by_area_the_worst_first(house: Bridge, open_page: OpenPage) -
     hmi.row("3").get_by_role("button").focus()
     hmi.page.keyboard.press("Tab")
     expect(hmi.row("1").get_by_role("button")).to_be_focused()
-    # The keys that go from tag to tag follow the rows.
+    # The keys for the next tag follow the rows.
     for tag_id in ("3", "1"):
         hmi.page.keyboard.press("n")
         expect(hmi.row(tag_id)).to_have_attribute("data-selected", "true")
     assert violations(hmi) == []
-    # Kept on this device.
+    # Stored on this device.
     hmi.go()
     expect(heads).to_have_count(3)
-    # Where nobody has named areas there is nothing to group by.
+    # Without named areas there is nothing to group by.
     hmi.page.unroute_all()
     hmi.page.reload()
     hmi.expect_rows(*TAGS)

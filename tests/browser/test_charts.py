@@ -1,4 +1,4 @@
-"""Charts and the difference layer, held against what the API says of the same past."""
+"""Charts and the difference layer, compared with the API's answers about the same past."""
 
 import csv
 import io
@@ -36,7 +36,7 @@ window.texts = []; CanvasRenderingContext2D.prototype.fillText = function (text,
 
 
 class Garden:
-    """Two hours of tag 1 with twenty minutes of nothing; of tag 2 more than a chart has points."""
+    """Two hours of tag 1 with twenty minutes missing; of tag 2 more than a chart has points."""
 
     def __init__(self, running: Bridge) -> None:
         self.bridge = running
@@ -75,7 +75,7 @@ class Garden:
         running.tag("1", lambda tag: tag["species"] == "lupin")
 
     def _observe(self, tag_id: str, messages: Sequence[Any]) -> None:
-        """As many at once as the latch holds, each lot once the one before is remembered."""
+        """As many at once as the latch holds, each batch once the one before is stored."""
         for start in range(0, len(messages), LOT):
             lot = messages[start : start + LOT]
             self.bridge.peer.observe(*lot)
@@ -96,18 +96,18 @@ class Garden:
 
 @pytest.fixture(scope="module")
 def garden() -> Iterator[Garden]:
-    """A bridge that remembers two hours."""
+    """A bridge with two hours of past."""
     with bridge() as running:
         yield Garden(running)
 
 
 def questions(hmi: Hmi) -> list[dict[str, str]]:
-    """What the page has asked about the past of sensors."""
+    """The page's queries of the past of sensors."""
     return [dict(parse_qsl(urlsplit(url).query)) for url in hmi.requests if "/api/history?" in url]
 
 
 def asked(hmi: Hmi, sensor: str = "temperature") -> dict[str, str]:
-    """The last question about a sensor's past that the page has asked."""
+    """The page's last query of a sensor's past."""
     return [question for question in questions(hmi) if question["sensor_type"] == sensor][-1]
 
 
@@ -116,7 +116,7 @@ def plot(hmi: Hmi, sensor: str = "Temperature") -> Locator:
 
 
 def plotted(hmi: Hmi) -> Image.Image:
-    """The inside of the first chart, once it has come."""
+    """The inside of the first chart, once it is there."""
     inside = plot(hmi).locator(".u-over")
     expect(inside).to_be_visible()
     hmi.expect(lambda: bool(columns(inside)), "a line in the chart")
@@ -128,7 +128,7 @@ def columns(inside: Locator, colour: Sequence[int] = LINE) -> list[int]:
 
 
 def line_columns(picture: Image.Image, colour: Sequence[int] = LINE) -> list[int]:
-    """The columns that have something of the line's own colour."""
+    """The columns with pixels of the line's own colour."""
     pixels = np.asarray(picture, dtype=int)
     near = np.abs(pixels - np.array(colour)).sum(axis=2) < 90
     return [int(column) for column in np.flatnonzero(near.any(axis=0))]
@@ -150,9 +150,7 @@ def rows(hmi: Hmi) -> list[dict[str, str]]:
     return found
 
 
-def test_a_gap_stays_open_and_the_table_says_what_the_api_says(
-    garden: Garden, open_page: OpenPage
-) -> None:
+def test_a_gap_stays_open_and_the_table_equals_the_api(garden: Garden, open_page: OpenPage) -> None:
     hmi = open_page(garden.bridge.url, f"chart.tag=1&{garden.period}")
     picture = plotted(hmi)
     share = picture.width / (garden.now_s - garden.from_s)
@@ -184,7 +182,9 @@ def test_a_gap_stays_open_and_the_table_says_what_the_api_says(
     assert any("no data for" in row["text"] for row in found if row["kind"] == "gap")
 
 
-def test_many_are_buckets_and_a_drag_brings_readings(garden: Garden, open_page: OpenPage) -> None:
+def test_many_come_in_buckets_and_a_drag_brings_readings(
+    garden: Garden, open_page: OpenPage
+) -> None:
     # A wider chart has room for each of them.
     narrow = {"width": 1200, "height": 900}
     hmi = open_page(garden.bridge.url, f"chart.tag=2&{garden.period}", viewport=narrow)
@@ -210,7 +210,7 @@ def test_many_are_buckets_and_a_drag_brings_readings(garden: Garden, open_page: 
     hmi.expect(lambda: "period=" in hmi.address(), "the link to follow")
     expect(plot(hmi)).not_to_have_attribute("aria-label", whole)
     hmi.page.get_by_role("button", name="Whole period").click()
-    # What is shown, not what was asked: the answer before stays until the next has come.
+    # The shown range, not the requested one: the old answer stays until the next arrives.
     expect(plot(hmi)).to_have_attribute("aria-label", whole)
     with hmi.page.expect_download() as download:
         hmi.page.get_by_role("button", name="CSV of this view").click()
@@ -226,7 +226,7 @@ def test_many_are_buckets_and_a_drag_brings_readings(garden: Garden, open_page: 
     assert len(exported) == 1 + MANY
 
 
-def test_hover_tells_the_time_and_a_click_goes_there(garden: Garden, open_page: OpenPage) -> None:
+def test_hover_shows_the_time_and_a_click_goes_there(garden: Garden, open_page: OpenPage) -> None:
     hmi = open_page(garden.bridge.url, f"tag=1&{garden.period}")
     hmi.page.keyboard.press("c")
     picture = plotted(hmi)
@@ -242,7 +242,7 @@ def test_hover_tells_the_time_and_a_click_goes_there(garden: Garden, open_page: 
     expect(hmi.test_id("chart-view")).to_have_count(0)
 
 
-def test_the_day_before_is_compared_and_the_axis_is_of_the_pages_language(
+def test_the_day_before_is_compared_and_the_axis_is_in_the_pages_language(
     garden: Garden, open_page: OpenPage
 ) -> None:
     now_s = time.time()
@@ -275,14 +275,14 @@ def test_on_a_phone_the_card_makes_room_for_its_charts(garden: Garden, open_page
     expect(hmi.test_id("chart-view")).to_be_visible()
     expect(card).to_be_hidden()
     hmi.test_id("chart-view").get_by_role("button", name="Close").click()
-    # To where it was opened, not to the map nor to the top of the card.
+    # Back to where it was opened, not to the map or the top of the card.
     expect(card).to_be_visible()
     expect(tab).to_have_attribute("aria-pressed", "true")
     expect(charts).to_be_focused()
     expect(hmi.test_id("card-chart")).to_be_in_viewport()
 
 
-def test_each_of_several_tags_has_the_colour_that_its_name_has(
+def test_each_of_several_tags_has_the_colour_of_its_name(
     garden: Garden, open_page: OpenPage
 ) -> None:
     hmi = open_page(garden.bridge.url, f"chart.tag=1&{garden.period}")

@@ -33,7 +33,7 @@ def opened(browser: Browser, url: str, **context: object) -> Iterator[BrowserPag
 
 
 def expect_no_wider_than_a_phone(page: BrowserPage) -> None:
-    """Nothing sticks out of a phone's screen."""
+    """Nothing is wider than a phone's screen."""
     page.set_viewport_size(PHONE)
     page.wait_for_function(f"innerWidth === {PHONE['width']}")
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
@@ -41,7 +41,7 @@ def expect_no_wider_than_a_phone(page: BrowserPage) -> None:
 
 @contextmanager
 def three_sites(archive: Archive, folder: Path) -> Iterator[Page]:
-    """One that is well, one that is not, and one that is silent."""
+    """One healthy, one not, and one silent."""
     with ExitStack() as ending:
         for site, temperature in (("silent", 22.0), ("warm", 45.0), ("gh1", 22.0)):
             archive.add_user(site)
@@ -62,7 +62,7 @@ def three_sites(archive: Archive, folder: Path) -> Iterator[Page]:
 
 @pytest.fixture(scope="module")
 def sites(shared_archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    """Those three, for tests that change nothing that another one looks at."""
+    """These three, for tests whose changes no other test reads."""
     with three_sites(shared_archive, tmp_path_factory.mktemp("sites")) as served:
         yield served
 
@@ -78,14 +78,14 @@ def test_the_worst_first_and_a_click_away(browser: Browser, sites: Page) -> None
         expect(cards.nth(1)).to_contain_text("Last known: Healthy")
         # That it is silent.
         expect(cards.nth(1)).to_contain_text("1 alarm")
-        # Where the tags are: fetched, and of the size that was kept for it.
+        # The positions of the tags: fetched, and as large as their placeholder.
         for card in (cards.nth(0), cards.nth(2)):
             image = card.locator(".fleet-map img")
             expect(image).to_have_js_property("complete", value=True)
             assert image.evaluate("image => image.naturalWidth > 0")
         expect(cards.nth(1)).not_to_have_attribute("data-health", "healthy")
         expect(cards.nth(2)).to_contain_text("No alarms")
-        # Nobody says where the rows come from; with two groups at least, there are headings.
+        # No row has a source; from two groups on, there are headings.
         expect(page.locator(".fleet-origin")).to_have_count(0)
         expect(page.locator(".fleet-group")).to_have_count(0)
         page.keyboard.press("/")
@@ -101,7 +101,7 @@ def test_the_worst_first_and_a_click_away(browser: Browser, sites: Page) -> None
         expect(page).to_have_url(re.compile(r"/sites/gh1/"))
         expect(page.get_by_role("banner")).to_contain_text("gh1")
         expect(page.locator(".tag-table, table").first).to_contain_text("4")
-        # Nothing is pushed out of sight by the way back.
+        # The link back pushes nothing out of sight.
         assert page.evaluate("document.documentElement.scrollHeight <= innerHeight")
         page.get_by_role("link", name="All greenhouses").click()
         expect(page.get_by_role("heading", level=1)).to_have_text("Greenhouses")
@@ -133,21 +133,21 @@ def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
             expect(rows.first).to_contain_text("warm")
             expect(rows.first).to_contain_text("Critical")
             expect(rows.first).to_contain_text("Temperature above 35")
-            # The filters are those of the cards.
+            # The filters of the cards.
             page.get_by_role("searchbox").fill("gh1")
             expect(rows).to_have_count(0)
             expect(page.get_by_role("main")).to_contain_text("No alarms")
             expect(page).to_have_title("(6) Greenhouses")
             page.get_by_role("searchbox").fill("warm")
             expect(rows).to_have_count(5)
-            # What is over leaves the cards, the count, the title and the list.
+            # A resolved alarm leaves the cards, the count, the title and the list.
             now_ns = wall().stamp_ns
             journal = tmp_path / "warm.sqlite"
             write(journal, [scan("0", now_ns + n, temperature=22.0) for n in range(3)])
             expect(page).to_have_title("(5) Greenhouses")
             expect(page.get_by_role("button", name="Alarms 5")).to_be_visible()
             expect(rows).to_have_count(4)
-            # What people say of one is beside it.
+            # Its notes are beside it.
             answer = partial(served.http.get, "/api/alarms")
             name = answer().json()["alarms"][0]["id"]
             archive.do(
@@ -161,18 +161,18 @@ def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
             tag = rows.first.locator("span", has_text=re.compile(r"^Tag \d$")).inner_text()
             rows.first.get_by_role("link").click()
             expect(page).to_have_url(re.compile(r"/sites/warm/.*#.*at=\d+"))
-            # Its card, and as of then.
+            # Its card, as of that moment.
             expect(page.get_by_role("complementary", name=tag)).to_be_visible()
             expect(page.locator(".app")).to_have_attribute("data-past", "true")
         with opened(browser, f"{served.url}?kiosk") as page:
             expect(page.get_by_role("banner")).to_contain_text("5 alarms")
 
 
-def test_one_sensor_of_several_greenhouses_the_outlier_first(
+def test_one_sensor_of_several_greenhouses_with_the_outlier_first(
     browser: Browser, archive: Archive, tmp_path: Path
 ) -> None:
     temperatures = {"gh1": 20.0, "gh2": 21.0, "gh3": 22.0, "odd": 33.0}
-    # The same for all: an hour may end meanwhile.
+    # The same period for all: an hour may end meanwhile.
     now_ns = wall().stamp_ns
     for site, temperature in temperatures.items():
         journal = tmp_path / f"{site}.sqlite"
@@ -267,7 +267,7 @@ def test_groups_fold_and_can_be_chosen(browser: Browser, archive: Archive) -> No
             expect(page.locator(".fleet-name")).to_have_text(["Noord 1", "north-2"])
 
 
-def test_what_is_simulated_says_so(browser: Browser, archive: Archive, tmp_path: Path) -> None:
+def test_simulated_data_are_marked(browser: Browser, archive: Archive, tmp_path: Path) -> None:
     journal = tmp_path / "journal.sqlite"
     with recording(journal, wall(), world=World("simulated")) as twin:
         for row in scans_lately():

@@ -1,6 +1,6 @@
-"""What a page of another origin gets out of the bridge, in a real browser: nothing.
+"""What a page of another origin can read from the bridge, in a real browser: nothing.
 
-The operator's browser reaches the bridge, and every page that it shows may try to use that.
+The operator's browser reaches the bridge, and any page in it may try to use that.
 """
 
 import threading
@@ -18,7 +18,7 @@ from tests.support.waiting import PATIENCE_S
 from tests.support.web import Bridge, bridge
 
 FIELD = "/api/field.png?sensor_type=co2&resolution=0.5"
-# Everything that a page can try, each answering with what it got out of the bridge.
+# Everything that a page can attempt, each with what it read from the bridge.
 TRY = """
 async ({ url, field, init }) => {
   const outcome = (promise) => promise.catch((error) => `refused: ${error.name || error}`);
@@ -89,7 +89,7 @@ def foreign_page(name: str) -> Iterator[str]:
             self.wfile.write(b"<!doctype html><title>Elsewhere</title><body></body>")
 
         def log_message(self, *_: Any) -> None:
-            """Say nothing."""
+            """Log nothing."""
 
     with ThreadingHTTPServer(("127.0.0.1", 0), EmptyPage) as server:
         thread = threading.Thread(target=server.serve_forever)
@@ -109,7 +109,7 @@ def page(browser: Browser) -> Iterator[Page]:
 
 
 def try_all(page: Page, origin: str, url: str, **init: Any) -> dict[str, str]:
-    """What a page of `origin` gets out of the bridge at `url`."""
+    """What a page of `origin` reads from the bridge at `url`."""
     page.goto(origin)
     got: dict[str, str] = page.evaluate(TRY, {"url": url, "field": FIELD, "init": init})
     return got
@@ -129,19 +129,19 @@ def running() -> Iterator[Bridge]:
         yield it
 
 
-# A site is scheme and host: another port of this host is the nearer stranger.
+# A site is scheme and host: another port of this host is the closest foreign origin.
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost"], ids=["same-site", "cross-site"])
 def test_a_foreign_page_gets_nothing(page: Page, running: Bridge, host: str) -> None:
     with foreign_page(host) as origin:
         assert try_all(page, origin, running.url) == NOTHING
 
 
-def test_an_allowed_page_gets_what_it_names_itself_for(page: Page) -> None:
+def test_an_allowed_page_gets_what_it_identifies_itself_for(page: Page) -> None:
     with foreign_page("localhost") as origin, bridge_with_a_tag("--allow-origin", origin) as it:
         got = try_all(page, origin, it.url)
         assert "secret tag" in got["fetch"]
         assert got["corsImage"] == "6 px, data:image"
         assert got["socket"] == got["rosbridge"] == "open"
-        # These do not say whose page asks.
+        # These do not name the page that sends them.
         assert got["image"] == "refused: <img>"
         assert got["script"] == "refused: <script>"

@@ -1,4 +1,4 @@
-"""Where things lie, by pixel: the field upright, pins on their cells."""
+"""Positions, by pixel: the field upright, pins on their cells."""
 
 import colorsys
 import json
@@ -19,12 +19,12 @@ SENSORS: Any = json.loads((Path(lupin_bridge.__file__).parent / "sensors.json").
 
 # The bodies of pins in the light theme.
 HEALTHY, CRITICAL = (31, 122, 69), (196, 33, 26)
-# What it makes of occupied cells.
+# The colour of occupied cells.
 WALL = (84, 94, 88)
 
 
 def colour_of(sensor: str) -> Pixel:
-    """A sensor's colour, worked out here once more from its declaration."""
+    """A sensor's colour, computed here again from its declaration."""
     declared = SENSORS["sensors"][sensor]
     parts = colorsys.hls_to_rgb(
         declared["hue"] / 360, declared["lightness"] / 100, SENSORS["ramp"]["saturation"] / 100
@@ -34,7 +34,7 @@ def colour_of(sensor: str) -> Pixel:
 
 
 def over(base: Pixel, sensor: str, share: float) -> Pixel:
-    """The heat map's colour for that share of the range, upon a base."""
+    """The heat map's colour for that share of the range, over a base."""
     alpha = SENSORS["ramp"]["max_alpha"] * share
     mixed = (round(b + alpha * (c - b)) for b, c in zip(base, colour_of(sensor), strict=True))
     red, green, blue = mixed
@@ -62,7 +62,7 @@ def hot_corner(running: Bridge) -> None:
 VIEW = "view=2,1.5,7"
 
 
-def test_a_cell_that_is_not_known_shows_the_map_below_it(domain: int, open_page: OpenPage) -> None:
+def test_an_unknown_cell_shows_the_map_below_it(domain: int, open_page: OpenPage) -> None:
     with bridge(domain=domain) as running:
         hot_corner(running)
         # A wall through the middle, farther than 1.5 m from every tag.
@@ -100,7 +100,7 @@ def rgb(picture: Any, at: tuple[int, int]) -> Pixel:
     return red, green, blue
 
 
-def test_a_pin_sits_on_its_pose_and_in_its_cell(domain: int, open_page: OpenPage) -> None:
+def test_a_pin_is_on_its_pose_and_in_its_cell(domain: int, open_page: OpenPage) -> None:
     with bridge(domain=domain) as running:
         running.peer.publish_map(occupancy_grid([[0] * 6] * 6))
         at = (3.125, 2.375)
@@ -118,20 +118,20 @@ def test_a_pin_sits_on_its_pose_and_in_its_cell(domain: int, open_page: OpenPage
             assert abs((pin.top + pin.bottom - 1) / 2 - y) <= 1
             # Its body has the colour of its verdict, here above the sign.
             assert close(hmi.pixel(at[0], at[1] + 6 / hmi.view().scale), HEALTHY)
-        # Zoomed in this far a cell is as large as the pin, and the pin's is the known one whose
+        # At this zoom a cell is as large as the pin, and the pin's is the known one whose
         # centre is nearest: the field's value there is the tag's own.
         hmi.page.keyboard.press("Escape")
         hmi.point_at(*at)
         expect(hmi.test_id("readout")).to_have_text("600 ppmidealx 3.12 m, y 2.38 m")
         hmi.page.mouse.move(1, 1)
         running.peer.observe(scan("a", {"co2": 9000.0}, at=at))
-        # Above its sign, and in the corner that a square has and no disc.
+        # Above its sign, and in the corner that a square has and a disc has not.
         metre = hmi.view().scale
         above, corner = (at[0], at[1] + 7 / metre), (at[0] + 9 / metre, at[1] + 9 / metre)
         hmi.expect_pixels(lambda pixel: close(pixel, CRITICAL), above, corner, what="a red square")
 
 
-# Tells of each label what its picture's width is, and how wide its text came out in it.
+# Records the width of each label's picture, and of its drawn text.
 WATCH_LABELS = """
   const paint = CanvasRenderingContext2D.prototype.fillText;
   window.labels = [];
@@ -149,10 +149,10 @@ def test_a_label_is_as_wide_as_its_text(house: Bridge, open_page: OpenPage) -> N
     hmi.go()
     hmi.expect_samples(3)
     hmi.settled_picture()
-    # Once more, with the font that has come meanwhile.
+    # Once more, with the font loaded meanwhile.
     hmi.page.evaluate("document.fonts.ready.then(() => { labels.length = 0; })")
     hmi.page.emulate_media(color_scheme="dark")
     hmi.expect(lambda: hmi.page.evaluate("labels.length") >= 5, "all labels painted anew")
     for text, picture, wide in hmi.page.evaluate("labels"):
-        # 5 pixels of padding on each side, and all of it in whole pixels.
+        # 5 pixels of padding on each side, all in whole pixels.
         assert picture == math.ceil(wide) + 10, text

@@ -1,4 +1,4 @@
-"""The guide as `make docs` has built it, served by a bridge: no browser complains of it."""
+"""The guide of `make docs`, served by a bridge, without errors in the browser."""
 
 import re
 
@@ -23,7 +23,7 @@ def url() -> object:
 
 @pytest.fixture
 def page(browser: Browser) -> object:
-    """A page; whatever the browser complains of fails the test."""
+    """A page; any error in the browser's console fails the test."""
     said: list[str] = []
     context = browser.new_context()
     page = context.new_page()
@@ -39,7 +39,7 @@ def page(browser: Browser) -> object:
     assert said == []
 
 
-def test_every_page_was_built_and_all_together_is_small() -> None:
+def test_every_page_was_built_and_all_together_are_small() -> None:
     assert len(SOURCES) > 10
     assert [str(it) for it in SOURCES if not (GUIDE_FOLDER / f"{it}.html").is_file()] == []
     files = [file for file in GUIDE_FOLDER.rglob("*") if file.is_file()]
@@ -61,7 +61,7 @@ def test_the_first_page_leads_to_the_reference(page: Page, url: str) -> None:
     page.get_by_role("link", name="Settings of the bridge").first.click()
     expect(page.get_by_role("heading", level=1)).to_contain_text("Settings of the bridge")
     expect(page.get_by_role("cell", name=option(table()[0].name)).first).to_be_visible()
-    # Its styles hold: the sprite of icons takes no room, the theme can be chosen.
+    # Its styles apply: the sprite of icons takes no room, the theme can be chosen.
     expect(page.locator("svg").first).to_be_hidden()
     page.locator(".theme-toggle:visible").first.click()
     chosen = page.evaluate("localStorage.getItem('theme')")

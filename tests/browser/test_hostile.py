@@ -1,4 +1,4 @@
-"""What strangers may write into strings is shown as text, and the page stays within its walls."""
+"""Hostile strings are shown as text, and the page keeps its layout."""
 
 import re
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ IMAGE = "<img src=x onerror=alert('species')>"
 HOSTILE_IDS = (
     SCRIPT,
     IMAGE,
-    "\u202egnp.exe\u202c",  # turns what follows about
+    "\u202egnp.exe\u202c",  # reverses the text after it
     "\x01\x1b[31m\x7f\x9bred",
     "zero\u200bwidth\u2066joined",
     "__proto__",
@@ -88,14 +88,14 @@ def test_every_such_tag_opens_its_card_and_every_such_sensor_can_be_chosen(
         rows.nth(hmi.rows().index(tag_id)).get_by_role("button").click()
         expect(card.locator("[data-sensor=temperature]")).to_contain_text(f"{10 + index}.0")
         assert card.get_attribute("data-tag-id") == tag_id
-    # Its link names it, whatever it is called.
+    # Its link names it, whatever its name is.
     for tag_id in (SCRIPT, "../../api/state?x=1#y&z"):
         rows.nth(hmi.rows().index(tag_id)).get_by_role("button").click()
         hmi.expect(partial(is_linked, hmi, tag_id), "its link")
         hmi.page.reload()
         expect(card).to_have_attribute("data-tag-id", tag_id)
     sensors = hmi.page.locator(".sensors input")
-    declared = 1  # temperature: a declared sensor that nobody measures has no button
+    declared = 1  # temperature: a declared sensor without readings has no button
     expect(sensors).to_have_count(declared + len(HOSTILE_SENSORS))
     for index, name in enumerate(sorted(HOSTILE_SENSORS)):
         sensors.nth(declared + index).check(force=True)
@@ -108,7 +108,7 @@ def is_linked(hmi: Hmi, tag_id: str) -> bool:
     return parse_qs(urlsplit(hmi.address()).fragment).get("tag") == [tag_id]
 
 
-def test_a_phone_and_a_wall_screen_bear_it_too(hostile: Bridge, open_page: OpenPage) -> None:
+def test_a_phone_and_a_wall_screen_show_it_too(hostile: Bridge, open_page: OpenPage) -> None:
     phone = open_page(hostile.url, viewport=PHONE)
     phone.expect(lambda: len(phone.rows()) == len(HOSTILE_IDS), "every tag")
     assert nothing_sticks_out(phone)
@@ -119,7 +119,7 @@ def test_a_phone_and_a_wall_screen_bear_it_too(hostile: Bridge, open_page: OpenP
     assert nothing_sticks_out(wall)
 
 
-def test_the_policy_of_the_page_lets_nothing_of_a_stranger_run(
+def test_the_policy_of_the_page_runs_no_foreign_script(
     hostile: Bridge, open_page: OpenPage
 ) -> None:
     hmi = open_page(hostile.url)

@@ -1,4 +1,4 @@
-"""The page over https can be installed, and opens where the bridge is gone: without any data."""
+"""The page over https can be installed, and opens without the bridge, then without any data."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,7 +22,7 @@ FETCHED = "(path) => fetch(path).then(({ status }) => status, () => 'nothing')"
 
 @contextmanager
 def page_that_trusts(browser: Browser) -> Iterator[Page]:
-    """Of a browser that trusts our certificate: without that there is no service worker."""
+    """In a browser that trusts our certificate: otherwise there is no service worker."""
     chromium = browser.browser_type.launch(
         executable_path=CHROMIUM, args=[*CHROMIUM_ARGS, "--ignore-certificate-errors"]
     )
@@ -31,7 +31,7 @@ def page_that_trusts(browser: Browser) -> Iterator[Page]:
         yield context.new_page()
 
 
-def test_a_browser_without_room_for_the_shell_opens_the_page_all_the_same(
+def test_a_browser_without_storage_for_the_shell_still_opens_the_page(
     browser: Browser, tmp_path: Path
 ) -> None:
     ours = certificate(tmp_path)
@@ -47,7 +47,7 @@ def test_a_browser_without_room_for_the_shell_opens_the_page_all_the_same(
         assert page.evaluate(CACHED) == []
 
 
-def test_the_shell_opens_without_the_bridge_and_no_data_is_kept(
+def test_the_shell_opens_without_the_bridge_and_no_data_are_stored(
     browser: Browser, tmp_path: Path
 ) -> None:
     ours = certificate(tmp_path)

@@ -1,4 +1,4 @@
-"""A wall screen, which is looked at: whoever brushes past it changes nothing."""
+"""A wall screen, for viewing only: an accidental touch changes nothing."""
 
 import json
 import re
@@ -10,7 +10,7 @@ from tests.browser.hmi import PHONE, Hmi, OpenPage
 from tests.browser.places import places
 from tests.support.web import Bridge
 
-# Of one moment: what the list holds changes with the room that it has.
+# At one moment: the list's content depends on its room.
 _NONE_IS_CUT = """() => {
   const bottom = (element) => element.getBoundingClientRect().bottom;
   const rows = [...document.querySelectorAll('li[data-fits=true]')];
@@ -18,7 +18,7 @@ _NONE_IS_CUT = """() => {
 }"""
 
 
-def test_a_wall_screen_that_is_brushed_stays_as_its_link_says(
+def test_a_wall_screen_that_is_touched_stays_as_its_link_says(
     house: Bridge, open_page: OpenPage
 ) -> None:
     wall = open_page(house.url, "sensor=humidity&tag=1", "?kiosk=1", has_touch=True)
@@ -34,7 +34,7 @@ def test_a_wall_screen_that_is_brushed_stays_as_its_link_says(
     wall.page.mouse.up()
     for key in ("Enter", "+", "ArrowLeft", "n", "t", "3", "s", "Tab"):
         wall.page.keyboard.press(key)
-    # Without the mouse on it there is nothing left of all that.
+    # Without the mouse on it, all of that is gone.
     wall.page.mouse.move(1, 1)
     wall.page.evaluate("document.activeElement.blur()")
     expect(wall.test_id("hover-card")).to_have_count(0)
@@ -43,20 +43,20 @@ def test_a_wall_screen_that_is_brushed_stays_as_its_link_says(
     assert wall.address() == address
     expect(wall.test_id("tag-card")).to_have_count(0)
     expect(wall.test_id("legend")).to_contain_text("Humidity %")
-    # Nothing to grab, nothing to click on.
+    # Nothing to drag, nothing to click on.
     wall.point_at(1, 3)
     assert wall.map.evaluate("map => getComputedStyle(map).cursor") == "default"
-    # To assistive technology it is a picture, not something to operate.
+    # To assistive technology it is a picture, not a control.
     expect(wall.map).to_have_attribute("role", "img")
 
 
-def test_a_wall_screen_goes_round_and_is_left_by_the_key_that_it_names(
+def test_a_wall_screen_rotates_and_the_named_key_leaves_it(
     house: Bridge, open_page: OpenPage
 ) -> None:
     wall = open_page(house.url, "sensor=temperature", "?kiosk=1&cycle=5")
     note, legend = wall.test_id("kiosk-note"), wall.test_id("legend")
     expect(note).to_contain_text(re.compile(r"Temperature next: Humidity in [1-5]\u00a0s"))
-    # Too low for the whole list: it says how many are left, and cuts none in two.
+    # Too low for the whole list: it shows the number left, and cuts none in two.
     wall.resize(1100, 500)
     listed = wall.page.locator("li[data-fits=true]")
     row, since = places(wall, ".attention > ul > li", ".attention-do small:not(:empty)")
@@ -73,7 +73,7 @@ def test_a_wall_screen_goes_round_and_is_left_by_the_key_that_it_names(
     expect(legend).to_contain_text("Humidity %")
     wall.page.keyboard.press("Escape")
     expect(wall.test_id("tag-table")).to_be_visible()
-    # What the link names, not what was shown just now.
+    # What the link names, not the last view.
     expect(wall.page).not_to_have_url(re.compile("kiosk"))
     expect(legend).to_contain_text("Temperature °C")
     wall.page.go_back()
@@ -88,7 +88,7 @@ def _middle(wall: Hmi, part: str) -> float:
     return (box.top + box.bottom) / 2
 
 
-def test_on_a_phone_what_is_to_be_done_comes_first_whole_and_the_page_scrolls(
+def test_on_a_phone_open_actions_come_first_in_full_and_the_page_scrolls(
     house: Bridge, open_page: OpenPage
 ) -> None:
     wall = open_page(
@@ -110,7 +110,7 @@ def test_on_a_phone_what_is_to_be_done_comes_first_whole_and_the_page_scrolls(
     wall.resize(390, 740)
     wall.expect(lambda: len({round(_middle(wall, part)) for part in _HEADER}) == 1, "one row")
     wall.resize(**PHONE)
-    # The chosen sensor comes into its row, and leaves the page where it is.
+    # The chosen sensor is scrolled into its row, and the page does not move.
     assert wall.page.evaluate("scrollY") == 0
     wall.map.scroll_into_view_if_needed()
     assert wall.page.evaluate("scrollY") > 0
@@ -127,7 +127,7 @@ BREAK: Final = """() => {
 }"""
 
 
-def test_a_wall_screen_that_fails_comes_back_by_itself(house: Bridge, open_page: OpenPage) -> None:
+def test_a_wall_screen_that_fails_recovers_by_itself(house: Bridge, open_page: OpenPage) -> None:
     wall = open_page(house.url, "sensor=humidity", "?kiosk=1")
     wall.expect_samples(3)
     wall.allow_noise("no more canvas")

@@ -1,4 +1,4 @@
-"""Every size of window, every setting of the eye: all is there, in its place, and can be hit."""
+"""All window sizes and vision settings: everything is there, in its place, and can be clicked."""
 
 import io
 import re
@@ -22,11 +22,11 @@ LOW = (ZOOMED, LANDSCAPE, (1280, 540))
 # A tablet on its side, below a browser's bars; half a screen, and a little less.
 MIDDLING = ((1024, 650), (960, 896), (960, 895))
 SIZES = ((360, 640), (820, 1180), (1440, 900), *LOW)
-# A phone, a laptop, and a phone on its side: of each way to lay the page out one.
+# A phone, a laptop, and a phone on its side: one of each layout.
 FEW = ((360, 640), (1440, 900), LANDSCAPE)
 # Tablets held upright, and other narrow windows: map or table, and the card below the map.
 UPRIGHT = ((768, 1024), (820, 1180), (960, 896), (1090, 1100))
-# A wall screen without a scale of its own: slow to draw.
+# A wall screen without its own scale: slow to draw.
 HUGE = (3840, 2160)
 
 CONTROLS = "button, a[href]:not(.skip), input, .legend li, .legend-title, .legend-facts span"
@@ -34,7 +34,7 @@ CONTROLS = "button, a[href]:not(.skip), input, .legend li, .legend-title, .legen
 
 @pytest.fixture
 def open_at(house: Bridge, open_page: OpenPage) -> Callable[..., Hmi]:
-    """`open_at(size, fragment, query, **options)`: the house in a window of that size."""
+    """`open_at(size, fragment, query, **options)`: the greenhouse in a window of that size."""
 
     def open_one(size: Size, fragment: str = "", query: str = "", **options: object) -> Hmi:
         viewport = {"width": size[0], "height": size[1]}
@@ -46,10 +46,10 @@ def open_at(house: Bridge, open_page: OpenPage) -> Callable[..., Hmi]:
     return open_one
 
 
-# Asked for before `open_page`, so that it ends after the pages.
+# Created before `open_page`, so that it ends after the pages.
 @pytest.fixture
 def running(domain: int) -> Iterator[Bridge]:
-    """A server with a house that is empty at first."""
+    """A server with a greenhouse that is empty at first."""
     with bridge(domain=domain) as empty:
         yield empty
 
@@ -63,11 +63,11 @@ def show(hmi: Hmi, name: str) -> None:
     expect(hmi.map if name == "Map" else hmi.row("1")).to_be_visible()
 
 
-# Of a table: how much of it is out of sight to the right, px.
+# How much of a table is out of sight to the right, px.
 HIDDEN = "table => table.scrollWidth - table.clientWidth"
 
 
-def test_everything_can_be_hit(open_at: Callable[..., Hmi]) -> None:
+def test_everything_can_be_clicked(open_at: Callable[..., Hmi]) -> None:
     hmi = open_at(SIZES[0])
     for size in (*SIZES, *MIDDLING, HUGE):
         hmi.resize(*size)
@@ -77,7 +77,7 @@ def test_everything_can_be_hit(open_at: Callable[..., Hmi]) -> None:
         for mode in ("Ideal", "Value", "Fixed"):
             hmi.page.get_by_role("radio", name=mode).check()
             if mode == "Value":
-                continue  # all that it has, "Fixed" has too
+                continue  # "Fixed" has everything that it has
             # Lower than this, a greenhouse of ten metres is the size of a stamp.
             least = 120 if size in LOW else 200
             tall = "([map, least]) => map.clientHeight >= least"
@@ -90,7 +90,7 @@ def test_everything_can_be_hit(open_at: Callable[..., Hmi]) -> None:
         show(hmi, "Tags")
         expect_in_reach(hmi, "tbody tr, .filter-bar *:not(.unseen), .health button")
         assert hmi.page.locator(".table-scroll").evaluate(HIDDEN) == 0, size
-        # Narrower, why a tag is ill has the room.
+        # In a narrower window, the reason of a tag has the room.
         sure = hmi.row("1").locator(".cell-species .faint")
         has_room = 820 <= size[0] < 1100 or size[0] >= 1264
         expect(sure).to_be_visible(visible=has_room)
@@ -98,7 +98,7 @@ def test_everything_can_be_hit(open_at: Callable[..., Hmi]) -> None:
             assert place(sure).right <= place(hmi.page.locator(".table-scroll")).right
 
 
-def test_below_the_layers_are_their_labelled_choices_always_in_sight(
+def test_below_the_layers_their_labelled_choices_are_always_in_sight(
     open_at: Callable[..., Hmi],
 ) -> None:
     for size in ((1100, 800), (390, 844)):
@@ -115,14 +115,14 @@ def test_below_the_layers_are_their_labelled_choices_always_in_sight(
     assert heat.top >= place(hmi.page.locator(".layer-list")).bottom
 
 
-def test_the_word_for_now_has_one_line_of_the_time_bar(house: Bridge, open_page: OpenPage) -> None:
+def test_the_label_of_now_has_one_line_of_the_time_bar(house: Bridge, open_page: OpenPage) -> None:
     hmi = open_page(house.url, query="?lang=es", viewport={"width": 1100, "height": 800})
     now = hmi.test_id("timebar-when")
     expect(now).to_have_text("En directo")
     assert place(now).bottom - place(now).top < 24
 
 
-# By how much a choice is narrower than its words, px.
+# How much narrower a choice is than its words, px.
 _CUT_CHOICE = """(e) => {
   const width = e.offsetWidth;
   e.style.maxWidth = 'none';
@@ -166,7 +166,7 @@ def test_an_upright_window_has_the_map_or_the_table_and_a_card_below_the_map(
         assert frame.top + 200 <= frame.bottom <= card.top < card.bottom <= tabs.top
 
 
-def test_a_phone_has_room_for_the_facts_a_fixed_range_and_what_is_missing(
+def test_a_phone_has_room_for_the_facts_a_fixed_range_and_missing_data(
     open_at: Callable[..., Hmi],
 ) -> None:
     hmi = open_at((PHONE["width"], PHONE["height"]))
@@ -176,7 +176,7 @@ def test_a_phone_has_room_for_the_facts_a_fixed_range_and_what_is_missing(
     legend.get_by_text("Details").click()
     expect(facts).to_contain_text("3 tags contribute")
     expect(facts.get_by_text("no data", exact=False).locator("visible=true")).to_have_count(1)
-    # Over the map, which stays as high as it is.
+    # Over the map, whose height stays.
     assert place(facts).bottom <= place(legend).top
     hmi.turn("sensor=soil_moisture&colour=value")
     hmi.page.get_by_role("radio", name="Fixed").check()
@@ -189,14 +189,14 @@ def test_a_phone_has_room_for_the_facts_a_fixed_range_and_what_is_missing(
     assert notice.top > frame.bottom - (frame.bottom - frame.top) / 3
 
 
-def test_a_longer_word_about_the_house_does_not_move_the_table(
+def test_a_longer_message_about_the_greenhouse_does_not_move_the_table(
     running: Bridge, open_page: OpenPage
 ) -> None:
     running.peer.observe(scan("1", {"temperature": 22.0}, at=(1, 1)))
     hmi = open_page(running.url)
     driver = hmi.test_id("health-driver")
     expect(driver).to_have_text("All assessed readings are within their ideal ranges")
-    # Late ones take room from the table, and so does a word about a server that is late.
+    # Late messages take room from the table, and so does one about a late server.
     hmi.expect_parts()
     hmi.expect_phase("live")
     hmi.page.evaluate("document.fonts.ready")
@@ -213,16 +213,14 @@ def test_a_longer_word_about_the_house_does_not_move_the_table(
         hmi.expect_phase("live")
         in_place = partial(stands_at, hmi, before[size])
         hmi.expect(in_place, f"the table in its place at {size}")
-    # The rest is to be had by pointing at it, and to be heard anyway.
+    # The rest appears on hover, and a screen reader reads all of it.
     expect(driver).to_have_attribute("title", f"Tag {long}: Temperature 79.0\u00a0°C, above 35.0")
 
 
-def test_the_table_stays_where_it_is_while_tags_arrive(
-    running: Bridge, open_page: OpenPage
-) -> None:
+def test_the_table_stays_in_place_while_tags_arrive(running: Bridge, open_page: OpenPage) -> None:
     hmi = open_page(running.url)
     table = hmi.page.locator(".table-scroll")
-    # Each comes above those that are there, as the robot meets them in no order.
+    # Each sorts above the present ones, as the robot meets them in no order.
     for first in range(60, 0, -20):
         ids = [str(first + i) for i in range(20)]
         running.peer.observe(*(scan(i, {"temperature": 20.0}, at=(1, 1)) for i in ids))
@@ -236,14 +234,14 @@ def stands_at(hmi: Hmi, filter_bar: list[Box]) -> bool:
 
 
 def colours(thing: Locator) -> set[Pixel]:
-    """All that it is made of on the screen, without the edge that it shares with its neighbour."""
+    """All colours that it has on the screen, without the edge that it shares with its neighbour."""
     picture = Image.open(io.BytesIO(thing.screenshot())).convert("RGB")
     picture = picture.crop((1, 1, picture.width - 1, picture.height - 1))
     data = picture.tobytes()
     return set(zip(data[::3], data[1::3], data[2::3], strict=True))
 
 
-def test_high_contrast_still_tells_what_is_chosen_and_what_a_colour_means(
+def test_high_contrast_shows_what_is_chosen_and_what_a_colour_means(
     open_at: Callable[..., Hmi],
 ) -> None:
     hmi = open_at((1440, 900), "tag=2", forced_colors="active")
@@ -270,13 +268,13 @@ def test_high_contrast_still_tells_what_is_chosen_and_what_a_colour_means(
     swatches = [colours(swatch) for swatch in hmi.page.locator(".sensors .swatch").all()]
     assert len({frozenset(each) for each in swatches}) == len(swatches)
     assert len(colours(hmi.page.locator(".ideal-bar").first)) > 50
-    # Of the time bar, what needs somebody stands out from scans that failed.
+    # In the time bar, open actions stand out from failed scans.
     marks = [hmi.page.locator(f".timebar-picture [data-mark={it}]") for it in ("pest", "failures")]
     pest, failed = (mark.first.evaluate("e => getComputedStyle(e).fill") for mark in marks)
     assert pest != failed
 
 
-def test_an_empty_house_says_what_to_do_beside_the_controls_and_in_the_table(
+def test_an_empty_greenhouse_says_what_to_do_beside_the_controls_and_in_the_table(
     running: Bridge, open_page: OpenPage
 ) -> None:
     hmi = open_page(running.url)
@@ -305,7 +303,7 @@ def test_an_empty_house_says_what_to_do_beside_the_controls_and_in_the_table(
     expect(hmi.test_id("empty-table")).to_have_count(0)
 
 
-def test_all_text_grows_with_the_text_of_the_browser(open_at: Callable[..., Hmi]) -> None:
+def test_all_text_grows_with_the_browsers_text_size(open_at: Callable[..., Hmi]) -> None:
     hmi = open_at((1440, 900))
     # In one go, so that nothing arrives meanwhile.
     grow = """() => {
@@ -326,17 +324,17 @@ def test_all_text_grows_with_the_text_of_the_browser(open_at: Callable[..., Hmi]
         expect_in_reach(hmi, ".row-button, .filter-bar *:not(.unseen), .health button")
 
 
-def test_the_words_of_the_ideal_range_stand_below_its_bracket(open_at: Callable[..., Hmi]) -> None:
+def test_the_labels_of_the_ideal_range_are_below_its_bracket(open_at: Callable[..., Hmi]) -> None:
     hmi = open_at((1440, 900), "sensor=humidity&colour=value")
     expect(hmi.page.locator(".ramp-note")).to_be_visible()
-    # Measured from the middle of the ramp, where they would stand without a bracket.
+    # Measured from the middle of the ramp, their position without a bracket.
     words, bracket, ramp = places(hmi, ".ramp-note", ".ramp-ideal", ".ramp-bar")
     aside = (bracket.left + bracket.right - ramp.left - ramp.right) / 2
     assert abs(aside) > 30
     assert (words.left + words.right - ramp.left - ramp.right) / 2 == pytest.approx(aside, abs=20)
 
 
-def test_the_row_of_sensors_fades_where_it_has_more(open_at: Callable[..., Hmi]) -> None:
+def test_the_row_of_sensors_fades_where_there_are_more(open_at: Callable[..., Hmi]) -> None:
     hmi = open_at((PHONE["width"], PHONE["height"]))
     row = hmi.page.locator(".sensor-picker")
     expect(row).to_have_attribute("data-more", "after")
@@ -353,7 +351,7 @@ def test_the_row_of_sensors_fades_where_it_has_more(open_at: Callable[..., Hmi])
         assert last.bottom < bar.bottom
 
 
-# What sticks out of the window, or of its own place, and is no list to be scrolled. Of a column's
+# Elements beyond the window, or beyond their own box, that are no scrollable list. Of a column's
 # head its words count; the arrow beside them may be hidden.
 _TOO_LONG = """() => [...document.querySelectorAll('body *')].filter((e) => {
   if (!e.checkVisibility() || e.closest("canvas, .unseen, .skip")) return false;
@@ -375,12 +373,12 @@ _TOO_LONG = """() => [...document.querySelectorAll('body *')].filter((e) => {
 _CUT_REASONS = """() => [...document.querySelectorAll('tbody .cell-health > div')]
   .filter((e) => e.scrollHeight > e.clientHeight + 1).map((e) => e.textContent)"""
 
-# Of what has to be done the parts that are left out.
+# The parts of open actions that are left out.
 _CUT_TODO = """() => [...document.querySelectorAll('.health .do-what > *')]
   .filter((e) => e.offsetTop >= e.parentElement.offsetTop + e.parentElement.offsetHeight)
   .map((e) => e.textContent)"""
 
-# What a phone says in each, and how it writes a number.
+# A phone's texts in each language, and its format of a number.
 LANGUAGES = {
     "en": ("tags contribute", "20.0"),
     "de": ("Messpunkte tragen bei", "20,0"),
@@ -415,7 +413,7 @@ def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) 
         line = place(hmi.test_id("house-line"))
         assert line.bottom - line.top < 24, language
         assert hmi.page.evaluate(_TOO_LONG) == []
-        # Three letters, and the arrow beside them: no word to be broken.
+        # Three letters, and the arrow beside them: a word that cannot be broken.
         assert hmi.page.locator("thead th").first.locator("span").first.evaluate(LINES) == 1
         assert hmi.page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
         # On a phone and on the smallest laptops this column is narrow, with the arrow at first.
@@ -428,7 +426,7 @@ def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) 
             for head in hmi.page.locator("thead button > span:first-child:visible").all():
                 words = place(head)
                 assert words.bottom - words.top < 24, (language, width, head.inner_text())
-        # Where the name of the page has no room, none of it is shown.
+        # Where the page's name has no room, none of it is shown.
         hmi.resize(230, 740)
         brand = place(hmi.page.locator(".brand"))
         assert place(hmi.page.locator(".brand > span")).top >= brand.bottom

@@ -1,4 +1,4 @@
-"""A house of thousands of tags: the page holds what is in sight, and nobody misses the rest."""
+"""A greenhouse of thousands of tags: the page renders only the visible rows, without gaps."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ IS_ON_THE_SCREEN = """row => { const { x, y, height } = row.getBoundingClientRec
 
 OpenHouse = Callable[..., Hmi]
 
-# A server that says nothing for 3 s is told of above the table, which has less room then.
+# A server that is silent for 3 s causes a message above the table, which has less room then.
 GOES_ON = """
 setInterval(() => { if (document.querySelector('tr[data-tag-id]')) house.idle(); }, 500);
 """
@@ -31,7 +31,7 @@ setInterval(() => { if (document.querySelector('tr[data-tag-id]')) house.idle();
 
 @pytest.fixture
 def open_house(house: Bridge, open_page: OpenPage) -> OpenHouse:
-    """`open_house(tags, fragment, **options)`: the page with a house of so many tags."""
+    """`open_house(tags, fragment, **options)`: the page with a greenhouse of that many tags."""
 
     def open_one(tags: int = TAGS, fragment: str = "", **options: object) -> Hmi:
         hmi = open_page(house.url, go=False, **options)
@@ -43,11 +43,11 @@ def open_house(house: Bridge, open_page: OpenPage) -> OpenHouse:
     return open_one
 
 
-def test_the_page_holds_few_rows_and_shows_any(open_house: OpenHouse) -> None:
+def test_the_page_renders_few_rows_and_shows_any(open_house: OpenHouse) -> None:
     hmi = open_house()
     expect(hmi.page.get_by_role("table")).to_have_attribute("aria-rowcount", str(TAGS + 1))
     frame = hmi.page.locator(".table-scroll")
-    # As wide as its place, with the gaps for the rows that it does not hold.
+    # As wide as its place, with the gaps for the rows that are not rendered.
     table, last = hmi.page.get_by_role("table"), hmi.page.locator("thead th:visible").last
     assert place(last).right == place(table).right
     for share, tag_id in ((1.0, str(TAGS)), (0.5, str(TAGS // 2 + 5)), (0.0, "1")):
@@ -56,8 +56,8 @@ def test_the_page_holds_few_rows_and_shows_any(open_house: OpenHouse) -> None:
         assert len(hmi.rows()) < MOST
         row = hmi.row(tag_id)
         assert row.get_attribute("aria-rowindex") == str(int(tag_id) + 1)
-        # What is on the screen there is this very row, not a gap. Waited for: what comes late above
-        # the table pushes the last row below the window's edge, until the page has heard more.
+        # The element on the screen there is this row, not a gap. Waited for: late content above
+        # the table pushes the last row below the window's edge, until the page has received more.
         hmi.expect(partial(row.evaluate, IS_ON_THE_SCREEN), f"row {tag_id} on the screen")
 
 
@@ -67,7 +67,7 @@ def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(open_house: 
     hmi.page.keyboard.press("n")
     expect(hmi.row(str(TAGS - 2))).to_be_in_viewport()
     expect(hmi.test_id("said-choice")).to_contain_text(f"{TAGS - 2:d} of {TAGS:d}")
-    # With the Tab key from row to row, further than the page held rows when it began.
+    # With the Tab key from row to row, further than the page's first rows.
     hmi.page.keyboard.press("Escape")
     hmi.page.locator(".table-scroll").evaluate("e => { e.scrollTop = 0; }")
     hmi.row("1").get_by_role("button").focus()
@@ -75,7 +75,7 @@ def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(open_house: 
     further = len(hmi.rows()) + 5
     for index in range(further):
         hmi.page.keyboard.press("Tab")
-        # No finger is as quick as to outrun the rows that come with the scrolling.
+        # No finger is fast enough to outrun the rendering of rows.
         expect(focused).to_have_attribute("data-tag-id", str(index + 2))
     expect(focused).to_be_in_viewport()
     # Scrolled far away it keeps its focus, and goes on from there.
@@ -100,8 +100,8 @@ def test_axe_and_windows_of_any_size(open_house: OpenHouse) -> None:
     assert hmi.row("3").evaluate("row => getComputedStyle(row).outlineWidth") == "3px"
 
 
-def test_rows_are_equally_high_whatever_they_hold(open_house: OpenHouse) -> None:
-    """Or the table would jump as it scrolls."""
+def test_all_rows_have_the_same_height_whatever_they_contain(open_house: OpenHouse) -> None:
+    """Otherwise the table would jump as it scrolls."""
     hmi = open_house(300)
     hmi.page.evaluate("house.unpin(3)")
     expect(hmi.row("3")).to_have_attribute("data-pinned", "false")

@@ -1,4 +1,4 @@
-"""The page looks back: what it shows is what the journal has, and nobody can take it for now."""
+"""The page looks back: it shows the journal's data, and marks them clearly as past."""
 
 import re
 import time
@@ -25,10 +25,10 @@ TAGS: Final = ("a", "b", "c")
 PLACES: Final = {"a": 1.0, "b": 3.0, "c": 5.0}
 EVERY_S: Final = 30
 SCANS: Final = 90
-# No scan of the past reads this, so that now cannot be taken for then.
+# No past scan has this reading, so that now and then differ.
 NOW_READS: Final = 25.5
 
-# What the page says that it shows, and what it shows, whenever one of them changes.
+# The moment that the page shows, and its content, at each change.
 WATCH: Final = """
 window.seen = [];
 (function watch() {
@@ -44,14 +44,14 @@ window.seen = [];
 
 @dataclass(frozen=True)
 class Hour:
-    """A twin that remembers its last 45 minutes, and goes on."""
+    """A twin with 45 minutes of past, which goes on."""
 
     bridge: Bridge
     journal: Path
     begun_s: int
 
     def read_then(self, at_s: float) -> dict[str, str]:
-        """The temperatures that the journal has as of a moment, as the table writes them."""
+        """The journal's temperatures as of a moment, as the table writes them."""
         with closing(open_reader(self.journal)) as connection:
             tags = state_at(connection, round(at_s * 1000) * 1_000_000, "map").tags
         return {tag.tag_id: f"{tag.readings[0].value:.1f}" for tag in tags if tag.readings}
@@ -91,27 +91,27 @@ def page(hour: Hour, open_page: OpenPage) -> Hmi:
 
 
 def moment(hmi: Hmi) -> float | None:
-    """The moment that the page says it shows; None: now."""
+    """The moment that the page names; None: now."""
     told = hmi.app.get_attribute("data-moment")
     assert told is not None
     return None if told == "now" else float(told)
 
 
 def settled(hmi: Hmi) -> float | None:
-    """The moment that is shown once it is the one that is wanted."""
+    """The moment that is shown once it is the wanted one."""
     expect(hmi.page.locator(".timebar-cursor")).to_have_attribute("data-awaited", "false")
     return moment(hmi)
 
 
 def expect_past(hmi: Hmi) -> float:
-    """Wait until another moment than now is shown, said in every place; that moment."""
+    """Wait until a past moment is shown, with every label; that moment."""
     expect(hmi.app).to_have_attribute("data-past", "true")
     at = settled(hmi)
     assert at is not None
     expect(hmi.test_id("past-header")).to_contain_text("Past")
     when = hmi.test_id("past-header").locator("strong").inner_text()
     expect(hmi.test_id("past-frame")).to_be_attached()
-    # The number of active alarms is that of now, and stands before it.
+    # The number of active alarms is the current one, and comes before it.
     title = re.escape(f"{when} (past) · Lupin twin")
     expect(hmi.page).to_have_title(re.compile(rf"^(\([1-9]\d*\) )?{title}$"))
     expect(hmi.test_id("connection")).not_to_contain_text("Live")
@@ -127,7 +127,7 @@ def expect_now(hmi: Hmi) -> None:
 
 
 def check_seen(hmi: Hmi, hour: Hour) -> set[float]:
-    """Hold all that the page has shown to the journal; the moments that it showed."""
+    """Compare all that the page has shown with the journal; the moments that it showed."""
     moments = set()
     for line in hmi.page.evaluate("window.seen.map((each) => JSON.parse(each))"):
         told, cell, title = line
@@ -140,11 +140,11 @@ def check_seen(hmi: Hmi, hour: Hour) -> set[float]:
     return moments
 
 
-def test_dragging_shows_each_moment_as_the_journal_has_it(page: Hmi, hour: Hour) -> None:
+def test_dragging_shows_each_moment_as_in_the_journal(page: Hmi, hour: Hour) -> None:
     mouse = page.page.mouse
     mouse.move(*point(page, 0.95))
     mouse.down()
-    expect_past(page)  # else the next may come in its place
+    expect_past(page)  # otherwise the next may take its place
     for share in (0.9, 0.7, 0.5, 0.4):
         mouse.move(*point(page, share), steps=5)
         at = expect_past(page)
@@ -159,7 +159,7 @@ def test_dragging_shows_each_moment_as_the_journal_has_it(page: Hmi, hour: Hour)
     assert len(check_seen(page, hour)) > 4
 
 
-def test_the_end_of_the_bar_is_now_before_memory_is_nothing_and_between_what_was_then(
+def test_the_end_of_the_bar_is_now_and_before_the_log_is_nothing_and_between_is_the_past(
     page: Hmi, hour: Hour
 ) -> None:
     press_at(page, 0.6)
@@ -180,7 +180,7 @@ def test_the_end_of_the_bar_is_now_before_memory_is_nothing_and_between_what_was
     expect_past(page)
     expect(page.card("b")).to_contain_text(re.compile("pests? seen", re.IGNORECASE))
     expect(page.card("b").locator("[data-sensor=temperature] strong")).to_have_text("20.3\u00a0°C")
-    # What was wrong then is told; what was to be done is no order now.
+    # What was wrong then is shown; its open actions are not.
     expect(page.test_id("health-driver")).to_contain_text(re.compile("pests? seen", re.IGNORECASE))
     expect(page.page.locator(".do-what strong")).to_have_count(0)
     page.turn(f"tag=b&at={hour.begun_s + 1000}&period=hour")
@@ -207,7 +207,7 @@ def test_a_phone_has_the_menu_and_every_count_on_its_screen(
     hmi = open_page(hour.bridge.url, f"at={hour.begun_s + 700}", viewport=PHONE)
     expect(hmi.app).to_have_attribute("data-past", "true")
     hmi.expect_parts()
-    # As wide as the words of a simulation make it.
+    # As wide as the label of a simulation makes it.
     hmi.page.evaluate(
         """() => document.querySelector('.past-header').insertAdjacentHTML('afterend',
              '<div class="origin"><span class="origin-word">Simulated</span></div>')"""
@@ -218,7 +218,7 @@ def test_a_phone_has_the_menu_and_every_count_on_its_screen(
         for each in buttons.all():
             expect(each).to_be_in_viewport(ratio=1)
             assert each.evaluate("(e) => e.scrollWidth <= e.clientWidth"), width
-    # Beside a card, the bar is the way along the past.
+    # Beside a card, the bar is the way through the past.
     hmi.turn(f"at={hour.begun_s + 700}&tag=a")
     expect(hmi.card("a")).to_be_in_viewport()
     expect(slider(hmi)).to_be_in_viewport(ratio=1)

@@ -35,7 +35,7 @@ def site() -> Iterator[Bridge]:
 
 
 def is_home_in(hmi: Hmi, view: View) -> bool:
-    """Whether all of what there is at home is to be seen."""
+    """Whether everything at home is visible."""
     box = hmi.map.bounding_box()
     assert box is not None
     left, bottom = view.pixel(-REACH, -REACH)
@@ -56,17 +56,17 @@ def test_the_page_opens_on_the_tags_at_home_and_lists_the_one_far_off(
     hmi.expect_phase("live")
     hmi.expect(lambda: is_home_in(hmi, hmi.view()), "the tags at home")
     assert hmi.view().scale > 50, "no wider than the tags at home"
-    # A card of such a tag has all but a place on the map.
+    # A card of such a tag has everything but a position on the map.
     hmi.row("lost").get_by_role("button").click()
     expect(hmi.card("lost")).to_contain_text("far from all other tags")
     assert hmi.view().scale > 50
 
 
-def test_that_it_stands_still_lies_under_no_other_word(site: Bridge, open_page: OpenPage) -> None:
+def test_nothing_covers_the_label_of_a_stopped_robot(site: Bridge, open_page: OpenPage) -> None:
     hmi = open_page(site.url, go=False, viewport={"width": 1100, "height": 800})
     no_value = {"sensor": "", "value": None, "limit": None, "since": None}
     stopped = {"kind": "stopped", "verdict": "unknown", **no_value}
-    # Something else to do: a line of its own, which has no room.
+    # Another open action: a line of its own, which has no room.
     pest = {"kind": "pest", "verdict": "stressed", **no_value}
 
     def meet(socket: WebSocketRoute) -> None:

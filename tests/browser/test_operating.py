@@ -1,4 +1,4 @@
-"""The operator's hands: sensors, table, layers, range, units; by mouse and by keyboard alone."""
+"""Operation: sensors, table, layers, range, units; by mouse and by keyboard alone."""
 
 import re
 from urllib.parse import parse_qs, urlsplit
@@ -20,19 +20,19 @@ def test_a_low_window_has_one_line_of_sensors_with_the_chosen_one_in_sight(hmi: 
         chosen, bar = places(hmi, ".sensors label:has(:checked)", ".sensor-picker")
         assert bar.bottom - bar.top < 60
         assert bar.left <= chosen.left < chosen.right <= bar.right
-    # So has a wide one, where there is the room for it.
+    # So has a wide one, where there is room for it.
     hmi.resize(1440, 900)
     names = hmi.page.locator(".sensors label")
     expect(names).to_have_count(8)
     assert len({place(name).top for name in names.all()}) == 1
 
 
-def test_a_sensor_has_its_colours_words_legend_and_column(hmi: Hmi) -> None:
+def test_a_sensor_has_its_colours_texts_legend_and_column(hmi: Hmi) -> None:
     expect(hmi.test_id("ideal-scale")).to_contain_text("daytime ideal 18.0 – 26.0\u00a0°C")
     for at, words in (((1.3, 1.3), "ideal"), ((1.3, 3.3), "too high by 5.0\u00a0°C")):
         hmi.point_at(*at)
         expect(hmi.test_id("readout-ideal")).to_have_text(words)
-    # Too high is orange, what is right is green.
+    # Too high is orange, the ideal range is green.
     hmi.expect_pixels(lambda pixel: pixel[0] > pixel[2] + 60, (1.4, 3.3), what="orange")
     hmi.expect_pixels(lambda pixel: pixel[1] > pixel[0] + 15, (1.4, 1.5), what="green")
     hmi.colour_by_value()
@@ -53,7 +53,7 @@ def test_a_sensor_has_its_colours_words_legend_and_column(hmi: Hmi) -> None:
     expect(hmi.test_id("range-low")).to_have_text("40.0")
     expect(hmi.test_id("range-high")).to_have_text("85.0\u00a0%")
     hmi.expect_change(before)
-    # At the tag with the most humid air: a clear blue where temperature's red was not.
+    # At the most humid tag: a clear blue where temperature's red was not.
     hmi.expect_pixels(lambda pixel: pixel[2] > pixel[0] + 50, (3.3, 3.3), what="a clear blue")
     hmi.page.get_by_role("radio", name="Fixed").check()
     hmi.page.get_by_role("button", name="Use ideal range").click()
@@ -61,7 +61,7 @@ def test_a_sensor_has_its_colours_words_legend_and_column(hmi: Hmi) -> None:
 
     hmi.choose_sensor("Soil moisture")
     hmi.expect_samples(1)
-    hmi.choose_sensor("Light")  # the only tag that carries it has no pose
+    hmi.choose_sensor("Light")  # its only tag has no pose
     expect(hmi.test_id("sample-count")).to_have_text("No tag contributes")
     expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
 
@@ -69,7 +69,7 @@ def test_a_sensor_has_its_colours_words_legend_and_column(hmi: Hmi) -> None:
 # --- table --------------------------------------------------------------------------------------
 
 
-def test_beside_a_card_the_table_keeps_rows_and_none_that_is_chosen_ends_below_its_head(
+def test_beside_a_card_the_table_has_rows_and_the_chosen_one_is_not_below_its_head(
     hmi: Hmi,
 ) -> None:
     hmi.resize(1280, 720)
@@ -80,7 +80,7 @@ def test_beside_a_card_the_table_keeps_rows_and_none_that_is_chosen_ends_below_i
     head, table = place(hmi.page.locator("thead")), place(frame)
     assert (table.bottom - head.bottom) / 45 > 3.7
     assert place(hmi.card("3")).bottom == 720
-    # Where it comes to stand as the table is sorted anew: half of it below the head.
+    # Its place after the table is sorted anew: half of it below the head.
     hmi.page.locator("th[data-column=tag] button").hover()
     frame.evaluate("(frame) => { frame.scrollTop = 112; }")
     hmi.page.mouse.down()
@@ -89,17 +89,17 @@ def test_beside_a_card_the_table_keeps_rows_and_none_that_is_chosen_ends_below_i
     hmi.expect(lambda: place(hmi.row("3")).top == head.bottom, "the chosen row below the head")
 
 
-def test_a_row_and_its_pin_find_each_other_and_the_card_tells_all(hmi: Hmi) -> None:
+def test_a_row_and_its_pin_mark_each_other_and_the_card_shows_everything(hmi: Hmi) -> None:
     hmi.click_map(3, 1)
     expect(hmi.card("2")).to_be_visible()
     expect(hmi.row("2")).to_have_attribute("data-selected", "true")
     hmi.point_at(1, 1)
     expect(hmi.row("1")).to_have_attribute("data-hovered", "true")
-    # Its card in short is never in the way.
+    # Its short card is never in the way.
     expect(hmi.test_id("hover-card")).to_have_css("pointer-events", "none")
 
     hmi.page.get_by_role("button", name="Close").first.click()
-    # The button lay above a row, which the mouse is on now: off it, or its pin is marked before.
+    # The button lay above a row, under the mouse now: move it off, or the pin is marked already.
     hmi.page.get_by_role("searchbox").hover()
     expect(hmi.page.locator("tr[data-hovered=true]")).to_have_count(0)
     before = hmi.settled_picture()
@@ -127,7 +127,7 @@ def _on_page(hmi: Hmi, x: float, y: float) -> tuple[float, float]:
     return box["x"] + x, box["y"] + y
 
 
-def test_the_readout_says_what_is_known_and_the_map_moves_about_the_pointer(hmi: Hmi) -> None:
+def test_the_readout_shows_what_is_known_and_the_map_zooms_about_the_pointer(hmi: Hmi) -> None:
     hmi.point_at(1.02, 2.98)
     expect(hmi.test_id("readout")).to_have_text(
         re.compile(r"^31\.0\s°C\s?too high by 5\.0\s°Cx 1\.0\d m, y (2|3)\.\d\d m$")
@@ -140,7 +140,7 @@ def test_the_readout_says_what_is_known_and_the_map_moves_about_the_pointer(hmi:
     hmi.map.hover(position={"x": x, "y": y})
     hmi.page.mouse.wheel(0, -240)
     hmi.expect(lambda: hmi.view().scale > start.scale * 1.2, "a closer view")
-    # What is under the pointer stays there.
+    # The point under the pointer stays there.
     assert hmi.view().pixel(1, 1) == pytest.approx((x, y), abs=1)
 
     zoomed = hmi.view()
@@ -156,12 +156,12 @@ def test_the_readout_says_what_is_known_and_the_map_moves_about_the_pointer(hmi:
     hmi.expect(lambda: hmi.view().scale > start.scale * 1.4, "a closer view")
 
 
-def test_each_layer_goes_and_comes_back(hmi: Hmi) -> None:
-    # At some scales Chromium rounds a few pixels of an image otherwise when it paints it again.
+def test_each_layer_can_be_hidden_and_shown(hmi: Hmi) -> None:
+    # At some scales Chromium rounds a few pixels of an image differently when it paints it again.
     hmi.resize(1440, 862)
     hmi.page.get_by_role("button", name="Layers").click()
     panel = hmi.page.locator(".layers .disclosure-panel")
-    # The part of the map that the panel, which changes with each click, leaves free.
+    # The part of the map outside the panel, which changes with each click.
     left = round(_on_page(hmi, 0, 0)[0])
     free = panel.bounding_box()
     assert free is not None
@@ -223,7 +223,7 @@ def test_sensor_layers_zoom_table_and_tag_by_keyboard_alone(hmi: Hmi) -> None:
     expect(hmi.card("3")).to_have_count(0)
 
 
-def test_every_focus_is_to_be_seen_and_none_is_a_trap(hmi: Hmi) -> None:
+def test_every_focus_is_visible_and_none_is_a_trap(hmi: Hmi) -> None:
     seen: list[str] = []
     for _ in range(120):
         hmi.page.keyboard.press("Tab")
@@ -271,7 +271,7 @@ def test_help_takes_the_focus_and_no_key_reaches_through_it(hmi: Hmi) -> None:
 # --- language -----------------------------------------------------------------------------------
 
 
-def test_the_page_speaks_as_the_browser_the_address_or_the_menu_says(
+def test_the_page_uses_the_language_of_the_browser_or_the_address_or_the_menu(
     house: Bridge, open_page: OpenPage
 ) -> None:
     hmi = open_page(house.url, "sensor=humidity&tag=1", locale="de-AT")
@@ -292,13 +292,13 @@ def test_the_page_speaks_as_the_browser_the_address_or_the_menu_says(
         "the language in the address, beside the view",
     )
 
-    # What is not spoken is said, in words that whoever asked may know.
+    # A missing language is reported, in a language that its user may know.
     hmi.go(query="?lang=xx")
     expect(hmi.test_id("troubles")).to_have_text(re.compile("is not available in “xx”"))
     expect(hmi.page.locator("html")).to_have_attribute("lang", "en")
 
 
-# The words of the table's heads that go on in another line.
+# The words of the table's heads that wrap.
 _BROKEN = """() => [...document.querySelectorAll('thead button span:not(.unseen, .head-unit)')]
   .filter((head) => head.checkVisibility())
   .flatMap((head) => [...head.childNodes].filter((node) => node.nodeType === 3))
@@ -310,7 +310,7 @@ _BROKEN = """() => [...document.querySelectorAll('thead button span:not(.unseen,
   }).map(([word]) => word))"""
 
 
-# Two heads whose words stand closer together than the words of one; and those that are cut.
+# Two heads that are closer than the words of one; and those that are cut.
 _HEADS_TOO_CLOSE = """() => {
   const rectsOf = (head) => {
     const range = document.createRange();

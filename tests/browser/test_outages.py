@@ -1,4 +1,4 @@
-"""When something is gone: nothing looks fresh that is not, and the page heals without a reload."""
+"""Outages: no stale data look fresh, and the page recovers without a reload."""
 
 import re
 from urllib.parse import urlsplit
@@ -14,7 +14,7 @@ CLOCK = re.compile(r"Last data at \d\d:\d\d:\d\d")
 
 
 def expect_frozen(hmi: Hmi, why: str) -> None:
-    """The page shows what it had, dimmed, and says since when and why."""
+    """The page dims its last data, and shows since when and why."""
     banner = hmi.test_id("frozen")
     expect(banner).to_contain_text(CLOCK)
     expect(banner).to_contain_text(why)
@@ -23,7 +23,7 @@ def expect_frozen(hmi: Hmi, why: str) -> None:
 
 
 def expect_live(hmi: Hmi) -> None:
-    """The page is live again, and it is still the same page."""
+    """The page is live again, and it was not reloaded."""
     hmi.expect_phase("live")
     expect(hmi.test_id("frozen")).to_have_count(0)
     expect(hmi.page.locator("canvas[data-layer=pins]")).to_have_css("opacity", "1")
@@ -40,7 +40,7 @@ def stay(hmi: Hmi) -> None:
     hmi.page.evaluate("window.stayed = true")
 
 
-def test_a_server_that_is_killed_and_starts_anew_with_other_tags(
+def test_a_server_that_is_killed_and_restarts_with_other_tags(
     domain: int, open_page: OpenPage
 ) -> None:
     with lupin_twin(domain, "serve") as old:
@@ -80,7 +80,7 @@ def test_a_server_that_is_killed_and_starts_anew_with_other_tags(
         expect_live(hmi)
         expect(hmi.cell("a", "temperature")).to_contain_text("no sensor")
         expect(hmi.cell("a", "humidity")).to_have_text("61.0")
-        # No heat map of a house that is no more, and not its map either.
+        # No heat map of the old greenhouse, and not its map either.
         expect(hmi.test_id("sample-count")).to_have_text("No tag contributes")
         hmi.expect(lambda: len(set(hmi.pixels([ground, hot, floor]))) == 1, "bare ground")
     assert min(seqs(hmi)[len(old_seqs) :]) < old_seqs[-1]

@@ -23,12 +23,12 @@ from tests.support.web import Bridge, bridge
 LONG = "a" * 200
 HOSTILE = "<script>document.title = 'owned'</script>"
 TAGS = (*(f"tag {number}" for number in range(60)), LONG, HOSTILE)
-# What A4 has between the margins of the page, and the page between, CSS pixels.
+# The space of A4 between the margins of the page, and the page between, CSS pixels.
 A4_PX = round(186 / 25.4 * 96)
 
 
 @pytest.fixture(scope="module")
-def troubled(browser: Browser) -> Iterator[Bridge]:  # begun before the page
+def troubled(browser: Browser) -> Iterator[Bridge]:  # created before the page
     """A greenhouse with more alarms than a sheet of paper holds."""
     with bridge() as running:
         running.peer.wait_for_twin()
@@ -40,7 +40,7 @@ def troubled(browser: Browser) -> Iterator[Bridge]:  # begun before the page
             if number % 20 == 0:  # no queue has room for all
                 wait_for(partial(has_tags, running, number), "tags")
         wait_for(lambda: counts(running)["raised"] == len(TAGS), "the alarms in the report")
-        # A report ends with a whole second, of a page whose newest state may be a second old.
+        # A report ends with a whole second; the page's latest state may be a second old.
         end_s = math.floor(time.time()) + 2
         wait_for(lambda: time.time() >= end_s, "the seconds to be over")
         yield running
@@ -113,7 +113,7 @@ def test_nothing_is_cut_on_paper_and_names_are_text(
         assert page.locator("script").count() == 0
 
 
-def test_on_a_phone_in_the_dark_it_is_light_and_a_wide_table_scrolls_and_not_the_page(
+def test_on_a_dark_phone_it_is_light_and_only_a_wide_table_scrolls(
     troubled: Bridge, browser: Browser
 ) -> None:
     phone: ViewportSize = {"width": 390, "height": 844}

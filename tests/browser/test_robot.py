@@ -1,4 +1,4 @@
-"""The robot on the map: quiet, as old as it is, and never of another moment than now."""
+"""The robot on the map: discreet, with its age, and only at the current moment."""
 
 import math
 import re
@@ -40,7 +40,7 @@ def stamp(live: Bridge, message: object, ago_s: float) -> None:
 
 
 def place(live: Bridge, x: float, y: float, yaw: float = 0.0, ago_s: float = 0.0) -> None:
-    """Have the robot say where it is, and wait until the bridge knows."""
+    """Publish the robot's position, and wait until the bridge has it."""
     message = PoseWithCovarianceStamped()
     message.pose.pose = pose(x, y, yaw)
     stamp(live, message, ago_s)
@@ -66,7 +66,7 @@ def plan(live: Bridge, *points: tuple[float, float]) -> None:
 
 
 def mark(hmi: Hmi) -> tuple[float, float]:
-    """Where the middle of the robot's mark is, m."""
+    """The centre of the robot's mark, m."""
     box = hmi.test_id("robot-mark").locator(".robot-body").bounding_box()
     around, view = hmi.map.bounding_box(), hmi.view()
     assert box is not None
@@ -75,10 +75,10 @@ def mark(hmi: Hmi) -> tuple[float, float]:
     return (x - view.x) / view.scale, (view.y - y) / view.scale
 
 
-def test_the_robot_its_trail_its_way_and_its_battery_are_shown_and_told_as_of_now(
+def test_the_robot_and_its_trail_plan_and_battery_are_shown_in_the_live_view(
     robot: Bridge, open_page: OpenPage
 ) -> None:
-    # Without a robot nothing of it is there, nor loaded.
+    # Without a robot nothing of it is shown, nor loaded.
     hmi = open_page(robot.url)
     hmi.expect_parts()
     hmi.page.get_by_role("button", name="Layers").click()
@@ -98,7 +98,7 @@ def test_the_robot_its_trail_its_way_and_its_battery_are_shown_and_told_as_of_no
     place(robot, 3.2, 1.6, math.pi / 2)
     expect(layer).to_have_attribute("data-looks", "live")
     hmi.expect(lambda: mark(hmi) == pytest.approx((3.2, 1.6), abs=0.05), "the mark where it is")
-    # Pins' labels are read over it.
+    # Pins' labels are readable over it.
     heights = [
         int(hmi.page.locator(layer).evaluate("it => +getComputedStyle(it).zIndex || 0"))
         for layer in (".robot-now", ".map-view [data-layer=pins]")
@@ -116,7 +116,7 @@ def test_the_robot_its_trail_its_way_and_its_battery_are_shown_and_told_as_of_no
     expect(layer.locator(".robot-plan")).to_have_attribute("points", "3.2,1.6 3.2,3")
     assert violations(hmi) == []
 
-    # It can be switched off, for who opens the link too.
+    # It can be switched off, also for others who open the link.
     hmi.page.get_by_role("button", name="Layers").click()
     hmi.page.get_by_label("Robot", exact=True).uncheck()
     expect(layer).to_have_count(0)
@@ -124,7 +124,7 @@ def test_the_robot_its_trail_its_way_and_its_battery_are_shown_and_told_as_of_no
     hmi.page.get_by_label("Robot", exact=True).check()
     expect(layer).to_have_count(1)
 
-    # Who looks back sees no robot.
+    # The past view has no robot.
     stamp_s = robot.json("/api/state")["header"]["stamp"]["sec"]
     hmi.go(f"at={stamp_s}")
     expect(hmi.app).to_have_attribute("data-moment", str(stamp_s))

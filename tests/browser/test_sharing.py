@@ -1,4 +1,4 @@
-"""What leaves the page: links, CSV, PNG, and the settings that a browser keeps."""
+"""What leaves the page: links, CSV, PNG, and the settings that a browser stores."""
 
 import io
 import math
@@ -14,7 +14,7 @@ from tests.support.web import Bridge
 
 
 def save(hmi: Hmi, name: str) -> Download:
-    """Choose an entry of the menu that saves a file, once the sensors' own names have come."""
+    """Choose an entry of the menu that saves a file, once the sensors' own names are loaded."""
     expect(hmi.test_id("legend")).to_contain_text("Temperature °C")
     hmi.page.get_by_role("button", name="Menu").click()
     with hmi.page.expect_download() as download:
@@ -53,7 +53,7 @@ def is_on_the_screen(hmi: Hmi, part: Image.Image, at: tuple[int, int], ratio: in
     return changed_box(shown, part) is None
 
 
-def test_the_map_as_png_is_what_is_on_the_screen(house: Bridge, open_page: OpenPage) -> None:
+def test_the_map_as_png_equals_the_screen(house: Bridge, open_page: OpenPage) -> None:
     for options, ratio in (({}, 1), ({"device_scale_factor": 2, "viewport": PHONE}, 2)):
         hmi = open_page(house.url, "colour=value&layers=map,field,boxes", **options)
         hmi.expect_samples(3)
@@ -65,8 +65,8 @@ def test_the_map_as_png_is_what_is_on_the_screen(house: Bridge, open_page: OpenP
         assert box is not None
         height = math.ceil(box["height"]) + FOOTER_PX
         assert picture.size == (math.ceil(box["width"]) * ratio, height * ratio)
-        # The same to the pixel, where no button or legend stands above it. The pointer is where
-        # the menu was, above a row, whose tag has a ring on the screen alone: take it away.
+        # The same to the pixel, where no button or legend covers it. The pointer is where
+        # the menu was, above a row, whose tag has a ring on the screen alone: move it away.
         hmi.page.mouse.move(0, 0)
         hmi.settled_picture()
         view = hmi.view()
@@ -75,7 +75,7 @@ def test_the_map_as_png_is_what_is_on_the_screen(house: Bridge, open_page: OpenP
         hmi.expect(partial(is_on_the_screen, hmi, saved, (x0, y0), ratio), "what was saved")
         assert len(saved.getcolors(1 << 20) or []) > 50
         footer = picture.crop((0, picture.height - FOOTER_PX * ratio, *picture.size))
-        # The ramp's upper half ends in temperature's full red, a legend of what is above.
+        # The ramp's upper half ends in temperature's full red, a legend of values above.
         reds = [rgb for _, rgb in footer.getcolors(1 << 20) or [] if is_red(rgb)]
         assert len(reds) > 20
         # The scale bar, of a round length.
@@ -102,25 +102,25 @@ def typical_luminance(picture: Image.Image) -> float:
     return float(ImageStat.Stat(picture.convert("L")).median[0])
 
 
-A4: ViewportSize = {"width": 702, "height": 1032}  # but for the margins, CSS pixels
-# What is shown of the page's controls, but for buttons that are content: a row, a tag, a status.
+A4: ViewportSize = {"width": 702, "height": 1032}  # without the margins, CSS pixels
+# The page's visible controls, except buttons that are content: a row, a tag, a status.
 CONTROLS = """[...document.querySelectorAll('button, input, select, summary, [role=slider]')]
     .filter(it => it.checkVisibility({ visibilityProperty: true }))
     .filter(it => !it.matches('thead *, .row-button, [data-tag-id], [data-health]'))
     .map(it => it.outerHTML)"""
-# What the names of columns are drawn as: a sheet repeats a header group whose cells stay in it.
+# Drawn names of columns: a sheet repeats a header group whose cells stay in it.
 HEAD = """[...document.querySelectorAll('.tags thead, .tags thead th')]
     .filter(it => it.checkVisibility())
     .map(it => getComputedStyle(it))
     .map(it => `${it.display} ${it.position}`)"""
-# What of a cell, or of what stands in it, hides a part of its words.
+# The property of a cell, or of its content, that hides a part of its words.
 CUT = """it => [it, ...it.closest('td').querySelectorAll('*'), it.closest('td')]
     .filter(each => getComputedStyle(each).overflow !== 'visible' && !each.matches('.unseen'))
     .filter(each => each.scrollWidth > each.clientWidth || each.scrollHeight > each.clientHeight)
     .map(each => each.outerHTML)"""
 
 
-def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: OpenPage) -> None:
+def test_paper_has_every_row_and_its_time_and_is_light(house: Bridge, open_page: OpenPage) -> None:
     # Where the floor is most of the picture, and the coloured field is not.
     hmi = open_page(house.url, "view=2,2,20", color_scheme="dark")
     hmi.expect_rows(*TAGS)
@@ -130,7 +130,7 @@ def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: Op
     expect(line).to_be_hidden()
     assert typical_luminance(hmi.settled_picture()) < 60
 
-    # What a browser does on its way to the printer.
+    # As a browser does before printing.
     hmi.page.emulate_media(media="print")
     hmi.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     expect(hmi.row("seen")).to_be_visible()
@@ -139,7 +139,7 @@ def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: Op
     expect(hmi.page.get_by_role("button", name="Menu")).to_be_hidden()
     expect(hmi.page.locator(".connection")).to_be_hidden()
     moment = r"\d{1,2} \w+ \d{4}, \d\d:\d\d:\d\d"
-    # The house follows /clock.
+    # The greenhouse follows /clock.
     taken = rf"^As of {moment} \(Simulated time\), printed {moment} ?"
     expect(line).to_have_text(
         re.compile(rf"{taken}Temperature compared with its ideal range 18\.0 – 26\.0\s°C$")
@@ -147,7 +147,7 @@ def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: Op
     expect(line).to_be_visible()
     assert hmi.page.evaluate(CONTROLS) == []
     assert set(hmi.page.evaluate(HEAD)) == {"table-header-group static", "table-cell static"}
-    # All reasons, where the screen has a line of them and how many there are besides.
+    # All reasons, where the screen has a line of them and the number of the others.
     reasons = (
         "Vapour pressure deficit 2.70 kPa, above 2.50; 3 pests seen;"
         " Temperature 31.0\u00a0°C, above 26.0; Humidity 40.0\u00a0%, below 50.0"
@@ -158,7 +158,7 @@ def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: Op
     assert why.evaluate(CUT) == []
     assert screen is not None
     hmi.page.set_viewport_size(screen)
-    # Of a PDF each canvas must be a group of its own, or the clearing of one whitens those below.
+    # In a PDF each canvas must be a group of its own, or the clearing of one whitens those below.
     alone = "each => each.every(canvas => getComputedStyle(canvas).opacity === '0.999')"
     assert hmi.page.locator(".map-view canvas").evaluate_all(alone)
     ground = hmi.page.evaluate("getComputedStyle(document.body).backgroundColor")
@@ -170,7 +170,7 @@ def test_paper_has_every_row_says_when_and_is_light(house: Bridge, open_page: Op
     expect(hmi.page.locator("html")).to_have_attribute("data-theme", "dark")
     assert len(hmi.page.pdf(format="A4")) > 10_000
 
-    # What is coloured by value is between what there is and what is ideal.
+    # The colours of values span the real and the ideal range.
     hmi.colour_by_value()
     hmi.page.emulate_media(media="print")
     hmi.page.evaluate("dispatchEvent(new Event('beforeprint'))")

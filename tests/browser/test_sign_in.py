@@ -1,4 +1,4 @@
-"""Signing in as a person does it: the page, a wrong token, the right one, and coming back."""
+"""Signing in as a person does: the page, a wrong token, the right one, and coming back."""
 
 import re
 from collections.abc import Iterator
@@ -36,7 +36,7 @@ def page(context: BrowserContext) -> Page:
 
 
 def new_page(context: BrowserContext) -> Page:
-    """A page that is slow where `SLOW_PAGES` says so."""
+    """A page that `SLOW_PAGES` slows down."""
     page = context.new_page()
     slow_down(page)
     return page
@@ -58,7 +58,7 @@ def test_a_person_signs_in_with_the_keyboard_alone(closed: Served, page: Page) -
     page.goto(closed.url)
     expect(page).to_have_url(closed.url + "/signin")
     expect(page.get_by_label("Access token")).to_be_focused()
-    # The page's mark and font come without a token.
+    # The page's mark and font need no token.
     expect(page.locator("h1 img")).not_to_have_js_property("naturalWidth", 0)
     assert page.evaluate(FONTS) == ["loaded"]
     page.keyboard.type(TOKEN)
@@ -68,7 +68,7 @@ def test_a_person_signs_in_with_the_keyboard_alone(closed: Served, page: Page) -
     assert not [address for address in addresses if TOKEN in address]
 
 
-def test_by_name_one_is_told_who_sees_what_is_done_to_alarms(
+def test_with_a_name_the_page_says_who_sees_what_is_done_to_alarms(
     domain: int, browser: Browser, tmp_path: Path
 ) -> None:
     accounts = tmp_path / "accounts.sqlite"
@@ -89,7 +89,7 @@ def test_by_name_one_is_told_who_sees_what_is_done_to_alarms(
                 expect(page.locator(".alarms-mine")).to_contain_text(words)
 
 
-def test_a_wrong_token_can_be_corrected_and_nothing_of_the_right_one_is_kept(
+def test_a_wrong_token_can_be_corrected_and_nothing_of_the_right_one_is_stored(
     closed: Served, page: Page
 ) -> None:
     page.goto(closed.url + "/signin")
@@ -131,8 +131,8 @@ def test_a_link_on_another_page_leads_in_although_the_cookie_is_strict(
     expect(page.get_by_test_id("app")).to_have_count(0)
 
 
-def test_a_page_whose_session_has_ended_leaves_for_the_sign_in(page: Page) -> None:
-    """Its next connection is refused, which a WebSocket does not tell a page."""
+def test_a_page_whose_session_has_ended_goes_to_the_sign_in_page(page: Page) -> None:
+    """Its next connection is refused, with a status that a WebSocket does not show to a page."""
     with served(LUPIN_TOKEN=TOKEN) as first:
         page.goto(first.url + "/signin")
         sign_in(page, TOKEN)

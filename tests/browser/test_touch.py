@@ -20,7 +20,7 @@ def phone(house: Bridge, open_page: OpenPage) -> Hmi:
 
 
 def drag(hmi: Hmi, *paths: Sequence[tuple[float, float]]) -> None:
-    """Fingers that each go along a path of the map view, pixels; all paths have as many points."""
+    """Fingers that each move along a path of the map view, pixels; all paths have equal lengths."""
     box = hmi.map.bounding_box()
     assert box is not None
     session = hmi.page.context.new_cdp_session(hmi.page)
@@ -31,7 +31,7 @@ def drag(hmi: Hmi, *paths: Sequence[tuple[float, float]]) -> None:
             for index, (x, y) in enumerate(points)
         ]
         session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
-        # Chromium hands a page one move a frame.
+        # Chromium delivers one move a frame to a page.
         hmi.page.evaluate("new Promise(requestAnimationFrame)")
 
     for index, points in enumerate(zip(*paths, strict=True)):
@@ -47,8 +47,8 @@ def show(phone: Hmi, pane: str) -> None:
     expect(phone.row("1")).to_be_visible(visible=pane == "Tags")
 
 
-def test_most_of_the_height_is_for_what_is_looked_at(phone: Hmi) -> None:
-    """Not for bars: of each tab, and of the card."""
+def test_most_of_the_height_is_content(phone: Hmi) -> None:
+    """Not bars: on each tab, and in the card."""
     tall = 0.6 * PHONE["height"]
 
     def heights(*selectors: str) -> list[float]:
@@ -58,13 +58,13 @@ def test_most_of_the_height_is_for_what_is_looked_at(phone: Hmi) -> None:
     for pane in ("Tags", "Alarms"):
         phone.page.get_by_role("navigation").get_by_role("button", name=pane).tap()
         (panel,) = heights(".tags-panel")
-        # What stays in place while the rest scrolls.
+        # The fixed part while the rest scrolls.
         still = sum(heights(*("thead",) if pane == "Tags" else (".alarm-line", ".alarms h3")))
         assert panel - still >= tall, pane
     show(phone, "Tags")
     phone.row("2").tap()
     assert heights(".card")[0] >= tall
-    # How old and how it should be share a line.
+    # Its age and its ideal range share a line.
     assert heights(".card-readings li:has(.card-ideal)")[0] < 84
     phone.page.get_by_role("navigation").get_by_role("button", name="Map").tap()
     expect(phone.map).to_be_visible()
@@ -121,7 +121,7 @@ def test_a_narrow_screen_shows_one_half_at_a_time_large_enough_for_a_finger(phon
     phone.page.get_by_role("radio", name="Fixed").check()
     for pane in ("Map", "Tags"):
         show(phone, pane)
-        # WCAG 2.2, 2.5.5, and what phones ask for; text that is a link among them is as high.
+        # WCAG 2.2, 2.5.5, as phones recommend; a text link among them is as high.
         small = phone.page.evaluate(
             """() => [...document.querySelectorAll('button, a, label, select, input')]
               .filter((e) => e.checkVisibility() && !e.closest('.unseen, .skip, .row-button'))
@@ -131,7 +131,7 @@ def test_a_narrow_screen_shows_one_half_at_a_time_large_enough_for_a_finger(phon
               .map(([e, box]) => `${e.textContent || e.ariaLabel} ${box.width}x${box.height}`)"""
         )
         assert small == []
-    # A row is hit anywhere, not only on the few letters of its id.
+    # The whole row reacts, not only the few letters of its id.
     box = phone.row("2").bounding_box()
     assert box is not None
     assert box["height"] >= 40

@@ -41,7 +41,7 @@ def test_a_bad_value_is_refused_in_one_line_with_option_value_and_limits(
 
 
 @pytest.mark.parametrize("arguments", [["--spee", "2"], ["--twice"], ["stray"]])
-def test_an_unknown_option_is_refused_and_named(
+def test_an_unknown_option_is_refused_by_name(
     capsys: pytest.CaptureFixture[str], arguments: list[str]
 ) -> None:
     with pytest.raises(SystemExit) as refusal:

@@ -1,4 +1,4 @@
-"""The occupancy grid that grows."""
+"""The growing occupancy grid."""
 
 from math import dist
 
@@ -19,7 +19,7 @@ from tests.support.climate import known_in
 
 
 def cell(grid: Grid, point: Point) -> int:
-    """The value at a point, by nav_msgs/OccupancyGrid's own rule."""
+    """The value at a point, by the rule of nav_msgs/OccupancyGrid."""
     column = int((point[0] - grid.origin[0]) / grid.resolution_m)
     row = int((point[1] - grid.origin[1]) / grid.resolution_m)
     return int(np.frombuffer(grid.cells, dtype=np.int8)[row * grid.width + column])
@@ -41,7 +41,7 @@ def everywhere(greenhouse: Greenhouse) -> list[Point]:
     ]
 
 
-def test_a_complete_map_has_tables_and_walls_and_else_free_floor() -> None:
+def test_a_complete_map_has_tables_and_walls_and_otherwise_free_floor() -> None:
     greenhouse = read_greenhouse(GreenhouseSimulator())
     grid = explored_from(*everywhere(greenhouse), greenhouse=greenhouse)
     assert known_in(grid) == len(grid.cells)

@@ -14,7 +14,7 @@ from lupin_twin.core.state import Bloom, Flower, Inspection, Scan
 
 STAMP_NS = 12_000_000_034
 POSE = pose_of((1.5, 2.5), pi / 2)
-# Numbers that a float32 holds exactly: what was sent equals what comes.
+# Numbers that a float32 holds exactly: sent and received values are equal.
 BLOOM = Bloom(1.5, 2.2, 0.6, 0.25, "lupin", 0.875, anomaly=True)
 BOX = Rect(1.0, 2.0, 2.0, 2.25)
 CORNERS = tuple((x, y, 0.0) for x, y in BOX.corners)
@@ -28,7 +28,7 @@ def _field_checks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def over_the_wire(message: Any) -> Any:
-    """What a subscriber gets; a value of the wrong type does not survive this."""
+    """The received message; a value of the wrong type does not survive this."""
     received = deserialize_message(serialize_message(message), type(message))
     assert received == message
     return received
@@ -41,7 +41,7 @@ def over_the_wire(message: Any) -> Any:
         (ScanStatus.SCAN_FAILED, Observation.STATUS_SCAN_FAILED),
     ],
 )
-def test_a_failed_scan_says_why_and_has_no_pose(status: ScanStatus, expected: int) -> None:
+def test_a_failed_scan_has_a_reason_and_no_pose(status: ScanStatus, expected: int) -> None:
     failed = Visited(3.0, 0, 0.0, Scan("7", 0, (), None, status, "the way is blocked"))
     message = over_the_wire(messages.observation(failed, STAMP_NS, "map"))
     assert message.status == expected

@@ -53,7 +53,7 @@ def scans_of(events: list[Event]) -> list[Scan]:
 
 @pytest.fixture(scope="module")
 def patrol() -> list[Event]:
-    """The first passes with the default seed."""
+    """The first rounds with the default seed."""
     return played(passes=PASSES)
 
 
@@ -66,7 +66,7 @@ def many_first_passes() -> list[list[Event]]:
 
 
 def test_the_same_seed_gives_the_same_events(patrol: list[Event]) -> None:
-    random.seed(2026)  # the simulator draws from the process's own stream
+    random.seed(2026)  # the simulator uses the global random generator
     assert played(passes=PASSES) == patrol
 
 
@@ -85,7 +85,7 @@ def test_the_map_grows_and_never_forgets(patrol: list[Event]) -> None:
 # --- discovery -----------------------------------------------------------------------------------
 
 
-def test_a_tag_is_discovered_before_it_is_tried(many_first_passes: list[list[Event]]) -> None:
+def test_a_tag_is_discovered_before_its_first_attempt(many_first_passes: list[list[Event]]) -> None:
     for events in many_first_passes:
         discovered: set[str] = set()
         for event in events:
@@ -98,7 +98,7 @@ def test_a_tag_is_discovered_before_it_is_tried(many_first_passes: list[list[Eve
 # --- scans ---------------------------------------------------------------------------------------
 
 
-def test_every_tag_is_read_within_a_minute_its_retries_included(
+def test_every_tag_is_read_within_a_minute_with_its_retries(
     many_first_passes: list[list[Event]],
 ) -> None:
     for events in many_first_passes:
@@ -106,12 +106,12 @@ def test_every_tag_is_read_within_a_minute_its_retries_included(
         assert len({scan.tag_id for scan in scans if scan.status == ScanStatus.OK}) == 29
         [completed] = only(PassCompleted, events)
         assert completed.failed == ()
-        # Patrol time: a second of it is a second at the default speed. Five seconds are left for
+        # Patrol time: at the default speed one second is one second. Five seconds are left for
         # the start of the process and DDS discovery.
         assert completed.at_s <= 55.0
 
 
-def test_readings_are_in_the_contracts_units(patrol: list[Event]) -> None:
+def test_readings_have_the_units_of_the_contract(patrol: list[Event]) -> None:
     plausible = {
         "temperature": (0.0, 40.0),
         "humidity": (10.0, 100.0),
@@ -125,7 +125,7 @@ def test_readings_are_in_the_contracts_units(patrol: list[Event]) -> None:
             assert low < reading.value < high, reading
 
 
-def test_a_retry_may_fail_too_and_a_later_pass_brings_the_tag_back(patrol: list[Event]) -> None:
+def test_a_retry_may_fail_too_and_a_later_round_reads_the_tag(patrol: list[Event]) -> None:
     lost = [(done.pass_index, tag) for done in only(PassCompleted, patrol) for tag in done.failed]
     assert lost
     for pass_index, tag_id in lost:
@@ -148,7 +148,7 @@ def yaw_of(pose: Pose) -> float:
     return 2.0 * atan2(pose.qz, pose.qw)
 
 
-def test_poses_are_the_tags_own_at_first_and_jitter_a_little_later(patrol: list[Event]) -> None:
+def test_poses_are_exact_at_first_and_jitter_a_little_later(patrol: list[Event]) -> None:
     greenhouse = Mission(GreenhouseSimulator(), 0, DAY_SPEED).greenhouse
     tags = {tag.tag_id: tag for tag in greenhouse.tags}
     for visit in only(Visited, patrol):
@@ -171,7 +171,7 @@ def test_poses_are_the_tags_own_at_first_and_jitter_a_little_later(patrol: list[
 # --- the robot and the day -----------------------------------------------------------------------
 
 
-def test_the_robot_never_enters_a_table_nor_jumps(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_robot_never_enters_a_table_and_never_jumps(monkeypatch: pytest.MonkeyPatch) -> None:
     mission = Mission(GreenhouseSimulator(), DEFAULT_SEED, DAY_SPEED)
     positions: list[Point] = []
     see_tags = mission._detector.observe_from

@@ -39,7 +39,7 @@ def patrol(domain: int, *arguments: str) -> Process:
 
 @dataclass
 class Received:
-    """All that came on the three topics, asked for as the contract has it."""
+    """All messages of the three topics, subscribed as in the contract."""
 
     observations: list[Any] = field(default_factory=list)
     discovered_tags: list[Any] = field(default_factory=list)
@@ -76,7 +76,7 @@ class Received:
         return bool(self.maps) and not (np.asarray(self.maps[-1].data) == -1).any()
 
 
-def test_one_pass_shows_the_whole_greenhouse_and_ends(domain: int) -> None:
+def test_one_round_shows_the_whole_greenhouse_and_ends(domain: int) -> None:
     tags = GreenhouseSimulator().tag_manager.get_tags()
     with Peer(domain) as peer:
         heard = Received().listen(peer)
@@ -93,7 +93,7 @@ def test_one_pass_shows_the_whole_greenhouse_and_ends(domain: int) -> None:
             assert process.exit_code == 0
             assert "Traceback" not in process.output
 
-    # Nothing got lost on the way: two observations a tag, and the two that failed at first.
+    # Nothing was lost: two observations a tag, and the two that failed at first.
     assert len(heard.observations) == 2 * 29 + 2
     for observation in heard.observations:
         assert observation.header.frame_id == "map"
@@ -107,10 +107,10 @@ def test_one_pass_shows_the_whole_greenhouse_and_ends(domain: int) -> None:
             assert reading.stamp == observation.header.stamp
 
 
-def test_it_does_not_begin_before_somebody_listens(
+def test_it_waits_for_a_subscriber_before_it_begins(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Else a fast patrol would push its first observations out of the latch during discovery.
+    # Otherwise a fast patrol would push its first observations out of the latch during discovery.
     monkeypatch.setattr(node, "_SUBSCRIBERS_S", PATIENCE_S)
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
     has_begun = Event()
@@ -131,7 +131,7 @@ def test_it_does_not_begin_before_somebody_listens(
         peer.until(lambda: not patrol_thread.is_alive(), "the end of the patrol")
 
 
-def test_who_comes_late_gets_the_latched_map_and_list(domain: int) -> None:
+def test_a_late_subscriber_gets_the_latched_map_and_list(domain: int) -> None:
     with Peer(domain) as early, patrol(domain, "--speed", "30"):
         first = Received().listen(early)
         # The map is published when it grows: once it is complete, never again.
@@ -144,7 +144,7 @@ def test_who_comes_late_gets_the_latched_map_and_list(domain: int) -> None:
                 lambda: second.discovered_tags and len(second.discovered_tags[-1].tags) == 29,
                 "the latched list of tags",
             )
-            # It missed the oldest observations of this pass (the latch holds 50). The next ones
+            # It missed the oldest observations of this round (the latch holds 50). The next ones
             # bring every tag.
             late.until(lambda: len(second.read_tags) == 29, "a reading of every tag")
 
@@ -162,7 +162,7 @@ def test_topics_and_frame_are_parameters_and_stamps_follow_simulated_time(domain
         heard = Received().listen(peer, "/robot/observations", "/elsewhere/tags", "/elsewhere/map")
 
         def heard_simulated_time() -> bool:
-            # Again and again: who listens to /clock does not ask for the latched one.
+            # Repeated: a subscriber of /clock does not request a latched one.
             peer.publish("/clock", Clock(clock=Time(sec=1234, nanosec=500_000_000)), depth=1)
             return bool(
                 heard.discovered_tags
@@ -177,7 +177,7 @@ def test_topics_and_frame_are_parameters_and_stamps_follow_simulated_time(domain
         assert message.header.frame_id == "greenhouse"
 
 
-def test_a_signal_ends_it_cleanly_even_while_it_waits_for_long(domain: int) -> None:
+def test_a_signal_ends_it_without_errors_even_while_it_waits_for_long(domain: int) -> None:
     with Peer(domain) as peer, patrol(domain, "--speed", "0.1") as process:
         heard = Received().listen(peer)
         peer.until(lambda: heard.maps, "the first look around")
@@ -185,7 +185,7 @@ def test_a_signal_ends_it_cleanly_even_while_it_waits_for_long(domain: int) -> N
         assert "Traceback" not in process.output
 
 
-def test_a_signal_ends_it_cleanly_while_nobody_listens(domain: int) -> None:
+def test_a_signal_ends_it_without_errors_without_subscribers(domain: int) -> None:
     with patrol(domain) as process:
         process.wait_for_output("patrol starts")
         assert process.stop(signal.SIGTERM) == 0
@@ -220,7 +220,7 @@ def test_without_the_simulator_it_says_what_to_install(domain: int) -> None:
     assert "pip install mdp-greenhouse" in line
 
 
-def test_what_it_latches_is_as_deep_as_the_contract_says(domain: int) -> None:
+def test_its_latch_is_as_deep_as_in_the_contract(domain: int) -> None:
     with ros_domain(domain):
         rclpy.init(args=[])
         try:

@@ -1,4 +1,4 @@
-"""The past of a demo: what the patrol would have observed until it begins."""
+"""The past of a demo: what the patrol would have observed until it starts."""
 
 from pathlib import Path
 from statistics import fmean
@@ -37,14 +37,14 @@ def scans(rows: list[Write]) -> list[Scan]:
     return [row for row in rows if isinstance(row, Scan)]
 
 
-def test_it_is_three_days_of_the_demo_s_own_length_up_to_now(rows: list[Write]) -> None:
+def test_it_is_three_days_of_the_demos_own_length_up_to_now(rows: list[Write]) -> None:
     times = [at_s(row) for row in rows]
     assert times == sorted(times)
     assert -DAYS * 86_400 / DAY_SPEED <= times[0] < -DAYS * 86_400 / DAY_SPEED + 10
     assert -10 < times[-1] < 0
 
 
-def test_every_tag_is_scanned_in_every_pass_and_some_scans_fail(scans: list[Scan]) -> None:
+def test_every_tag_is_scanned_in_every_round_and_some_scans_fail(scans: list[Scan]) -> None:
     tags = {tag.tag_id for tag in read_greenhouse(GreenhouseSimulator()).tags}
     last = int(scans[-1].mission.removeprefix("past-"))
     assert last > 50
@@ -57,7 +57,7 @@ def test_every_tag_is_scanned_in_every_pass_and_some_scans_fail(scans: list[Scan
         assert not any(row.readings for row in failed)
 
 
-def test_each_tag_gets_its_exact_place_before_anything_else(rows: list[Write]) -> None:
+def test_each_tag_gets_its_exact_position_before_anything_else(rows: list[Write]) -> None:
     greenhouse = read_greenhouse(GreenhouseSimulator())
     pins = {row.tag_id: row.pose for row in rows if isinstance(row, Pin)}
     assert {tag: (pose.x, pose.y) for tag, pose in pins.items()} == {
@@ -94,7 +94,7 @@ def test_its_time_of_day_is_that_of_the_patrol(scans: list[Scan]) -> None:
     assert off_by(0) < min(off_by(hours) for hours in (-2, -1, 1, 2)) / 1.5
 
 
-def test_options_are_the_patrol_s() -> None:
+def test_options_are_those_of_the_patrol() -> None:
     rows = made("--speed=10", "--day-speed=3600", "--seed=3")
     assert -DAYS * 86_400 / 3600 / 10 <= at_s(rows[0]) < at_s(rows[-1]) < 0
     assert rows == made("--speed=10", "--day-speed=3600", "--seed=3")
@@ -105,7 +105,7 @@ def test_where_the_day_stands_still_there_is_no_past() -> None:
     assert made("--day-speed=0") == []
 
 
-def test_it_fills_a_journal_that_is_new_and_leaves_somebody_s(tmp_path: Path) -> None:
+def test_it_fills_a_new_journal_and_leaves_a_used_one_alone(tmp_path: Path) -> None:
     path = tmp_path / "demo.sqlite"
     assert fill_past(path, parser().parse_args(SHORT)) == 0
     made_of = select(
@@ -119,7 +119,7 @@ def test_it_fills_a_journal_that_is_new_and_leaves_somebody_s(tmp_path: Path) ->
     assert select(theirs, "SELECT count(*) FROM scan") == [(1,)]
 
 
-def test_what_hinders_it_ends_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_error_ends_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "no").write_text("a file where a folder should be")
     assert fill_past(tmp_path / "no" / "demo.sqlite", parser().parse_args(SHORT)) == 2
     assert "File exists" in capsys.readouterr().err

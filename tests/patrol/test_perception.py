@@ -18,7 +18,7 @@ def sees(position: Point, greenhouse: Greenhouse = HALL) -> bool:
 
 
 def in_front(angle_deg: float, away_m: float) -> Point:
-    """A place before the tag, so far off its normal."""
+    """A position before the tag, that far off its normal."""
     angle = radians(angle_deg)
     return TAG.edge[0] - away_m * cos(angle), TAG.edge[1] + away_m * sin(angle)
 
@@ -40,7 +40,7 @@ def test_a_tag_is_seen_from_near_and_from_its_front(position: Point, expected: b
     assert sees(position) is expected
 
 
-def test_every_tag_of_the_greenhouse_is_seen_from_its_stop_in_the_order_of_the_looks() -> None:
+def test_every_tag_is_seen_from_its_stop_in_the_order_of_the_inspections() -> None:
     greenhouse = read_greenhouse(GreenhouseSimulator())
     plants = Plants(greenhouse, 0)
     for tag in greenhouse.tags:

@@ -1,4 +1,4 @@
-"""Plants, pests and what a look at them shows."""
+"""Plants, pests and the result of an inspection."""
 
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
@@ -45,7 +45,7 @@ def test_blooms_stand_inside_the_tags_own_table(greenhouse: Greenhouse, plants: 
             assert 0.0 <= look.confidence <= 1.0
 
 
-def test_pests_come_now_and_then_and_go_after_two_passes(
+def test_pests_appear_now_and_then_and_go_after_two_rounds(
     greenhouse: Greenhouse, plants: Plants
 ) -> None:
     quiet = 0
@@ -57,7 +57,7 @@ def test_pests_come_now_and_then_and_go_after_two_passes(
     assert 0.9 < quiet / (29 * len(PASSES)) < 1.0
 
 
-def test_a_pest_shows_in_the_look_and_on_some_blooms(
+def test_a_pest_shows_in_the_inspection_and_on_some_blooms(
     greenhouse: Greenhouse, plants: Plants
 ) -> None:
     shown = 0

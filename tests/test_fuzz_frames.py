@@ -141,9 +141,9 @@ def test_unexpected_frames_change_nothing(
         for _ in range(frames // at_once):
             with RawClient(live.url, path) as client:
                 said = b"".join(anything(chance) for _ in range(at_once))
-                heard = client.say(said + masked(CLOSE, struct.pack("!H", NORMAL)))
+                received = client.say(said + masked(CLOSE, struct.pack("!H", NORMAL)))
                 # A message in pieces has more than one frame: some connections send too much.
-                assert closing_code(heard) in (NORMAL, POLICY)
+                assert closing_code(received) in (NORMAL, POLICY)
             healthy.rest()
         for _ in range(BROKEN_CONNECTIONS):
             with RawClient(live.url, path) as client:

@@ -30,7 +30,7 @@ from tests.support.web import Bridge, bridge
 # is bounded tag by tag, and there are some 30), with the cache of fields. In one arena: what the C
 # library retains of more of them grows with the threads, not with what is sent.
 MEMORY_MB = 40.0
-KEPT_MB = 150.0
+STORED_MB = 150.0
 ONE_ARENA = {"MALLOC_ARENA_MAX": "1"}
 NO_LIMITS = limits(answers_per_s=10_000)
 # Often enough that no batch waits for a state, which is large here, and is published twice.
@@ -58,7 +58,7 @@ def both() -> Iterator[tuple[Bridge, Bridge]]:
             field_of(live, sensor_type="co2")
         memory = resident_mb(twin.process.pid)
         yield twin, apart
-        assert resident_mb(twin.process.pid) - memory < KEPT_MB
+        assert resident_mb(twin.process.pid) - memory < STORED_MB
 
 
 _marks = count(1)
@@ -214,12 +214,12 @@ def test_a_bridge_apart_survives_an_invalid_twin() -> None:
                 sane = TwinState()
                 sane.header.stamp.sec = number
 
-                def is_told(sane: TwinState = sane, number: int = number) -> bool:
+                def is_reported(sane: TwinState = sane, number: int = number) -> bool:
                     # As a twin publishes: again and again.
                     peer.publish(topic, sane, depth=1)
                     return has_stamp(live, number)
 
-                wait_for(is_told, "the sane state")
+                wait_for(is_reported, "the sane state")
                 if memory is None:
                     memory = resident_mb(process.pid)
                     reset_peak(process.pid)

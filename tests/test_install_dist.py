@@ -60,10 +60,10 @@ def copy_libraries(of: str, venv: Path) -> None:
     (found,) = distributions(path=[str(site)], name=Requirement(of).name)
     waiting, known = [(found, Requirement(of))], set[str]()
     while waiting:
-        package, asked = waiting.pop()
+        package, requested = waiting.pop()
         for text in package.requires or ():
             wanted = Requirement(text)
-            environments = [{"extra": extra} for extra in (*asked.extras, "")]
+            environments = [{"extra": extra} for extra in (*requested.extras, "")]
             if wanted.marker and not any(map(wanted.marker.evaluate, environments)):
                 continue
             if str(wanted) not in known:

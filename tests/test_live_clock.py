@@ -121,12 +121,12 @@ def is_called_silent(live: Bridge) -> bool:
 
 def goes_back_during_a_query_of_the_past(twin: Bridge, live: Bridge, seconds: int) -> None:
     """No answer of either time is an error, and connected clients get the new time."""
-    asked = ("/api/state?at=1000", "/api/history?tag_id=1&sensor_type=co2", "/api/timeline")
+    requested = ("/api/state?at=1000", "/api/history?tag_id=1&sensor_type=co2", "/api/timeline")
     statuses: set[int] = set()
 
     def gone_back() -> bool:
         tick(twin, seconds)
-        statuses.update(live.get(path).status_code for path in asked)
+        statuses.update(live.get(path).status_code for path in requested)
         return bool(live.json("/api/state")["header"]["stamp"]["sec"] == seconds)
 
     with live.listen() as listening:
@@ -135,7 +135,7 @@ def goes_back_during_a_query_of_the_past(twin: Bridge, live: Bridge, seconds: in
     assert statuses == {200}
     later = live.get("/api/state", at=seconds + 90)
     assert (later.status_code, "later than now" in later.text) == (400, True)
-    for path in asked[1:]:
+    for path in requested[1:]:
         assert live.json(path)["to"]["sec"] == seconds
     # What it knew it still knows.
     found = wait_for(lambda: live.json("/api/state", at=seconds)["tags"], "the new run in the log")

@@ -80,12 +80,12 @@ def test_with_a_full_disk_answers_have_their_limit_of_completeness(tmp_path: Pat
         at_s = wait_for(lambda: at if (at := now_s(serve)) > before_s + 3.0 else None, "3 s later")
         assert at_s is not None
         for live in lives:
-            told = wait_for(lambda live=live: as_of(live, "/api/state", at_s - 0.5), "an answer")  # type: ignore[misc]
-            assert told is not None
+            past = wait_for(lambda live=live: as_of(live, "/api/state", at_s - 0.5), "an answer")  # type: ignore[misc]
+            assert past is not None
             # The value from before is old, and is not shown as new.
-            [reading] = told.json()["tags"][0]["readings"]
+            [reading] = past.json()["tags"][0]["readings"]
             assert reading["value"] == 400.0
-            etag = {"If-None-Match": told.headers["etag"]}
+            etag = {"If-None-Match": past.headers["etag"]}
             never = as_of(live, "/api/tags/gone", at_s - 0.5)
             for answer, status in (
                 (live.get("/api/state", etag, at=f"{at_s - 0.5:.3f}"), 304),
@@ -146,7 +146,7 @@ def test_no_process_imports_a_module_of_the_working_folder(tmp_path: Path) -> No
         wait_until_ready(live)
         at_s = now_s(live) - 600
         wait_for(lambda: as_of(live, "/api/state", at_s).status_code == 200, "a look back")
-        told = imported.read_text() if imported.exists() else ""
-        assert told == ""
+        reported = imported.read_text() if imported.exists() else ""
+        assert reported == ""
         assert as_of(live, "/api/state", at_s).json()["tags"], "the past that was filled in"
         assert patrols_of(process.pid)

@@ -41,7 +41,7 @@ def secret(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         assert "Traceback" not in running.process.output
 
 
-def asked(*lines: bytes, version: bytes = b"1.1") -> bytes:
+def requested(*lines: bytes, version: bytes = b"1.1") -> bytes:
     """A request for a WebSocket with further header lines."""
     head = b"GET /ws/state HTTP/" + version + b"\r\n" + UPGRADE
     return head + b"".join(line + b"\r\n" for line in lines) + b"\r\n"
@@ -50,25 +50,28 @@ def asked(*lines: bytes, version: bytes = b"1.1") -> bytes:
 # --- handshakes ---------------------------------------------------------------------------------
 
 NO_HANDSHAKES = {
-    "a body": (asked(b"Content-Length: 1"), 413),
-    "a body that has come": (asked(b"Content-Length: 1") + b"x", 413),
-    "chunks": (asked(b"Transfer-Encoding: chunked"), 413),
-    "chunks that have come": (asked(b"Transfer-Encoding: chunked") + b"1\r\nx\r\n0\r\n\r\n", 413),
-    "a long cookie": (asked(b"Cookie: " + b"x" * 9_000), 431),
-    "many headers": (asked(*(b"X-%d: y" % i for i in range(130))), 431),
+    "a body": (requested(b"Content-Length: 1"), 413),
+    "a body that has come": (requested(b"Content-Length: 1") + b"x", 413),
+    "chunks": (requested(b"Transfer-Encoding: chunked"), 413),
+    "chunks that have come": (
+        requested(b"Transfer-Encoding: chunked") + b"1\r\nx\r\n0\r\n\r\n",
+        413,
+    ),
+    "a long cookie": (requested(b"Cookie: " + b"x" * 9_000), 431),
+    "many headers": (requested(*(b"X-%d: y" % i for i in range(130))), 431),
     "a long line": (
         UPGRADE.join((b"GET /ws/state?" + b"x" * 9_000 + b" HTTP/1.1\r\n", b"\r\n")),
         414,
     ),
-    "a long head": (asked(*(b"X-%d: " % i + b"y" * 7_000 for i in range(12))), 431),
-    "a bad key": (asked().replace(b"dGhlIHNhbXBsZSBub25jZQ==", b"dGhl"), 400),
-    "no key": (asked().replace(b"Sec-WebSocket-Key", b"X-Key"), 400),
-    "two keys": (asked(b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="), 400),
-    "no version": (asked().replace(b"Sec-WebSocket-Version", b"X-Version"), 400),
-    "another version": (asked().replace(b"Version: 13", b"Version: 8"), 400),
-    "another method": (asked().replace(b"GET", b"PUT", 1), 405),
-    "HTTP/1.0": (asked(version=b"1.0"), 404),
-    "no text": (asked(b"X-Bytes: \xff\xfe", b"Content-Length: \xb9"), 400),
+    "a long head": (requested(*(b"X-%d: " % i + b"y" * 7_000 for i in range(12))), 431),
+    "a bad key": (requested().replace(b"dGhlIHNhbXBsZSBub25jZQ==", b"dGhl"), 400),
+    "no key": (requested().replace(b"Sec-WebSocket-Key", b"X-Key"), 400),
+    "two keys": (requested(b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="), 400),
+    "no version": (requested().replace(b"Sec-WebSocket-Version", b"X-Version"), 400),
+    "another version": (requested().replace(b"Version: 13", b"Version: 8"), 400),
+    "another method": (requested().replace(b"GET", b"PUT", 1), 405),
+    "HTTP/1.0": (requested(version=b"1.0"), 404),
+    "no text": (requested(b"X-Bytes: \xff\xfe", b"Content-Length: \xb9"), 400),
     "TLS": (b"\x16\x03\x01\x02\x00\x01\x00", 400),  # a browser at https: must not wait
 }
 
@@ -76,9 +79,9 @@ NO_HANDSHAKES = {
 @pytest.mark.parametrize("name", NO_HANDSHAKES)
 def test_an_invalid_handshake_is_answered_and_ended(plain: Served, name: str) -> None:
     said, expected = NO_HANDSHAKES[name]
-    heard = raw_http.answer(plain.url, said)
-    assert status(heard) == expected, heard
-    assert heard.count(b"HTTP/1.1") == 1
+    received = raw_http.answer(plain.url, said)
+    assert status(received) == expected, received
+    assert received.count(b"HTTP/1.1") == 1
 
 
 @pytest.mark.parametrize("name", ["a body", "a long cookie", "many headers", "a bad key"])
@@ -90,10 +93,10 @@ def test_over_tls_and_with_a_token_too(secret: Served, name: str) -> None:
 
 def test_a_refusal_has_its_reason(plain: Served) -> None:
     said = {
-        "this is no request for a WebSocket: ": asked(b"Cookie: " + b"x" * 9_000),
-        "the request has a body (content-length: 1), and none": asked(b"Content-Length: 1"),
-        "the request has more headers than the limit of 128": asked(*[b"a:"] * 128),
-        "the request's head is longer than 32768 bytes": asked(b"a: " + b"x" * 40_000),
+        "this is no request for a WebSocket: ": requested(b"Cookie: " + b"x" * 9_000),
+        "the request has a body (content-length: 1), and none": requested(b"Content-Length: 1"),
+        "the request has more headers than the limit of 128": requested(*[b"a:"] * 128),
+        "the request's head is longer than 32768 bytes": requested(b"a: " + b"x" * 40_000),
     }
     for why, request in said.items():
         body = raw_http.answer(plain.url, request).partition(b"\r\n\r\n")[2]
@@ -134,8 +137,8 @@ def test_a_head_has_a_size_limit_however_it_arrives(plain: Served, line: int, fi
     for extra, expected in ((0, b" 200 "), (1, b" 431 "), (200_000, b" 431 ")):
         said = head_of(MAX_HEAD_BYTES + extra, line)
         assert len(said) == MAX_HEAD_BYTES + extra
-        heard = raw_http.answer(plain.url, first + said)
-        heads = [part[:5] for part in heard.split(b"HTTP/1.1")[1:]]
+        received = raw_http.answer(plain.url, first + said)
+        heads = [part[:5] for part in received.split(b"HTTP/1.1")[1:]]
         assert heads == [b" 200 "] * (answers - 1) + [expected]
 
 
@@ -144,8 +147,8 @@ def test_the_number_of_headers_is_limited(plain: Served, first: bytes) -> None:
     for end in (b"Connection: close\r\n\r\n", b"Connection: close\n\n"):
         for more, expected in ((MAX_HEADERS - 2, b" 200 "), (MAX_HEADERS - 1, b" 431 ")):
             head = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"a:\r\n" * more + end
-            heard = raw_http.answer(plain.url, first + head)
-            assert heard.split(b"HTTP/1.1")[-1].startswith(expected)
+            received = raw_http.answer(plain.url, first + head)
+            assert received.split(b"HTTP/1.1")[-1].startswith(expected)
 
 
 def test_endless_lines_are_not_waited_for(plain: Served) -> None:
@@ -156,8 +159,8 @@ def test_endless_lines_are_not_waited_for(plain: Served) -> None:
 def test_pipelined_requests_are_all_answered(plain: Served) -> None:
     one = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nX: " + bytes(b"x" * 20_000) + b"\r\n\r\n"
     last = b"GET /nowhere HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\nGET / and more"
-    heard = raw_http.answer(plain.url, one * 20 + last)
-    assert (heard.count(b"HTTP/1.1 200"), heard.count(b"HTTP/1.1")) == (20, 21)
+    received = raw_http.answer(plain.url, one * 20 + last)
+    assert (received.count(b"HTTP/1.1 200"), received.count(b"HTTP/1.1")) == (20, 21)
 
 
 @pytest.mark.parametrize(
@@ -173,9 +176,9 @@ def test_pipelined_requests_are_all_answered(plain: Served) -> None:
 def test_a_target_is_a_path(plain: Served, target: bytes) -> None:
     """Otherwise a host would have two names, and one of them would go unchecked."""
     said = b"GET " + target + b" HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
-    heard = raw_http.answer(plain.url, said)
-    assert (status(heard), heard.count(b"HTTP/1.1")) == (400, 1)
-    assert repr(target.decode()).encode() in heard
+    received = raw_http.answer(plain.url, said)
+    assert (status(received), received.count(b"HTTP/1.1")) == (400, 1)
+    assert repr(target.decode()).encode() in received
     upgrade = said.replace(b"Host: 127.0.0.1\r\n", UPGRADE)
     assert status(raw_http.answer(plain.url, upgrade)) == 400
 
@@ -287,7 +290,7 @@ def test_a_websocket_after_an_unread_answer_stores_nothing(plain: Served) -> Non
         # As many large answers as one address may get at once; each exceeds a socket's buffer.
         clients = [stack.enter_context(raw_http.connect(plain.url, room=4_096)) for _ in range(4)]
         for width, client in enumerate(clients, 16):
-            client.sendall(LARGE_FIELD % width + asked())
+            client.sendall(LARGE_FIELD % width + requested())
         wait_for(lambda: all(map(raw_http.is_over, clients)), "their end")
         wait_for(lambda: open_files(pid) <= files, "the end of their files")
         assert peak_mb(pid) - memory < 2 * MEMORY_MB
@@ -301,7 +304,7 @@ def test_after_an_unread_answer_nothing_more_is_read(plain: Served) -> None:
 
 def test_a_websocket_after_an_answer_stays(plain: Served) -> None:
     with raw_http.connect(plain.url) as client:
-        client.sendall(b"GET /healthz HTTP/1.1\r\n" + HOST + asked())
+        client.sendall(b"GET /healthz HTTP/1.1\r\n" + HOST + requested())
         seen = b""
         # Heartbeats: for longer than a request may take.
         while seen.count(b'"type":"state"') < 2 * TIMEOUT_S + 1:

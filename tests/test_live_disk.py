@@ -69,9 +69,9 @@ def feeding(disk: Disk, log_bytes: int = 8_000_000) -> Iterator[TwinUpdate]:
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
     )
-    told = TwinUpdate(child)
+    reported = TwinUpdate(child)
     try:
-        yield told
+        yield reported
     finally:
         assert child.stdin is not None
         child.stdin.close()
@@ -79,7 +79,7 @@ def feeding(disk: Disk, log_bytes: int = 8_000_000) -> Iterator[TwinUpdate]:
             child.wait(PATIENCE_S)
         finally:
             child.kill()
-            told.join()
+            reported.join()
             child.wait()
             if child.stdout is not None:
                 child.stdout.close()
@@ -100,10 +100,10 @@ def test_a_fault_from_the_start_is_reported_and_heals(
     disk: Disk, fault: Weather, said: str
 ) -> None:
     disk.be(fault)
-    with feeding(disk) as told:
-        told.wait("failing", said)
+    with feeding(disk) as reported:
+        reported.wait("failing", said)
         disk.be("well")
-        told.wait("recording", written=100)
+        reported.wait("recording", written=100)
     assert_whole(disk)
 
 
@@ -128,21 +128,21 @@ def test_a_journal_in_a_read_only_folder_can_be_read(disk: Disk) -> None:
 
 
 def test_a_slow_sync_delays_no_commit(disk: Disk) -> None:
-    with feeding(disk) as told:
-        told.wait("recording", written=50)
+    with feeding(disk) as reported:
+        reported.wait("recording", written=50)
         disk.be("slow-sync")
-        told.wait("recording", written=told.last[1] + 300)
-        assert told.last[2] == 0
+        reported.wait("recording", written=reported.last[1] + 300)
+        assert reported.last[2] == 0
         disk.be("well")
 
 
 def test_a_slow_disk_is_reported_and_nothing_is_lost(disk: Disk) -> None:
-    with feeding(disk) as told:
-        told.wait("recording", written=50)
+    with feeding(disk) as reported:
+        reported.wait("recording", written=50)
         disk.be("slow-write")
-        told.wait("slow", "the disk is slow: the journal is ")
+        reported.wait("slow", "the disk is slow: the journal is ")
         disk.be("well")
-        told.wait("recording", written=told.last[1] + 200)
+        reported.wait("recording", written=reported.last[1] + 200)
     assert_whole(disk)
 
 
@@ -157,8 +157,8 @@ def test_a_power_cut_costs_at_most_the_last_second(
     many times.
     """
     disk.log = tmp_path / "log"
-    with feeding(disk, log_bytes=log_bytes) as told:
-        told.wait("recording", written=4 * RATE)
+    with feeding(disk, log_bytes=log_bytes) as reported:
+        reported.wait("recording", written=4 * RATE)
     done = notes(disk.log)
     handed_over = [
         (note.at_ns, int(note.data))

@@ -89,16 +89,16 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
         client.until_tag("a")
         field_of(live, **FIELD)
 
-        def told_in_time() -> bool:
+        def reported_in_time() -> bool:
             twin.freeze()
-            told_s = reason(client, "stale")["state_age_seconds"]
+            reported_s = reason(client, "stale")["state_age_seconds"]
             twin.thaw()
             reason(client, "live")
             field_of(live, **FIELD)
-            return bool(told_s <= 3.5)
+            return bool(reported_s <= 3.5)
 
         # As the client receives it; a busy machine may be late once.
-        assert any(told_in_time() for _ in range(5))
+        assert any(reported_in_time() for _ in range(5))
 
         twin.freeze()
         wait_for(lambda: live.get("/readyz").status_code == 503, "its silence")

@@ -54,11 +54,11 @@ def test_a_publisher_with_other_qos_is_received_and_reported(
     peer = running.peer
     publisher = peer.node.create_publisher(Observation, TOPIC, qos)
 
-    def is_heard() -> bool:
+    def is_received() -> bool:
         publisher.publish(scan("foreign", {"co2": 1.0}))
         return running.get("/api/tags/foreign").status_code == 200
 
-    wait_for(is_heard, "what it says")
+    wait_for(is_received, "what it says")
     (said,) = wait_for(lambda: running.json("/readyz")["input_problems"], "the problem")
     assert said.startswith(f"/peer publishes {TOPIC} with another QoS")
     assert said.endswith(remedy)

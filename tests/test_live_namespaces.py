@@ -51,10 +51,10 @@ def answers(process: Process, tag_id: str) -> tuple[list[str], dict[str, object]
 def viewed(process: Process, namespace: str) -> tuple[str, list[int]]:
     """A greenhouse in Foxglove's own client: the tag last observed, and the map."""
     topics = [f"{namespace}/{name}" for name in ("floranova/observations", "map", "twin/state")]
-    told = play(url_of(process), "look", *topics)
-    channels = {channel["topic"]: channel for channel in told["channels"]}
+    reported = play(url_of(process), "look", *topics)
+    channels = {channel["topic"]: channel for channel in reported["channels"]}
     observation, grid, _state = (
-        reader_of(channels[topic])(base64.b64decode(told["first"][topic]["data"]))
+        reader_of(channels[topic])(base64.b64decode(reported["first"][topic]["data"]))
         for topic in topics
     )
     return observation.tag_reading.tag_id or observation.flower.tag_id, list(grid.data)

@@ -32,7 +32,7 @@ PAUSE_S = 0.5
 
 
 @dataclass
-class House:
+class Greenhouse:
     """A twin, three replicas, and nginx before them."""
 
     url: str
@@ -41,7 +41,7 @@ class House:
 
 
 @contextmanager
-def running(folder: Path) -> Iterator[House]:
+def running(folder: Path) -> Iterator[Greenhouse]:
     with ExitStack() as stack:
         domain = stack.enter_context(own_domain())
         stack.enter_context(twin_node(domain, *OFTEN))
@@ -60,11 +60,11 @@ def running(folder: Path) -> Iterator[House]:
         for replica in replicas:
             replica.tag("a")
         ports = [int(replica.url.rpartition(":")[2]) for replica in replicas]
-        yield House(stack.enter_context(nginx(folder, ports)), replicas, peer)
+        yield Greenhouse(stack.enter_context(nginx(folder, ports)), replicas, peer)
 
 
 @pytest.fixture(scope="module")
-def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[House]:
+def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Greenhouse]:
     with running(tmp_path_factory.mktemp("nginx")) as it:
         yield it
 
@@ -72,12 +72,12 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[House]:
 # --- everything below the prefix ------------------------------------------------------------------
 
 
-def test_the_page_and_all_its_requests_are_below_the_prefix(house: House) -> None:
+def test_the_page_and_all_its_requests_are_below_the_prefix(house: Greenhouse) -> None:
     with httpx.Client(base_url=house.url, trust_env=False, timeout=PATIENCE_S) as browser:
         page = {"Accept": "text/html", "Host": "twin.example"}
         # Redirected to the sign-in page, and in with its cookie.
-        asked = browser.get("/gh1/", headers=page)
-        assert (asked.status_code, asked.headers["location"]) == (303, "signin")
+        requested = browser.get("/gh1/", headers=page)
+        assert (requested.status_code, requested.headers["location"]) == (303, "signin")
         assert browser.get("/gh1/signin", headers=page).status_code == 200
         signed_in = browser.post("/gh1/api/signin", headers={**BEARER, **OWN})
         (cookie,) = signed_in.headers.get_list("set-cookie")
@@ -106,11 +106,11 @@ def test_the_page_and_all_its_requests_are_below_the_prefix(house: House) -> Non
         assert Ros(socket).call("/rosapi/topics")["result"]
 
 
-def ws(house: House) -> str:
+def ws(house: Greenhouse) -> str:
     return house.url.replace("http", "ws", 1) + "/gh1/ws/state"
 
 
-def test_limits_and_logs_go_by_the_client_and_not_by_nginx(house: House) -> None:
+def test_limits_and_logs_go_by_the_client_and_not_by_nginx(house: Greenhouse) -> None:
     wrong = {"Authorization": "Bearer " + "x" * 32, "X-Forwarded-For": "203.0.113.9"}
     transport = httpx.HTTPTransport(local_address="127.0.0.9")
     with httpx.Client(
@@ -170,7 +170,7 @@ class Screen:
             self.last_frame_s = now_s
 
 
-def longest_gap_s(house: House, screens: list[Screen], replica: Bridge, number: int) -> float:
+def longest_gap_s(house: Greenhouse, screens: list[Screen], replica: Bridge, number: int) -> float:
     """How long a client was without a frame, at most, since a replica was stopped."""
     returns = sum(screen.returns for screen in screens)
     before = [len(screen.gaps_s) for screen in screens]
@@ -200,7 +200,7 @@ def test_clients_of_a_replica_that_stops_under_load_are_back_in_time(
         stop_under_load(house, number)
 
 
-def stop_under_load(house: House, number: signal.Signals) -> None:
+def stop_under_load(house: Greenhouse, number: signal.Signals) -> None:
     screens = [Screen(ws(house)) for _ in range(CLIENTS)]
     threads = [threading.Thread(target=screen.run) for screen in screens]
     load = Load(f"{house.url}/gh1/api/field?sensor_type=co2&resolution=0.02")

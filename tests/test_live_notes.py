@@ -17,7 +17,7 @@ from tests.support.waiting import wait_for
 from tests.support.web import Bridge
 
 
-def told(browser: httpx.Client) -> dict[str, Any] | None:
+def reported(browser: httpx.Client) -> dict[str, Any] | None:
     """The alarm, once somebody has acknowledged it."""
     answer = browser.get("/api/alarms")
     found = answer.json()["alarms"] if answer.status_code == 200 else []
@@ -54,7 +54,7 @@ def test_web_shows_the_same_notes_and_says_where_to_write_them(tmp_path: Path) -
     ):
         note = acknowledged(live)
         with signed_in(web.url, "anna") as anna:
-            alarm = wait_for(lambda: told(anna), "the note at the other bridge")
+            alarm = wait_for(lambda: reported(anna), "the note at the other bridge")
             assert alarm is not None
             assert alarm["acknowledged_by"] == "anna"
             assert anna.get("/api/notes").json() == {"notes": [note]}

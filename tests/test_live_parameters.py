@@ -47,9 +47,9 @@ def test_the_same_file_means_the_same_to_both(domain: int, tmp_path: Path) -> No
         web.tag("c")
         wait_for(lambda: web.get("/api/map").status_code == 200, "the map")
 
-        asked: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.25}
+        requested: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.25}
         # The box is web's, the values are the twin's.
-        field = field_of(web, **asked).json()
+        field = field_of(web, **requested).json()
         assert (field["origin_x"], field["origin_y"]) == (-REACH_M, -REACH_M)
         assert (field["width"], field["height"]) == (12, 6)
         assert field["values"][0] is None
@@ -62,13 +62,13 @@ def test_the_same_file_means_the_same_to_both(domain: int, tmp_path: Path) -> No
             "bbox_min_y": -0.1,
             "bbox_max_y": 0.1,
         }
-        [value] = web.get("/api/field", **asked | cell).json()["values"]
+        [value] = web.get("/api/field", **requested | cell).json()["values"]
         assert value == pytest.approx((400 * 8 + 500 * 8 + 900) / 17, rel=1e-3)
 
         # a has no other tag in reach; c is predicted from b, and three times as far from a.
-        quality = web.get("/api/field/quality", **asked).json()
+        quality = web.get("/api/field/quality", **requested).json()
         assert quality["judged_count"] == 2
         assert quality["worst"]["predicted"] == pytest.approx((400 + 500 * 27) / 28)
 
-        refused = web.get("/api/field", **asked | {"resolution": 0.05})
+        refused = web.get("/api/field", **requested | {"resolution": 0.05})
         assert "the limit is 900" in refused.json()["error_message"]

@@ -75,7 +75,7 @@ def series(peer: Peer, tag_id: str, sensor_type: str, **more: Any) -> Any:
     return response
 
 
-def told(response: Any) -> list[tuple[float, float]]:
+def reported(response: Any) -> list[tuple[float, float]]:
     """(seconds after T, value) of each entry."""
     return [
         (at.sec - T + at.nanosec / 1e9, mean)
@@ -129,15 +129,15 @@ def test_an_impossible_query_is_refused_by_name_without_data(peer: Peer) -> None
 
 
 def test_readings_come_one_by_one_or_in_buckets(peer: Peer) -> None:
-    assert told(series(peer, "a", "co2")) == [(0.0, 400.0), (100.5, 500.0)]
+    assert reported(series(peer, "a", "co2")) == [(0.0, 400.0), (100.5, 500.0)]
     half = series(peer, "a", "co2", start=stamp(T + 0.0), end=stamp(T + 100.5))
-    assert told(half) == [(0.0, 400.0)]
+    assert reported(half) == [(0.0, 400.0)]
     bucketed = series(peer, "a", "co2", start=stamp(T), end=stamp(T + 200), max_points=1)
     assert bucketed.is_bucketed
     assert (list(bucketed.counts), list(bucketed.means)) == ([2], [450.0])
     assert (list(bucketed.minima), list(bucketed.maxima)) == ([400.0], [500.0])
-    assert told(series(peer, "a", "ph")) == []
-    assert told(series(peer, "*", "~looks")) == [(10.0, 3.0), (300.0, 0.0)]
+    assert reported(series(peer, "a", "ph")) == []
+    assert reported(series(peer, "*", "~looks")) == [(10.0, 3.0), (300.0, 0.0)]
     assert list(series(peer, "*", "~runs").minima) == [0.0], "by no simulated clock"
 
 
@@ -179,14 +179,14 @@ def test_a_flood_of_expensive_queries_loses_no_observation(domain: int, tmp_path
                 wait_for(lambda c=count: select(journal, "SELECT count(*) FROM scan") == c, "25")  # type: ignore[misc]
         client = curious.node.create_client(GetStateAt, STATE_AT)
         curious.until(client.service_is_ready, "the service")
-        asked: list[Any] = []
+        requested: list[Any] = []
         answers: list[Any] = []
 
         def ask(_: float = 0.0) -> None:
-            answers.extend(future.result() for future in asked if future.done())
-            asked[:] = [future for future in asked if not future.done()]
-            while len(asked) < AT_ONCE:
-                asked.append(client.call_async(GetStateAt.Request(at=stamp(T + 1))))
+            answers.extend(future.result() for future in requested if future.done())
+            requested[:] = [future for future in requested if not future.done()]
+            while len(requested) < AT_ONCE:
+                requested.append(client.call_async(GetStateAt.Request(at=stamp(T + 1))))
             curious.spin_briefly()
 
         wait_for(lambda: answers, "the first answer", meanwhile=ask)

@@ -25,7 +25,7 @@ T = 1_700_000_000.0
 OBSERVED = 40
 # Another file for each process, as on another host: that of its own working folder.
 JOURNAL = "/proc/self/cwd/j.sqlite"
-QUESTIONS = (
+QUERIES = (
     f"/api/state?at={T + 100}",
     f"/api/tags/a?at={T + 100}",
     f"/api/tags/nobody?at={T + 100}",
@@ -105,7 +105,7 @@ class Apart:
 
     def are_same(self, one: Bridge, other: Bridge) -> None:
         """Every query has the same answer, to the last byte, as soon as all has arrived."""
-        for path in QUESTIONS:
+        for path in QUERIES:
 
             def same(path: str = path) -> bool:
                 here, there = one.http.get(path), other.http.get(path)
@@ -144,7 +144,7 @@ def own(tmp_path: Path) -> Iterator[Apart]:
         yield it
 
 
-def asked(live: Bridge, path: str, **query: Any) -> Any:
+def requested(live: Bridge, path: str, **query: Any) -> Any:
     """The JSON, as soon as the twin's service was found."""
 
     def look_for() -> Any:
@@ -155,16 +155,16 @@ def asked(live: Bridge, path: str, **query: Any) -> Any:
 
 
 def test_without_its_twin_web_still_answers_and_goes_on_with_the_next(own: Apart) -> None:
-    before = {path: own.beside.http.get(path) for path in QUESTIONS[:-2]}
+    before = {path: own.beside.http.get(path) for path in QUERIES[:-2]}
     own.twin.kill()
     for replica in (own.beside, own.following):
         wait_for(lambda replica=replica: replica.get("/readyz").status_code == 503, "silence")  # type: ignore[misc]
     afresh = own.start_web()
     for replica in (own.beside, own.following, afresh):
-        for path, told in before.items():
+        for path, reported in before.items():
             if "/api/alarms" not in path:
                 answer = replica.http.get(path)
-                assert still(answer) == still(told), path
+                assert still(answer) == still(reported), path
         headers = replica.get("/api/state", at=time.time() - 1.0).headers
         assert float(headers["x-complete-to"]) < time.time() - 1.0
     # Another journal is followed into another file.
@@ -205,7 +205,7 @@ def test_the_copy_gives_the_same_answers_as_the_file_itself(apart: Apart) -> Non
 
 def test_alarms_are_the_same_when_the_copy_comes_late(apart: Apart) -> None:
     """As on a busy machine: no news of the twin comes after the copy."""
-    path = QUESTIONS[-3]
+    path = QUERIES[-3]
     assert "/api/alarms" in path
     (file,) = apart.followed()
 
@@ -248,5 +248,5 @@ def test_a_damaged_copy_is_made_anew(apart: Apart, harm: str) -> None:
                 other.execute("CREATE TABLE theirs (x)")
     at_s = T + 60.0 * OBSERVED
     apart.peer.observe(scan(harm, {"co2": 1.0}, stamp_s=at_s))
-    asked(apart.following, f"/api/tags/{harm}", at=at_s)
+    requested(apart.following, f"/api/tags/{harm}", at=at_s)
     assert apart.followed() == [file]

@@ -14,13 +14,13 @@ from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
 
 DAY = f"from={T0 - HOUR}&to={T0 + 15 * HOUR}"
-KEPT = ("--ros-args", "-p", "journal_days:=36500")
+STORED = ("--ros-args", "-p", "journal_days:=36500")
 
 
 def test_a_report_covers_its_period_and_an_invalid_one_is_refused(tmp_path: Path) -> None:
     """`test_live_same_answers` compares `serve`, `web` and a fleet."""
     journal = Path(shutil.copy(JOURNALS / "day.sqlite", tmp_path / "j.sqlite"))
-    with bridge(*OPTIONS, *KEPT, "-p", f"journal:={journal}") as live:
+    with bridge(*OPTIONS, *STORED, "-p", f"journal:={journal}") as live:
         wait_for(lambda: live.json("/api/alarms")["source"] == "journal", "the alarms")
         check(live)
         check_refusals(live)

@@ -79,15 +79,15 @@ def robot(live: Bridge) -> Json:
 
 def at(live: Bridge, x: float) -> Json | None:
     """The robot in the state, once it is at this position."""
-    told = robot(live)
-    return told if told["position"] and told["position"]["x"] == x else None
+    reported = robot(live)
+    return reported if reported["position"] and reported["position"]["x"] == x else None
 
 
 def until_at(live: Bridge, x: float) -> Json:
     """The same, awaited."""
-    told = live.peer.until(lambda: at(live, x), f"the robot at {x} m")
-    assert told is not None
-    return told
+    reported = live.peer.until(lambda: at(live, x), f"the robot at {x} m")
+    assert reported is not None
+    return reported
 
 
 def assert_no_robot(client: Listener) -> None:
@@ -120,12 +120,12 @@ def test_serve_and_web_show_pose_plan_and_battery_from_standard_messages(
 
     for live in both:
 
-        def told(live: Bridge = live) -> Json | None:
+        def reported(live: Bridge = live) -> Json | None:
             volatile.publish(stamped(battery, twin, "base_link"))
             found = at(live, 2.1)
             return found if found and found["battery"] and found["plan"] else None
 
-        found = twin.peer.until(told, "the robot, its plan and its battery")
+        found = twin.peer.until(reported, "the robot, its plan and its battery")
         assert found is not None
         stamp = pose.header.stamp
         assert found["position"] == {
@@ -205,11 +205,11 @@ def test_before_the_first_message_nothing_is_known_and_odometry_is_recognised_by
     best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     publisher = alone.peer.node.create_publisher(Odometry, "/amcl_pose", best_effort)
 
-    def told() -> Json | None:
+    def reported() -> Json | None:
         publisher.publish(stamped(message, alone))
         return at(alone, 7.0)
 
-    alone.peer.until(told, "the odometry")
+    alone.peer.until(reported, "the odometry")
 
 
 def test_a_topic_of_another_type_is_named_and_does_no_harm(alone: Bridge) -> None:
@@ -245,8 +245,8 @@ def test_a_flood_of_poses_costs_the_ros_thread_no_more_than_one_a_second(alone: 
     assert sent[0] > 100
     first, *_, last = (frame["position"]["x"] for frame in frames)
     assert last - first > 20, "the newest, and none that waited"
-    told = robot(alone)
-    assert len(told["trail"]) <= took_s + 3
+    reported = robot(alone)
+    assert len(reported["trail"]) <= took_s + 3
 
 
 def test_a_clock_that_never_starts_dates_nothing_and_shows_no_age() -> None:
@@ -256,6 +256,6 @@ def test_a_clock_that_never_starts_dates_nothing_and_shows_no_age() -> None:
         message = amcl(3.0, 3.0)
         message.header.stamp.sec = 1_000
         running.peer.publish("/amcl_pose", message, depth=1)
-        told = until_at(running, 3.0)
-        assert told["position"]["observed_at"]["sec"] == 1_000
+        reported = until_at(running, 3.0)
+        assert reported["position"]["observed_at"]["sec"] == 1_000
         assert running.get("/readyz").json()["reason"] == "no_clock"

@@ -29,8 +29,8 @@ def test_a_fleet_answers_for_a_site_byte_for_byte_as_its_serve(
     tmp_path: Path, archive: Archive
 ) -> None:
     journal = Path(shutil.copy(JOURNALS / "day.sqlite", tmp_path / "j.sqlite"))
-    asked = json.loads(gzip.decompress((JOURNALS / "day.http.json.gz").read_bytes()))["serve"]
-    asked.append([f"/api/report?from={T0}&to={T0 + 24 * HOUR}", None])
+    requested = json.loads(gzip.decompress((JOURNALS / "day.http.json.gz").read_bytes()))["serve"]
+    requested.append([f"/api/report?from={T0}&to={T0 + 24 * HOUR}", None])
     with (
         bridges(journal) as (serve, _),
         forwarder(archive, journal),
@@ -40,7 +40,7 @@ def test_a_fleet_answers_for_a_site_byte_for_byte_as_its_serve(
         page.site(is_live=True)
         with httpx.Client(base_url=f"{page.url}/sites/gh1", timeout=PATIENCE_S) as site:
             wait_for(lambda: site.get("/api/alarms").status_code == 200, "its alarms")
-            different = [path for path, _ in asked if ask(site, path) != ask(serve.http, path)]
+            different = [path for path, _ in requested if ask(site, path) != ask(serve.http, path)]
     assert different == [], different
 
 
@@ -49,13 +49,13 @@ def test_a_past_moment_depends_only_on_the_log_up_to_then_on_every_server(
 ) -> None:
     """Judged by no interval, day or plants of later; and with the same ETags."""
     journal = Path(shutil.copy(JOURNALS / "day.sqlite", tmp_path / "j.sqlite"))
-    asked = [f"/api/health?at={T0 + minutes * 60 + 0.5}" for minutes in range(-30, 14 * 60, 31)]
-    asked += [f"{path}at={T0 + 9 * HOUR}" for path in OF_A_MOMENT]
-    asked += [f"/api/report.html?from={T0 - HOUR}&to={T0 + 14 * HOUR}&lang=nl"]
+    requested = [f"/api/health?at={T0 + minutes * 60 + 0.5}" for minutes in range(-30, 14 * 60, 31)]
+    requested += [f"{path}at={T0 + 9 * HOUR}" for path in OF_A_MOMENT]
+    requested += [f"/api/report.html?from={T0 - HOUR}&to={T0 + 14 * HOUR}&lang=nl"]
     found = []
     for _ in range(2):
         with bridges(journal) as both:
-            found += [[told(bridge.http, path) for path in asked] for bridge in both]
+            found += [[reported(bridge.http, path) for path in requested] for bridge in both]
         # As if nothing had come after that.
         with closing(sqlite3.connect(journal)) as log, log:
             for table in ("scan", "look"):
@@ -66,6 +66,6 @@ def test_a_past_moment_depends_only_on_the_log_up_to_then_on_every_server(
         assert other == found[0]
 
 
-def told(http: httpx.Client, path: str) -> list[Any]:
+def reported(http: httpx.Client, path: str) -> list[Any]:
     answer = http.get(path)
     return [answer.status_code, answer.headers["etag"], answer.content]

@@ -90,11 +90,11 @@ def trickle(client: socket.socket) -> None:
 def wait_reading(healthy: Listener, look: Callable[[], bool], what: str) -> None:
     """Wait on a condition, with the healthy client reading all the while."""
 
-    def read_and_look() -> bool:
+    def read_and_check() -> bool:
         healthy.rest()
         return look()
 
-    wait_for(read_and_look, what)
+    wait_for(read_and_check, what)
 
 
 def newest(client: Listener) -> int:

@@ -6,7 +6,7 @@ import subprocess
 from tests.support.structure import ROOT
 
 
-def told(*target: str) -> str:
+def reported(*target: str) -> str:
     """The commands of a target, none of them run."""
     own = ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")
     result = subprocess.run(
@@ -18,7 +18,7 @@ def told(*target: str) -> str:
 
 
 def test_every_check_is_part_of_make_test_and_two_run_at_a_time() -> None:
-    lines = told("test")
+    lines = reported("test")
     for command in (
         "ruff check",
         "ruff format --check",
@@ -34,14 +34,14 @@ def test_every_check_is_part_of_make_test_and_two_run_at_a_time() -> None:
         "-j 2 --output-sync=target lint types docs hmi-test collect",
     ):
         assert command in lines
-    assert "-j 2 --output-sync=target quick lint types hmi-test" in told("check")
+    assert "-j 2 --output-sync=target quick lint types hmi-test" in reported("check")
 
 
 def test_a_warning_ends_the_build_of_the_guide() -> None:
-    assert "sphinx-build --quiet -n -W " in told("--what-if=docs/conf.py", "docs")
+    assert "sphinx-build --quiet -n -W " in reported("--what-if=docs/conf.py", "docs")
 
 
 def test_processes_of_the_tests_compile_no_module_again() -> None:
-    lines = [line for line in told("test", "quick").splitlines() if "/pytest " in line]
+    lines = [line for line in reported("test", "quick").splitlines() if "/pytest " in line]
     assert len(lines) == 3
     assert all(line.startswith("PYTHONDONTWRITEBYTECODE= ") for line in lines)

@@ -25,7 +25,7 @@ def roslib(url: str, scenario: str) -> Process:
     return Process([node, str(SCRIPT), address, scenario], ros_env(0))
 
 
-def told_by(process: Process) -> Any:
+def reported_by(process: Process) -> Any:
     """A scenario's result, printed at its end."""
     assert process.wait() == 0, process.output
     return json.loads(process.output.splitlines()[-1])
@@ -33,7 +33,7 @@ def told_by(process: Process) -> Any:
 
 def play(url: str, scenario: str) -> Any:
     with roslib(url, scenario) as process:
-        return told_by(process)
+        return reported_by(process)
 
 
 @pytest.fixture(scope="module")
@@ -57,9 +57,9 @@ def test_a_subscriber_gets_the_state(house: Bridge) -> None:
 def test_fields_have_null_and_a_refused_field_differs_from_a_failed_call(
     house: Bridge,
 ) -> None:
-    told = play(house.url, "field")
-    assert told["known"]["callback"] == "done"
-    known = told["known"]["values"]
+    reported = play(house.url, "field")
+    assert reported["known"]["callback"] == "done"
+    known = reported["known"]["values"]
     assert (known["ok"], known["width"], known["height"]) == (True, 12, 12)
     assert set(known["values"]) == {20.0, None}
     assert known == house.json(
@@ -71,62 +71,62 @@ def test_fields_have_null_and_a_refused_field_differs_from_a_failed_call(
         bbox_max_x=3,
         bbox_max_y=3,
     )
-    assert told["refused"]["callback"] == "done"
-    assert told["refused"]["values"]["ok"] is False
-    assert "resolution" in told["refused"]["values"]["error_message"]
-    assert told["failed"]["callback"] == "failed"
-    assert told["failed"]["values"].startswith("args.colour is unknown")
-    assert told["late"] == {
+    assert reported["refused"]["callback"] == "done"
+    assert reported["refused"]["values"]["ok"] is False
+    assert "resolution" in reported["refused"]["values"]["error_message"]
+    assert reported["failed"]["callback"] == "failed"
+    assert reported["failed"]["values"].startswith("args.colour is unknown")
+    assert reported["late"] == {
         "callback": "failed",
         "values": "/twin/get_field did not answer within 1e-09 s",
     }
 
 
 def test_roslibs_queries_about_names_are_answered(house: Bridge) -> None:
-    told = play(house.url, "names")
-    assert dict(zip(*told["topics"].values(), strict=True)) == {
+    reported = play(house.url, "names")
+    assert dict(zip(*reported["topics"].values(), strict=True)) == {
         "/twin/state": "lupin_msgs/msg/TwinState",
         "/floranova/observations": "lupin_msgs/msg/Observation",
         "/perception/discovered_tags": "lupin_msgs/msg/DiscoveredTags",
         "/map": "nav_msgs/msg/OccupancyGrid",
         "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
     }
-    assert told["topicType"] == "lupin_msgs/msg/TwinState"
-    assert "/twin/get_field" in told["services"]
-    assert told["serviceType"] == "lupin_msgs/srv/GetField"
-    assert told["nodes"]["failed"].startswith("service 'rosapi/nodes' is not served")
+    assert reported["topicType"] == "lupin_msgs/msg/TwinState"
+    assert "/twin/get_field" in reported["services"]
+    assert reported["serviceType"] == "lupin_msgs/srv/GetField"
+    assert reported["nodes"]["failed"].startswith("service 'rosapi/nodes' is not served")
 
 
 def test_map_and_inputs_arrive_as_they_were_published(house: Bridge) -> None:
     house.peer.publish_map(messages.occupancy_grid([[0, 100], [-1, 50]]))
     house.peer.discover(messages.discovered({"1": messages.pose(1.0, 2.0)}))
-    told = play(house.url, "inputs")
-    assert (told["map"]["info"]["width"], told["map"]["header"]["frame_id"]) == (2, "map")
-    assert told["map"]["data"] == [0, 100, -1, 50]
-    assert told["observation"]["tag_reading"]["tag_id"] == "1"
-    assert told["tags"]["tags"][0]["tag_id"] == "1"
+    reported = play(house.url, "inputs")
+    assert (reported["map"]["info"]["width"], reported["map"]["header"]["frame_id"]) == (2, "map")
+    assert reported["map"]["data"] == [0, 100, -1, 50]
+    assert reported["observation"]["tag_reading"]["tag_id"] == "1"
+    assert reported["tags"]["tags"][0]["tag_id"] == "1"
     # Requested in CBOR, which is not sent: roslib reads them all the same.
-    assert told["compressed"] == {"cbor": "map", "cbor-raw": "map", "png": "map"}
-    assert told["statuses"] == []
+    assert reported["compressed"] == {"cbor": "map", "cbor-raw": "map", "png": "map"}
+    assert reported["statuses"] == []
 
 
 def test_a_client_cannot_write(house: Bridge) -> None:
-    told = play(house.url, "write")
-    assert [status["msg"].partition(":")[0] for status in told["told"]] == [
+    reported = play(house.url, "write")
+    assert [status["msg"].partition(":")[0] for status in reported["told"]] == [
         f"op '{name}' is refused"
         for name in ("advertise", "publish", "unadvertise", "advertise_service", "auth")
     ]
-    assert {status["level"] for status in told["told"]} == {"error"}
-    assert told["told"][1]["id"].startswith("publish:/cmd_vel:"), "roslib's own id comes back"
+    assert {status["level"] for status in reported["told"]} == {"error"}
+    assert reported["told"][1]["id"].startswith("publish:/cmd_vel:"), "roslib's own id comes back"
     house.peer.spin_briefly()
     assert house.peer.node.count_publishers("/cmd_vel") == 0
 
 
 def test_two_components_of_a_page_share_a_topic(house: Bridge) -> None:
-    told = play(house.url, "two")
-    assert told["statuses"] == []
-    assert told["heardAfterUnsubscribe"] == 0
-    assert told["afterTheEnd"] == 0
+    reported = play(house.url, "two")
+    assert reported["statuses"] == []
+    assert reported["heardAfterUnsubscribe"] == 0
+    assert reported["afterTheEnd"] == 0
 
 
 def test_a_subscription_survives_a_restart_of_the_bridge() -> None:
@@ -143,7 +143,7 @@ def test_a_subscription_survives_a_restart_of_the_bridge() -> None:
             port = url.rpartition(":")[2]
             with lupin_twin(domain, "serve", "--port", port) as second:
                 assert url_of(second) == url
-                told = told_by(client)
-    assert [tag["tag_id"] for tag in told["before"]["tags"]] == ["old"]
+                reported = reported_by(client)
+    assert [tag["tag_id"] for tag in reported["before"]["tags"]] == ["old"]
     # The robot's topics are latched, too: the new twin may know the tag again by now.
-    assert [tag["tag_id"] for tag in told["after"]["tags"]] in ([], ["old"])
+    assert [tag["tag_id"] for tag in reported["after"]["tags"]] in ([], ["old"])

@@ -55,7 +55,7 @@ def imported(files: Iterable[Path], package: str) -> set[str]:
     return {key for name in names if (key := ROSDEP_KEYS.get(name, name)) is not None}
 
 
-def told(package: str, *kinds: str) -> set[str]:
+def reported(package: str, *kinds: str) -> set[str]:
     """The dependencies of these kinds in package.xml."""
     document = ElementTree.parse(ROS_NODE / package / "package.xml")
     return {str(element.text) for kind in kinds for element in document.iter(kind)}
@@ -78,8 +78,8 @@ def test_pyproject_lists_what_its_packages_import() -> None:
 def project() -> dict[str, Any]:
     """The metadata that pip reads."""
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    told: dict[str, Any] = tomllib.loads(text)["project"]
-    return told
+    reported: dict[str, Any] = tomllib.loads(text)["project"]
+    return reported
 
 
 def test_every_part_has_the_same_version() -> None:
@@ -121,9 +121,9 @@ def test_the_oldest_node_is_the_same_everywhere() -> None:
 def test_set_up_refuses_an_older_node(version: str, is_taken: bool, tmp_path: Path) -> None:
     """The preflight's own check, with a Node of another version."""
     text = (ROOT / ".ci" / "preflight").read_text(encoding="utf-8")
-    asked = re.search(r"node -e '(.*?)'", text, re.DOTALL)[1]  # type: ignore[index]
+    requested = re.search(r"node -e '(.*?)'", text, re.DOTALL)[1]  # type: ignore[index]
     made = f"Object.defineProperty(process, 'versions', {{value: {{node: '{version}'}}}});"
-    done = subprocess.run(["node", "-e", made + asked], cwd=tmp_path, check=False)
+    done = subprocess.run(["node", "-e", made + requested], cwd=tmp_path, check=False)
     assert (done.returncode == 0) == is_taken
 
 
@@ -132,9 +132,9 @@ def test_package_xml_lists_exactly_what_is_imported(package: str) -> None:
     folder = ROS_NODE / package
     tests = set((folder / "test").rglob("*.py"))
     files = set(folder.rglob("*.py")) - tests - {folder / "setup.py"}
-    assert told(package, "exec_depend") == imported(files, package)
-    assert told(package, "test_depend") == (
-        imported(tests, package) - told(package, "exec_depend") | {"python3-pytest"}
+    assert reported(package, "exec_depend") == imported(files, package)
+    assert reported(package, "test_depend") == (
+        imported(tests, package) - reported(package, "exec_depend") | {"python3-pytest"}
     )
 
 
@@ -145,9 +145,11 @@ def test_package_xml_of_the_messages_lists_what_they_and_their_build_use() -> No
     )
     used = set(re.findall(r"^(\w+)/\w+", definitions, re.MULTILINE))
     cmake = (folder / "CMakeLists.txt").read_text(encoding="utf-8")
-    assert told("lupin_msgs", "depend") == used
+    assert reported("lupin_msgs", "depend") == used
     assert set(re.findall(r"find_package\((\w+)", cmake)) == used | OF_CMAKE
-    assert told("lupin_msgs", "buildtool_depend", "test_depend") == OF_CMAKE | {"python3-pytest"}
+    assert reported("lupin_msgs", "buildtool_depend", "test_depend") == OF_CMAKE | {
+        "python3-pytest"
+    }
     assert set(re.search(r"DEPENDENCIES (.*)", cmake)[1].split()) == used  # type: ignore[index]
 
 
@@ -175,14 +177,14 @@ def set_up(monkeypatch: pytest.MonkeyPatch) -> Any:
     """The arguments of a package's setup.py to setuptools."""
 
     def run(package: str) -> dict[str, Any]:
-        told: dict[str, Any] = {}
+        reported: dict[str, Any] = {}
         setuptools = ModuleType("setuptools")  # the real one would set up this process
-        setuptools.setup = lambda **arguments: told.update(arguments)  # type: ignore[attr-defined]
+        setuptools.setup = lambda **arguments: reported.update(arguments)  # type: ignore[attr-defined]
         setuptools.find_packages = lambda **_: []  # type: ignore[attr-defined]
         monkeypatch.setitem(sys.modules, "setuptools", setuptools)
         monkeypatch.chdir(ROS_NODE / package)
         exec(compile(Path("setup.py").read_text(encoding="utf-8"), "setup.py", "exec"), {})
-        return told
+        return reported
 
     return run
 
@@ -200,11 +202,11 @@ def test_every_file_of_a_package_exists_and_is_installed(package: str, set_up: A
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_names_versions_and_commands_agree(package: str, set_up: Any) -> None:
-    told = set_up(package)
+    reported = set_up(package)
     document = ElementTree.parse("package.xml")
     for field in ("name", "version", "license"):
-        assert told[field] == document.findtext(field)
-    for script in told["entry_points"]["console_scripts"]:
+        assert reported[field] == document.findtext(field)
+    for script in reported["entry_points"]["console_scripts"]:
         module, function = re.fullmatch(r"\w+ = ([\w.]+):(\w+)", script).groups()  # type: ignore[union-attr]
         source = Path(f"{module.replace('.', '/')}.py").read_text(encoding="utf-8")
         assert f"def {function}(" in source
@@ -230,5 +232,5 @@ def test_every_executable_is_where_ros2_run_looks_and_runs(
         (own,) = prefix.glob("lib/python3*/site-packages")
         env = {**os.environ, "PYTHONPATH": str(own)}
         command = [str(prefix / "lib" / package / "adapt"), "--help"]
-        told = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
-        assert "usage: adapt [-h] [--config FILE] [--check]" in told.stdout
+        reported = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
+        assert "usage: adapt [-h] [--config FILE] [--check]" in reported.stdout

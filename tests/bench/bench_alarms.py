@@ -62,25 +62,25 @@ def ms_since(start: float) -> float:
 
 
 def alarms_of(tags: int) -> None:
-    heard = list(past_of(tags))
+    received = list(past_of(tags))
     before_mb = resident_mb(os.getpid())
     follower = AlarmFolder(BY_LIGHT, SPANS)
     lots = []
-    for first in range(0, len(heard), LOT):
+    for first in range(0, len(received), LOT):
         start = time.thread_time()
-        follower.take(heard[first : first + LOT])
+        follower.take(received[first : first + LOT])
         lots.append(ms_since(start))
-    now_ns = heard[-1].stamp_ns
+    now_ns = received[-1].stamp_ns
     start = time.thread_time()
     found = follower.found(now_ns)
-    row(tags, f"start: {len(heard):,} scans", sum(lots) + ms_since(start), max(lots))
+    row(tags, f"start: {len(received):,} scans", sum(lots) + ms_since(start), max(lots))
     row(tags, f"start: all {len(found.alarms):,} alarms told", ms_since(start))
     took_mb = resident_mb(os.getpid()) - before_mb
     print(f"{'':>7}  memory of that, without the scans heard: {took_mb:.0f} MB")
     took = []
     for change in range(CHANGES):
         now_ns += S
-        one = write(len(heard) + change + 1, str(change), now_ns, [*MIDDLE.values()])
+        one = write(len(received) + change + 1, str(change), now_ns, [*MIDDLE.values()])
         start = time.thread_time()
         follower.take([one])
         follower.found(now_ns)
@@ -88,8 +88,8 @@ def alarms_of(tags: int) -> None:
     row(tags, "alarms: one scan", statistics.median(took), max(took))
     took = []
     for change in range(CHANGES):
-        late_ns = heard[-1].stamp_ns - (change + 1) * (heard[-1].stamp_ns // 100)
-        one = write(2 * len(heard) + change, str(change), late_ns, [*MIDDLE.values()])
+        late_ns = received[-1].stamp_ns - (change + 1) * (received[-1].stamp_ns // 100)
+        one = write(2 * len(received) + change, str(change), late_ns, [*MIDDLE.values()])
         start = time.thread_time()
         follower.take([one])
         follower.found(now_ns)
@@ -152,16 +152,16 @@ def row(tags: int, name: str, took_ms: float, most_ms: float | None = None) -> N
 
 
 def ordinary() -> None:
-    heard = ordinary_days()
+    received = ordinary_days()
     follower = AlarmFolder(BY_LIGHT, SPANS)
-    follower.take(heard)
-    raised = follower.found(heard[-1].stamp_ns).alarms
-    spells = (heard[-1].stamp_ns - heard[0].stamp_ns) / (600 * S)
+    follower.take(received)
+    raised = follower.found(received[-1].stamp_ns).alarms
+    spells = (received[-1].stamp_ns - received[0].stamp_ns) / (600 * S)
     kinds = Counter(alarm.reason.kind.value for alarm in raised)
-    told = ", ".join(f"{kind} {count}" for kind, count in kinds.most_common())
+    reported = ", ".join(f"{kind} {count}" for kind, count in kinds.most_common())
     print(
         f"\nThe simulator's ordinary days: {len(raised)} alarms in {spells / 144:.1f} days, "
-        f"{len(raised) / spells:.2f} in ten minutes ({told})"
+        f"{len(raised) / spells:.2f} in ten minutes ({reported})"
     )
 
 

@@ -35,8 +35,8 @@ ROUNDS = 10
 
 
 def posterior_at(all_read: Readings, at_s: float) -> Posterior:
-    heard = thinned(all_read.take(all_read.time_s <= at_s), at_s, DAY_S)
-    return fit(heard).posterior(heard, at_s)
+    received = thinned(all_read.take(all_read.time_s <= at_s), at_s, DAY_S)
+    return fit(received).posterior(received, at_s)
 
 
 def changed(all_read: Readings, at_s: float) -> list[int]:
@@ -77,7 +77,7 @@ def trust(world: World, all_read: Readings) -> tuple[bool | None, float]:
 
 def main() -> None:
     found: Counter[int] = Counter()
-    houses = alarms = tags = 0
+    greenhouses = alarms = tags = 0
     said: Counter[tuple[str, bool | None, bool]] = Counter()
     for sort in SORTS:
         for seed in JUDGING:
@@ -88,14 +88,16 @@ def main() -> None:
                 said[name, is_trusted, covers < 0.7] += 1
             if sort in CHANGING:
                 continue
-            houses += 1
+            greenhouses += 1
             tags += len(world.xy)
             alarms += len(changed(all_read, AT_S))
             for count, is_found in found_after(all_read, seed % len(world.xy))[0].items():
                 found[count] += is_found
-    print(f"said to have changed where none has: {alarms} of {tags} tags, {houses} greenhouses")
+    print(
+        f"said to have changed where none has: {alarms} of {tags} tags, {greenhouses} greenhouses"
+    )
     for count in AFTER:
-        print(f"+{OFFSET:g} found after {count} scans: {found[count] / houses:.2f}")
+        print(f"+{OFFSET:g} found after {count} scans: {found[count] / greenhouses:.2f}")
     for name, trusted, is_narrow in sorted(said, key=str):
         what = "under 0.7" if is_narrow else "0.7 or more"
         count = said[name, trusted, is_narrow]

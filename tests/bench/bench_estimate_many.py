@@ -74,10 +74,10 @@ def house(tags: int, metres: float, seed: int, passes: int) -> tuple[Truth, Read
 def judged(tags: int, metres: float, seed: int, phase: str) -> list[float]:
     """The error as a ratio to IDW's where that paints; the coverage over all cells."""
     passes, silent_s = PHASES[phase]
-    truth, heard = house(tags, metres, seed, passes)
-    readings = thinned(heard, silent_s, DAY_S)
+    truth, received = house(tags, metres, seed, passes)
+    readings = thinned(received, silent_s, DAY_S)
     cell_m = metres / CELLS
-    field = idw_of(heard, metres, metres, cell_m).ravel()
+    field = idw_of(received, metres, metres, cell_m).ravel()
     grid = (
         fit(readings)
         .posterior(readings, silent_s)

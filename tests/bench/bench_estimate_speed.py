@@ -13,7 +13,7 @@ from tests.support.estimates import DAY_S, many_tags
 
 Made = TypeVar("Made")
 # Tags, readings of each, m of the greenhouse's side, cells of a side.
-HOUSES = (
+GREENHOUSES = (
     (10, 32, 8.0, 200),
     (30, 20, 8.0, 200),
     (1_000, 8, 20.0, 1_000),
@@ -70,6 +70,6 @@ def costs(tags: int, each: int, metres: float, side: int) -> list[float]:
 def main() -> None:
     columns = ("IDW", "fit", "load", "grid", "checks")
     print(f"{'tags x readings, cells':<34}" + "".join(f"{name:>10}" for name in columns))
-    for tags, each, metres, side in HOUSES:
+    for tags, each, metres, side in GREENHOUSES:
         label = f"{tags} x {each}, {side} x {side} in {metres:g} m"
         print(f"{label:<34}" + "".join(f"{one:>10.1f}" for one in costs(tags, each, metres, side)))

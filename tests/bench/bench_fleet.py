@@ -29,7 +29,7 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.queries import series
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import SiteLog
-from tests.bench.journal_double import BEGUN_NS, House, filled
+from tests.bench.journal_double import BEGUN_NS, Greenhouse, filled
 from tests.support.archive import Archive, forward_once
 from tests.support.journal import SECOND, kept, scan
 from tests.support.postgres import server
@@ -39,7 +39,7 @@ SENSORS = ("temperature", "humidity", "co2", "light", "moisture")
 # What comes before does not count: 200 connections, and journals that have just started.
 WARM_S, MEASURED_S = 15.0, 20.0
 HOUR = 3_600 * SECOND
-DAY = House(tags=TAGS, days=1.0, every_s=120.0, look_days=0.0, failing=0)
+DAY = Greenhouse(tags=TAGS, days=1.0, every_s=120.0, inspection_days=0.0, failing=0)
 
 
 # --- lag ------------------------------------------------------------------------------------------
@@ -168,9 +168,9 @@ def measure(archive: Archive, sites: int, days: int) -> None:
             found = state_at(log, at_ns, "map")  # type: ignore[arg-type]  # queries are of both
             states.append((time.perf_counter() - start) * 1e3)
             assert len(found.tags) == TAGS, len(found.tags)
-            asked = SeriesRequest("7", "co2", BEGUN_NS, end_ns, 500)
+            requested = SeriesRequest("7", "co2", BEGUN_NS, end_ns, 500)
             start = time.perf_counter()
-            series(log, asked, end_ns)
+            series(log, requested, end_ns)
             past.append((time.perf_counter() - start) * 1e3)
     rows = sites * days * DAY.scans * TAGS
     print(

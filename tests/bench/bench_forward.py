@@ -5,11 +5,11 @@
 
 import time
 
-from tests.bench.journal_double import House, filled
+from tests.bench.journal_double import Greenhouse, filled
 from tests.support.archive import Archive, forward_once
 from tests.support.postgres import server
 
-WEEK = House(tags=30, days=7.0, every_s=120.0, look_days=0.0, failing=0)
+WEEK = Greenhouse(tags=30, days=7.0, every_s=120.0, inspection_days=0.0, failing=0)
 
 
 def main() -> None:

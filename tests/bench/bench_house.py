@@ -9,7 +9,7 @@ from collections.abc import Callable
 from playwright.sync_api import CDPSession, Page
 
 from tests.bench.bench_page import chromium, page_of
-from tests.bench.house_double import house_of
+from tests.bench.house_double import greenhouse_of
 from tests.support.web import bridge
 
 SIZES = (1_000, 10_000)
@@ -46,7 +46,7 @@ def main() -> None:
         for count in SIZES:
             with page_of(browser) as page:
                 page.add_init_script(FIRST_ROW)
-                page.add_init_script(house_of(count))
+                page.add_init_script(greenhouse_of(count))
                 page.goto(running.url)
                 page.wait_for_function("() => window.firstRow")
                 page.evaluate(SETTLED)

@@ -25,12 +25,12 @@ from lupin_twin.journal.schema import open_reader
 from lupin_twin.journal.writer import Journal
 from lupin_twin.journal.writes import rows as exported
 from lupin_twin.runtime.memory import Memory
-from tests.bench.journal_double import BEGUN_NS, LIMITS, Filled, House, filled
+from tests.bench.journal_double import BEGUN_NS, LIMITS, Filled, Greenhouse, filled
 
-YEAR: Final = House(tags=30, days=365.0, every_s=2880.0)
+YEAR: Final = Greenhouse(tags=30, days=365.0, every_s=2880.0)
 # The largest: 10,000 tags with five sensors each, every ten minutes.
-MANY: Final = House(tags=10_000, days=2.0, every_s=43_200.0, look_days=0.0, failing=0)
-DAY: Final = House(tags=10_000, days=1.0, every_s=600.0)
+MANY: Final = Greenhouse(tags=10_000, days=2.0, every_s=43_200.0, inspection_days=0.0, failing=0)
+DAY: Final = Greenhouse(tags=10_000, days=1.0, every_s=600.0)
 SCANS: Final = 60_000
 # Scans that share a commit where the writer has to catch up.
 LOT: Final = 500
@@ -48,16 +48,16 @@ def main() -> None:
     restart(filled(MANY))
 
 
-def report(what: str, figure: str, asked: str) -> None:
-    print(f"{what:58}{figure:>26}   (asked {asked})", flush=True)
+def report(what: str, figure: str, requested: str) -> None:
+    print(f"{what:58}{figure:>26}   (asked {requested})", flush=True)
 
 
 def write(folder: Path) -> None:
-    heard = DAY.rows()
+    received = DAY.rows()
     # The first scan of each tag creates its series, once.
-    before = list(islice(heard, DAY.tags * 2))
-    told = list(islice(heard, SCANS))
-    paced = list(islice(heard, 2_000))
+    before = list(islice(received, DAY.tags * 2))
+    reported = list(islice(received, SCANS))
+    paced = list(islice(received, 2_000))
     path = folder / "log.sqlite"
     file = JournalFile(path, LIMITS, is_sound=True)
     with closing(file):
@@ -80,10 +80,10 @@ def write(folder: Path) -> None:
         in_lots(before, LOT)
         first_bytes = size()
         begun_s = time.process_time()
-        in_lots(told, LOT)
-        rate = readings(told) / (time.process_time() - begun_s)
+        in_lots(reported, LOT)
+        rate = readings(reported) / (time.process_time() - begun_s)
         report("readings written a second", f"{rate:,.0f}", "100,000")
-        each = (size() - first_bytes) / readings(told)
+        each = (size() - first_bytes) / readings(reported)
         report("bytes a reading in the file", f"{each:.1f}", "20")
         begun_bytes = handed_to_disk()
         in_lots(paced, 1)
@@ -104,14 +104,14 @@ def handed_to_disk() -> int:
 
 def ask(year: Filled, many: Filled) -> None:
     begin, end = BEGUN_NS, year.house.end_ns
-    for house, asked in ((year, "3"), (many, "60")):
+    for house, requested in ((year, "3"), (many, "60")):
         at_ns = (BEGUN_NS + house.house.end_ns) // 2
         with closing(open_reader(house.path)) as reader:
             assert len(state_at(reader, at_ns, "map").tags) == house.house.tags
         report(
             f"state as of a moment, {house.house.tags:,} tags, ms",
             timed(house.path, lambda log, at_ns=at_ns: state_at(log, at_ns, "map")),  # type: ignore[misc]
-            asked,
+            requested,
         )
     sensor = SeriesRequest("7", "temperature", begin, end)
     what = f"one sensor of {year.house.scans:,} scans as 500 buckets, ms"
@@ -130,13 +130,13 @@ def ask(year: Filled, many: Filled) -> None:
     report("readings exported a second", f"{rate:,.0f}", "-")
 
 
-def timed(path: Path, question: Callable[[object], object]) -> str:
+def timed(path: Path, query: Callable[[object], object]) -> str:
     """Ms of one core: the first over a connection, and the median of nine."""
     took = []
     with closing(open_reader(path)) as reader:
         for _ in range(9):
             begun_s = time.thread_time()
-            question(reader)
+            query(reader)
             took.append((time.thread_time() - begun_s) * 1e3)
     return f"{took[0]:.2f}, then {statistics.median(took):.2f}"
 

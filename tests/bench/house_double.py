@@ -88,6 +88,6 @@ window.house = {};
 """
 
 
-def house_of(count: int) -> str:
+def greenhouse_of(count: int) -> str:
     """The script for a page with that many tags."""
     return _SCRIPT.replace("COUNT", str(count))

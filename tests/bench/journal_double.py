@@ -30,17 +30,17 @@ _BATCH: Final = 20_000
 
 
 @dataclass(frozen=True)
-class House:
+class Greenhouse:
     """The received observations of a greenhouse.
 
-    `look_days` is how often a tag's flowers are inspected, 0 for never; `failing` every that many
+    `inspection_days` : how often flowers are inspected, 0 for never; `failing`: every that many
     attempts fail, 0: none.
     """
 
     tags: int
     days: float
     every_s: float
-    look_days: float = 1.0
+    inspection_days: float = 1.0
     failing: int = 50
 
     @property
@@ -57,7 +57,7 @@ class House:
         """All observations, by time."""
         step_ns = int(self.every_s * SECOND / self.tags)
         ids = [str(number + 1) for number in range(self.tags)]
-        looks_every = max(1, int(self.look_days * DAY_S / self.every_s))
+        inspections_every = max(1, int(self.inspection_days * DAY_S / self.every_s))
         for turn in range(self.scans):
             by_day = math.sin(turn * self.every_s / DAY_S * 2.0 * math.pi)
             for tag, tag_id in enumerate(ids):
@@ -77,7 +77,7 @@ class House:
                 yield Scan(
                     tag_id, at_ns, readings, None, 0, "", "robot", at_ns, "patrol", arrival_ns
                 )
-                if self.look_days and turn % looks_every == tag % looks_every:
+                if self.inspection_days and turn % inspections_every == tag % inspections_every:
                     yield _look(tag, at_ns, has_pest=(turn + tag) % 97 == 0)
 
 
@@ -101,12 +101,12 @@ class Filled:
     """A journal, and its content."""
 
     path: Path
-    house: House
+    house: Greenhouse
     readings: int
 
 
 @cache
-def filled(house: House) -> Filled:
+def filled(house: Greenhouse) -> Filled:
     """The journal of a greenhouse, written once per process; it is deleted with the process."""
     return fill(_folder() / f"{house.tags}-{house.days:g}-{house.every_s:g}.sqlite", house)
 
@@ -118,14 +118,14 @@ def _folder() -> Path:
     return folder
 
 
-def fill(path: Path, house: House) -> Filled:
+def fill(path: Path, house: Greenhouse) -> Filled:
     """Write all observations of a greenhouse, as its twin would."""
     readings = 0
     file = JournalFile(path, LIMITS, is_sound=True)
     with closing(file):
         run = file.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), is_believed=True).run
-        heard = house.rows()
-        while lot := list(islice(heard, _BATCH)):
+        received = house.rows()
+        while lot := list(islice(received, _BATCH)):
             file.append([(run, row) for row in lot])
             readings += sum(len(row.readings) for row in lot if isinstance(row, Scan))
             file.check_size(may_purge=False)

@@ -68,7 +68,7 @@ class Clients:
     def run(self, count: int) -> None:
         """Serve until standard input ends."""
         self._poll.register(sys.stdin, select.EPOLLIN)
-        has_told = False
+        has_reported = False
         while True:
             events = self._poll.poll(0.5)
             for fd, event in events:
@@ -81,8 +81,8 @@ class Clients:
                     self._upgrade(self._streams[fd])
                 elif not self._read(self._streams[fd]):
                     self._poll.unregister(fd)
-            if not has_told and len(self._joined) == count:
-                has_told = True
+            if not has_reported and len(self._joined) == count:
+                has_reported = True
                 tell(joined_s=self._joined)
             if time.monotonic() > self._window[1] + DRAIN_S:
                 self._report()

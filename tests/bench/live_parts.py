@@ -77,7 +77,7 @@ class Clients:
 
     def joined_s(self) -> float:
         """Wait for every client's first state; the time that the last one took, s."""
-        return max(max(map(float, told["joined_s"])) for told in self._told())
+        return max(max(map(float, reported["joined_s"])) for reported in self._reported())
 
     def measure(self, start_s: float, end_s: float) -> Seen:
         """Measure changes published in a stretch of the monotonic clock."""
@@ -86,14 +86,14 @@ class Clients:
             process.stdin.write(f"measure {start_s} {end_s}\n")
             process.stdin.flush()
         seen = Seen([], Counter(), 0.0)
-        for told in self._told():
-            seen.delays_s += told["delays_s"]
-            seen.received.update({int(seq): n for seq, n in told["received"].items()})
-            seen.frame_bytes = max(seen.frame_bytes, told["frame_bytes"])
+        for reported in self._reported():
+            seen.delays_s += reported["delays_s"]
+            seen.received.update({int(seq): n for seq, n in reported["received"].items()})
+            seen.frame_bytes = max(seen.frame_bytes, reported["frame_bytes"])
         seen.delays_s.sort()
         return seen
 
-    def _told(self) -> Iterator[dict[str, Any]]:
+    def _reported(self) -> Iterator[dict[str, Any]]:
         for process in self._processes:
             assert process.stdout is not None
             line = process.stdout.readline()

@@ -72,21 +72,21 @@ class Ear:
     can_take = True
 
     def __init__(self) -> None:
-        self.heard: list[dict[str, Any]] = []
+        self.frames: list[dict[str, Any]] = []
 
     def write(self, wire: bytes) -> None:
-        self.heard.append(json.loads(received(wire)))
+        self.frames.append(json.loads(received(wire)))
 
     def dismiss(self, code: int, reason: str) -> None:
         raise AssertionError(f"dismissed: {code} {reason}")
 
     @property
     def states(self) -> list[dict[str, Any]]:
-        return [frame for frame in self.heard if frame["type"] == "state"]
+        return [frame for frame in self.frames if frame["type"] == "state"]
 
     @property
     def reasons(self) -> list[str]:
-        return [frame["reason"] for frame in self.heard if frame["type"] == "status"]
+        return [frame["reason"] for frame in self.frames if frame["type"] == "status"]
 
 
 def state(number: int) -> TwinUpdate:
@@ -258,9 +258,9 @@ async def test_a_second_twin_is_reported(caplog: pytest.LogCaptureFixture) -> No
     async with Stage() as stage:
         stage.script.tell(state(1))
         stage.script.tell(replace(state(2), twin_count=2))
-        told = stage.ear.heard[-1] if stage.ear.reasons[-1] == "live" else {}
-        await until(lambda: any("2 twins" in f.get("message", "") for f in stage.ear.heard), "it")
-        assert told
+        reported = stage.ear.frames[-1] if stage.ear.reasons[-1] == "live" else {}
+        await until(lambda: any("2 twins" in f.get("message", "") for f in stage.ear.frames), "it")
+        assert reported
         assert "2 twins publish on the same topic" in caplog.text
 
 
@@ -310,21 +310,21 @@ async def test_alarms_are_sent_at_once_and_those_right_after_once_a_second() -> 
             found = board_of(map(alarm, tag_ids))
             stage.bridge.alarms.put(found, Change(()), "heard", 1)
 
-        def told() -> list[int]:
-            frames = [frame for frame in stage.ear.heard if frame["type"] == "alarms"]
+        def reported() -> list[int]:
+            frames = [frame for frame in stage.ear.frames if frame["type"] == "alarms"]
             return [len(frame["alarms"]) for frame in frames if frame["alarms"]]
 
         stage.script.tell(state(1))
         loop = asyncio.get_running_loop()
         put("a")
-        await until(lambda: told() == [1], "the first")
+        await until(lambda: reported() == [1], "the first")
         first_s = loop.time()
         for count in range(2, 6):
             put("abcde"[:count])
             for _ in range(5):  # as a frame would, if it were written now
                 await asyncio.wrap_future(stage.script.workers.submit(lambda _: None))
-        await until(lambda: told()[-1] == 5, "the newest")
-        assert told() == [1, 5]
+        await until(lambda: reported()[-1] == 5, "the newest")
+        assert reported() == [1, 5]
         assert loop.time() - first_s > 0.8 * ALARMS_REST_S
 
 
@@ -339,7 +339,7 @@ async def test_a_channel_that_fails_on_an_alarm_costs_the_page_no_alarms(
         stage.script.tell(state(1))
         monkeypatch.setattr(Webhook, "on_alarms", lambda *_: 1 / 0)
         stage.bridge.alarms.put(board_of([alarm("a")]), Change(()), "heard", 1)
-        await until(lambda: any(it.get("alarms") for it in stage.ear.heard), "the alarm")
+        await until(lambda: any(it.get("alarms") for it in stage.ear.frames), "the alarm")
     assert "webhook had an error with changed alarms" in caplog.text
 
 
@@ -360,8 +360,8 @@ async def test_while_the_twin_is_silent_its_status_is_repeated() -> None:
         await until(lambda: a_second_later("never_seen"), "the status, again and again")
         stage.script.tell(state(1))
         await until(lambda: a_second_later("stale"), "the silence, again and again")
-        told = [frame for frame in stage.ear.heard if frame["type"] == "status"]
-        ages_s = [frame["state_age_seconds"] for frame in told if frame["reason"] == "stale"]
+        reported = [frame for frame in stage.ear.frames if frame["type"] == "status"]
+        ages_s = [frame["state_age_seconds"] for frame in reported if frame["reason"] == "stale"]
         assert ages_s == sorted(set(ages_s)), "each as of then"
 
 

@@ -28,10 +28,10 @@ def judged_state(number: int) -> TwinUpdate:
 async def test_a_robot_is_not_reported_as_stopped_before_the_log_was_read(
     error: Exception | None,
 ) -> None:
-    asked, may_answer = asyncio.Event(), asyncio.Event()
+    requested, may_answer = asyncio.Event(), asyncio.Event()
 
     async def ask(*_: object) -> tuple[PastWrite, ...]:
-        asked.set()
+        requested.set()
         await may_answer.wait()
         if error is not None:
             raise error
@@ -48,7 +48,7 @@ async def test_a_robot_is_not_reported_as_stopped_before_the_log_was_read(
             house = stage.ear.states[-1]["health"]["house"]
             if number == 1:
                 assert house["verdict"] == "healthy"
-                await asked.wait()
+                await requested.wait()
                 may_answer.set()
                 await until(lambda: stage.bridge._judge.knows_recent, "the log's word")
         assert [reason["kind"] for reason in house["reasons"]] == ["stopped"]
@@ -78,7 +78,7 @@ async def test_a_state_that_cannot_be_judged_is_sent_with_everything_unknown(
             await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
             wanted = "unknown" if is_broken else "healthy"
             assert verdicts(stage.ear.states[-1]) == [wanted] * 3
-        assert [verdicts(frame) for frame in delta.heard if frame["type"] == "delta"] == [
+        assert [verdicts(frame) for frame in delta.frames if frame["type"] == "delta"] == [
             ["unknown"] * 3,
             ["unknown"],
             ["healthy"] * 3,

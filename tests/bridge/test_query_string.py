@@ -63,13 +63,13 @@ def test_any_query_string_is_parsed_or_refused(pairs: list[tuple[str, str]]) -> 
 
 
 def test_without_options_a_client_gets_every_state_whole() -> None:
-    asked = read(ListenQuery, [])
-    assert (asked.delta, asked.min_interval_s) == (False, 0.0)
+    requested = read(ListenQuery, [])
+    assert (requested.delta, requested.min_interval_s) == (False, 0.0)
 
 
 def test_the_lowest_rate_is_one_and_anything_lower_is_refused() -> None:
-    asked = read(ListenQuery, [("delta", "1"), ("max_rate_hz", "0.01")])
-    assert (asked.delta, asked.min_interval_s) == (True, 100.0)
+    requested = read(ListenQuery, [("delta", "1"), ("max_rate_hz", "0.01")])
+    assert (requested.delta, requested.min_interval_s) == (True, 100.0)
     for value in ("0.0099", "0", "-1", "nan", "fast", ""):
         with pytest.raises(ValueError, match=f"max_rate_hz is '{value}': input should be"):
             read(ListenQuery, [("max_rate_hz", value)])

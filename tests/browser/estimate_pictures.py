@@ -56,13 +56,13 @@ def taken(browser: Browser, folder: Path) -> None:
     with tempfile.TemporaryDirectory() as home:
         journal = Path(home) / "journal.sqlite"
         now_ns = time.time_ns()
-        told, end_ns = remembered(now_ns), now_ns - GRADED_S * SECOND
-        known = [row for row in told if row.stamp_ns <= end_ns]
-        robot = Robot(row for row in told if isinstance(row, Scan) and row.stamp_ns > end_ns)
+        reported, end_ns = remembered(now_ns), now_ns - GRADED_S * SECOND
+        known = [row for row in reported if row.stamp_ns <= end_ns]
+        robot = Robot(row for row in reported if isinstance(row, Scan) and row.stamp_ns > end_ns)
         kept(journal, known, Clock(now_ns, now_ns, is_simulated=False))
         world = ("--world", f"day_length_s={DAY_S}")
         with bridge(*world, "--ros-args", "-p", f"journal:={journal}") as running:
-            running.peer.publish_map(house_map())
+            running.peer.publish_map(greenhouse_map())
             wait_for(lambda: is_fitted(running), "a model, and the map", READY_S)
             for name, before_s in PAST.items():
                 robot.go_on(running)
@@ -88,7 +88,7 @@ class Robot:
         for start in range(0, len(due), LOT):
             lot = due[start : start + LOT]
             running.peer.observe(*map(message_of, lot))
-            running.tag(lot[-1].tag_id, partial(is_told, lot[-1]))
+            running.tag(lot[-1].tag_id, partial(is_reported, lot[-1]))
 
 
 def message_of(row: Scan) -> Any:
@@ -97,10 +97,10 @@ def message_of(row: Scan) -> Any:
     return scan(row.tag_id, readings, status=row.status, stamp_s=row.stamp_ns / SECOND)
 
 
-def is_told(row: Scan, tag: dict[str, Any]) -> bool:
+def is_reported(row: Scan, tag: dict[str, Any]) -> bool:
     """Whether the twin knows the scan."""
-    tried = filled(tag)["last_try"]
-    return tried is not None and tried["sec"] >= row.stamp_ns // SECOND
+    attempted = filled(tag)["last_try"]
+    return attempted is not None and attempted["sec"] >= row.stamp_ns // SECOND
 
 
 def remembered(now_ns: int) -> list[Write]:
@@ -122,7 +122,7 @@ def scan_wrongly(running: Bridge) -> None:
         running.peer.observe(scan(CHANGED_TAG, wrong, stamp_s=now_s - number * APART_S))
 
 
-def house_map() -> object:
+def greenhouse_map() -> object:
     """The greenhouse's floor within its walls."""
     inside = read_greenhouse(GreenhouseSimulator()).interior
     columns, lines = (
@@ -146,8 +146,8 @@ def is_fitted(running: Bridge) -> bool:
 def has_changed(running: Bridge) -> bool:
     """Whether the estimate leaves the tag out, and the page shows it."""
     tags = running.json("/api/estimate/tags", sensor_type="temperature")["tags"]
-    told = running.json("/api/health")["tags"][CHANGED_TAG].get("reasons", ())
-    return tags[CHANGED_TAG]["left_out"] and any(each["kind"] == "changed" for each in told)
+    reported = running.json("/api/health")["tags"][CHANGED_TAG].get("reasons", ())
+    return tags[CHANGED_TAG]["left_out"] and any(each["kind"] == "changed" for each in reported)
 
 
 def picture(browser: Browser, url: str, path: Path, link: str) -> None:

@@ -339,8 +339,8 @@ def _rgb(picture: Image.Image, x: int, y: int) -> Pixel:
     return int(pixel[0]), int(pixel[1]), int(pixel[2])
 
 
-LATE_ANSWERS: Final = """const ask = fetch; fetch = async (...question) => {
-  const answer = await ask(...question);
+LATE_ANSWERS: Final = """const real = fetch; fetch = async (...args) => {
+  const answer = await real(...args);
   await new Promise((go) => setTimeout(go, 300 + 1200 * Math.random()));
   return answer; };"""
 

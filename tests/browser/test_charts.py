@@ -101,14 +101,14 @@ def garden() -> Iterator[Garden]:
         yield Garden(running)
 
 
-def questions(hmi: Hmi) -> list[dict[str, str]]:
+def queries(hmi: Hmi) -> list[dict[str, str]]:
     """The page's queries of the past of sensors."""
     return [dict(parse_qsl(urlsplit(url).query)) for url in hmi.requests if "/api/history?" in url]
 
 
-def asked(hmi: Hmi, sensor: str = "temperature") -> dict[str, str]:
+def requested(hmi: Hmi, sensor: str = "temperature") -> dict[str, str]:
     """The page's last query of a sensor's past."""
-    return [question for question in questions(hmi) if question["sensor_type"] == sensor][-1]
+    return [each for each in queries(hmi) if each["sensor_type"] == sensor][-1]
 
 
 def plot(hmi: Hmi, sensor: str = "Temperature") -> Locator:
@@ -161,11 +161,11 @@ def test_a_gap_stays_open_and_the_table_equals_the_api(garden: Garden, open_page
     inside = [column for column in drawn if 20 < column < left - 10]
     assert len(inside) > 0.9 * (left - 30)
 
-    told = garden.history(**asked(hmi))
-    assert not told["is_bucketed"]
-    assert len(told["gaps"]) == 1
+    reported = garden.history(**requested(hmi))
+    assert not reported["is_bucketed"]
+    assert len(reported["gaps"]) == 1
     summary = plot(hmi).get_attribute("aria-label") or ""
-    assert f"{len(told['readings'])} readings" in summary
+    assert f"{len(reported['readings'])} readings" in summary
     assert "1 gap" in summary
     hmi.page.get_by_role("button", name="Show as table").click()
     expect(hmi.test_id("series-table")).to_be_visible()
@@ -173,9 +173,9 @@ def test_a_gap_stays_open_and_the_table_equals_the_api(garden: Garden, open_page
     readings = [row for row in reversed(found) if row["kind"] == "reading"]
     assert [float(row["at"]) for row in readings] == [
         pytest.approx(each["stamp"]["sec"] + each["stamp"]["nanosec"] / 1e9)
-        for each in told["readings"]
+        for each in reported["readings"]
     ]
-    for row, each in zip(readings, told["readings"], strict=True):
+    for row, each in zip(readings, reported["readings"], strict=True):
         assert f"|{each['value']:.1f}\u00a0°C|" in row["text"]
     kinds = [row["kind"] for row in found]
     assert (kinds.count("gap"), kinds.count("failure"), kinds.count("look")) == (1, 1, 1)
@@ -189,8 +189,8 @@ def test_many_come_in_buckets_and_a_drag_brings_readings(
     narrow = {"width": 1200, "height": 900}
     hmi = open_page(garden.bridge.url, f"chart.tag=2&{garden.period}", viewport=narrow)
     picture = plotted(hmi)
-    told = garden.history(**asked(hmi))
-    assert told["is_bucketed"]
+    reported = garden.history(**requested(hmi))
+    assert reported["is_bucketed"]
     whole = plot(hmi).get_attribute("aria-label") or ""
     inside = plot(hmi).locator(".u-over")
     box = inside.bounding_box()
@@ -200,11 +200,11 @@ def test_many_come_in_buckets_and_a_drag_brings_readings(
     hmi.page.mouse.down()
     hmi.page.mouse.move(box["x"] + 0.75 * picture.width, y, steps=5)
     hmi.page.mouse.up()
-    hmi.expect(lambda: float(asked(hmi)["from"]) > garden.from_s + 60, "a finer question")
-    finer = garden.history(**asked(hmi))
+    hmi.expect(lambda: float(requested(hmi)["from"]) > garden.from_s + 60, "a finer query")
+    finer = garden.history(**requested(hmi))
     assert not finer["is_bucketed"]
     span_s = garden.now_s - garden.from_s
-    assert float(asked(hmi)["from"]) == pytest.approx(
+    assert float(requested(hmi)["from"]) == pytest.approx(
         garden.from_s + 0.6 * span_s, abs=0.02 * span_s
     )
     hmi.expect(lambda: "period=" in hmi.address(), "the link to follow")
@@ -217,9 +217,9 @@ def test_many_come_in_buckets_and_a_drag_brings_readings(
     text = download.value.path().read_text(encoding="utf-8-sig")
     table = list(csv.DictReader(io.StringIO(text)))
     buckets = [row for row in table if row["kind"] == "bucket"]
-    assert [int(row["n"]) for row in buckets] == [bucket["n"] for bucket in told["buckets"]]
+    assert [int(row["n"]) for row in buckets] == [bucket["n"] for bucket in reported["buckets"]]
     assert [float(row["value"]) for row in buckets] == [
-        pytest.approx(bucket["mean"]) for bucket in told["buckets"]
+        pytest.approx(bucket["mean"]) for bucket in reported["buckets"]
     ]
     link = hmi.test_id("export-link").get_attribute("href") or ""
     exported = garden.bridge.http.get(link).text.splitlines()

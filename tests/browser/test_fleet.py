@@ -225,8 +225,8 @@ def test_a_row_for_each_greenhouse_leads_to_its_shift_report(
         expect(notes.nth(0)).to_contain_text("Benalarm acknowledged (withdrawn by Cem)")
         expect(notes.nth(1)).to_contain_text("warmAnnaTag 1: vents <b>checked</b>")
         expect(rows.locator("th")).to_have_text(["warm", "silent", "gh1"])
-        asked = sites.http.get("/api/report").json()["sites"]
-        scans = next(each["scans"] for each in asked if each["site"] == "warm")
+        requested = sites.http.get("/api/report").json()["sites"]
+        scans = next(each["scans"] for each in requested if each["site"] == "warm")
         assert scans > 0
         expect(rows.first.locator("td").first).to_have_text(str(scans))
         expect(rows.first.locator("td").nth(4)).to_have_text("5")

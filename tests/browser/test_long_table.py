@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 from playwright.sync_api import expect
 
-from tests.bench.house_double import house_of
+from tests.bench.house_double import greenhouse_of
 from tests.browser.hmi import PHONE, WIDE, Hmi, OpenPage
 from tests.browser.places import place
 from tests.browser.test_accessibility import violations
@@ -30,12 +30,12 @@ setInterval(() => { if (document.querySelector('tr[data-tag-id]')) house.idle();
 
 
 @pytest.fixture
-def open_house(house: Bridge, open_page: OpenPage) -> OpenHouse:
+def open_greenhouse(house: Bridge, open_page: OpenPage) -> OpenHouse:
     """`open_house(tags, fragment, **options)`: the page with a greenhouse of that many tags."""
 
     def open_one(tags: int = TAGS, fragment: str = "", **options: object) -> Hmi:
         hmi = open_page(house.url, go=False, **options)
-        hmi.page.add_init_script(house_of(tags) + GOES_ON)
+        hmi.page.add_init_script(greenhouse_of(tags) + GOES_ON)
         hmi.go(fragment)
         expect(hmi.page.locator("tr[data-tag-id]").first).to_be_attached()
         return hmi
@@ -43,8 +43,8 @@ def open_house(house: Bridge, open_page: OpenPage) -> OpenHouse:
     return open_one
 
 
-def test_the_page_renders_few_rows_and_shows_any(open_house: OpenHouse) -> None:
-    hmi = open_house()
+def test_the_page_renders_few_rows_and_shows_any(open_greenhouse: OpenHouse) -> None:
+    hmi = open_greenhouse()
     expect(hmi.page.get_by_role("table")).to_have_attribute("aria-rowcount", str(TAGS + 1))
     frame = hmi.page.locator(".table-scroll")
     # As wide as its place, with the gaps for the rows that are not rendered.
@@ -61,8 +61,10 @@ def test_the_page_renders_few_rows_and_shows_any(open_house: OpenHouse) -> None:
         hmi.expect(partial(row.evaluate, IS_ON_THE_SCREEN), f"row {tag_id} on the screen")
 
 
-def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(open_house: OpenHouse) -> None:
-    hmi = open_house(fragment=f"tag={TAGS - 3}")
+def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(
+    open_greenhouse: OpenHouse,
+) -> None:
+    hmi = open_greenhouse(fragment=f"tag={TAGS - 3}")
     expect(hmi.row(str(TAGS - 3))).to_be_in_viewport()
     hmi.page.keyboard.press("n")
     expect(hmi.row(str(TAGS - 2))).to_be_in_viewport()
@@ -86,8 +88,8 @@ def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(open_house: 
     expect(focused).to_be_in_viewport()
 
 
-def test_axe_and_windows_of_any_size(open_house: OpenHouse) -> None:
-    hmi = open_house(1_000, "tag=3", bypass_csp=True)
+def test_axe_and_windows_of_any_size(open_greenhouse: OpenHouse) -> None:
+    hmi = open_greenhouse(1_000, "tag=3", bypass_csp=True)
     for viewport in (WIDE, PHONE):
         hmi.resize(**viewport)
         tabs = hmi.page.locator(".pane-tabs")
@@ -100,9 +102,9 @@ def test_axe_and_windows_of_any_size(open_house: OpenHouse) -> None:
     assert hmi.row("3").evaluate("row => getComputedStyle(row).outlineWidth") == "3px"
 
 
-def test_all_rows_have_the_same_height_whatever_they_contain(open_house: OpenHouse) -> None:
+def test_all_rows_have_the_same_height_whatever_they_contain(open_greenhouse: OpenHouse) -> None:
     """Otherwise the table would jump as it scrolls."""
-    hmi = open_house(300)
+    hmi = open_greenhouse(300)
     hmi.page.evaluate("house.unpin(3)")
     expect(hmi.row("3")).to_have_attribute("data-pinned", "false")
     heights = hmi.page.locator("tr[data-tag-id]").evaluate_all(

@@ -92,9 +92,9 @@ def page(hour: Hour, open_page: OpenPage) -> Hmi:
 
 def moment(hmi: Hmi) -> float | None:
     """The moment that the page names; None: now."""
-    told = hmi.app.get_attribute("data-moment")
-    assert told is not None
-    return None if told == "now" else float(told)
+    reported = hmi.app.get_attribute("data-moment")
+    assert reported is not None
+    return None if reported == "now" else float(reported)
 
 
 def settled(hmi: Hmi) -> float | None:
@@ -130,13 +130,13 @@ def check_seen(hmi: Hmi, hour: Hour) -> set[float]:
     """Compare all that the page has shown with the journal; the moments that it showed."""
     moments = set()
     for line in hmi.page.evaluate("window.seen.map((each) => JSON.parse(each))"):
-        told, cell, title = line
-        if told == "now":
+        reported, cell, title = line
+        if reported == "now":
             assert cell in (None, "25.5"), line
             assert title == "Lupin twin", line
         else:
-            assert cell in (None, hour.read_then(float(told)).get("a")), line
-            moments.add(float(told))
+            assert cell in (None, hour.read_then(float(reported)).get("a")), line
+            moments.add(float(reported))
     return moments
 
 

@@ -52,12 +52,12 @@ class Received:
         discovered_tags: str = DISCOVERED_TAGS,
         map_topic: str = MAP,
     ) -> Received:
-        for kind, topic, depth, heard in (
+        for kind, topic, depth, received in (
             (Observation, observations, 50, self.observations),
             (DiscoveredTags, discovered_tags, 50, self.discovered_tags),
             (OccupancyGrid, map_topic, 1, self.maps),
         ):
-            peer.node.create_subscription(kind, topic, heard.append, latched(depth))
+            peer.node.create_subscription(kind, topic, received.append, latched(depth))
         return self
 
     @property
@@ -79,23 +79,23 @@ class Received:
 def test_one_round_shows_the_whole_greenhouse_and_ends(domain: int) -> None:
     tags = GreenhouseSimulator().tag_manager.get_tags()
     with Peer(domain) as peer:
-        heard = Received().listen(peer)
+        received = Received().listen(peer)
         with patrol(domain, "--once", "--speed", "10") as process:
-            peer.until(heard.map_is_complete, "a complete map")
+            peer.until(received.map_is_complete, "a complete map")
             peer.until(
-                lambda: heard.discovered_tags and len(heard.discovered_tags[-1].tags) == 29,
+                lambda: received.discovered_tags and len(received.discovered_tags[-1].tags) == 29,
                 "29 discovered tags",
             )
-            peer.until(lambda: heard.read_tags == set(tags), "a reading of every tag")
-            peer.until(lambda: heard.seen_tags == set(tags), "a look at every tag")
+            peer.until(lambda: received.read_tags == set(tags), "a reading of every tag")
+            peer.until(lambda: received.seen_tags == set(tags), "a look at every tag")
             peer.until(lambda: process.exit_code is not None, "the end of the process")
-            peer.until(lambda: len(heard.observations) >= 2 * 29 + 2, "what came last")
+            peer.until(lambda: len(received.observations) >= 2 * 29 + 2, "what came last")
             assert process.exit_code == 0
             assert "Traceback" not in process.output
 
     # Nothing was lost: two observations a tag, and the two that failed at first.
-    assert len(heard.observations) == 2 * 29 + 2
-    for observation in heard.observations:
+    assert len(received.observations) == 2 * 29 + 2
+    for observation in received.observations:
         assert observation.header.frame_id == "map"
         assert observation.header.stamp.sec > 0
         reading = observation.tag_reading
@@ -159,28 +159,30 @@ def test_topics_and_frame_are_parameters_and_stamps_follow_simulated_time(domain
     }
     arguments = [part for name, value in parameters.items() for part in ("-p", f"{name}:={value}")]
     with Peer(domain) as peer:
-        heard = Received().listen(peer, "/robot/observations", "/elsewhere/tags", "/elsewhere/map")
+        received = Received().listen(
+            peer, "/robot/observations", "/elsewhere/tags", "/elsewhere/map"
+        )
 
-        def heard_simulated_time() -> bool:
+        def received_simulated_time() -> bool:
             # Repeated: a subscriber of /clock does not request a latched one.
             peer.publish("/clock", Clock(clock=Time(sec=1234, nanosec=500_000_000)), depth=1)
             return bool(
-                heard.discovered_tags
-                and heard.maps
-                and heard.observations
-                and heard.observations[-1].header.stamp == Time(sec=1234, nanosec=500_000_000)
+                received.discovered_tags
+                and received.maps
+                and received.observations
+                and received.observations[-1].header.stamp == Time(sec=1234, nanosec=500_000_000)
             )
 
         with patrol(domain, "--speed", "20", "--ros-args", *arguments):
-            peer.until(heard_simulated_time, "every topic, and a stamp in simulated time")
-    for message in (heard.observations[0], heard.discovered_tags[0], heard.maps[0]):
+            peer.until(received_simulated_time, "every topic, and a stamp in simulated time")
+    for message in (received.observations[0], received.discovered_tags[0], received.maps[0]):
         assert message.header.frame_id == "greenhouse"
 
 
 def test_a_signal_ends_it_without_errors_even_while_it_waits_for_long(domain: int) -> None:
     with Peer(domain) as peer, patrol(domain, "--speed", "0.1") as process:
-        heard = Received().listen(peer)
-        peer.until(lambda: heard.maps, "the first look around")
+        received = Received().listen(peer)
+        peer.until(lambda: received.maps, "the first look around")
         assert process.stop(signal.SIGINT) == 0
         assert "Traceback" not in process.output
 

@@ -49,9 +49,9 @@ def test_every_tag_is_scanned_in_every_round_and_some_scans_fail(scans: list[Sca
     last = int(scans[-1].mission.removeprefix("past-"))
     assert last > 50
     for number in range(1, last):
-        tried = [row for row in scans if row.mission == f"past-{number:04d}"]
-        assert {row.tag_id for row in tried} == tags
-        failed = [row for row in tried if row.status]
+        attempted = [row for row in scans if row.mission == f"past-{number:04d}"]
+        assert {row.tag_id for row in attempted} == tags
+        failed = [row for row in attempted if row.status]
         assert {row.status for row in failed} == {1, 2}
         assert all(row.status_detail for row in failed)
         assert not any(row.readings for row in failed)

@@ -70,11 +70,11 @@ def main(hours: int = HOURS) -> bool:
             wait_for(lambda: not journal.condition.waiting, "all of it written", 60.0)
             gc.collect()
             resident.append(resident_mb(os.getpid()))
-            told = journal.condition
+            found = journal.condition
             count = (hour + 1) * TAGS * 3600 // EVERY_S
             print(
-                f"hour {hour + 1}: {count:,} scans, {told.file_bytes / 1e6:.0f} MB with the log,"
-                f" {resident[-1]:.0f} MB resident, lost {told.lost},"
+                f"hour {hour + 1}: {count:,} scans, {found.file_bytes / 1e6:.0f} MB with the log,"
+                f" {resident[-1]:.0f} MB resident, lost {found.lost},"
                 f" {time.monotonic() - begun_s:.0f} s",
                 flush=True,
             )

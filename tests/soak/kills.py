@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tests.support.domains import own_domain
 from tests.support.journal import is_whole, select
-from tests.support.killing import RATE, SAFE_S, TWICE, kill_and_look
+from tests.support.killing import RATE, SAFE_S, TWICE, kill_and_check
 
 ROUNDS = 50
 
@@ -22,7 +22,7 @@ def main() -> bool:
         journal = Path(folder) / "j.sqlite"
         for round_ in range(1, ROUNDS + 1):
             try:
-                number = kill_and_look(domain, journal, chance, number)
+                number = kill_and_check(domain, journal, chance, number)
             except AssertionError as error:
                 lost += 1
                 number += 10_000

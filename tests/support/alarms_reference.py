@@ -51,25 +51,25 @@ class _Said:
 
 
 def alarms(
-    heard: Iterable[PastWrite],
+    received: Iterable[PastWrite],
     spans: Sequence[RunSpan],
     now_ns: int,
     sensors: Sensors,
     day_of: Callable[[bool | None, int], bool],
 ) -> set[Plain]:
-    once = {write.number: write for write in heard}.values()
-    told = [
+    once = {write.number: write for write in received}.values()
+    reported = [
         write
         for write in once
         if any(s.run == write.run and s.start_ns <= write.stamp_ns < s.end_ns for s in spans)
     ]
     found: set[Plain] = set()
-    for run in {write.run for write in told}:
+    for run in {write.run for write in reported}:
         of_run = sorted(
-            (write for write in told if write.run == run), key=lambda w: (w.stamp_ns, w.number)
+            (write for write in reported if write.run == run), key=lambda w: (w.stamp_ns, w.number)
         )
         is_on = run == spans[-1].run
-        found |= set(_of_house(of_run, now_ns if is_on else None))
+        found |= set(_of_greenhouse(of_run, now_ns if is_on else None))
         for tag_id in {write.tag_id for write in of_run}:
             found |= set(_of_tag(tag_id, of_run, sensors, day_of, is_on=is_on))
     return found
@@ -127,7 +127,7 @@ def _of_tag(
         for key, said in (
             *_of_readings(occasion, sensors),
             *_of_ranges(occasion, sensors, species, is_day=is_day),
-            *_of_tries(occasion, [one for one in scans if one <= at]),
+            *_of_attempts(occasion, [one for one in scans if one <= at]),
             *_of_silent_sensors(at, occasions, [one for one in scans if one <= at]),
         ):
             matters.setdefault(key, []).append(said)
@@ -184,21 +184,21 @@ def _of_ranges(
 def _of_silent_sensors(
     at: int, occasions: list[list[PastWrite]], scans: list[int]
 ) -> Iterator[tuple[_Key, _Said]]:
-    told: dict[str, list[int]] = {}
+    reported: dict[str, list[int]] = {}
     for occasion in occasions:
         for name in _readings(occasion):
             if occasion[0].stamp_ns <= at:
-                told.setdefault(name, []).append(occasion[0].stamp_ns)
+                reported.setdefault(name, []).append(occasion[0].stamp_ns)
     if not scans or scans[-1] != at:
         return
-    for name, every in told.items():
+    for name, every in reported.items():
         limit = max(_holds(scans), _holds(every[-2:]))
         is_so = at - every[-1] > limit
         said = _Said(at, is_so, is_so, "unknown", None, limit / 1e9, since_ns=every[-1])
         yield ("old", name, ""), said
 
 
-def _of_tries(occasion: list[PastWrite], scans: list[int]) -> Iterator[tuple[_Key, _Said]]:
+def _of_attempts(occasion: list[PastWrite], scans: list[int]) -> Iterator[tuple[_Key, _Said]]:
     at = occasion[0].stamp_ns
     for kind, status in {w.kind: w.status for w in occasion}.items():
         bad = status != 0
@@ -294,7 +294,7 @@ def _overdue(tag_id: str, of_run: list[PastWrite], *, is_on: bool) -> Iterator[P
             yield Plain(tag_id, "old", "", "unknown", None, holds / 1e9, start, due, cleared, None)
 
 
-def _of_house(of_run: list[PastWrite], now_ns: int | None) -> Iterator[Plain]:
+def _of_greenhouse(of_run: list[PastWrite], now_ns: int | None) -> Iterator[Plain]:
     pauses: list[tuple[int, int | None]] = [*_pauses(of_run)]
     last_ns = of_run[-1].stamp_ns
     if now_ns is not None and now_ns - last_ns > SHORTEST:

@@ -82,7 +82,7 @@ def after_power_cut(done: list[Note], into: Path) -> None:
     Of a file: the writes before a completed sync began. Of a name: the folder's last sync.
     A real disk may hold more; this one is as bad as it may be.
     """
-    kept = _Kept()
+    kept = _Stored()
     for note in done:
         kept.follow(note)
     for path, file in kept.files.items():
@@ -90,7 +90,7 @@ def after_power_cut(done: list[Note], into: Path) -> None:
             (into / Path(path).name).write_bytes(bytes(file.content))
 
 
-class _Kept:
+class _Stored:
     """Files, and the syncs that have begun: each with its file and how much of that it covers."""
 
     def __init__(self) -> None:

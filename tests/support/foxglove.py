@@ -32,16 +32,16 @@ class Viewer:
         """The next message: JSON, or (subscription or -1 for a time, ns, payload)."""
         message = self.connection.recv(timeout=PATIENCE_S)
         if isinstance(message, str):
-            told: TwinUpdate = json.loads(message)
-            if told["op"] == "advertise":
-                self.channels |= {channel["topic"]: channel for channel in told["channels"]}
-            return told
+            reported: TwinUpdate = json.loads(message)
+            if reported["op"] == "advertise":
+                self.channels |= {channel["topic"]: channel for channel in reported["channels"]}
+            return reported
         if message[0] == 2:
             return -1, struct.unpack_from("<Q", message, 1)[0], b""
         key, stamp_ns = struct.unpack_from("<IQ", message, 1)
         return key, stamp_ns, message[13:]
 
-    def told(self, op: str) -> TwinUpdate:
+    def reported(self, op: str) -> TwinUpdate:
         """Read on to the first JSON message of a kind."""
         while not isinstance(message := self.next(), dict) or message["op"] != op:
             pass
@@ -49,7 +49,7 @@ class Viewer:
 
     def status(self) -> str:
         """The text of the next error."""
-        status = self.told("status")
+        status = self.reported("status")
         assert status["level"] == 2, status
         return str(status["message"])
 
@@ -71,7 +71,7 @@ def viewer(url: str, subprotocols: Sequence[str] = (SDK,), **options: Any) -> It
     address = f"{url.replace('http', 'ws', 1)}/foxglove"
     with open_websocket(address, subprotocols, **options) as connection:
         client = Viewer(connection)
-        client.told("advertise")
+        client.reported("advertise")
         yield client
 
 

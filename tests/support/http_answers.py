@@ -23,7 +23,7 @@ from tests.support.web import Bridge
 T0 = 1_763_683_200
 HOUR = 3_600
 # The journals are of a day long ago: nothing in them may be deleted at the start.
-_KEPT = ("-p", "journal_days:=36500")
+_STORED = ("-p", "journal_days:=36500")
 # Parts that depend on the current time: ages, and moments long after the journals' own.
 _NOW = re.compile(r'\{"sec":1(?:7[89]|[89]\d)\d{7},"nanosec":\d+\}|later than now, [0-9.]+ s')
 _AGE = re.compile(r'"(stale_seconds|age_s|since_s)":[-+.0-9e]+')
@@ -43,7 +43,7 @@ def bridges(journal: Path) -> Iterator[tuple[Bridge, Bridge]]:
     with ExitStack() as stack:
         domain = stack.enter_context(own_domain())
         serve = stack.enter_context(
-            lupin_twin(domain, "serve", *OPTIONS, *OFTEN, "-p", f"journal:={journal}", *_KEPT)
+            lupin_twin(domain, "serve", *OPTIONS, *OFTEN, "-p", f"journal:={journal}", *_STORED)
         )
         peer = stack.enter_context(Peer(domain))
         web = stack.enter_context(lupin_twin(domain, "web", *OPTIONS))

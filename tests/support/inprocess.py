@@ -63,10 +63,10 @@ async def started(
 ) -> AsyncIterator[tuple[SourceT, list[TwinUpdate]]]:
     """A source from its start to its stop, and its updates; it must not die meanwhile."""
     source = make(ros_args=ros_args, timeout_s=timeout_s)
-    told, deaths = list[TwinUpdate](), list[None]()
-    await source.start(told.append, lambda: deaths.append(None))
+    reported, deaths = list[TwinUpdate](), list[None]()
+    await source.start(reported.append, lambda: deaths.append(None))
     try:
-        yield source, told
+        yield source, reported
     finally:
         await source.stop()
     assert deaths == []

@@ -32,12 +32,12 @@ def answers(name: str) -> list[tuple[list[Any], Any]]:
     text = gzip.decompress((JOURNALS / f"{name}.answers.json.gz").read_bytes())
     # Infinite values are stored as null now.
     found: list[tuple[list[Any], Any]] = json.loads(text, parse_constant=lambda _: math.nan)
-    return [(question, right) for question, right in found if question[0] in _ANSWERS]
+    return [(query, right) for query, right in found if query[0] in _ANSWERS]
 
 
-def answer(connection: sqlite3.Connection, question: list[Any]) -> Any:
+def answer(connection: sqlite3.Connection, query: list[Any]) -> Any:
     """The journal's answer, as JSON reads it back."""
-    kind, *arguments = question
+    kind, *arguments = query
     return json.loads(json.dumps(_ANSWERS[kind](connection, *arguments)))
 
 

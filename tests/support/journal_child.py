@@ -23,7 +23,7 @@ def main(path: Path, rows_a_second: int, log_bytes: int, first: int = 0) -> None
     journal = Journal(path, "/child", LIMITS)
     journal.begin(CLOCK)
     journal.take_restored(10.0)
-    number, begun, told = first, time.monotonic(), ""
+    number, begun, reported = first, time.monotonic(), ""
     while not select.select([sys.stdin], [], [], 1 / rows_a_second)[0]:
         while number - first < (time.monotonic() - begun) * rows_a_second:
             number += 1
@@ -31,8 +31,8 @@ def main(path: Path, rows_a_second: int, log_bytes: int, first: int = 0) -> None
             os.write(marks, b"%d\n" % number)
         condition = journal.condition
         say = f"{condition.state.value}\t{condition.written}\t{condition.lost}\t{condition.detail}"
-        if say != told:
-            told = say
+        if say != reported:
+            reported = say
             print(say, flush=True)
     journal.close(10.0)
 

@@ -19,7 +19,7 @@ RATE = 200
 SAFE_S = 0.1
 
 
-def kill_and_look(domain: int, journal: Path, chance: random.Random, first: int) -> int:
+def kill_and_check(domain: int, journal: Path, chance: random.Random, first: int) -> int:
     """One round: observe, kill, restart, compare. Values count from `first`; returns the next one.
 
     Raises:

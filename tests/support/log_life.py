@@ -215,15 +215,15 @@ class Life:
 def check(answer: SeriesPast, request: SeriesRequest, entries: list[Entry], *, now_ns: int) -> None:
     """An answer contains all expected entries: each, or each bucket's count and values."""
     end_ns = request.end_ns or now_ns + 1
-    asked = [entry for entry in entries if request.start_ns <= entry[0] < end_ns]
+    requested = [entry for entry in entries if request.start_ns <= entry[0] < end_ns]
     if not answer.is_bucketed:
-        assert len(asked) <= request.max_points
-        assert list(answer.stamps_ns) == [stamp_ns for stamp_ns, *_ in asked]
+        assert len(requested) <= request.max_points
+        assert list(answer.stamps_ns) == [stamp_ns for stamp_ns, *_ in requested]
         # A value that is no number is null in the log.
-        values = [value if math.isfinite(value) else math.nan for *_, value in asked]
+        values = [value if math.isfinite(value) else math.nan for *_, value in requested]
         assert repr(answer.means) == repr(tuple(values))
         assert repr(answer.minima) == repr(answer.maxima) == repr(answer.means)
-        assert answer.counts == (1,) * len(asked)
+        assert answer.counts == (1,) * len(requested)
         return
     bucket_ns = answer.bucket_ns or 0
     if entries:
@@ -279,7 +279,7 @@ steps = st.lists(
     min_size=1,
     max_size=8,
 )
-one_run = steps.map(lambda told: [step for step in told if step[0] != "back"])
+one_run = steps.map(lambda taken: [step for step in taken if step[0] != "back"])
 periods = st.one_of(
     st.tuples(_stamps, _stamps).map(sorted),
     st.tuples(st.just(0), _stamps),
@@ -289,14 +289,14 @@ periods = st.one_of(
 
 
 @contextmanager
-def lived(path: Path, told: Iterable[tuple[str, Any]] = ()) -> Iterator[Life]:
+def lived(path: Path, taken: Iterable[tuple[str, Any]] = ()) -> Iterator[Life]:
     """A log that has gone through the steps."""
     connection = open_writer(path)
     connection.execute("PRAGMA synchronous = OFF")
     try:
         life = Life(connection)
         life.begin(BEGUN)
-        for what, arg in told:
+        for what, arg in taken:
             match what:
                 case "rows":
                     life.write(arg)

@@ -34,10 +34,10 @@ class Endless:
 
     def __call__(self, find: Find, should_stop: ShouldStop) -> None:
         """See `PastQuery`."""
-        _until_told(should_stop)
+        _until_reported(should_stop)
 
 
-def _until_told(should_stop: ShouldStop) -> None:
+def _until_reported(should_stop: ShouldStop) -> None:
     while not should_stop():
         time.sleep(0.001)
 
@@ -53,7 +53,7 @@ class Running:
 
 def _endless() -> int:
     frames = [sys._current_frames().get(thread.ident or 0) for thread in threading.enumerate()]
-    return sum(frame is not None and frame.f_code is _until_told.__code__ for frame in frames)
+    return sum(frame is not None and frame.f_code is _until_reported.__code__ for frame in frames)
 
 
 @dataclass(frozen=True, slots=True)

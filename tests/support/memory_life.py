@@ -77,8 +77,8 @@ class Twin:
             if flower is None
             else Inspection(tag, 0, flower, **of)
         )
-        heard = Received(kind_of(sent), "", sent)
-        write = ingest.observation(heard, "map", self.now_ns)
+        received = Received(kind_of(sent), "", sent)
+        write = ingest.observation(received, "map", self.now_ns)
         assert not isinstance(write, Drop)
         assert self.memory.apply(write, self.wall_ns) is None
 
@@ -96,8 +96,10 @@ class Twin:
         wait_for(lambda: self.memory.condition.waiting == 0, "all to be written")
         offset_ns = 0 if self.is_simulated else NOW
         at_ns = self.now_ns if at_s is None else int(at_s * S) + offset_ns
-        asked = self.memory.recall.query(lambda connection, _: state_at(connection, at_ns, "map"))
-        return by_id(asked.result(20.0))
+        requested = self.memory.recall.query(
+            lambda connection, _: state_at(connection, at_ns, "map")
+        )
+        return by_id(requested.result(20.0))
 
     def says(self, name: str = "t", tag: str = "7") -> tuple[float, float | None]:
         """A sensor's value and age, the same live and in the log."""

@@ -58,12 +58,12 @@ class Subscriber:
     """Receives all that is published at a broker, in a thread of its own."""
 
     def __init__(self, broker: Broker, topics: str = "#") -> None:
-        self.heard: list[MQTTMessage] = []
+        self.received: list[MQTTMessage] = []
         self._is_there = False
         self._client = Client(CallbackAPIVersion.VERSION2)
         self._client.on_connect = lambda client, *_: client.subscribe(topics, 1)
         self._client.on_subscribe = self._subscribed
-        self._client.on_message = lambda _client, _data, message: self.heard.append(message)
+        self._client.on_message = lambda _client, _data, message: self.received.append(message)
         if broker.wants_password:
             self._client.username_pw_set(USER, PASSWORD)
         self._client.connect("127.0.0.1", broker.port)
@@ -86,7 +86,7 @@ class Subscriber:
 
     def of(self, topic: str) -> list[bytes]:
         """All payloads of a topic so far."""
-        return [bytes(message.payload) for message in self.heard if message.topic == topic]
+        return [bytes(message.payload) for message in self.received if message.topic == topic]
 
     def last(self, topic: str) -> Any:
         """The latest payload of a topic as JSON; None: there is none."""

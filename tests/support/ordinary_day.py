@@ -22,10 +22,10 @@ _DAY_SPEED: Final = 60.0
 def ordinary_days(seed: int = 0) -> list[PastWrite]:
     """Scans and inspections of three days, from 0 ns on, as a journal returns them."""
     rows = past(GreenhouseSimulator(), seed, _DAY_SPEED, 1.0, 0)
-    told = (row for row in rows if not isinstance(row, Pin))
+    reported = (row for row in rows if not isinstance(row, Pin))
     return [
         _write(number, row, DAYS * DAY_NS + round(row.stamp_ns * _DAY_SPEED))
-        for number, row in enumerate(told, start=1)
+        for number, row in enumerate(reported, start=1)
     ]
 
 

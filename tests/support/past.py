@@ -30,9 +30,9 @@ NS = 10**9
 ResultT = TypeVar("ResultT")
 
 
-async def look_up(question: PastQuery[ResultT], past: MadeUp, workers: Workers) -> ResultT:
+async def look_up(query: PastQuery[ResultT], past: MadeUp, workers: Workers) -> ResultT:
     """Answer a query in a worker here."""
-    return await asyncio.wrap_future(workers.submit(lambda stop: question(past.find, stop), 0.0))
+    return await asyncio.wrap_future(workers.submit(lambda stop: query(past.find, stop), 0.0))
 
 
 @dataclass
@@ -47,7 +47,7 @@ class MadeUp:
     lots: list[list[PastRow]] = field(default_factory=list)
     snapshot: Snapshot = field(default_factory=lambda: Snapshot(0, "map", ()))
     error: Exception | None = None
-    asked: list[object] = field(default_factory=list)
+    requested: list[object] = field(default_factory=list)
     costs: list[float] = field(default_factory=list)
     lots_taken: int = 0
     is_closed: bool = False
@@ -112,7 +112,7 @@ class MadeUp:
         write: Callable[[Sequence[PastRow]], Any],
     ) -> AsyncGenerator[Any]:
         """The batches, one by one; the error, if there is one, after the last."""
-        self.asked.append((start_ns, end_ns, tag_id, sensor_type))
+        self.requested.append((start_ns, end_ns, tag_id, sensor_type))
         try:
             for lot in self.lots:
                 await asyncio.sleep(0)  # as it is for every source of batches
@@ -123,8 +123,8 @@ class MadeUp:
         finally:
             self.is_closed = True
 
-    def _note(self, asked: object) -> None:
-        self.asked.append(asked)
+    def _note(self, requested: object) -> None:
+        self.requested.append(requested)
         if self.error is not None:
             raise self.error
 

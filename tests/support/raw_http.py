@@ -37,7 +37,7 @@ def connect(url: str, source: str = "", *, room: int | None = None) -> socket.so
     return client
 
 
-def heard(client: socket.socket) -> bytes:
+def received(client: socket.socket) -> bytes:
     """All bytes until the connection ends."""
     blocks = []
     with suppress(ConnectionError):
@@ -51,10 +51,10 @@ def answer(url: str, said: bytes, trust: ssl.SSLContext | None = None) -> bytes:
     with connect(url) as plain:
         if trust is None:
             plain.sendall(said)
-            return heard(plain)
+            return received(plain)
         with trust.wrap_socket(plain, server_hostname="127.0.0.1") as client:
             client.sendall(said)
-            return heard(client)
+            return received(client)
 
 
 def status(said: bytes) -> int:

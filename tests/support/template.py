@@ -74,7 +74,7 @@ class Template:
     def __init__(self, imported: Sequence[str] = IMPORTED) -> None:
         self._env = dict(os.environ)
         self._folder = Path.cwd()
-        self._said = tempfile.TemporaryFile("w+")  # noqa: SIM115  # as long as the worker
+        self._output = tempfile.TemporaryFile("w+")  # noqa: SIM115  # as long as the worker
         self._lock = threading.Lock()
         self._link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
@@ -82,7 +82,7 @@ class Template:
                 [sys.executable, "-m", __name__, str(theirs.fileno()), *imported],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
-                stderr=self._said,
+                stderr=self._output,
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,
             )
@@ -112,7 +112,7 @@ class Template:
         """Kill it, and all that it has started."""
         self._link.close()
         self._process.wait()
-        self._said.close()
+        self._output.close()
 
     def _ask(self, request: Mapping[str, Any], files: Sequence[int] = ()) -> int:
         with self._lock:
@@ -124,8 +124,8 @@ class Template:
             else:
                 why = "it says no more"
         if not answer:
-            self._said.seek(0)
-            raise RuntimeError(f"the process that is forked has died: {why}\n{self._said.read()}")
+            self._output.seek(0)
+            raise RuntimeError(f"the process that is forked has died: {why}\n{self._output.read()}")
         return int(answer)
 
 

@@ -37,11 +37,11 @@ def main(path: Path, kill_at: int) -> None:
 
     tell = Journal._report_progress
 
-    def tell_and_count(journal: Journal, share: float) -> None:
+    def report_and_count(journal: Journal, share: float) -> None:
         tell(journal, share)
         step()
 
-    Journal._report_progress = tell_and_count  # type: ignore[assignment, method-assign]
+    Journal._report_progress = report_and_count  # type: ignore[assignment, method-assign]
     sys.addaudithook(watch)
     journal = Journal(path, "/child", LIMITS)
     journal.begin(CLOCK)

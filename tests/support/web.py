@@ -120,8 +120,8 @@ def filled(tag: dict[str, Any]) -> dict[str, Any]:
     for reading in tag["readings"]:
         usual = reading.get("observed_at", usual)
         readings.append({**reading, "observed_at": usual})
-    tried = {"last_try": tag["last_observed"], "last_try_status": 0, "last_try_detail": ""}
-    return {"looked_at": None, **tried, **tag, "readings": readings}
+    attempted = {"last_try": tag["last_observed"], "last_try_status": 0, "last_try_detail": ""}
+    return {"looked_at": None, **attempted, **tag, "readings": readings}
 
 
 def without_ages(state: dict[str, Any]) -> list[dict[str, Any]]:
@@ -192,9 +192,9 @@ def deaf_client(url: str, *paths: str) -> Iterator[socket.socket]:
 
     Without a path it is a WebSocket client that requests frames.
     """
-    asked = [f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode() for path in paths]
+    requested = [f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode() for path in paths]
     with raw_http.connect(url, room=4_096) as client:
-        for request in asked or [raw_http.handshake("/ws/state")]:
+        for request in requested or [raw_http.handshake("/ws/state")]:
             client.sendall(request)
         yield client
 

@@ -142,8 +142,8 @@ async def test_a_flood_of_sign_ins_waits_in_a_short_queue_while_other_writes_go_
 
     monkeypatch.setattr(people_module, "verify", slow)
     people = People(path)
-    tries = (people.check("anna", "x", str(n)) for n in range(3 * MAX_WAITING))
-    found = await asyncio.gather(*tries, return_exceptions=True)
+    attempts = (people.check("anna", "x", str(n)) for n in range(3 * MAX_WAITING))
+    found = await asyncio.gather(*attempts, return_exceptions=True)
     assert found.count(None) == MAX_WAITING
     assert sum(isinstance(it, ClientLimitError) for it in found) == 2 * MAX_WAITING
     flood = [asyncio.ensure_future(people.check("anna", "x", f"b{n}")) for n in range(20)]

@@ -67,8 +67,8 @@ def test_an_allowed_host_is_a_name_and_not_an_origin(open_bridge: Served) -> Non
 
 def test_a_rebound_name_gets_nothing(open_bridge: Served) -> None:
     rebound = {"Host": "evil.example:8000", "Origin": "http://evil.example:8000"}
-    asked = [(path, rebound) for path in ("/api/state", "/healthz", "/", "/signin", "/nowhere")]
-    for path, headers in [*asked, ("/ws/state", UPGRADE | rebound)]:
+    requested = [(path, rebound) for path in ("/api/state", "/healthz", "/", "/signin", "/nowhere")]
+    for path, headers in [*requested, ("/ws/state", UPGRADE | rebound)]:
         answer = open_bridge.get(path, headers)
         assert answer.status_code == 403, path
         detail = refusal_of(answer)
@@ -107,15 +107,15 @@ def test_a_cache_keeps_the_origins_apart(open_bridge: Served) -> None:
 
 
 def test_an_allowed_page_may_send_a_preflight_with_a_token(open_bridge: Served) -> None:
-    asks = {"Access-Control-Request-Method": "GET"}
-    answer = open_bridge.get("/api/state", {"Origin": PANEL, **asks}, method="OPTIONS")
+    requests = {"Access-Control-Request-Method": "GET"}
+    answer = open_bridge.get("/api/state", {"Origin": PANEL, **requests}, method="OPTIONS")
     assert (answer.status_code, answer.content) == (204, b"")
     assert answer.headers["access-control-allow-origin"] == PANEL
     assert answer.headers["access-control-allow-methods"] == "GET, HEAD"
     assert "Authorization" in answer.headers["access-control-allow-headers"]
     assert "X-Lupin-Twin" not in answer.headers["access-control-allow-headers"]
     for origin, status in (("http://evil.example", 403), (open_bridge.url, 405)):
-        other = open_bridge.get("/api/state", {"Origin": origin, **asks}, method="OPTIONS")
+        other = open_bridge.get("/api/state", {"Origin": origin, **requests}, method="OPTIONS")
         assert other.status_code == status
         assert "access-control-allow-origin" not in other.headers
 

@@ -213,8 +213,8 @@ def test_a_foreign_page_without_an_origin_header_gets_nothing(
 
 
 def test_an_allowed_origin_may_send_cross_site_requests() -> None:
-    asked = ("127.0.0.1", "http://panel.example:3000")
-    assert judge(*asked, sec_fetch_site="cross-site", sec_fetch_mode="cors").refusal is None
+    requested = ("127.0.0.1", "http://panel.example:3000")
+    assert judge(*requested, sec_fetch_site="cross-site", sec_fetch_mode="cors").refusal is None
 
 
 # --- Referer ------------------------------------------------------------------------------------

@@ -163,8 +163,10 @@ def is_trusted(live: Served, trust: ssl.SSLContext) -> bool:
         return False
 
 
-@pytest.mark.parametrize("is_told", [True, False])
-def test_a_renewed_pair_is_served_to_every_new_connection(tmp_path: Path, is_told: bool) -> None:
+@pytest.mark.parametrize("is_reported", [True, False])
+def test_a_renewed_pair_is_served_to_every_new_connection(
+    tmp_path: Path, is_reported: bool
+) -> None:
     old = certificate(tmp_path)
     with (
         served(*old.options, trust=old.trust) as live,
@@ -174,7 +176,7 @@ def test_a_renewed_pair_is_served_to_every_new_connection(tmp_path: Path, is_tol
         connection.next_state()
         assert kept.get("/healthz").status_code == 200
         new = renew(old, tmp_path / "new")
-        if is_told:
+        if is_reported:
             live.process.send(signal.SIGHUP)
         wait_for(lambda: is_trusted(live, new.trust), "the new certificate")
         assert not is_trusted(live, old.trust)

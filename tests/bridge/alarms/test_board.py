@@ -26,23 +26,23 @@ A, B = alarm("a"), alarm("b", raised_ns=2)
 
 
 def test_a_change_is_reported_after_the_board_has_it() -> None:
-    board, told = Alarms(), list[tuple[Change, int]]()
+    board, reported = Alarms(), list[tuple[Change, int]]()
     board.show([A], is_past=True)
-    board.on_change = lambda change: told.append((change, board.now.number))
+    board.on_change = lambda change: reported.append((change, board.now.number))
     cleared = replace(A, cleared_at_ns=A.raised_at_ns + 1)
     board.show([cleared, B])
-    assert told == [(Change((B, cleared)), board.now.number)]
+    assert reported == [(Change((B, cleared)), board.now.number)]
     assert (board.now.alarms, board.now.active) == ((cleared, B), (B,))
 
 
 def test_the_same_alarms_are_no_change_but_another_source_is_one() -> None:
-    board, heard = Alarms(), list[Change]()
+    board, received = Alarms(), list[Change]()
     board.show([A])
-    board.on_change, number = heard.append, board.now.number
+    board.on_change, number = received.append, board.now.number
     board.show([A])
-    assert (heard, board.now.number) == ([], number)
+    assert (received, board.now.number) == ([], number)
     board.show([A], "starting")
-    assert (heard, board.now.number) == ([Change(())], number + 1)
+    assert (received, board.now.number) == ([Change(())], number + 1)
 
 
 def test_active_alarms_come_before_worse_ones_that_are_over() -> None:
@@ -132,11 +132,11 @@ NOW = 10**18
 HOUR = 3_600 * 10**9
 COLD = Alarm("a", Reason(Kind.RANGE, Verdict.STRESSED, "temperature", 9.0, 12.0), "7", NOW - 1)
 SHELF = Note("1", NOW, "anna", SHELVE, "alarm:a", "heater", NOW + HOUR)
-SEEN = Note("0", NOW, "bert", ACKNOWLEDGE, "alarm:a")
+FOUND = Note("0", NOW, "bert", ACKNOWLEDGE, "alarm:a")
 
 
 def test_an_alarm_shows_who_acknowledged_it_and_who_shelved_it_until_when() -> None:
-    said = [SEEN, SHELF]
+    said = [FOUND, SHELF]
     found = alarm_json(COLD, notes_of_alarms([COLD], said, NOW).get("a"))
     assert {name: value for name, value in found.items() if "_by" in name} == {
         "acknowledged_by": "bert",
@@ -157,7 +157,7 @@ def test_a_shelf_ends_at_its_time_or_by_a_later_note_or_by_withdrawal() -> None:
     assert notes_of_alarms([COLD], [SHELF, Note("2", NOW, "anna", WITHDRAW, "note:1")], NOW) == {}
 
 
-@pytest.mark.parametrize("said", [SHELF, SEEN], ids=["shelved", "acknowledged"])
+@pytest.mark.parametrize("said", [SHELF, FOUND], ids=["shelved", "acknowledged"])
 def test_notes_end_when_their_alarm_gets_worse_and_later_ones_hold(
     said: Note,
 ) -> None:

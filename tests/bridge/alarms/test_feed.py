@@ -34,17 +34,17 @@ class Journal:
     def __init__(self) -> None:
         self.workers = Workers("test")
         self.writes_now: list[PastWrite] = []
-        self.name, self.asked = "a", 0
+        self.name, self.requested = "a", 0
         self.is_removed = False
         self.written = 0
 
     def journal(self) -> Condition:
-        """The number of writes in the log. `told`, the reported number, may be lower."""
+        """The number of writes in the log. `reported`, the reported number, may be lower."""
         return Condition(JournalState.RECORDING, written=self.written)
 
     async def writes(self, request: WritesRequest) -> PastWrites:
         """The next write of the log."""
-        self.asked += 1
+        self.requested += 1
         if self.is_removed:
             raise TwinUnavailableError("no twin offers /twin/get_writes")
         found = [write for write in self.writes_now if write.number > request.after]
@@ -59,7 +59,7 @@ def pest(number: int, bugs: int) -> PastWrite:
     return PastWrite(number, 1, "a", NOW - 100 + number, 1, 0, (), (), *seen)
 
 
-def told(number: int, **over: object) -> TwinUpdate:
+def reported(number: int, **over: object) -> TwinUpdate:
     store = TwinStore()
     store.record_inspection(
         Inspection("a", NOW - 100 + number, Flower(bug_count=number, anomaly=True))
@@ -90,27 +90,27 @@ async def changed(board: AlarmBoard) -> None:
 async def test_it_reads_the_past_once_then_new_writes_and_a_new_journal_whole() -> None:
     async with following() as (feed, board, source):
         source.writes_now = [pest(number, number % 2) for number in range(1, 1_200)]
-        heard: list[Change] = []
-        board.on_change = heard.append
-        feed.on_state(told(1))
+        received: list[Change] = []
+        board.on_change = received.append
+        feed.on_state(reported(1))
         await changed(board)
-        assert (board.now.source, board.now.since_ns, heard[0].is_past) == (
+        assert (board.now.source, board.now.since_ns, received[0].is_past) == (
             "journal",
             NOW - 99,
             True,
         )
         assert len(board.now.active) == 1
         source.writes_now += [pest(1_200, 0), pest(1_201, 0)]
-        feed.on_state(told(2))
+        feed.on_state(reported(2))
         await changed(board)
         assert [alarm.is_active for alarm in board.now.alarms[:1]] == [False]
-        assert not heard[-1].is_past
-        asked = source.asked
+        assert not received[-1].is_past
+        requested = source.requested
         for _ in range(5):
-            feed.on_state(told(2))
-        assert source.asked == asked
+            feed.on_state(reported(2))
+        assert source.requested == requested
         source.name, source.writes_now = "b", [pest(1, 4)]
-        feed.on_state(told(3))
+        feed.on_state(reported(3))
         await changed(board)
         assert [alarm.worst for alarm in board.now.alarms] == [4.0]
 
@@ -126,7 +126,7 @@ async def test_an_error_in_a_silence_does_not_end_the_alarms() -> None:
         feed.on_silence(is_silent=True, last_ns=NOW)
         await changed(board)
         source.is_removed, source.writes_now = False, [pest(1, 4)]
-        feed.on_state(told(1))
+        feed.on_state(reported(1))
         await changed(board)
         assert len(board.now.active) == 2
 
@@ -134,13 +134,13 @@ async def test_an_error_in_a_silence_does_not_end_the_alarms() -> None:
 async def test_writes_are_read_also_when_the_state_does_not_change() -> None:
     async with following() as (feed, board, source):
         source.writes_now, source.written = [pest(1, 2)], 1
-        feed.on_state(told(1))
+        feed.on_state(reported(1))
         await changed(board)
         # For a slow disk the feed reads once more by itself. After that it has to be woken.
         feed._ask_again(1_000_000.0)
         source.writes_now += [pest(2, 0), pest(3, 0)]
         source.written = 3
-        feed.on_state(told(1))
+        feed.on_state(reported(1))
         await changed(board)
         assert board.now.active == ()
 
@@ -156,10 +156,10 @@ async def test_writes_older_than_the_window_are_counted_and_reported(
         source.writes_now = [
             replace(pest(number, 1), stamp_ns=NOW - 1_000 + number) for number in range(1, 70)
         ]
-        feed.on_state(told(1))
+        feed.on_state(reported(1))
         await changed(board)
         source.writes_now.append(replace(pest(99, 1), stamp_ns=NOW - 1_000))
-        feed.on_state(told(2))
+        feed.on_state(reported(2))
         await until(lambda: feed.missed == 1, "that it was missed")
         assert len(board.now.active) == 1
     assert "too late for its alarms" in caplog.text
@@ -168,7 +168,7 @@ async def test_writes_older_than_the_window_are_counted_and_reported(
 async def test_a_missing_twin_adds_its_alarm_to_those_of_before() -> None:
     async with following() as (feed, board, source):
         source.writes_now = [pest(1, 2)]
-        feed.on_state(told(1))
+        feed.on_state(reported(1))
         await changed(board)
         source.is_removed = True
         feed.on_silence(is_silent=True, last_ns=NOW - 5)
@@ -188,24 +188,24 @@ async def test_alarms_that_the_journal_has_long_not_confirmed_are_reported_as_in
 
     async with following() as (feed, board, source):
         source.writes_now = [pest(1, 2)]
-        feed.on_state(told(1))
+        feed.on_state(reported(1))
         await changed(board)
         source.is_removed = True
-        feed.on_state(told(2))
+        feed.on_state(reported(2))
         await changed(board)
         assert [alarm.reason.kind for alarm in board.now.active] == ["pest"]
         assert (board.now.source, len(board.now.alarms)) == ("starting", 1)
         source.is_removed = False
-        feed.on_state(told(3))
+        feed.on_state(reported(3))
         await changed(board)
         assert (board.now.source, len(board.now.alarms)) == ("journal", 1)
 
 
 async def test_without_a_journal_states_raise_alarms_and_a_silent_twin_is_one() -> None:
     async with following() as (feed, board, source):
-        feed.on_state(told(3, journal=Condition(JournalState.FAILING)))
+        feed.on_state(reported(3, journal=Condition(JournalState.FAILING)))
         await changed(board)
-        assert (board.now.source, source.asked) == ("heard", 0)
+        assert (board.now.source, source.requested) == ("heard", 0)
         assert [alarm.worst for alarm in board.now.active] == [3.0]
         feed.on_silence(is_silent=True, last_ns=NOW - 5)
         await changed(board)
@@ -221,12 +221,12 @@ async def test_without_a_journal_states_raise_alarms_and_a_silent_twin_is_one() 
 async def test_a_state_from_before_a_silence_does_not_withdraw_it() -> None:
     async with following() as (feed, board, source):
         source.writes_now = [pest(1, 2)]
-        feed.on_state(told(1))
+        feed.on_state(reported(1))
         await changed(board)
         feed.on_silence(is_silent=True, last_ns=NOW - 5)
         await changed(board)
-        heard = replace(told(1).snapshot, stamp_ns=NOW - 10)
-        feed.on_state(replace(told(1), snapshot=heard))
+        received = replace(reported(1).snapshot, stamp_ns=NOW - 10)
+        feed.on_state(replace(reported(1), snapshot=received))
         feed.on_silence(is_silent=False, last_ns=NOW)
         await changed(board)
         over = next(alarm for alarm in board.now.alarms if not alarm.tag_id)
@@ -254,14 +254,14 @@ def test_new_alarms_are_reported_once_in_the_order_of_time_and_numbered() -> Non
         Inspection("a", 4, pest),
         Scan("b", 6, (), status=2),
     )
-    told = writes_between(None, first, 7)
-    assert [(w.number, w.tag_id, w.stamp_ns, w.kind, w.status) for w in told] == [
+    reported = writes_between(None, first, 7)
+    assert [(w.number, w.tag_id, w.stamp_ns, w.kind, w.status) for w in reported] == [
         (7, "a", 4, 1, 0),
         (8, "a", 5, 0, 0),
         (9, "b", 6, 0, 2),
     ]
-    assert (told[0].species, told[0].anomaly, told[0].bug_count) == ("tulip", True, 3)
-    assert (told[1].sensors, told[1].values) == (("co2", "light"), (400.0, 1.0))
+    assert (reported[0].species, reported[0].anomaly, reported[0].bug_count) == ("tulip", True, 3)
+    assert (reported[1].sensors, reported[1].values) == (("co2", "light"), (400.0, 1.0))
     second = after(store, Scan("a", 9, (Reading("co2", 410.0),)))
     (new,) = writes_between(first, second, 10)
     assert (new.stamp_ns, new.sensors, new.values) == (9, ("co2",), (410.0,))

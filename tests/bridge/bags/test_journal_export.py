@@ -26,7 +26,7 @@ from tests.support.bags import is_open, no_file_above, read
 from tests.support.journal import NOW, SECOND, kept, look, opened, pin, scan
 from tests.support.processes import said
 
-FAILED_LOOK = Inspection(
+FAILED_INSPECTION = Inspection(
     "7", NOW, None, status=2, status_detail="dark", source="robot", mission="m1"
 )
 ROWS: list[Write] = [
@@ -35,7 +35,7 @@ ROWS: list[Write] = [
     pin("8", NOW + SECOND, x=8.5),
     look("8", NOW + SECOND, anomaly=True),
     scan("7", NOW + 2 * SECOND, temperature=21.0, light=float("nan")),
-    replace(FAILED_LOOK, arrival_ns=NOW + 2000),
+    replace(FAILED_INSPECTION, arrival_ns=NOW + 2000),
     # Late, and from a robot whose clock is ahead: such a clock does not count.
     replace(scan("8", NOW + SECOND), own_stamp_ns=NOW * 3),
     replace(scan("8", NOW + 3 * SECOND), readings=(), status=1, status_detail="no way"),
@@ -75,8 +75,8 @@ def fed(target: Path) -> tuple[dict[str, str], list[str]]:
             assert ingest.apply(write, store, repeats) is None
             written.append(repr(write))
         elif topic == "/perception/discovered_tags":
-            heard = convert.received_tags(deserialize_message(data, DiscoveredTags))
-            for pinned in list(ingest.discoveries(heard, "", "map", store.is_pinned)):
+            found = convert.received_tags(deserialize_message(data, DiscoveredTags))
+            for pinned in list(ingest.discoveries(found, "", "map", store.is_pinned)):
                 assert not isinstance(pinned, Drop)
                 assert ingest.apply(pinned, store, repeats) is None
     return by_id(store.snapshot(NOW * 2, "map").tags), written

@@ -89,11 +89,11 @@ def test_a_recorded_clock_is_the_time(domain: int, tmp_path: Path) -> None:
 
 
 def test_a_clock_topic_without_times_is_named_with_its_file(tmp_path: Path) -> None:
-    told = b"\0\1\0\0" + b"1111"
+    reported = b"\0\1\0\0" + b"1111"
     sent = [Sent("/clock", 5_000.0, Clock(clock=Time(sec=0x31313131))), seen("a", 5_002.0)]
     path = write_bag(tmp_path / "run.mcap", sent, is_chunked=False)
-    assert path.read_bytes().count(told) == 1
-    path.write_bytes(path.read_bytes().replace(told, b"\xff\xff" + told[2:]))
+    assert path.read_bytes().count(reported) == 1
+    path.write_bytes(path.read_bytes().replace(reported, b"\xff\xff" + reported[2:]))
     with (
         Recording([path]) as recording,
         pytest.raises(RecordingError, match=f"^cannot read {path}: a message on /clock is not a "),

@@ -163,7 +163,7 @@ def test_an_error_of_our_own_has_a_traceback_and_one_from_bad_input_has_none(
     assert "UnicodeDecodeError" not in err
 
 
-def said_by(name: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
+def logged_by(name: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
     """What a logger has written so far, line by line."""
     lines = capsys.readouterr().err.splitlines()
     return [line.partition(f" {name}: ")[2] for line in lines if f" {name}: " in line]
@@ -178,11 +178,11 @@ def test_some_of_our_own_lines_are_never_rate_limited(
     for number in range(command.AT_ONCE + 7):
         log.warning("wrong token from %s", f"10.0.0.{number}")
     log.warning("something else")
-    assert len(said_by(name, capsys)) == command.AT_ONCE + 1
+    assert len(logged_by(name, capsys)) == command.AT_ONCE + 1
     now_s[0] += command.PERIOD_S
     log.warning("wrong token from %s", "10.0.0.9")
     log.warning("wrong token from %s", "10.0.0.9")
-    assert said_by(name, capsys) == ["wrong token from 10.0.0.9 (7 more since the last time)"]
+    assert logged_by(name, capsys) == ["wrong token from 10.0.0.9 (7 more since the last time)"]
 
 
 @pytest.mark.parametrize("name", ["asyncio", "uvicorn.error", "websockets.server", "nobodys"])

@@ -45,7 +45,7 @@ def journal(*words: object) -> CompletedProcess[str]:
     return said("journal", *words)
 
 
-def told(*words: object) -> dict[str, str]:
+def reported(*words: object) -> dict[str, str]:
     """Lines of `info` by their names."""
     lines = (line.partition("  ") for line in journal("info", *words).stdout.splitlines())
     return {what: text.strip() for what, _, text in lines if what}
@@ -69,7 +69,7 @@ def test_the_default_file_is_found_by_the_rule_of_the_node(
         path = journal_path("", environ, domain, namespace)
         assert path is not None
         kept(path, [])
-        assert told(*words)["file"] == str(path)
+        assert reported(*words)["file"] == str(path)
     kept(demo_journal_path(environ, 2), [])
     assert "demo-seed-2.sqlite" in journal("info", "--demo", 2).stdout
 
@@ -164,7 +164,7 @@ def test_info_lists_the_content(path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     path.with_name("j.sqlite.damaged-20261121T141500Z").write_bytes(b"x" * 2_000_000)
     done = journal("info", "--journal", path)
     assert (done.returncode, done.stderr) == (0, "")
-    found = told("--journal", path)
+    found = reported("--journal", path)
     assert found["recording"] == "nobody"
     assert found["scans"] == "2,002, 1 of them failed"
     assert (found["inspections"], found["places"], found["tags"]) == ("1", "1", "3")
@@ -179,7 +179,7 @@ def test_a_journal_in_use_can_be_read_and_not_shrunk(path: Path) -> None:
         for number in range(300):
             twin.write(scan("new", NOW + number, a=1.0))
         wait_for(lambda: twin.condition.written == 300, "all of it written")
-        info = told("--journal", path)
+        info = reported("--journal", path)
         assert info["scans"] == "2,301, 1 of them failed"
         assert info["recording"].startswith("/test/lupin_twin (process ")
         assert journal("check", "--journal", path).returncode == 0
@@ -197,7 +197,7 @@ def test_the_wal_of_a_killed_twin_is_read_too(path: Path) -> None:
     for name in ("j.sqlite", "j.sqlite-wal"):
         path.with_name(name.replace("j", "k", 1)).write_bytes(path.with_name(name).read_bytes())
     connection.close()
-    assert told("--journal", path.with_name("k.sqlite"))["inspections"] == "0"
+    assert reported("--journal", path.with_name("k.sqlite"))["inspections"] == "0"
 
 
 def test_check_reports_the_damage_and_exits_with_1(path: Path) -> None:

@@ -233,7 +233,7 @@ def test_a_failure_to_fill_in_the_past_is_reported_and_the_demo_goes_on(
     ):
         feed = feed_of(tmp_path / name, options)
         assert with_past(feed) == feed
-    told = [record.message for record in caplog.records]
+    reported = [record.message for record in caplog.records]
     expected = ("argument --speed: ", r"\[Errno 17\] File exists", ".*not a database")
-    for text, why in zip(told, expected, strict=True):
+    for text, why in zip(reported, expected, strict=True):
         assert re.match(f"the demo starts without history: {why}", text)

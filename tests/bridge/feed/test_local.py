@@ -93,7 +93,7 @@ async def test_a_query_that_takes_too_long_ends_and_delays_no_observation(domain
         await until(lambda: twin.journal().state == "recording", "the journal")
         await twin.past.ask(partial(as_found, 0), await twin.now(), 0.0)
         waiting = asyncio.create_task(twin.ask(Endless(), 0.0))
-        await until(lambda: len(twin.past.pending) == 1, "the question")
+        await until(lambda: len(twin.past.pending) == 1, "the query")
         # Meanwhile the ROS thread answers as usual.
         await twin.thread.call(lambda node: node.notify_listener())
         assert not waiting.done()

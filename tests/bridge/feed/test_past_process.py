@@ -169,5 +169,5 @@ async def test_a_process_that_dies_or_cannot_start_is_reported_and_replaced(
         await until(lambda: not past.why_down, "the next one")
         assert past.pid is None, "nobody asked"
         assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
-        told = [r.getMessage() for r in caplog.records if r.levelno == logging.ERROR]
-        assert told[-1] == "the process that reads the past was killed by SIGKILL"
+        reported = [r.getMessage() for r in caplog.records if r.levelno == logging.ERROR]
+        assert reported[-1] == "the process that reads the past was killed by SIGKILL"

@@ -70,10 +70,10 @@ class Ear:
     """What a listener has received."""
 
     def __init__(self) -> None:
-        self.heard: list[bytes] = []
+        self.received: list[bytes] = []
 
     def __call__(self, sample: Sample) -> None:
-        self.heard.append(sample.data)
+        self.received.append(sample.data)
 
 
 @pytest.fixture
@@ -99,7 +99,7 @@ async def test_all_listeners_share_one_subscription(ros: Ros, relay: Relay) -> N
     ears = [Ear() for _ in range(3)]
     await asyncio.gather(*(relay.listen(STATE, ear) for ear in ears))
     await ros.publish(b"1", b"2")
-    assert [ear.heard for ear in ears] == [[b"1", b"2"]] * 3
+    assert [ear.received for ear in ears] == [[b"1", b"2"]] * 3
     assert (ros.subscribed, ros.wake_ups, len(relay)) == (["/twin/state"], 2, 1)
 
 
@@ -112,7 +112,7 @@ async def test_a_late_listener_receives_the_last_latched_message_and_nothing_els
             await ros.publish(data, topic=topic)
         late = Ear()
         await relay.listen(topic, late)
-        assert late.heard == expected
+        assert late.received == expected
 
 
 async def test_depth_and_bytes_drop_the_oldest_and_a_too_large_message_is_never_sent(
@@ -121,7 +121,7 @@ async def test_depth_and_bytes_drop_the_oldest_and_a_too_large_message_is_never_
     ear = Ear()
     await relay.listen(STATE, ear)
     await ros.publish(b"1", b"2", b"3")
-    assert (ear.heard, relay.skipped) == ([b"2", b"3"], 1)
+    assert (ear.received, relay.skipped) == ([b"2", b"3"], 1)
     for samples, kept in (
         ((b"four", b"fivefi"), [b"four", b"fivefi"]),  # 10 bytes: both
         ((b"four", b"fivefiv"), [b"fivefiv"]),  # 11
@@ -130,7 +130,7 @@ async def test_depth_and_bytes_drop_the_oldest_and_a_too_large_message_is_never_
         await ros.publish(*samples)
         late = Ear()
         await relay.listen(STATE, late)
-        assert late.heard == kept
+        assert late.received == kept
     assert relay.skipped == 2, "the oldest, and the one that is too large"
 
 
@@ -143,11 +143,11 @@ async def test_a_subscription_ends_with_its_last_listener(ros: Ros, relay: Relay
     first()
     await all_has_ended(ros, relay)
     await ros.publish(b"1")
-    assert ear.heard == [b"1"], "however often the first one closes"
+    assert ear.received == [b"1"], "however often the first one closes"
     second()
     await ros.publish(b"2")
     await until(lambda: not ros.takes, "the end of the subscription")
-    assert (ear.heard, len(relay)) == ([b"1"], 0)
+    assert (ear.received, len(relay)) == ([b"1"], 0)
     await relay.listen(STATE, Ear())
     assert ros.subscribed == ["/twin/state", "/diagnostics", "/twin/state"]
 
@@ -163,7 +163,7 @@ async def test_listeners_that_come_and_go_cause_no_work_in_ros(ros: Ros, relay: 
     assert not any(ref() for ref in gone), "nothing is kept of them"
     ear = Ear()
     await relay.listen(STATE, ear)
-    assert ear.heard == [b"1"], "it was heard all the while"
+    assert ear.received == [b"1"], "it was heard all the while"
     assert (ros.subscribed, ros.calls, len(relay)) == (["/twin/state"], 1, 1)
 
 
@@ -174,7 +174,7 @@ async def test_a_listener_just_in_time_reuses_the_subscription(ros: Ros, relay: 
     await relay.listen(STATE, ear)
     await all_has_ended(ros, relay)
     await ros.publish(b"1")
-    assert (ear.heard, ros.subscribed) == ([b"1"], ["/twin/state", "/diagnostics"])
+    assert (ear.received, ros.subscribed) == ([b"1"], ["/twin/state", "/diagnostics"])
 
 
 async def test_a_listener_may_leave_while_a_subscription_opens(ros: Ros, relay: Relay) -> None:
@@ -188,7 +188,7 @@ async def test_a_listener_may_leave_while_a_subscription_opens(ros: Ros, relay: 
     ros.gate.set()
     await staying
     await ros.publish(b"1")
-    assert ear.heard == [b"1"]
+    assert ear.received == [b"1"]
 
 
 async def test_without_the_thread_nothing_is_received_and_nothing_breaks(

@@ -56,43 +56,43 @@ async def only_the_expected_type_counts(relay: Relay, topic: Topic, domain: int)
 async def test_a_twins_topics_are_relayed_byte_for_byte(
     domain: int, source_type: Any, peer: Peer
 ) -> None:
-    async with started(source_type, *OFTEN) as (source, told):
+    async with started(source_type, *OFTEN) as (source, reported):
         relay: Relay = source.relay
         relay.linger_s = 0.0
         state, observations, discovered, map_, diagnostics = topics_of(source.names)
         grid, seen = occupancy_grid([[0, 100]]), scan("1", {"co2": 400.0}, stamp_s=5.0)
         peer.publish_map(grid)
         peer.observe(seen)
-        await until(lambda: told and told[-1].snapshot.tags, "the tag")
+        await until(lambda: reported and reported[-1].snapshot.tags, "the tag")
         assert len(relay) == 0, "nobody has asked"
 
-        heard: dict[str, list[Sample]] = {}
+        received: dict[str, list[Sample]] = {}
         listening = [
-            await relay.listen(topic, heard.setdefault(topic.name, []).append)
+            await relay.listen(topic, received.setdefault(topic.name, []).append)
             for topic in (state, observations, map_, diagnostics)
         ]
-        await until(lambda: all(heard.values()), "a sample of each")
+        await until(lambda: all(received.values()), "a sample of each")
 
         def first(topic: Topic, message_type: Any) -> Any:
-            return deserialize_message(heard[topic.name][0].data, message_type)
+            return deserialize_message(received[topic.name][0].data, message_type)
 
         # Latched, and published before the subscription.
         assert first(observations, Observation) == seen
         assert first(map_, OccupancyGrid) == grid
         # And as a message, whose lengths are checked before it is decoded.
-        assert relay.read(observations, heard[observations.name][0]) == seen
-        for data in (heard[map_.name][0].data[:-1], b"\0" * (map_.max_bytes + 1)):
+        assert relay.read(observations, received[observations.name][0]) == seen
+        for data in (received[map_.name][0].data[:-1], b"\0" * (map_.max_bytes + 1)):
             with pytest.raises(ValueError, match="bytes"):
                 relay.read(map_, Sample(data, 0))
 
         def newest() -> Any:
-            message: Any = deserialize_message(heard[state.name][-1].data, TwinState)
+            message: Any = deserialize_message(received[state.name][-1].data, TwinState)
             return message if message.tags else None
 
         last = await until(newest, "a state with the tag")
         assert [tag.tag_id for tag in last.tags] == ["1"]
         assert first(diagnostics, DiagnosticArray).status
-        came_ns = heard[state.name][-1].stamp_ns
+        came_ns = received[state.name][-1].stamp_ns
         assert 0 <= came_ns - convert.nanoseconds(last.header.stamp) < 60e9
 
         def count(node: Any) -> int:

@@ -104,14 +104,14 @@ def test_an_empty_plan_and_one_from_ten_minutes_ago_are_ignored() -> None:
     there = Plan(((9.0, 0.0),), 100 * S)
     again = Plan(((9.0, 0.0),), 800 * S)
     plans = []
-    for heard, now_ns in (
+    for received, now_ns in (
         (there, 100 * S),
         (None, 700 * S),
         (None, 700 * S + 1),
         (again, 800 * S),
         (Plan((), 801 * S), 801 * S),
     ):
-        log.take(Robot(plan=heard), now_ns)
+        log.take(Robot(plan=received), now_ns)
         plans.append(log.now.plan)
     assert plans == [there, there, None, again, None]
 

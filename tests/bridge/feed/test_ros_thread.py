@@ -46,7 +46,7 @@ class Stage:
 
     def __init__(self) -> None:
         self.events: list[int] = []
-        self.told_by: set[threading.Thread] = set()
+        self.reported_by: set[threading.Thread] = set()
         self.deaths = 0
         self.ros: RosThread[Probe, int] = RosThread(
             Probe, ros_args=(), on_event=self._on_event, on_death=self._on_death
@@ -54,7 +54,7 @@ class Stage:
 
     def _on_event(self, event: int) -> None:
         self.events.append(event)
-        self.told_by.add(threading.current_thread())
+        self.reported_by.add(threading.current_thread())
 
     def _on_death(self) -> None:
         self.deaths += 1
@@ -128,7 +128,7 @@ async def test_the_loop_receives_the_latest_event_and_skips_those_before_it(doma
         await until(lambda: stage.events and stage.events[-1] == 1_000, "the newest event")
         assert len(stage.events) < 1_000
         assert stage.events == sorted(stage.events)
-        assert stage.told_by == {threading.current_thread()}
+        assert stage.reported_by == {threading.current_thread()}
 
 
 def test_events_after_the_loop_has_closed_do_no_harm(domain: int) -> None:
@@ -164,10 +164,10 @@ async def test_an_error_of_a_ros_future_is_raised(domain: int) -> None:
 
 async def test_a_cancelled_future_is_released_in_the_thread_of_the_nodes(domain: int) -> None:
     async with Stage() as stage:
-        asked, given_up = Future(), list[tuple[Future, threading.Thread]]()
+        requested, given_up = Future(), list[tuple[Future, threading.Thread]]()
         waiting = asyncio.create_task(
             stage.ros.ask(
-                lambda _: asked,
+                lambda _: requested,
                 lambda _, future: given_up.append((future, threading.current_thread())),
             )
         )
@@ -176,22 +176,22 @@ async def test_a_cancelled_future_is_released_in_the_thread_of_the_nodes(domain:
         await until(lambda: stage.ros.calls_waiting == 0, "the question to be asked")
         waiting.cancel()
         await until(lambda: given_up, "the future to be given up")
-        assert given_up == [(asked, stage.ros.require_node().thread)]
+        assert given_up == [(requested, stage.ros.require_node().thread)]
 
 
 async def test_a_caller_cancelled_while_its_call_starts_leaves_nothing_behind(domain: int) -> None:
     async with Stage() as stage:
         gate, busy = threading.Event(), threading.Event()
-        open_questions: list[Future] = []
+        open_queries: list[Future] = []
 
         def start(_: Probe) -> Future:
             busy.set()
             gate.wait(20.0)
-            open_questions.append(Future())
-            return open_questions[-1]
+            open_queries.append(Future())
+            return open_queries[-1]
 
         waiting = asyncio.create_task(
-            stage.ros.ask(start, lambda _, future: open_questions.remove(future))
+            stage.ros.ask(start, lambda _, future: open_queries.remove(future))
         )
         await until(busy.is_set, "a busy thread")
         waiting.cancel()
@@ -201,7 +201,7 @@ async def test_a_caller_cancelled_while_its_call_starts_leaves_nothing_behind(do
         # By then, all that was handed over before has run.
         for _ in range(3):
             await stage.ros.call(lambda _: None)
-        assert open_questions == []
+        assert open_queries == []
         assert stage.ros.callback_errors == 0
 
 
@@ -275,9 +275,9 @@ def test_with_json_logging_every_line_of_a_bridge_is_an_object(domain: int) -> N
         process.wait_for_output("sabotage of")
         process.stop()
         written = entries(process.output)
-    told = {entry["level"]: entry for entry in written if entry["logger"] == "lupin_twin"}
-    assert "'odom'" in told["warning"]["message"]
-    assert "Traceback" in told["error"]["message"], "a trace of many lines is in one"
+    reported = {entry["level"]: entry for entry in written if entry["logger"] == "lupin_twin"}
+    assert "'odom'" in reported["warning"]["message"]
+    assert "Traceback" in reported["error"]["message"], "a trace of many lines is in one"
 
 
 def test_every_severity_is_passed_on_once_with_its_level(
@@ -293,8 +293,10 @@ def test_every_severity_is_passed_on_once_with_its_level(
     for _ in range(2):
         logger.warning("told once", once=True)
     logger.debug("not told")
-    told = [(record.levelno, record.message) for record in caplog.records if record.name == "probe"]
-    assert told == [
+    reported = [
+        (record.levelno, record.message) for record in caplog.records if record.name == "probe"
+    ]
+    assert reported == [
         (logging.INFO, "100 %s"),
         (logging.WARNING, "careful"),
         (logging.ERROR, "broken"),

@@ -45,14 +45,14 @@ def state_of(value: float) -> TwinState:
 
 async def test_a_new_map_is_a_new_revision_and_no_sign_of_life(domain: int) -> None:
     with Peer(domain) as peer:
-        async with started(WebTwin) as (twin, told):
+        async with started(WebTwin) as (twin, reported):
             states = peer.publish("/twin/state", state_of(1.0), depth=1)
-            await until(lambda: told and twin.revision() == told[-1].revision, "a state")
-            before = len(told)
+            await until(lambda: reported and twin.revision() == reported[-1].revision, "a state")
+            before = len(reported)
             peer.publish_map(occupancy_grid([[0, 100]]))
             await until(lambda: twin.occupancy_map() is not None, "the map")
-            assert twin.revision() != told[-1].revision
-            assert len(told) == before
+            assert twin.revision() != reported[-1].revision
+            assert len(reported) == before
             # Nor does a new node drop the state for it.
             peer.node.destroy_publisher(states)
             await twin.thread.stop()
@@ -60,9 +60,9 @@ async def test_a_new_map_is_a_new_revision_and_no_sign_of_life(domain: int) -> N
             revision = twin.revision()
             peer.publish_map(occupancy_grid([[100, 0]]))
             await until(lambda: twin.revision() != revision, "another map")
-            assert len(told) == before
+            assert len(reported) == before
             assert twin.update is not None
-            assert twin.update.snapshot is told[-1].snapshot
+            assert twin.update.snapshot is reported[-1].snapshot
 
 
 async def test_without_a_twin_the_missing_service_is_named(domain: int) -> None:
@@ -79,12 +79,12 @@ async def test_after_a_silence_a_new_node_recovers_everything(domain: int) -> No
         peer.node.create_subscription(
             Observation, "/floranova/observations", scans.append, latched(50)
         )
-        async with started(WebTwin) as (twin, told):
+        async with started(WebTwin) as (twin, reported):
             state_topic = topics_of(twin.names)[0]
             await twin.relay.listen(state_topic, samples.append)
 
             def received() -> float:
-                return told[-1].snapshot.tags[0].readings[0].value if told else 0.0
+                return reported[-1].snapshot.tags[0].readings[0].value if reported else 0.0
 
             def relayed() -> float:
                 message = twin.relay.read(state_topic, samples[-1]) if samples else state_of(0.0)
@@ -132,10 +132,10 @@ async def test_after_a_silence_a_new_node_recovers_everything(domain: int) -> No
 async def test_the_last_state_of_a_lost_twin_is_no_news_to_a_new_node(domain: int) -> None:
     samples = list[Sample]()
     with Peer(domain) as peer:
-        async with started(WebTwin) as (twin, told):
+        async with started(WebTwin) as (twin, reported):
             await twin.relay.listen(topics_of(twin.names)[0], samples.append)
             peer.publish("/twin/state", state_of(1.0), depth=1)
-            await until(lambda: told and samples, "the state")
+            await until(lambda: reported and samples, "the state")
             before = twin.revision()
             await twin.thread.call(
                 lambda node: node.set_parameters([Parameter("idw_power", value=3.0)])
@@ -153,8 +153,10 @@ async def test_the_last_state_of_a_lost_twin_is_no_news_to_a_new_node(domain: in
             assert state in twin.revision(), "the state is the same"
             assert twin.rules.idw_power == 3.0
             peer.publish("/twin/state", state_of(2.0), depth=1)
-            await until(lambda: told[-1].snapshot.tags[0].readings[0].value == 2.0, "the next one")
-            assert [it.snapshot.tags[0].readings[0].value for it in told] == [1.0, 2.0]
+            await until(
+                lambda: reported[-1].snapshot.tags[0].readings[0].value == 2.0, "the next one"
+            )
+            assert [it.snapshot.tags[0].readings[0].value for it in reported] == [1.0, 2.0]
 
 
 async def test_a_node_is_replaced_after_ever_longer_silences_of_five_minutes_at_most(
@@ -202,11 +204,11 @@ async def test_refusals_are_the_services_and_no_wait_is_endless(
             await until_answered(is_given_up, "the peer, which does not spin", bool)
             twin.timeout_s = 20.0
             for sensor, kind in (("refused", FieldRefused), ("busy", TwinUnavailableError)):
-                asked = asyncio.create_task(twin.estimate_report(ReportRequest(sensor)))
-                while not asked.done():
+                requested = asyncio.create_task(twin.estimate_report(ReportRequest(sensor)))
+                while not requested.done():
                     await asyncio.to_thread(peer.spin_briefly)
                 with pytest.raises(kind, match=SAYS[sensor]):
-                    await asked
+                    await requested
 
 
 # --- copies of journals ---------------------------------------------------------------------------

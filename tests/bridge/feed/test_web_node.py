@@ -26,8 +26,8 @@ class Stage:
     def __init__(self, domain: int, *ros_args: str) -> None:
         self._context = Context()
         rclpy.init(args=list(ros_args), context=self._context, domain_id=domain)
-        self.told: list[Snapshot] = []
-        self.node = WebNode(self.told.append, context=self._context)
+        self.reported: list[Snapshot] = []
+        self.node = WebNode(self.reported.append, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self.stamp_s = 0
@@ -52,14 +52,14 @@ class Stage:
         snapshot = Snapshot(self.stamp_s * S, "map", tags)
         peer.publish("/twin/times", convert.StateMessages().times(snapshot), depth=1)
         peer.publish("/twin/state", convert.StateMessages().build(snapshot), depth=1)
-        if not has_times(self.told_of(self.stamp_s * S)):  # it arrived before its times
-            self.until(lambda: has_times(self.told[-1]), "its times")
-        return self.told[-1]
+        if not has_times(self.reported_of(self.stamp_s * S)):  # it arrived before its times
+            self.until(lambda: has_times(self.reported[-1]), "its times")
+        return self.reported[-1]
 
-    def told_of(self, stamp_ns: int) -> Snapshot:
+    def reported_of(self, stamp_ns: int) -> Snapshot:
         """The snapshot of that stamp."""
-        self.until(lambda: self.told and self.told[-1].stamp_ns == stamp_ns, "the state")
-        return self.told[-1]
+        self.until(lambda: self.reported and self.reported[-1].stamp_ns == stamp_ns, "the state")
+        return self.reported[-1]
 
 
 @contextmanager
@@ -102,7 +102,7 @@ def tag(
 def test_the_revision_changes_with_poses_and_readings_and_with_nothing_else(
     stage: Stage, peer: Peer
 ) -> None:
-    revisions, told = [], []
+    revisions, reported = [], []
     for state in (
         [tag("1", 1.0)],
         [tag("1", 2.0)],
@@ -111,12 +111,12 @@ def test_the_revision_changes_with_poses_and_readings_and_with_nothing_else(
         [tag("1", 2.0), tag("2", 1.0)],
         [tag("1", 2.0), tag("2", 2.0)],
     ):
-        told.append(stage.take(peer, *state))
+        reported.append(stage.take(peer, *state))
         revisions.append(stage.node.revision)
     assert len(set(revisions)) == len(revisions)
-    assert told[1].tags[0] is not told[0].tags[0]
+    assert reported[1].tags[0] is not reported[0].tags[0]
     # Unchanged values are the same objects.
-    assert told[-1].tags[0] is told[-2].tags[0]
+    assert reported[-1].tags[0] is reported[-2].tags[0]
     stage.take(peer, tag("1", 2.0, at_s=6), tag("2", 2.0, flower=Flower(species="rose")))
     assert stage.node.revision == revisions[-1]
 
@@ -157,21 +157,21 @@ def spare(_: float) -> None:
 
 
 def test_a_state_waits_for_its_own_times_alone(stage: Stage, peer: Peer) -> None:
-    told = stage.take(peer, tag())
-    assert told.tags[0].readings[0].observed_at_ns == 5 * S
-    count = len(stage.told)
+    reported = stage.take(peer, tag())
+    assert reported.tags[0].readings[0].observed_at_ns == 5 * S
+    count = len(stage.reported)
     # A state without its times is passed on without them, so that the twin does not seem dead.
     late = Snapshot(90 * S, "map", (tag(value=7.0, at_s=80),))
     peer.publish("/twin/state", convert.StateMessages().build(late), depth=1)
-    alone = stage.told_of(90 * S)
+    alone = stage.reported_of(90 * S)
     assert not has_times(alone)
     assert alone.tags[0].readings[0] == Reading("co2", 7.0)
-    assert len(stage.told) == count + 1
+    assert len(stage.reported) == count + 1
     # And again with them as soon as they arrive.
     times = convert.StateMessages().times(late)
     peer.publish("/twin/times", times, depth=1)
-    stage.until(lambda: has_times(stage.told[-1]), "the times")
-    assert stage.told[-1].tags[0].readings[0].observed_at_ns == 80 * S
+    stage.until(lambda: has_times(stage.reported[-1]), "the times")
+    assert stage.reported[-1].tags[0].readings[0].observed_at_ns == 80 * S
 
 
 # --- maps ---------------------------------------------------------------------------------------

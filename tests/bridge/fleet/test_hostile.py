@@ -105,7 +105,7 @@ def test_no_process_is_started_for_unknown_sites(page: Page) -> None:
 
 def test_a_client_that_reads_many_sites_loses_one_to_another_client(page: Page) -> None:
     with (
-        open_websocket(ws(page, "/sites/gh1/ws/state")) as kept_on,
+        open_websocket(ws(page, "/sites/gh1/ws/state")) as stored_on,
         open_websocket(ws(page, "/sites/gh2/ws/state")) as given_up,
     ):
         refused = page.http.get("/sites/gh3/api/state")
@@ -116,7 +116,7 @@ def test_a_client_that_reads_many_sites_loses_one_to_another_client(page: Page) 
         with pytest.raises(ConnectionClosed, match="2 sites are open here, the limit"):
             deque(iter(lambda: given_up.recv(timeout=PATIENCE_S), None))
         # The first one is unchanged.
-        while '"type":"s' not in str(kept_on.recv(timeout=PATIENCE_S)):
+        while '"type":"s' not in str(stored_on.recv(timeout=PATIENCE_S)):
             pass
         assert page.metric("lupin_clients", "/sites/gh1") == 1
     assert page.metric("lupin_fleet_sites_open") <= 2
@@ -309,10 +309,10 @@ def test_nothing_that_a_site_writes_stops_the_overview_of_the_others(
     with fleet(archive) as running:
         running.site("gh2", is_live=True)
         with psycopg.connect(archive.url("gh2"), autocommit=True) as site:
-            for heard in ("infinity", "0001-01-01"):
-                site.execute("UPDATE forwarder SET heard_at = %s", (heard,))
-                running.site("gh2", is_live=heard == "infinity")
-                assert running.site("gh1")["is_live"], heard
+            for at in ("infinity", "0001-01-01"):
+                site.execute("UPDATE forwarder SET heard_at = %s", (at,))
+                running.site("gh2", is_live=at == "infinity")
+                assert running.site("gh1")["is_live"], at
             site.execute("UPDATE epoch SET seq_offset = 9223372036854775807")
             site.execute("UPDATE hour SET n = '[\"some\"]'")
             looks = running.metric("lupin_fleet_looks")

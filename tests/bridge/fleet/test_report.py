@@ -40,10 +40,10 @@ def test_a_sites_report_is_that_of_its_journal_and_the_totals_cover_all(
     begun_s = int(time.time()) // HOUR_S * HOUR_S - 4 * HOUR_S
     for site, rows in (("gh1", rows_of(begun_s)), ("gh2", rows_of(begun_s)[:10]), ("no", [])):
         forward(archive.of_site(site), tmp_path / f"{site}.sqlite", rows)
-    asked = f"from={begun_s + 1800}&to={begun_s + 3 * HOUR_S}"
+    requested = f"from={begun_s + 1800}&to={begun_s + 3 * HOUR_S}"
     with fleet(archive, "--time-zone", "UTC") as page:
         page.site("gh1")
-        path = f"/sites/gh1/api/report.html?{asked}&lang=nl"
+        path = f"/sites/gh1/api/report.html?{requested}&lang=nl"
         wait_for(lambda: page.http.get(path).status_code == 200, "the report")
         assert "Dienstrapport: gh1</h1>" in page.http.get(path).text
         every = page.http.get(f"/api/report?from={begun_s}&to={begun_s + 3 * HOUR_S}").json()
@@ -56,7 +56,7 @@ def test_a_sites_report_is_that_of_its_journal_and_the_totals_cover_all(
                 assert row[name] == counts[name], (site, name)
         assert (whole["gh1"]["failed"], whole["no"]["scans"]) == (1, 0)
         # In whole hours.
-        some = page.http.get(f"/api/report?{asked}&sites=gh2").json()
+        some = page.http.get(f"/api/report?{requested}&sites=gh2").json()
         assert (some["from"]["sec"], len(some["sites"])) == (begun_s, 1)
         assert (every["notes"], some["notes"]) == ([], [])
         for query, status in (

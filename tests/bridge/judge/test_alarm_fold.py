@@ -111,12 +111,12 @@ def test_alarms_equal_the_simplest_rule_in_any_order_and_with_repeats(
     seed: int,
 ) -> None:
     chance = random.Random(seed)
-    heard = [some_write(chance, number) for number in range(chance.randint(0, 60))]
+    received = [some_write(chance, number) for number in range(chance.randint(0, 60))]
     spans = chance.choice(SPANS)
-    last_ns = max((write.stamp_ns for write in heard), default=START)
+    last_ns = max((write.stamp_ns for write in received), default=START)
     now_ns = last_ns + chance.randint(0, 300) * MINUTE
-    expected = alarms(heard, spans, now_ns, SENSORS, day_of)
-    arrived = [*heard, *chance.choices(heard, k=5)] if heard else []
+    expected = alarms(received, spans, now_ns, SENSORS, day_of)
+    arrived = [*received, *chance.choices(received, k=5)] if received else []
     chance.shuffle(arrived)
     lots = []
     while arrived:
@@ -127,9 +127,9 @@ def test_alarms_equal_the_simplest_rule_in_any_order_and_with_repeats(
         found = follow(lots, spans, now_ns)
     assert {plain(alarm) for alarm in found} == expected
     assert len({alarm.id for alarm in found}) == len(found)
-    at_once = follow([heard], spans, now_ns)
+    at_once = follow([received], spans, now_ns)
     assert at_once == found
-    in_order = sorted(heard, key=lambda write: write.stamp_ns)
+    in_order = sorted(received, key=lambda write: write.stamp_ns)
     one_by_one = follow([[write] for write in in_order], spans, now_ns)
     assert one_by_one == found
 
@@ -138,23 +138,23 @@ def test_alarms_equal_the_simplest_rule_in_any_order_and_with_repeats(
 @given(st.integers(0, 2**32))
 def test_old_writes_are_dropped_and_change_no_result(seed: int) -> None:
     chance = random.Random(seed)
-    heard = [some_write(chance, number) for number in range(chance.randint(1, 60))]
-    heard.sort(key=lambda write: write.stamp_ns)
-    spans, now_ns = chance.choice(SPANS), heard[-1].stamp_ns + chance.randint(0, 300) * MINUTE
-    expected = alarms(heard, spans, now_ns, SENSORS, day_of)
+    received = [some_write(chance, number) for number in range(chance.randint(1, 60))]
+    received.sort(key=lambda write: write.stamp_ns)
+    spans, now_ns = chance.choice(SPANS), received[-1].stamp_ns + chance.randint(0, 300) * MINUTE
+    expected = alarms(received, spans, now_ns, SENSORS, day_of)
     # Writes beyond the limit are stored only as their result.
     follower = AlarmFolder(BY, spans, kept=chance.choice([3, 24, 300]))
     since_ns = 0
-    while heard:
+    while received:
         # Late, but not too late.
-        count = min(len(heard), chance.randint(1, 9))
-        lot, heard = heard[:count], heard[count:]
+        count = min(len(received), chance.randint(1, 9))
+        lot, received = received[:count], received[count:]
         chance.shuffle(lot)
         follower.take(lot)
         with patch.object(alarm_fold, "FORGET_EVERY_NS", 0):
             follower.found(now_ns, since_ns)
         since_ns = max(since_ns, lot[0].stamp_ns - chance.randint(0, 60) * MINUTE)
-        since_ns = min(since_ns, heard[0].stamp_ns) if heard else since_ns
+        since_ns = min(since_ns, received[0].stamp_ns) if received else since_ns
     page = board_of(follower.found(now_ns, since_ns).alarms, since_ns)
     if follower.missed:
         return
@@ -163,19 +163,19 @@ def test_old_writes_are_dropped_and_change_no_result(seed: int) -> None:
 
 
 def test_writes_older_than_the_window_are_counted_and_not_used() -> None:
-    follower, heard = AlarmFolder(BY, SPANS[0], kept=4), scans([22] * 9)
-    follower.take(heard[:5])
-    follower.take(heard[5:])
-    late = [replace(one, number=90 + one.number, stamp_ns=one.stamp_ns + S) for one in heard]
+    follower, received = AlarmFolder(BY, SPANS[0], kept=4), scans([22] * 9)
+    follower.take(received[:5])
+    follower.take(received[5:])
+    late = [replace(one, number=90 + one.number, stamp_ns=one.stamp_ns + S) for one in received]
     follower.take(late[5:8])
     assert follower.missed == 0
     follower.take(late[3:4])
     assert follower.missed == 1
     since_ns = START + 2 * alarm_fold.FORGET_EVERY_NS
     follower.found(since_ns, since_ns)
-    follower.take([replace(heard[0], number=99, stamp_ns=since_ns - 1)])
+    follower.take([replace(received[0], number=99, stamp_ns=since_ns - 1)])
     assert follower.missed == 2
-    follower.take([replace(heard[0], number=100, stamp_ns=since_ns)])
+    follower.take([replace(received[0], number=100, stamp_ns=since_ns)])
     assert follower.missed == 2
 
 
@@ -205,13 +205,13 @@ def scans(values: Sequence[float], sensor: str = "temperature", tag: str = "a") 
     ]
 
 
-def told(heard: Sequence[PastWrite], later_ns: int = 0) -> list[Alarm]:
-    return list(follow([heard], SPANS[0], heard[-1].stamp_ns + later_ns))
+def reported(received: Sequence[PastWrite], later_ns: int = 0) -> list[Alarm]:
+    return list(follow([received], SPANS[0], received[-1].stamp_ns + later_ns))
 
 
 def test_two_scans_raise_an_alarm_and_two_clear_it() -> None:
-    assert told(scans([22, 17, 22, 17, 22])) == []
-    (alarm,) = told(scans([22, 17, 16, 22, 16.5, 22, 22, 17]))
+    assert reported(scans([22, 17, 22, 17, 22])) == []
+    (alarm,) = reported(scans([22, 17, 16, 22, 16.5, 22, 22, 17]))
     at = [(at_ns - START) // MINUTE for at_ns in (alarm.raised_at_ns, alarm.cleared_at_ns or 0)]
     assert at == [2, 6]
     assert alarm.id == "512f1a86ed4ca811ba00eed7", "the same in every process and version"
@@ -222,14 +222,14 @@ def test_two_scans_raise_an_alarm_and_two_clear_it() -> None:
 
 
 def test_an_alarm_that_gets_worse_is_the_same_alarm_with_a_worse_verdict() -> None:
-    (stressed,) = told(scans([17, 17]))
-    (critical,) = told(scans([17, 17, 6, 12]))
+    (stressed,) = reported(scans([17, 17]))
+    (critical,) = reported(scans([17, 17, 6, 12]))
     assert critical.id == stressed.id
     assert (stressed.reason.verdict, critical.reason.verdict) == ("stressed", "critical")
     assert (critical.worst, critical.reason.limit) == (6, 18)
     assert (critical.raised_as, critical.is_worse, stressed.is_worse) == ("stressed", True, False)
     assert (critical.worse_at_ns, stressed.worse_at_ns) == (START + 2 * MINUTE, None)
-    (bad,) = told(scans([6, 6, 6]))
+    (bad,) = reported(scans([6, 6, 6]))
     assert (bad.raised_as, bad.is_worse, bad.worse_at_ns) == ("critical", False, None)
 
 
@@ -241,15 +241,19 @@ def test_every_kind_of_reason_becomes_an_alarm_except_those_of_the_estimate() ->
         names = ("temperature", "door")[: len(values)]
         return PastWrite(0, 1, tag, START + minute * MINUTE, SCAN, status, names, values)
 
-    heard = [at(minute, "well", *good) for minute in range(60)]
-    heard += [at(minute, "cold", 6.0) for minute in range(60)]
-    heard += [at(minute, "dead", 22.0, math.nan) for minute in range(60)]
-    heard += [at(minute, "silent", *(good if minute < 9 else good[:1])) for minute in range(60)]
-    heard += [at(minute, "left out", *good) for minute in range(9)]
-    heard += [at(minute, "lost", *(good if minute < 50 else ()), status=2) for minute in range(60)]
-    heard += [replace(at(7, "pest"), kind=LOOK, has_seen=True, anomaly=True, bug_count=2)]
-    heard = [replace(write, number=number) for number, write in enumerate(heard)]
-    found = {(one.tag_id, str(one.reason.kind), one.reason.sensor) for one in told(heard, DAY_NS)}
+    received = [at(minute, "well", *good) for minute in range(60)]
+    received += [at(minute, "cold", 6.0) for minute in range(60)]
+    received += [at(minute, "dead", 22.0, math.nan) for minute in range(60)]
+    received += [at(minute, "silent", *(good if minute < 9 else good[:1])) for minute in range(60)]
+    received += [at(minute, "left out", *good) for minute in range(9)]
+    received += [
+        at(minute, "lost", *(good if minute < 50 else ()), status=2) for minute in range(60)
+    ]
+    received += [replace(at(7, "pest"), kind=LOOK, has_seen=True, anomaly=True, bug_count=2)]
+    received = [replace(write, number=number) for number, write in enumerate(received)]
+    found = {
+        (one.tag_id, str(one.reason.kind), one.reason.sensor) for one in reported(received, DAY_NS)
+    }
     assert found == {
         ("cold", "range", "temperature"),
         ("dead", "reading_failed", "door"),
@@ -264,9 +268,9 @@ def test_every_kind_of_reason_becomes_an_alarm_except_those_of_the_estimate() ->
 
 def test_the_fold_reports_when_it_will_change_without_news() -> None:
     follower = AlarmFolder(BY, SPANS[0])
-    heard = scans([22, 22])
-    follower.take(heard)
-    last_ns = heard[-1].stamp_ns
+    received = scans([22, 22])
+    follower.take(received)
+    last_ns = received[-1].stamp_ns
     due_ns = follower.found(last_ns).due_ns
     assert follower.found(due_ns - 1).alarms == ()
     assert [one.reason.kind for one in follower.found(due_ns).alarms] == ["stopped"]
@@ -275,24 +279,26 @@ def test_the_fold_reports_when_it_will_change_without_news() -> None:
 
 def test_unchanged_alarms_are_the_same_objects() -> None:
     follower = AlarmFolder(BY, SPANS[0])
-    heard = scans([17, 17, 16, 22, 22])
-    follower.take(heard[:2])
-    now_ns = heard[-1].stamp_ns
+    received = scans([17, 17, 16, 22, 22])
+    follower.take(received[:2])
+    now_ns = received[-1].stamp_ns
     first = follower.found(now_ns).alarms
     assert [one.worst for one in first] == [17]
     assert follower.found(now_ns).alarms is first
-    follower.take(heard[2:])
+    follower.take(received[2:])
     assert [one.worst for one in follower.found(now_ns).alarms] == [16]
     # It was warm between the two.
-    late = [replace(heard[0], number=90 + n, stamp_ns=START + n, values=(900, 22)) for n in (1, 2)]
+    late = [
+        replace(received[0], number=90 + n, stamp_ns=START + n, values=(900, 22)) for n in (1, 2)
+    ]
     follower.take(late)
     assert first[0].id not in {one.id for one in follower.found(now_ns).alarms}
 
 
 def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false() -> None:
-    heard = ordinary_days()
-    last_ns = heard[-1].stamp_ns
-    raised = follow([heard], SPANS[0], last_ns)
+    received = ordinary_days()
+    last_ns = received[-1].stamp_ns
+    raised = follow([received], SPANS[0], last_ns)
     counts = Counter((one.reason.kind.value, one.reason.sensor) for one in raised)
     # The climate's own nights and positions, with noise as wide as the range's margin.
     assert counts == {
@@ -305,7 +311,7 @@ def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false
         ("range", "temperature_night_minimum"): 6,
         ("scan_failed", ""): 1,
     }
-    first_round_ns = heard[0].stamp_ns + 3600 * S
+    first_round_ns = received[0].stamp_ns + 3600 * S
     steady = [one for one in raised if one.raised_at_ns > first_round_ns]
     assert len(steady) / ((last_ns - first_round_ns) / (10 * MINUTE)) < 0.3
     for day in range(3):
@@ -314,7 +320,7 @@ def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false
     # Pests are real: from the first inspection that saw one to the second that did not.
     clean: dict[str, int] = {}
     broke_out = 0
-    for look in (write for write in heard if write.has_seen):
+    for look in (write for write in received if write.has_seen):
         broke_out += look.anomaly and clean.get(look.tag_id, 2) >= 2
         clean[look.tag_id] = 0 if look.anomaly else clean.get(look.tag_id, 2) + 1
     assert counts["pest", ""] == broke_out

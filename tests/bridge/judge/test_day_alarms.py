@@ -57,9 +57,9 @@ def new_follower() -> AlarmFolder:
     return AlarmFolder(DawnToDusk(own_sensors(), None, ClockDay(None)), SPANS)
 
 
-def found(heard: Iterable[PastWrite]) -> list[Alarm]:
+def found(received: Iterable[PastWrite]) -> list[Alarm]:
     follower = new_follower()
-    follower.take(heard)
+    follower.take(received)
     alarms = [one for one in follower.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]
     return sorted(alarms, key=lambda one: (one.raised_at_ns, one.id))
 
@@ -81,12 +81,12 @@ def test_a_days_mean_raises_at_the_next_dawn_and_one_good_day_clears() -> None:
 
 def test_the_value_equals_that_of_the_history_at_that_moment() -> None:
     chance = random.Random(4)
-    heard = [
+    received = [
         replace(one, values=(chance.uniform(5.0, 14.0),))
         for one in scans({"temperature": [0.0] * 3}, every_h=0.2)
     ]
-    readings = [(one.stamp_ns, one.values[0]) for one in heard]
-    alarms = found(heard)
+    readings = [(one.stamp_ns, one.values[0]) for one in received]
+    alarms = found(received)
     assert {one.reason.sensor for one in alarms} == {MEAN, MINIMUM}
     for alarm in alarms:
         at_dawn = DAILY[alarm.reason.sensor].at(dawn(1), readings, is_day)
@@ -96,8 +96,8 @@ def test_the_value_equals_that_of_the_history_at_that_moment() -> None:
 
 def test_a_daily_quantity_has_no_deadband() -> None:
     wobbling = found(scans({"temperature": [16.8, 17.2, 16.8, 17.4, 20.0]}))
-    told = [(one.raised_at_ns, one.cleared_at_ns) for one in wobbling]
-    assert told == [(dawn(1), dawn(2)), (dawn(3), dawn(4))]
+    reported = [(one.raised_at_ns, one.cleared_at_ns) for one in wobbling]
+    assert reported == [(dawn(1), dawn(2)), (dawn(3), dawn(4))]
 
 
 def test_too_little_of_a_day_gives_no_value() -> None:
@@ -110,24 +110,24 @@ def test_too_little_of_a_day_gives_no_value() -> None:
 
 
 def test_a_late_scan_corrects_its_day() -> None:
-    heard = scans({"temperature": [14.0, 14.0, 14.0]})
-    late = [one for one in heard if dawn(0) + 4 * HOUR < one.stamp_ns < dawn(0) + 15 * HOUR]
-    early = [one for one in heard if one not in late]
+    received = scans({"temperature": [14.0, 14.0, 14.0]})
+    late = [one for one in received if dawn(0) + 4 * HOUR < one.stamp_ns < dawn(0) + 15 * HOUR]
+    early = [one for one in received if one not in late]
     assert [one.raised_at_ns for one in found(early)] == [dawn(2)]
     follower = new_follower()
     follower.take(early)
     follower.found(40 * DAY_NS)
     follower.take(late)
     after = follower.found(40 * DAY_NS).alarms
-    assert [one for one in after if one.reason.sensor in DAILY] == found(heard)
-    assert [one.raised_at_ns for one in found(heard)] == [dawn(1)]
+    assert [one for one in after if one.reason.sensor in DAILY] == found(received)
+    assert [one.raised_at_ns for one in found(received)] == [dawn(1)]
 
 
 def test_a_range_of_light_belongs_to_a_crop() -> None:
-    heard = scans({"light": [4_000.0, 4_000.0]})
-    assert found(heard) == []
+    received = scans({"light": [4_000.0, 4_000.0]})
+    assert found(received) == []
     look = PastWrite(10_000, 1, "a", HOUR, 1, 0, has_seen=True, species="Lettuce")
-    [dim] = found([look, *heard])
+    [dim] = found([look, *received])
     assert dim.reason.sensor == "daily_light_integral"
     assert dim.reason.value == pytest.approx(24 * 3600 * 4_000.0 / 54.0 / 1e6)
     assert dim.reason.limit == 12.0
@@ -155,14 +155,14 @@ def test_at_any_moment_the_recent_window_gives_the_days_that_the_whole_log_gives
     chance = random.Random(seed)
     # Some days lack their last hours and much of the next day.
     gaps = [(dawn(day) + 20 * HOUR, dawn(day) + 44 * HOUR) for day in range(seed % 3, 7, 3)]
-    heard = [
+    received = [
         replace(one, values=(chance.choice([*3 * [5.0, 14.0, 20.0], math.nan, 1e9]),))
         for one in scans({"temperature": [0.0] * 7}, every_h=chance.choice([0.5, 1.0]))
         if not any(start < one.stamp_ns < end for start, end in gaps)
     ]
     known = 0
     for at_ns in [*(end + COUNTS_NS for _, end in gaps), *range(dawn(1), 8 * DAY_NS, 11 * HOUR)]:
-        by_then = [one for one in heard if one.stamp_ns <= at_ns]
+        by_then = [one for one in received if one.stamp_ns <= at_ns]
         last = [one for one in by_then if at_ns - SINCE_NS <= one.stamp_ns]
         past = days_of(last, own_sensors(), is_day, day_number)
         follower = new_follower()
@@ -180,11 +180,11 @@ def counting(days: Mapping[str, Sequence[Reading]], at_ns: int) -> set[Reading]:
 
 
 def test_the_last_whole_days_value_holds_until_the_next_scan_after_a_dawn() -> None:
-    heard = scans({"temperature": [14.0, 20.0, 20.0]})
+    received = scans({"temperature": [14.0, 20.0, 20.0]})
 
     def mean(at_ns: int) -> float | None:
         follower = new_follower()
-        follower.take(one for one in heard if one.stamp_ns <= at_ns)
+        follower.take(one for one in received if one.stamp_ns <= at_ns)
         days = follower.found(at_ns).days.get("a", ())
         return next((day.value for day in days if day.name == MEAN), None)
 
@@ -194,6 +194,6 @@ def test_the_last_whole_days_value_holds_until_the_next_scan_after_a_dawn() -> N
 
 
 def test_a_day_without_scans_is_not_judged_by_the_day_before() -> None:
-    heard = scans({"temperature": [14.0, 14.0, 14.0, 14.0]})
-    late = [one for one in heard if not dawn(1) <= one.stamp_ns < dawn(2)]
+    received = scans({"temperature": [14.0, 14.0, 14.0, 14.0]})
+    late = [one for one in received if not dawn(1) <= one.stamp_ns < dawn(2)]
     assert [one.raised_at_ns for one in found(late)] == [dawn(3)]

@@ -80,8 +80,8 @@ def test_the_nights_of_a_period(
     clock: ClockDay, from_h: int, to_h: int, nights: list[tuple[int, int]]
 ) -> None:
     found = clock.nights(MIDNIGHT_S + from_h * 3600, MIDNIGHT_S + to_h * 3600)
-    told = [tuple((at_s - MIDNIGHT_S) / 3600 for at_s in night) for night in found]
-    assert told == nights
+    reported = [tuple((at_s - MIDNIGHT_S) / 3600 for at_s in night) for night in found]
+    assert reported == nights
     for hour in range(from_h, to_h):
         is_night = any(dusk <= hour < dawn for dusk, dawn in nights)
         assert clock.is_day(MIDNIGHT_S + hour * 3600) is not is_night

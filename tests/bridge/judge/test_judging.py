@@ -169,22 +169,22 @@ def test_a_reading_is_judged_by_the_daylight_and_the_plants_of_its_own_time() ->
     # The next reading is from the night.
     warm = tag("a", START + 2 * MINUTE, temperature=25.0)
     later = judge.see(snapshot(START + 2 * MINUTE, warm, dark))
-    assert told(later.tags["a"]) == [("stressed", 25.0, 24.0)]
+    assert reported(later.tags["a"]) == [("stressed", 25.0, 24.0)]
     # Plants that are seen later apply to the next reading too.
     tulips = replace(warm, flower=Flower("tulip", 0.9), looked_at_ns=START + 3 * MINUTE)
     seen = judge.see(snapshot(START + 3 * MINUTE, tulips, dark))
-    assert told(seen.tags["a"]) == [("stressed", 25.0, 24.0)]
+    assert reported(seen.tags["a"]) == [("stressed", 25.0, 24.0)]
     reading = (Reading("temperature", 25.5, START + 4 * MINUTE),)
     again = judge.see(snapshot(START + 4 * MINUTE, replace(tulips, readings=reading), dark))
-    assert told(again.tags["a"]) == [("critical", 25.5, 25.0)]
+    assert reported(again.tags["a"]) == [("critical", 25.5, 25.0)]
     # An uncertain detection changes nothing.
     reading = (Reading("temperature", 25.5, START + 6 * MINUTE),)
     unsure = replace(tulips, flower=Flower("orchid", 0.05), looked_at_ns=START + 5 * MINUTE)
     still = judge.see(snapshot(START + 6 * MINUTE, replace(unsure, readings=reading), dark))
-    assert told(still.tags["a"]) == [("critical", 25.5, 25.0)]
+    assert reported(still.tags["a"]) == [("critical", 25.5, 25.0)]
 
 
-def told(health: Health) -> list[tuple[str, float | None, float | None]]:
+def reported(health: Health) -> list[tuple[str, float | None, float | None]]:
     return [(it.verdict, it.value, it.limit) for it in health.reasons]
 
 
@@ -287,10 +287,10 @@ def test_judging_at_once_is_bounded_by_readings() -> None:
     many = {f"s{number}": 1.0 for number in range(59)}
     judge = Judge(BY_LIGHT)
     house = [tag(str(number), START, **many) for number in range(150)]
-    told = judge.see(snapshot(START, *house))
-    assert len(told.tags) == MAX_AT_ONCE // 60
-    told = judge.see(snapshot(START, *house))
-    assert len(told.tags) == 150
+    reported = judge.see(snapshot(START, *house))
+    assert len(reported.tags) == MAX_AT_ONCE // 60
+    reported = judge.see(snapshot(START, *house))
+    assert len(reported.tags) == 150
 
 
 def test_a_changed_sensor_is_a_reason_until_it_has_recovered() -> None:

@@ -54,10 +54,10 @@ def tags_of(state: dict[str, Any]) -> dict[str, dict[str, Any]]:
 
 def writes_of(state: dict[str, Any]) -> list[Write]:
     """All received observations, in the order of time."""
-    heard = [
+    received = [
         write for tag_id, tag in tags_of(state).items() for write in of_tag(state, tag_id, tag)
     ]
-    return sorted(heard, key=lambda write: write[0])
+    return sorted(received, key=lambda write: write[0])
 
 
 def of_tag(state: dict[str, Any], tag_id: str, tag: dict[str, Any]) -> Iterator[Write]:
@@ -81,7 +81,7 @@ def of_tag(state: dict[str, Any], tag_id: str, tag: dict[str, Any]) -> Iterator[
         yield at_ns, tag_id, Inspection(tag_id, at_ns, flower)
 
 
-def heard_by_the_journal(writes: list[Write]) -> list[PastWrite]:
+def journal_rows(writes: list[Write]) -> list[PastWrite]:
     return [
         PastWrite(
             number,
@@ -130,7 +130,7 @@ async def alarms(state: dict[str, Any]) -> list[list[str]]:
     feed = AlarmFeed(source, criteria(), board, lambda: moment_ns, 7.0, note_days=lambda _: None)  # type: ignore[arg-type]
     feed.start()
     try:
-        source.writes_now = heard_by_the_journal(writes_of(state))
+        source.writes_now = journal_rows(writes_of(state))
         is_silent = state.get("twin") == "silent"
         feed.on_silence(is_silent=is_silent, last_ns=moment_ns - 60 * S)
         if state.get("twin") != "never_seen":
@@ -145,7 +145,7 @@ async def alarms(state: dict[str, Any]) -> list[list[str]]:
     )
 
 
-def told(health: Health) -> list[list[Any]]:
+def reported(health: Health) -> list[list[Any]]:
     return [[r.kind, r.verdict, r.sensor, r.value, r.limit] for r in health.reasons]
 
 
@@ -171,7 +171,7 @@ def test_a_greenhouse_is_judged_as_an_expert_would(
         tag_id: tag["verdict"] for tag_id, tag in of_tags.items()
     }
     for tag_id, tag in of_tags.items():
-        assert told(said.tags[tag_id]) == expected(tag["reasons"])
+        assert reported(said.tags[tag_id]) == expected(tag["reasons"])
     assert asyncio.run(alarms(state)) == state["alarms"]
 
 
@@ -179,9 +179,11 @@ def test_the_table_has_every_sensor_every_kind_and_every_verdict() -> None:
     reasons = [
         reason for state in STATES for tag in tags_of(state).values() for reason in tag["reasons"]
     ]
-    of_house = {kind for state in STATES for kind in state["house"]["reasons"]}
+    of_greenhouse = {kind for state in STATES for kind in state["house"]["reasons"]}
     alarmed = {kind for state in STATES for _, kind, _, _ in state["alarms"]}
-    assert {kind for kind, *_ in reasons} | of_house | {"stopped"} == set(Kind) - {Kind.CHANGED}
+    assert {kind for kind, *_ in reasons} | of_greenhouse | {"stopped"} == set(Kind) - {
+        Kind.CHANGED
+    }
     assert alarmed == set(Kind) - {Kind.CHANGED}
     measured = ("temperature", "humidity", "co2", "light", "soil_moisture")
     for sensor in measured:

@@ -181,8 +181,8 @@ def test_the_shipped_file_has_texts_in_all_languages() -> None:
     sensors = json.loads(OURS)["sensors"]
     silent = {
         name
-        for name, told in sensors.items()
-        if told.get("labels", {}).keys() != set(get_args(Language))
+        for name, reported in sensors.items()
+        if reported.get("labels", {}).keys() != set(get_args(Language))
     }
     assert silent == {"co2"}  # a formula
 

@@ -19,25 +19,25 @@ def write(number: int, at_s: int, light: float = 900.0) -> PastWrite:
 
 
 def test_ordered_writes_are_read_once_and_late_ones_from_a_mark_on() -> None:
-    asked: list[int] = []
+    requested: list[int] = []
 
     def is_day(at_ns: int) -> bool:
-        asked.append(at_ns)
+        requested.append(at_ns)
         return True
 
     past = tag(is_day=is_day)
     for number in range(5 * MARK):
         past.add(write(number, 60 * number))
         assert list(past.episodes.alarms()) == []
-    assert len(asked) == 5 * MARK
+    assert len(requested) == 5 * MARK
     past.add(write(9_999, 60 * (5 * MARK - 2) + 1))
     assert list(past.episodes.alarms()) == []
-    assert len(asked) <= 6 * MARK + 1
-    asked.clear()
+    assert len(requested) <= 6 * MARK + 1
+    requested.clear()
     past.add(write(9_998, 1))
     assert list(past.episodes.alarms()) == []
-    assert len(asked) == 5 * MARK + 2
-    asked.clear()
+    assert len(requested) == 5 * MARK + 2
+    requested.clear()
     past.judge_anew(60 * S)
     assert list(past.episodes.alarms()) == []
-    assert len(asked) == 5 * MARK + 2
+    assert len(requested) == 5 * MARK + 2

@@ -58,16 +58,16 @@ def judge(case: dict[str, Any], now_ns: int = NOW_NS) -> Health:
 def test_a_tag_is_judged_as_an_expert_would(case: dict[str, Any]) -> None:
     health = judge(case)
     assert health.verdict == case["verdict"]
-    told = [(r.kind, r.verdict, r.sensor, r.value, r.limit) for r in health.reasons]
-    assert told == [
+    reported = [(r.kind, r.verdict, r.sensor, r.value, r.limit) for r in health.reasons]
+    assert reported == [
         (*names, value if value is None else pytest.approx(value, rel=1e-3), limit)
         for *names, value, limit in case["reasons"]
     ]
 
 
 def test_the_table_has_every_kind_of_reason_that_a_tag_can_have() -> None:
-    told = {kind for case in CASES for kind, *_ in case["reasons"]}
-    assert told == set(Kind) - {Kind.SILENT, Kind.STOPPED, Kind.CHANGED}
+    reported = {kind for case in CASES for kind, *_ in case["reasons"]}
+    assert reported == set(Kind) - {Kind.SILENT, Kind.STOPPED, Kind.CHANGED}
 
 
 def test_a_reason_names_the_observation_that_it_comes_from() -> None:

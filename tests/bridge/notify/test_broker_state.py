@@ -22,7 +22,7 @@ def mirror(discovery: str = "homeassistant") -> Mirror:
     return Mirror(Topics("lt", discovery), SENSORS)
 
 
-def told(mirror: Mirror, now: GreenhouseState) -> dict[str, Any]:
+def reported(mirror: Mirror, now: GreenhouseState) -> dict[str, Any]:
     """What is sent about the greenhouse as it is now: topic to payload, None to remove."""
     mirror.see(now)
     messages = list(mirror.messages())
@@ -39,7 +39,7 @@ def announcements(found: Mapping[str, Any]) -> set[str]:
 def test_everything_is_sent_once_and_then_only_changes() -> None:
     one = mirror()
     a, b = tag("a", temperature=21.0, humidity=60.0), tag("b", temperature=22.0)
-    first = told(one, seen(a, b))
+    first = reported(one, seen(a, b))
     assert first["lt/tags/a/readings/temperature"]["value"] == 21.0
     assert first["lt/tags/b/health"]["verdict"] == "healthy"
     assert first["lt/house/health"]["verdict"] == "healthy"
@@ -47,9 +47,9 @@ def test_everything_is_sent_once_and_then_only_changes() -> None:
     assert first["lt/tags/a/readings/vpd"]["unit"] == "kPa"
     # For a: five readings, verdict, alarm. For b: one, and these two. For the greenhouse: three.
     assert len(announcements(first)) == 7 + 3 + 3
-    assert told(one, seen(a, b)) == {}
+    assert reported(one, seen(a, b)) == {}
     later = tag("b", NOW_NS + 60 * S, temperature=6.0)
-    news = told(one, seen(a, later, now_ns=NOW_NS + 60 * S))
+    news = reported(one, seen(a, later, now_ns=NOW_NS + 60 * S))
     assert set(news) == {"lt/tags/b/readings/temperature", "lt/tags/b/health", "lt/house/health"}
     assert news["lt/tags/b/health"]["verdict"] == "critical"
 
@@ -57,9 +57,9 @@ def test_everything_is_sent_once_and_then_only_changes() -> None:
 def test_an_expired_reading_is_sent_as_unknown() -> None:
     one = mirror()
     state = tag("a", temperature=21.0)
-    told(one, seen(state))
-    assert told(one, seen(state, now_ns=NOW_NS + HOLDS_NS)) == {}
-    news = told(one, seen(state, now_ns=NOW_NS + HOLDS_NS + 1))
+    reported(one, seen(state))
+    assert reported(one, seen(state, now_ns=NOW_NS + HOLDS_NS)) == {}
+    news = reported(one, seen(state, now_ns=NOW_NS + HOLDS_NS + 1))
     assert news["lt/tags/a/readings/temperature"]["value"] is None
     assert news["lt/tags/a/readings/temperature"]["stamp"]["sec"] == NOW_NS // S
     assert news["lt/tags/a/health"]["verdict"] == "unknown"
@@ -68,9 +68,9 @@ def test_an_expired_reading_is_sent_as_unknown() -> None:
 def test_only_the_verdict_that_changes_by_itself_is_sent() -> None:
     one = mirror()
     day = seen(tag("a", temperature=16.0), tag("b", temperature=20.0))
-    told(one, day)
+    reported(one, day)
     tags = {**day.judged.tags, "a": Health(Verdict.HEALTHY)}
-    news = told(one, replace(day, judged=replace(day.judged, tags=tags)))
+    news = reported(one, replace(day, judged=replace(day.judged, tags=tags)))
     assert set(news) == {"lt/tags/a/health"}
     assert news["lt/tags/a/health"]["verdict"] == "healthy"
 
@@ -78,9 +78,9 @@ def test_only_the_verdict_that_changes_by_itself_is_sent() -> None:
 def test_readings_of_a_silent_twin_still_expire() -> None:
     one = mirror()
     now = seen(tag("a", temperature=21.0))
-    told(one, now)
+    reported(one, now)
     silent = replace(now, status=replace(now.status, reason="stale"), now_ns=NOW_NS + HOLDS_NS + 1)
-    news = told(one, silent)
+    news = reported(one, silent)
     assert news["lt/house/twin"]["state"] == "OFF"
     assert news["lt/tags/a/readings/temperature"]["value"] is None
 
@@ -88,19 +88,21 @@ def test_readings_of_a_silent_twin_still_expire() -> None:
 def test_while_the_clock_does_not_run_nothing_is_known() -> None:
     one = mirror()
     state = tag("a", temperature=21.0)
-    told(one, seen(state))
-    assert told(one, seen(state, now_ns=None))["lt/tags/a/readings/temperature"]["value"] is None
-    assert told(one, seen(state))["lt/tags/a/readings/temperature"]["value"] == 21.0
+    reported(one, seen(state))
+    assert (
+        reported(one, seen(state, now_ns=None))["lt/tags/a/readings/temperature"]["value"] is None
+    )
+    assert reported(one, seen(state))["lt/tags/a/readings/temperature"]["value"] == 21.0
 
 
 def test_each_message_names_its_source_and_a_new_source_sends_all_again() -> None:
     one = mirror()
     state = tag("a", temperature=6.0)
     then = seen(state, alarms=(alarm("a"),))
-    first = told(one, then)
+    first = reported(one, then)
     said = {topic for topic in first if topic.startswith("lt/")}
     assert {first[topic]["origin"] for topic in said} == {"robot"}
-    news = told(one, seen(state, alarms=(alarm("a"),), origin="recorded"))
+    news = reported(one, seen(state, alarms=(alarm("a"),), origin="recorded"))
     assert {topic: it["origin"] for topic, it in news.items()} == dict.fromkeys(said, "recorded")
 
 
@@ -108,48 +110,48 @@ def test_alarms_are_sent_for_the_tag_and_for_the_greenhouse() -> None:
     one = mirror()
     state = tag("a", temperature=21.0)
     starting = replace(seen(state), board=Board())
-    first = told(one, starting)
+    first = reported(one, starting)
     assert first["lt/tags/a/alarms"]["state"] is None
     assert first["lt/house/alarms"]["state"] is None
-    known = told(one, replace(starting, board=seen(state).board))
+    known = reported(one, replace(starting, board=seen(state).board))
     assert {topic: payload["state"] for topic, payload in known.items()} == {
         "lt/tags/a/alarms": "OFF",
         "lt/house/alarms": "OFF",
     }
-    news = told(one, seen(state, alarms=(alarm("a"), alarm("", Verdict.UNKNOWN))))
+    news = reported(one, seen(state, alarms=(alarm("a"), alarm("", Verdict.UNKNOWN))))
     assert news["lt/tags/a/alarms"]["state"] == "ON"
     assert news["lt/tags/a/alarms"]["alarms"][0]["worst"] == 6.6
     assert news["lt/house/alarms"]["count"] == 2
-    news = told(one, seen(state, alarms=(alarm("a", cleared_ns=NOW_NS),)))
+    news = reported(one, seen(state, alarms=(alarm("a", cleared_ns=NOW_NS),)))
     assert (news["lt/tags/a/alarms"]["state"], news["lt/house/alarms"]["state"]) == ("OFF", "OFF")
 
 
 def test_an_announcement_that_changes_is_sent_again() -> None:
     one = mirror()
     state = tag("a", temperature=21.0)
-    told(one, seen(state))
+    reported(one, seen(state))
     slower = tag("a", NOW_NS + 1, temperature=21.0)
-    assert announcements(told(one, seen(slower, now_ns=NOW_NS + 1))) == set()
+    assert announcements(reported(one, seen(slower, now_ns=NOW_NS + 1))) == set()
     holds = {"a": HOLDS_NS + 1}
-    news = told(one, seen(tag("a", NOW_NS + 2, temperature=21.0), holds_ns=holds))
+    news = reported(one, seen(tag("a", NOW_NS + 2, temperature=21.0), holds_ns=holds))
     (config,) = announcements(news)
     assert news[config]["expire_after"] == 900
-    more = told(one, seen(tag("a", NOW_NS + 2, temperature=21.0, co2=500.0), holds_ns=holds))
+    more = reported(one, seen(tag("a", NOW_NS + 2, temperature=21.0, co2=500.0), holds_ns=holds))
     assert announcements(more) == {"homeassistant/sensor/lt/tag_a_-_reading_co2/config"}
 
 
 def test_a_tag_that_is_gone_is_removed() -> None:
     one = mirror()
-    first = told(one, seen(tag("a", temperature=21.0), tag("b", temperature=21.0)))
-    news = told(one, seen(tag("a", temperature=21.0)))
+    first = reported(one, seen(tag("a", temperature=21.0), tag("b", temperature=21.0)))
+    news = reported(one, seen(tag("a", temperature=21.0)))
     gone = {topic for topic, payload in news.items() if payload is None}
     assert gone == {topic for topic in announcements(first) if "/tag_b_-_" in topic}
     one.forget()
-    assert not [topic for topic in told(one, seen()) if "/tag_b_-_" in topic]
+    assert not [topic for topic in reported(one, seen()) if "/tag_b_-_" in topic]
 
 
 def test_without_a_discovery_prefix_nothing_is_announced() -> None:
-    assert announcements(told(mirror(""), seen(tag("a", temperature=21.0)))) == set()
+    assert announcements(reported(mirror(""), seen(tag("a", temperature=21.0)))) == set()
 
 
 def test_the_queue_is_bounded_by_the_greenhouse_and_dropped_messages_are_counted() -> None:
@@ -177,16 +179,16 @@ def test_a_change_during_a_send_is_sent_in_its_latest_form() -> None:
 
 
 VALUES = st.sampled_from([None, 5.0, 20.0, 40.0])
-HOUSES = st.lists(st.tuples(VALUES, VALUES, st.booleans()), min_size=1, max_size=6)
+GREENHOUSES = st.lists(st.tuples(VALUES, VALUES, st.booleans()), min_size=1, max_size=6)
 
 
-@given(HOUSES, st.sets(st.integers(0, 5)))
+@given(GREENHOUSES, st.sets(st.integers(0, 5)))
 def test_in_any_order_the_broker_ends_up_with_the_latest_state(
-    houses: list[tuple[float | None, float | None, bool]], cuts: set[int]
+    greenhouses: list[tuple[float | None, float | None, bool]], cuts: set[int]
 ) -> None:
     """Whatever it received before, and however often the connection was lost."""
     one, knows = mirror(), dict[str, Any]()
-    for number, (first, second, has_alarm) in enumerate(houses):
+    for number, (first, second, has_alarm) in enumerate(greenhouses):
         at_ns = NOW_NS + number * S
         tags = [
             tag(name, at_ns, temperature=value)
@@ -196,8 +198,8 @@ def test_in_any_order_the_broker_ends_up_with_the_latest_state(
         now = seen(*tags, alarms=(alarm("a"),) if has_alarm else (), now_ns=at_ns)
         if number in cuts:
             one.forget()
-        knows |= told(one, now)
-    fresh = told(mirror(), now)
+        knows |= reported(one, now)
+    fresh = reported(mirror(), now)
     assert {topic: payload for topic, payload in knows.items() if topic in fresh} == fresh
     rest = {topic for topic in knows if topic not in fresh and knows[topic] is not None}
     assert not {topic for topic in rest if topic.startswith("homeassistant/")}

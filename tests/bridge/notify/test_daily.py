@@ -66,10 +66,10 @@ class Greenhouse:
             JournalState.RECORDING, complete_ns=complete_ns, journal_id=self.journal_id
         )
 
-    async def ask(self, question: Any, _cost_s: float) -> Answered:
+    async def ask(self, query: Any, _cost_s: float) -> Answered:
         if self.error is not None:
             raise self.error
-        of = question.args[0]
+        of = query.args[0]
         return Answered('"x"', Answer(orjson.dumps([of.start_ns, of.end_ns]), "", {}))
 
 
@@ -252,9 +252,9 @@ async def test_a_clock_that_was_ahead_stops_no_reports_and_simulated_time_has_no
 
 
 async def test_two_greenhouses_with_one_receiver_have_separate_reports(tmp_path: Path) -> None:
-    houses = [Greenhouse(ns("2026-05-01T07:00Z"), journal_id=name) for name in ("j1", "j2")]
+    greenhouses = [Greenhouse(ns("2026-05-01T07:00Z"), journal_id=name) for name in ("j1", "j2")]
     with receiver(status(200)) as at:
-        for house in houses:
+        for house in greenhouses:
             async with sending(house, tmp_path, at.port):
                 await looks(house)
             house.ros_time_ns = ns("2026-05-02T07:00Z")
@@ -310,8 +310,8 @@ async def test_a_broker_gets_it_once_reachable_and_retains_it(
         house.ros_time_ns = ns("2026-05-02T07:00Z")
         await looks(house, 1)
         with broker.running():
-            with Subscriber(broker) as heard:
-                await until(lambda: heard.last("lt/house/report"), "the report")
+            with Subscriber(broker) as received:
+                await until(lambda: received.last("lt/house/report"), "the report")
             with Subscriber(broker, "lt/house/report") as later:
                 await until(lambda: later.last("lt/house/report"), "that it is kept")
                 found = later.last("lt/house/report")

@@ -124,12 +124,12 @@ def test_an_interim_response_is_skipped() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wish", "told_s"),
+    ("retry_after", "reported_s"),
     [("Wed, 21 Oct 2026 07:28:00 GMT", 0), ("9" * 5_000, 999_999_999)],
 )
-def test_retry_after_is_a_number(wish: str, told_s: int) -> None:
-    with receiver(status(503, f"Retry-After: {wish}")) as server:
-        assert said(server.port) == (503, told_s)
+def test_retry_after_is_a_number(retry_after: str, reported_s: int) -> None:
+    with receiver(status(503, f"Retry-After: {retry_after}")) as server:
+        assert said(server.port) == (503, reported_s)
 
 
 def test_https_trusts_its_authority_alone(tmp_path: Path) -> None:

@@ -67,9 +67,11 @@ async def telling(
             await channel.stop()
 
 
-async def told(heard: Subscriber, value: float) -> None:
+async def reported(received: Subscriber, value: float) -> None:
     """Wait until a broker has received this temperature."""
-    await until(lambda: (heard.last(READING) or {}).get("value") == value, f"the reading {value}")
+    await until(
+        lambda: (received.last(READING) or {}).get("value") == value, f"the reading {value}"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -85,20 +87,20 @@ async def test_a_broker_gets_the_state_and_then_its_changes(
 ) -> None:
     house = Greenhouse()
     house.now = seen(tag("a", temperature=20.0), alarms=(alarm("a"),))
-    with Subscriber(shared) as heard:
+    with Subscriber(shared) as received:
         async with telling(shared, house) as channel:
-            await told(heard, 20.0)
-            await until(lambda: heard.last("lt/tags/a/alarms"), "the alarm")
-            await told(heard, house.scan())
+            await reported(received, 20.0)
+            await until(lambda: received.last("lt/tags/a/alarms"), "the alarm")
+            await reported(received, house.scan())
             await until(lambda: channel.condition.waiting == 0, "the rest")
             assert (channel.condition.is_connected, channel.condition.failed) == (True, 0)
-        await until(lambda: heard.of("lt/status")[-1:] == [b"offline"], "the good-bye")
-    assert heard.last(READING)["observed_at"] == "2026-11-21T14:15:01.000000000Z"
-    assert heard.last(CONFIG)["state_topic"] == READING
-    assert heard.last("lt/tags/a/alarms")["state"] == "OFF"
-    assert heard.last("lt/house/twin")["state"] == "ON"
-    assert heard.of("lt/status")[-2:] == [b"online", b"offline"]
-    assert {message.qos for message in heard.heard} == {1}
+        await until(lambda: received.of("lt/status")[-1:] == [b"offline"], "the good-bye")
+    assert received.last(READING)["observed_at"] == "2026-11-21T14:15:01.000000000Z"
+    assert received.last(CONFIG)["state_topic"] == READING
+    assert received.last("lt/tags/a/alarms")["state"] == "OFF"
+    assert received.last("lt/house/twin")["state"] == "ON"
+    assert received.of("lt/status")[-2:] == [b"online", b"offline"]
+    assert {message.qos for message in received.received} == {1}
 
 
 async def test_only_the_status_is_retained_and_that_of_removed_tags_is_not(
@@ -109,15 +111,15 @@ async def test_only_the_status_is_retained_and_that_of_removed_tags_is_not(
     async with telling(shared, house) as channel:
         await until(lambda: channel.condition.sent > 14, "all of it")
         await until(lambda: channel.condition.waiting == 0, "all of it")
-        with Subscriber(shared) as heard:
+        with Subscriber(shared) as received:
             house.now = seen(tag("a", temperature=20.0))
             gone = CONFIG.replace("tag_a_", "tag_gone_")
-            await until(lambda: heard.of(gone) == [b""], "the end of its entity")
+            await until(lambda: received.of(gone) == [b""], "the end of its entity")
         with Subscriber(shared) as late:
             # Sent in order: whoever has this has all that was retained.
             late.say("marker", "x")
             await until(lambda: late.of("marker"), "the marker")
-            retained = {it.topic: it.payload for it in late.heard if it.retain}
+            retained = {it.topic: it.payload for it in late.received if it.retain}
             assert retained == {"lt/status": b"online"}
 
 
@@ -131,7 +133,7 @@ async def test_at_home_assistants_birth_everything_is_sent_again(
         with Subscriber(shared) as later:
             later.say("homeassistant/status", "offline")
             later.say("homeassistant/status", "online")
-            await told(later, 20.0)
+            await reported(later, 20.0)
             await until(lambda: later.last("lt/tags/a/health"), "the verdict")
             assert later.last(CONFIG)["expire_after"] == 600
 
@@ -142,17 +144,17 @@ async def test_a_flood_of_wills_and_births_is_answered_at_a_limited_rate(
     """The last process's will, or another one's offline message, may arrive late."""
     for name in ("STATUS_S", "REPEAT_S"):
         monkeypatch.setattr(mqtt, name, 2.0)
-    with Subscriber(shared) as heard:
+    with Subscriber(shared) as received:
         async with telling(shared, Greenhouse()) as channel:
             await until(lambda: channel.condition.sent > 10, "the first time")
-            await until(lambda: heard.of("lt/status")[-1:] == [b"online"], "that it has come")
-            before, sent = len(heard.of("lt/status")), channel.condition.sent
+            await until(lambda: received.of("lt/status")[-1:] == [b"online"], "that it has come")
+            before, sent = len(received.of("lt/status")), channel.condition.sent
             for _ in range(100):
-                heard.say("lt/status", "offline", retain=True)
-                heard.say("homeassistant/status", "online")
-            await until(lambda: heard.of("lt/status")[-1:] == [b"online"], "that it is there")
+                received.say("lt/status", "offline", retain=True)
+                received.say("homeassistant/status", "online")
+            await until(lambda: received.of("lt/status")[-1:] == [b"online"], "that it is there")
             await until(lambda: channel.condition.sent > sent, "all of it, again")
-            said = heard.of("lt/status")[before:]
+            said = received.of("lt/status")[before:]
             assert said.count(b"offline") == 100
             # The flood took a moment; by the clock there was time for one or two.
             assert said.count(b"online") <= 3
@@ -201,9 +203,9 @@ async def test_a_broker_that_is_absent_appears_and_is_killed_gets_the_latest_sta
         await until(lambda: channel.condition.failed > 2, "some tries")
         assert channel.condition.detail == f"[Errno 111] Connection refused ({broker.url})"
         for _ in range(2):
-            with broker.running() as process, Subscriber(broker) as heard:
+            with broker.running() as process, Subscriber(broker) as received:
                 house.scan()
-                await told(heard, house.scan())
+                await reported(received, house.scan())
                 assert channel.condition.detail == ""
                 process.kill()
             await until(lambda: not channel.condition.is_connected, "the end of the broker")
@@ -215,21 +217,21 @@ async def test_after_a_failure_to_read_the_greenhouse_everything_is_sent_again(
     shared: Broker,
 ) -> None:
     house = Greenhouse()
-    with Subscriber(shared) as heard:
+    with Subscriber(shared) as received:
         async with telling(shared, house) as channel:
-            await told(heard, 20.0)
+            await reported(received, 20.0)
             house.is_faulty = True
             await until(lambda: "AssertionError" in channel.condition.detail, "the fault")
             house.is_faulty = False
-            await told(heard, house.scan())
+            await reported(received, house.scan())
 
 
 async def test_a_broker_that_hangs_is_reconnected_and_gets_the_latest_state(tmp_path: Path) -> None:
     broker, house = Broker(tmp_path), Greenhouse()
     with broker.running() as process:
         async with telling(broker, house, answer_s=0.3) as channel:
-            with Subscriber(broker) as heard:
-                await told(heard, 20.0)
+            with Subscriber(broker) as received:
+                await reported(received, 20.0)
             process.freeze()
             house.scan()
             failed = channel.condition.failed
@@ -238,8 +240,8 @@ async def test_a_broker_that_hangs_is_reconnected_and_gets_the_latest_state(tmp_
             assert not channel.condition.is_connected
             last = house.scan()
             process.thaw()
-            with Subscriber(broker) as heard:
-                await told(heard, last)
+            with Subscriber(broker) as received:
+                await reported(received, last)
                 await until(lambda: channel.condition.is_connected, "the connection")
 
 

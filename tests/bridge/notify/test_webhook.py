@@ -130,16 +130,16 @@ async def test_a_refused_message_is_sent_again_with_the_same_id_and_the_rest_aft
 
 
 async def test_nothing_is_posted_before_the_source_is_known() -> None:
-    asked: list[int] = []
+    requested: list[int] = []
     origins: list[Origin] = ["unknown"]
 
     def origin() -> Origin:
-        asked.append(1)
+        requested.append(1)
         return origins[-1]
 
     with receiver(status(200)) as server:
         async with telling(server.port, A, B, origin=origin, origin_s=PATIENCE_S) as (hook, _):
-            await until(lambda: len(asked) > 4, "it to be looked for, again and again")
+            await until(lambda: len(requested) > 4, "it to be looked for, again and again")
             assert (hook.condition.waiting, server.posted) == (2, [])
             origins.append("robot")
             await until(lambda: hook.condition.sent == 2, "both")

@@ -41,7 +41,7 @@ def a_map(revision: int, free: int = 0) -> OccupancyMap:
     return map_of([[free, -1]], stamp_ns=revision, resolution=0.5, revision=revision)
 
 
-def asked(
+def requested(
     rules: FieldRules = RULES, occupancy: OccupancyMap | None = None, **parameters: Any
 ) -> Field:
     values = {"sensor_type": "co2", **parameters}
@@ -59,34 +59,36 @@ def body(plan: Plan) -> dict[str, Any]:
 
 
 def test_a_field_has_the_tags_and_the_box_of_its_moment() -> None:
-    found = body(field_of(SITE, asked(), JSON))
+    found = body(field_of(SITE, requested(), JSON))
     schema.GetFieldResponse.model_validate(found)
     assert (found["origin_x"], found["origin_y"]) == (-1.5, -1.5)
     assert (found["width"], found["height"], found["sample_count"]) == (40, 30, 2)
     assert 400.0 <= found["value_min"] < found["value_max"] <= 500.0
-    found = body(field_of(SITE, asked()))
+    found = body(field_of(SITE, requested()))
     schema.FieldQuality.model_validate(found)
     assert (found["sample_count"], found["rmse"]) == (2, 100.0)
 
 
 def test_a_tag_pinned_far_away_by_a_lost_robot_is_left_out_and_named() -> None:
     lost = replace(SITE, tags=(*SITE.tags, tag("c", 0.5, 450.0), tag("lost", 5_000.0, 40.0)))
-    written = field_of(lost, asked(), JSON).write(lambda: False)
+    written = field_of(lost, requested(), JSON).write(lambda: False)
     found = json.loads(written.body)
     assert (found["origin_x"], found["width"], found["value_min"]) == (-1.5, 40, 400.0)
     assert written.headers["X-Field-Far-Off-Count"] == "1"
-    assert body(field_of(lost, asked()))["far_off_tags"] == ["lost"]
-    there = asked(resolution=0.5, bbox_min_x=4_999, bbox_min_y=-1, bbox_max_x=5_001, bbox_max_y=1)
+    assert body(field_of(lost, requested()))["far_off_tags"] == ["lost"]
+    there = requested(
+        resolution=0.5, bbox_min_x=4_999, bbox_min_y=-1, bbox_max_x=5_001, bbox_max_y=1
+    )
     assert set(body(field_of(lost, there, JSON))["values"]) == {40.0}
 
 
 def test_a_broken_sensor_is_not_used_for_a_field() -> None:
     broken = replace(SITE, tags=(*SITE.tags, tag("c", 0.5, -1.0)))
     assert (
-        body(field_of(broken, asked(), JSON))["values"]
-        == (body(field_of(SITE, asked(), JSON))["values"])
+        body(field_of(broken, requested(), JSON))["values"]
+        == (body(field_of(SITE, requested(), JSON))["values"])
     )
-    assert body(field_of(broken, asked())) == body(field_of(SITE, asked()))
+    assert body(field_of(broken, requested())) == body(field_of(SITE, requested()))
 
 
 def test_a_broken_sensor_is_not_used_for_an_estimate() -> None:
@@ -111,23 +113,23 @@ def test_a_derived_reading_uses_the_readings_of_one_scan() -> None:
     house = Snapshot(5 * NS, "map", (air("a", 0.25, NS), air("b", 9.0, 2 * NS)))
     box = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 0.5, "bbox_max_y": 0.5}
     query: dict[str, Any] = {"sensor_type": "vpd", "resolution": 0.5, **box}
-    found = body(field_of(house, asked(**query), JSON))
+    found = body(field_of(house, requested(**query), JSON))
     assert found["values"] == [pytest.approx(vapour_pressure_deficit_kpa(25.0, 60.0), rel=1e-6)]
     assert found["sample_count"] == 1
-    quality = body(field_of(house, asked(**query)))
+    quality = body(field_of(house, requested(**query)))
     assert (quality["sensor_type"], quality["unit"], quality["sample_count"]) == ("vpd", "kPa", 1)
 
 
 def test_before_the_first_observation_state_and_field_are_empty() -> None:
     nothing = Snapshot(1, "map", ())
     assert body(WholeState(None).plan(nothing))["tags"] == []
-    found = body(field_of(nothing, asked(), JSON))
+    found = body(field_of(nothing, requested(), JSON))
     assert (found["sample_count"], set(found["values"])) == (0, {None})
 
 
 def test_a_past_field_is_clipped_to_the_current_map() -> None:
     box = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 1, "bbox_max_y": 0.5, "resolution": 0.5}
-    found = body(field_of(SITE, asked(RULES, a_map(1), **box), JSON))
+    found = body(field_of(SITE, requested(RULES, a_map(1), **box), JSON))
     assert [value is None for value in found["values"]] == [False, True]
 
 
@@ -182,14 +184,14 @@ def test_the_etag_of_a_judgement_identifies_its_content() -> None:
 
 def test_too_large_a_past_field_is_refused() -> None:
     limit = replace(RULES, max_grid_cells=40 * 30)
-    field_of(SITE, asked(limit), JSON)
+    field_of(SITE, requested(limit), JSON)
     with pytest.raises(FieldRefused, match="the limit is 1199"):
-        field_of(SITE, asked(replace(RULES, max_grid_cells=1_199), resolution=0.1), JSON)
+        field_of(SITE, requested(replace(RULES, max_grid_cells=1_199), resolution=0.1), JSON)
     # Without a resolution in the query, the cells get wider.
-    field_of(SITE, asked(replace(RULES, max_grid_cells=1_199)), JSON)
-    field_of(SITE, asked(replace(RULES, max_grid_cells=4_800), scale=2), PNG)
+    field_of(SITE, requested(replace(RULES, max_grid_cells=1_199)), JSON)
+    field_of(SITE, requested(replace(RULES, max_grid_cells=4_800), scale=2), PNG)
     with pytest.raises(FieldRefused, match="4800 pixels, the limit is 4799"):
-        field_of(SITE, asked(replace(RULES, max_grid_cells=4_799), scale=2), PNG)
+        field_of(SITE, requested(replace(RULES, max_grid_cells=4_799), scale=2), PNG)
 
 
 # --- ETags ----------------------------------------------------------------------------------------
@@ -207,7 +209,10 @@ def plans(house: Snapshot, field: Field) -> list[str]:
 
 def test_equal_content_has_equal_etags_on_every_replica() -> None:
     again = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
-    for one, other in ((asked(), asked()), (asked(RULES, a_map(1)), asked(RULES, a_map(7)))):
+    for one, other in (
+        (requested(), requested()),
+        (requested(RULES, a_map(1)), requested(RULES, a_map(7))),
+    ):
         assert plans(again, other) == plans(SITE, one)
         assert len(set(plans(SITE, one))) == 7
 
@@ -215,16 +220,16 @@ def test_equal_content_has_equal_etags_on_every_replica() -> None:
 @pytest.mark.parametrize(
     "other",
     [
-        asked(sensor_type="light"),
-        asked(resolution=0.2),
-        asked(bbox_min_x=0, bbox_min_y=0, bbox_max_x=1, bbox_max_y=1),
-        asked(replace(RULES, idw_power=3.0)),
-        asked(RULES, a_map(1)),
-        asked(RULES, a_map(1, free=-1)),
+        requested(sensor_type="light"),
+        requested(resolution=0.2),
+        requested(bbox_min_x=0, bbox_min_y=0, bbox_max_x=1, bbox_max_y=1),
+        requested(replace(RULES, idw_power=3.0)),
+        requested(RULES, a_map(1)),
+        requested(RULES, a_map(1, free=-1)),
     ],
 )
 def test_another_field_has_another_etag(other: Field) -> None:
-    assert not set(plans(SITE, other)[3:]) & set(plans(SITE, asked())[3:])
+    assert not set(plans(SITE, other)[3:]) & set(plans(SITE, requested())[3:])
 
 
 # --- cost -----------------------------------------------------------------------------------------
@@ -237,6 +242,10 @@ def test_expensive_answers_declare_their_cost(field_format: FieldFormat) -> None
     def cost_s(tags: int, field: Field) -> float:
         return replace(field, field_format=field_format).write_s(tags)
 
-    assert cost_s(len(SITE.tags), asked()) < SMALL_S < cost_s(2_000, asked(large, resolution=1))
-    assert cost_s(len(SITE.tags), asked(large, resolution=0.004)) > SMALL_S
-    assert cost_s(2, asked(scale=9)) > cost_s(2, asked()), "of a picture each pixel"
+    assert (
+        cost_s(len(SITE.tags), requested())
+        < SMALL_S
+        < cost_s(2_000, requested(large, resolution=1))
+    )
+    assert cost_s(len(SITE.tags), requested(large, resolution=0.004)) > SMALL_S
+    assert cost_s(2, requested(scale=9)) > cost_s(2, requested()), "of a picture each pixel"

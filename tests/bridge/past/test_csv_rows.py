@@ -99,7 +99,7 @@ def test_numbers_are_read_back_to_the_last_bit_and_stay_numbers(value: float) ->
 
 
 @pytest.mark.parametrize(
-    ("asked", "now_ns", "expected"),
+    ("requested", "now_ns", "expected"),
     [
         (OfExport(), None, "lupin-twin.csv"),
         (OfExport(), 86_400 * NS, "lupin-twin_to_19700102T000000Z.csv"),
@@ -116,6 +116,6 @@ def test_numbers_are_read_back_to_the_last_bit_and_stay_numbers(value: float) ->
     ],
 )
 def test_the_file_name_describes_the_content(
-    asked: OfExport, now_ns: int | None, expected: str
+    requested: OfExport, now_ns: int | None, expected: str
 ) -> None:
-    assert bodies.export_file_name(asked, now_ns, "csv") == expected
+    assert bodies.export_file_name(requested, now_ns, "csv") == expected

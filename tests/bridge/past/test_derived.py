@@ -29,7 +29,7 @@ SITE: Known = {
     # From another moment, impossible, failed.
     "humidity": {10 * S: 50.0, 20 * S + 1: 50.0, 30 * S: 120.0, 40 * S: math.nan, 50 * S: 9.0},
 }
-ASKED = SeriesRequest("a", "vpd", 0, 0, 100)
+REQUESTED = SeriesRequest("a", "vpd", 0, 0, 100)
 
 
 def is_day(at_ns: int) -> bool:
@@ -52,30 +52,30 @@ def found_in(need: SeriesRequest, known: Known, now_ns: int = NOW_NS) -> SeriesP
 
 def answer(request: SeriesRequest, known: Known) -> tuple[SeriesPast, list[SeriesRequest]]:
     """The answer for a greenhouse with these readings, and the queries that it made."""
-    asked: list[SeriesRequest] = []
+    requested: list[SeriesRequest] = []
 
     def find(need: SeriesRequest) -> SeriesPast:
-        asked.append(need)
-        return found_in(need, known, NOW_NS + len(asked))  # time goes on
+        requested.append(need)
+        return found_in(need, known, NOW_NS + len(requested))  # time goes on
 
-    return derived.derived_series(request, own_sensors(), is_day, find), asked
+    return derived.derived_series(request, own_sensors(), is_day, find), requested
 
 
 def test_only_possible_readings_of_one_scan_are_paired() -> None:
-    past, asked = answer(ASKED, SITE)
+    past, requested = answer(REQUESTED, SITE)
     assert past.stamps_ns == (10 * S,)
     assert past.means == past.minima == past.maxima == (vpd(20.0, 50.0),)
     assert (past.counts, past.is_bucketed, past.start_ns) == ((1,), False, 10 * S)
-    assert [it.sensor_type for it in asked] == ["vpd", "temperature", "humidity"]
-    assert {it.end_ns for it in asked[1:]} == {past.end_ns}, "one now for all"
+    assert [it.sensor_type for it in requested] == ["vpd", "temperature", "humidity"]
+    assert {it.end_ns for it in requested[1:]} == {past.end_ns}, "one now for all"
 
 
 def test_a_real_sensor_of_that_name_takes_precedence_and_is_read_alone() -> None:
     for name in ("vpd", "co2"):
-        past, asked = answer(replace(ASKED, sensor_type=name), {**SITE, name: {5 * S: 1.0}})
-        assert (past.means, len(asked)) == ((1.0,), 1)
-    past, asked = answer(replace(ASKED, sensor_type="co2"), SITE)
-    assert (past.stamps_ns, len(asked)) == ((), 1)
+        past, requested = answer(replace(REQUESTED, sensor_type=name), {**SITE, name: {5 * S: 1.0}})
+        assert (past.means, len(requested)) == ((1.0,), 1)
+    past, requested = answer(replace(REQUESTED, sensor_type="co2"), SITE)
+    assert (past.stamps_ns, len(requested)) == ((), 1)
 
 
 def test_too_many_derived_readings_come_in_buckets() -> None:
@@ -102,9 +102,9 @@ def test_more_readings_than_a_history_may_have_are_still_read() -> None:
         "temperature": {at: 20.0 + n % 10 for n, at in enumerate(stamps)},
         "humidity": {at: 40.0 + n % 7 for n, at in enumerate(stamps)},
     }
-    past, asked = answer(ASKED, known)
+    past, requested = answer(REQUESTED, known)
     assert sum(past.counts) == count - 1
-    assert len(asked) < 40
+    assert len(requested) < 40
     every = [vpd(20.0 + n % 10, 40.0 + n % 7) for n in range(count - 1)]
     assert (past.minima[0], past.maxima[0]) == pytest.approx((min(every), max(every)), rel=1e-11)
 
@@ -112,7 +112,7 @@ def test_more_readings_than_a_history_may_have_are_still_read() -> None:
 def test_too_many_to_read_one_by_one_are_refused_by_name_and_limit() -> None:
     known: Known = {"temperature": dict.fromkeys(range(S, S + MAX_READINGS + 1), 20.0)}
     with pytest.raises(PastRefused) as refused:
-        answer(ASKED, known)
+        answer(REQUESTED, known)
     assert str(refused.value) == (
         "vpd is derived of temperature and humidity, reading by reading: from 1.000000000 s to "
         "1000.000000001 s temperature has more than 40000 of them, the limit, or hours alone: ask "
@@ -128,8 +128,8 @@ COURSE: Known = {
 
 def test_a_daily_quantity_has_a_value_for_every_hour_of_the_day_so_far() -> None:
     request = SeriesRequest("a", "daily_light_integral", 30 * HOUR_NS, 60 * HOUR_NS, 100)
-    past, asked = answer(request, COURSE)
-    assert [(it.sensor_type, it.start_ns // HOUR_NS) for it in asked] == [
+    past, requested = answer(request, COURSE)
+    assert [(it.sensor_type, it.start_ns // HOUR_NS) for it in requested] == [
         ("daily_light_integral", 30),
         ("light", 6),
     ]

@@ -16,7 +16,7 @@ from lupin_twin.core.past import SeriesPast, SeriesRequest
 
 NS = 10**9
 SENSORS = own_sensors()
-ASKED = SeriesRequest("7", "co2", 0, 100 * NS)
+REQUESTED = SeriesRequest("7", "co2", 0, 100 * NS)
 
 
 def readings(*stamps_ns: int, values: list[float] | None = None, end_ns: int = 100) -> SeriesPast:
@@ -32,9 +32,9 @@ def buckets(width_ns: int, counts: dict[int, int], end_ns: int = 100) -> SeriesP
     return SeriesPast(0, end_ns, width_ns, starts, tuple(counts.values()), ones, ones, ones)
 
 
-def written(past: SeriesPast, asked: SeriesRequest = ASKED) -> dict[str, Any]:
+def written(past: SeriesPast, requested: SeriesRequest = REQUESTED) -> dict[str, Any]:
     """The body as a client parses it, validated by the contract."""
-    text = orjson.dumps(history_body(asked, past, None, SENSORS))
+    text = orjson.dumps(history_body(requested, past, None, SENSORS))
     routes_schema.History.model_validate_json(text)
     found: dict[str, Any] = orjson.loads(text)
     return found

@@ -28,24 +28,24 @@ from lupin_twin.core.past import EVERY_TAG, SeriesPast, SeriesRequest
 from lupin_twin.core.state import Attempt, Reading, TagState
 from lupin_twin.field.idw import never
 from lupin_twin.runtime.workers import SMALL_S
-from tests.bridge.past.test_as_of import NS, SITE, asked
+from tests.bridge.past.test_as_of import NS, SITE, requested
 
 CRITERIA = Criteria.of(Settings(time_zone="Europe/Amsterdam"))
-QUESTIONS: tuple[Query, ...] = (
+QUERIES: tuple[Query, ...] = (
     WholeState(5 * NS),
     OneTag(5 * NS, "b"),
     Health(5 * NS, CRITERIA),
-    replace(asked(sensor_type="co2_dose"), at_ns=5 * NS, field_format=PNG),
-    replace(asked(), at_ns=5 * NS, field_format=PNG),
-    replace(asked(), at_ns=5 * NS),
+    replace(requested(sensor_type="co2_dose"), at_ns=5 * NS, field_format=PNG),
+    replace(requested(), at_ns=5 * NS, field_format=PNG),
+    replace(requested(), at_ns=5 * NS),
     History(SeriesRequest("a", "co2"), 9 * NS, CRITERIA, UNKNOWN_JOURNAL),
     Timeline(0, 9 * NS, 5, EVERY_TAG, UNKNOWN_JOURNAL),
 )
 
 
-def answer(question: Query, has: str = "") -> Answered:
+def answer(query: Query, has: str = "") -> Answered:
     """The answer for this greenhouse, and for series without an entry."""
-    return answered(question, has, found, never)
+    return answered(query, has, found, never)
 
 
 def found(need: Any) -> Any:
@@ -54,16 +54,16 @@ def found(need: Any) -> Any:
     return SITE if isinstance(need, int) else ()
 
 
-@pytest.mark.parametrize("question", QUESTIONS, ids=lambda q: type(q).__name__)
-def test_a_query_can_be_sent_to_another_process_with_the_same_result(question: Query) -> None:
-    there: Query = pickle.loads(pickle.dumps(question, 5))
-    assert there == question
-    assert hash(there) == hash(question)
-    told = answer(there)
-    assert told == answer(question)
-    assert pickle.loads(pickle.dumps(told, 5)) == told
+@pytest.mark.parametrize("query", QUERIES, ids=lambda q: type(q).__name__)
+def test_a_query_can_be_sent_to_another_process_with_the_same_result(query: Query) -> None:
+    there: Query = pickle.loads(pickle.dumps(query, 5))
+    assert there == query
+    assert hash(there) == hash(query)
+    reported = answer(there)
+    assert reported == answer(query)
+    assert pickle.loads(pickle.dumps(reported, 5)) == reported
     # With a matching ETag, no body is written.
-    assert answer(there, f'"other", W/{told.etag}') == Answered(told.etag, None)
+    assert answer(there, f'"other", W/{reported.etag}') == Answered(reported.etag, None)
 
 
 def test_an_unknown_tag_is_reported_with_the_number_of_known_ones() -> None:
@@ -74,17 +74,17 @@ def test_an_unknown_tag_is_reported_with_the_number_of_known_ones() -> None:
 
 
 def test_a_large_greenhouse_and_a_large_field_cost_more_than_small_ones() -> None:
-    for question in QUESTIONS:
-        assert question.cost_s(10_000) >= question.cost_s(30)
-    assert QUESTIONS[0].cost_s(30) < SMALL_S < QUESTIONS[0].cost_s(10_000)
-    fine = replace(asked(resolution=0.001), at_ns=0, field_format=PNG)
+    for query in QUERIES:
+        assert query.cost_s(10_000) >= query.cost_s(30)
+    assert QUERIES[0].cost_s(30) < SMALL_S < QUERIES[0].cost_s(10_000)
+    fine = replace(requested(resolution=0.001), at_ns=0, field_format=PNG)
     assert fine.cost_s(30) > SMALL_S, "one that will be refused is no small one"
     # Everything that is read counts, not only the first of it.
     history = History(SeriesRequest("a", "co2"), None, CRITERIA, UNKNOWN_JOURNAL)
     assert history.cost_s(30) < SMALL_S
     assert Timeline(0, 0, 1, "a", UNKNOWN_JOURNAL).cost_s(30) > SMALL_S
-    for question in QUESTIONS[:5]:
-        assert json.dumps(question.cost_s(0))
+    for query in QUERIES[:5]:
+        assert json.dumps(query.cost_s(0))
 
 
 def test_a_tags_data_that_are_not_in_the_log_yet_come_from_its_state() -> None:
@@ -92,6 +92,8 @@ def test_a_tags_data_that_are_not_in_the_log_yet_come_from_its_state() -> None:
     for newest, values in ((tag, [7.0]), (None, [])):
         log: dict[Any, Any] = {LatestRequest("a", 3): []}
         body = LatestOfTag("a", newest, 3).look(log.__getitem__).write(never).body
-        told = json.loads(body)
-        assert [each["value"] for sensor in told["sensors"] for each in sensor["values"]] == values
-        assert len(told["tries"]) == len(values)
+        reported = json.loads(body)
+        assert [
+            each["value"] for sensor in reported["sensors"] for each in sensor["values"]
+        ] == values
+        assert len(reported["tries"]) == len(values)

@@ -134,10 +134,10 @@ def test_times_are_those_of_the_greenhouse_or_of_the_readers_zone() -> None:
 def test_a_zone_that_this_machine_does_not_know_is_reported() -> None:
     period_ns = BEGUN_S * 10**9, (BEGUN_S + HOUR_S) * 10**9
     page = ReportPage(*period_ns, GREENHOUSE, UNKNOWN_JOURNAL, "en", UTC, "Mars/<North>")
-    told = (
+    reported = (
         "Times: UTC (UTC+00:00) This server does not know the time zone Mars/<North>: times are in"
     )
-    assert told in text_of(page, 1)
+    assert reported in text_of(page, 1)
 
 
 def test_a_note_has_its_kind_and_its_text_and_headings_do_not_contradict_their_content() -> None:
@@ -148,7 +148,7 @@ def test_a_note_has_its_kind_and_its_text_and_headings_do_not_contradict_their_c
 
 
 def test_missing_earlier_data_are_reported_only_where_the_log_begins_within_the_period() -> None:
-    whole, late = (page_of(kept_from=at(seconds)) for seconds in (0, HOUR_S))
+    whole, late = (page_of(stored_from=at(seconds)) for seconds in (0, HOUR_S))
     assert "No data before" not in whole
     assert "Complete up to 27 Nov 2026, 14:00." in whole
     assert "No data before 27 Nov 2026, 07:00. Complete up to 27 Nov 2026, 14:00." in late
@@ -158,8 +158,8 @@ def test_the_report_names_its_greenhouse_and_says_when_nothing_was_recorded() ->
     end_ns = (BEGUN_S + HOUR_S) * 10**9
     page = ReportPage(BEGUN_S * 10**9, end_ns, GREENHOUSE, UNKNOWN_JOURNAL, "de")
     assert "Simuliert" not in text_of(page, 1)
-    told = text_of(replace(page, origin="simulated", site="gh<1>"), 1)
-    assert "Schichtbericht: gh<1> Simuliert. Kein echter Roboter: Gewächshaus" in told
+    reported = text_of(replace(page, origin="simulated", site="gh<1>"), 1)
+    assert "Schichtbericht: gh<1> Simuliert. Kein echter Roboter: Gewächshaus" in reported
 
 
 def test_a_column_of_acknowledgements_and_shelves_appears_when_one_is_needed() -> None:

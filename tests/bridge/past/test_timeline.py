@@ -23,13 +23,15 @@ def one_by_one(stamps_ns: list[int], start_ns: int, end_ns: int) -> SeriesPast:
     return SeriesPast(start_ns, end_ns, None, stamps, (1,) * len(stamps), ones, ones, ones)
 
 
-def in_buckets(stamps_ns: list[int], told: Grid) -> SeriesPast:
+def in_buckets(stamps_ns: list[int], reported: Grid) -> SeriesPast:
     """The same in buckets, without the empty ones."""
-    found = Counter((stamp - told.start_ns) // told.bucket_ns for stamp in stamps_ns)
-    starts = tuple(told.start_ns + number * told.bucket_ns for number in sorted(found))
+    found = Counter((stamp - reported.start_ns) // reported.bucket_ns for stamp in stamps_ns)
+    starts = tuple(reported.start_ns + number * reported.bucket_ns for number in sorted(found))
     counts = tuple(found[number] for number in sorted(found))
     ones = (1.0,) * len(counts)
-    return SeriesPast(told.start_ns, told.end_ns, told.bucket_ns, starts, counts, ones, ones, ones)
+    return SeriesPast(
+        reported.start_ns, reported.end_ns, reported.bucket_ns, starts, counts, ones, ones, ones
+    )
 
 
 def parts(
@@ -145,8 +147,8 @@ def test_the_period_is_the_given_one_or_all_that_is_stored() -> None:
 def test_counts_come_in_the_buckets_of_the_period(
     start_ns: int, length_ns: int, points: int
 ) -> None:
-    told = grid(start_ns, start_ns + length_ns, points)
-    assert grid(told.start_ns, told.end_ns, points) == told
+    reported = grid(start_ns, start_ns + length_ns, points)
+    assert grid(reported.start_ns, reported.end_ns, points) == reported
 
 
 STAMPS = st.lists(st.integers(0, 999), max_size=30)

@@ -59,7 +59,7 @@ async def test_every_route_answers_as_of_a_moment(domain: int) -> None:
             (await it.http.get("/api/health?at=9")).content
         )
         assert (health.house.verdict, health.tags["a/b"].verdict) == ("healthy", "healthy")
-        assert set(past.asked) == {9 * NS, 19 * NS // 2}
+        assert set(past.requested) == {9 * NS, 19 * NS // 2}
         answer = await it.http.get("/api/tags/c?at=9")
         assert answer.status_code == 404
         # Before the start of the log, nothing is known.
@@ -81,8 +81,8 @@ async def test_a_daily_quantity_is_queried_like_a_sensor(domain: int) -> None:
         assert (found["sample_count"], found["value_max"]) == (1, pytest.approx(86.4))
         now = (await it.http.get(path)).json()
         assert now["ok"]
-        asked = "tag_id=a%2Fb&sensor_type=daily_light_integral"
-        history = (await it.http.get(f"/api/history?{asked}&from=108000&to=144000")).json()
+        requested = "tag_id=a%2Fb&sensor_type=daily_light_integral"
+        history = (await it.http.get(f"/api/history?{requested}&from=108000&to=144000")).json()
         assert history["unit"] == "mol/m²/d"
         assert [it["value"] for it in history["readings"]] == [pytest.approx(86.4)] * 10
 
@@ -139,7 +139,7 @@ async def test_simultaneous_equal_queries_run_once(domain: int) -> None:
     gate = threading.Event()
 
     def held(at_ns: int) -> Snapshot:
-        past.asked.append(at_ns)
+        past.requested.append(at_ns)
         gate.wait(PATIENCE_S)
         return past.snapshot
 
@@ -152,7 +152,7 @@ async def test_simultaneous_equal_queries_run_once(domain: int) -> None:
         gate.set()
         assert {(await task).status_code for task in asking} == {200}
         # One more for each state since: it may have changed the past.
-        assert len(past.asked) <= 1 + it.bridge.state_number - number
+        assert len(past.requested) <= 1 + it.bridge.state_number - number
 
 
 async def test_the_future_and_invalid_moments_are_refused_before_any_work(domain: int) -> None:
@@ -171,4 +171,4 @@ async def test_the_future_and_invalid_moments_are_refused_before_any_work(domain
                 assert part in answer.json()[name]
         answer = await it.http.get("/api/field?sensor_type=co2&resolution=0&at=9")
         assert "resolution" in answer.json()["error_message"]
-        assert past.asked == []
+        assert past.requested == []

@@ -174,13 +174,13 @@ async def test_identical_requests_take_one_place_and_one_computation(
     domain: int, held: Held
 ) -> None:
     async with greenhouse() as it:
-        asked = ask(it, *[field("co2", LARGE)] * 6, field("co2", LARGE, "npy"))
+        requested = ask(it, *[field("co2", LARGE)] * 6, field("co2", LARGE, "npy"))
         await until(lambda: it.bridge.admission.in_flight["127.0.0.1"] == 7, "all of them")
         await until(lambda: it.bridge.admission.being_computed == 2, "a body each")
         served = [c for c in it.server.server_state.connections if isinstance(c, HttpConnection)]
         assert [c.waiting_since_s for c in served] == [None] * 7, "and nobody makes room for others"
         held.gate.set()
-        answers = await asyncio.gather(*asked)
+        answers = await asyncio.gather(*requested)
         assert {answer.status_code for answer in answers} == {200}
         assert held.begun == ["co2"] * 2, "and a field each"
 

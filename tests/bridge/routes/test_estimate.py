@@ -61,11 +61,13 @@ def test_the_service_and_the_formats_give_the_same_numbers(live: Bridge) -> None
     sd_known = body.pop("sd_known")
     assert 0.0 < sd_known < service.sd_known
     for name, value in body.items():
-        told = getattr(service, name)
+        reported = getattr(service, name)
         if isinstance(value, list):
-            np.testing.assert_array_equal(np.array(value, np.float32), np.array(told, np.float32))
+            np.testing.assert_array_equal(
+                np.array(value, np.float32), np.array(reported, np.float32)
+            )
         else:
-            assert (np.float32(value) if isinstance(value, float) else value) == told, name
+            assert (np.float32(value) if isinstance(value, float) else value) == reported, name
     assert (body["sample_count"], body["reading_count"]) == (3, 15)
     array = np.load(io.BytesIO(npy.content), allow_pickle=False)
     assert array.shape == (2, 6, 4)

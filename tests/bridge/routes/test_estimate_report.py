@@ -68,8 +68,10 @@ def answered(live: Bridge, path: str, accept: Any, **query: Any) -> Any:
 def test_a_changed_tag_is_reported_left_out_and_judged(live: Bridge) -> None:
     def is_of_the_last(body: Any) -> bool:
         # Predictions run beside the ingest, and may be from the scan before.
-        told = body["tags"].get("d")
-        return bool(told and told["left_out"] and told["measured"] == temperature("d", 1))
+        reported = body["tags"].get("d")
+        return bool(
+            reported and reported["left_out"] and reported["measured"] == temperature("d", 1)
+        )
 
     body = answered(live, "/api/estimate/tags", is_of_the_last, **SENSOR)
     ExpectedTags.model_validate(body)

@@ -50,7 +50,7 @@ async def test_all_rows_come_under_one_header(domain: int) -> None:
             'attachment; filename="lupin-twin_a_b_co2_'
             'from_19700101T000001Z_to_19700101T000009Z.csv"'
         )
-        assert past.asked == [(NS, 9 * NS, "a/b", "co2")]
+        assert past.requested == [(NS, 9 * NS, "a/b", "co2")]
 
 
 async def test_head_reads_no_row(domain: int) -> None:
@@ -59,7 +59,7 @@ async def test_head_reads_no_row(domain: int) -> None:
         answer = await it.http.head(f"{PATH}?to=9")
         assert (answer.status_code, answer.content) == (200, b"")
         assert "19700101T000009Z" in answer.headers["content-disposition"]
-        assert past.asked == []
+        assert past.requested == []
         assert (await it.http.head(f"{PATH}?to=now")).status_code == 400
 
 

@@ -31,9 +31,9 @@ def play(url: str, scenario: str, *topics: str) -> Any:
     address = url.replace("http", "ws", 1) + "/foxglove"
     with Process([node, str(SCRIPT), address, scenario, *topics], ros_env(0)) as process:
         assert process.wait() == 0, process.output
-        told = json.loads(process.output.splitlines()[-1])
-    assert told["errors"] == []
-    return told
+        reported = json.loads(process.output.splitlines()[-1])
+    assert reported["errors"] == []
+    return reported
 
 
 @pytest.fixture(scope="module")
@@ -59,22 +59,22 @@ def client(greenhouse: Bridge) -> Iterator[Viewer]:
 def test_foxgloves_client_finds_and_decodes_the_channels(
     greenhouse: Bridge,
 ) -> None:
-    told = play(greenhouse.url, "look", STATE, INPUT, "/map", DIAGNOSTICS, *LAYERS)
-    assert told["chosen"] == [WEBSOCKET, SDK]
-    info = told["info"]
+    reported = play(greenhouse.url, "look", STATE, INPUT, "/map", DIAGNOSTICS, *LAYERS)
+    assert reported["chosen"] == [WEBSOCKET, SDK]
+    info = reported["info"]
     assert (info["name"], info["capabilities"], info["supportedEncodings"]) == (
         "lupin-twin",
         [],
         [],
     )
-    channels = {channel["topic"]: channel for channel in told["channels"]}
+    channels = {channel["topic"]: channel for channel in reported["channels"]}
     others = {"/perception/discovered_tags", "/twin/planters"}
     assert set(channels) == {STATE, INPUT, "/map", DIAGNOSTICS, *LAYERS, *others}
     assert {channel["encoding"] for channel in channels.values()} == {"cdr"}
     # With nothing but the advertised schema.
     read = {
         topic: reader_of(channels[topic])(base64.b64decode(message["data"]))
-        for topic, message in told["first"].items()
+        for topic, message in reported["first"].items()
     }
     [tag] = read[STATE].tags
     served = greenhouse.json("/api/state")["tags"][0]
@@ -89,7 +89,7 @@ def test_foxgloves_client_finds_and_decodes_the_channels(
     assert [field.name for field in points.fields] == ["x", "y", "z", "value", "error"]
     assert points.width * points.height > 0
     assert [marker.text for marker in read["/twin/tags"].markers if marker.text] == ["1"]
-    stamps = [int(message["timestamp"]) for message in told["first"].values()]
+    stamps = [int(message["timestamp"]) for message in reported["first"].values()]
     stamp = read[STATE].header.stamp
     assert all(abs(ns - stamp.sec * 10**9) < 120e9 for ns in stamps)
 
@@ -97,9 +97,9 @@ def test_foxgloves_client_finds_and_decodes_the_channels(
 def test_foxgloves_client_gets_latched_messages_until_it_unsubscribes(
     greenhouse: Bridge,
 ) -> None:
-    told = play(greenhouse.url, "again", "/map")
-    assert told["before"]["data"] == told["after"]["data"]
-    assert (told["late"], told["statuses"]) == (0, [])
+    reported = play(greenhouse.url, "again", "/map")
+    assert reported["before"]["data"] == reported["after"]["data"]
+    assert (reported["late"], reported["statuses"]) == (0, [])
 
 
 def test_every_change_by_foxgloves_client_is_refused(greenhouse: Bridge) -> None:
@@ -179,7 +179,7 @@ def test_a_flood_closes_its_own_connection_and_subscribes_nothing(
                 loud.send(op="subscribe", subscriptions=[{"id": 1, "channelId": channel}])
                 loud.send(op="unsubscribe", subscriptionIds=[1])
         with pytest.raises(ConnectionClosed) as closed:
-            loud.told("never")
+            loud.reported("never")
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 1008
         assert closed.value.rcvd.reason == "more than 100 messages a second after 500 at once"

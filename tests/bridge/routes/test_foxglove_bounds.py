@@ -114,9 +114,9 @@ async def test_simulated_time_is_sent_and_stamps_the_messages(domain: int) -> No
                 return latest is not None and latest.snapshot.stamp_ns == 5_250_000_000
 
             await until(tick, "a state of that time")
-        told = await asyncio.to_thread(play, here.url, "time")
-        assert told["info"]["capabilities"] == ["time"]
-        assert told["timestamp"] == "5250000000"
+        reported = await asyncio.to_thread(play, here.url, "time")
+        assert reported["info"]["capabilities"] == ["time"]
+        assert reported["timestamp"] == "5250000000"
 
         def state() -> int:
             with viewer(here.url) as client:

@@ -20,25 +20,25 @@ def verdicts(live: Bridge) -> dict[str, str]:
 
 
 def test_frames_and_http_have_the_verdict_and_deltas_its_changes() -> None:
-    def tells(tag_id: str) -> Any:
+    def reports(tag_id: str) -> Any:
         return lambda frame: tag_id in frame["health"]["tags"]
 
     with bridge() as live, live.listen(delta=1) as changes, live.listen() as whole:
         changes.until("state")  # from before
         live.peer.observe(scan("tag_1", {"temperature": 22.0}))
-        fine = changes.until("delta", tells("tag_1"))["health"]
+        fine = changes.until("delta", reports("tag_1"))["health"]
         assert fine["tags"]["tag_1"] == {"verdict": "healthy"}
         assert fine["house"]["verdict"] == "healthy"
         live.peer.observe(scan("tag_2", {"temperature": 6.0}))
-        cold = changes.until("delta", tells("tag_2"))["health"]
+        cold = changes.until("delta", reports("tag_2"))["health"]
         assert list(cold["tags"]) == ["tag_2"]
         assert cold["house"]["verdict"] == "critical"
         (reason,) = cold["tags"]["tag_2"]["reasons"]
         assert (reason["kind"], reason["sensor"]) == ("range", "temperature")
         assert (reason["value"], reason["limit"]) == (6.0, 10.0)
 
-        told = whole.until("state", tells("tag_2"))["health"]
-        assert told == live.json("/api/health")
+        reported = whole.until("state", reports("tag_2"))["health"]
+        assert reported == live.json("/api/health")
         assert verdicts(live) == {"tag_1": "healthy", "tag_2": "critical"}
 
 

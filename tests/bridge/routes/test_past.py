@@ -82,11 +82,11 @@ async def test_a_timeline_queries_every_event_of_one_period(domain: int) -> None
         found = routes_schema.Timeline.model_validate_json(answer.content)
         assert [(b.start.sec, b.scans) for b in found.buckets] == [(0, 2)]
         assert (found.bucket_s, found.reach is None, len(found.runs)) == (100.0, False, 1)
-        asked = [request for request in past.asked if isinstance(request, SeriesRequest)]
-        assert {request.sensor_type for request in asked} == set(Event)
-        assert {request.tag_id for request in asked} == {"*"}
+        requested = [request for request in past.requested if isinstance(request, SeriesRequest)]
+        assert {request.sensor_type for request in requested} == set(Event)
+        assert {request.tag_id for request in requested} == {"*"}
         # The first query reads the time; all others use it.
-        assert [request.end_ns for request in asked] == [0, *[past.now_ns] * 6]
+        assert [request.end_ns for request in requested] == [0, *[past.now_ns] * 6]
         answer = await it.http.get("/api/timeline?points=10&tag_id=7")
         found = routes_schema.Timeline.model_validate_json(answer.content)
         assert [b.scans for b in found.buckets] == [1]
@@ -104,10 +104,10 @@ async def test_events_in_five_minute_buckets_share_a_grid_with_single_events(
     def series(request: SeriesRequest) -> SeriesPast:
         if request.event is not Event.SCANS:
             return MadeUp.series(past, request)
-        told = grid(request.start_ns, request.end_ns, request.max_points, slot_ns)
+        reported = grid(request.start_ns, request.end_ns, request.max_points, slot_ns)
         found = (20_000.0,) * 2
         stamps = (slot_ns, 2 * slot_ns)
-        edges = told.start_ns, told.end_ns, told.bucket_ns
+        edges = reported.start_ns, reported.end_ns, reported.bucket_ns
         return SeriesPast(*edges, stamps, (20_000,) * 2, found, found, found)
 
     async with remembering(past) as it:
@@ -161,7 +161,7 @@ async def test_an_invalid_query_is_refused_before_the_source_is_queried(domain: 
             answer = await it.http.get(path)
             assert answer.status_code == 400
             assert part in answer.json()["detail"]
-        assert past.asked == []
+        assert past.requested == []
 
 
 async def test_a_client_that_disconnects_cancels_its_query(domain: int) -> None:
@@ -178,7 +178,7 @@ async def test_a_client_that_disconnects_cancels_its_query(domain: int) -> None:
         for path in (HISTORY, "/api/state?at=9"):
             ended.clear()
             asking = asyncio.create_task(it.http.get(path))
-            await until(lambda: it.bridge.admission.being_computed == 1, "the question")
+            await until(lambda: it.bridge.admission.being_computed == 1, "the query")
             asking.cancel()
             await until(ended.is_set, "its end")
             await until(lambda: it.bridge.admission.being_computed == 0, "its place")

@@ -79,9 +79,13 @@ def test_with_accounts_every_read_needs_a_name(live: Bridge) -> None:
 
 def test_a_session_shows_its_name_and_ends_when_it_signs_out(live: Bridge) -> None:
     with signed_in(live.url, "anna") as browser:
-        told = routes_schema.Session.model_validate(browser.get("/api/session").json())
-        assert (told.name, told.role, told.can_write_notes) == ("anna", "operator", True)
-        assert told.can_sign_out
+        reported = routes_schema.Session.model_validate(browser.get("/api/session").json())
+        assert (reported.name, reported.role, reported.can_write_notes) == (
+            "anna",
+            "operator",
+            True,
+        )
+        assert reported.can_sign_out
         cookie = dict(browser.cookies)
         assert PASSWORD not in str(cookie)
         assert browser.post("/api/signout").status_code == 204

@@ -173,17 +173,17 @@ def test_a_shutdown_during_a_sign_in_is_no_error(tmp_path: Path) -> None:
     # The parameters in the hash decide the work: minutes for this one.
     add(path, secret=f"$argon2id$v=19$m=65536,t=2000,p=1${'A' * 22}${'A' * 43}", anna="viewer")
     body = json.dumps({"name": "anna", "password": "x" * 12}).encode()
-    asks = b"POST /api/signin HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Lupin-Twin: 1\r\n"
-    asks += b"Content-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(body) + body
+    requests = b"POST /api/signin HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Lupin-Twin: 1\r\n"
+    requests += b"Content-Type: application/json\r\nContent-Length: %d\r\n\r\n" % len(body) + body
     with bridge("--accounts", str(path)) as running, raw_http.connect(running.url) as client:
-        client.sendall(asks)
+        client.sendall(requests)
         with raw_http.connect(running.url) as gone:
             for _ in range(2):  # after a response, neither the rest nor the end is read
-                gone.sendall(asks)
+                gone.sendall(requests)
                 running.get("/healthz")
         running.get("/healthz")  # and all is read
         assert running.process.stop(signal.SIGTERM) == 0
-        assert raw_http.status(raw_http.heard(client)) == 503
+        assert raw_http.status(raw_http.received(client)) == 503
         assert "ERROR" not in running.process.output
 
 

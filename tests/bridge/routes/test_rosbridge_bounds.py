@@ -56,13 +56,13 @@ async def test_open_calls_are_limited_and_the_others_get_an_error(
     most_at_once = 0
     held = asyncio.Event()
 
-    async def slow_field(*asked: Any) -> Any:
+    async def slow_field(*requested: Any) -> Any:
         nonlocal running_at_once, most_at_once
         running_at_once += 1
         most_at_once = max(most_at_once, running_at_once)
         await held.wait()
         running_at_once -= 1
-        return await newest_field(*asked)
+        return await newest_field(*requested)
 
     monkeypatch.setattr(sockets, "newest_field", slow_field)
     async with inprocess.running() as here:

@@ -254,10 +254,14 @@ def test_no_other_page_can_sign_anybody_out(
 
 
 def test_a_page_knows_whether_it_can_sign_out(closed: Served) -> None:
-    told = closed.get("/api/session", session(closed)).json()
-    assert (told["name"], told["role"], told["can_write_notes"]) == (None, "viewer", False)
-    assert told["can_sign_out"]
-    assert SHARED_SESSION_S - 600 < told["seconds_left"] <= SHARED_SESSION_S
+    reported = closed.get("/api/session", session(closed)).json()
+    assert (reported["name"], reported["role"], reported["can_write_notes"]) == (
+        None,
+        "viewer",
+        False,
+    )
+    assert reported["can_sign_out"]
+    assert SHARED_SESSION_S - 600 < reported["seconds_left"] <= SHARED_SESSION_S
     nobody = {"name": None, "role": "viewer", "can_write_notes": False}
     program = {"can_sign_out": False, "seconds_left": None, **nobody}
     assert closed.get("/api/session", BEARER).json() == program

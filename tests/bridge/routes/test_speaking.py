@@ -7,7 +7,7 @@ SPOKEN = ("en", "de", "nl", "es")
 
 
 @pytest.mark.parametrize(
-    ("asked", "accepted", "language"),
+    ("requested", "accepted", "language"),
     [
         ("", "", "en"),
         ("", "de-AT,de;q=0.9,en;q=0.8", "de"),
@@ -26,8 +26,8 @@ SPOKEN = ("en", "de", "nl", "es")
     ],
 )
 def test_the_language_is_chosen_from_accept_language(
-    asked: str, accepted: str, language: str
+    requested: str, accepted: str, language: str
 ) -> None:
     headers = [(b"accept-language", accepted.encode())]
-    request = Request({"type": "http", "query_string": asked.encode(), "headers": headers})
+    request = Request({"type": "http", "query_string": requested.encode(), "headers": headers})
     assert language_of(request, SPOKEN) == language

@@ -91,7 +91,7 @@ def test_one_address_evicts_only_its_own_connections(live: Served) -> None:
         ]
         assert others[0].recv(1) == b"", "it made room for the last of its own"
         quiet.sendall(GET[-2:])
-        assert raw_http.status(raw_http.heard(quiet)) == 200
+        assert raw_http.status(raw_http.received(quiet)) == 200
 
 
 def test_websockets_leave_room_for_requests_and_stay(live: Served) -> None:
@@ -125,7 +125,7 @@ def test_out_of_files_it_waits_logs_so_once_and_recovers(live: Served) -> None:
             client.sendall(GET)
         live.process.wait_for_output("no new connections for now: Too many open files")
         resource.prlimit(pid, resource.RLIMIT_NOFILE, (FILES, FILES))
-        assert all(raw_http.status(raw_http.heard(client)) == 200 for client in waiting)
+        assert all(raw_http.status(raw_http.received(client)) == 200 for client in waiting)
         assert live.process.output.count("no new connections") == 1
 
 

@@ -229,10 +229,10 @@ async def test_a_place_is_held_until_the_answer_exists_and_is_then_released(
     monkeypatch.setattr(answers_of, "newest_field", never)
     async with running(Limits(concurrency=3)) as it:
         fields = [f"/api/field{QUERY.replace('co2', f'{n}')}" for n in range(8)]
-        asked = [asyncio.create_task(it.http.get(field)) for field in fields]
-        await until(lambda: sum(each.done() for each in asked) == 5, "the refusals")
+        requested = [asyncio.create_task(it.http.get(field)) for field in fields]
+        await until(lambda: sum(each.done() for each in requested) == 5, "the refusals")
         time_is_up.set()
-        answers = await asyncio.gather(*asked)
+        answers = await asyncio.gather(*requested)
         assert sorted(answer.status_code for answer in answers) == [429] * 5 + [504] * 3
         assert it.bridge.admission.refused == {"client_in_flight": 5}
         assert not it.bridge.admission.in_flight

@@ -12,7 +12,7 @@ def answer(size: int) -> Answer:
     return Answer(b"x" * size, "text/plain")
 
 
-def kept_for(*bodies: int) -> AnswerCache:
+def cached(*bodies: int) -> AnswerCache:
     """Room for exactly these bodies."""
     return AnswerCache(max_bytes=sum(bodies) + len(bodies) * ENTRY_BYTES)
 
@@ -32,7 +32,7 @@ def holds(kept: AnswerCache, key: object, expected: Answer) -> bool:
 
 
 def test_an_answer_being_sent_stays_and_counts_until_it_is_released() -> None:
-    kept = kept_for(10, 10)
+    kept = cached(10, 10)
     kept.put("a", answer(10))
     lent = [kept.lend("a"), kept.lend("a")]
     kept.put("b", answer(10))
@@ -48,7 +48,7 @@ def test_an_answer_being_sent_stays_and_counts_until_it_is_released() -> None:
 
 
 def test_a_replacement_takes_the_place_of_the_old_answer() -> None:
-    kept = kept_for(10, 10, 10)
+    kept = cached(10, 10, 10)
     kept.put("field", answer(10))
     for number in range(100):
         kept.put(("state", number), answer(10), instead_of=("state", number - 1))
@@ -84,7 +84,7 @@ def test_the_bound_always_holds(steps: list[Step]) -> None:
     assert (len(kept), kept.bytes) == (1, 60 + 3 * ENTRY_BYTES), "nobody holds anything any more"
 
 
-def test_the_latest_etags_are_reported() -> None:
+def test_the_newest_tags_are_reported() -> None:
     kept = AnswerCache()
     for number in range(MAX_NEWEST + 1):
         kept.put(f'"{number}"', Answer(b"", "text/plain"))

@@ -51,6 +51,6 @@ def test_stuck_readers_hold_only_their_own_places_and_are_cut_off(live: Served) 
             assert other.get(SMALL_FIELD).status_code == 200, "it is another client"
         line = f"disconnected a reader that accepted nothing for {TIMEOUT_S} s"
         wait_for(lambda: live.process.output.count(line) == CONCURRENCY, "their end")
-        assert all(len(raw_http.heard(client)) < 4_000_000 for client in deaf)
+        assert all(len(raw_http.received(client)) < 4_000_000 for client in deaf)
     wait_for(lambda: live.get(SMALL_FIELD).status_code == 200, "their places to be free")
     assert "ERROR" not in live.process.output

@@ -5,8 +5,8 @@ import pytest
 from lupin_bridge.serving.admission import RateLimit, client_key
 
 
-def taken(limit: RateLimit, client: str, now_s: float, tries: int) -> int:
-    return sum(limit.take(client, now_s) == 0.0 for _ in range(tries))
+def taken(limit: RateLimit, client: str, now_s: float, attempts: int) -> int:
+    return sum(limit.take(client, now_s) == 0.0 for _ in range(attempts))
 
 
 def test_a_burst_passes_at_once_and_the_next_turn_waits_an_interval() -> None:

@@ -207,8 +207,8 @@ def test_fields_that_never_finish_do_not_delay_the_shutdown(domain: int) -> None
         answers = []
         for hang, path in HANGS:
             _, what, sensor = hang.split(":")
-            asked = waiting_for(url_of(process), path.replace("co2", sensor))
-            answers.append(stack.enter_context(asked))
+            requested = waiting_for(url_of(process), path.replace("co2", sensor))
+            answers.append(stack.enter_context(requested))
             process.wait_for_output(f"{what} hangs")
         assert process.stop(signal.SIGINT) == 0
         for answer in answers:

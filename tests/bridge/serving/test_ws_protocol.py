@@ -78,12 +78,12 @@ async def test_a_client_that_does_not_read_gets_no_pongs_and_ends_after_its_clos
     async with running(Limits(client_timeout_s=3.0), SILENT) as served:
         with deaf_client(served.url) as deaf:
             connection = await joined(served)
-            heard = 0
+            pongs = 0
             handle_ping = connection.handle_ping
 
             def counted() -> None:
-                nonlocal heard
-                heard += 1
+                nonlocal pongs
+                pongs += 1
                 handle_ping()
 
             connection.handle_ping = counted  # type: ignore[method-assign]
@@ -91,7 +91,7 @@ async def test_a_client_that_does_not_read_gets_no_pongs_and_ends_after_its_clos
                 connection.write(SMALL_FRAME)
             queued = connection.transport.get_write_buffer_size()
             deaf.sendall(masked(PING, bytes(125)) * pings)
-            await until(lambda: heard == pings, "all pings")
+            await until(lambda: pongs == pings, "all pings")
             assert connection.transport.get_write_buffer_size() == queued
             deaf.sendall(masked(CLOSE, b"\x03\xe8"))
             await until(lambda: not served.server.server_state.connections, "its end")
@@ -153,18 +153,18 @@ async def test_a_refused_client_can_read_the_reason(
     # However long a busy machine takes to send and to receive it.
     monkeypatch.setattr(ws_protocol, "CLOSE_GRACE_S", PATIENCE_S)
 
-    def say_and_hear(url: str) -> None:
+    def send_and_receive(url: str) -> None:
         with RawClient(url, "/ws/state") as client:
             client.socket.sendall(said + masked(BINARY, bytes(1_000)) * 200)
-            heard = client.received
-            while not (frames := list(frames_of(heard))) or frames[-1][0] != CLOSE:
+            data = client.received
+            while not (frames := list(frames_of(data))) or frames[-1][0] != CLOSE:
                 block = client.socket.recv(BLOCK)
                 assert block, "it ended without a reason"
-                heard += block
+                data += block
             assert int.from_bytes(frames[-1][1][:2]) == code
             # No reset: the system would drop what was not read by then.
             client.socket.shutdown(socket.SHUT_WR)
             assert client.socket.recv(BLOCK) == b""
 
     async with running(ros_args=SILENT) as served:
-        await asyncio.to_thread(say_and_hear, served.url)
+        await asyncio.to_thread(send_and_receive, served.url)

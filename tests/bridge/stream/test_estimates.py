@@ -56,15 +56,15 @@ class Stage:
     """The queries of a follower, and its updates."""
 
     def __init__(self) -> None:
-        self.asked: list[str] = []
-        self.told: list[Changed] = []
+        self.requested: list[str] = []
+        self.reported: list[Changed] = []
         self.snapshot: Snapshot | None = None
         self.answers: dict[str, Report] = {}
         stage: Any = self
-        self.follower = EstimateFollower(stage, lambda: self.snapshot, self.told.append)
+        self.follower = EstimateFollower(stage, lambda: self.snapshot, self.reported.append)
 
     async def estimate_report(self, request: ReportRequest) -> Report:
-        self.asked.append(request.sensor_type)
+        self.requested.append(request.sensor_type)
         if request.sensor_type not in self.answers:
             raise TwinUnavailableError("nobody is there")
         return self.answers[request.sensor_type]
@@ -73,19 +73,19 @@ class Stage:
 async def test_changes_are_passed_on_in_their_current_form() -> None:
     stage = Stage()
     await stage.follower.update()
-    assert stage.asked == [], "there is no state yet"
+    assert stage.requested == [], "there is no state yet"
     stage.snapshot = snapshot(co2=5, light=6)
     stage.answers = {"co2": report(9, {"co2": None}), "light": report(4, {})}
     await stage.follower.update()
-    assert stage.asked == ["co2", "light"]
-    assert stage.told == [{}]
+    assert stage.requested == ["co2", "light"]
+    assert stage.reported == [{}]
     stage.answers["co2"] = report(9, {"co2": 5})
     for _ in range(2):
         await stage.follower.update()
-        assert stage.told[-1] == {"co2": {"co2": 5}}
+        assert stage.reported[-1] == {"co2": {"co2": 5}}
     stage.snapshot = snapshot(light=6)
     await stage.follower.update()
-    assert stage.told[-1] == {}, "no tag has that sensor any more"
+    assert stage.reported[-1] == {}, "no tag has that sensor any more"
 
 
 async def test_where_a_report_fails_the_last_one_holds() -> None:
@@ -94,7 +94,7 @@ async def test_where_a_report_fails_the_last_one_holds() -> None:
     await stage.follower.update()
     stage.answers = {}
     await stage.follower.update()
-    assert stage.told[-1] == {"co2": {"co2": 5}}
+    assert stage.reported[-1] == {"co2": {"co2": 5}}
 
 
 def test_the_number_of_queried_sensors_is_limited() -> None:
@@ -103,7 +103,7 @@ def test_the_number_of_queried_sensors_is_limited() -> None:
     stage.snapshot = snapshot(**dict.fromkeys(names, 1))
     stage.answers = dict.fromkeys(names, report(9, {}))
     asyncio.run(stage.follower.update())
-    assert stage.asked == names[:-1]
+    assert stage.requested == names[:-1]
 
 
 async def test_a_failed_query_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -111,7 +111,7 @@ async def test_a_failed_query_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     stage = Stage()
     stage.snapshot = snapshot(co2=1)
     stage.follower.start()
-    await until(lambda: len(stage.asked) > 1, "it to be asked again")
+    await until(lambda: len(stage.requested) > 1, "it to be asked again")
     stage.answers = {"co2": report(9, {"co2": 1})}
-    await until(lambda: stage.told[-1], "the answer")
+    await until(lambda: stage.reported[-1], "the answer")
     await stage.follower.stop()

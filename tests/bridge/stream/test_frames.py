@@ -113,7 +113,7 @@ def test_applying_the_deltas_gives_the_state(steps: list[dict[str, int]]) -> Non
 # --- size ---------------------------------------------------------------------------------------
 
 # What every browser gets ten times a second, for thirty tags with five sensors each.
-MAX_HOUSE_BYTES = 16_000
+MAX_GREENHOUSE_BYTES = 16_000
 
 
 def greenhouse() -> Snapshot:
@@ -142,4 +142,4 @@ def test_a_frame_of_a_greenhouse_is_within_its_budget_of_bytes() -> None:
     verdicts = Counter(health.verdict for health in judged.tags.values())
     assert verdicts == {"healthy": 27, "critical": 3}
     frame = FrameWriter().state(scanned, "0123456789abcdef-1234-5", judged)
-    assert len(frame.full()) <= MAX_HOUSE_BYTES
+    assert len(frame.full()) <= MAX_GREENHOUSE_BYTES

@@ -77,8 +77,8 @@ class Stage:
         board = replace(board_of(alarm(tag_id) for tag_id in tag_ids), source="journal", since_ns=0)
         self.hub.publish_alarms(alarms_message(board, None, (), 0), now_s)
 
-    def join(self, socket: Socket, now_s: float = 0.0, **asked: Any) -> Client:
-        client = Client(socket, **asked)
+    def join(self, socket: Socket, now_s: float = 0.0, **requested: Any) -> Client:
+        client = Client(socket, **requested)
         self.hub.join(client, now_s)
         return client
 

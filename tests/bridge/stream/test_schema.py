@@ -60,8 +60,8 @@ def test_after_the_fields_of_its_message_a_type_has_the_times(
     model: type[BaseModel], message_type: Any, times: list[str]
 ) -> None:
     assert list(model.model_fields) == names(message_type) + times
-    told = set(names(TagTimes)) - {"tag_id", "sensors"}
-    assert set(times) <= told
+    reported = set(names(TagTimes)) - {"tag_id", "sensors"}
+    assert set(times) <= reported
 
 
 def test_every_type_forbids_unknown_fields() -> None:

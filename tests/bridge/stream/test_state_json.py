@@ -205,10 +205,10 @@ def test_the_last_attempt_is_written_unless_it_was_the_last_observation() -> Non
         not {"last_try", "last_try_status", "last_try_detail"}
         & json.loads(StateJson().tag(tag, 5 * S)).keys()
     )
-    for tried in (Attempt(6 * S), Attempt(5 * S, 2), Attempt(5 * S, 0, "late"), None):
-        written = json.loads(StateJson().tag(replace(tag, last_try=tried), 5 * S))
-        assert written["last_try"] == (tried and stamp(tried.stamp_ns))
-        assert written["last_try_status"] == (tried and tried.status)
+    for attempted in (Attempt(6 * S), Attempt(5 * S, 2), Attempt(5 * S, 0, "late"), None):
+        written = json.loads(StateJson().tag(replace(tag, last_try=attempted), 5 * S))
+        assert written["last_try"] == (attempted and stamp(attempted.stamp_ns))
+        assert written["last_try_status"] == (attempted and attempted.status)
 
 
 def test_a_history_is_sorted_by_sensor_in_its_own_order() -> None:
@@ -258,9 +258,9 @@ def test_a_history_is_sorted_by_sensor_in_its_own_order() -> None:
 def test_without_a_running_clock_no_age_is_known(clock: ClockState) -> None:
     tag = TagState("1", readings=(Reading("co2", 1.0, S),), last_observed_ns=2 * S)
     snapshot = Snapshot(9 * S, "map", (tag,), clock=clock)
-    [told] = json.loads(StateJson().state(snapshot, snapshot.now_ns))["tags"]
-    assert told["stale_seconds"] is None
-    assert told["readings"][0]["observed_at"] == {"sec": 1, "nanosec": 0}
+    [reported] = json.loads(StateJson().state(snapshot, snapshot.now_ns))["tags"]
+    assert reported["stale_seconds"] is None
+    assert reported["readings"][0]["observed_at"] == {"sec": 1, "nanosec": 0}
     snapshot = replace(snapshot, clock="paused")
     paused = json.loads(StateJson().state(snapshot, snapshot.now_ns))
     assert paused["tags"][0]["stale_seconds"] == 7.0

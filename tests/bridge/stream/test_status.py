@@ -24,12 +24,12 @@ def live(age_s: float = 0.1, **says: Any) -> Status:
     return Status("live", age_s, update(**says))
 
 
-def heard(at_s: float, clock: ClockState = "running", **says: Any) -> Liveness:
+def received(at_s: float, clock: ClockState = "running", **says: Any) -> Liveness:
     return Liveness(update=update(clock, **says), updated_s=at_s)
 
 
 def test_a_twin_is_live_until_it_was_silent_for_the_limit() -> None:
-    liveness = heard(100.0)
+    liveness = received(100.0)
     assert liveness.status(100.0 + STALE_AFTER_S - 0.001).reason == "live"
     assert liveness.status(100.0 + STALE_AFTER_S).reason == "stale"
 
@@ -52,11 +52,11 @@ def test_the_log_has_observations_before_the_twin_is_received() -> None:
 
 
 def test_an_age_is_never_negative() -> None:
-    assert heard(10.0).status(9.0).state_age_s == 0.0
+    assert received(10.0).status(9.0).state_age_s == 0.0
 
 
 def test_the_most_specific_reason_comes_first() -> None:
-    liveness = heard(0.0)
+    liveness = received(0.0)
     liveness.thread_dead = True
     assert liveness.status(0.0).reason == "thread_dead"
     liveness.shutting_down = True
@@ -75,7 +75,7 @@ def test_every_status_has_a_frame_of_the_contract(reason: Reason, age_s: float |
 
 
 def test_more_than_one_twin_is_reported_while_they_live() -> None:
-    liveness = heard(0.0, twin_count=2)
+    liveness = received(0.0, twin_count=2)
     assert liveness.status(0.0).is_live
     assert liveness.status(0.0).message.startswith("2 twins publish on the same topic")
     assert "silent" in liveness.status(10.0).message
@@ -115,7 +115,7 @@ def test_which_changes_are_news_for_clients_and_which_for_people() -> None:
 def test_a_clock_that_does_not_run_is_reported_unless_the_twin_is_silent(
     clock: ClockState, reason: Reason
 ) -> None:
-    liveness = heard(0.0, clock)
+    liveness = received(0.0, clock)
     assert liveness.status(0.1).reason == reason
     assert liveness.status(10.0).reason == "stale"
 
@@ -143,8 +143,8 @@ def test_a_change_of_a_channels_state_is_news() -> None:
     assert well.is_news_after(failing)
     assert not status("refused").is_news_after(failing)
     assert not failing.has_more_detail_than(well), "the channel has logged it"
-    (told,) = schema.StatusFrame.model_validate(failing.frame()).outward
-    assert (told.channel, told.is_failing, told.detail) == ("mqtt", True, "refused")
+    (reported,) = schema.StatusFrame.model_validate(failing.frame()).outward
+    assert (reported.channel, reported.is_failing, reported.detail) == ("mqtt", True, "refused")
 
 
 def test_a_change_of_the_journals_state_is_news() -> None:
@@ -164,8 +164,8 @@ def test_a_change_of_the_journals_state_is_news() -> None:
     # Its delay changes every second.
     slow = status(JournalState.SLOW, "2 s behind")
     assert not status(JournalState.SLOW, "3 s behind").is_news_after(slow)
-    told = schema.StatusFrame.model_validate(slow.frame()).journal
-    assert (told.state, told.detail, told.simulated) == ("slow", "2 s behind", None)
+    reported = schema.StatusFrame.model_validate(slow.frame()).journal
+    assert (reported.state, reported.detail, reported.simulated) == ("slow", "2 s behind", None)
     filled = status(JournalState.RECORDING, simulated_ns=(1_000_000_002, 3_000_000_000))
     stretch = schema.StatusFrame.model_validate(filled.frame()).journal.simulated
     assert stretch is not None

@@ -229,9 +229,9 @@ def test_a_broker_that_comes_late_or_goes_is_reported_and_found_again(
         peer.until(lambda: robot.said("127.0.0.1"), "its end to be told")
         with broker.running(), device(broker) as client:
 
-            def is_heard() -> bool:
+            def is_received() -> bool:
                 client.publish("plain/a/co2", "5")
                 return bool(robot.observations)
 
-            peer.until(is_heard, "what it says after that")
+            peer.until(is_received, "what it says after that")
         assert process.exit_code is None

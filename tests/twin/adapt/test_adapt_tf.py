@@ -245,8 +245,8 @@ def test_check_without_a_configuration_finds_tf_and_detections(domain: int) -> N
             robot.be_at(5.0, robot.see(7, 0.3))
             robot.read(21.5)
             spin()
-            heard = {topic for topic, source in node.sources.items() if source.received}
-            return "base_link" in node.frames and heard >= {"/detections", "/temperature"}
+            found = {topic for topic, source in node.sources.items() if source.received}
+            return "base_link" in node.frames and found >= {"/detections", "/temperature"}
 
         peer.until(publish, "transforms, a sighting and a reading")
         found = config_of(yaml.safe_load(suggestion(node)))

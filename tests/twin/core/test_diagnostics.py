@@ -111,7 +111,7 @@ def test_the_source_of_observations_is_parsed_back(origin: Origin) -> None:
 
 
 def test_the_journals_report_is_parsed_back() -> None:
-    told = Condition(
+    reported = Condition(
         JournalState.FAILING,
         "the disk is full",
         "/j.sqlite",
@@ -126,7 +126,7 @@ def test_the_journals_report_is_parsed_back() -> None:
         journal_id="0123456789abcdef",
     )
     none: dict[str, Any] = {"simulated_ns": None, "complete_ns": None, "kept_ns": ()}
-    for journal in (told, replace(told, **none)):
+    for journal in (reported, replace(reported, **none)):
         assert self_report(findings(replace(WELL, journal=journal))).journal == journal
     for values in ({}, {"state": "constructor"}):
         assert self_report([Finding("journal", OK, "", values)]).journal == UNKNOWN_JOURNAL

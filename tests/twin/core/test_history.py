@@ -67,14 +67,14 @@ WRITES = st.lists(
 def test_the_history_equals_the_simplest_one(writes: list[Scan | Inspection], count: int) -> None:
     """All observations, sorted by stamp, each once, and of these the latest."""
     scans: dict[tuple[int, str], dict[str, float]] = {}
-    tries: dict[tuple[int, int, str], None] = {}
+    keys: dict[tuple[int, int, str], None] = {}
     for write in writes:
-        tries.setdefault((write.stamp_ns, isinstance(write, Inspection), write.source))
+        keys.setdefault((write.stamp_ns, isinstance(write, Inspection), write.source))
         if isinstance(write, Scan) and write.readings:
             readings = {r.name: r.value for r in write.readings}
             scans.setdefault((write.stamp_ns, write.source), {}).update(readings)
     past = tag_history(writes, None, count)
-    newest = sorted(tries, key=lambda key: key[0])[-count:]
+    newest = sorted(keys, key=lambda key: key[0])[-count:]
     assert [(each.stamp_ns, each.kind) for each in past.attempts] == [key[:2] for key in newest]
     expected = sorted(scans.items(), key=lambda item: item[0][0])[-count:]
     assert [(each.stamp_ns, {r.name: r.value for r in each.readings}) for each in past.scans] == [
@@ -94,10 +94,10 @@ def test_with_a_log_that_lacks_the_last_write_nothing_is_missing(
     """The latest state contains it."""
     store, repeats, every = TwinStore(), Repeats(), list[Scan | Inspection]()
     at_s = 0
-    for number, (wait_s, sensors, is_look) in enumerate(steps, 1):
+    for number, (wait_s, sensors, is_inspection) in enumerate(steps, 1):
         at_s += wait_s
         readings = tuple(Reading(name, float(number)) for name in sorted(sensors))
-        every.append(look("1", at_s) if is_look else Scan("1", at_s * S, readings))
+        every.append(look("1", at_s) if is_inspection else Scan("1", at_s * S, readings))
         assert ingest.apply(every[-1], store, repeats) is None
     for tag in store.snapshot(0, "map").tags:
         found, expected = tag_history(every[:-1], tag, 32), tag_history(every, None, 32)

@@ -23,16 +23,16 @@ READINGS = (Reading("co2", 1.0),)
 SENT: dict[str, Any] = {"pose": at(1.0, 2.0), "source": "robot", "own_stamp_ns": 4 * S}
 
 
-def heard_reading(tag_id: str = "1", frame_id: str = "map", **changes: Any) -> Received:
+def received_reading(tag_id: str = "1", frame_id: str = "map", **changes: Any) -> Received:
     return Received(0, frame_id, Scan(tag_id, 3 * S, READINGS, **(SENT | changes)))
 
 
-def heard_look(tag_id: str = "1", **changes: Any) -> Received:
+def received_inspection(tag_id: str = "1", **changes: Any) -> Received:
     return Received(1, "map", Inspection(tag_id, 0, Flower("rose", 0.9), **(SENT | changes)))
 
 
-def reason_of(heard: Received) -> Reason | None:
-    write = ingest.observation(heard, "map", NOW_NS)
+def reason_of(received: Received) -> Reason | None:
+    write = ingest.observation(received, "map", NOW_NS)
     return write.reason if isinstance(write, Drop) else None
 
 
@@ -41,35 +41,35 @@ def reason_of(heard: Received) -> Reason | None:
 
 @pytest.mark.parametrize(("own_s", "at_s"), [(0, 3), (101, 100)])
 def test_a_scan_without_a_stamp_has_the_time_of_its_sensors(own_s: int, at_s: int) -> None:
-    write = ingest.observation(heard_reading(own_stamp_ns=own_s * S), "map", NOW_NS)
+    write = ingest.observation(received_reading(own_stamp_ns=own_s * S), "map", NOW_NS)
     assert isinstance(write, Scan)
     assert (write.stamp_ns, write.own_stamp_ns) == (at_s * S, (own_s or 3) * S)
 
 
 def test_a_failed_scan_keeps_its_readings_and_reason_and_loses_its_pose() -> None:
-    heard = heard_reading(status=SKIPPED, status_detail="no time")
-    assert ingest.observation(heard, "map", NOW_NS) == Scan(
+    received = received_reading(status=SKIPPED, status_detail="no time")
+    assert ingest.observation(received, "map", NOW_NS) == Scan(
         "1", 4 * S, READINGS, None, SKIPPED, "no time", "robot", 4 * S
     )
 
 
 def test_an_inspection_has_the_result_of_the_camera() -> None:
-    assert ingest.observation(heard_look(), "map", NOW_NS) == Inspection(
+    assert ingest.observation(received_inspection(), "map", NOW_NS) == Inspection(
         "1", 4 * S, Flower("rose", 0.9), at(1.0, 2.0), source="robot", own_stamp_ns=4 * S
     )
 
 
 def test_a_failed_inspection_is_a_failed_attempt_without_its_payload() -> None:
-    heard = heard_look(status=SKIPPED, status_detail="dark")
-    assert ingest.observation(heard, "map", NOW_NS) == Inspection(
+    received = received_inspection(status=SKIPPED, status_detail="dark")
+    assert ingest.observation(received, "map", NOW_NS) == Inspection(
         "1", 4 * S, None, None, SKIPPED, "dark", "robot", 4 * S
     )
 
 
 @pytest.mark.parametrize(("length", "kept"), [(256, 256), (257, 256), (10_000, 256)])
 def test_a_long_text_of_a_producer_is_cut_and_drops_nothing(length: int, kept: int) -> None:
-    heard = heard_reading(source="s" * length, status_detail="d" * length)
-    write = ingest.observation(heard, "map", NOW_NS)
+    received = received_reading(source="s" * length, status_detail="d" * length)
+    write = ingest.observation(received, "map", NOW_NS)
     assert isinstance(write, Scan)
     assert (len(write.source), len(write.status_detail)) == (kept, kept)
     assert write.source.endswith("…") == (length > kept)
@@ -84,8 +84,8 @@ def test_other_kinds_are_dropped_with_their_name(kind: int, name: str) -> None:
 
 
 def test_a_frame_is_the_expected_one_or_empty() -> None:
-    assert reason_of(heard_reading(frame_id="")) is None
-    assert reason_of(heard_reading(frame_id="odom")) is Reason.FRAME
+    assert reason_of(received_reading(frame_id="")) is None
+    assert reason_of(received_reading(frame_id="odom")) is Reason.FRAME
 
 
 @pytest.mark.parametrize(
@@ -136,25 +136,25 @@ def test_a_discoverys_half_turn_is_preserved_and_is_not_an_absent_pose(length: f
 
 
 def test_a_discovery_pins_a_tag_without_a_pose_and_changes_no_other() -> None:
-    asked = []
+    requested = []
 
     def pose(index: int) -> Pose:
-        asked.append(index)
+        requested.append(index)
         return at(math.nan if index == 3 else index)
 
-    heard = [(name, partial(pose, n)) for n, name in enumerate(["a", "b", "", "broken"])]
-    made = list(ingest.discoveries(heard, "map", "map", is_pinned=lambda tag_id: tag_id == "a"))
+    received = [(name, partial(pose, n)) for n, name in enumerate(["a", "b", "", "broken"])]
+    made = list(ingest.discoveries(received, "map", "map", is_pinned=lambda tag_id: tag_id == "a"))
     assert made[0] == Pin("b", at(1.0))
     assert [drop.reason for drop in made[1:] if isinstance(drop, Drop)] == [
         Reason.TAG_ID,
         Reason.POSE,
     ]
-    assert asked == [1, 3]
+    assert requested == [1, 3]
 
 
 def test_a_discovery_in_another_frame_is_dropped_once_whatever_it_holds() -> None:
-    heard = [("a", partial(at, 0.0)), ("", partial(at, 0.0))]
-    [drop] = ingest.discoveries(heard, "odom", "map", is_pinned=lambda _: False)
+    received = [("a", partial(at, 0.0)), ("", partial(at, 0.0))]
+    [drop] = ingest.discoveries(received, "odom", "map", is_pinned=lambda _: False)
     assert isinstance(drop, Drop)
     assert drop.on("/t") == "dropped a message on /t: its frame is 'odom', expected 'map'"
 
@@ -185,8 +185,8 @@ def test_a_message_from_the_future_keeps_the_age_of_its_first_receipt(own_s: int
     """When it is received again, latched, its content must not look fresh, even after its time."""
     store, repeats = TwinStore(), Repeats()
     for now_s in (100, 130, 200):
-        heard = heard_reading(own_stamp_ns=own_s * S)
-        write = ingest.observation(heard, "map", now_s * S)
+        received = received_reading(own_stamp_ns=own_s * S)
+        write = ingest.observation(received, "map", now_s * S)
         assert isinstance(write, Scan)
         ingest.apply(write, store, repeats)
     [tag] = store.snapshot(200 * S, "map").tags

@@ -51,7 +51,7 @@ def own(found: list[tuple[str, list[str]]]) -> dict[str, str]:
     }
 
 
-def told(those: Any) -> dict[str, str]:
+def reported(those: Any) -> dict[str, str]:
     """The same from the table."""
     return {
         f"/{it.name.lstrip('/')}".replace("<sensor>", sensor): it.type_name
@@ -69,11 +69,11 @@ def test_a_twin_has_the_topics_and_services_of_the_table_and_no_others(
     nodes: dict[str, Node],
 ) -> None:
     twin = nodes["lupin_twin"]
-    assert by(twin, "publisher") == told(interfaces.PUBLISHED)
+    assert by(twin, "publisher") == reported(interfaces.PUBLISHED)
     # Only with simulated time is there a clock subscription.
     expected = [it for it in interfaces.SUBSCRIBED if it is not interfaces.CLOCK]
-    assert by(twin, "subscriber") == told(expected)
-    assert by(twin, "service") == told(interfaces.SERVICES)
+    assert by(twin, "subscriber") == reported(expected)
+    assert by(twin, "service") == reported(interfaces.SERVICES)
 
 
 def test_qos_is_that_of_the_table(nodes: dict[str, Node]) -> None:
@@ -83,7 +83,7 @@ def test_qos_is_that_of_the_table(nodes: dict[str, Node]) -> None:
         (interfaces.SUBSCRIBED[:-1], twin.get_subscriptions_info_by_topic),
     ):
         for topic in those:
-            for name in told([topic]):
+            for name in reported([topic]):
                 [offered] = [i.qos_profile for i in look(name) if i.node_name == "lupin_twin"]
                 assert (offered.durability == DurabilityPolicy.TRANSIENT_LOCAL) == topic.is_latched
                 assert (offered.reliability == ReliabilityPolicy.RELIABLE) == topic.is_reliable

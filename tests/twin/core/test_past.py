@@ -21,14 +21,14 @@ from lupin_twin.core.past import (
     message_of,
 )
 
-ASKED: dict[str, Any] = {"tag_id": "tag_7", "sensor_type": "temperature"}
+REQUESTED: dict[str, Any] = {"tag_id": "tag_7", "sensor_type": "temperature"}
 
 
 def request(given: dict[str, Any]) -> SeriesRequest | WritesRequest:
     """A query of a series, or of one of the kinds of write."""
     if given.keys() & {"reach_s", "after", "max_count"}:
         return WritesRequest(**given)
-    return SeriesRequest(**(ASKED | given))
+    return SeriesRequest(**(REQUESTED | given))
 
 
 @pytest.mark.parametrize(
@@ -112,7 +112,7 @@ def test_the_reason_for_a_missing_answer_is_text_and_is_parsed_back(
 
 
 @pytest.mark.parametrize(
-    ("asked", "expected"),
+    ("requested", "expected"),
     [
         ((7, 107, 10), Grid(7, 107, 10)),
         ((7, 108, 10), Grid(7, 108, 11)),
@@ -131,11 +131,11 @@ def test_the_reason_for_a_missing_answer_is_text_and_is_parsed_back(
     ],
 )
 def test_buckets_cover_a_period_and_long_ones_begin_on_the_full_hour(
-    asked: tuple[int, int, int], expected: Grid
+    requested: tuple[int, int, int], expected: Grid
 ) -> None:
-    assert grid(*asked) == expected
+    assert grid(*requested) == expected
 
 
 def test_data_missing_here_may_exist_in_another_process() -> None:
-    told = pickle.loads(pickle.dumps(NotRemembered("gone", damage="a page")))
-    assert (str(told), told.damage) == ("gone", "a page")
+    reported = pickle.loads(pickle.dumps(NotRemembered("gone", damage="a page")))
+    assert (str(reported), reported.damage) == ("gone", "a page")

@@ -67,16 +67,16 @@ def plainest(writes: list[Write]) -> dict[str, TagState]:
     for tag_id in dict.fromkeys(write.tag_id for write in writes):
         own = [write for write in writes if write.tag_id == tag_id]
         names = dict.fromkeys(r.name for w in own if isinstance(w, Scan) for r in w.readings)
-        tried = sorted(own, key=lambda write: write.stamp_ns)
-        seen = [write for write in tried if brings(write)]
+        attempted = sorted(own, key=lambda write: write.stamp_ns)
+        seen = [write for write in attempted if brings(write)]
         values = {
             reading.name: Reading(reading.name, reading.value, write.stamp_ns)
-            for write in tried
+            for write in attempted
             if isinstance(write, Scan)
             for reading in write.readings
         }
-        looks = [w for w in tried if isinstance(w, Inspection) and w.flower is not None]
-        last_observed = seen[-1] if seen else tried[0]
+        looks = [w for w in attempted if isinstance(w, Inspection) and w.flower is not None]
+        last_observed = seen[-1] if seen else attempted[0]
         tags[tag_id] = TagState(
             tag_id,
             next((write.pose for write in own if write.pose is not None), None),
@@ -84,7 +84,7 @@ def plainest(writes: list[Write]) -> dict[str, TagState]:
             last_observed.stamp_ns,
             looks[-1].flower or Flower() if looks else Flower(),
             looks[-1].stamp_ns if looks else None,
-            Attempt(tried[-1].stamp_ns, tried[-1].status, tried[-1].status_detail),
+            Attempt(attempted[-1].stamp_ns, attempted[-1].status, attempted[-1].status_detail),
         )
     return tags
 

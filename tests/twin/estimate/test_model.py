@@ -60,10 +60,10 @@ def test_certainty_is_limited_by_the_variation_of_positions_and_readings() -> No
 def test_the_daily_course_bridges_an_outage_only_with_the_right_length_of_the_day() -> None:
     day = a_day(passes=24)
     true = 21.0 + 4.0 * np.sin(2.0 * np.pi * 1.25) + 0.4 * day.xy[:, 1]
-    told = fit(day).posterior(day, 1.25 * DAY_S).points(day.xy)
+    reported = fit(day).posterior(day, 1.25 * DAY_S).points(day.xy)
     wrong = fit(day, day_length_s=60 * DAY_S)
     off = wrong.posterior(day, 1.25 * DAY_S).points(day.xy)
-    assert np.abs(told[0] - true).mean() < 0.3
+    assert np.abs(reported[0] - true).mean() < 0.3
     assert np.abs(off[0] - true).mean() > 1.0
 
 

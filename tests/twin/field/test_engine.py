@@ -156,9 +156,9 @@ def test_a_cancelled_job_ends_between_two_parts(store: TwinStore) -> None:
     rules = {"falloff_radius_m": 200.0, "max_distance_m": 200.0}
     samples = store.samples_for_sensor("temperature")
     compute = partial(compute_field, request_of(resolution=0.01), samples, None, rules_of(**rules))
-    asked = itertools.count(1)
-    compute(lambda: next(asked) == 0)
-    assert next(asked) > 400 * 200 * 100 / idw.MAX_PAIRS
+    requested = itertools.count(1)
+    compute(lambda: next(requested) == 0)
+    assert next(requested) > 400 * 200 * 100 / idw.MAX_PAIRS
     answers = iter([False, False, True])
     with pytest.raises(Abandoned):
         compute(lambda: next(answers))

@@ -63,7 +63,7 @@ def test_a_text_that_is_no_map_is_refused(changed: dict[str, object]) -> None:
             map_of(other, revision=1)
 
 
-def kept_map(path: Path) -> list[tuple[object, ...]]:
+def stored_map(path: Path) -> list[tuple[object, ...]]:
     return select(path, "SELECT value FROM meta WHERE key = 'map'")
 
 
@@ -74,6 +74,6 @@ def test_the_journal_has_the_latest_map_and_none_where_that_is_too_large(tmp_pat
         try:
             journal.begin(CLOCK)
             journal.write_map(floor)
-            wait_for(lambda it=floor: kept_map(path) == [(text_of(it),)], "the map in the file")  # type: ignore[misc]
+            wait_for(lambda it=floor: stored_map(path) == [(text_of(it),)], "the map in the file")  # type: ignore[misc]
         finally:
             journal.close()

@@ -58,7 +58,7 @@ def engines(copied: Copied) -> Engines:
 def living(tmp_path_factory: pytest.TempPathFactory) -> Living:
     """A log that has gone through these steps, in its own file."""
     folder, numbers = tmp_path_factory.mktemp("lives"), count()
-    return lambda told: lived(folder / f"{next(numbers)}.sqlite", told)
+    return lambda reported: lived(folder / f"{next(numbers)}.sqlite", reported)
 
 
 def fail_on_a_full_disk(code: str, path: Path, most: int) -> None:

@@ -70,16 +70,18 @@ def test_damage_is_reported_by_row(path: Path, sql: str, said: str) -> None:
 
 def test_all_damage_is_found_and_progress_is_reported(path: Path) -> None:
     changed(path, "UPDATE scan SET readings = '[]' WHERE seq % 2")
-    told: list[tuple[str, float]] = []
+    reported: list[tuple[str, float]] = []
 
     def found() -> Iterator[str]:
         with closing(open_reader(path)) as connection:
-            yield from find_all_damage(connection, lambda what, share: told.append((what, share)))
+            yield from find_all_damage(
+                connection, lambda what, share: reported.append((what, share))
+            )
 
     assert len([wrong for wrong in found() if wrong.startswith("scan")]) == 150
     order = ["structure", "scan", "look", "place"]
-    assert list(dict.fromkeys(what for what, _ in told)) == order
-    assert {what: share for what, share in told if what != "structure"} == dict.fromkeys(
+    assert list(dict.fromkeys(what for what, _ in reported)) == order
+    assert {what: share for what, share in reported if what != "structure"} == dict.fromkeys(
         order[1:], 1.0
     )
 

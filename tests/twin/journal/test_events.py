@@ -23,7 +23,7 @@ def ask(
     return series(connection, SeriesRequest(tag_id, event, start, end, points), now)
 
 
-def told(answer: SeriesPast) -> list[tuple[int, float]]:
+def reported(answer: SeriesPast) -> list[tuple[int, float]]:
     assert not answer.is_bucketed
     return list(zip(answer.stamps_ns, answer.means, strict=True))
 
@@ -33,8 +33,8 @@ def test_of_deleted_inspections_the_presence_of_a_pest_is_known(tmp_path: Path) 
         life.write([look(at_ns=BEGUN, anomaly=True)])
         life.delete(BEGUN + HOUR)
         life.write([look(at_ns=BEGUN + 2 * HOUR, anomaly=True), look(at_ns=BEGUN + 3 * HOUR)])
-        assert told(ask(life.connection, Event.PESTS_SEEN)) == [(BEGUN, 1.0)]
-        assert told(ask(life.connection, Event.PESTS_CLEARED)) == [(BEGUN + 3 * HOUR, 0.0)]
+        assert reported(ask(life.connection, Event.PESTS_SEEN)) == [(BEGUN, 1.0)]
+        assert reported(ask(life.connection, Event.PESTS_CLEARED)) == [(BEGUN + 3 * HOUR, 0.0)]
 
 
 def test_runs_are_intervals_of_the_period(tmp_path: Path) -> None:
@@ -43,7 +43,7 @@ def test_runs_are_intervals_of_the_period(tmp_path: Path) -> None:
         log = life.connection
 
         def runs(start: int, end: int) -> list[tuple[int, float]]:
-            return told(ask(log, Event.RUNS, start=start, end=end))
+            return reported(ask(log, Event.RUNS, start=start, end=end))
 
         assert runs(BEGUN, BEGUN + 200 * MINUTE) == [
             (BEGUN, 30 * 60.0),
@@ -63,19 +63,19 @@ def test_a_silence_is_longer_than_ten_minutes_and_than_three_usual_intervals(
         life.write(scan(at_ns=BEGUN + second * SECOND) for second in stamps)
         last = BEGUN + stamps[-1] * SECOND
         expected = [(BEGUN + 1203 * SECOND, 601.0)]
-        assert told(ask(log, Event.SILENCES, now=last + SILENCE_NS)) == expected
+        assert reported(ask(log, Event.SILENCES, now=last + SILENCE_NS)) == expected
         # One that continues lasts until now.
-        assert told(ask(log, Event.SILENCES, now=last + 700 * SECOND))[-1] == (last, 700.0)
+        assert reported(ask(log, Event.SILENCES, now=last + 700 * SECOND))[-1] == (last, 700.0)
         cut = ask(log, Event.SILENCES, end=last + 9 * SECOND, now=last + 9000 * SECOND)
-        assert told(cut)[-1] == (last, 9.0)
+        assert reported(cut)[-1] == (last, 9.0)
     with lived(tmp_path / "hourly.sqlite") as life:
         log = life.connection
         life.write([scan(at_ns=BEGUN + hour * HOUR) for hour in (0, 1, 2, 5, 9)])
-        assert told(ask(log, Event.SILENCES, now=BEGUN + 9 * HOUR)) == []
+        assert reported(ask(log, Event.SILENCES, now=BEGUN + 9 * HOUR)) == []
         seconds = [hour * 3600 for hour in range(5)]
         seconds += [7 * 3600, 10 * 3600 + 1, 11 * 3600 + 1]
         life.write([scan("9", at_ns=BEGUN + second * SECOND) for second in seconds])
-        silences = told(ask(log, Event.SILENCES, "9", now=BEGUN + seconds[-1] * SECOND))
+        silences = reported(ask(log, Event.SILENCES, "9", now=BEGUN + seconds[-1] * SECOND))
         assert silences == [(BEGUN + 7 * HOUR, 3 * 3600 + 1.0)]
 
 
@@ -85,4 +85,4 @@ def test_silences_in_deleted_years_are_still_reported(tmp_path: Path) -> None:
         life.write(scan(at_ns=stamp_ns) for stamp_ns in stamps)
         life.delete(BEGUN + 110 * MINUTE)
         answer = ask(life.connection, Event.SILENCES, start=BEGUN, now=BEGUN + 121 * MINUTE)
-    assert told(answer) == [(BEGUN + 29 * MINUTE, 61 * 60.0)]
+    assert reported(answer) == [(BEGUN + 29 * MINUTE, 61 * 60.0)]

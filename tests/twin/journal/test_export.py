@@ -38,18 +38,18 @@ def test_a_deletion_of_rows_still_to_come_ends_the_export(
         whole, late, early = (Export(0, END, None, None) for _ in range(3))
 
         def taken(export: Export, at_least: int) -> int:
-            told = 0
-            while told < at_least:
-                told += len(export.step(life.connection) or [])
-            return told
+            reported = 0
+            while reported < at_least:
+                reported += len(export.step(life.connection) or [])
+            return reported
 
         taken(late, 1)
-        told = taken(whole, 2_000)
+        reported = taken(whole, 2_000)
         life.delete(BEGUN + 1_000 * SECOND)
         # An export past these rows gets the rest.
         while (found := whole.step(life.connection)) is not None:
-            told += len(found)
-        assert told == total - 100
+            reported += len(found)
+        assert reported == total - 100
         with pytest.raises(NotRemembered, match="deleted while"):
             taken(late, total)
         # And one that has not started begins later.

@@ -105,8 +105,8 @@ def test_what_was_forgotten_is_recorded_with_person_and_time(path: Path, journal
     assert "has no place of tag 'lost'" in again.stderr
     assert journal("forget", LOST).returncode == 0
     assert "has no tag 'lost'" in journal("forget", LOST).stderr
-    told = journal("info").stdout
+    reported = journal("info").stdout
     by = getpass.getuser()
-    assert f"forgotten    the pose of tag 'lost', by {by}, 20" in told
-    assert f"forgotten    all of tag 'lost', by {by}, 20" in told
-    assert told.count("forgotten") == 2
+    assert f"forgotten    the pose of tag 'lost', by {by}, 20" in reported
+    assert f"forgotten    all of tag 'lost', by {by}, 20" in reported
+    assert reported.count("forgotten") == 2

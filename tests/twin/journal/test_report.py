@@ -93,8 +93,8 @@ def test_later_rows_are_not_in_it(living: Living) -> None:
 
     @given(chance, st.integers(1, LATEST))
     @settings(deadline=None, max_examples=40)
-    def hold(told: tuple[list[tuple[str, Any]], int], minutes: int) -> None:
-        lives, end_ns = told
+    def hold(reported: tuple[list[tuple[str, Any]], int], minutes: int) -> None:
+        lives, end_ns = reported
         lives = [step for step in lives if step[0] != "back"]
         start_ns = max(1, end_ns - minutes * MINUTE)
         before = [
@@ -111,7 +111,7 @@ def test_later_rows_are_not_in_it(living: Living) -> None:
 
 def check(found: dict[str, Any], life: Life, start_ns: int, end_ns: int) -> None:
     known = [(n, row) for n, row in life._holds() if row.stamp_ns < end_ns]
-    told = sorted(
+    reported = sorted(
         (
             write(number, life.rows[number][0], row)
             for number, row in known
@@ -119,7 +119,7 @@ def check(found: dict[str, Any], life: Life, start_ns: int, end_ns: int) -> None
         ),
         key=lambda it: (it.stamp_ns, it.number),
     )
-    within = [it for it in told if it.stamp_ns >= start_ns]
+    within = [it for it in reported if it.stamp_ns >= start_ns]
     scans = [it for it in within if it.kind == 0 and it.status == 0]
     counts = found["counts"]
     assert counts["scans"] == len(scans)
@@ -128,7 +128,7 @@ def check(found: dict[str, Any], life: Life, start_ns: int, end_ns: int) -> None
     assert not {it.tag_id for it in scans} & set(found["never_scanned"])
     assert counts["tags"] == counts["tags_scanned"] + len(found["never_scanned"])
     check_sensors(found["sensors"], [it for it in within if it.kind == 0])
-    check_silences(found["silences"], told, start_ns, end_ns)
+    check_silences(found["silences"], reported, start_ns, end_ns)
     axis = [
         RunSpan(it.run.id, it.start_ns, min(it.end_ns, end_ns))
         for it in spans(runs(life.connection.execute))
@@ -140,7 +140,7 @@ def check(found: dict[str, Any], life: Life, start_ns: int, end_ns: int) -> None
 
     right = {
         it
-        for it in alarms(told, axis, end_ns - 1, CRITERIA.sensors, day_of)
+        for it in alarms(reported, axis, end_ns - 1, CRITERIA.sensors, day_of)
         if it.cleared_ns is None or it.cleared_ns >= start_ns
     }
     assert {plain(it) for it in found["alarms"]} == {without_nan(it) for it in right}
@@ -177,7 +177,7 @@ def check_sensors(found: list[dict[str, Any]], scans: list[PastWrite]) -> None:
 
 
 def check_silences(
-    found: list[dict[str, Any]], told: list[PastWrite], start_ns: int, end_ns: int
+    found: list[dict[str, Any]], reported: list[PastWrite], start_ns: int, end_ns: int
 ) -> None:
     def gaps(stamps: list[int], pauses: list[tuple[int, int]]) -> list[tuple[int, int]]:
         usual = median(b - a for a, b in pairwise(stamps)) if len(stamps) > 1 else 0
@@ -188,15 +188,15 @@ def check_silences(
             if b - a - sum(max(0, min(b, d) - max(a, c)) for c, d in pauses) > longest
         ]
 
-    whole = gaps([it.stamp_ns for it in told], [])
+    whole = gaps([it.stamp_ns for it in reported], [])
     right = {("", max(a, start_ns), b) for a, b in whole if b > start_ns}
-    for tag_id in {it.tag_id for it in told}:
-        mine = [it.stamp_ns for it in told if it.tag_id == tag_id and it.kind == 0]
+    for tag_id in {it.tag_id for it in reported}:
+        mine = [it.stamp_ns for it in reported if it.tag_id == tag_id and it.kind == 0]
         right |= {
             (tag_id, max(a, start_ns), b) for a, b in (gaps(mine, whole) if mine else [])
             if b > start_ns
         }  # fmt: skip
-    if not told:
+    if not reported:
         right = set()
     assert {(it["tag_id"], ns(it["from"]), ns(it["to"])) for it in found} == right
 

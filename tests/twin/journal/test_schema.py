@@ -73,11 +73,11 @@ def test_a_file_being_created_is_empty_or_complete_but_never_foreign(
     steps = iter(range(after))
 
     class Reader(sqlite3.Connection):
-        def execute(self, *asked: Any) -> sqlite3.Cursor:
+        def execute(self, *requested: Any) -> sqlite3.Cursor:
             if next(steps, None) is None and maker.in_transaction:
                 with suppress(sqlite3.OperationalError):  # it waits for the reader
                     maker.execute("COMMIT")
-            return super().execute(*asked)
+            return super().execute(*requested)
 
     connect = sqlite3.connect
     monkeypatch.setattr(sqlite3, "connect", partial(connect, factory=Reader))

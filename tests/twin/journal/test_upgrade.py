@@ -38,9 +38,9 @@ def started(path: Path) -> Iterator[Journal]:
 def check_states(path: Path, name: str) -> None:
     """The upgraded file gives the same state at every moment as the old one."""
     with closing(open_reader(path)) as connection:
-        for question, right in answers(name):
-            if question[0] == "state":
-                assert same(answer(connection, question), right), question
+        for query, right in answers(name):
+            if query[0] == "state":
+                assert same(answer(connection, query), right), query
 
 
 def names_in(folder: Path) -> set[str]:
@@ -100,16 +100,16 @@ def test_the_answers_are_those_of_the_old_file(name: str, tmp_path: Path) -> Non
     assert not is_version3(path)
     with closing(open_reader(path)) as connection:
         assert list(find_all_damage(connection, lambda what, share: None)) == []
-        for question, right in answers(name):
-            found = answer(connection, question)
-            assert same(found, right) or is_another(name, question), question
+        for query, right in answers(name):
+            found = answer(connection, query)
+            assert same(found, right) or is_another(name, query), query
 
 
-def is_another(name: str, question: list[Any]) -> bool:
+def is_another(name: str, query: list[Any]) -> bool:
     """Whether a different answer is right, where the old build's was not."""
-    if question[0] != "series":
+    if query[0] != "series":
         return False
-    _, tag_id, sensor, *_ = question
+    _, tag_id, sensor, *_ = query
     if name == "purged":
         # For deleted attempts the old build had counts by five minutes, now there are hours; a
         # pause is then longer than the usual interval of hours, not of five minutes.

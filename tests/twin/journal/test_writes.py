@@ -13,7 +13,7 @@ from tests.twin.journal.conftest import Copied
 DAY = 86_400 * SECOND
 
 
-def asked(connection: Any, **query: Any) -> PastWrites:
+def requested(connection: Any, **query: Any) -> PastWrites:
     return writes(connection, WritesRequest(**query))
 
 
@@ -22,11 +22,11 @@ def test_writes_come_in_the_order_of_receipt_and_once_each(tmp_path: Path, copie
         life.write([scan("7", BEGUN + 5), pin("7"), look("7", BEGUN + 4, anomaly=True)])
         life.write([failure("8", BEGUN + 3)])
         life.write(scan("9", BEGUN + n, co2=400.0 + n, light=1.0) for n in range(7))
-        whole = asked(life.connection)
+        whole = requested(life.connection)
         assert whole.is_all
         assert len(whole.journal) == 32
-        told = [(w.tag_id, w.stamp_ns - BEGUN, w.kind, w.status) for w in whole.writes]
-        assert told[:3] == [("7", 5, 0, 0), ("7", 4, 1, 0), ("8", 3, 0, 2)]
+        reported = [(w.tag_id, w.stamp_ns - BEGUN, w.kind, w.status) for w in whole.writes]
+        assert reported[:3] == [("7", 5, 0, 0), ("7", 4, 1, 0), ("8", 3, 0, 2)]
         seen = whole.writes[1]
         assert (seen.species, seen.anomaly, seen.bug_count, seen.has_seen) == (
             ("lupin", True, 1, True)
@@ -34,19 +34,19 @@ def test_writes_come_in_the_order_of_receipt_and_once_each(tmp_path: Path, copie
         assert whole.writes[3].sensors == ("co2", "light")
         assert whole.writes[3].values == (400.0, 1.0)
         assert [(span.start_ns, span.end_ns) for span in whole.spans] == [(0, 2**63 - 1)]
-        assert asked(copied(life.connection)) == whole
+        assert requested(copied(life.connection)) == whole
 
         found: list[PastWrite] = []
-        part = asked(life.connection, max_count=3)
+        part = requested(life.connection, max_count=3)
         while True:
             found += part.writes
             if part.is_all:
                 break
-            part = asked(life.connection, after=part.last, max_count=3)
+            part = requested(life.connection, after=part.last, max_count=3)
         assert tuple(found) == whole.writes
-        assert asked(life.connection, after=whole.last).writes == ()
+        assert requested(life.connection, after=whole.last).writes == ()
         life.write([scan("7", BEGUN - 60 * SECOND)])
-        late = asked(life.connection, after=whole.last)
+        late = requested(life.connection, after=whole.last)
         assert [write.stamp_ns for write in late.writes] == [BEGUN - 60 * SECOND]
         assert late.journal == whole.journal
 
@@ -56,7 +56,7 @@ def test_copies_of_known_rows_are_no_writes(tmp_path: Path) -> None:
         life.write([scan(), look()])
         life.begin(BEGUN - SECOND)
         life.write([scan("8", BEGUN)])
-        assert [(w.run, w.tag_id) for w in asked(life.connection).writes] == (
+        assert [(w.run, w.tag_id) for w in requested(life.connection).writes] == (
             [(1, "7"), (1, "7"), (2, "8")]
         )
 
@@ -65,7 +65,7 @@ def test_reading_from_the_beginning_is_limited(tmp_path: Path) -> None:
     now = time.time_ns()
 
     def count(life: Life, **query: Any) -> int:
-        return len(asked(life.connection, **query).writes)
+        return len(requested(life.connection, **query).writes)
 
     with lived(tmp_path / "j.sqlite") as life:
         life.write(scan("7", now - n * DAY) for n in range(9, -1, -1))
@@ -74,7 +74,7 @@ def test_reading_from_the_beginning_is_limited(tmp_path: Path) -> None:
         assert count(life, reach_s=2.5 * 86_400, reach_count=2) == 2
         assert count(life, reach_s=1e9) == 10
     with lived(tmp_path / "empty.sqlite") as life:
-        empty = asked(life.connection)
+        empty = requested(life.connection)
         assert (empty.writes, empty.is_all) == ((), True)
 
 
@@ -102,7 +102,7 @@ def test_the_recent_window_has_the_last_nine_scans_and_inspections_of_each_tag(
             ("8", 1): [9, 10, 11, 12, 13, 14, 15, 16, 17],
         }
         assert recent(copied(life.connection), then) == found
-        assert recent_of(asked(life.connection).writes, then.at_ns) == found
+        assert recent_of(requested(life.connection).writes, then.at_ns) == found
         assert recent(life.connection, RecentRequest(BEGUN - 9 * DAY)) == ()
 
 
@@ -112,6 +112,6 @@ def test_an_uncertain_species_is_left_out(tmp_path: Path) -> None:
             one = look("7", BEGUN + number)
             flower = replace(one.flower or NO_FLOWER, confidence=confidence)
             life.write([replace(one, flower=flower)])
-        assert [write.species for write in asked(life.connection).writes] == (
+        assert [write.species for write in requested(life.connection).writes] == (
             ["", "", "lupin", "lupin"]
         )

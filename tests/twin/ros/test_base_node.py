@@ -150,7 +150,7 @@ def test_waiting_messages_are_taken_one_right_after_the_other(
     utilities: NodeUtilities, domain: int
 ) -> None:
     """In one round of the executor, whatever else is due; and before any slow work."""
-    heard: list[float] = []
+    received: list[float] = []
     large = MessageShape(Observation, max_bytes=10_000)
     group = utilities.node.default_callback_group
     utilities.subscribe(
@@ -159,7 +159,7 @@ def test_waiting_messages_are_taken_one_right_after_the_other(
         large,
         depth=50,
         group=group,
-        callback=lambda message: heard.append(message.tag_reading.readings[0].value),
+        callback=lambda message: received.append(message.tag_reading.readings[0].value),
     )
     executor = SingleThreadedExecutor(context=utilities.node.context)
     executor.add_node(utilities.node)
@@ -174,13 +174,13 @@ def test_waiting_messages_are_taken_one_right_after_the_other(
             assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE_S))
 
         publish(range(1))
-        wait_for(lambda: heard, "the first", meanwhile=executor.spin_once)
+        wait_for(lambda: received, "the first", meanwhile=executor.spin_once)
         publish(range(1, 40))
         executor.spin_once(PATIENCE_S)
-        assert heard == list(map(float, range(40)))
+        assert received == list(map(float, range(40)))
         publish(range(40, 90))
         utilities.drain()
-        assert heard == list(map(float, range(90)))
+        assert received == list(map(float, range(90)))
         assert utilities.counts().dropped.get(LOST, 0) == 0
     executor.shutdown()
 

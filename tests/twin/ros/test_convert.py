@@ -59,8 +59,8 @@ def test_a_state_survives_the_wire_and_back() -> None:
 
 def test_without_times_only_the_last_observation_is_known() -> None:
     snapshot = Snapshot(stamp_ns=9 * S, frame_id="map", tags=(PINNED, UNPINNED))
-    heard = convert.snapshot_of(over_the_wire(convert.StateMessages().build(snapshot)))
-    [pinned, unpinned] = heard.tags
+    back = convert.snapshot_of(over_the_wire(convert.StateMessages().build(snapshot)))
+    [pinned, unpinned] = back.tags
     assert pinned.readings == tuple(replace(r, observed_at_ns=None) for r in PINNED.readings)
     assert (pinned.last_observed_ns, pinned.looked_at_ns, pinned.last_try) == (
         PINNED.last_observed_ns,
@@ -104,9 +104,9 @@ def test_a_tag_reading_is_received_field_by_field() -> None:
         "1", {"co2": 1.0}, at=(1.0, 2.0), status=ObservationMsg.STATUS_SKIPPED, stamp_s=4.0
     )
     msg.tag_reading.stamp.sec = 3
-    heard = convert.received(msg)
-    assert (heard.kind, heard.frame_id) == (0, "map")
-    assert heard.sent == Scan(
+    found = convert.received(msg)
+    assert (found.kind, found.frame_id) == (0, "map")
+    assert found.sent == Scan(
         "1", 3 * S, (Reading("co2", 1.0),), Pose.at(1.0, 2.0), 3, "", "test", 4 * S
     )
 

@@ -32,9 +32,9 @@ def test_a_report_comes_back_as_it_was(report: Report) -> None:
 
 
 def test_a_report_query_comes_back_as_it_was() -> None:
-    asked = ReportRequest("co2", 7)
-    message = convert_services.report_request_message(asked)
-    assert convert_services.report_request_of(message) == asked
+    requested = ReportRequest("co2", 7)
+    message = convert_services.report_request_message(requested)
+    assert convert_services.report_request_of(message) == requested
     message.max_places = 0
     assert convert_services.report_request_of(message) == ReportRequest("co2", DEFAULT_PLACES)
     message.max_places = 21

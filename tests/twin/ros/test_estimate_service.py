@@ -86,28 +86,30 @@ def test_a_flood_of_expensive_requests_delays_no_observation_and_no_field(
     ]
     for client in clients:
         peer.until(client.service_is_ready, "the service")
-    asked: list[Any] = []
+    requested: list[Any] = []
 
-    def ask_both() -> None:
-        place = {**dearest, "bbox_max_x": 2.0 + len(asked) / 1000.0}
-        asked.append(clients[0].call_async(GetEstimate.Request(**place)))
-        asked.append(clients[1].call_async(GetEstimateReport.Request(sensor_type="temperature")))
+    def query_both() -> None:
+        place = {**dearest, "bbox_max_x": 2.0 + len(requested) / 1000.0}
+        requested.append(clients[0].call_async(GetEstimate.Request(**place)))
+        requested.append(
+            clients[1].call_async(GetEstimateReport.Request(sensor_type="temperature"))
+        )
 
     for _ in range(MAX_QUERIES + 8):
-        ask_both()
+        query_both()
         peer.spin_briefly()
     peer.observe(messages.scan("in the flood", {"co2": 400.0}, at=(1.0, 1.0)))
     peer.tag("in the flood")
     assert peer.get_field(**{**BOX, "sensor_type": "co2"}).sample_count == 1
 
     def answers(ok: bool) -> list[Any]:
-        return [one.result() for one in asked if one.done() and one.result().ok is ok]
+        return [one.result() for one in requested if one.done() and one.result().ok is ok]
 
     def are_there() -> bool:
         # A service queues ten requests: DDS loses some of such a flood, and all but twenty for a
         # twin that stands still meanwhile, which are too few to be refused.
         if not answers(False):
-            ask_both()
+            query_both()
         return bool(answers(True) and answers(False))
 
     peer.until(are_there, "an answer and a refusal")

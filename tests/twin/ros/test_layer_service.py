@@ -63,7 +63,7 @@ class Viewer(Peer):
             lambda: came[-1] if came and accept(came[-1]) else None, f"a message on {topic}"
         )
 
-    def hear_diagnostics(self) -> None:
+    def receive_diagnostics(self) -> None:
         def receive(msg: Any) -> None:
             for status in msg.status:
                 if status.name == "/gh1/lupin_twin: layers":
@@ -114,7 +114,7 @@ def test_a_layer_is_the_field_and_is_computed_only_for_subscribers(
     house: tuple[int, Process, Viewer],
 ) -> None:
     domain, _, robot = house
-    robot.hear_diagnostics()
+    robot.receive_diagnostics()
     for x in (0, 4):
         observe(robot, scan(f"t{x}", {"co2": 400.0 + x, "soil moisture": 30.0}, (x, 0)))
     box = box_of((0.0, 0.0), (4.0, 0.0))
@@ -249,7 +249,7 @@ def test_rviz_shows_what_the_twin_publishes(house: tuple[int, Process, Viewer]) 
         )
     known = json.loads(SENSORS.read_text(encoding="utf-8"))["sensors"]
     layers = {name: each for name, each in shown.items() if "PointCloud2" in each["Class"]}
-    assert list(layers) == [name for name, told in known.items() if "derived" not in told]
+    assert list(layers) == [name for name, reported in known.items() if "derived" not in reported]
     # A displayed layer costs the twin something.
     assert [name for name, each in layers.items() if each["Enabled"]] == ["temperature"]
     assert {each["Channel Name"] for each in layers.values()} == {"value"}

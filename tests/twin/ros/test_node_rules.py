@@ -53,14 +53,14 @@ def stage(domain: int) -> Iterator[Stage]:
 
 def test_a_changed_rule_takes_effect_at_once(stage: Stage) -> None:
     node = stage.node
-    told: list[Any] = []
-    node.listen(told.append, heartbeat_s=60.0)
+    reported: list[Any] = []
+    node.listen(reported.append, heartbeat_s=60.0)
     before, revision = node.rules, node.revision
     [result] = node.set_parameters([Parameter("idw_power", value=3.5)])
     assert (result.successful, result.reason) == (True, "")
     assert node.rules == replace(before, idw_power=3.5)
     assert node.revision != revision
-    assert len(told) == 2
+    assert len(reported) == 2
 
 
 # --- the map ------------------------------------------------------------------------------------
@@ -68,8 +68,8 @@ def test_a_changed_rule_takes_effect_at_once(stage: Stage) -> None:
 
 def test_the_maps_revision_grows_with_each_accepted_new_map(stage: Stage) -> None:
     node = stage.node
-    told: list[Any] = []
-    node.listen(told.append, heartbeat_s=1000.0)
+    reported: list[Any] = []
+    node.listen(reported.append, heartbeat_s=1000.0)
     revisions = []
     broken, again = occupancy_grid([[0, 0]]), occupancy_grid([[0, -1]])
     broken.info.width = 7
@@ -86,7 +86,7 @@ def test_the_maps_revision_grows_with_each_accepted_new_map(stage: Stage) -> Non
     assert revisions == [1, 1, 1, 1, 2]
     assert node.occupancy_map is not None
     assert node.occupancy_map.revision == 2
-    assert len(told) == 3, "at first, and for each new map"
+    assert len(reported) == 3, "at first, and for each new map"
 
 
 # --- names --------------------------------------------------------------------------------------

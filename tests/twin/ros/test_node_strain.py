@@ -102,7 +102,7 @@ def test_a_heavy_field_delays_no_observation_no_state_and_not_the_shutdown(wide:
     start_s = time.monotonic()
     sent = 0
 
-    def send_and_look() -> bool:
+    def send_and_check() -> bool:
         # Two hundred within a second or so, and for as long as it computes.
         nonlocal sent
         if sent < 200:
@@ -110,7 +110,7 @@ def test_a_heavy_field_delays_no_observation_no_state_and_not_the_shutdown(wide:
             sent += 1
         return sent == 200 and all(future.done() for future in heavy)
 
-    pause_s = wide.longest_pause_s(send_and_look, "the heavy fields")
+    pause_s = wide.longest_pause_s(send_and_check, "the heavy fields")
     took_s = time.monotonic() - start_s
     peer.tag("counted", lambda tag: readings(tag) == {f"s{n}": 150.0 + n for n in range(50)})
     assert "lost" not in wide.process.output
@@ -160,26 +160,28 @@ def test_all_requests_made_while_the_twin_stands_still_are_answered(strained: St
         strained.peer.until(client.service_is_ready, client.service_name)
     strained.process.freeze()
     # An empty request is refused, and that is an answer.
-    asked = [client.call_async(client.srv_type.Request()) for client in clients * SERVICE_QOS.depth]
+    requested = [
+        client.call_async(client.srv_type.Request()) for client in clients * SERVICE_QOS.depth
+    ]
     strained.process.thaw()
-    strained.peer.until(lambda: all(future.done() for future in asked), "all answers")
+    strained.peer.until(lambda: all(future.done() for future in requested), "all answers")
 
 
 def test_the_twin_reports_its_health_on_diagnostics(strained: Strained) -> None:
     peer = strained.peer
-    heard: list[Any] = []
-    peer.node.create_subscription(DiagnosticArray, "/diagnostics", heard.append, 10)
+    received: list[Any] = []
+    peer.node.create_subscription(DiagnosticArray, "/diagnostics", received.append, 10)
 
     def levels() -> dict[str, bytes]:
-        return {status.name: status.level for status in heard[-1].status} if heard else {}
+        return {status.name: status.level for status in received[-1].status} if received else {}
 
     inputs, drops = "/lupin_twin: inputs", "/lupin_twin: drops"
     peer.until(lambda: levels().get(inputs) == DiagnosticStatus.STALE, "no observation yet")
     assert levels()["/lupin_twin: clock"] == DiagnosticStatus.OK
     peer.observe(scan("1", frame_id="odom"))
     peer.until(lambda: levels()[drops] == DiagnosticStatus.WARN, "the drop")
-    [told] = [status for status in heard[-1].status if status.name == drops]
-    assert {pair.key: pair.value for pair in told.values}["frame"] == "1"
+    [reported] = [status for status in received[-1].status if status.name == drops]
+    assert {pair.key: pair.value for pair in reported.values}["frame"] == "1"
     for topic, message in (("/perception/discovered_tags", discovered({})), ("/map", None)):
         peer.publish(topic, message or occupancy_grid([[0]]))
     peer.observe(scan("1", {"co2": 1.0}))

@@ -47,10 +47,10 @@ def test_descriptors_have_meaning_range_and_why_a_parameter_is_read_only(domain:
 
 
 def test_a_change_is_reported_once_with_all_parameters(domain: int) -> None:
-    told: list[TwinParameters] = []
+    reported: list[TwinParameters] = []
     with node_with(domain, made=AdjustableNode) as node:
         node.parameters = declare(node)
-        node.adjust = told.append
+        node.adjust = reported.append
         wanted = [Parameter("idw_power", value=3), Parameter("idw_max_distance_m", value=2.5)]
         assert node.set_parameters_atomically(wanted).successful
         assert node.set_parameters_atomically(wanted).successful, "and nothing is new"
@@ -58,7 +58,7 @@ def test_a_change_is_reported_once_with_all_parameters(domain: int) -> None:
         # ROS's own, and those of any other node.
         [result] = node.set_parameters([Parameter("use_sim_time", value=False)])
         assert result.successful
-    assert told == [TwinParameters(idw_power=3.0, idw_max_distance_m=2.5)]
+    assert reported == [TwinParameters(idw_power=3.0, idw_max_distance_m=2.5)]
 
 
 @pytest.mark.parametrize(

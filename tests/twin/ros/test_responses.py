@@ -34,7 +34,7 @@ class Stage:
         self.now_s = 100.0
         self.found: set[Any] = set()
         self.takes_s = 0.125
-        self.tried: list[Any] = []
+        self.attempted: list[Any] = []
         self.sent: list[tuple[Any, Any]] = []
         self.warned: list[str] = []
         self.drained = 0
@@ -49,7 +49,7 @@ class Stage:
         self.drained += 1
 
     def send_response(self, response: Any, header: Any) -> None:
-        self.tried.append(header)
+        self.attempted.append(header)
         self.now_s += 0.0 if header in self.found else self.takes_s
         if header in self.found:
             self.sent.append((response, header))
@@ -58,10 +58,10 @@ class Stage:
 
     def go_on(self) -> list[Any]:
         """Continue; returns the clients that were attempted."""
-        del self.tried[:]
+        del self.attempted[:]
         self.now_s += RETRY_S
         self.responses.go_on()
-        return self.tried
+        return self.attempted
 
 
 @pytest.fixture

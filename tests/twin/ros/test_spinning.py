@@ -60,37 +60,37 @@ def test_the_shutdown_breaks_no_spin_that_is_about_to_wait(
     spinning: Spinning, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """rclpy's own shutdown, called from here at that moment, breaks the spin."""
-    about_to_wait, asked = threading.Event(), threading.Event()
+    about_to_wait, requested = threading.Event(), threading.Event()
     get_nodes = spinning.executor.get_nodes
 
     def pause() -> Any:
-        if threading.current_thread() is spinning.thread and not asked.is_set():
+        if threading.current_thread() is spinning.thread and not requested.is_set():
             about_to_wait.set()
-            asked.wait(20)
+            requested.wait(20)
         return get_nodes()
 
     monkeypatch.setattr(spinning.executor, "get_nodes", pause)
     spinning.thread.start()
     assert about_to_wait.wait(20)
     end_spinning(spinning.executor)
-    asked.set()
+    requested.set()
     wait_for(spinning.has_ended, "the end of the spinning")
     assert spinning.errors == []
 
 
 def test_a_callback_ends_before_the_spinning_does(spinning: Spinning) -> None:
-    runs, asked, ended = threading.Event(), threading.Event(), threading.Event()
+    runs, requested, ended = threading.Event(), threading.Event(), threading.Event()
 
     def work() -> None:
         runs.set()
-        asked.wait(20)
+        requested.wait(20)
         ended.set()
 
     spinning.node.create_timer(0.01, work)
     spinning.thread.start()
     assert runs.wait(20)
     end_spinning(spinning.executor)
-    asked.set()
+    requested.set()
     wait_for(spinning.has_ended, "the end of the spinning")
     assert ended.is_set()
     assert spinning.errors == []

@@ -125,21 +125,21 @@ def test_large_queries_run_one_at_a_time_and_small_ones_do_not_wait(
 @pytest.mark.parametrize("cost_s", [SMALL_S, LARGE_S])
 def test_queries_wait_for_observations_except_one_a_second(made: Stage, cost_s: float) -> None:
     made.is_behind = True
-    asked = [made.ask(cost_s=cost_s) for _ in range(4)]
-    assert made.begun == asked[:1]
-    asked[0].set_result(0)
+    requested = [made.ask(cost_s=cost_s) for _ in range(4)]
+    assert made.begun == requested[:1]
+    requested[0].set_result(0)
     assert made.delivered() == "0"
     made.now_s += PACE_S - 0.01
     made.queue.go_on()
-    assert made.begun == asked[:1], "one answer is no leave for the next"
+    assert made.begun == requested[:1], "one answer is no leave for the next"
     made.now_s += 0.02
     made.queue.go_on()
-    assert made.begun == asked[:2]
+    assert made.begun == requested[:2]
     assert made.queue.waiting == 3
     made.is_behind = False
-    asked[1].set_result(1)
+    requested[1].set_result(1)
     assert made.delivered() == "1"
-    assert made.begun[:3] == asked[:3], "at once"
+    assert made.begun[:3] == requested[:3], "at once"
 
 
 @pytest.mark.parametrize("cost_s", [SMALL_S, LARGE_S])

@@ -82,8 +82,8 @@ def test_a_query_sees_one_moment(path: Path) -> None:
 
 def test_the_journal_of_another_twin_is_not_read(path: Path) -> None:
     kept(path, [scan()])
-    told = Condition(JournalState.IN_USE, "the journal j is in use by /other", str(path))
-    recall = Recall(lambda: told)
+    reported = Condition(JournalState.IN_USE, "the journal j is in use by /other", str(path))
+    recall = Recall(lambda: reported)
     assert "in use by /other: ask that twin" in why_not(recall)
     recall.close()
 
@@ -134,11 +134,11 @@ def test_a_cancelled_query_ends(path: Path) -> None:
     with recalling(path) as recall:
         begun = threading.Event()
 
-        def asks(connection: sqlite3.Connection, _: ShouldStop) -> None:
+        def requests(connection: sqlite3.Connection, _: ShouldStop) -> None:
             begun.set()
             connection.execute(ENDLESS).fetchone()
 
-        future = recall.query(asks)
+        future = recall.query(requests)
         assert begun.wait(PATIENCE_S)
         future.cancel()
         with pytest.raises(CancelledError):

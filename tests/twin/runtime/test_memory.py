@@ -119,7 +119,7 @@ def test_damage_found_by_a_reader_quarantines_the_file_while_the_twin_records(
 
 
 def test_the_restored_state_is_logged_in_one_line(tmp_path: Path) -> None:
-    def told(path: Path, *clocks: Clock, writes: Sequence[Write] = ()) -> list[str | None]:
+    def reported(path: Path, *clocks: Clock, writes: Sequence[Write] = ()) -> list[str | None]:
         memory = Memory(TwinStore(), open_journal(path, "/twin", 1e4, 1e4))
         said = [memory.follow(clock) for clock in clocks]
         for write in writes:
@@ -129,17 +129,17 @@ def test_the_restored_state_is_logged_in_one_line(tmp_path: Path) -> None:
 
     path = tmp_path / "j.sqlite"
     nothing = f"journal {path}: nothing to restore"
-    assert told(path, wall(5), wall(6), writes=WRITES) == [nothing, None]
-    [line] = told(path, wall(9))
+    assert reported(path, wall(5), wall(6), writes=WRITES) == [nothing, None]
+    [line] = reported(path, wall(9))
     oldest = f"{datetime.fromtimestamp(PART.stamp_ns / S, UTC):%Y-%m-%dT%H:%M:%SZ}"
     assert line == (
         f"journal {path}: restored 3 tags with 3 positions, 3 readings, 1 inspections;"
         f" the oldest observation is from {oldest}"
     )
     path = tmp_path / "simulated.sqlite"
-    told(path, sim(5, 5), writes=[at(SCAN, 4 * S)])
+    reported(path, sim(5, 5), writes=[at(SCAN, 4 * S)])
     waiting = Clock(0, NOW, is_simulated=True)
-    before, after = told(path, waiting, sim(6, 6))
+    before, after = reported(path, waiting, sim(6, 6))
     assert before is None
     assert str(after).endswith("; the oldest observation is from second 4.000")
 

@@ -51,9 +51,9 @@ def stage() -> Stage:
 
 
 def errors(reaction: Reaction) -> list[str]:
-    told = [json.loads(reply) for reply in reaction.replies]
-    assert all((status["op"], status["level"]) == ("status", 2) for status in told)
-    return [status["message"] for status in told]
+    reported = [json.loads(reply) for reply in reaction.replies]
+    assert all((status["op"], status["level"]) == ("status", 2) for status in reported)
+    return [status["message"] for status in reported]
 
 
 def test_each_channel_is_subscribed_once_and_each_id_used_once(stage: Stage) -> None:

@@ -108,14 +108,14 @@ async def test_a_message_is_serialised_once_for_all_clients_with_equal_options(
 
 
 @pytest.mark.parametrize(
-    ("topic", "meanwhile", "told"),
+    ("topic", "meanwhile", "reported"),
     [
         (INPUT, ("1", "2", "3", "4"), ("2", "3", "4")),
         (replace(INPUT, max_bytes=10), ("11111", "22222", "33333"), ("22222", "33333")),
     ],
 )
 async def test_what_waits_for_a_slow_client_is_limited_by_the_topics_depth_and_bytes(
-    relay: Relay, writer: Writer, topic: Topic, meanwhile: Sequence[str], told: Sequence[str]
+    relay: Relay, writer: Writer, topic: Topic, meanwhile: Sequence[str], reported: Sequence[str]
 ) -> None:
     slow = Client(writer)
     slow.gate.clear()
@@ -125,13 +125,13 @@ async def test_what_waits_for_a_slow_client_is_limited_by_the_topics_depth_and_b
     await until(lambda: bool(slow.frames), "the first")
     relay.publish(*meanwhile)
     slow.gate.set()
-    await until(lambda: len(slow.frames) == 1 + len(told), "the rest")
-    assert slow.frames == [json_frame(text) for text in ("0", *told)]
+    await until(lambda: len(slow.frames) == 1 + len(reported), "the rest")
+    assert slow.frames == [json_frame(text) for text in ("0", *reported)]
 
 
-@pytest.mark.parametrize(("size", "is_told"), [(20, True), (21, False)])
+@pytest.mark.parametrize(("size", "is_reported"), [(20, True), (21, False)])
 async def test_a_too_large_message_is_left_out_and_the_client_gets_an_error(
-    relay: Relay, writer: Writer, monkeypatch: pytest.MonkeyPatch, size: int, is_told: bool
+    relay: Relay, writer: Writer, monkeypatch: pytest.MonkeyPatch, size: int, is_reported: bool
 ) -> None:
     monkeypatch.setattr(feeds, "MAX_MESSAGE_BYTES", 20)
 
@@ -140,8 +140,8 @@ async def test_a_too_large_message_is_left_out_and_the_client_gets_an_error(
     await until(lambda: bool(relay.ears), "it to listen")
     relay.publish("x" * size)
     await until(lambda: bool(client.frames), "an answer")
-    assert (client.frames == [json_frame("x" * size)]) is is_told
-    assert is_told or b"it has 21 bytes, the limit is 20" in client.frames[0]
+    assert (client.frames == [json_frame("x" * size)]) is is_reported
+    assert is_reported or b"it has 21 bytes, the limit is 20" in client.frames[0]
 
 
 async def test_a_throttled_client_gets_the_latest_message_and_not_before_its_time(

@@ -140,15 +140,15 @@ def test_unexpected_frames_change_nothing(
         reset_peak(pid)
         for _ in range(frames // at_once):
             with RawClient(live.url, path) as client:
-                said = b"".join(anything(chance) for _ in range(at_once))
-                received = client.say(said + masked(CLOSE, struct.pack("!H", NORMAL)))
+                message = b"".join(anything(chance) for _ in range(at_once))
+                received = client.say(message + masked(CLOSE, struct.pack("!H", NORMAL)))
                 # A message in pieces has more than one frame: some connections send too much.
                 assert closing_code(received) in (NORMAL, POLICY)
             healthy.rest()
         for _ in range(BROKEN_CONNECTIONS):
             with RawClient(live.url, path) as client:
-                said = anything(chance) + broken(chance)
-                assert closing_code(client.say(said)) in (
+                message = anything(chance) + broken(chance)
+                assert closing_code(client.say(message)) in (
                     *(None, NORMAL, PROTOCOL_ERROR, NO_UTF8, TOO_BIG),
                 )
         healthy.rest()

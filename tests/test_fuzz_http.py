@@ -17,7 +17,7 @@ from schemathesis.specs.openapi.checks import positive_data_acceptance
 
 from lupin_bridge.access.middleware import MAX_TARGET_BYTES
 from lupin_bridge.app import document
-from tests.support.messages import look, occupancy_grid, scan
+from tests.support.messages import inspection, occupancy_grid, scan
 from tests.support.proc_stat import open_files, peak_mb, reset_peak, resident_mb
 from tests.support.processes import limits
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -33,7 +33,7 @@ def live() -> Iterator[Bridge]:
     with bridge(*NO_LIMITS, afresh=True) as running:
         running.peer.observe(
             scan("1", {"co2": 400.0, "temperature": 20.0}, (0, 0)),
-            look("1", blooms=[(0.1, 0.1)], footprint=[(0, 0), (1, 0), (1, 1)]),
+            inspection("1", blooms=[(0.1, 0.1)], footprint=[(0, 0), (1, 0), (1, 1)]),
             scan("2", {"co2": float("nan")}, (1, 1)),
             scan("no pose", {"co2": 1.0}),
         )

@@ -19,7 +19,7 @@ from lupin_twin.core.drops import MAX_BLOOMS_PER_TAG, MAX_SENSORS_PER_TAG, MAX_T
 from tests.support.domains import own_domain
 from tests.support.hostile import ANY, MEGABYTE, NAN, TEXTS, any_state, damaged, long_lies
 from tests.support.live import attached, field_of, wait_until_ready
-from tests.support.messages import discovered, look, pose, scan
+from tests.support.messages import discovered, inspection, pose, scan
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
 from tests.support.processes import limits, lupin_twin
 from tests.support.ros import Peer
@@ -117,13 +117,13 @@ def past_every_bound() -> Iterator[Any]:
     yield scan("sensors", {f"s{n}": 1.0 for n in range(MAX_SENSORS_PER_TAG + 1)})
     yield scan(MEGABYTE, {"co2": 1.0})
     yield scan("megabyte", {MEGABYTE: 1.0})
-    yield look("megabyte", species=MEGABYTE)
+    yield inspection("megabyte", species=MEGABYTE)
     for where in ("status_detail", "mission_id"):
         msg = scan("megabyte")
         setattr(msg, where, MEGABYTE)
         yield msg
-    yield look("blooms", blooms=[(0, 0)] * 20_000)
-    yield look("outline", footprint=[(0, 0)] * 5_000)
+    yield inspection("blooms", blooms=[(0, 0)] * 20_000)
+    yield inspection("outline", footprint=[(0, 0)] * 5_000)
     yield scan("", {"co2": 1.0})
     yield scan("far", {"co2": 1.0}, (1e300, -1e300))
     yield scan("nan", {"co2": NAN, "": NAN}, (NAN, 0))
@@ -177,7 +177,7 @@ def test_requests_for_fields_of_any_numbers_are_answered(both: tuple[Bridge, Bri
     numbers = (NAN, float("inf"), -1.0, 0.0, 1e-45, 0.1, 3e38, -3e38)
     names = ("resolution", "bbox_min_x", "bbox_min_y", "bbox_max_x", "bbox_max_y")
 
-    def ask(peer: Peer) -> None:
+    def query(peer: Peer) -> None:
         for _ in range(LOT):
             answer = peer.get_field(
                 sensor_type=chance.choice((*TEXTS, MEGABYTE)),
@@ -187,7 +187,7 @@ def test_requests_for_fields_of_any_numbers_are_answered(both: tuple[Bridge, Bri
                 assert answer == GetField.Response(error_message=answer.error_message)
                 assert answer.error_message
 
-    survive(both, ask)
+    survive(both, query)
 
 
 def test_a_bridge_apart_survives_an_invalid_twin() -> None:

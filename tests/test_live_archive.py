@@ -89,7 +89,7 @@ def test_serve_forwards_and_survives_the_end_of_archive_and_forwarder(
 
 
 @pytest.mark.parametrize(
-    ("args", "said"),
+    ("args", "message"),
     [
         (("--site", "gh1"), "--site is given without --archive-url"),
         (("--archive-url", "postgresql:///x"), "--archive-url is given without --site"),
@@ -97,5 +97,5 @@ def test_serve_forwards_and_survives_the_end_of_archive_and_forwarder(
         (("--site", "gh1", "--archive-url", "x"), "--archive-url is not a PostgreSQL"),
     ],
 )
-def test_serve_refuses_what_can_never_be_forwarded(args: tuple[str, ...], said: str) -> None:
-    assert said in refused_start(*args)
+def test_serve_refuses_what_can_never_be_forwarded(args: tuple[str, ...], message: str) -> None:
+    assert message in refused_start(*args)

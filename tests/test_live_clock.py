@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rosgraph_msgs.msg import Clock
 
 from tests.support.domains import own_domain
-from tests.support.journal import SECOND, kept
+from tests.support.journal import SECOND, append
 from tests.support.journal import scan as row
 from tests.support.live import attached
 from tests.support.messages import scan
@@ -148,10 +148,10 @@ def test_a_clock_that_contradicts_the_journal_is_reported(
 ) -> None:
     """As on a board that starts years ago; `test_memory_one_truth` has what a twin does then."""
     journal = tmp_path / "journal.sqlite"
-    kept(journal, [row("1", time.time_ns() + 86_400 * SECOND, co2=5.0)])
+    append(journal, [row("1", time.time_ns() + 86_400 * SECOND, co2=5.0)])
     with both("--ros-args", "-p", f"journal:={journal}") as lives:
-        peer, said = lives[0].peer, list[DiagnosticArray]()
-        peer.node.create_subscription(DiagnosticArray, "/diagnostics", said.append, 10)
+        peer, message = lives[0].peer, list[DiagnosticArray]()
+        peer.node.create_subscription(DiagnosticArray, "/diagnostics", message.append, 10)
 
         def journal_of(live: Bridge) -> Any:
             return live.get("/readyz").json()["journal"]
@@ -164,7 +164,7 @@ def test_a_clock_that_contradicts_the_journal_is_reported(
             assert ([it["value"] for it in tag["readings"]], tag["stale_seconds"]) == ([5.0], None)
 
         def levels() -> dict[str, bytes]:
-            return {it.name: it.level for it in said[-1].status} if said else {}
+            return {it.name: it.level for it in message[-1].status} if message else {}
 
         for name in ("/lupin_twin: clock", "/lupin_twin: journal"):
             peer.until(lambda name=name: levels().get(name) == DiagnosticStatus.ERROR, name)  # type: ignore[misc]

@@ -78,27 +78,27 @@ NO_HANDSHAKES = {
 
 @pytest.mark.parametrize("name", NO_HANDSHAKES)
 def test_an_invalid_handshake_is_answered_and_ended(plain: Served, name: str) -> None:
-    said, expected = NO_HANDSHAKES[name]
-    received = raw_http.answer(plain.url, said)
+    message, expected = NO_HANDSHAKES[name]
+    received = raw_http.answer(plain.url, message)
     assert status(received) == expected, received
     assert received.count(b"HTTP/1.1") == 1
 
 
 @pytest.mark.parametrize("name", ["a body", "a long cookie", "many headers", "a bad key"])
 def test_over_tls_and_with_a_token_too(secret: Served, name: str) -> None:
-    said, expected = NO_HANDSHAKES[name]
+    message, expected = NO_HANDSHAKES[name]
     assert isinstance(secret.trust, ssl.SSLContext)
-    assert status(raw_http.answer(secret.url, said, secret.trust)) == expected
+    assert status(raw_http.answer(secret.url, message, secret.trust)) == expected
 
 
 def test_a_refusal_has_its_reason(plain: Served) -> None:
-    said = {
+    message = {
         "this is no request for a WebSocket: ": requested(b"Cookie: " + b"x" * 9_000),
         "the request has a body (content-length: 1), and none": requested(b"Content-Length: 1"),
         "the request has more headers than the limit of 128": requested(*[b"a:"] * 128),
         "the request's head is longer than 32768 bytes": requested(b"a: " + b"x" * 40_000),
     }
-    for why, request in said.items():
+    for why, request in message.items():
         body = raw_http.answer(plain.url, request).partition(b"\r\n\r\n")[2]
         assert orjson.loads(body)["detail"].startswith(why)
 
@@ -111,8 +111,8 @@ def test_an_unfinished_tls_handshake_ends_after_the_timeout(secret: Served) -> N
     before_mb = resident_mb(secret.process.pid)
     with ExitStack() as stack:
         clients = [stack.enter_context(raw_http.connect(secret.url)) for _ in range(100)]
-        for client, said in zip(clients, cycle(begun), strict=False):
-            client.sendall(said)
+        for client, message in zip(clients, cycle(begun), strict=False):
+            client.sendall(message)
         wait_for(lambda: all(map(raw_http.is_over, clients)), "their end")
         wait_for(lambda: open_files(secret.process.pid) <= files, "the end of their files")
     assert peak_mb(secret.process.pid) - before_mb < MEMORY_MB
@@ -135,9 +135,9 @@ def head_of(length: int, line: int) -> bytes:
 def test_a_head_has_a_size_limit_however_it_arrives(plain: Served, line: int, first: bytes) -> None:
     answers = 2 if first else 1
     for extra, expected in ((0, b" 200 "), (1, b" 431 "), (200_000, b" 431 ")):
-        said = head_of(MAX_HEAD_BYTES + extra, line)
-        assert len(said) == MAX_HEAD_BYTES + extra
-        received = raw_http.answer(plain.url, first + said)
+        message = head_of(MAX_HEAD_BYTES + extra, line)
+        assert len(message) == MAX_HEAD_BYTES + extra
+        received = raw_http.answer(plain.url, first + message)
         heads = [part[:5] for part in received.split(b"HTTP/1.1")[1:]]
         assert heads == [b" 200 "] * (answers - 1) + [expected]
 
@@ -175,11 +175,11 @@ def test_pipelined_requests_are_all_answered(plain: Served) -> None:
 )
 def test_a_target_is_a_path(plain: Served, target: bytes) -> None:
     """Otherwise a host would have two names, and one of them would go unchecked."""
-    said = b"GET " + target + b" HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
-    received = raw_http.answer(plain.url, said)
+    message = b"GET " + target + b" HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+    received = raw_http.answer(plain.url, message)
     assert (status(received), received.count(b"HTTP/1.1")) == (400, 1)
     assert repr(target.decode()).encode() in received
-    upgrade = said.replace(b"Host: 127.0.0.1\r\n", UPGRADE)
+    upgrade = message.replace(b"Host: 127.0.0.1\r\n", UPGRADE)
     assert status(raw_http.answer(plain.url, upgrade)) == 400
 
 

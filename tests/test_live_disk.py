@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.disk import Disk, Weather, after_power_cut, build, notes
-from tests.support.journal import NOW, is_whole, kept, scan, select
+from tests.support.journal import NOW, append, is_whole, scan, select
 from tests.support.waiting import PATIENCE_S, wait_for
 
 ROOT = Path(__file__).parents[1]
@@ -95,13 +95,15 @@ def assert_whole(disk: Disk) -> None:
     assert found == list(range(1, len(found) + 1))
 
 
-@pytest.mark.parametrize(("fault", "said"), [("full", ""), ("readonly", "Read-only file system")])
+@pytest.mark.parametrize(
+    ("fault", "message"), [("full", ""), ("readonly", "Read-only file system")]
+)
 def test_a_fault_from_the_start_is_reported_and_heals(
-    disk: Disk, fault: Weather, said: str
+    disk: Disk, fault: Weather, message: str
 ) -> None:
     disk.be(fault)
     with feeding(disk) as reported:
-        reported.wait("failing", said)
+        reported.wait("failing", message)
         disk.be("well")
         reported.wait("recording", written=100)
     assert_whole(disk)
@@ -109,10 +111,10 @@ def test_a_fault_from_the_start_is_reported_and_heals(
 
 def test_a_journal_in_a_read_only_folder_can_be_read(disk: Disk) -> None:
     path = disk.folder / "j.sqlite"
-    kept(path, [scan()])
+    append(path, [scan()])
     disk.be("readonly")
     command = (sys.executable, "-m", "lupin_bridge.cli.command", "journal")
-    for action, said in (
+    for action, message in (
         ("info", "scans        1, 0 of them failed"),
         ("check", f"{path} is whole"),
     ):
@@ -123,7 +125,7 @@ def test_a_journal_in_a_read_only_folder_can_be_read(disk: Disk) -> None:
             capture_output=True,
             text=True,
         )
-        assert said in done.stdout
+        assert message in done.stdout
     assert not any(disk.folder.glob("*-*"))
 
 

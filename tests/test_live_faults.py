@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.domains import own_domain
 from tests.support.live import attached, field_of, wait_until_ready
-from tests.support.messages import discovered, look, occupancy_grid, pose, scan
+from tests.support.messages import discovered, inspection, occupancy_grid, pose, scan
 from tests.support.processes import OFTEN, constants, faults, limits, lupin_twin, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
@@ -31,9 +31,9 @@ def apply(known: list[str], frame: Frame) -> list[str]:
     if frame["type"] == "state":
         return tag_ids(frame["state"])
     if frame["type"] == "delta":
-        kept = [tag_id for tag_id in known if tag_id not in frame["removed"]]
+        stored = [tag_id for tag_id in known if tag_id not in frame["removed"]]
         changed = [tag["tag_id"] for tag in frame["changed"]]
-        return kept + [tag_id for tag_id in changed if tag_id not in kept]
+        return stored + [tag_id for tag_id in changed if tag_id not in stored]
     return known
 
 
@@ -54,9 +54,9 @@ def test_a_twin_is_killed_and_its_successor_has_fewer_tags(domain: int) -> None:
             old = field_of(live, **FIELD).headers["etag"]
 
             twin.kill()
-            said = reason(client, "stale")
-            assert (said["twin"], live.get("/readyz").status_code) == ("offline", 503)
-            assert "silent" in said["message"]
+            message = reason(client, "stale")
+            assert (message["twin"], live.get("/readyz").status_code) == ("offline", 503)
+            assert "silent" in message["message"]
             assert live.json("/healthz")["ok"], "the bridge itself is well"
             assert tag_ids(live.json("/api/state")) == ["a", "b"], "the last that is known"
             old_s = live.tag("a")["stale_seconds"]
@@ -66,8 +66,8 @@ def test_a_twin_is_killed_and_its_successor_has_fewer_tags(domain: int) -> None:
             with twin_node(domain):
                 robot.observe(scan("c", {"co2": 3.0}, (2, 0)))
                 reason(client, "live")
-                newest = client.until_tag("c")
-                assert tag_ids(newest["state"]) == ["c"]
+                latest = client.until_tag("c")
+                assert tag_ids(latest["state"]) == ["c"]
                 while known != ["c"]:
                     known = apply(known, delta.next())
                 assert live.get("/readyz").status_code == 200
@@ -133,10 +133,10 @@ def test_a_second_twin_is_reported_and_its_end_too(domain: int) -> None:
         reason(client, "live")
         with twin_node(domain) as second:
             second.wait_for_output("lupin_twin in ROS domain")
-            said = client.until("status", lambda frame: "2 twins" in frame["message"])
+            message = client.until("status", lambda frame: "2 twins" in frame["message"])
             first.wait_for_output("2 nodes publish /twin/state")
-            assert (said["twin"], said["twin_count"]) == ("live", 2)
-            assert "mixture" in said["message"]
+            assert (message["twin"], message["twin_count"]) == ("live", 2)
+            assert "mixture" in message["message"]
             assert "2 twins" in live.json("/readyz")["message"]
             process.wait_for_output("2 nodes publish /twin/state")
             second.stop()
@@ -218,7 +218,7 @@ def goes_on_after(live: Bridge, fault: Callable[[], object], counted: int) -> No
     ("fault", "counted"),
     [
         pytest.param(lambda peer: peer.observe(scan("boom-scan")), 1, id="a scan"),
-        pytest.param(lambda peer: peer.observe(look("boom-look")), 1, id="a look at flowers"),
+        pytest.param(lambda peer: peer.observe(inspection("boom-look")), 1, id="a look at flowers"),
         pytest.param(lambda peer: peer.discover(discovered({"boom-find": pose()})), 1, id="a find"),
         pytest.param(lambda peer: peer.publish_map(occupancy_grid([[0] * 13])), 1, id="a map"),
         pytest.param(lambda peer: peer.observe(scan("boom-state")), 2, id="the state's timer"),
@@ -234,12 +234,12 @@ def test_serve_goes_on_after_an_exception_in(
 def test_serve_goes_on_after_an_exception_in_the_service(sabotaged_serve: Bridge) -> None:
     request = {"sensor_type": "boom-field", "resolution": 1.0}
 
-    def ask() -> None:
+    def query() -> None:
         answer = sabotaged_serve.peer.get_field(**request)
         assert not answer.ok
         assert "sabotage" in answer.error_message
 
-    goes_on_after(sabotaged_serve, ask, 1)
+    goes_on_after(sabotaged_serve, query, 1)
     assert sabotaged_serve.peer.get_field(**request).ok
 
 

@@ -59,11 +59,11 @@ def test_a_publisher_with_other_qos_is_received_and_reported(
         return running.get("/api/tags/foreign").status_code == 200
 
     wait_for(is_received, "what it says")
-    (said,) = wait_for(lambda: running.json("/readyz")["input_problems"], "the problem")
-    assert said.startswith(f"/peer publishes {TOPIC} with another QoS")
-    assert said.endswith(remedy)
-    assert running.process.output.count(said) == 1
-    assert diagnosed(peer, lambda values: said in values.get("inputs", {}).values())
+    (text,) = wait_for(lambda: running.json("/readyz")["input_problems"], "the problem")
+    assert text.startswith(f"/peer publishes {TOPIC} with another QoS")
+    assert text.endswith(remedy)
+    assert running.process.output.count(text) == 1
+    assert diagnosed(peer, lambda values: text in values.get("inputs", {}).values())
     # A matching publisher reaches both subscriptions, and counts once; it gives no stamp.
     for value in range(20):
         peer.observe(scan("ours", {"co2": float(value)}))
@@ -142,25 +142,25 @@ if os.geteuid() == 0:  # only root can run a process as another user; see test_i
                 [sys.executable, "-c", AS_NOBODY], ros_env(domain, HOME=home, ROS_LOG_DIR=home)
             ),
         ):
-            (said,) = wait_for(lambda: live.json("/readyz")["input_problems"], "the hint")
-        assert said.startswith(f"nothing has come yet from the publisher of {TOPIC}")
-        assert f"uid {NOBODY}" in said
-        assert "FASTDDS_BUILTIN_TRANSPORTS=UDPv4" in said
+            (text,) = wait_for(lambda: live.json("/readyz")["input_problems"], "the hint")
+        assert text.startswith(f"nothing has come yet from the publisher of {TOPIC}")
+        assert f"uid {NOBODY}" in text
+        assert "FASTDDS_BUILTIN_TRANSPORTS=UDPv4" in text
 
 
 def diagnosed(peer: Peer, accept: Callable[[dict[str, dict[str, str]]], bool]) -> bool:
     """Wait until the twin's `/diagnostics`, by finding and key, are as expected."""
-    said: list[Any] = []
-    subscription = peer.node.create_subscription(DiagnosticArray, "/diagnostics", said.append, 10)
+    text: list[Any] = []
+    subscription = peer.node.create_subscription(DiagnosticArray, "/diagnostics", text.append, 10)
 
-    def look() -> bool:
-        return bool(said) and accept(
+    def check() -> bool:
+        return bool(text) and accept(
             {
                 status.name.rpartition(": ")[2]: {it.key: it.value for it in status.values}
-                for status in said[-1].status
+                for status in text[-1].status
             }
         )
 
-    peer.until(look, "the diagnosis")
+    peer.until(check, "the diagnosis")
     peer.node.destroy_subscription(subscription)
     return True

@@ -7,7 +7,7 @@ import httpx
 from lupin_twin.core.interfaces import SERVICES
 from tests.bridge.routes.test_foxglove import play
 from tests.support.foxglove import reader_of
-from tests.support.messages import look, occupancy_grid, scan
+from tests.support.messages import inspection, occupancy_grid, scan
 from tests.support.processes import Process, lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -23,7 +23,7 @@ def below(namespace: str) -> tuple[str, ...]:
 def fill(robot: Peer, namespace: str, tag_id: str, co2: float) -> None:
     """What one greenhouse's robot publishes, on its own topics."""
     robot.publish(f"{namespace}/floranova/observations", scan(tag_id, {"co2": co2}, (0, 0)))
-    robot.publish(f"{namespace}/floranova/observations", look(tag_id, "lupin"))
+    robot.publish(f"{namespace}/floranova/observations", inspection(tag_id, "lupin"))
     robot.publish(f"{namespace}/map", occupancy_grid([[0, 0], [0, 0]]), depth=1)
 
 

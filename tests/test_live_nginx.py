@@ -64,7 +64,7 @@ def running(folder: Path) -> Iterator[Greenhouse]:
 
 
 @pytest.fixture(scope="module")
-def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Greenhouse]:
+def greenhouse(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Greenhouse]:
     with running(tmp_path_factory.mktemp("nginx")) as it:
         yield it
 
@@ -72,8 +72,8 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Greenhouse]:
 # --- everything below the prefix ------------------------------------------------------------------
 
 
-def test_the_page_and_all_its_requests_are_below_the_prefix(house: Greenhouse) -> None:
-    with httpx.Client(base_url=house.url, trust_env=False, timeout=PATIENCE_S) as browser:
+def test_the_page_and_all_its_requests_are_below_the_prefix(greenhouse: Greenhouse) -> None:
+    with httpx.Client(base_url=greenhouse.url, trust_env=False, timeout=PATIENCE_S) as browser:
         page = {"Accept": "text/html", "Host": "twin.example"}
         # Redirected to the sign-in page, and in with its cookie.
         requested = browser.get("/gh1/", headers=page)
@@ -93,38 +93,38 @@ def test_the_page_and_all_its_requests_are_below_the_prefix(house: Greenhouse) -
             assert browser.get(f"/gh1/{name}").status_code == 200, name
         assert browser.get("/gh1/api/state").json()["tags"][0]["tag_id"] == "a"
         docs = browser.get("/gh1/docs").text
-        assert f"curl '{house.url}/gh1/api/state'" in docs
+        assert f"curl '{greenhouse.url}/gh1/api/state'" in docs
         assert browser.get("/gh1/openapi.json").json()["servers"] == [{"url": "/gh1"}]
-        ours, theirs = {"Origin": house.url}, {"Origin": "http://evil.example"}
+        ours, theirs = {"Origin": greenhouse.url}, {"Origin": "http://evil.example"}
         assert browser.get("/gh1/api/state", headers=ours).status_code == 200
         assert browser.get("/gh1/api/state", headers=theirs).status_code == 403
         headers = {"Cookie": cookie.partition(";")[0], **ours}
-    with connect(ws(house), additional_headers=headers, proxy=None) as socket:
+    with connect(ws(greenhouse), additional_headers=headers, proxy=None) as socket:
         assert '"status"' in str(socket.recv(timeout=PATIENCE_S))
-    rosbridge = f"{house.url.replace('http', 'ws', 1)}/gh1/rosbridge"
+    rosbridge = f"{greenhouse.url.replace('http', 'ws', 1)}/gh1/rosbridge"
     with connect(rosbridge, additional_headers=headers, proxy=None) as socket:
         assert Ros(socket).call("/rosapi/topics")["result"]
 
 
-def ws(house: Greenhouse) -> str:
-    return house.url.replace("http", "ws", 1) + "/gh1/ws/state"
+def ws(greenhouse: Greenhouse) -> str:
+    return greenhouse.url.replace("http", "ws", 1) + "/gh1/ws/state"
 
 
-def test_limits_and_logs_go_by_the_client_and_not_by_nginx(house: Greenhouse) -> None:
+def test_limits_and_logs_go_by_the_client_and_not_by_nginx(greenhouse: Greenhouse) -> None:
     wrong = {"Authorization": "Bearer " + "x" * 32, "X-Forwarded-For": "203.0.113.9"}
     transport = httpx.HTTPTransport(local_address="127.0.0.9")
     with httpx.Client(
-        base_url=house.url, trust_env=False, transport=transport, timeout=PATIENCE_S
+        base_url=greenhouse.url, trust_env=False, transport=transport, timeout=PATIENCE_S
     ) as stranger:
         wait_for(
             lambda: stranger.get("/gh1/api/state", headers=wrong).status_code == 429,
             "ten wrong tokens at a replica",
             meanwhile=lambda _: None,
         )
-    said = "".join(replica.process.output for replica in house.replicas)
-    assert "wrong token from 127.0.0.9" in said
-    assert "203.0.113.9" not in said
-    url = f"{house.url}/gh1/api/state"
+    message = "".join(replica.process.output for replica in greenhouse.replicas)
+    assert "wrong token from 127.0.0.9" in message
+    assert "203.0.113.9" not in message
+    url = f"{greenhouse.url}/gh1/api/state"
     assert httpx.get(url, headers=BEARER, trust_env=False, timeout=PATIENCE_S).is_success
 
 
@@ -170,13 +170,15 @@ class Screen:
             self.last_frame_s = now_s
 
 
-def longest_gap_s(house: Greenhouse, screens: list[Screen], replica: Bridge, number: int) -> float:
+def longest_gap_s(
+    greenhouse: Greenhouse, screens: list[Screen], replica: Bridge, number: int
+) -> float:
     """How long a client was without a frame, at most, since a replica was stopped."""
     returns = sum(screen.returns for screen in screens)
     before = [len(screen.gaps_s) for screen in screens]
     replica.process.send(signal.Signals(number))
     wait_for(lambda: sum(screen.returns for screen in screens) > returns, "clients cut off")
-    house.peer.observe(scan("after", {"co2": 1.0}, (2, 0)))
+    greenhouse.peer.observe(scan("after", {"co2": 1.0}, (2, 0)))
     replica.process.wait()
     deadline = time.monotonic() + BACK_WITHIN_S
     wait_for(
@@ -196,14 +198,14 @@ def longest_gap_s(house: Greenhouse, screens: list[Screen], replica: Bridge, num
 def test_clients_of_a_replica_that_stops_under_load_are_back_in_time(
     tmp_path: Path, number: signal.Signals
 ) -> None:
-    with running(tmp_path) as house:
-        stop_under_load(house, number)
+    with running(tmp_path) as greenhouse:
+        stop_under_load(greenhouse, number)
 
 
-def stop_under_load(house: Greenhouse, number: signal.Signals) -> None:
-    screens = [Screen(ws(house)) for _ in range(CLIENTS)]
+def stop_under_load(greenhouse: Greenhouse, number: signal.Signals) -> None:
+    screens = [Screen(ws(greenhouse)) for _ in range(CLIENTS)]
     threads = [threading.Thread(target=screen.run) for screen in screens]
-    load = Load(f"{house.url}/gh1/api/field?sensor_type=co2&resolution=0.02")
+    load = Load(f"{greenhouse.url}/gh1/api/field?sensor_type=co2&resolution=0.02")
     threads.append(threading.Thread(target=load.run))
     for thread in threads:
         thread.start()
@@ -213,8 +215,8 @@ def stop_under_load(house: Greenhouse, number: signal.Signals) -> None:
         before = load.answers
         # A busy machine may be late once.
         assert any(
-            longest_gap_s(house, screens, replica, number) < BACK_WITHIN_S
-            for replica in house.replicas[:2]
+            longest_gap_s(greenhouse, screens, replica, number) < BACK_WITHIN_S
+            for replica in greenhouse.replicas[:2]
         )
         wait_for(lambda: load.answers > before + 10, "answers from the others")
     finally:

@@ -9,7 +9,7 @@ import httpx
 from tests.support.docs import ROOT
 from tests.support.domains import own_domain, ros_env
 from tests.support.live import attached
-from tests.support.messages import look
+from tests.support.messages import inspection
 from tests.support.people import OWN, add, signed_in, write
 from tests.support.processes import Process, lupin_twin
 from tests.support.ros import Peer
@@ -28,7 +28,7 @@ def acknowledged(live: Bridge) -> dict[str, Any]:
     """An alarm that anna has acknowledged; her note."""
     live.peer.wait_for_twin()
     with signed_in(live.url, "anna") as anna:
-        live.peer.observe(look("a", anomaly=True, bug_count=2))
+        live.peer.observe(inspection("a", anomaly=True, bug_count=2))
         (alarm,) = wait_for(lambda: anna.get("/api/alarms").json()["alarms"], "the alarm") or []
         answer = write(anna, kind="acknowledge", subject=f"alarm:{alarm['id']}", text="seen")
         assert answer.status_code == 201, answer.text

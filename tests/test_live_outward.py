@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.support.domains import own_domain
-from tests.support.messages import look, scan
+from tests.support.messages import inspection, scan
 from tests.support.mosquitto import PASSWORD, USER, Broker, Subscriber
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
 from tests.support.processes import OFTEN, lupin_twin, twin_node
@@ -36,7 +36,7 @@ def test_an_observation_reaches_the_broker_and_a_killed_bridge_is_offline(
         health = wait_for(lambda: received.last("farm/gh1/tags/a_2Fb/health"), "the verdict")
         assert health["verdict"] == "critical"
         # A pest is an alarm at once.
-        live.peer.observe(look("a/b", anomaly=True))
+        live.peer.observe(inspection("a/b", anomaly=True))
         wait_for(lambda: hook.posted, "the alarm")
         posted = hook.posted[0].json
         assert (posted["change"], posted["alarm"]["tag_id"]) == ("raised", "a/b")
@@ -96,7 +96,7 @@ def test_the_first_webhook_of_web_names_the_source(tmp_path: Path) -> None:
         receiver(status(200)) as hook,
     ):
         robot.wait_for_twin()
-        robot.observe(look("a", anomaly=True))
+        robot.observe(inspection("a", anomaly=True))
         robot.tag("a")
         to = ("--webhook-url", f"http://127.0.0.1:{hook.port}/")
         with lupin_twin(domain, "web", *to, **secrets):

@@ -11,7 +11,7 @@ from lupin_msgs.srv import GetHistory, GetStateAt
 
 from tests.support.domains import own_domain
 from tests.support.journal import select
-from tests.support.messages import discovered, look, pose, scan
+from tests.support.messages import discovered, inspection, pose, scan
 from tests.support.proc_stat import waited_s
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer
@@ -35,11 +35,13 @@ def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
         peer.discover(discovered({"pinned": pose(5.0, 6.0)}))
         peer.observe(
             scan("a", {"co2": 400.0, "light": 9.0}, (1.0, 2.0), stamp_s=T),
-            look("a", "lupin", anomaly=True, bug_count=3, blooms=[(1.0, 2.0)], stamp_s=T + 10.0),
+            inspection(
+                "a", "lupin", anomaly=True, bug_count=3, blooms=[(1.0, 2.0)], stamp_s=T + 10.0
+            ),
             scan("a", {"co2": 500.0}, stamp_s=T + 100.5),
             scan("a", status=2, stamp_s=T + 110.0),
             scan("b", {"co2": 700.0}, stamp_s=T + 200.0),
-            look("a", "lupin", stamp_s=T + 300.0),
+            inspection("a", "lupin", stamp_s=T + 300.0),
             scan("late", {"co2": 1.0}, stamp_s=T + 10_000.0),
         )
         peer.tag("late")
@@ -52,7 +54,7 @@ def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
 
 
 def state_at(peer: Peer, at_s: float) -> Any:
-    response = peer.ask(GetStateAt, STATE_AT, at=stamp(at_s))
+    response = peer.call(GetStateAt, STATE_AT, at=stamp(at_s))
     assert response.ok, response.error_message
     assert response.error_message == ""
     assert response.state.header == response.times.header
@@ -70,7 +72,7 @@ def stamp_ns(at_s: float) -> int:
 
 
 def series(peer: Peer, tag_id: str, sensor_type: str, **more: Any) -> Any:
-    response = peer.ask(GetHistory, HISTORY, tag_id=tag_id, sensor_type=sensor_type, **more)
+    response = peer.call(GetHistory, HISTORY, tag_id=tag_id, sensor_type=sensor_type, **more)
     assert response.ok, response.error_message
     return response
 
@@ -108,23 +110,23 @@ def test_a_later_moment_has_later_readings_the_failed_attempt_and_no_pest(peer: 
 
 
 def test_as_of_now_it_is_the_current_state(peer: Peer) -> None:
-    newest = peer.state(lambda _: True, "a state")
-    response = peer.ask(GetStateAt, STATE_AT, at=newest.header.stamp)
-    for tag in [*response.state.tags, *newest.tags]:
+    latest = peer.state(lambda _: True, "a state")
+    response = peer.call(GetStateAt, STATE_AT, at=latest.header.stamp)
+    for tag in [*response.state.tags, *latest.tags]:
         tag.stale_seconds = 0.0
     by_id = {tag.tag_id: tag for tag in response.state.tags}
-    assert by_id == {tag.tag_id: tag for tag in newest.tags}
+    assert by_id == {tag.tag_id: tag for tag in latest.tags}
     assert by_id["a"].pose.position.x == 1.0
     assert by_id["pinned"].pose.orientation.w == 1.0
 
 
 def test_an_impossible_query_is_refused_by_name_without_data(peer: Peer) -> None:
-    later = peer.ask(GetStateAt, STATE_AT, at=Time(sec=2**31 - 1))
+    later = peer.call(GetStateAt, STATE_AT, at=Time(sec=2**31 - 1))
     assert "at is 2147483647.000000000 s, later than now, 1" in later.error_message
     assert later == GetStateAt.Response(error_message=later.error_message)
-    nameless = peer.ask(GetHistory, HISTORY, sensor_type="co2")
+    nameless = peer.call(GetHistory, HISTORY, sensor_type="co2")
     assert nameless == GetHistory.Response(error_message="tag_id is empty")
-    many = peer.ask(GetHistory, HISTORY, tag_id="a", sensor_type="co2", max_points=5001)
+    many = peer.call(GetHistory, HISTORY, tag_id="a", sensor_type="co2", max_points=5001)
     assert many.error_message == "max_points is 5001, the limits are 1 and 5000"
 
 
@@ -182,21 +184,21 @@ def test_a_flood_of_expensive_queries_loses_no_observation(domain: int, tmp_path
         requested: list[Any] = []
         answers: list[Any] = []
 
-        def ask(_: float = 0.0) -> None:
+        def query(_: float = 0.0) -> None:
             answers.extend(future.result() for future in requested if future.done())
             requested[:] = [future for future in requested if not future.done()]
             while len(requested) < AT_ONCE:
                 requested.append(client.call_async(GetStateAt.Request(at=stamp(T + 1))))
             curious.spin_briefly()
 
-        wait_for(lambda: answers, "the first answer", meanwhile=ask)
+        wait_for(lambda: answers, "the first answer", meanwhile=query)
         before = len(answers)
         for piece in pieces(twin.pid):
             for number in piece:
                 robot.observe(scan("beside", {"co2": number}, stamp_s=T + 2.0 + number / RATE))
-            ask()
+            query()
         last = f"SELECT 1 FROM scan WHERE stamp_ns = {stamp_ns(T + 2.0 + (OBSERVED - 1) / RATE)}"
-        wait_for(lambda: select(journal, last), "the last of them in the journal", meanwhile=ask)
+        wait_for(lambda: select(journal, last), "the last of them in the journal", meanwhile=query)
         assert select(journal, "SELECT count(*) FROM scan") == [(SITE + OBSERVED,)]
         assert "they arrived too fast" not in twin.output
         assert len(answers) > before + 2, "asked all the while"

@@ -14,7 +14,7 @@ import pytest
 from tests.support.domains import own_domain, ros_env
 from tests.support.journal import select
 from tests.support.live import attached, wait_until_ready
-from tests.support.messages import look, scan
+from tests.support.messages import inspection, scan
 from tests.support.processes import OFTEN, Process, limits
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
@@ -92,7 +92,7 @@ class Apart:
             self.peer.observe(scan("a", values, stamp_s=at_s, at=(1.0, 2.0)))
         at_s = T + 60.0 * first + 90.0
         self.peer.observe(
-            look("a", anomaly=True, bug_count=2, blooms=[(1.0, 2.0)], stamp_s=at_s),
+            inspection("a", anomaly=True, bug_count=2, blooms=[(1.0, 2.0)], stamp_s=at_s),
             scan("b", status=2, stamp_s=at_s + 5.0),
         )
         # The last of them is the failed one.

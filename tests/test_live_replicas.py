@@ -10,7 +10,7 @@ from lupin_msgs.msg import TwinState, TwinTagState
 
 from tests.support.domains import own_domain
 from tests.support.live import attached, field_of, wait_until_ready
-from tests.support.messages import look, occupancy_grid, scan
+from tests.support.messages import inspection, occupancy_grid, scan
 from tests.support.processes import OFTEN, lupin_twin, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
@@ -44,7 +44,7 @@ def replicas() -> Iterator[tuple[Bridge, Bridge]]:
         peer.observe(
             scan("a", {"co2": 500.0}),
             scan("b", {"co2": 700.0, "humidity": float("nan")}, (1, 0)),
-            look("a", "lupin", blooms=[(0.1, 0.1)], footprint=[(0, 0), (1, 0), (1, 1)]),
+            inspection("a", "lupin", blooms=[(0.1, 0.1)], footprint=[(0, 0), (1, 0), (1, 1)]),
         )
         second = replica()
         for running in (first, second):

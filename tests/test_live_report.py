@@ -58,7 +58,7 @@ def check(live: Bridge) -> None:
 
 
 def check_refusals(live: Bridge) -> None:
-    for query, said in (
+    for query, message in (
         (f"from={T0}&to={T0 - 1}", "must be before to"),
         (f"from={T0}&to={T0}", "must be before to"),
         (f"from={T0 - 31 * 24 * HOUR - 1}&to={T0}", "31.0 days apart, the limit is 31"),
@@ -68,7 +68,7 @@ def check_refusals(live: Bridge) -> None:
         (f"to={T0}&lang=de", "lang"),
     ):
         answer = live.http.get(f"/api/report?{query}")
-        assert (answer.status_code, said in answer.text) == (400, True), answer.text
+        assert (answer.status_code, message in answer.text) == (400, True), answer.text
     answer = live.http.get(f"/api/report.html?to={T0}&lang=fr")
     assert (answer.status_code, "lang" in answer.json()["detail"]) == (400, True)
     html = {"Accept": "text/html,*/*;q=0.8"}

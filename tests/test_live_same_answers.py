@@ -12,7 +12,7 @@ import httpx
 
 from tests.support.archive import Archive, forwarder, wait_until_equal
 from tests.support.fleet import fleet
-from tests.support.http_answers import HOUR, OPTIONS, T0, ask, bridges
+from tests.support.http_answers import HOUR, OPTIONS, T0, bridges, query
 from tests.support.journal_answers import JOURNALS
 from tests.support.waiting import PATIENCE_S, wait_for
 
@@ -40,7 +40,9 @@ def test_a_fleet_answers_for_a_site_byte_for_byte_as_its_serve(
         page.site(is_live=True)
         with httpx.Client(base_url=f"{page.url}/sites/gh1", timeout=PATIENCE_S) as site:
             wait_for(lambda: site.get("/api/alarms").status_code == 200, "its alarms")
-            different = [path for path, _ in requested if ask(site, path) != ask(serve.http, path)]
+            different = [
+                path for path, _ in requested if query(site, path) != query(serve.http, path)
+            ]
     assert different == [], different
 
 

@@ -87,17 +87,17 @@ def trickle(client: socket.socket) -> None:
         client.recv(1)
 
 
-def wait_reading(healthy: Listener, look: Callable[[], bool], what: str) -> None:
+def wait_reading(healthy: Listener, check: Callable[[], bool], what: str) -> None:
     """Wait on a condition, with the healthy client reading all the while."""
 
     def read_and_check() -> bool:
         healthy.rest()
-        return look()
+        return check()
 
     wait_for(read_and_check, what)
 
 
-def newest(client: Listener) -> int:
+def latest(client: Listener) -> int:
     """The number of the latest frame that is there."""
     client.rest()
     return int(client.until("state")["seq"])
@@ -116,8 +116,8 @@ def gone_in_the_end(server: Server, healthy: Listener) -> Iterator[ExitStack]:
             healthy, lambda: open_files(server.process.pid) <= files, "the end of their sockets"
         )
         assert peak_mb(server.process.pid) - memory < MEMORY_MB
-        seq = newest(healthy)
-        assert newest(healthy) > seq
+        seq = latest(healthy)
+        assert latest(healthy) > seq
 
 
 def test_clients_that_do_not_read_are_gone_after_the_timeout(
@@ -226,8 +226,8 @@ def test_a_message_has_a_limit_of_pieces_however_small(server: Server, path: str
     with RawClient(url(server), path) as most:
         assert most.say(begin + masked(CONT, b"") + bye)[-1] == (CLOSE, b"\x03\xe8")
     with RawClient(url(server), path) as endless:
-        said = endless.say(begin + piece + masked(CONT, b""))
-        assert said[-1] == (CLOSE, b"\x03\xf0sent a message in more than %d pieces" % MAX_PIECES)
+        message = endless.say(begin + piece + masked(CONT, b""))
+        assert message[-1] == (CLOSE, b"\x03\xf0sent a message in more than %d pieces" % MAX_PIECES)
 
 
 def test_one_client_too_many_gets_the_reason_and_may_come_when_another_has_gone() -> None:

@@ -37,7 +37,7 @@ def play(url: str, scenario: str) -> Any:
 
 
 @pytest.fixture(scope="module")
-def house() -> Iterator[Bridge]:
+def greenhouse() -> Iterator[Bridge]:
     """A twin with one tag."""
     with bridge() as running:
         running.peer.observe(messages.scan("1", {"temperature": 20.0}, at=(0.0, 0.0)))
@@ -47,22 +47,22 @@ def house() -> Iterator[Bridge]:
         yield running
 
 
-def test_a_subscriber_gets_the_state(house: Bridge) -> None:
-    state = play(house.url, "latch")["state"]
+def test_a_subscriber_gets_the_state(greenhouse: Bridge) -> None:
+    state = play(greenhouse.url, "latch")["state"]
     (tag,) = state["tags"]
     assert (tag["tag_id"], tag["readings"]) == ("1", [{"name": "temperature", "value": 20.0}])
     assert state["header"]["frame_id"] == "map"
 
 
 def test_fields_have_null_and_a_refused_field_differs_from_a_failed_call(
-    house: Bridge,
+    greenhouse: Bridge,
 ) -> None:
-    reported = play(house.url, "field")
+    reported = play(greenhouse.url, "field")
     assert reported["known"]["callback"] == "done"
     known = reported["known"]["values"]
     assert (known["ok"], known["width"], known["height"]) == (True, 12, 12)
     assert set(known["values"]) == {20.0, None}
-    assert known == house.json(
+    assert known == greenhouse.json(
         "/api/field",
         sensor_type="temperature",
         resolution=0.5,
@@ -82,8 +82,8 @@ def test_fields_have_null_and_a_refused_field_differs_from_a_failed_call(
     }
 
 
-def test_roslibs_queries_about_names_are_answered(house: Bridge) -> None:
-    reported = play(house.url, "names")
+def test_roslibs_queries_about_names_are_answered(greenhouse: Bridge) -> None:
+    reported = play(greenhouse.url, "names")
     assert dict(zip(*reported["topics"].values(), strict=True)) == {
         "/twin/state": "lupin_msgs/msg/TwinState",
         "/floranova/observations": "lupin_msgs/msg/Observation",
@@ -97,10 +97,10 @@ def test_roslibs_queries_about_names_are_answered(house: Bridge) -> None:
     assert reported["nodes"]["failed"].startswith("service 'rosapi/nodes' is not served")
 
 
-def test_map_and_inputs_arrive_as_they_were_published(house: Bridge) -> None:
-    house.peer.publish_map(messages.occupancy_grid([[0, 100], [-1, 50]]))
-    house.peer.discover(messages.discovered({"1": messages.pose(1.0, 2.0)}))
-    reported = play(house.url, "inputs")
+def test_map_and_inputs_arrive_as_they_were_published(greenhouse: Bridge) -> None:
+    greenhouse.peer.publish_map(messages.occupancy_grid([[0, 100], [-1, 50]]))
+    greenhouse.peer.discover(messages.discovered({"1": messages.pose(1.0, 2.0)}))
+    reported = play(greenhouse.url, "inputs")
     assert (reported["map"]["info"]["width"], reported["map"]["header"]["frame_id"]) == (2, "map")
     assert reported["map"]["data"] == [0, 100, -1, 50]
     assert reported["observation"]["tag_reading"]["tag_id"] == "1"
@@ -110,20 +110,20 @@ def test_map_and_inputs_arrive_as_they_were_published(house: Bridge) -> None:
     assert reported["statuses"] == []
 
 
-def test_a_client_cannot_write(house: Bridge) -> None:
-    reported = play(house.url, "write")
+def test_a_client_cannot_write(greenhouse: Bridge) -> None:
+    reported = play(greenhouse.url, "write")
     assert [status["msg"].partition(":")[0] for status in reported["told"]] == [
         f"op '{name}' is refused"
         for name in ("advertise", "publish", "unadvertise", "advertise_service", "auth")
     ]
     assert {status["level"] for status in reported["told"]} == {"error"}
     assert reported["told"][1]["id"].startswith("publish:/cmd_vel:"), "roslib's own id comes back"
-    house.peer.spin_briefly()
-    assert house.peer.node.count_publishers("/cmd_vel") == 0
+    greenhouse.peer.spin_briefly()
+    assert greenhouse.peer.node.count_publishers("/cmd_vel") == 0
 
 
-def test_two_components_of_a_page_share_a_topic(house: Bridge) -> None:
-    reported = play(house.url, "two")
+def test_two_components_of_a_page_share_a_topic(greenhouse: Bridge) -> None:
+    reported = play(greenhouse.url, "two")
     assert reported["statuses"] == []
     assert reported["heardAfterUnsubscribe"] == 0
     assert reported["afterTheEnd"] == 0

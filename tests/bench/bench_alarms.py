@@ -130,10 +130,12 @@ def loop_of(tags: int) -> None:
     )
     now_ns = DAY_NS
     readings = tuple(Reading(name, value, now_ns) for name, value in MIDDLE.items())
-    house = tuple(TagState(str(n), readings=readings, last_observed_ns=now_ns) for n in range(tags))
+    greenhouse = tuple(
+        TagState(str(n), readings=readings, last_observed_ns=now_ns) for n in range(tags)
+    )
     took = []
     for second in range(CHANGES):
-        snapshot = Snapshot(now_ns + second * S, "map", house)
+        snapshot = Snapshot(now_ns + second * S, "map", greenhouse)
         start = time.process_time()
         judged = judge.see(snapshot)
         status = Status("live", 0.0, TwinUpdate(snapshot, "r"))

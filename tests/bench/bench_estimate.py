@@ -71,9 +71,9 @@ def case_of(world: World, phase: str, seed: int) -> Case:
 
 def idw_of(read: Readings, width_m: float, height_m: float, cell_m: float) -> Floats:
     """The plain field of the latest readings over a floor, cell by cell."""
-    newest = {int(tag): row for row, tag in enumerate(read.tag)}
+    latest = {int(tag): row for row, tag in enumerate(read.tag)}
     return compute_idw_field(
-        [(*read.xy[tag].tolist(), float(read.value[row])) for tag, row in newest.items()],
+        [(*read.xy[tag].tolist(), float(read.value[row])) for tag, row in latest.items()],
         bbox_min_x=0.0,
         bbox_min_y=0.0,
         bbox_max_x=width_m,

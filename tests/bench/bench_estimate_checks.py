@@ -52,8 +52,8 @@ def found_after(all_read: Readings, tag: int) -> tuple[dict[int, bool], int]:
     off = Readings(all_read.time_s, all_read.tag, value, all_read.xy)
     found, others = {}, 0
     for count in AFTER:
-        said = changed(off, float(all_read.time_s[own[count - 1]]))
-        found[count], others = tag in said, len(set(said) - {tag})
+        message = changed(off, float(all_read.time_s[own[count - 1]]))
+        found[count], others = tag in message, len(set(message) - {tag})
     return found, others
 
 
@@ -78,14 +78,14 @@ def trust(world: World, all_read: Readings) -> tuple[bool | None, float]:
 def main() -> None:
     found: Counter[int] = Counter()
     greenhouses = alarms = tags = 0
-    said: Counter[tuple[str, bool | None, bool]] = Counter()
+    message: Counter[tuple[str, bool | None, bool]] = Counter()
     for sort in SORTS:
         for seed in JUDGING:
             world = world_of(sort, seed)
             all_read = world.read(AT_S + (max(AFTER) + 2) * world.round_s + 4 * HOUR_S, seed)
             for name, one in (("as usual", world), ("restless", restless(world, AT_S, seed))):
                 is_trusted, covers = trust(one, one.read(all_read.time_s[-1], seed))
-                said[name, is_trusted, covers < 0.7] += 1
+                message[name, is_trusted, covers < 0.7] += 1
             if sort in CHANGING:
                 continue
             greenhouses += 1
@@ -98,7 +98,7 @@ def main() -> None:
     )
     for count in AFTER:
         print(f"+{OFFSET:g} found after {count} scans: {found[count] / greenhouses:.2f}")
-    for name, trusted, is_narrow in sorted(said, key=str):
+    for name, trusted, is_narrow in sorted(message, key=str):
         what = "under 0.7" if is_narrow else "0.7 or more"
-        count = said[name, trusted, is_narrow]
+        count = message[name, trusted, is_narrow]
         print(f"{name}: is_trusted {trusted}, coverage {what}: {count}")

@@ -61,7 +61,7 @@ def truth_of(chance: np.random.Generator) -> Truth:
     return truth
 
 
-def house(tags: int, metres: float, seed: int, passes: int) -> tuple[Truth, Readings]:
+def greenhouse(tags: int, metres: float, seed: int, passes: int) -> tuple[Truth, Readings]:
     """The readings of each tag in that many rounds until 0 s."""
     chance = np.random.default_rng([seed, tags, int(metres)])
     truth, xy = truth_of(chance), chance.uniform(0.0, metres, (tags, 2))
@@ -74,7 +74,7 @@ def house(tags: int, metres: float, seed: int, passes: int) -> tuple[Truth, Read
 def judged(tags: int, metres: float, seed: int, phase: str) -> list[float]:
     """The error as a ratio to IDW's where that paints; the coverage over all cells."""
     passes, silent_s = PHASES[phase]
-    truth, received = house(tags, metres, seed, passes)
+    truth, received = greenhouse(tags, metres, seed, passes)
     readings = thinned(received, silent_s, DAY_S)
     cell_m = metres / CELLS
     field = idw_of(received, metres, metres, cell_m).ravel()

@@ -39,10 +39,10 @@ def costs(tags: int, each: int, metres: float, side: int) -> list[float]:
     readings = thinned(readings, at_s, DAY_S)
     resolution = metres / side
     box = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": metres, "bbox_max_y": metres}
-    newest = [FieldSample(x, y, 20.0) for x, y in readings.xy.tolist()]
+    latest = [FieldSample(x, y, 20.0) for x, y in readings.xy.tolist()]
     idw = partial(
         compute_idw_field,
-        newest,
+        latest,
         bbox_min_x=0.0,
         bbox_min_y=0.0,
         bbox_max_x=metres,

@@ -31,7 +31,7 @@ from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import SiteLog
 from tests.bench.journal_double import BEGUN_NS, Greenhouse, filled
 from tests.support.archive import Archive, forward_once
-from tests.support.journal import SECOND, kept, scan
+from tests.support.journal import SECOND, append, scan
 from tests.support.postgres import server
 
 TAGS, PROCESSES = 30, 2
@@ -84,7 +84,7 @@ class _Twin:
         rows = [
             scan(str(tag), now_ns - 1000 + tag, source="robot", **values) for tag in range(TAGS)
         ]
-        kept(path, rows, Clock(now_ns, now_ns, is_simulated=False))
+        append(path, rows, Clock(now_ns, now_ns, is_simulated=False))
         self._connection = sqlite3.connect(path, isolation_level=None)
         self._connection.execute("PRAGMA synchronous = OFF")
         self._series = [row[0] for row in self._connection.execute("SELECT series FROM series")]

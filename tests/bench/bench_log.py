@@ -44,7 +44,7 @@ def main() -> None:
     """Print the selected figures."""
     with tempfile.TemporaryDirectory(prefix="lupin-twin-log-") as folder:
         write(Path(folder))
-    ask(filled(YEAR), filled(MANY))
+    request(filled(YEAR), filled(MANY))
     restart(filled(MANY))
 
 
@@ -102,30 +102,30 @@ def handed_to_disk() -> int:
     return int(dict(line.split(": ") for line in lines)["wchar"])
 
 
-def ask(year: Filled, many: Filled) -> None:
-    begin, end = BEGUN_NS, year.house.end_ns
-    for house, requested in ((year, "3"), (many, "60")):
-        at_ns = (BEGUN_NS + house.house.end_ns) // 2
-        with closing(open_reader(house.path)) as reader:
-            assert len(state_at(reader, at_ns, "map").tags) == house.house.tags
+def request(year: Filled, many: Filled) -> None:
+    begin, end = BEGUN_NS, year.greenhouse.end_ns
+    for greenhouse, requested in ((year, "3"), (many, "60")):
+        at_ns = (BEGUN_NS + greenhouse.greenhouse.end_ns) // 2
+        with closing(open_reader(greenhouse.path)) as reader:
+            assert len(state_at(reader, at_ns, "map").tags) == greenhouse.greenhouse.tags
         report(
-            f"state as of a moment, {house.house.tags:,} tags, ms",
-            timed(house.path, lambda log, at_ns=at_ns: state_at(log, at_ns, "map")),  # type: ignore[misc]
+            f"state as of a moment, {greenhouse.greenhouse.tags:,} tags, ms",
+            timed(greenhouse.path, lambda log, at_ns=at_ns: state_at(log, at_ns, "map")),  # type: ignore[misc]
             requested,
         )
     sensor = SeriesRequest("7", "temperature", begin, end)
-    what = f"one sensor of {year.house.scans:,} scans as 500 buckets, ms"
+    what = f"one sensor of {year.greenhouse.scans:,} scans as 500 buckets, ms"
     report(what, timed(year.path, lambda log: series(log, sensor, end)), "10")
 
     def timeline(log: object) -> None:
         for event in TIMELINE:
             series(log, SeriesRequest(EVERY_TAG, event, begin, end), end)
 
-    what = f"timeline of {year.house.days:g} days, {year.readings:,} readings, ms"
+    what = f"timeline of {year.greenhouse.days:g} days, {year.readings:,} readings, ms"
     report(what, timed(year.path, timeline), "15")
     with closing(open_reader(many.path)) as reader:
         begun_s = time.process_time()
-        count = sum(map(len, exported(reader, BEGUN_NS, many.house.end_ns)))
+        count = sum(map(len, exported(reader, BEGUN_NS, many.greenhouse.end_ns)))
         rate = count / (time.process_time() - begun_s)
     report("readings exported a second", f"{rate:,.0f}", "-")
 
@@ -142,14 +142,14 @@ def timed(path: Path, query: Callable[[object], object]) -> str:
 
 
 def restart(many: Filled) -> None:
-    store, end_ns = TwinStore(), many.house.end_ns
+    store, end_ns = TwinStore(), many.greenhouse.end_ns
     begun_s, used_s = time.perf_counter(), time.process_time()
     journal = Journal(many.path, "/bench/lupin_twin", LIMITS)
     try:
         memory = Memory(store, journal)
         memory.follow(Clock(end_ns, end_ns, is_simulated=False))
         took = time.perf_counter() - begun_s, time.process_time() - used_s
-        assert len(store.snapshot(end_ns, "map").tags) == many.house.tags
+        assert len(store.snapshot(end_ns, "map").tags) == many.greenhouse.tags
     finally:
         journal.close(60.0)
     report("restart with 10,000 tags, s; of one core", f"{took[0]:.2f}; {took[1]:.2f}", "1.6")

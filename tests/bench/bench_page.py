@@ -11,7 +11,7 @@ from itertools import pairwise
 from playwright.sync_api import Browser, Page, ViewportSize, expect, sync_playwright
 
 from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
-from tests.support.messages import look, occupancy_grid, scan
+from tests.support.messages import inspection, occupancy_grid, scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
 
@@ -103,7 +103,7 @@ def fill(running: Bridge, tags: int, side_m: float, blooms: int) -> None:
         tag_id = str(index + 1)
         running.peer.observe(
             scan(tag_id, {"temperature": 18.0 + index % 12, "humidity": 55.0}, at=(x, y)),
-            look(tag_id, species, blooms=spots, flower_count=blooms, anomaly=index % 50 == 0),
+            inspection(tag_id, species, blooms=spots, flower_count=blooms, anomaly=index % 50 == 0),
         )
         if index % 20 == 19:  # what the latch holds of the 50 that it may
             wait_until_known(running, index + 1)

@@ -101,14 +101,17 @@ class Filled:
     """A journal, and its content."""
 
     path: Path
-    house: Greenhouse
+    greenhouse: Greenhouse
     readings: int
 
 
 @cache
-def filled(house: Greenhouse) -> Filled:
+def filled(greenhouse: Greenhouse) -> Filled:
     """The journal of a greenhouse, written once per process; it is deleted with the process."""
-    return fill(_folder() / f"{house.tags}-{house.days:g}-{house.every_s:g}.sqlite", house)
+    return fill(
+        _folder() / f"{greenhouse.tags}-{greenhouse.days:g}-{greenhouse.every_s:g}.sqlite",
+        greenhouse,
+    )
 
 
 @cache
@@ -118,15 +121,15 @@ def _folder() -> Path:
     return folder
 
 
-def fill(path: Path, house: Greenhouse) -> Filled:
+def fill(path: Path, greenhouse: Greenhouse) -> Filled:
     """Write all observations of a greenhouse, as its twin would."""
     readings = 0
     file = JournalFile(path, LIMITS, is_sound=True)
     with closing(file):
         run = file.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), is_believed=True).run
-        received = house.rows()
+        received = greenhouse.rows()
         while lot := list(islice(received, _BATCH)):
             file.append([(run, row) for row in lot])
             readings += sum(len(row.readings) for row in lot if isinstance(row, Scan))
             file.check_size(may_purge=False)
-    return Filled(path, house, readings)
+    return Filled(path, greenhouse, readings)

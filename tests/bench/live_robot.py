@@ -14,7 +14,7 @@ from typing import Any
 
 import httpx
 
-from tests.support.messages import look, scan
+from tests.support.messages import inspection, scan
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 
@@ -59,7 +59,7 @@ def tag_messages(tag_id: str, number: int) -> tuple[Any, Any]:
     blooms = [(x - 0.05, y), (x + 0.05, y)]
     return (
         scan(tag_id, {**readings, BEAT: 0.0} if tag_id == BEAT else readings, (x, y)),
-        look(tag_id, at=(x, y), flower_count=2, blooms=blooms, footprint=corners),
+        inspection(tag_id, at=(x, y), flower_count=2, blooms=blooms, footprint=corners),
     )
 
 

@@ -65,9 +65,9 @@ def _plain(chance: Chance) -> World:
     clouds = swing * chance.uniform(0.0, 0.4)
 
     def truth(xy: Floats, at_s: Floats) -> Floats:
-        house = 20.0 + swing * _day(at_s, phases[0]) + clouds * weather(at_s)
+        greenhouse = 20.0 + swing * _day(at_s, phases[0]) + clouds * weather(at_s)
         place: Floats = uneven * always(xy) + locally * daily(xy) * _day(at_s, phases[1])
-        return house + place
+        return greenhouse + place
 
     return World(
         size_m,

@@ -36,7 +36,7 @@ def request(app: FastAPI, method: str, path: str, prefix: str = "") -> httpx.Res
     return asyncio.run(answer())
 
 
-def ask(static_folder: Path, method: str, path: str) -> httpx.Response:
+def query(static_folder: Path, method: str, path: str) -> httpx.Response:
     """A request to an application without a twin."""
     return request(create_app(None, static_folder), method, path)
 
@@ -45,25 +45,25 @@ def test_it_describes_itself_without_a_twin_and_the_frameworks_own_pages_are_off
     tmp_path: Path,
 ) -> None:
     for path in ("/docs", "/openapi.json"):
-        assert ask(tmp_path, "GET", path).status_code == 200
+        assert query(tmp_path, "GET", path).status_code == 200
     for path in ("/redoc", "/docs/oauth2-redirect"):
-        assert ask(tmp_path, "GET", path).status_code == 404
+        assert query(tmp_path, "GET", path).status_code == 404
 
 
 def test_the_page_and_its_files_are_served_from_the_same_origin(static: Path) -> None:
-    page = ask(static, "GET", "/")
+    page = query(static, "GET", "/")
     assert (page.status_code, page.text) == (200, PAGE)
     assert page.headers["content-type"].startswith("text/html")
     assert "default-src 'self'" in page.headers["content-security-policy"]
-    script = ask(static, "GET", "/assets/a.js")
+    script = query(static, "GET", "/assets/a.js")
     assert script.headers["content-type"].startswith("text/javascript")
     assert script.headers["x-content-type-options"] == "nosniff"
-    assert ask(static, "HEAD", "/").text == ""
+    assert query(static, "HEAD", "/").text == ""
 
 
 def test_the_page_hides_no_route(static: Path) -> None:
     (static / "docs").write_text("a file of that name")
-    assert "API" in ask(static, "GET", "/docs").text
+    assert "API" in query(static, "GET", "/docs").text
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_the_page_hides_no_route(static: Path) -> None:
 def test_nothing_outside_the_folder_is_served(static: Path, path: str) -> None:
     (static / "link.txt").symlink_to(static.parent / "secret.txt")
     (static / "folder").symlink_to(static.parent)
-    answer = ask(static, "GET", path)
+    answer = query(static, "GET", path)
     assert answer.status_code == 404
     assert "root:" not in answer.text
     assert "secret" not in answer.text.replace("secret.txt", "")
@@ -93,7 +93,7 @@ def test_nothing_outside_the_folder_is_served(static: Path, path: str) -> None:
 @pytest.mark.parametrize("built", [True, False])
 @pytest.mark.parametrize("path", ["/nowhere", "/api/nowhere", "/api/field.gif", "/API/state"])
 def test_a_missing_path_is_reported_in_json(static: Path, path: str, built: bool) -> None:
-    answer = ask(static if built else static / "nonexistent", "GET", path)
+    answer = query(static if built else static / "nonexistent", "GET", path)
     assert answer.status_code == 404
     message = schema.ErrorMessage.model_validate_json(answer.content)
     assert message.detail == f"there is nothing at {path!r}; see /docs"
@@ -126,4 +126,4 @@ def test_a_missing_websocket_is_refused_in_json(static: Path, built: bool) -> No
 
 
 def test_a_long_path_is_shortened_in_the_answer(tmp_path: Path) -> None:
-    assert len(ask(tmp_path, "GET", "/" + "x" * 4_000).text) < 300
+    assert len(query(tmp_path, "GET", "/" + "x" * 4_000).text) < 300

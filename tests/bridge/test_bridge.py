@@ -237,14 +237,14 @@ async def test_a_busy_memory_at_the_start_is_queried_again(
         answers = iter([NotRemembered("busy"), TwinUnavailableError("gone")])
         tag_id = f"t{4 * hour_ns}"
 
-        async def ask(*_: object) -> tuple[PastWrite, ...]:
+        async def query(*_: object) -> tuple[PastWrite, ...]:
             for error in answers:
                 raise error
             return tuple(
                 PastWrite(n, 1, tag_id, hour_ns * n, 0, 0, ("co2",), (400.0,)) for n in range(1, 5)
             )
 
-        monkeypatch.setattr(stage.script, "ask", ask)
+        monkeypatch.setattr(stage.script, "ask", query)
         stage.script.tell(state(4 * hour_ns))
 
         def is_learnt() -> bool:

@@ -30,7 +30,7 @@ async def test_a_robot_is_not_reported_as_stopped_before_the_log_was_read(
 ) -> None:
     requested, may_answer = asyncio.Event(), asyncio.Event()
 
-    async def ask(*_: object) -> tuple[PastWrite, ...]:
+    async def query(*_: object) -> tuple[PastWrite, ...]:
         requested.set()
         await may_answer.wait()
         if error is not None:
@@ -38,20 +38,20 @@ async def test_a_robot_is_not_reported_as_stopped_before_the_log_was_read(
         return ()
 
     stage = Stage(frames_per_s=1000.0)
-    stage.script.ask = ask  # type: ignore[method-assign]
+    stage.script.ask = query  # type: ignore[method-assign]
     tags = judged_state(1).snapshot.tags
     async with stage:
         for number in (1, 2):
             later = TwinUpdate(Snapshot((2_000 + number) * 10**9, "map", tags), f"r{number}")
             stage.script.tell(later)
             await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
-            house = stage.ear.states[-1]["health"]["house"]
+            greenhouse = stage.ear.states[-1]["health"]["house"]
             if number == 1:
-                assert house["verdict"] == "healthy"
+                assert greenhouse["verdict"] == "healthy"
                 await requested.wait()
                 may_answer.set()
                 await until(lambda: stage.bridge._judge.knows_recent, "the log's word")
-        assert [reason["kind"] for reason in house["reasons"]] == ["stopped"]
+        assert [reason["kind"] for reason in greenhouse["reasons"]] == ["stopped"]
 
 
 async def test_a_state_that_cannot_be_judged_is_sent_with_everything_unknown(

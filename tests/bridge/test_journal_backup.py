@@ -11,7 +11,7 @@ import pytest
 
 from lupin_bridge.cli.command import main
 from lupin_bridge.console import backup
-from tests.support.journal import NOW, kept
+from tests.support.journal import NOW, append
 from tests.support.journal import scan as row
 from tests.support.messages import scan
 from tests.support.processes import lupin_twin, url_of
@@ -80,7 +80,7 @@ def test_nothing_is_overwritten_and_a_failed_backup_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = tmp_path / "twin.sqlite"
-    kept(source, [row(at_ns=NOW + n, a=n / 3) for n in range(2000)])
+    append(source, [row(at_ns=NOW + n, a=n / 3) for n in range(2000)])
     taken = tmp_path / "taken"
     taken.write_text("mine", encoding="ascii")
     for target, why in (
@@ -89,16 +89,16 @@ def test_nothing_is_overwritten_and_a_failed_backup_is_named(
         (tmp_path / "none" / "copy", "No such file or directory"),
     ):
         assert main(["journal", "backup", str(target), "--journal", str(source)]) == 1
-        said = capsys.readouterr().err
-        assert said.startswith("lupin-twin: ")
-        assert str(target) in said
-        assert said.endswith(f"{why}\n")
+        message = capsys.readouterr().err
+        assert message.startswith("lupin-twin: ")
+        assert str(target) in message
+        assert message.endswith(f"{why}\n")
     assert taken.read_text(encoding="ascii") == "mine"
 
 
 def test_a_failed_backup_leaves_no_file(tmp_path: Path) -> None:
     source, copy = tmp_path / "twin.sqlite", tmp_path / "copy.sqlite"
-    kept(source, [row(at_ns=NOW + n, a=n / 3) for n in range(2000)])
+    append(source, [row(at_ns=NOW + n, a=n / 3) for n in range(2000)])
     assert source.stat().st_size > 40_960
     # A limit of 40 kB a file: enough for SQLite's 32 kB beside the journal, not for the copy.
     # Its signal is ignored, so that SQLite sees the error.

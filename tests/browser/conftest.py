@@ -104,7 +104,7 @@ def bridge_of_a_moment() -> Iterator[tuple[Bridge, float]]:
 
 
 @pytest.fixture(scope="package")
-def house() -> Iterator[Bridge]:
+def greenhouse() -> Iterator[Bridge]:
     """A server with the greenhouse of `greenhouse.py`, for tests that change nothing in it.
 
     No pin fades between two pictures.
@@ -126,9 +126,9 @@ def open_page(browser: Browser) -> Iterator[OpenPage]:
 
 
 @pytest.fixture
-def hmi(house: Bridge, open_page: OpenPage) -> Hmi:
+def hmi(greenhouse: Bridge, open_page: OpenPage) -> Hmi:
     """A page that shows the whole greenhouse."""
-    page = open_page(house.url)
+    page = open_page(greenhouse.url)
     page.expect_rows(*TAGS)
     page.expect_samples(3)
     page.expect_layout()

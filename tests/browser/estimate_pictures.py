@@ -23,7 +23,7 @@ from lupin_patrol.mission import past
 from lupin_patrol.perception import FREE, OCCUPIED, RESOLUTION_M
 from lupin_twin.core.state import Scan, Write
 from lupin_twin.journal.runs import Clock
-from tests.support.journal import SECOND, kept
+from tests.support.journal import SECOND, append
 from tests.support.messages import occupancy_grid, pose, scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge, filled
@@ -59,7 +59,7 @@ def taken(browser: Browser, folder: Path) -> None:
         reported, end_ns = remembered(now_ns), now_ns - GRADED_S * SECOND
         known = [row for row in reported if row.stamp_ns <= end_ns]
         robot = Robot(row for row in reported if isinstance(row, Scan) and row.stamp_ns > end_ns)
-        kept(journal, known, Clock(now_ns, now_ns, is_simulated=False))
+        append(journal, known, Clock(now_ns, now_ns, is_simulated=False))
         world = ("--world", f"day_length_s={DAY_S}")
         with bridge(*world, "--ros-args", "-p", f"journal:={journal}") as running:
             running.peer.publish_map(greenhouse_map())

@@ -4,7 +4,7 @@ from typing import Any
 
 from lupin_msgs.msg import Observation
 
-from tests.support.messages import discovered, look, occupancy_grid, pose, scan
+from tests.support.messages import discovered, inspection, occupancy_grid, pose, scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge
 
@@ -22,9 +22,9 @@ def observations() -> list[Any]:
         scan("2", {"temperature": 23.0, "co2": 600.0}, at=(3, 1)),
         scan("3", {"humidity": 70.0, "co2": float("nan")}, at=(3, 3)),
         scan("failed", status=Observation.STATUS_SCAN_FAILED, at=(2, 2)),
-        look("1", "lupin", blooms=[(0.8, 1.0), (1.2, 1.0)], flower_count=2, footprint=box),
-        look("2", "tomato", blooms=[(2.9, 1.0)], flower_count=1, footprint=box),
-        look("10", "lupin", anomaly=True, bug_count=3),
+        inspection("1", "lupin", blooms=[(0.8, 1.0), (1.2, 1.0)], flower_count=2, footprint=box),
+        inspection("2", "tomato", blooms=[(2.9, 1.0)], flower_count=1, footprint=box),
+        inspection("10", "lupin", anomaly=True, bug_count=3),
     ]
 
 

@@ -45,9 +45,9 @@ def violations(hmi: Hmi) -> list[str]:
     ("viewport", "query"), [(WIDE, "?kiosk=1"), (PHONE, "")], ids=["kiosk", "phone"]
 )
 def test_the_page_as_it_opens(
-    house: Bridge, open_page: OpenPage, viewport: dict[str, int], query: str
+    greenhouse: Bridge, open_page: OpenPage, viewport: dict[str, int], query: str
 ) -> None:
-    hmi = open_page(house.url, "tag=10", query, viewport=viewport, bypass_csp=True)
+    hmi = open_page(greenhouse.url, "tag=10", query, viewport=viewport, bypass_csp=True)
     hmi.expect_samples(3)
     assert violations(hmi) == []
     if viewport is PHONE:
@@ -56,8 +56,8 @@ def test_the_page_as_it_opens(
         assert violations(hmi) == []
 
 
-def test_what_opens_on_demand(house: Bridge, open_page: OpenPage) -> None:
-    hmi = open_page(house.url, "tag=10", bypass_csp=True)
+def test_what_opens_on_demand(greenhouse: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(greenhouse.url, "tag=10", bypass_csp=True)
     hmi.expect_rows(*TAGS)
     hmi.expect_samples(3)
     assert violations(hmi) == []
@@ -80,9 +80,9 @@ def test_what_opens_on_demand(house: Bridge, open_page: OpenPage) -> None:
     assert violations(hmi) == []
 
 
-def test_table_alarms_and_charts(house: Bridge, open_page: OpenPage) -> None:
+def test_table_alarms_and_charts(greenhouse: Bridge, open_page: OpenPage) -> None:
     """In the colouring that is not the default."""
-    hmi = open_page(house.url, "colour=value&chart.tag=10&tag=10", bypass_csp=True)
+    hmi = open_page(greenhouse.url, "colour=value&chart.tag=10&tag=10", bypass_csp=True)
     hmi.expect_rows(*TAGS)
     hmi.page.get_by_role("button", name="Show as table").first.click()
     expect(hmi.test_id("series-table").first).to_be_visible()

@@ -31,11 +31,11 @@ def act(hmi: Hmi, tag: str, what: str) -> None:
 def active(running: Bridge, count: int) -> list[dict[str, Any]]:
     """The bridge's active alarms, once there are that many."""
 
-    def look() -> list[dict[str, Any]] | None:
+    def check() -> list[dict[str, Any]] | None:
         alarms: list[dict[str, Any]] = running.json("/api/alarms", active=1)["alarms"]
         return alarms if len(alarms) == count else None
 
-    found = wait_for(look, f"{count} active alarms")
+    found = wait_for(check, f"{count} active alarms")
     assert found is not None
     return found
 

@@ -16,8 +16,8 @@ def with_areas(route: Route) -> None:
     route.fulfill(response=answer, json={**answer.json(), "areas": AREAS})
 
 
-def test_the_table_by_area_has_the_worst_first(house: Bridge, open_page: OpenPage) -> None:
-    hmi = open_page(house.url, go=False, bypass_csp=True)
+def test_the_table_by_area_has_the_worst_first(greenhouse: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(greenhouse.url, go=False, bypass_csp=True)
     hmi.page.route("**/api/sensors", with_areas)
     hmi.go("tag=10")
     hmi.expect_rows(*TAGS)

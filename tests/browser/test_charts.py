@@ -17,7 +17,7 @@ from PIL import Image
 from playwright.sync_api import Locator, expect
 
 from tests.browser.hmi import PHONE, Hmi, OpenPage
-from tests.support.messages import look, scan, set_stamp
+from tests.support.messages import inspection, scan, set_stamp
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
 
@@ -70,7 +70,7 @@ class Garden:
         )
         running.peer.observe(
             scan("1", status=Observation.STATUS_SCAN_FAILED, at=(1, 1), stamp_s=self.now_s - 4990),
-            look("1", "lupin", stamp_s=self.now_s - 4500),
+            inspection("1", "lupin", stamp_s=self.now_s - 4500),
         )
         running.tag("1", lambda tag: tag["species"] == "lupin")
 

@@ -143,8 +143,8 @@ WATCH_LABELS = """
 """
 
 
-def test_a_label_is_as_wide_as_its_text(house: Bridge, open_page: OpenPage) -> None:
-    hmi = open_page(house.url, go=False)
+def test_a_label_is_as_wide_as_its_text(greenhouse: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(greenhouse.url, go=False)
     hmi.page.add_init_script(WATCH_LABELS)
     hmi.go()
     hmi.expect_samples(3)

@@ -24,19 +24,19 @@ def url() -> object:
 @pytest.fixture
 def page(browser: Browser) -> object:
     """A page; any error in the browser's console fails the test."""
-    said: list[str] = []
+    wording: list[str] = []
     context = browser.new_context()
     page = context.new_page()
 
     def receive(message: ConsoleMessage) -> None:
         if message.type in ("error", "warning"):
-            said.append(message.text)
+            wording.append(message.text)
 
     page.on("console", receive)
-    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("pageerror", lambda error: wording.append(str(error)))
     yield page
     context.close()
-    assert said == []
+    assert wording == []
 
 
 def test_every_page_was_built_and_all_together_are_small() -> None:

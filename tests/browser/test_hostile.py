@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 
 from tests.browser.hmi import PHONE, Hmi, OpenPage
 from tests.support.domains import own_domain
-from tests.support.messages import look, occupancy_grid, scan
+from tests.support.messages import inspection, occupancy_grid, scan
 from tests.support.web import Bridge, bridge
 
 SCRIPT = "<script>alert('tag')</script>"
@@ -43,7 +43,7 @@ def hostile() -> Iterator[Bridge]:
             at = (1 + index % 4, 1 + index // 4)
             running.peer.observe(
                 scan(tag_id, {"temperature": 10.0 + index, **readings}, at=at),
-                look(
+                inspection(
                     tag_id, IMAGE * (1 + 2000 * (index == 0)), blooms=[at], anomaly=index % 2 == 0
                 ),
             )

@@ -19,9 +19,9 @@ _NONE_IS_CUT = """() => {
 
 
 def test_a_wall_screen_that_is_touched_stays_as_its_link_says(
-    house: Bridge, open_page: OpenPage
+    greenhouse: Bridge, open_page: OpenPage
 ) -> None:
-    wall = open_page(house.url, "sensor=humidity&tag=1", "?kiosk=1", has_touch=True)
+    wall = open_page(greenhouse.url, "sensor=humidity&tag=1", "?kiosk=1", has_touch=True)
     wall.expect_samples(3)
     picture, view, address = wall.settled_picture(), wall.view(), wall.address()
     x, y = view.pixel(1, 3)
@@ -51,9 +51,9 @@ def test_a_wall_screen_that_is_touched_stays_as_its_link_says(
 
 
 def test_a_wall_screen_rotates_and_the_named_key_leaves_it(
-    house: Bridge, open_page: OpenPage
+    greenhouse: Bridge, open_page: OpenPage
 ) -> None:
-    wall = open_page(house.url, "sensor=temperature", "?kiosk=1&cycle=5")
+    wall = open_page(greenhouse.url, "sensor=temperature", "?kiosk=1&cycle=5")
     note, legend = wall.test_id("kiosk-note"), wall.test_id("legend")
     expect(note).to_contain_text(re.compile(r"Temperature next: Humidity in [1-5]\u00a0s"))
     # Too low for the whole list: it shows the number left, and cuts none in two.
@@ -89,10 +89,15 @@ def _middle(wall: Hmi, part: str) -> float:
 
 
 def test_on_a_phone_open_actions_come_first_in_full_and_the_page_scrolls(
-    house: Bridge, open_page: OpenPage
+    greenhouse: Bridge, open_page: OpenPage
 ) -> None:
     wall = open_page(
-        house.url, "sensor=humidity", "?kiosk=1", viewport=PHONE, has_touch=True, is_mobile=True
+        greenhouse.url,
+        "sensor=humidity",
+        "?kiosk=1",
+        viewport=PHONE,
+        has_touch=True,
+        is_mobile=True,
     )
     wall.expect_samples(3)
     needs = wall.page.locator("li[data-fits]")
@@ -127,8 +132,10 @@ BREAK: Final = """() => {
 }"""
 
 
-def test_a_wall_screen_that_fails_recovers_by_itself(house: Bridge, open_page: OpenPage) -> None:
-    wall = open_page(house.url, "sensor=humidity", "?kiosk=1")
+def test_a_wall_screen_that_fails_recovers_by_itself(
+    greenhouse: Bridge, open_page: OpenPage
+) -> None:
+    wall = open_page(greenhouse.url, "sensor=humidity", "?kiosk=1")
     wall.expect_samples(3)
     wall.allow_noise("no more canvas")
     wall.page.evaluate(BREAK)

@@ -33,12 +33,12 @@ CONTROLS = "button, a[href]:not(.skip), input, .legend li, .legend-title, .legen
 
 
 @pytest.fixture
-def open_at(house: Bridge, open_page: OpenPage) -> Callable[..., Hmi]:
+def open_at(greenhouse: Bridge, open_page: OpenPage) -> Callable[..., Hmi]:
     """`open_at(size, fragment, query, **options)`: the greenhouse in a window of that size."""
 
     def open_one(size: Size, fragment: str = "", query: str = "", **options: object) -> Hmi:
         viewport = {"width": size[0], "height": size[1]}
-        hmi = open_page(house.url, fragment, query, viewport=viewport, **options)
+        hmi = open_page(greenhouse.url, fragment, query, viewport=viewport, **options)
         hmi.expect_samples()
         hmi.settled_picture()
         return hmi
@@ -115,8 +115,10 @@ def test_below_the_layers_their_labelled_choices_are_always_in_sight(
     assert heat.top >= place(hmi.page.locator(".layer-list")).bottom
 
 
-def test_the_label_of_now_has_one_line_of_the_time_bar(house: Bridge, open_page: OpenPage) -> None:
-    hmi = open_page(house.url, query="?lang=es", viewport={"width": 1100, "height": 800})
+def test_the_label_of_now_has_one_line_of_the_time_bar(
+    greenhouse: Bridge, open_page: OpenPage
+) -> None:
+    hmi = open_page(greenhouse.url, query="?lang=es", viewport={"width": 1100, "height": 800})
     now = hmi.test_id("timebar-when")
     expect(now).to_have_text("En directo")
     assert place(now).bottom - place(now).top < 24
@@ -132,10 +134,12 @@ _CUT_CHOICE = """(e) => {
 }"""
 
 
-def test_a_laptop_has_room_for_what_the_heat_map_shows(house: Bridge, open_page: OpenPage) -> None:
+def test_a_laptop_has_room_for_what_the_heat_map_shows(
+    greenhouse: Bridge, open_page: OpenPage
+) -> None:
     for language, width in (("en", 1100), ("nl", 1100), ("de", 1280)):
         size = {"width": width, "height": 720}
-        hmi = open_page(house.url, query=f"?lang={language}", viewport=size)
+        hmi = open_page(greenhouse.url, query=f"?lang={language}", viewport=size)
         choice = hmi.test_id("heat-legend")
         expect(choice).to_be_visible()
         assert (language == "nl") == (choice.evaluate(_CUT_CHOICE) > 0), language
@@ -387,8 +391,8 @@ LANGUAGES = {
 }
 
 
-def test_every_language_has_room_on_a_phone(house: Bridge, open_page: OpenPage) -> None:
-    hmi = open_page(house.url, go=False)
+def test_every_language_has_room_on_a_phone(greenhouse: Bridge, open_page: OpenPage) -> None:
+    hmi = open_page(greenhouse.url, go=False)
     for language, (contribute, reading) in LANGUAGES.items():
         hmi.resize(**PHONE)
         hmi.go(query=f"?lang={language}")

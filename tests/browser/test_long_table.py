@@ -30,11 +30,11 @@ setInterval(() => { if (document.querySelector('tr[data-tag-id]')) house.idle();
 
 
 @pytest.fixture
-def open_greenhouse(house: Bridge, open_page: OpenPage) -> OpenHouse:
+def open_greenhouse(greenhouse: Bridge, open_page: OpenPage) -> OpenHouse:
     """`open_house(tags, fragment, **options)`: the page with a greenhouse of that many tags."""
 
     def open_one(tags: int = TAGS, fragment: str = "", **options: object) -> Hmi:
-        hmi = open_page(house.url, go=False, **options)
+        hmi = open_page(greenhouse.url, go=False, **options)
         hmi.page.add_init_script(greenhouse_of(tags) + GOES_ON)
         hmi.go(fragment)
         expect(hmi.page.locator("tr[data-tag-id]").first).to_be_attached()

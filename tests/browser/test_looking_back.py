@@ -17,7 +17,7 @@ from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from tests.browser.hmi import PHONE, Hmi, OpenPage, point, press_at, slider
 from tests.browser.test_accessibility import violations
-from tests.support.journal import SECOND, kept, look, pin, scan
+from tests.support.journal import SECOND, append, inspection, pin, scan
 from tests.support.messages import scan as observed
 from tests.support.web import Bridge, bridge
 
@@ -63,14 +63,14 @@ def hour(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hour]:
     begun_s = int(time.time()) - EVERY_S * SCANS
     begun_ns = begun_s * SECOND
     rows: list[Write] = [pin(tag, begun_ns, x=PLACES[tag]) for tag in TAGS]
-    rows.append(look("b", begun_ns + 600 * SECOND, anomaly=True))
-    rows += [look("b", begun_ns + second * SECOND) for second in (900, 901)]
+    rows.append(inspection("b", begun_ns + 600 * SECOND, anomaly=True))
+    rows += [inspection("b", begun_ns + second * SECOND) for second in (900, 901)]
     rows += [
         scan(tag, begun_ns + number * EVERY_S * SECOND, temperature=18.0 + number % 40 / 10)
         for number in range(SCANS)
         for tag in TAGS
     ]
-    kept(journal, rows, Clock(begun_ns, begun_ns, is_simulated=False))
+    append(journal, rows, Clock(begun_ns, begun_ns, is_simulated=False))
     with bridge("--ros-args", "-p", f"journal:={journal}") as running:
         running.peer.observe(*(observed(tag, {"temperature": NOW_READS}) for tag in TAGS))
         for tag in TAGS:

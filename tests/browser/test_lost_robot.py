@@ -10,7 +10,7 @@ from playwright.sync_api import WebSocketRoute, expect
 
 from tests.browser.hmi import Hmi, OpenPage, View
 from tests.support.domains import own_domain
-from tests.support.messages import look, scan
+from tests.support.messages import inspection, scan
 from tests.support.web import Bridge, bridge
 
 AT_HOME: Final = {"1": (0.0, 0.0), "2": (4.0, 0.0), "3": (0.0, 3.0), "4": (4.0, 3.0)}
@@ -28,7 +28,7 @@ def site() -> Iterator[Bridge]:
             running.peer.observe(scan(tag_id, {"temperature": 20.0 + at[0]}, at=at))
         running.peer.observe(
             scan("lost", {"temperature": 30.0}, at=(5000.0, 1.0)),
-            look("1", "lupin", blooms=[(4995.0, 1.0)], footprint=PLANTER),
+            inspection("1", "lupin", blooms=[(4995.0, 1.0)], footprint=PLANTER),
         )
         running.tag("1", lambda tag: tag["species"])
         yield running

@@ -272,9 +272,9 @@ def test_help_takes_the_focus_and_no_key_reaches_through_it(hmi: Hmi) -> None:
 
 
 def test_the_page_uses_the_language_of_the_browser_or_the_address_or_the_menu(
-    house: Bridge, open_page: OpenPage
+    greenhouse: Bridge, open_page: OpenPage
 ) -> None:
-    hmi = open_page(house.url, "sensor=humidity&tag=1", locale="de-AT")
+    hmi = open_page(greenhouse.url, "sensor=humidity&tag=1", locale="de-AT")
     expect(hmi.test_id("legend")).to_contain_text("Luftfeuchte")
     expect(hmi.card("1")).to_contain_text("Messpunkt 1")
     assert hmi.page.evaluate(_BROKEN) == []
@@ -283,11 +283,11 @@ def test_the_page_uses_the_language_of_the_browser_or_the_address_or_the_menu(
     expect(hmi.test_id("legend")).to_contain_text("Luchtvochtigheid")
     expect(hmi.card("1")).to_contain_text("Meetpunt 1")
     assert hmi.page.evaluate(_BROKEN) == []
-    kept = {"sensor": ["humidity"], "tag": ["1"]}
+    stored = {"sensor": ["humidity"], "tag": ["1"]}
     hmi.expect(
         lambda: (
             urlsplit(hmi.address()).query == "lang=nl"
-            and kept.items() <= parse_qs(urlsplit(hmi.address()).fragment).items()
+            and stored.items() <= parse_qs(urlsplit(hmi.address()).fragment).items()
         ),
         "the language in the address, beside the view",
     )
@@ -334,9 +334,9 @@ _HEADS_TOO_CLOSE = """() => {
 
 
 def test_in_each_language_heads_stay_apart_and_whole_and_the_chosen_sensor_moves_no_age(
-    house: Bridge, open_page: OpenPage
+    greenhouse: Bridge, open_page: OpenPage
 ) -> None:
-    hmi = open_page(house.url, go=False)
+    hmi = open_page(greenhouse.url, go=False)
     for language in ("en", "de", "nl", "es"):
         hmi.go(query=f"?lang={language}")
         hmi.resize(360, 1024)

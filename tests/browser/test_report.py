@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page, ViewportSize, expect
 
 from tests.browser.hmi import FONTS, OpenPage
 from tests.browser.places import place
-from tests.support.messages import look, scan
+from tests.support.messages import inspection, scan
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
 
@@ -36,7 +36,7 @@ def troubled(browser: Browser) -> Iterator[Bridge]:  # created before the page
             running.peer.observe(
                 scan(tag_id, {"temperature": 21.5, "humidity": 60.0, "a" * 100: 1e300})
             )
-            running.peer.observe(look(tag_id, anomaly=True, bug_count=3))
+            running.peer.observe(inspection(tag_id, anomaly=True, bug_count=3))
             if number % 20 == 0:  # no queue has room for all
                 wait_for(partial(has_tags, running, number), "tags")
         wait_for(lambda: counts(running)["raised"] == len(TAGS), "the alarms in the report")
@@ -127,9 +127,9 @@ def test_on_a_dark_phone_it_is_light_and_only_a_wide_table_scrolls(
         assert colour == "rgb(255, 255, 255)"
 
 
-def test_on_a_phone_an_alarm_has_room(house: Bridge, browser: Browser) -> None:
+def test_on_a_phone_an_alarm_has_room(greenhouse: Bridge, browser: Browser) -> None:
     with browser.new_context(viewport={"width": 390, "height": 844}) as context:
         page = context.new_page()
-        page.goto(f"{house.url}/api/report.html?lang=nl")
+        page.goto(f"{greenhouse.url}/api/report.html?lang=nl")
         hidden = "table => table.scrollWidth - table.clientWidth"
         assert [it.evaluate(hidden) for it in page.locator("table.alarms").all()] == [0]

@@ -53,9 +53,9 @@ def is_on_the_screen(hmi: Hmi, part: Image.Image, at: tuple[int, int], ratio: in
     return changed_box(shown, part) is None
 
 
-def test_the_map_as_png_equals_the_screen(house: Bridge, open_page: OpenPage) -> None:
+def test_the_map_as_png_equals_the_screen(greenhouse: Bridge, open_page: OpenPage) -> None:
     for options, ratio in (({}, 1), ({"device_scale_factor": 2, "viewport": PHONE}, 2)):
-        hmi = open_page(house.url, "colour=value&layers=map,field,boxes", **options)
+        hmi = open_page(greenhouse.url, "colour=value&layers=map,field,boxes", **options)
         hmi.expect_samples(3)
         hmi.settled_picture()
         download = save(hmi, "Save map as PNG")
@@ -83,13 +83,15 @@ def test_the_map_as_png_equals_the_screen(house: Bridge, open_page: OpenPage) ->
         assert min(abs(length - metres) for metres in (0.5, 1, 2)) < 3 / view.scale
 
 
-def test_copying_the_link_works_or_says_where_it_is(house: Bridge, open_page: OpenPage) -> None:
-    hmi = open_page(house.url, "sensor=co2", permissions=["clipboard-read", "clipboard-write"])
+def test_copying_the_link_works_or_says_where_it_is(
+    greenhouse: Bridge, open_page: OpenPage
+) -> None:
+    hmi = open_page(greenhouse.url, "sensor=co2", permissions=["clipboard-read", "clipboard-write"])
     hmi.expect_rows(*TAGS)
     hmi.page.get_by_role("button", name="Menu").click()
     hmi.page.get_by_role("button", name="Copy link").click()
     expect(hmi.page.locator(".toast")).to_have_text("Link copied")
-    assert hmi.page.evaluate("navigator.clipboard.readText()") == f"{house.url}/#sensor=co2"
+    assert hmi.page.evaluate("navigator.clipboard.readText()") == f"{greenhouse.url}/#sensor=co2"
 
 
 def luminance(pixel: object) -> float:
@@ -120,9 +122,11 @@ CUT = """it => [it, ...it.closest('td').querySelectorAll('*'), it.closest('td')]
     .map(each => each.outerHTML)"""
 
 
-def test_paper_has_every_row_and_its_time_and_is_light(house: Bridge, open_page: OpenPage) -> None:
+def test_paper_has_every_row_and_its_time_and_is_light(
+    greenhouse: Bridge, open_page: OpenPage
+) -> None:
     # Where the floor is most of the picture, and the coloured field is not.
-    hmi = open_page(house.url, "view=2,2,20", color_scheme="dark")
+    hmi = open_page(greenhouse.url, "view=2,2,20", color_scheme="dark")
     hmi.expect_rows(*TAGS)
     hmi.expect_samples(3)
     hmi.expect_map()

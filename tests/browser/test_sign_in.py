@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from tests.browser.hmi import FONTS, slow_down
 from tests.support.access import TOKEN, Served, served
-from tests.support.messages import look
+from tests.support.messages import inspection
 from tests.support.people import PASSWORD, add
 from tests.support.waiting import PATIENCE_S
 from tests.support.web import bridge
@@ -75,7 +75,7 @@ def test_with_a_name_the_page_says_who_sees_what_is_done_to_alarms(
     add(accounts, anna="operator", vera="viewer")
     with bridge("--accounts", str(accounts), domain=domain) as running:
         running.peer.wait_for_twin()
-        running.peer.observe(look("a", anomaly=True))
+        running.peer.observe(inspection("a", anomaly=True))
         for name, words in (("anna", "Signed in as anna"), ("vera", "vera (viewer)")):
             with browser.new_context() as context:
                 context.set_default_timeout(PATIENCE_S * 1000)
@@ -101,11 +101,11 @@ def test_a_wrong_token_can_be_corrected_and_nothing_of_the_right_one_is_stored(
     sign_in(page, f" {TOKEN} ")
     expect_live(page)
 
-    kept = page.evaluate(
+    stored = page.evaluate(
         "() => JSON.stringify([{...localStorage}, {...sessionStorage}, document.cookie])"
     )
-    assert TOKEN not in kept
-    assert "lupin_session" not in kept, "scripts do not see the cookie"
+    assert TOKEN not in stored
+    assert "lupin_session" not in stored, "scripts do not see the cookie"
     (cookie,) = page.context.cookies()
     assert cookie["httpOnly"]
     assert cookie["sameSite"] == "Strict"

@@ -12,8 +12,8 @@ from tests.support.web import Bridge
 
 
 @pytest.fixture
-def phone(house: Bridge, open_page: OpenPage) -> Hmi:
-    hmi = open_page(house.url, viewport=PHONE, has_touch=True, is_mobile=True)
+def phone(greenhouse: Bridge, open_page: OpenPage) -> Hmi:
+    hmi = open_page(greenhouse.url, viewport=PHONE, has_touch=True, is_mobile=True)
     hmi.expect_samples(3)
     hmi.settled_picture()
     return hmi

@@ -11,7 +11,7 @@ from lupin_patrol.greenhouse import read_greenhouse
 from lupin_patrol.mission import DAYS, PAST_SOURCE, START_OF_DAY_S, past
 from lupin_twin.core.state import Pin, Scan, Write
 from tests.support.climate import Truth
-from tests.support.journal import NOW, kept, scan, select
+from tests.support.journal import NOW, append, scan, select
 
 DAY_SPEED = 60.0
 SHORT = ["--speed=50"]
@@ -114,7 +114,7 @@ def test_it_fills_a_new_journal_and_leaves_a_used_one_alone(tmp_path: Path) -> N
     assert made_of == [(PAST_SOURCE, 0)]
     assert select(path, "SELECT count(*) > 3 FROM look") == [(1,)]
     theirs = tmp_path / "theirs.sqlite"
-    kept(theirs, [scan()])
+    append(theirs, [scan()])
     assert fill_past(theirs, parser().parse_args(SHORT)) == 0
     assert select(theirs, "SELECT count(*) FROM scan") == [(1,)]
 

@@ -81,14 +81,14 @@ def main(hours: int = HOURS) -> bool:
         journal.close(60.0)  # the last fold may take longer than a twin would wait
         memory.close()
         size, whole = path.stat().st_size, is_whole(path)
-        ((kept,),) = select(path, "SELECT count(*) FROM scan")
+        ((stored,),) = select(path, "SELECT count(*) FROM scan")
     # By the sizes of their rows.
     computed = count * (SCAN / FULL + ENTRY / SPREAD) + hours * TAGS * ROLLUP / SPREAD
     readings = count * len(SENSORS)
     print(
-        f"{kept} scans of {count} in the file, whole: {whole}; {size / 1e6:.1f} MB, computed"
+        f"{stored} scans of {count} in the file, whole: {whole}; {size / 1e6:.1f} MB, computed"
         f" {computed / 1e6:.1f} MB; {size / readings:.1f} bytes a reading; resident up to the"
         f" third hour {max(resident[:3]):.0f} MB, up to the end {max(resident):.0f} MB"
     )
     is_flat = max(resident) < 1.05 * max(resident[:3])
-    return is_flat and whole and kept == count and 0.85 < size / computed < 1.15
+    return is_flat and whole and stored == count and 0.85 < size / computed < 1.15

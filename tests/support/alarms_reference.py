@@ -89,17 +89,17 @@ def _readings(occasion: list[PastWrite]) -> dict[str, float]:
 
 
 def _light(of_run: list[PastWrite], at_ns: int) -> bool | None:
-    newest: dict[str, tuple[int, float]] = {}
+    latest: dict[str, tuple[int, float]] = {}
     scanned: dict[str, int] = {}
     for write in of_run:
         if write.stamp_ns <= at_ns:
             for name, value in zip(write.sensors, write.values, strict=True):
                 scanned[write.tag_id] = write.stamp_ns
                 if name == "light":
-                    newest[write.tag_id] = write.stamp_ns, value
+                    latest[write.tag_id] = write.stamp_ns, value
     lights = [
         value
-        for tag_id, (reported_ns, value) in newest.items()
+        for tag_id, (reported_ns, value) in latest.items()
         if math.isfinite(value) and scanned[tag_id] - reported_ns <= LEFT_OUT
     ]
     bright = sum(value >= 50.0 for value in lights)
@@ -124,13 +124,13 @@ def _of_tag(
         seen = (w.species for w in reversed(occasion) if w.has_seen and w.species)
         species = next(seen, species)
         is_day = day_of(_light(of_run, at), at)
-        for key, said in (
+        for key, message in (
             *_of_readings(occasion, sensors),
             *_of_ranges(occasion, sensors, species, is_day=is_day),
             *_of_attempts(occasion, [one for one in scans if one <= at]),
             *_of_silent_sensors(at, occasions, [one for one in scans if one <= at]),
         ):
-            matters.setdefault(key, []).append(said)
+            matters.setdefault(key, []).append(message)
     ended_ns = None if is_on else last_ns
     for key, every in matters.items():
         for plain in _episodes(key, every, ended_ns):
@@ -194,16 +194,16 @@ def _of_silent_sensors(
     for name, every in reported.items():
         limit = max(_holds(scans), _holds(every[-2:]))
         is_so = at - every[-1] > limit
-        said = _Said(at, is_so, is_so, "unknown", None, limit / 1e9, since_ns=every[-1])
-        yield ("old", name, ""), said
+        message = _Said(at, is_so, is_so, "unknown", None, limit / 1e9, since_ns=every[-1])
+        yield ("old", name, ""), message
 
 
 def _of_attempts(occasion: list[PastWrite], scans: list[int]) -> Iterator[tuple[_Key, _Said]]:
     at = occasion[0].stamp_ns
     for kind, status in {w.kind: w.status for w in occasion}.items():
         bad = status != 0
-        said = _Said(at, bad, bad, "unknown", float(status), scans=tuple(scans[-9:]))
-        yield ("scan_failed", "", str(kind)), said
+        message = _Said(at, bad, bad, "unknown", float(status), scans=tuple(scans[-9:]))
+        yield ("scan_failed", "", str(kind)), message
     looks = [w for w in occasion if w.kind == FLOWER and w.has_seen]
     if looks:
         seen, bugs = looks[-1].anomaly, float(looks[-1].bug_count)
@@ -211,22 +211,22 @@ def _of_attempts(occasion: list[PastWrite], scans: list[int]) -> Iterator[tuple[
         yield ("pest", "", ""), _Said(at, seen, seen, verdict, bugs)
 
 
-def _episodes(key: _Key, said: list[_Said], ended_ns: int | None) -> Iterator[Plain]:
+def _episodes(key: _Key, message: list[_Said], ended_ns: int | None) -> Iterator[Plain]:
     """Walk from episode to episode: where each one begins and ends, and what lies between."""
     kind, sensor, which = key
     hold = 1 if kind == "pest" else 2
     at = 0
-    while at + hold <= len(said):
+    while at + hold <= len(message):
         raised = next(
             (
                 index
-                for index in range(at + hold - 1, len(said))
-                if all(one.is_so for one in said[at : index + 1])
-                and said[index].at_ns - said[at].at_ns
+                for index in range(at + hold - 1, len(message))
+                if all(one.is_so for one in message[at : index + 1])
+                and message[index].at_ns - message[at].at_ns
                 >= (
                     DIM
                     if key == ("range", "light", "low")
-                    else _usual(said[index].scans, said[at].at_ns)
+                    else _usual(message[index].scans, message[at].at_ns)
                 )
             ),
             None,
@@ -235,9 +235,9 @@ def _episodes(key: _Key, said: list[_Said], ended_ns: int | None) -> Iterator[Pl
             at += 1
             continue
         end = raised + 1
-        while end < len(said) and (said[end].is_nearly_so or said[end - 1].is_nearly_so):
+        while end < len(message) and (message[end].is_nearly_so or message[end - 1].is_nearly_so):
             end += 1
-        over = said[at:end]
+        over = message[at:end]
         out = [one for one in over if one.is_so]
         values = [one.value for one in out if one.value is not None]
         worst = (min if which == "low" else max)(values) if kind in ("range", "pest") else None
@@ -246,11 +246,11 @@ def _episodes(key: _Key, said: list[_Said], ended_ns: int | None) -> Iterator[Pl
             kind,
             sensor,
             "critical" if any(one.verdict == "critical" for one in out) else out[0].verdict,
-            said[raised].value,
-            said[raised].limit,
-            since if (since := said[raised].since_ns) is not None else said[at].at_ns,
-            said[raised].at_ns,
-            said[end].at_ns if end < len(said) else ended_ns,
+            message[raised].value,
+            message[raised].limit,
+            since if (since := message[raised].since_ns) is not None else message[at].at_ns,
+            message[raised].at_ns,
+            message[end].at_ns if end < len(message) else ended_ns,
             worst,
         )
         at = end + 1

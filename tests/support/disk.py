@@ -82,10 +82,10 @@ def after_power_cut(done: list[Note], into: Path) -> None:
     Of a file: the writes before a completed sync began. Of a name: the folder's last sync.
     A real disk may hold more; this one is as bad as it may be.
     """
-    kept = _Stored()
+    stored = _Stored()
     for note in done:
-        kept.follow(note)
-    for path, file in kept.files.items():
+        stored.follow(note)
+    for path, file in stored.files.items():
         if file.is_named:
             (into / Path(path).name).write_bytes(bytes(file.content))
 

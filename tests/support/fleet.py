@@ -12,7 +12,7 @@ import httpx
 from lupin_twin.core.state import Write
 from lupin_twin.journal.runs import Clock
 from tests.support.archive import Archive, forward_once
-from tests.support.journal import SECOND, kept, pin, scan
+from tests.support.journal import SECOND, append, pin, scan
 from tests.support.processes import Process, lupin_twin, url_of
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.ws_client import open_websocket
@@ -37,7 +37,7 @@ def scans_lately(temperature: float = 22.0, tags: int = 5, scans: int = 6) -> li
 
 def write(journal: Path, rows: list[Write]) -> None:
     """As its twin writes them."""
-    kept(journal, rows, wall())
+    append(journal, rows, wall())
 
 
 def forward(archive: Archive, journal: Path, rows: list[Write]) -> None:
@@ -65,14 +65,14 @@ class Page:
         lines = self.http.get(f"{below}/metrics").text.splitlines()
         return next(float(line.split()[1]) for line in lines if line.startswith(f"{name} "))
 
-    def site(self, name: str = "gh1", **said: Any) -> dict[str, Any]:
+    def site(self, name: str = "gh1", **message: Any) -> dict[str, Any]:
         """A site's entry once it has these values."""
 
-        def look() -> dict[str, Any] | None:
+        def check() -> dict[str, Any] | None:
             found = self.sites().get(name, {})
-            return found if found and all(found[key] == it for key, it in said.items()) else None
+            return found if found and all(found[key] == it for key, it in message.items()) else None
 
-        found = wait_for(look, f"{name} with {said}: {self.sites()}")
+        found = wait_for(check, f"{name} with {message}: {self.sites()}")
         assert found is not None
         return found
 

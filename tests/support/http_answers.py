@@ -58,7 +58,7 @@ def _remembers(bridge: Bridge) -> bool:
     return bridge.http.get(f"/api/state?at={T0}").status_code == 200
 
 
-def ask(http: httpx.Client, path: str) -> list[Any]:
+def query(http: httpx.Client, path: str) -> list[Any]:
     """[status, media type, body] of an answer; a body that is not text in base64."""
     response = http.get(path)
     kind = response.headers.get("content-type", "")

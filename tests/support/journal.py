@@ -35,7 +35,7 @@ def scan(tag_id: str = "7", at_ns: int = NOW, *, source: str = "robot", **readin
     )
 
 
-def look(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) -> Inspection:
+def inspection(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) -> Inspection:
     """An inspection of two flowers."""
     flower = Flower(
         species="lupin",
@@ -82,13 +82,13 @@ def _now(path: Path) -> Clock:
     """The last arrival in the last run; `NOW` where there is none."""
     with closing(open_reader(path)) as connection:
         for run, is_simulated, begun_ns, arrival_ns in connection.execute(_LAST_RUN):
-            newest = connection.execute(_LAST.format(run)).fetchone() or (0, 0)
-            stamp_ns, arrival_ns = max((begun_ns, arrival_ns), newest)  # noqa: PLW2901
+            latest = connection.execute(_LAST.format(run)).fetchone() or (0, 0)
+            stamp_ns, arrival_ns = max((begun_ns, arrival_ns), latest)  # noqa: PLW2901
             return Clock(stamp_ns, arrival_ns, bool(is_simulated))
     return CLOCK
 
 
-def kept(path: Path, rows: Iterable[Write], now: Clock | None = None) -> tuple[int, int]:
+def append(path: Path, rows: Iterable[Write], now: Clock | None = None) -> tuple[int, int]:
     """Write rows, in one run of a twin; returns the result of `JournalFile.append`."""
     with opened(path) as file:
         run = file.start(now or _now(path), is_believed=True).run

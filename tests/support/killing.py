@@ -47,8 +47,8 @@ def kill_and_check(domain: int, journal: Path, chance: random.Random, first: int
                 )
             robot.spin_briefly()
             if robot.states:
-                newest = counts(robot.states[-1])
-                shown.append((time.monotonic(), waited_s(twin.pid), newest))
+                latest = counts(robot.states[-1])
+                shown.append((time.monotonic(), waited_s(twin.pid), latest))
         killed, waited = time.monotonic(), waited_s(twin.pid)
         twin.send(signal.SIGKILL)
     # Nothing runs that could publish it again.

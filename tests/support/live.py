@@ -30,10 +30,10 @@ def field_of(live: Bridge, **request: Any) -> httpx.Response:
     It receives a twin's states before that, and a dead twin may still seem to offer its service.
     """
 
-    def look() -> httpx.Response | None:
+    def check() -> httpx.Response | None:
         answer = live.get("/api/field", **request)
         return answer if answer.status_code == 200 else None
 
-    found = wait_for(look, f"a field at {live.url}")
+    found = wait_for(check, f"a field at {live.url}")
     assert found is not None
     return found

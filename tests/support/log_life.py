@@ -19,7 +19,7 @@ from lupin_twin.journal.appending import Appender
 from lupin_twin.journal.retention import Limits, purge_step
 from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import open_writer, transaction
-from tests.support.journal import NOW, SECOND, look, pin, scan
+from tests.support.journal import NOW, SECOND, inspection, pin, scan
 
 MINUTE = 60 * SECOND
 HOUR = 60 * MINUTE
@@ -156,7 +156,7 @@ class Life:
         found = []
         had: dict[tuple[int, str], bool] = {}
         looks = [(row.stamp_ns, n, run, row) for n, (run, row) in enumerate(self.rows)]
-        for stamp_ns, number, run, row in sorted(looks, key=lambda look: look[:2]):
+        for stamp_ns, number, run, row in sorted(looks, key=lambda inspection: inspection[:2]):
             flower = _seen(row)
             if flower is None or tag_id not in (EVERY_TAG, row.tag_id):
                 continue
@@ -266,7 +266,7 @@ _rows: st.SearchStrategy[Write] = st.one_of(
     ),
     st.builds(failure, _tags, _stamps, st.integers(1, 3), st.integers(0, 1)),
     st.builds(
-        lambda tag, at, anomaly: look(tag, at, anomaly=anomaly), _tags, _stamps, st.booleans()
+        lambda tag, at, anomaly: inspection(tag, at, anomaly=anomaly), _tags, _stamps, st.booleans()
     ),
     st.builds(pin, _tags, _stamps),
 )

@@ -43,7 +43,7 @@ def scan(
     return msg
 
 
-def look(
+def inspection(
     tag_id: str,
     species: str = "lupin",
     at: tuple[float, float] | None = None,

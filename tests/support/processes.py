@@ -90,7 +90,7 @@ class Process:
     def wait_for_output(self, text: str, timeout_s: float = PATIENCE_S) -> str:
         """Wait until it has printed `text`; returns the line that contains it."""
 
-        def look() -> str | None:
+        def check() -> str | None:
             for line in self.output.splitlines():
                 if text in line:
                     return line
@@ -98,7 +98,7 @@ class Process:
                 raise AssertionError(f"ended with {self.exit_code} before {text!r}:\n{self.output}")
             return None
 
-        return str(wait_for(look, f"{text!r} in the output", timeout_s))
+        return str(wait_for(check, f"{text!r} in the output", timeout_s))
 
     def wait_until_listening(self, port: int) -> None:
         """Wait until it accepts connections at a port of loopback."""
@@ -163,7 +163,7 @@ def run(command: Sequence[str], env: Mapping[str, str]) -> subprocess.CompletedP
         return subprocess.CompletedProcess(command, code, out.read(), err.read())
 
 
-def said(*words: object) -> subprocess.CompletedProcess[str]:
+def run_here(*words: object) -> subprocess.CompletedProcess[str]:
     """Output and exit code of a command that needs no ROS; it runs in this process."""
     from lupin_bridge.cli.command import main
 

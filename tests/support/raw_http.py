@@ -46,20 +46,20 @@ def received(client: socket.socket) -> bytes:
     return b"".join(blocks)
 
 
-def answer(url: str, said: bytes, trust: ssl.SSLContext | None = None) -> bytes:
+def answer(url: str, message: bytes, trust: ssl.SSLContext | None = None) -> bytes:
     """All bytes after this request, until the other side ends the connection."""
     with connect(url) as plain:
         if trust is None:
-            plain.sendall(said)
+            plain.sendall(message)
             return received(plain)
         with trust.wrap_socket(plain, server_hostname="127.0.0.1") as client:
-            client.sendall(said)
+            client.sendall(message)
             return received(client)
 
 
-def status(said: bytes) -> int:
+def status(message: bytes) -> int:
     """The status of an answer; 0: there is none."""
-    return int(said.split(b" ", 2)[1]) if said.startswith(b"HTTP/1.1 ") else 0
+    return int(message.split(b" ", 2)[1]) if message.startswith(b"HTTP/1.1 ") else 0
 
 
 def is_over(client: socket.socket) -> bool:

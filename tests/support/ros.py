@@ -104,9 +104,9 @@ class Peer:
         qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
         self.node.create_subscription(TwinState, "/twin/state", self.states.append, qos)
 
-    def until(self, look: Callable[[], T], what: str, timeout_s: float = PATIENCE_S) -> T:
-        """Spin until `look` returns something true, and return that."""
-        return wait_for(look, what, timeout_s, meanwhile=self.spin_briefly)
+    def until(self, check: Callable[[], T], what: str, timeout_s: float = PATIENCE_S) -> T:
+        """Spin until `check` returns something true, and return that."""
+        return wait_for(check, what, timeout_s, meanwhile=self.spin_briefly)
 
     def spin_briefly(self, timeout_s: float = 0.05) -> None:
         """Handle what is there, or wait a moment for it."""
@@ -136,9 +136,9 @@ class Peer:
 
     def get_field(self, **request: Any) -> Any:
         """Call `/twin/get_field` and return the response."""
-        return self.ask(GetField, "/twin/get_field", **request)
+        return self.call(GetField, "/twin/get_field", **request)
 
-    def ask(self, kind: Any, service: str, **request: Any) -> Any:
+    def call(self, kind: Any, service: str, **request: Any) -> Any:
         """Call a service and return the response."""
         [answer] = self.ask_all(kind, service, [kind.Request(**request)])
         return answer

@@ -68,11 +68,11 @@ class Ros:
     def until_tag(self, tag_id: str) -> Message:
         """Read on to the first state that has the tag."""
 
-        def look() -> Message | None:
+        def check() -> Message | None:
             message = self.next()
             return message if message["op"] == "publish" and tag_id in tags(message) else None
 
-        found = wait_for(look, f"a state with tag {tag_id}", meanwhile=lambda _: None)
+        found = wait_for(check, f"a state with tag {tag_id}", meanwhile=lambda _: None)
         assert found is not None
         return found
 

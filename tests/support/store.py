@@ -33,6 +33,8 @@ def scan(
     return Scan(tag_id, round(at_s * S), values, pose, status, source=source)
 
 
-def look(tag_id: str, at_s: float = 1.0, pose: Pose | None = None, **flower: object) -> Inspection:
+def inspection(
+    tag_id: str, at_s: float = 1.0, pose: Pose | None = None, **flower: object
+) -> Inspection:
     """An inspection of the flowers; keyword arguments are its results."""
     return Inspection(tag_id, round(at_s * S), Flower(**flower), pose)  # type: ignore[arg-type]

@@ -132,8 +132,8 @@ class Template:
 class Forked:
     """The part of `subprocess.Popen` that tests need."""
 
-    def __init__(self, args: Sequence[str], pid: int, ask: Callable[[Mapping[str, Any]], int]):
-        self.args, self.pid, self._ask = args, pid, ask
+    def __init__(self, args: Sequence[str], pid: int, query: Callable[[Mapping[str, Any]], int]):
+        self.args, self.pid, self._ask = args, pid, query
         self._lock = threading.Lock()
         self._ended: int | None = None
         self._handle = os.pidfd_open(pid)  # it exists until `_ask` has fetched its end

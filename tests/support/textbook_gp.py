@@ -32,8 +32,8 @@ def common(a: Spot, b: Spot, h: Hyper) -> float:
     apart = a.hour - b.hour
     day = cos(2.0 * pi * apart / 24.0) + h.half**2 * cos(4.0 * pi * apart / 24.0)
     near = matern(a.x - b.x, h.l) * matern(a.y - b.y, h.l)
-    house = 100.0 + h.sg**2 * matern(apart, h.lg) + h.sp**2 * day
-    return house + near * (h.sa**2 + h.sh**2 * matern(apart, h.lh) + h.sq**2 * day)
+    greenhouse = 100.0 + h.sg**2 * matern(apart, h.lg) + h.sp**2 * day
+    return greenhouse + near * (h.sa**2 + h.sh**2 * matern(apart, h.lh) + h.sq**2 * day)
 
 
 def of_readings(spots: Sequence[Spot], h: Hyper) -> FloatArray:

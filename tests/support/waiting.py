@@ -15,12 +15,12 @@ _SHORTEST_PAUSE_S, _LONGEST_PAUSE_S = 0.02, 0.25
 
 
 def wait_for(
-    look: Callable[[], T],
+    check: Callable[[], T],
     what: str,
     timeout_s: float = PATIENCE_S,
     meanwhile: Callable[[float], object] = time.sleep,
 ) -> T:
-    """Call `look` until it returns something true, and return that.
+    """Call `check` until it returns something true, and return that.
 
     `meanwhile` passes the time between two calls, for the given seconds or fewer (spins a
     node, say).
@@ -29,21 +29,21 @@ def wait_for(
         AssertionError: nothing true within `timeout_s`; names what was waited for.
     """
     begun_s = time.monotonic()
-    while not (found := look()):
+    while not (found := check()):
         meanwhile(_pause(begun_s, timeout_s, what, found))
     return found
 
 
-async def until(look: Callable[[], T], what: str, timeout_s: float = PATIENCE_S) -> T:
+async def until(check: Callable[[], T], what: str, timeout_s: float = PATIENCE_S) -> T:
     """`wait_for` in a coroutine: the loop goes on meanwhile."""
     begun_s = time.monotonic()
-    while not (found := look()):
+    while not (found := check()):
         await asyncio.sleep(_pause(begun_s, timeout_s, what, found))
     return found
 
 
 async def until_answered(
-    ask: Callable[[], Awaitable[T]],
+    query: Callable[[], Awaitable[T]],
     what: str,
     is_it: Callable[[T], object] = bool,
 ) -> T:
@@ -52,7 +52,7 @@ async def until_answered(
     last: T | None = None
     try:
         async with asyncio.timeout(PATIENCE_S):
-            while not is_it(found := await ask()):
+            while not is_it(found := await query()):
                 last = found
                 await asyncio.sleep(_pause(begun_s, PATIENCE_S, what, last))
             return found

@@ -12,7 +12,7 @@ from websockets.sync.client import ClientConnection
 
 from tests.support import raw_http
 from tests.support.domains import own_domain
-from tests.support.messages import look
+from tests.support.messages import inspection
 from tests.support.processes import Process, lupin_twin, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -88,11 +88,11 @@ class Listener:
     def until(self, kind: str, accept: Callable[[Frame], bool] = lambda _: True) -> Frame:
         """Read on to the first frame of a type that `accept` takes, and return that."""
 
-        def look() -> Frame | None:
+        def check() -> Frame | None:
             frame = self.next()
             return frame if frame["type"] == kind and accept(frame) else None
 
-        found = wait_for(look, f"a {kind} frame as expected", meanwhile=lambda _: None)
+        found = wait_for(check, f"a {kind} frame as expected", meanwhile=lambda _: None)
         assert found is not None
         return found
 
@@ -155,11 +155,11 @@ class Bridge:
     def tag(self, tag_id: str, accept: Callable[[Any], bool] = lambda _: True) -> Any:
         """A tag as soon as the bridge has it and `accept` takes it."""
 
-        def look() -> Any:
+        def check() -> Any:
             tags = self.json("/api/state")["tags"]
             return next((t for t in tags if t["tag_id"] == tag_id and accept(t)), None)
 
-        return wait_for(look, f"tag {tag_id} as expected at {self.url}")
+        return wait_for(check, f"tag {tag_id} as expected at {self.url}")
 
     def listen(self, **query: Any) -> Any:
         """A `Listener`, in a `with`; keyword arguments are the query."""
@@ -205,7 +205,7 @@ def overfill(running: Bridge, reader: Listener) -> None:
     A socket takes 4 MB (Linux's tcp_wmem); these are eight states of 0.3 MB to 2.5 MB, 10 MB in
     all. Returns when `reader` has the last one.
     """
-    message = look("", blooms=[(i, i) for i in range(2_000)])
+    message = inspection("", blooms=[(i, i) for i in range(2_000)])
     for number in range(8):
         message.flower.tag_id = f"fat {number}"
         running.peer.observe(message)

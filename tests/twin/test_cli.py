@@ -80,7 +80,7 @@ def test_it_exits_with_1_when_its_thread_dies(domain: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (["-p"], "Couldn't parse trailing -p flag"),
         (["-r", "__node:=bad name"], "__node:=bad name"),
@@ -91,12 +91,12 @@ def test_it_exits_with_1_when_its_thread_dies(domain: int) -> None:
     ],
 )
 def test_impossible_arguments_are_refused_in_one_line(
-    domain: int, arguments: list[str], said: str
+    domain: int, arguments: list[str], message: str
 ) -> None:
     with twin_node(domain, "--ros-args", *arguments) as process:
         assert process.wait() == 2
         [line] = [line for line in process.output.splitlines() if line.startswith("lupin_twin: ")]
-        assert said in line
+        assert message in line
         # Beside it only what ROS itself may log.
         others = [text for text in process.output.splitlines() if text != line]
         assert all(text.startswith("[") for text in others), others

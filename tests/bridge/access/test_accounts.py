@@ -115,9 +115,9 @@ async def test_an_unknown_name_takes_as_much_work_as_a_wrong_password(
     worked: list[str] = []
     verify = PasswordHasher.verify
 
-    def counted(hasher: PasswordHasher, kept: str, password: str) -> bool:
-        worked.append(kept)
-        return verify(hasher, kept, password)
+    def counted(hasher: PasswordHasher, stored: str, password: str) -> bool:
+        worked.append(stored)
+        return verify(hasher, stored, password)
 
     monkeypatch.setattr(PasswordHasher, "verify", counted)
     people = People(path)
@@ -125,7 +125,7 @@ async def test_an_unknown_name_takes_as_much_work_as_a_wrong_password(
     for name in ("anna", "nobody", "bert"):
         assert await people.check(name, "wrong" + PASSWORD, "1") is None
     assert await people.check("nobody", "", "1") is None
-    assert [kept[:10] for kept in worked] == ["$argon2id$"] * 5
+    assert [stored[:10] for stored in worked] == ["$argon2id$"] * 5
 
 
 async def test_a_flood_of_sign_ins_waits_in_a_short_queue_while_other_writes_go_on(
@@ -134,7 +134,7 @@ async def test_a_flood_of_sign_ins_waits_in_a_short_queue_while_other_writes_go_
     add(path, anna="operator")
     at_work: list[int] = []
 
-    def slow(kept: str, password: str) -> bool:
+    def slow(stored: str, password: str) -> bool:
         at_work.append(1)
         assert len(at_work) == 1, "two at once"
         at_work.pop()

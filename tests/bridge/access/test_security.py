@@ -33,14 +33,14 @@ def live() -> Iterator[Bridge]:
         yield running
 
 
-def ask(live: Bridge, method: str, path: str) -> httpx.Response:
+def send(live: Bridge, method: str, path: str) -> httpx.Response:
     query = PAST[path] | PERIOD if path in PAST else QUERY if path in IN_CELLS else None
     return live.http.request(method, path, params=query if path not in OF_SENSOR else SENSOR)
 
 
 @pytest.mark.parametrize("path", PATHS)
 def test_head_is_get_without_the_body(live: Bridge, path: str) -> None:
-    got, head = (ask(live, method, path) for method in ("GET", "HEAD"))
+    got, head = (send(live, method, path) for method in ("GET", "HEAD"))
     assert (got.status_code, head.status_code, head.content) == (200, 200, b"")
     assert got.content
     # The other headers depend on the time: lengths, ETags, file names.
@@ -51,7 +51,7 @@ def test_head_is_get_without_the_body(live: Bridge, path: str) -> None:
 @pytest.mark.parametrize("path", [*(path for path in PATHS if path != "/api/notes"), *ELSEWHERE])
 @pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE", "BREW"])
 def test_any_method_but_a_read_is_refused(live: Bridge, path: str, method: str) -> None:
-    answer = ask(live, method, path)
+    answer = send(live, method, path)
     assert answer.status_code == 405
     assert answer.headers["allow"] == "GET, HEAD"
     message = schema.ErrorMessage.model_validate_json(answer.content)

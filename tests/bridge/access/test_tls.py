@@ -171,10 +171,10 @@ def test_a_renewed_pair_is_served_to_every_new_connection(
     with (
         served(*old.options, trust=old.trust) as live,
         wss(ws_url(live.url), old.trust) as connection,
-        live.client() as kept,
+        live.client() as stored,
     ):
         connection.next_state()
-        assert kept.get("/healthz").status_code == 200
+        assert stored.get("/healthz").status_code == 200
         new = renew(old, tmp_path / "new")
         if is_reported:
             live.process.send(signal.SIGHUP)
@@ -182,12 +182,12 @@ def test_a_renewed_pair_is_served_to_every_new_connection(
         assert not is_trusted(live, old.trust)
         assert live.process.output.count("new connections use the renewed TLS certificate") == 1
         # Open connections go on.
-        now_s = kept.get("/api/state").json()["header"]["stamp"]["sec"]
+        now_s = stored.get("/api/state").json()["header"]["stamp"]["sec"]
         wait_for(
             lambda: connection.next_state()["state"]["header"]["stamp"]["sec"] > now_s,
             "a later state",
         )
-        assert kept.get("/healthz").status_code == 200
+        assert stored.get("/healthz").status_code == 200
 
 
 def test_a_broken_new_pair_is_logged_once_and_the_old_one_served(
@@ -197,7 +197,7 @@ def test_a_broken_new_pair_is_logged_once_and_the_old_one_served(
     key = ours.key.read_bytes()
     with served(*ours.options, trust=ours.trust) as live:
         other = certificate(tmp_path, "other")
-        for content, said in (
+        for content, text in (
             (b"nonsense", "is not a usable private key"),
             (other.key.read_bytes(), "is not the key of"),
             (None, "No such file or directory"),
@@ -209,8 +209,8 @@ def test_a_broken_new_pair_is_logged_once_and_the_old_one_served(
             for _ in range(3):
                 live.process.send(signal.SIGHUP)
                 assert is_trusted(live, ours.trust)
-            live.process.wait_for_output(said)
-            assert live.process.output.count(said) == 1
+            live.process.wait_for_output(text)
+            assert live.process.output.count(text) == 1
         assert live.process.output.count("is refused, the old one stays: --tls-key") == 3
         put(ours.key, key)
         live.process.wait_for_output("new connections use the renewed TLS certificate")

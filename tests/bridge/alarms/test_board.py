@@ -136,8 +136,8 @@ FOUND = Note("0", NOW, "bert", ACKNOWLEDGE, "alarm:a")
 
 
 def test_an_alarm_shows_who_acknowledged_it_and_who_shelved_it_until_when() -> None:
-    said = [FOUND, SHELF]
-    found = alarm_json(COLD, notes_of_alarms([COLD], said, NOW).get("a"))
+    message = [FOUND, SHELF]
+    found = alarm_json(COLD, notes_of_alarms([COLD], message, NOW).get("a"))
     assert {name: value for name, value in found.items() if "_by" in name} == {
         "acknowledged_by": "bert",
         "shelved_by": "anna",
@@ -146,7 +146,7 @@ def test_an_alarm_shows_who_acknowledged_it_and_who_shelved_it_until_when() -> N
     assert found["shelved_until"] == {"sec": 10**9 + 3_600, "nanosec": 0}
     assert found["shelved_reason"] == "heater"
     assert "acknowledged_by" not in alarm_json(COLD)
-    assert notes_of_alarms([COLD], said, None) == {}
+    assert notes_of_alarms([COLD], message, None) == {}
 
 
 def test_a_shelf_ends_at_its_time_or_by_a_later_note_or_by_withdrawal() -> None:
@@ -157,16 +157,16 @@ def test_a_shelf_ends_at_its_time_or_by_a_later_note_or_by_withdrawal() -> None:
     assert notes_of_alarms([COLD], [SHELF, Note("2", NOW, "anna", WITHDRAW, "note:1")], NOW) == {}
 
 
-@pytest.mark.parametrize("said", [SHELF, FOUND], ids=["shelved", "acknowledged"])
+@pytest.mark.parametrize("message", [SHELF, FOUND], ids=["shelved", "acknowledged"])
 def test_notes_end_when_their_alarm_gets_worse_and_later_ones_hold(
-    said: Note,
+    message: Note,
 ) -> None:
     bad = replace(COLD.reason, verdict=Verdict.CRITICAL)
     worse = replace(COLD, reason=bad, raised_as=Verdict.STRESSED, worse_at_ns=NOW + 1)
-    assert "a" in notes_of_alarms([COLD], [said], NOW + 1)
-    assert notes_of_alarms([worse], [said], NOW + 1) == {}
-    again = replace(said, id="2", made_at_ns=NOW + 1)
-    assert "a" in notes_of_alarms([worse], [said, again], NOW + 2)
+    assert "a" in notes_of_alarms([COLD], [message], NOW + 1)
+    assert notes_of_alarms([worse], [message], NOW + 1) == {}
+    again = replace(message, id="2", made_at_ns=NOW + 1)
+    assert "a" in notes_of_alarms([worse], [message, again], NOW + 2)
 
 
 def test_an_alarm_that_comes_back_stays_shelved_unless_it_is_worse_or_of_another_kind() -> None:

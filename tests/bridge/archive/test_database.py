@@ -9,7 +9,7 @@ import pytest
 
 from tests.support.archive import Archive, forward_once, run
 from tests.support.fleet import scans_lately, write
-from tests.support.journal import kept, scan
+from tests.support.journal import append, scan
 from tests.support.postgres import Postgres, server
 from tests.support.tls import certificate
 
@@ -20,7 +20,7 @@ def two_sites(archive: Archive, tmp_path: Path) -> Archive:
     for site in ("gh1", "gh2"):
         archive.site = site
         archive.add_user(site)
-        kept(tmp_path / site, [scan(site, a=1.0)])
+        append(tmp_path / site, [scan(site, a=1.0)])
         forward_once(archive, tmp_path / site)
     archive.add_user("page", "lupin_page")
     return archive

@@ -27,7 +27,7 @@ from tests.support.archive import (
     run,
     wait_until_equal,
 )
-from tests.support.journal import NOW, SECOND, kept, look, opened, pin, recording, scan
+from tests.support.journal import NOW, SECOND, append, inspection, opened, pin, recording, scan
 from tests.support.waiting import wait_for
 
 HOUR = 3600 * SECOND
@@ -41,7 +41,7 @@ def journal(tmp_path: Path) -> Path:
 
 
 def forward(archive: Archive, journal: Path, rows: list[Write], now: Clock | None = None) -> None:
-    kept(journal, rows, now)
+    append(journal, rows, now)
     forward_once(archive, journal)
 
 
@@ -54,10 +54,10 @@ def scans(start: int, count: int) -> list[Write]:
 
 
 def test_what_comes_later_goes_after_it_late_writes_too(archive: Archive, journal: Path) -> None:
-    forward(archive, journal, [*scans(0, 50), scan("9", NOW + DAY), look("7", NOW + DAY)])
+    forward(archive, journal, [*scans(0, 50), scan("9", NOW + DAY), inspection("7", NOW + DAY)])
     # A pause is cut in two, a pest is seen before a look that saw none; a sensor comes later.
-    kept(journal, [scan("9", NOW + DAY // 2), look("7", NOW + HOUR, anomaly=True)])
-    kept(journal, [scan("9", NOW + DAY, temperature=1.0, humidity=50.0), *scans(50, 20)])
+    append(journal, [scan("9", NOW + DAY // 2), inspection("7", NOW + HOUR, anomaly=True)])
+    append(journal, [scan("9", NOW + DAY, temperature=1.0, humidity=50.0), *scans(50, 20)])
     assert archive.rows() != rows_of(journal)
     forward_once(archive, journal)
     assert archive.rows() == rows_of(journal)
@@ -66,7 +66,7 @@ def test_what_comes_later_goes_after_it_late_writes_too(archive: Archive, journa
 def test_runs_of_the_clock_and_their_ends(archive: Archive, journal: Path) -> None:
     forward(archive, journal, scans(0, 50))
     back = Clock(10 * SECOND, NOW + DAY, is_simulated=True)
-    kept(journal, [scan("1", 11 * SECOND), scan("2", 12 * SECOND)], back)
+    append(journal, [scan("1", 11 * SECOND), scan("2", 12 * SECOND)], back)
     again = Clock(SECOND, NOW + DAY + HOUR, is_simulated=True)
     forward(archive, journal, [scan("1", 2 * SECOND)], again)
     assert archive.rows() == rows_of(journal)
@@ -82,7 +82,7 @@ def test_more_rows_than_go_at_once(archive: Archive, journal: Path) -> None:
     forward(
         archive,
         journal,
-        [pin("1"), *scans(0, 6_000), *(look("7", NOW + n * HOUR) for n in range(600))],
+        [pin("1"), *scans(0, 6_000), *(inspection("7", NOW + n * HOUR) for n in range(600))],
     )
     assert archive.rows() == rows_of(journal)
 
@@ -103,7 +103,7 @@ def test_the_archive_keeps_what_the_journal_deletes(archive: Archive, journal: P
 def test_of_what_was_deleted_before_it_is_known_what_was_counted(
     archive: Archive, journal: Path
 ) -> None:
-    kept(journal, scans(0, 50))
+    append(journal, scans(0, 50))
     purge(journal)
     forward(archive, journal, scans(60, 10))
     assert archive.rows() == rows_of(journal)
@@ -120,7 +120,7 @@ def purge(journal: Path) -> None:
 
 def test_a_journal_keeps_what_is_not_forwarded_and_says_so(archive: Archive, journal: Path) -> None:
     forward(archive, journal, scans(0, 50))
-    kept(journal, scans(50, 25))
+    append(journal, scans(50, 25))
     purge(journal)
     assert len(rows_of(journal)["scan"]) == 25
     with recording(journal, AFTER, limits=Limits(days=0.0, max_bytes=10**9)) as twin:
@@ -135,7 +135,7 @@ def test_a_journal_keeps_what_is_not_forwarded_and_says_so(archive: Archive, jou
 
 
 def test_a_disk_that_is_full_is_not_kept_for_the_archive(archive: Archive, journal: Path) -> None:
-    kept(journal, scans(0, 50))
+    append(journal, scans(0, 50))
     mark_of(journal).write_text("another 99\n")
     with opened(journal, Limits(days=1.0, max_bytes=0)) as file:
         file.start(Clock(NOW, NOW, is_simulated=False), is_believed=True)
@@ -151,7 +151,7 @@ def test_another_journal_overwrites_nothing(archive: Archive, journal: Path) -> 
     forward(
         archive,
         journal,
-        [pin(), look(), *scans(200, 20)],
+        [pin(), inspection(), *scans(200, 20)],
         Clock(NOW + DAY, NOW + DAY, is_simulated=False),
     )
     after = archive.rows()
@@ -169,7 +169,7 @@ def test_another_journal_overwrites_nothing(archive: Archive, journal: Path) -> 
 def test_a_backup_that_is_put_back_loses_and_overwrites_nothing(
     archive: Archive, journal: Path, tmp_path: Path
 ) -> None:
-    kept(journal, scans(0, 50))
+    append(journal, scans(0, 50))
     backup = shutil.copy(journal, tmp_path / "backup")
     forward(archive, journal, scans(50, 10))
     before = archive.rows()
@@ -184,9 +184,9 @@ def test_a_backup_that_is_put_back_loses_and_overwrites_nothing(
 def test_a_forwarder_follows_a_journal_that_is_replaced_under_it(
     archive: Archive, journal: Path, tmp_path: Path
 ) -> None:
-    kept(journal, scans(0, 50))
+    append(journal, scans(0, 50))
     other = tmp_path / "other"
-    kept(other, scans(70, 7))
+    append(other, scans(70, 7))
     with forwarder(archive, journal) as following:
         following.wait_for_output("is forwarded to")
         wait_until_equal(archive, journal)
@@ -205,9 +205,9 @@ def test_a_journal_without_gaps_is_the_same_journal(archive: Archive, journal: P
 def test_a_tag_that_its_journal_forgets_is_forgotten_in_the_archive(
     archive: Archive, journal: Path, *, pose_only: bool
 ) -> None:
-    forward(archive, journal, [pin("4"), *scans(0, 50), look("4", NOW + HOUR, anomaly=True)])
+    forward(archive, journal, [pin("4"), *scans(0, 50), inspection("4", NOW + HOUR, anomaly=True)])
     forget(journal, "4", pose_only=pose_only, by="test", at_ns=NOW)
-    forward(archive, journal, [pin("4"), *scans(54, 6), look("4", NOW + DAY, anomaly=True)])
+    forward(archive, journal, [pin("4"), *scans(54, 6), inspection("4", NOW + DAY, anomaly=True)])
     assert archive.rows() == rows_of(journal)
     # What was scanned since stays, also when the forwarder begins anew.
     forward_once(archive, journal)
@@ -224,10 +224,10 @@ def test_a_forgotten_tag_is_forgotten_in_journals_of_before_and_of_its_site_alon
     for site in ("gh2", "gh1"):
         archive.site = site
         journal.unlink(missing_ok=True)
-        kept(journal, scans(0, 50))
+        append(journal, scans(0, 50))
         forward_once(archive, journal)
     journal.unlink()
-    kept(journal, scans(100, 50))
+    append(journal, scans(100, 50))
     forget(journal, "4", pose_only=False, by="test", at_ns=NOW)
     forward_once(archive, journal)
     tags = "SELECT site, count(*) FROM scan JOIN series USING (site, series) WHERE tag = '4'"
@@ -235,7 +235,7 @@ def test_a_forgotten_tag_is_forgotten_in_journals_of_before_and_of_its_site_alon
 
 
 def test_notes_are_forwarded_as_they_were_written(archive: Archive, journal: Path) -> None:
-    kept(journal, scans(0, 5))
+    append(journal, scans(0, 5))
     for number, until in ((1, "NULL"), (2, "5")):
         row = f"('local', 'n{number}', 1, 'anna', 'comment', 'tag:7', 'dry', {until})"
         with closing(sqlite3.connect(journal)) as connection, connection:
@@ -251,7 +251,7 @@ def test_notes_are_forwarded_as_they_were_written(archive: Archive, journal: Pat
 
 
 def test_a_second_forwarder_of_a_site_is_refused_by_name(archive: Archive, journal: Path) -> None:
-    kept(journal, scans(0, 5))
+    append(journal, scans(0, 5))
     with forwarder(archive, journal) as first:
         first.wait_for_output("is forwarded to")
         again = run(*words(archive, journal))
@@ -270,7 +270,7 @@ def words(archive: Archive, path: Path, **more: str) -> list[str]:
 def test_an_archive_that_is_reached_and_takes_nothing_is_said_once(
     archive: Archive, journal: Path
 ) -> None:
-    kept(journal, scans(0, 50))
+    append(journal, scans(0, 50))
     archive.do("REVOKE INSERT ON scan FROM lupin_forwarder")
     with forwarder(archive, journal) as process:
         process.wait_for_output("is not forwarded: the archive does not permit it")
@@ -289,7 +289,7 @@ def test_an_archive_that_is_reached_and_takes_nothing_is_said_once(
 def test_a_journal_that_is_saved_from_damage_waits_until_it_is(
     archive: Archive, journal: Path
 ) -> None:
-    kept(journal, scans(0, 50))
+    append(journal, scans(0, 50))
     with closing(sqlite3.connect(journal)) as connection, connection:
         connection.execute("INSERT INTO meta VALUES ('local', 'salvage', 'somewhere')")
     refused = run(*words(archive, journal))
@@ -299,7 +299,7 @@ def test_a_journal_that_is_saved_from_damage_waits_until_it_is(
 
 
 def test_what_is_wrong_is_said_in_one_line(archive: Archive, journal: Path) -> None:
-    kept(journal, scans(0, 5))
+    append(journal, scans(0, 5))
     for given, code, said in (
         ({"site": "GH 1"}, 2, "--site is 'GH 1', expected a-z"),
         ({"archive_url": "nonsense"}, 2, "--archive-url is not a PostgreSQL address"),

@@ -9,7 +9,7 @@ import pytest
 
 from lupin_twin.journal.runs import Clock
 from tests.support.archive import Archive, forward_once, forwarder, rows_of, run, wait_until_equal
-from tests.support.journal import SECOND, kept, look, scan
+from tests.support.journal import SECOND, append, inspection, scan
 
 DAY = 86_400 * SECOND
 NOW = time.time_ns()
@@ -31,8 +31,8 @@ def sites(archive: Archive, tmp_path: Path) -> Archive:
         archive.site = site
         archive.add_user(site)
         begun = Clock(stamps(*ages)[0], stamps(*ages)[0], is_simulated=False)
-        rows = [write for at in stamps(*ages) for write in (scan("7", at), look("7", at))]
-        kept(tmp_path / site, rows, begun)
+        rows = [write for at in stamps(*ages) for write in (scan("7", at), inspection("7", at))]
+        append(tmp_path / site, rows, begun)
         forward_once(archive, tmp_path / site)
     archive.site = "gh1"
     return archive
@@ -68,7 +68,7 @@ def test_rows_lie_by_the_month_of_their_stamp_and_the_next_month_is_there(sites:
 
 def test_a_simulated_clock_has_a_part_of_its_own(archive: Archive, tmp_path: Path) -> None:
     journal, begun = tmp_path / "journal", Clock(SECOND, NOW, is_simulated=True)
-    kept(journal, [scan("7", 2 * SECOND), look("7", 3 * SECOND)], begun)
+    append(journal, [scan("7", 2 * SECOND), inspection("7", 3 * SECOND)], begun)
     forward_once(archive, journal)
     assert archive.rows() == rows_of(journal)
     assert parts(archive) == ["scan_before"]
@@ -80,7 +80,7 @@ def test_a_month_that_cannot_be_made_holds_up_its_own_rows_alone(
     archive: Archive, tmp_path: Path
 ) -> None:
     journal = tmp_path / "journal"
-    kept(journal, [scan("7", NOW)])
+    append(journal, [scan("7", NOW)])
     with forwarder(archive, journal) as process:
         with psycopg.connect(archive.owner) as reader:
             reader.execute("SELECT count(*) FROM scan")
@@ -88,7 +88,7 @@ def test_a_month_that_cannot_be_made_holds_up_its_own_rows_alone(
         wait_until_equal(archive, journal)
     (after,) = {*parts_made(archive)} - {"scan_before", month(NOW)}
     archive.do(f"DROP TABLE {after}")
-    kept(journal, [scan("7", NOW + SECOND)])
+    append(journal, [scan("7", NOW + SECOND)])
     with psycopg.connect(archive.owner) as reader:
         reader.execute("SELECT count(*) FROM scan")
         forward_once(archive, journal)
@@ -146,7 +146,7 @@ def test_what_was_deleted_is_not_forwarded_again(sites: Archive, tmp_path: Path)
     before = sites.rows()
     forward_once(sites, tmp_path / "gh1")
     assert sites.rows() == before
-    kept(tmp_path / "gh1", [scan("7", NOW)])
+    append(tmp_path / "gh1", [scan("7", NOW)])
     forward_once(sites, tmp_path / "gh1")
     assert len(sites.rows()["scan"]) == len(before["scan"]) + 1
 
@@ -155,7 +155,7 @@ def test_a_full_disk_is_said_in_one_line_and_holds_until_there_is_room(
     archive: Archive, tmp_path: Path
 ) -> None:
     journal = tmp_path / "journal"
-    kept(journal, [scan("7", NOW)])
+    append(journal, [scan("7", NOW)])
     # As PostgreSQL refuses a row for which its disk has no room.
     archive.do(
         "CREATE FUNCTION no_room() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN"

@@ -23,8 +23,8 @@ from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_reader
 from lupin_twin.ros import convert
 from tests.support.bags import is_open, no_file_above, read
-from tests.support.journal import NOW, SECOND, kept, look, opened, pin, scan
-from tests.support.processes import said
+from tests.support.journal import NOW, SECOND, append, inspection, opened, pin, scan
+from tests.support.processes import run_here
 
 FAILED_INSPECTION = Inspection(
     "7", NOW, None, status=2, status_detail="dark", source="robot", mission="m1"
@@ -33,13 +33,13 @@ ROWS: list[Write] = [
     pin("7"),
     scan("7", temperature=20.0, humidity=60.0),
     pin("8", NOW + SECOND, x=8.5),
-    look("8", NOW + SECOND, anomaly=True),
+    inspection("8", NOW + SECOND, anomaly=True),
     scan("7", NOW + 2 * SECOND, temperature=21.0, light=float("nan")),
     replace(FAILED_INSPECTION, arrival_ns=NOW + 2000),
     # Late, and from a robot whose clock is ahead: such a clock does not count.
     replace(scan("8", NOW + SECOND), own_stamp_ns=NOW * 3),
     replace(scan("8", NOW + 3 * SECOND), readings=(), status=1, status_detail="no way"),
-    look("7", NOW + 4 * SECOND),
+    inspection("7", NOW + 4 * SECOND),
     replace(pin("9", NOW + 5 * SECOND), pose=Pose(1.0, 2.0, 3.0, 0.0, 0.0, 1.0, 1e-9)),
     *(scan("7", NOW + 6 * SECOND + n, temperature=float(n)) for n in range(9)),
 ]
@@ -95,7 +95,7 @@ def test_a_twin_that_receives_the_recording_has_the_state_at_its_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, until_s: int, lot: int
 ) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
-    kept(path, ROWS)
+    append(path, ROWS)
     monkeypatch.setattr(journal_export, "LOT", lot)
     end_ns = NOW + until_s * SECOND
     made = exported(path, target, 0, end_ns + 1)
@@ -114,7 +114,7 @@ def test_a_twin_that_receives_the_recording_has_the_state_at_its_end(
 
 def test_types_and_qos_are_read_from_the_file(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
-    kept(path, [scan("7", 60 * SECOND)], SIMULATED)
+    append(path, [scan("7", 60 * SECOND)], SIMULATED)
     exported(path, target)
     with target.open("rb") as opened:
         reader = make_reader(opened)
@@ -134,7 +134,7 @@ def test_types_and_qos_are_read_from_the_file(tmp_path: Path) -> None:
 
 def test_a_recording_begins_with_the_earlier_positions(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
-    kept(path, ROWS)
+    append(path, ROWS)
     made = exported(path, target, NOW + 4 * SECOND, NOW + 6 * SECOND, namespace="/house/")
     assert made == (1, 2)
     first, *_ = read(target)
@@ -152,7 +152,7 @@ def test_simulated_time_comes_with_a_clock_topic(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
     row = scan("7", 60 * SECOND)
     late = replace(scan("7", 61 * SECOND), arrival_ns=65 * SECOND)
-    kept(path, [row, late], SIMULATED)
+    append(path, [row, late], SIMULATED)
     exported(path, target)
     (topic, log_ns, _, data), observation, (*_, later), _ = read(target)
     assert (topic, log_ns) == ("/clock", row.arrival_ns)
@@ -167,12 +167,12 @@ def test_writes_during_the_export_are_exported_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, later = tmp_path / "j.sqlite", scan("10", NOW + 9 * SECOND, light=1.0)
-    kept(path, ROWS[:4])
+    append(path, ROWS[:4])
     monkeypatch.setattr(journal_export, "LOT", 1)
     with closing(open_reader(path)) as connection:
         reading = iter(JournalRows(connection, 0, 2**62))
         first = [next(reading)[1] for _ in range(2)]
-        kept(path, [later])
+        append(path, [later])
         assert [*first, *(row for _, row in reading)] == [*ROWS[:4], later]
 
 
@@ -194,7 +194,7 @@ def test_positions_from_an_earlier_run_are_exported(tmp_path: Path) -> None:
 
 def test_an_empty_or_failed_export_leaves_no_file_and_overwrites_none(tmp_path: Path) -> None:
     path, target = tmp_path / "j.sqlite", tmp_path / "a.mcap"
-    kept(path, ROWS)
+    append(path, ROWS)
     assert exported(path, target, 0, NOW) == (0, 0)
     assert not target.exists()
     target.write_bytes(b"mine")
@@ -203,7 +203,7 @@ def test_an_empty_or_failed_export_leaves_no_file_and_overwrites_none(tmp_path: 
     assert target.read_bytes() == b"mine"
     target.unlink()
     # Room for SQLite's 32 KiB beside a journal that is read, but not for the recording.
-    kept(path, [scan("7", NOW + 9 * SECOND + n, temperature=float(n)) for n in range(2_000)])
+    append(path, [scan("7", NOW + 9 * SECOND + n, temperature=float(n)) for n in range(2_000)])
     with no_file_above(45_000), pytest.raises(OSError, match="File too large"):
         exported(path, target)
     assert not target.exists()
@@ -216,14 +216,14 @@ def test_an_empty_or_failed_export_leaves_no_file_and_overwrites_none(tmp_path: 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     made = tmp_path / "j.sqlite"
-    kept(made, [pin(), *(scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(10))])
+    append(made, [pin(), *(scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(10))])
     return made
 
 
 def test_export_writes_a_recording_of_a_period(path: Path, tmp_path: Path) -> None:
     target = tmp_path / "a.mcap"
     words = ("export", target, "--journal", path, "--from", "1763700003", "--to", "1763700005")
-    done = said("journal", *words)
+    done = run_here("journal", *words)
     assert (done.returncode, done.stdout, done.stderr) == (
         0,
         f"2 observations and 1 messages of discovered tags are in {target}\n",
@@ -234,7 +234,7 @@ def test_export_writes_a_recording_of_a_period(path: Path, tmp_path: Path) -> No
         "/floranova/observations",
         "/floranova/observations",
     ]
-    done = said("journal", *words)
+    done = run_here("journal", *words)
     assert (done.returncode, f"{target} already exists" in done.stderr) == (1, True)
 
 
@@ -251,7 +251,7 @@ def test_export_writes_a_recording_of_a_period(path: Path, tmp_path: Path) -> No
 def test_a_recording_that_cannot_be_made_is_one_clear_line(
     path: Path, tmp_path: Path, words: tuple[str, ...], text: str
 ) -> None:
-    done = said("journal", "export", tmp_path / words[0], *words[1:], "--journal", path)
+    done = run_here("journal", "export", tmp_path / words[0], *words[1:], "--journal", path)
     assert done.returncode == 1
     assert text in done.stderr
     assert done.stderr.count("\n") == 1

@@ -11,7 +11,7 @@ import pytest
 
 from lupin_bridge.cli import command
 from lupin_twin.runtime.process import split_ros_args
-from tests.support.processes import lupin_twin, said
+from tests.support.processes import lupin_twin, run_here
 from tests.support.waiting import wait_for
 from tests.support.web import bridge
 
@@ -63,7 +63,7 @@ def test_arguments_after_ros_args_belong_to_ros_up_to_a_double_dash(
 def test_a_mistake_in_the_command_line_is_named(
     arguments: list[str], named: str, signals: None
 ) -> None:
-    done = said(*arguments)
+    done = run_here(*arguments)
     assert done.returncode == 2
     assert named in done.stderr.splitlines()[-1]
 
@@ -141,10 +141,10 @@ def test_lines_below_the_level_are_left_out(level: str, capsys: pytest.CaptureFi
         logging.root.handle(record)
     logging.getLogger("asyncio").debug("a library's")
     logging.getLogger("uvicorn.error").info("a library's: Started server process")
-    said = capsys.readouterr().err
+    run_here = capsys.readouterr().err
     expected = len(LEVELS) - LEVELS.index(level)
-    assert (said.count(": ours"), said.count(": ros")) == (expected, expected)
-    assert "library" not in said
+    assert (run_here.count(": ours"), run_here.count(": ros")) == (expected, expected)
+    assert "library" not in run_here
 
 
 def test_an_error_of_our_own_has_a_traceback_and_one_from_bad_input_has_none(

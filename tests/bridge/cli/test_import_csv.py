@@ -15,8 +15,8 @@ import yaml
 from lupin_twin.journal.paths import Lock
 from lupin_twin.journal.runs import Clock
 from tests.support.docs import block_named
-from tests.support.journal import NOW, SECOND, kept, scan, select
-from tests.support.processes import lupin_twin, said, url_of
+from tests.support.journal import NOW, SECOND, append, scan, select
+from tests.support.processes import lupin_twin, run_here, url_of
 from tests.support.waiting import PATIENCE_S, wait_for
 
 WIDE = {
@@ -78,7 +78,7 @@ class Import:
         return self
 
     def run(self, *more: str) -> CompletedProcess[str]:
-        return said("import", self.file, "--map", self.map, "--journal", self.journal, *more)
+        return run_here("import", self.file, "--map", self.map, "--journal", self.journal, *more)
 
     def written(self) -> str:
         """The part of the output about what was written."""
@@ -174,7 +174,7 @@ def test_a_time_is_a_date_or_seconds_or_fractions_of_them(importing: Import, tex
 
 
 def test_rows_from_before_the_twin_are_in_its_past(importing: Import) -> None:
-    kept(importing.journal, [scan("A", NOW, temperature=25.0)])
+    append(importing.journal, [scan("A", NOW, temperature=25.0)])
     importing.given(WIDE, ROWS).written()
     assert [row[5] for row in importing.rows()] == ["import"] * 3 + ["robot"]
 
@@ -260,7 +260,7 @@ def test_a_journal_in_use_by_a_twin_is_refused(importing: Import) -> None:
 
 
 def test_a_journal_of_a_simulation_is_refused(importing: Import) -> None:
-    kept(importing.journal, [scan("A", 5 * SECOND)], Clock(5 * SECOND, NOW, is_simulated=True))
+    append(importing.journal, [scan("A", 5 * SECOND)], Clock(5 * SECOND, NOW, is_simulated=True))
     done = importing.given(WIDE, ROWS).run("--write")
     assert done.returncode == 1
     assert "is a simulation's: import into another one" in done.stderr

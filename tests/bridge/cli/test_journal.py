@@ -15,8 +15,8 @@ from lupin_bridge.past import bodies
 from lupin_twin.journal.paths import demo_journal_path, journal_path
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_writer
-from tests.support.journal import NOW, SECOND, is_whole, kept, look, pin, recording, scan
-from tests.support.processes import said
+from tests.support.journal import NOW, SECOND, append, inspection, is_whole, pin, recording, scan
+from tests.support.processes import run_here
 from tests.support.waiting import PATIENCE_S, wait_for
 
 # Of a twin that starts after all of it was written.
@@ -29,7 +29,7 @@ def path(tmp_path: Path) -> Path:
     made = tmp_path / "j.sqlite"
     failed = replace(scan("8"), readings=(), status=2, status_detail="no answer")
     scans = [scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(2000)]
-    kept(made, [pin(), failed, look(), *scans])
+    append(made, [pin(), failed, inspection(), *scans])
     return made
 
 
@@ -42,7 +42,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def journal(*words: object) -> CompletedProcess[str]:
     """What `lupin-twin journal` prints."""
-    return said("journal", *words)
+    return run_here("journal", *words)
 
 
 def reported(*words: object) -> dict[str, str]:
@@ -68,9 +68,9 @@ def test_the_default_file_is_found_by_the_rule_of_the_node(
         monkeypatch.setenv("ROS_DOMAIN_ID", "7")
         path = journal_path("", environ, domain, namespace)
         assert path is not None
-        kept(path, [])
+        append(path, [])
         assert reported(*words)["file"] == str(path)
-    kept(demo_journal_path(environ, 2), [])
+    append(demo_journal_path(environ, 2), [])
     assert "demo-seed-2.sqlite" in journal("info", "--demo", 2).stdout
 
 
@@ -160,7 +160,7 @@ def test_a_file_of_another_application_is_left_alone_and_named(tmp_path: Path) -
 
 def test_info_lists_the_content(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", "x")  # not needed for a file that is named
-    kept(path, [scan("9", 7 * SECOND)], SIMULATED)
+    append(path, [scan("9", 7 * SECOND)], SIMULATED)
     path.with_name("j.sqlite.damaged-20261121T141500Z").write_bytes(b"x" * 2_000_000)
     done = journal("info", "--journal", path)
     assert (done.returncode, done.stderr) == (0, "")

@@ -13,7 +13,7 @@ from lupin_bridge.access.accounts import Accounts
 from lupin_bridge.access.credentials import Person, digest
 from lupin_bridge.access.people import verify
 from tests.support.people import PASSWORD
-from tests.support.processes import said
+from tests.support.processes import run_here
 
 NOW = r"20\d\d-\d\d-\d\dT\d\d:\d\d:\d\dZ"
 
@@ -25,7 +25,7 @@ def file(tmp_path: Path) -> Path:
 
 def ended(file: Path, words: str) -> CompletedProcess[str]:
     """The command on this file."""
-    return said(*words.split(), "--accounts", file)
+    return run_here(*words.split(), "--accounts", file)
 
 
 def printed(file: Path, words: str) -> str:
@@ -58,9 +58,9 @@ def test_a_user_is_added_listed_and_removed(file: Path) -> None:
     with closing(Accounts(file, is_writer=True)) as accounts:
         found = accounts.of_name("anna")
         assert found is not None
-        person, kept = found
+        person, stored = found
         assert person == Person("anna", "operator", sites=("gh1", "gh2"))
-        assert verify(kept, PASSWORD)
+        assert verify(stored, PASSWORD)
         session = digest(accounts.begin_session("anna", "::1", int(time.time())))
     assert printed(file, "user remove anna") == "account anna is removed\n"
     assert printed(file, "user list").startswith("bert ")

@@ -14,7 +14,7 @@ from lupin_bridge.serving.server import listen
 from lupin_patrol.cli import parser as patrol_parser
 from lupin_patrol.perception import SECONDS_PER_DAY
 from lupin_twin.core.parameters import World
-from tests.support.journal import CLOCK, is_whole, kept, select
+from tests.support.journal import CLOCK, append, is_whole, select
 from tests.support.journal import scan as row
 from tests.support.messages import scan
 from tests.support.processes import Process, children_of, is_running, lupin_twin, patrols_of, url_of
@@ -215,7 +215,7 @@ def test_a_journal_of_another_twin_is_left_alone(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / "demo.sqlite"
-    kept(path, [row()], CLOCK)
+    append(path, [row()], CLOCK)
     assert with_past(feed_of(path, SHORT)) == feed_of(path, SHORT)
     assert select(path, "SELECT count(*) FROM scan") == [(1,)]
     assert caplog.records == []

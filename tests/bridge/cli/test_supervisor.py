@@ -105,9 +105,9 @@ def test_the_bridge_reports_when_it_is_ready_and_when_it_stops(
 ) -> None:
     env = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "1000000", "LUPIN_TOKEN": TOKEN}
     with lupin_twin(domain, "demo", afresh=False, **env) as process:
-        said = listening.next()
-        assert said["READY"] == "1"
-        url = said["STATUS"].removeprefix("serving ")
+        text = listening.next()
+        assert text["READY"] == "1"
+        url = text["STATUS"].removeprefix("serving ")
         answer = httpx.get(f"{url}/readyz", headers=BEARER, trust_env=False, timeout=PATIENCE_S)
         assert answer.json()["reason"] == "live", "ROS is up by then"
         for _ in range(3):
@@ -143,8 +143,8 @@ def test_a_hanging_callback_fails_health_checks_and_stops_the_watchdog_messages(
         process.wait_for_output("hangs")
         wait_for(lambda: health().status_code == 503, "health to tell")
         message = health().json()["message"]
-        said = r"The ROS thread has been stuck in a callback for \d+ s\. Restart\."
-        assert re.fullmatch(said, message)
+        text = r"The ROS thread has been stuck in a callback for \d+ s\. Restart\."
+        assert re.fullmatch(text, message)
         wait_for(lambda: any("stuck" in word.get("STATUS", "") for word in listening.rest()), "it")
         assert not any("WATCHDOG" in word for word in listening.rest())
         assert process.stop() == 0

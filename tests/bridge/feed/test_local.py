@@ -18,7 +18,7 @@ from lupin_twin.journal.runs import Clock
 from lupin_twin.ros.node import TwinNode
 from lupin_twin.runtime.estimates import ReportRequest
 from tests.support.inprocess import started
-from tests.support.journal import SECOND, kept, scan
+from tests.support.journal import SECOND, append, scan
 from tests.support.looking import Endless
 from tests.support.waiting import PATIENCE_S, until
 
@@ -63,7 +63,7 @@ async def test_two_twins_with_equal_content_have_different_revisions(domain: int
 async def test_damage_found_by_a_query_quarantines_the_file(domain: int, tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     begun_ns = time.time_ns() - 9_000 * SECOND
-    kept(
+    append(
         path,
         [scan(str(n % 9), begun_ns + n * SECOND, t=n) for n in range(5_000)],
         Clock(begun_ns, begun_ns, is_simulated=False),

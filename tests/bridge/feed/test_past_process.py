@@ -22,7 +22,7 @@ from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.writes import Export
-from tests.support.journal import NOW, SECOND, kept, scan
+from tests.support.journal import NOW, SECOND, append, scan
 from tests.support.looking import Body, Count, Endless, Failing, MapCells, Running
 from tests.support.maps import map_of
 from tests.support.waiting import until
@@ -36,7 +36,7 @@ NOW_NS = NOW + SECOND
 def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A journal of 2,500 scans of one tag."""
     found = tmp_path_factory.mktemp("past") / "j.sqlite"
-    kept(found, [scan(at_ns=NOW + number) for number in range(2_500)])
+    append(found, [scan(at_ns=NOW + number) for number in range(2_500)])
     return found
 
 

@@ -122,7 +122,7 @@ async def test_depth_and_bytes_drop_the_oldest_and_a_too_large_message_is_never_
     await relay.listen(STATE, ear)
     await ros.publish(b"1", b"2", b"3")
     assert (ear.received, relay.skipped) == ([b"2", b"3"], 1)
-    for samples, kept in (
+    for samples, stored in (
         ((b"four", b"fivefi"), [b"four", b"fivefi"]),  # 10 bytes: both
         ((b"four", b"fivefiv"), [b"fivefiv"]),  # 11
         ((b"0123456789", b"0123456789a"), [b"0123456789"]),
@@ -130,7 +130,7 @@ async def test_depth_and_bytes_drop_the_oldest_and_a_too_large_message_is_never_
         await ros.publish(*samples)
         late = Ear()
         await relay.listen(STATE, late)
-        assert late.received == kept
+        assert late.received == stored
     assert relay.skipped == 2, "the oldest, and the one that is too large"
 
 
@@ -229,7 +229,7 @@ def test_the_prefixes_of_a_sourced_ros_come_first(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("type_name", "said"),
+    ("type_name", "wording"),
     [
         ("nobody_msgs/msg/Thing", "nobody_msgs/msg/Thing is not installed"),
         ("lupin_msgs/msg/Nothing", "lupin_msgs/msg/Nothing is not installed"),
@@ -238,8 +238,8 @@ def test_the_prefixes_of_a_sourced_ros_come_first(tmp_path: Path) -> None:
         ("", "'' is not a message type"),
     ],
 )
-def test_a_type_that_is_not_installed_is_named(type_name: str, said: str) -> None:
-    with pytest.raises(LookupError, match=said):
+def test_a_type_that_is_not_installed_is_named(type_name: str, wording: str) -> None:
+    with pytest.raises(LookupError, match=wording):
         schema_text(type_name)
 
 

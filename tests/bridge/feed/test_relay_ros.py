@@ -85,11 +85,11 @@ async def test_a_twins_topics_are_relayed_byte_for_byte(
             with pytest.raises(ValueError, match="bytes"):
                 relay.read(map_, Sample(data, 0))
 
-        def newest() -> Any:
+        def latest() -> Any:
             message: Any = deserialize_message(received[state.name][-1].data, TwinState)
             return message if message.tags else None
 
-        last = await until(newest, "a state with the tag")
+        last = await until(latest, "a state with the tag")
         assert [tag.tag_id for tag in last.tags] == ["1"]
         assert first(diagnostics, DiagnosticArray).status
         came_ns = received[state.name][-1].stamp_ns
@@ -119,12 +119,12 @@ async def test_a_twins_topics_are_relayed_byte_for_byte(
         await only_the_expected_type_counts(relay, discovered, domain)
         now = await relay.time()
         assert (now.is_simulated, abs(now.now_ns - came_ns) < 60e9) == (False, True)
-        for topic, said in (
+        for topic, text in (
             (Topic("sensor_smsgs/msg/A", "", "/a"), "is not installed here"),
             (Topic("lupin_msgs/msg/TwinState", "", "/a b"), "topic name"),
         ):
             for _ in range(2):
-                with pytest.raises(NotRelayedError, match=f"{topic.name} cannot be .*{said}"):
+                with pytest.raises(NotRelayedError, match=f"{topic.name} cannot be .*{text}"):
                     await relay.listen(topic, lambda _: None)
         assert len(relay) == 0
     # A thread that has not ended in time is left behind, and ends by itself.

@@ -240,14 +240,14 @@ def left_after_start(folder: Path) -> tuple[str | None, list[Path]]:
 
 
 def test_an_old_copy_is_deleted_at_the_start(tmp_path: Path) -> None:
-    newest, recent, _ = paths = copies(tmp_path, 60.0, RETAINED_S - 60.0, RETAINED_S + 60.0)
-    assert left_after_start(tmp_path) == (str(newest), paths[:2])
+    latest, recent, _ = paths = copies(tmp_path, 60.0, RETAINED_S - 60.0, RETAINED_S + 60.0)
+    assert left_after_start(tmp_path) == (str(latest), paths[:2])
     assert recent.exists()
 
 
 def test_the_latest_copy_stays_whatever_its_age(tmp_path: Path) -> None:
-    newest, _ = copies(tmp_path, RETAINED_S + 60.0, RETAINED_S + 120.0)
-    assert left_after_start(tmp_path) == (str(newest), [newest])
+    latest, _ = copies(tmp_path, RETAINED_S + 60.0, RETAINED_S + 120.0)
+    assert left_after_start(tmp_path) == (str(latest), [latest])
 
 
 def test_a_configured_file_is_read_before_its_twin_is_received(tmp_path: Path) -> None:

@@ -37,9 +37,9 @@ class Stage:
         self.node.destroy_node()
         rclpy.try_shutdown(context=self._context)
 
-    def until(self, look: Callable[[], Any], what: str) -> Any:
-        """Spin the node until `look` returns something true, and return that."""
-        return wait_for(look, what, meanwhile=self._executor.spin_once)
+    def until(self, check: Callable[[], Any], what: str) -> Any:
+        """Spin the node until `check` returns something true, and return that."""
+        return wait_for(check, what, meanwhile=self._executor.spin_once)
 
     def first_map(self) -> OccupancyMap:
         """Wait for the first map."""

@@ -83,9 +83,9 @@ def test_alarms_of_all_sites_come_with_the_worst_first(every: All) -> None:
     page.site("gh2", active_alarms=1)
     page.site("well", active_alarms=0)
     found = alarms(page, "gh1,gh2,well")
-    said = [(it["site"], it["tag_id"], it["reason"]["verdict"]) for it in found["alarms"]]
-    assert said[0] == ("gh2", "0", "critical")
-    assert sorted(said[1:]) == [("gh1", "0", "stressed"), ("gh1", "1", "stressed")]
+    message = [(it["site"], it["tag_id"], it["reason"]["verdict"]) for it in found["alarms"]]
+    assert message[0] == ("gh2", "0", "critical")
+    assert sorted(message[1:]) == [("gh1", "0", "stressed"), ("gh1", "1", "stressed")]
     assert alarms(page)["total"] == sum(site["active_alarms"] for site in page.sites().values())
     # The latest first among equals.
     raised = [it["raised_at"] for it in found["alarms"][1:]]
@@ -150,13 +150,13 @@ def test_an_alarm_comes_with_its_notes(every: All) -> None:
             f" 'alarm:{alarm['id']}', 'valve', {until})"
         )
 
-    def said() -> dict[str, Any]:
+    def message() -> dict[str, Any]:
         return {it["id"]: it for it in alarms(page, "noted")["alarms"]}
 
     # Without a new row in the log.
-    wait_for(lambda: said()[second["id"]].get("shelved_by") == "anna", "who said what")
-    assert said()[second["id"]]["shelved_until"]["sec"] == until_ns // SECOND
-    assert "acknowledged_by" not in said()[first["id"]]
+    wait_for(lambda: message()[second["id"]].get("shelved_by") == "anna", "who said what")
+    assert message()[second["id"]]["shelved_until"]["sec"] == until_ns // SECOND
+    assert "acknowledged_by" not in message()[first["id"]]
     assert page.http.get("/api/alarms?sites=noted").headers["etag"] != etag
 
 
@@ -215,7 +215,7 @@ def test_the_compared_sensor_and_period_can_be_chosen(every: All) -> None:
 
 
 @pytest.mark.parametrize(
-    ("route", "status", "said"),
+    ("route", "status", "message"),
     [
         ("alarms?site=gh1", 400, "parameter 'site' is unknown, expected sites"),
         ("compare", 400, "sensor_type"),
@@ -228,10 +228,12 @@ def test_the_compared_sensor_and_period_can_be_chosen(every: All) -> None:
         ("compare?sensor_type=a&sites=gh1,nowhere", 404, "there is no site 'nowhere'"),
     ],
 )
-def test_bad_queries_are_refused_in_a_line(every: All, route: str, status: int, said: str) -> None:
+def test_bad_queries_are_refused_in_a_line(
+    every: All, route: str, status: int, message: str
+) -> None:
     answer = every.page.http.get(f"/api/{route}")
     assert answer.status_code == status
-    assert said in answer.json()["detail"]
+    assert message in answer.json()["detail"]
 
 
 def test_the_configured_sensors_are_those_of_a_bridge(every: All) -> None:

@@ -21,7 +21,7 @@ from websockets.exceptions import ConnectionClosed
 from tests.support import raw_http
 from tests.support.archive import Archive, forward_once, forwarder, run
 from tests.support.fleet import Page, fleet, forward, frames, scans_lately, wall, write
-from tests.support.journal import kept, look, scan
+from tests.support.journal import append, inspection, scan
 from tests.support.postgres import Postgres, server
 from tests.support.processes import children_of, constants, limits, lupin_twin
 from tests.support.raw_http import UPGRADE, status
@@ -240,7 +240,7 @@ def test_unreadable_rows_are_reported_on_the_page_of_their_site(
 ) -> None:
     journal = tmp_path / "journal"
     now_ns = time.time_ns()
-    write(journal, [*scans_lately(), look("1", now_ns - 10**9)])
+    write(journal, [*scans_lately(), inspection("1", now_ns - 10**9)])
     with forwarder(archive, journal), fleet(archive, *limits(answer_timeout_s=2)) as running:
         running.site(is_live=True, last_verdict="healthy")
         archive.copy_site("gh2")
@@ -254,7 +254,7 @@ def test_unreadable_rows_are_reported_on_the_page_of_their_site(
                 continue  # A history of readings needs no inspection.
             assert found.status_code == 503, found.text
             assert "ows of the site cannot be read" in found.json()["detail"]
-        kept(journal, [scan("0", time.time_ns())])
+        append(journal, [scan("0", time.time_ns())])
 
         def problem() -> str:
             return str(running.http.get("/sites/gh1/readyz").json()["input_problems"])
@@ -267,7 +267,7 @@ def test_unreadable_rows_are_reported_on_the_page_of_their_site(
         assert len(running.http.get("/sites/gh1/api/state").json()["tags"]) == 5
         assert running.http.get("/readyz").status_code == 200
         archive.do("UPDATE scan SET readings = '[21.5]' WHERE site = 'gh1'")
-        kept(journal, [scan("0", time.time_ns())])
+        append(journal, [scan("0", time.time_ns())])
         wait_for(lambda: problem() == "[]", "all to be well again")
 
 
@@ -327,7 +327,7 @@ def test_a_sites_clock_may_be_wrong_by_a_year(archive: Archive, tmp_path: Path) 
     sites = {"ahead": wall().stamp_ns + YEAR_NS, "behind": wall().stamp_ns - YEAR_NS}
     for name, now_ns in sites.items():
         rows = [scan("7", now_ns - number * 10**9) for number in range(5, 0, -1)]
-        kept(tmp_path / name, rows, replace(wall(), stamp_ns=now_ns, arrival_ns=now_ns))
+        append(tmp_path / name, rows, replace(wall(), stamp_ns=now_ns, arrival_ns=now_ns))
         forward_once(archive.of_site(name), tmp_path / name)
     archive.keep_live()
     with fleet(archive) as running:
@@ -347,18 +347,18 @@ def test_a_sites_clock_may_be_wrong_by_a_year(archive: Archive, tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
-    ("args", "said"),
+    ("args", "message"),
     [
         ((), "--archive-url is missing, or LUPIN_ARCHIVE_URL"),
         (("--archive-url", "postgresql://a@b/c", "--site", "gh1"), "--site is for a twin, not for"),
         (("--ros-args", "-p", "a:=1"), "fleet takes no ROS arguments"),
     ],
 )
-def test_an_error_that_cannot_pass_ends_the_process(args: tuple[str, ...], said: str) -> None:
+def test_an_error_that_cannot_pass_ends_the_process(args: tuple[str, ...], message: str) -> None:
     done = run("fleet", "--port", "0", *args)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
-    assert said in done.stderr
+    assert message in done.stderr
 
 
 def test_an_error_that_may_pass_is_reported_and_the_page_is_served(archive: Archive) -> None:

@@ -40,15 +40,15 @@ def here(shared_archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> I
         yield Here(page, archive, accounts, journal)
 
 
-def alarm_of(browser: httpx.Client, **said: str) -> dict[str, Any]:
+def alarm_of(browser: httpx.Client, **message: str) -> dict[str, Any]:
     """The alarm of the hot tag, once it has this note."""
 
-    def look() -> dict[str, Any] | None:
+    def check() -> dict[str, Any] | None:
         answer = browser.get(ALARMS)
         every = answer.json()["alarms"] if answer.status_code == 200 else []
-        return next((it for it in every if it["tag_id"] and said.items() <= it.items()), None)
+        return next((it for it in every if it["tag_id"] and message.items() <= it.items()), None)
 
-    found = wait_for(look, f"an alarm with {said}")
+    found = wait_for(check, f"an alarm with {message}")
     assert found is not None
     return found
 

@@ -17,7 +17,7 @@ from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Pose, TagState
 from tests.support.archive import Archive, forward_once, forwarder
 from tests.support.fleet import fleet, forward, frames, scans_lately, wall, write
-from tests.support.journal import kept, recording, scan
+from tests.support.journal import append, recording, scan
 from tests.support.waiting import wait_for
 
 
@@ -104,7 +104,7 @@ def test_the_last_state_of_a_silent_site_does_not_age(archive: Archive, journal:
         for minute in (3, 2, 1)
         for tag in range(3)
     ]
-    kept(journal, hot, then)
+    append(journal, hot, then)
     forward_once(archive, journal)
     archive.do("UPDATE forwarder SET heard_at = now() - INTERVAL '3 days'")
     with fleet(archive) as page:
@@ -170,9 +170,12 @@ def test_the_source_is_read_from_the_log(archive: Archive, tmp_path: Path) -> No
         record(archive.of_site(site), tmp_path / site, origin, is_simulated=is_simulated)
     forward(archive, tmp_path / "gh1", scans_lately())  # which does not contain it
     with fleet(archive) as page:
-        for site, said in [*((site, said) for site, _, _, said in SITES), ("gh1", "unknown")]:
-            page.site(site, origin=said)
-            assert page.http.get(f"/sites/{site}/readyz").json()["origin"] == said
+        for site, message in [
+            *((site, message) for site, _, _, message in SITES),
+            ("gh1", "unknown"),
+        ]:
+            page.site(site, origin=message)
+            assert page.http.get(f"/sites/{site}/readyz").json()["origin"] == message
         # A journal with another use is shown as such.
         record(archive.of_site("simulated"), tmp_path / "simulated", "robot")
         page.site("simulated", origin="robot")

@@ -13,7 +13,7 @@ from pyarrow import parquet
 from lupin_twin.core.state import Scan, Write
 from tests.support.archive import Archive
 from tests.support.fleet import fleet, forward, scans_lately
-from tests.support.journal import SECOND, look, scan
+from tests.support.journal import SECOND, inspection, scan
 from tests.support.waiting import wait_for
 
 HOUR_S = 3600
@@ -28,7 +28,7 @@ def rows_of(begun_s: int) -> list[Write]:
             found.append(scan("a", at_ns, temperature=22.0 + minute / 10, humidity=60.0))
         if minute < 90:
             found.append(scan("b", at_ns + SECOND, temperature=21.0))
-    found.append(look("b", (begun_s + 300) * SECOND, anomaly=True))
+    found.append(inspection("b", (begun_s + 300) * SECOND, anomaly=True))
     failed = (begun_s + 400) * SECOND
     found.append(Scan("b", failed, (), None, 2, "no", "robot", arrival_ns=failed + 1000))
     return sorted(found, key=lambda row: row.stamp_ns)
@@ -75,14 +75,14 @@ def test_the_latest_notes_of_all_sites_and_who_withdrew_one(
     at_s = int(time.time()) // HOUR_S * HOUR_S - 2 * HOUR_S
     for site in ("gh1", "gh2"):
         forward(archive.of_site(site), tmp_path / f"{site}.sqlite", rows_of(at_s)[:10])
-    said = (
+    message = (
         ("gh1", "1", at_s, "Anna", "comment", "site", "vents checked"),
         ("gh1", "2", at_s + 60, "Anna", "acknowledge", "alarm:x", ""),
         ("gh2", "1", at_s + 30, "Ben", "comment", "tag:a", "'; DROP TABLE note; --"),
         ("gh1", "3", at_s + 90, "Ben", "withdraw", "note:2", ""),
         ("gh1", "4", at_s - HOUR_S, "Anna", "comment", "site", "before"),
     )
-    for site, name, made_s, by, kind, subject, text in said:
+    for site, name, made_s, by, kind, subject, text in message:
         archive.do(
             f"INSERT INTO note VALUES ('{site}', '{name}', {made_s * SECOND}, '{by}', '{kind}',"
             f" '{subject}', $${text}$$, NULL)"
@@ -135,7 +135,7 @@ def test_sites_are_exported_together_or_by_name(archive: Archive, tmp_path: Path
         alone = parquet.read_table(pyarrow.BufferReader(of_site.content))
         assert "site" not in alone.column_names
         assert alone["value"] == table.slice(6, 6)["value"]
-        for query, status, said in (
+        for query, status, message in (
             ("sites=gh1,gh9", 404, "there is no site 'gh9' in the archive, which has 3"),
             ("sites=", 404, "there is no site ''"),
             ("site=gh1", 400, "parameter 'site' is unknown, expected from, to, tag_id,"),
@@ -144,5 +144,5 @@ def test_sites_are_exported_together_or_by_name(archive: Archive, tmp_path: Path
             for kind in ("csv", "parquet"):
                 answer = page.http.get(f"/api/export.{kind}?{query}")
                 assert answer.status_code == status, query
-                assert said in answer.json()["detail"]
+                assert message in answer.json()["detail"]
         assert page.http.head("/api/export.parquet").headers["content-disposition"]

@@ -320,9 +320,9 @@ def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false
     # Pests are real: from the first inspection that saw one to the second that did not.
     clean: dict[str, int] = {}
     broke_out = 0
-    for look in (write for write in received if write.has_seen):
-        broke_out += look.anomaly and clean.get(look.tag_id, 2) >= 2
-        clean[look.tag_id] = 0 if look.anomaly else clean.get(look.tag_id, 2) + 1
+    for inspection in (write for write in received if write.has_seen):
+        broke_out += inspection.anomaly and clean.get(inspection.tag_id, 2) >= 2
+        clean[inspection.tag_id] = 0 if inspection.anomaly else clean.get(inspection.tag_id, 2) + 1
     assert counts["pest", ""] == broke_out
     # Attempts that failed twice in one round are not reported; failures in two rounds are.
     (lost,) = (one for one in raised if one.reason.kind == "scan_failed")

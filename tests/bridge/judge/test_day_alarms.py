@@ -126,8 +126,8 @@ def test_a_late_scan_corrects_its_day() -> None:
 def test_a_range_of_light_belongs_to_a_crop() -> None:
     received = scans({"light": [4_000.0, 4_000.0]})
     assert found(received) == []
-    look = PastWrite(10_000, 1, "a", HOUR, 1, 0, has_seen=True, species="Lettuce")
-    [dim] = found([look, *received])
+    inspection = PastWrite(10_000, 1, "a", HOUR, 1, 0, has_seen=True, species="Lettuce")
+    [dim] = found([inspection, *received])
     assert dim.reason.sensor == "daily_light_integral"
     assert dim.reason.value == pytest.approx(24 * 3600 * 4_000.0 / 54.0 / 1e6)
     assert dim.reason.limit == 12.0

@@ -286,10 +286,10 @@ def test_judging_at_once_is_bounded_by_readings() -> None:
     """A tag of sixty sensors takes as long as ten of five."""
     many = {f"s{number}": 1.0 for number in range(59)}
     judge = Judge(BY_LIGHT)
-    house = [tag(str(number), START, **many) for number in range(150)]
-    reported = judge.see(snapshot(START, *house))
+    greenhouse = [tag(str(number), START, **many) for number in range(150)]
+    reported = judge.see(snapshot(START, *greenhouse))
     assert len(reported.tags) == MAX_AT_ONCE // 60
-    reported = judge.see(snapshot(START, *house))
+    reported = judge.see(snapshot(START, *greenhouse))
     assert len(reported.tags) == 150
 
 
@@ -333,24 +333,28 @@ def test_a_tag_is_also_judged_by_the_day_before_for_thirty_hours() -> None:
 
 def test_a_first_round_that_stops_is_not_healthy_for_a_day() -> None:
     judge = Judge(BY_LIGHT)
-    house = tuple(tag(name, START + n * MINUTE, temperature=22.0) for n, name in enumerate("abc"))
+    greenhouse = tuple(
+        tag(name, START + n * MINUTE, temperature=22.0) for n, name in enumerate("abc")
+    )
     last_ns = START + 2 * MINUTE
 
     def reasons(now_ns: int, *tags: TagState) -> tuple[Verdict, list[tuple[Kind, int | None]]]:
         live = judge.see(snapshot(now_ns, *tags))
-        once = judge_once(snapshot(now_ns, *tags), writes_of(*house, *tags), BY_LIGHT)
+        once = judge_once(snapshot(now_ns, *tags), writes_of(*greenhouse, *tags), BY_LIGHT)
         assert live.house == once.house
         return live.house.verdict, [(one.kind, one.since_ns) for one in live.house.reasons]
 
-    assert reasons(last_ns + 30 * MINUTE, *house) == (Verdict.HEALTHY, [])
+    assert reasons(last_ns + 30 * MINUTE, *greenhouse) == (Verdict.HEALTHY, [])
     stopped = [(Kind.STOPPED, last_ns)]
-    assert reasons(last_ns + 30 * MINUTE + 1, *house) == (Verdict.UNKNOWN, stopped)
-    assert judge.see(snapshot(last_ns + 20 * 60 * MINUTE, *house)).tags["a"].verdict == "healthy"
+    assert reasons(last_ns + 30 * MINUTE + 1, *greenhouse) == (Verdict.UNKNOWN, stopped)
+    assert (
+        judge.see(snapshot(last_ns + 20 * 60 * MINUTE, *greenhouse)).tags["a"].verdict == "healthy"
+    )
     # The next round: two of three tags have an interval, which holds for hours.
     again_ns = last_ns + 21 * 60 * MINUTE
     later = [tag(name, again_ns, temperature=22.0) for name in "ab"]
-    assert reasons(again_ns, *later, house[2]) == (Verdict.HEALTHY, [])
-    assert reasons(again_ns + 60 * MINUTE, *later, house[2]) == (Verdict.HEALTHY, [])
+    assert reasons(again_ns, *later, greenhouse[2]) == (Verdict.HEALTHY, [])
+    assert reasons(again_ns + 60 * MINUTE, *later, greenhouse[2]) == (Verdict.HEALTHY, [])
 
 
 def writes_of(*tags: TagState) -> list[PastWrite]:

@@ -99,9 +99,9 @@ def journal_rows(writes: list[Write]) -> list[PastWrite]:
     ]
 
 
-def seen(look: Inspection) -> tuple[bool, str, bool, int]:
-    assert look.flower is not None
-    return True, look.flower.species, look.flower.anomaly, look.flower.bug_count
+def seen(inspection: Inspection) -> tuple[bool, str, bool, int]:
+    assert inspection.flower is not None
+    return True, inspection.flower.species, inspection.flower.anomaly, inspection.flower.bug_count
 
 
 def criteria() -> Criteria:
@@ -120,8 +120,8 @@ def judged(state: dict[str, Any]) -> Judged:
         if not tag["readings"]:
             store.pin(tag_id, Pose(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0))
     moment_ns = now_ns(state)
-    said = judge.see(store.snapshot(moment_ns, "map"))
-    return silenced(said) if state.get("twin", "live") != "live" else said
+    message = judge.see(store.snapshot(moment_ns, "map"))
+    return silenced(message) if state.get("twin", "live") != "live" else message
 
 
 async def alarms(state: dict[str, Any]) -> list[list[str]]:
@@ -161,17 +161,17 @@ def test_a_greenhouse_is_judged_as_an_expert_would(
     state: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(feed_module, "JOURNAL_S", 0.0)
-    said, house = judged(state), state["house"]
-    assert said.house.verdict == house["verdict"]
-    assert [reason.kind for reason in said.house.reasons] == house["reasons"]
-    assert [said.day.is_day, said.day.source] == house["day"]
-    assert said.patrol.overdue == house["overdue"]
+    message, greenhouse = judged(state), state["house"]
+    assert message.house.verdict == greenhouse["verdict"]
+    assert [reason.kind for reason in message.house.reasons] == greenhouse["reasons"]
+    assert [message.day.is_day, message.day.source] == greenhouse["day"]
+    assert message.patrol.overdue == greenhouse["overdue"]
     of_tags = tags_of(state)
-    assert {tag_id: health.verdict for tag_id, health in said.tags.items()} == {
+    assert {tag_id: health.verdict for tag_id, health in message.tags.items()} == {
         tag_id: tag["verdict"] for tag_id, tag in of_tags.items()
     }
     for tag_id, tag in of_tags.items():
-        assert reported(said.tags[tag_id]) == expected(tag["reasons"])
+        assert reported(message.tags[tag_id]) == expected(tag["reasons"])
     assert asyncio.run(alarms(state)) == state["alarms"]
 
 

@@ -87,7 +87,7 @@ def test_a_reading_from_the_future_counts_as_read_now() -> None:
 
 
 @pytest.mark.parametrize(
-    ("tags", "house"),
+    ("tags", "greenhouse"),
     [
         (["healthy", "healthy"], "healthy"),
         (["healthy", "stressed"], "stressed"),
@@ -100,6 +100,6 @@ def test_a_reading_from_the_future_counts_as_read_now() -> None:
     ],
 )
 def test_a_greenhouse_has_its_worst_tags_verdict_or_is_unknown_where_most_tags_are(
-    tags: list[str], house: str
+    tags: list[str], greenhouse: str
 ) -> None:
-    assert judge_site(Counter(map(Verdict, tags)), is_silent=False).verdict == house
+    assert judge_site(Counter(map(Verdict, tags)), is_silent=False).verdict == greenhouse

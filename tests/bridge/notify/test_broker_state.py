@@ -100,10 +100,10 @@ def test_each_message_names_its_source_and_a_new_source_sends_all_again() -> Non
     state = tag("a", temperature=6.0)
     then = seen(state, alarms=(alarm("a"),))
     first = reported(one, then)
-    said = {topic for topic in first if topic.startswith("lt/")}
-    assert {first[topic]["origin"] for topic in said} == {"robot"}
+    message = {topic for topic in first if topic.startswith("lt/")}
+    assert {first[topic]["origin"] for topic in message} == {"robot"}
     news = reported(one, seen(state, alarms=(alarm("a"),), origin="recorded"))
-    assert {topic: it["origin"] for topic, it in news.items()} == dict.fromkeys(said, "recorded")
+    assert {topic: it["origin"] for topic, it in news.items()} == dict.fromkeys(message, "recorded")
 
 
 def test_alarms_are_sent_for_the_tag_and_for_the_greenhouse() -> None:

@@ -82,12 +82,12 @@ def in_a_hurry(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @asynccontextmanager
 async def sending(
-    house: Greenhouse, folder: Path, port: int, zone: tzinfo | None = UTC
+    greenhouse: Greenhouse, folder: Path, port: int, zone: tzinfo | None = UTC
 ) -> AsyncIterator[Webhook]:
     target = Targets.of(Settings(webhook_url=f"http://127.0.0.1:{port}/"), SECRETS).webhook
     assert target is not None
     hook = Webhook(target)
-    of: Any = house
+    of: Any = greenhouse
     hook.start(of)
     report = DailyReport(DailyTarget(SIX, zone, folder), hook, of)
     report.start()
@@ -111,36 +111,36 @@ async def begun(
     folder: Path, *answers: Reply, now: str = "2026-05-01T07:00Z"
 ) -> AsyncIterator[tuple[Greenhouse, Receiver]]:
     """A bridge that has recorded the last day as sent, and sends the next ones."""
-    house = Greenhouse(ns(now))
+    greenhouse = Greenhouse(ns(now))
     with receiver(*answers) as at:
-        async with sending(house, folder, at.port):
+        async with sending(greenhouse, folder, at.port):
             await noted(folder)
-            yield house, at
+            yield greenhouse, at
 
 
-async def looks(house: Greenhouse, count: int = 5) -> None:
+async def looks(greenhouse: Greenhouse, count: int = 5) -> None:
     """Wait until it has checked that often and found nothing to do."""
-    before = house.looks
-    await until(lambda: house.looks >= before + count, "more looks")
+    before = greenhouse.looks
+    await until(lambda: greenhouse.looks >= before + count, "more looks")
 
 
 async def test_each_day_is_sent_once_from_the_first_hour_on_also_after_restarts(
     tmp_path: Path,
 ) -> None:
-    house = Greenhouse(ns("2026-05-01T05:00Z"))
+    greenhouse = Greenhouse(ns("2026-05-01T05:00Z"))
     with receiver(status(200)) as at:
-        async with sending(house, tmp_path, at.port):
+        async with sending(greenhouse, tmp_path, at.port):
             await noted(tmp_path)
-            await looks(house)
+            await looks(greenhouse)
             assert at.posted == []
-            house.ros_time_ns = ns("2026-05-01T06:00Z")
+            greenhouse.ros_time_ns = ns("2026-05-01T06:00Z")
             await until(lambda: at.posted, "the first report")
-            await looks(house)
-        async with sending(house, tmp_path, at.port):
-            await looks(house)
-            house.ros_time_ns = ns("2026-05-02T06:30Z")
+            await looks(greenhouse)
+        async with sending(greenhouse, tmp_path, at.port):
+            await looks(greenhouse)
+            greenhouse.ros_time_ns = ns("2026-05-02T06:30Z")
             await until(lambda: len(at.posted) == 2, "the second")
-            await looks(house)
+            await looks(greenhouse)
         first = [ns("2026-04-30T06:00Z"), ns("2026-05-01T06:00Z")]
         assert periods(at) == [first, [first[1], ns("2026-05-02T06:00Z")]]
         assert at.ids == ["report.20260501T060000Z", "report.20260502T060000Z"]
@@ -151,22 +151,22 @@ async def test_each_day_is_sent_once_from_the_first_hour_on_also_after_restarts(
 async def test_missed_days_are_sent_in_order_and_at_most_a_week_of_them(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    house = Greenhouse(ns("2026-05-01T07:00Z"))
+    greenhouse = Greenhouse(ns("2026-05-01T07:00Z"))
     with receiver(status(200)) as at:
-        async with sending(house, tmp_path, at.port):
+        async with sending(greenhouse, tmp_path, at.port):
             await noted(tmp_path)
-        house.ros_time_ns = ns("2026-05-04T07:00Z")
-        async with sending(house, tmp_path, at.port):
+        greenhouse.ros_time_ns = ns("2026-05-04T07:00Z")
+        async with sending(greenhouse, tmp_path, at.port):
             await until(lambda: len(at.posted) == 3, "three days")
-            await looks(house)
+            await looks(greenhouse)
         assert [end for _, end in periods(at)] == [
             ns(f"2026-05-0{day}T06:00Z") for day in (2, 3, 4)
         ]
         assert "too many were missed" not in caplog.text
-        house.ros_time_ns = ns("2026-05-31T07:00Z")
-        async with sending(house, tmp_path, at.port):
+        greenhouse.ros_time_ns = ns("2026-05-31T07:00Z")
+        async with sending(greenhouse, tmp_path, at.port):
             await until(lambda: len(at.posted) == 3 + MOST_DAYS, "a week")
-            await looks(house)
+            await looks(greenhouse)
         assert periods(at)[-1][1] == ns("2026-05-31T06:00Z")
         assert "too many were missed" in caplog.text
 
@@ -174,11 +174,11 @@ async def test_missed_days_are_sent_in_order_and_at_most_a_week_of_them(
 async def test_a_day_with_too_much_data_holds_up_no_other(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    async with begun(tmp_path, status(200)) as (house, at):
-        house.error = PastRefused("about 200000 scans, the limit is 100000")
-        house.ros_time_ns = ns("2026-05-02T07:00Z")
+    async with begun(tmp_path, status(200)) as (greenhouse, at):
+        greenhouse.error = PastRefused("about 200000 scans, the limit is 100000")
+        greenhouse.ros_time_ns = ns("2026-05-02T07:00Z")
         await until(lambda: "20260502T060000Z is skipped" in caplog.text, "the word of it")
-        house.error, house.ros_time_ns = None, ns("2026-05-03T07:00Z")
+        greenhouse.error, greenhouse.ros_time_ns = None, ns("2026-05-03T07:00Z")
         await until(lambda: at.posted, "the next one")
     assert periods(at) == [[ns("2026-05-02T06:00Z"), ns("2026-05-03T06:00Z")]]
 
@@ -186,40 +186,40 @@ async def test_a_day_with_too_much_data_holds_up_no_other(
 async def test_a_report_that_is_not_accepted_is_sent_again_also_by_the_next_process(
     tmp_path: Path,
 ) -> None:
-    async with begun(tmp_path, status(500)) as (house, at):
-        house.ros_time_ns = ns("2026-05-02T07:00Z")
+    async with begun(tmp_path, status(500)) as (greenhouse, at):
+        greenhouse.ros_time_ns = ns("2026-05-02T07:00Z")
         await until(lambda: len(at.posted) >= 3, "some tries")
     with receiver(status(503), status(200), port=at.port) as again:
-        async with sending(house, tmp_path, at.port):
+        async with sending(greenhouse, tmp_path, at.port):
             await until(lambda: len(again.posted) == 2, "the report")
-            await looks(house)
+            await looks(greenhouse)
     assert len({*at.ids, *again.ids}) == 1
 
 
 async def test_a_report_that_cannot_be_recorded_as_sent_is_not_repeated_endlessly(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    async with begun(tmp_path, status(200)) as (house, at):
+    async with begun(tmp_path, status(200)) as (greenhouse, at):
         [note] = tmp_path.glob("*.sent")
         in_the_way, before = note.with_suffix(".new"), note.read_text()
         in_the_way.mkdir()
-        house.ros_time_ns = ns("2026-05-02T07:00Z")
+        greenhouse.ros_time_ns = ns("2026-05-02T07:00Z")
         await until(lambda: "is not sent by webhook: [Errno" in caplog.text, "why")
-        await looks(house)
+        await looks(greenhouse)
         assert len(at.posted) == 1
         in_the_way.rmdir()
         await until(lambda: note.read_text() != before, "the note of it")
-        await looks(house)
+        await looks(greenhouse)
         assert len(at.posted) == 1
 
 
 async def test_a_report_that_the_receiver_refuses_is_dropped_and_logged(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    async with begun(tmp_path, *[status(413)] * MAX_REFUSALS, status(200)) as (house, at):
-        house.ros_time_ns = ns("2026-05-02T07:00Z")
+    async with begun(tmp_path, *[status(413)] * MAX_REFUSALS, status(200)) as (greenhouse, at):
+        greenhouse.ros_time_ns = ns("2026-05-02T07:00Z")
         await until(lambda: "was given up by webhook" in caplog.text, "that it is given up")
-        house.ros_time_ns = ns("2026-05-03T07:00Z")
+        greenhouse.ros_time_ns = ns("2026-05-03T07:00Z")
         await until(lambda: len(at.posted) == MAX_REFUSALS + 1, "the next day's")
     assert at.posted[-1].json["lost"] == 1
 
@@ -227,39 +227,39 @@ async def test_a_report_that_the_receiver_refuses_is_dropped_and_logged(
 async def test_it_waits_for_the_log_and_reports_why_there_is_none(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    async with begun(tmp_path, status(200)) as (house, at):
-        house.lag_ns = 10 * 10**9
-        house.ros_time_ns = ns("2026-05-02T06:00:05Z")
-        await looks(house)
+    async with begun(tmp_path, status(200)) as (greenhouse, at):
+        greenhouse.lag_ns = 10 * 10**9
+        greenhouse.ros_time_ns = ns("2026-05-02T06:00:05Z")
+        await looks(greenhouse)
         assert at.posted == []
-        house.error = NotRemembered("the disk is gone")
-        house.ros_time_ns = ns("2026-05-02T06:00:20Z")
+        greenhouse.error = NotRemembered("the disk is gone")
+        greenhouse.ros_time_ns = ns("2026-05-02T06:00:20Z")
         await until(lambda: "not sent by webhook: the disk is gone" in caplog.text, "why")
-        house.error = None
+        greenhouse.error = None
         await until(lambda: at.posted, "the report")
 
 
 async def test_a_clock_that_was_ahead_stops_no_reports_and_simulated_time_has_none(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    async with begun(tmp_path, status(200), now="2036-05-01T07:00Z") as (house, at):
-        house.ros_time_ns = ns("2026-05-01T07:00Z")
-        await looks(house)
-        house.ros_time_ns = ns("2026-05-02T07:00Z")
+    async with begun(tmp_path, status(200), now="2036-05-01T07:00Z") as (greenhouse, at):
+        greenhouse.ros_time_ns = ns("2026-05-01T07:00Z")
+        await looks(greenhouse)
+        greenhouse.ros_time_ns = ns("2026-05-02T07:00Z")
         await until(lambda: at.posted, "the report of the true day")
-        house.ros_time_ns = 5_000 * 10**9
+        greenhouse.ros_time_ns = 5_000 * 10**9
         await until(lambda: "the time is simulated" in caplog.text, "why there is none")
 
 
 async def test_two_greenhouses_with_one_receiver_have_separate_reports(tmp_path: Path) -> None:
     greenhouses = [Greenhouse(ns("2026-05-01T07:00Z"), journal_id=name) for name in ("j1", "j2")]
     with receiver(status(200)) as at:
-        for house in greenhouses:
-            async with sending(house, tmp_path, at.port):
-                await looks(house)
-            house.ros_time_ns = ns("2026-05-02T07:00Z")
-            async with sending(house, tmp_path, at.port):
-                await looks(house, 20)
+        for greenhouse in greenhouses:
+            async with sending(greenhouse, tmp_path, at.port):
+                await looks(greenhouse)
+            greenhouse.ros_time_ns = ns("2026-05-02T07:00Z")
+            async with sending(greenhouse, tmp_path, at.port):
+                await looks(greenhouse, 20)
         assert len(at.posted) == 2
 
 
@@ -299,16 +299,16 @@ async def test_a_broker_gets_it_once_reachable_and_retains_it(
     broker = Broker(tmp_path)
     target = Targets.of(Settings(mqtt_url=broker.url, mqtt_prefix="lt"), Secrets()).mqtt
     assert target is not None
-    house = Greenhouse(ns("2026-05-01T07:00Z"))
+    greenhouse = Greenhouse(ns("2026-05-01T07:00Z"))
     channel = Mqtt(target, Mirror(target.topics, SENSORS))
-    of: Any = house
+    of: Any = greenhouse
     channel.start(of)
     report = DailyReport(DailyTarget(SIX, UTC, tmp_path), channel, of)
     report.start()
     try:
         await noted(tmp_path)
-        house.ros_time_ns = ns("2026-05-02T07:00Z")
-        await looks(house, 1)
+        greenhouse.ros_time_ns = ns("2026-05-02T07:00Z")
+        await looks(greenhouse, 1)
         with broker.running():
             with Subscriber(broker) as received:
                 await until(lambda: received.last("lt/house/report"), "the report")

@@ -74,17 +74,17 @@ def test_a_receiver_is_logged_without_its_path(url: str, port: int, path: str, c
     ],
 )
 def test_an_invalid_address_is_refused(url: str, named: str) -> None:
-    said = refusal(mqtt_url=url) if "mqtt" in named else refusal(webhook_url=url)
-    assert said.startswith(named)
-    assert "hunter2" not in said
+    message = refusal(mqtt_url=url) if "mqtt" in named else refusal(webhook_url=url)
+    assert message.startswith(named)
+    assert "hunter2" not in message
 
 
 @pytest.mark.parametrize("prefix", ["", "/a", "a/", "a/+/b", "a#", "$SYS/a", "a\nb", "a" * 129])
 def test_a_prefix_that_no_topic_may_have_is_refused(prefix: str) -> None:
     assert "--mqtt-prefix is " in refusal(mqtt_url="mqtt://a", mqtt_prefix=prefix)
     if prefix:
-        said = refusal(mqtt_url="mqtt://a", mqtt_discovery_prefix=prefix)
-        assert "--mqtt-discovery-prefix is " in said
+        message = refusal(mqtt_url="mqtt://a", mqtt_discovery_prefix=prefix)
+        assert "--mqtt-discovery-prefix is " in message
 
 
 @pytest.mark.parametrize("prefix", ["ferme/été 1", "a" * MAX_PREFIX])
@@ -115,8 +115,8 @@ def test_a_password_needs_a_user_and_a_warning_is_given_without_tls(
 
 def test_a_webhook_needs_a_valid_secret() -> None:
     assert "--webhook-secret-file" in refusal(Secrets(), webhook_url="http://a")
-    said = refusal(Secrets(webhook_secret=SECRET[1:]), webhook_url="http://a")
-    assert f"has {MIN_SECRET_LENGTH - 1} characters" in said
+    message = refusal(Secrets(webhook_secret=SECRET[1:]), webhook_url="http://a")
+    assert f"has {MIN_SECRET_LENGTH - 1} characters" in message
 
 
 @pytest.mark.parametrize(
@@ -131,13 +131,15 @@ def test_a_webhook_needs_a_valid_secret() -> None:
 )
 def test_an_unused_setting_is_reported(name: str, url: str) -> None:
     given: dict[str, Any] = {name: "x"}
-    said = refusal(**given)
-    assert said.startswith(f"--{name.replace('_', '-')} is given without --{url.replace('_', '-')}")
+    message = refusal(**given)
+    assert message.startswith(
+        f"--{name.replace('_', '-')} is given without --{url.replace('_', '-')}"
+    )
 
 
 def test_a_mistake_is_named_as_the_operator_wrote_it() -> None:
-    said = refusal(mqtt_url="x", given_as={"mqtt_url": "LUPIN_MQTT_URL"})
-    assert said.startswith("LUPIN_MQTT_URL must begin with")
+    message = refusal(mqtt_url="x", given_as={"mqtt_url": "LUPIN_MQTT_URL"})
+    assert message.startswith("LUPIN_MQTT_URL must begin with")
 
 
 def test_a_private_authority_is_trusted_and_an_invalid_file_of_one_is_named(

@@ -83,13 +83,13 @@ def test_a_tag_and_the_greenhouse_have_a_verdict_and_an_alarm() -> None:
 
 def test_a_silent_twin_makes_only_the_verdicts_of_tags_unavailable() -> None:
     tags = {it["name"]: it for it in announced("12", "co2").values()}
-    house = {it["name"]: it for it in dict(greenhouse_configs(TOPICS)).values()}
+    greenhouse = {it["name"]: it for it in dict(greenhouse_configs(TOPICS)).values()}
     for name in ("Verdict", "Alarm"):
         topics = [it["topic"] for it in tags[name]["availability"]]
         assert topics == ["lupin-twin/status", "lupin-twin/house/twin"]
-        assert [it["topic"] for it in house[name]["availability"]] == ["lupin-twin/status"]
+        assert [it["topic"] for it in greenhouse[name]["availability"]] == ["lupin-twin/status"]
     assert len(tags["CO₂"]["availability"]) == 1
-    assert house["Twin"]["device_class"] == "connectivity"
+    assert greenhouse["Twin"]["device_class"] == "connectivity"
 
 
 def test_no_two_entities_have_the_same_name() -> None:

@@ -38,7 +38,7 @@ def refusal(url: str, answer_s: float = 60.0, ca: str = "") -> str:
     return str(refused.value)
 
 
-def said(port: int) -> tuple[int, int]:
+def message(port: int) -> tuple[int, int]:
     """The status of a refusal, and its Retry-After."""
     with pytest.raises(PostError) as refused:
         sent(f"http://127.0.0.1:{port}/")
@@ -60,7 +60,7 @@ def test_any_other_status_fails_and_a_redirect_is_not_followed(code: int) -> Non
     with receiver(status(200)) as elsewhere:
         place = f"Location: http://127.0.0.1:{elsewhere.port}/"
         with receiver(status(code, place, "Retry-After: 7")) as server:
-            assert said(server.port) == (code, 7)
+            assert message(server.port) == (code, 7)
     assert elsewhere.posted == []
 
 
@@ -105,15 +105,15 @@ def test_a_head_is_read_up_to_a_limit(begin: bytes, more: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "why"),
+    ("message", "why"),
     [
         (b"SSH-2.0-OpenSSH\r\n\r\n", "no HTTP answer: "),
         (b"", "the connection was closed before an answer"),
         (b"HTTP/1.1 200", "the connection was closed before an answer"),
     ],
 )
-def test_an_invalid_answer_is_reported(said: bytes, why: str) -> None:
-    with receiver(lambda _: iter([said])) as server:
+def test_an_invalid_answer_is_reported(message: bytes, why: str) -> None:
+    with receiver(lambda _: iter([message])) as server:
         assert refusal(f"http://127.0.0.1:{server.port}/").startswith(why)
 
 
@@ -129,7 +129,7 @@ def test_an_interim_response_is_skipped() -> None:
 )
 def test_retry_after_is_a_number(retry_after: str, reported_s: int) -> None:
     with receiver(status(503, f"Retry-After: {retry_after}")) as server:
-        assert said(server.port) == (503, reported_s)
+        assert message(server.port) == (503, reported_s)
 
 
 def test_https_trusts_its_authority_alone(tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ class Greenhouse:
 @asynccontextmanager
 async def telling(
     broker: Broker,
-    house: Greenhouse,
+    greenhouse: Greenhouse,
     answer_s: float = PATIENCE_S,
     secrets: Secrets | None = None,
     **settings: Any,
@@ -60,7 +60,7 @@ async def telling(
         patch.setattr(mqtt, "FIRST_WAIT_S", 0.001)
         patch.setattr(mqtt, "ANSWER_S", answer_s)
         channel = Mqtt(target, Mirror(target.topics, SENSORS))
-        channel.start(house)  # type: ignore[arg-type]  # what it needs of one
+        channel.start(greenhouse)  # type: ignore[arg-type]  # what it needs of one
         try:
             yield channel
         finally:
@@ -85,13 +85,13 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
 async def test_a_broker_gets_the_state_and_then_its_changes(
     shared: Broker,
 ) -> None:
-    house = Greenhouse()
-    house.now = seen(tag("a", temperature=20.0), alarms=(alarm("a"),))
+    greenhouse = Greenhouse()
+    greenhouse.now = seen(tag("a", temperature=20.0), alarms=(alarm("a"),))
     with Subscriber(shared) as received:
-        async with telling(shared, house) as channel:
+        async with telling(shared, greenhouse) as channel:
             await reported(received, 20.0)
             await until(lambda: received.last("lt/tags/a/alarms"), "the alarm")
-            await reported(received, house.scan())
+            await reported(received, greenhouse.scan())
             await until(lambda: channel.condition.waiting == 0, "the rest")
             assert (channel.condition.is_connected, channel.condition.failed) == (True, 0)
         await until(lambda: received.of("lt/status")[-1:] == [b"offline"], "the good-bye")
@@ -106,13 +106,13 @@ async def test_a_broker_gets_the_state_and_then_its_changes(
 async def test_only_the_status_is_retained_and_that_of_removed_tags_is_not(
     shared: Broker,
 ) -> None:
-    house = Greenhouse()
-    house.now = seen(tag("a", temperature=20.0), tag("gone", temperature=20.0))
-    async with telling(shared, house) as channel:
+    greenhouse = Greenhouse()
+    greenhouse.now = seen(tag("a", temperature=20.0), tag("gone", temperature=20.0))
+    async with telling(shared, greenhouse) as channel:
         await until(lambda: channel.condition.sent > 14, "all of it")
         await until(lambda: channel.condition.waiting == 0, "all of it")
         with Subscriber(shared) as received:
-            house.now = seen(tag("a", temperature=20.0))
+            greenhouse.now = seen(tag("a", temperature=20.0))
             gone = CONFIG.replace("tag_a_", "tag_gone_")
             await until(lambda: received.of(gone) == [b""], "the end of its entity")
         with Subscriber(shared) as late:
@@ -154,10 +154,10 @@ async def test_a_flood_of_wills_and_births_is_answered_at_a_limited_rate(
                 received.say("homeassistant/status", "online")
             await until(lambda: received.of("lt/status")[-1:] == [b"online"], "that it is there")
             await until(lambda: channel.condition.sent > sent, "all of it, again")
-            said = received.of("lt/status")[before:]
-            assert said.count(b"offline") == 100
+            wording = received.of("lt/status")[before:]
+            assert wording.count(b"offline") == 100
             # The flood took a moment; by the clock there was time for one or two.
-            assert said.count(b"online") <= 3
+            assert wording.count(b"online") <= 3
             assert channel.condition.sent <= 3 * sent
 
 
@@ -198,47 +198,47 @@ async def test_two_bridges_with_one_prefix_do_not_disconnect_each_other(shared: 
 async def test_a_broker_that_is_absent_appears_and_is_killed_gets_the_latest_state(
     tmp_path: Path,
 ) -> None:
-    broker, house = Broker(tmp_path), Greenhouse()
-    async with telling(broker, house) as channel:
+    broker, greenhouse = Broker(tmp_path), Greenhouse()
+    async with telling(broker, greenhouse) as channel:
         await until(lambda: channel.condition.failed > 2, "some tries")
         assert channel.condition.detail == f"[Errno 111] Connection refused ({broker.url})"
         for _ in range(2):
             with broker.running() as process, Subscriber(broker) as received:
-                house.scan()
-                await reported(received, house.scan())
+                greenhouse.scan()
+                await reported(received, greenhouse.scan())
                 assert channel.condition.detail == ""
                 process.kill()
             await until(lambda: not channel.condition.is_connected, "the end of the broker")
-            house.scan()
+            greenhouse.scan()
         await until(lambda: channel.condition.waiting == 2, "the tag and the house")
 
 
 async def test_after_a_failure_to_read_the_greenhouse_everything_is_sent_again(
     shared: Broker,
 ) -> None:
-    house = Greenhouse()
+    greenhouse = Greenhouse()
     with Subscriber(shared) as received:
-        async with telling(shared, house) as channel:
+        async with telling(shared, greenhouse) as channel:
             await reported(received, 20.0)
-            house.is_faulty = True
+            greenhouse.is_faulty = True
             await until(lambda: "AssertionError" in channel.condition.detail, "the fault")
-            house.is_faulty = False
-            await reported(received, house.scan())
+            greenhouse.is_faulty = False
+            await reported(received, greenhouse.scan())
 
 
 async def test_a_broker_that_hangs_is_reconnected_and_gets_the_latest_state(tmp_path: Path) -> None:
-    broker, house = Broker(tmp_path), Greenhouse()
+    broker, greenhouse = Broker(tmp_path), Greenhouse()
     with broker.running() as process:
-        async with telling(broker, house, answer_s=0.3) as channel:
+        async with telling(broker, greenhouse, answer_s=0.3) as channel:
             with Subscriber(broker) as received:
                 await reported(received, 20.0)
             process.freeze()
-            house.scan()
+            greenhouse.scan()
             failed = channel.condition.failed
             # Once while connected, and then without accepting a connection.
             await until(lambda: channel.condition.failed > failed + 2, "some tries")
             assert not channel.condition.is_connected
-            last = house.scan()
+            last = greenhouse.scan()
             process.thaw()
             with Subscriber(broker) as received:
                 await reported(received, last)

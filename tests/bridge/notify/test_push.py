@@ -32,7 +32,7 @@ from lupin_bridge.notify.push import FIRST_WAIT_S, MAX_ATTEMPTS, MOST_WAIT_S, Pu
 from lupin_bridge.notify.webhook import PostError, until_taken
 from lupin_bridge.settings import Settings
 from tests.support.access import refused_start
-from tests.support.messages import look
+from tests.support.messages import inspection
 from tests.support.people import (
     OWN,
     PASSWORD,
@@ -318,7 +318,7 @@ def test_a_critical_alarm_reaches_exactly_the_browsers_that_may_have_it(
         with signed_in(on.live.url, "gone") as gone:
             subscribe(gone, gones)
         remove(on.accounts, "gone")
-        on.live.peer.observe(look("7", anomaly=True, bug_count=2))
+        on.live.peer.observe(inspection("7", anomaly=True, bug_count=2))
         wait_for(lambda: on.posted_to(annas) and on.posted_to(berts), "both messages")
         [to_anna], [to_bert] = on.posted_to(annas), on.posted_to(berts)
         assert annas.read(to_anna) == {"title": "Alarm", "body": "Tag 7: Pest seen (critical)"}
@@ -330,7 +330,7 @@ def test_a_critical_alarm_reaches_exactly_the_browsers_that_may_have_it(
         assert Vapid02.verify(authorization)
         for phone in (annas, berts):  # only she may remove hers
             bert.post("/api/push", json={"endpoint": phone.endpoint})
-        on.live.peer.observe(look("8", anomaly=True, bug_count=1))
+        on.live.peer.observe(inspection("8", anomaly=True, bug_count=1))
         wait_for(lambda: len(on.posted_to(annas)) == 2, "the next one")
         assert annas.read(on.posted_to(annas)[1])["body"].startswith("Tag 8:")
         anna.post("/api/push", json={"endpoint": annas.endpoint})
@@ -384,7 +384,7 @@ def test_nothing_is_posted_to_a_name_that_leads_into_a_private_network(
     with signed_in_once(open_to.live) as anna:
         before, posted = count(anna, "dropped"), len(open_to.service.posted)
         subscribe(anna, phone)
-        open_to.live.peer.observe(look(f"at {host}", anomaly=True, bug_count=2))
+        open_to.live.peer.observe(inspection(f"at {host}", anomaly=True, bug_count=2))
         wait_for(lambda: count(anna, "dropped") == before + 1, "that it is given up")
         assert "is not a public address" in anna.get("/readyz").text + open_to.live.process.output
         anna.post("/api/push", json={"endpoint": phone.endpoint})
@@ -431,12 +431,12 @@ def test_notified_browsers_per_person_are_limited_and_the_audit_trail_has_each_o
 
 def test_signing_out_everywhere_else_stops_notifications_there(open_to: Live) -> None:
     add(open_to.accounts, carl="viewer")
-    with signed_in(open_to.live.url, "carl") as lost, signed_in(open_to.live.url, "carl") as kept:
+    with signed_in(open_to.live.url, "carl") as lost, signed_in(open_to.live.url, "carl") as stored:
         phone = open_to.phone("lost")
         subscribe(lost, phone)
         given = {"name": "carl", "password": PASSWORD, "ends_others": True}
-        assert kept.post("/api/signin", json=given).status_code == 204
-        assert kept.get("/api/session").json()["name"] == "carl"
+        assert stored.post("/api/signin", json=given).status_code == 204
+        assert stored.get("/api/session").json()["name"] == "carl"
         assert lost.get("/api/session").status_code == 401
     assert phone.endpoint not in {device.endpoint for device in open_to.devices()}
 

@@ -72,8 +72,8 @@ async def test_past_the_limit_the_oldest_is_dropped_counted_and_reported() -> No
         async with telling(server.port, *many) as (hook, _):
             assert (hook.condition.waiting, hook.condition.dropped) == (MAX_WAITING, 2)
             await until(lambda: hook.condition.sent >= 2, "two of them")
-    said = [(it.json["alarm"]["tag_id"], it.json["lost"]) for it in server.posted[:2]]
-    assert said == [("2", 2), ("3", 0)]
+    message = [(it.json["alarm"]["tag_id"], it.json["lost"]) for it in server.posted[:2]]
+    assert message == [("2", 2), ("3", 0)]
 
 
 async def test_losses_during_a_post_are_reported_with_the_next() -> None:
@@ -83,8 +83,8 @@ async def test_losses_during_a_post_are_reported_with_the_next() -> None:
             await until(lambda: server.posted, "the first on its way")
             board.show([A, *many])
             await until(lambda: hook.condition.sent >= 2, "the next")
-    said = {it.json["alarm"]["tag_id"]: it.json["lost"] for it in server.posted[:4]}
-    assert said == {"a": 0, "1": 1}
+    message = {it.json["alarm"]["tag_id"]: it.json["lost"] for it in server.posted[:4]}
+    assert message == {"a": 0, "1": 1}
 
 
 async def test_changes_are_posted_in_order_and_signed() -> None:
@@ -177,8 +177,8 @@ async def test_texts_of_any_length_are_sent_once_and_cut(caplog: pytest.LogCaptu
     with receiver(lambda _: iter([b"x" * 3_000 + b"\r\n\r\n"])) as server:
         async with telling(server.port, A) as (hook, _):
             await until(lambda: hook.condition.failed > 2, "some tries")
-    (said,) = [r.getMessage() for r in caplog.records if "was not accepted" in r.getMessage()]
-    assert len(said) < 300
+    (message,) = [r.getMessage() for r in caplog.records if "was not accepted" in r.getMessage()]
+    assert len(message) < 300
 
 
 async def test_an_error_before_sending_is_a_failure_and_the_next_message_waits(

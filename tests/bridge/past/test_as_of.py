@@ -49,8 +49,8 @@ def requested(
     return Field(None, query, None, rules, occupancy, CRITERIA)
 
 
-def field_of(house: Snapshot, field: Field, field_format: FieldFormat | None = None) -> Plan:
-    return replace(field, field_format=field_format).plan(house)
+def field_of(greenhouse: Snapshot, field: Field, field_format: FieldFormat | None = None) -> Plan:
+    return replace(field, field_format=field_format).plan(greenhouse)
 
 
 def body(plan: Plan) -> dict[str, Any]:
@@ -110,13 +110,13 @@ def test_a_derived_reading_uses_the_readings_of_one_scan() -> None:
         humidity = Reading("humidity", 60.0, humidity_at_ns)
         return replace(dry, readings=(Reading("temperature", 25.0, NS), humidity))
 
-    house = Snapshot(5 * NS, "map", (air("a", 0.25, NS), air("b", 9.0, 2 * NS)))
+    greenhouse = Snapshot(5 * NS, "map", (air("a", 0.25, NS), air("b", 9.0, 2 * NS)))
     box = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 0.5, "bbox_max_y": 0.5}
     query: dict[str, Any] = {"sensor_type": "vpd", "resolution": 0.5, **box}
-    found = body(field_of(house, requested(**query), JSON))
+    found = body(field_of(greenhouse, requested(**query), JSON))
     assert found["values"] == [pytest.approx(vapour_pressure_deficit_kpa(25.0, 60.0), rel=1e-6)]
     assert found["sample_count"] == 1
-    quality = body(field_of(house, requested(**query)))
+    quality = body(field_of(greenhouse, requested(**query)))
     assert (quality["sensor_type"], quality["unit"], quality["sample_count"]) == ("vpd", "kPa", 1)
 
 
@@ -197,13 +197,13 @@ def test_too_large_a_past_field_is_refused() -> None:
 # --- ETags ----------------------------------------------------------------------------------------
 
 
-def plans(house: Snapshot, field: Field) -> list[str]:
+def plans(greenhouse: Snapshot, field: Field) -> list[str]:
     """The ETags of every kind of answer."""
     return [
-        WholeState(None).plan(house).etag,
-        *(OneTag(None, tag_id).plan(house).etag for tag_id in "ab"),
-        *(field_of(house, field, field_format).etag for field_format in FORMATS),
-        field_of(house, field).etag,
+        WholeState(None).plan(greenhouse).etag,
+        *(OneTag(None, tag_id).plan(greenhouse).etag for tag_id in "ab"),
+        *(field_of(greenhouse, field, field_format).etag for field_format in FORMATS),
+        field_of(greenhouse, field).etag,
     ]
 
 

@@ -89,9 +89,9 @@ def test_a_large_greenhouse_and_a_large_field_cost_more_than_small_ones() -> Non
 
 def test_a_tags_data_that_are_not_in_the_log_yet_come_from_its_state() -> None:
     tag = TagState("a", None, (Reading("co2", 7.0, 5 * NS),), 5 * NS, last_try=Attempt(5 * NS))
-    for newest, values in ((tag, [7.0]), (None, [])):
+    for latest, values in ((tag, [7.0]), (None, [])):
         log: dict[Any, Any] = {LatestRequest("a", 3): []}
-        body = LatestOfTag("a", newest, 3).look(log.__getitem__).write(never).body
+        body = LatestOfTag("a", latest, 3).look(log.__getitem__).write(never).body
         reported = json.loads(body)
         assert [
             each["value"] for sensor in reported["sensors"] for each in sensor["values"]

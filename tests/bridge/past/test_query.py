@@ -15,13 +15,13 @@ HISTORY, TIMELINE, EXPORT = query_string.OfHistory, query_string.OfTimeline, que
 NEEDED: dict[Any, dict[str, str]] = {HISTORY: {"tag_id": "7", "sensor_type": "co2"}}
 
 
-def ask(kind: type[query_string.OfPeriod], **given: str) -> Any:
+def query(kind: type[query_string.OfPeriod], **given: str) -> Any:
     values = NEEDED.get(kind, {}) | {name.rstrip("_"): value for name, value in given.items()}
     return read(kind, list(values.items()))
 
 
 def span(kind: type[query_string.OfPeriod], **given: str) -> tuple[int, int]:
-    start_ns, end_ns = ask(kind, **given).span(NOW_NS)
+    start_ns, end_ns = query(kind, **given).span(NOW_NS)
     return start_ns, end_ns
 
 
@@ -29,8 +29,8 @@ def test_the_default_is_all_that_is_stored() -> None:
     assert query_string.at([], NOW_NS) is None
     for kind in (HISTORY, TIMELINE, EXPORT):
         assert span(kind) == (0, 0)
-    assert ask(HISTORY).points == ask(TIMELINE).points == DEFAULT_POINTS
-    assert ask(TIMELINE).tag_id is ask(EXPORT).tag_id is ask(EXPORT).sensor_type is None
+    assert query(HISTORY).points == query(TIMELINE).points == DEFAULT_POINTS
+    assert query(TIMELINE).tag_id is query(EXPORT).tag_id is query(EXPORT).sensor_type is None
 
 
 @pytest.mark.parametrize(("to", "what"), [(None, "missing"), ("100", r"100\.000000000 s")])
@@ -48,10 +48,10 @@ def test_each_given_value_is_used() -> None:
     assert query_string.at([("at", "8.000000001")], NOW_NS) == 8 * NS + 1
     for kind in (HISTORY, TIMELINE, EXPORT):
         assert span(kind, **period) == (3 * NS // 2, 9 * NS)
-    assert ask(HISTORY, points="7").points == 7
-    timeline = ask(TIMELINE, points="5000", tag_id="a/b")
+    assert query(HISTORY, points="7").points == 7
+    timeline = query(TIMELINE, points="5000", tag_id="a/b")
     assert (timeline.points, timeline.tag_id) == (5000, "a/b")
-    export = ask(EXPORT, tag_id="7", sensor_type="co2")
+    export = query(EXPORT, tag_id="7", sensor_type="co2")
     assert (export.tag_id, export.sensor_type) == ("7", "co2")
 
 
@@ -94,10 +94,10 @@ def test_an_empty_or_impossible_name_is_refused(
     kind: type[query_string.OfPeriod],
 ) -> None:
     with pytest.raises(PastRefused, match=r"^tag_id is '': string should have at least 1 char"):
-        ask(kind, tag_id="")
-    assert ask(kind, tag_id="x" * MAX_TEXT_LENGTH).tag_id == "x" * MAX_TEXT_LENGTH
+        query(kind, tag_id="")
+    assert query(kind, tag_id="x" * MAX_TEXT_LENGTH).tag_id == "x" * MAX_TEXT_LENGTH
     with pytest.raises(PastRefused, match=f"at most {MAX_TEXT_LENGTH} characters"):
-        ask(kind, tag_id="x" * (MAX_TEXT_LENGTH + 1))
+        query(kind, tag_id="x" * (MAX_TEXT_LENGTH + 1))
 
 
 def test_a_history_is_of_one_sensor_or_of_one_event() -> None:

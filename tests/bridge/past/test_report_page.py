@@ -67,10 +67,10 @@ def body(hours: int) -> dict[str, Any]:
     }
 
 
-def alarm(**said: Any) -> dict[str, Any]:
+def alarm(**message: Any) -> dict[str, Any]:
     reason = {"verdict": "critical", "kind": "pest", "sensor": "", "value": 3.0, "limit": None}
     when = {"raised_at": at(60), "cleared_at": None}
-    return {"id": "9", "tag_id": "7", "reason": reason, "worst": 3.0, **when, **said}
+    return {"id": "9", "tag_id": "7", "reason": reason, "worst": 3.0, **when, **message}
 
 
 def page_of(
@@ -148,7 +148,7 @@ def test_a_note_has_its_kind_and_its_text_and_headings_do_not_contradict_their_c
 
 
 def test_missing_earlier_data_are_reported_only_where_the_log_begins_within_the_period() -> None:
-    whole, late = (page_of(stored_from=at(seconds)) for seconds in (0, HOUR_S))
+    whole, late = (page_of(kept_from=at(seconds)) for seconds in (0, HOUR_S))
     assert "No data before" not in whole
     assert "Complete up to 27 Nov 2026, 14:00." in whole
     assert "No data before 27 Nov 2026, 07:00. Complete up to 27 Nov 2026, 14:00." in late

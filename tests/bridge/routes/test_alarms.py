@@ -13,7 +13,7 @@ from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.routes.status import MAX_ALARMS, _is_in
 from lupin_bridge.stream import schema
 from tests.support.inprocess import running
-from tests.support.messages import look
+from tests.support.messages import inspection
 from tests.support.rosbridge import ros_at
 from tests.support.seen import alarm
 from tests.support.waiting import wait_for
@@ -25,7 +25,7 @@ def live() -> Iterator[Bridge]:
     """With a journal that is deleted at the end."""
     with bridge("--ros-args", "-p", "journal:=off") as running:
         running.peer.wait_for_twin()
-        running.peer.observe(look("a", anomaly=True, bug_count=2))
+        running.peer.observe(inspection("a", anomaly=True, bug_count=2))
         wait_for(lambda: alarms(running), "the alarm")
         yield running
 
@@ -42,9 +42,9 @@ def test_alarms_come_from_the_journal_and_the_answer_names_it(live: Bridge) -> N
     assert (body.source, body.since) == ("journal", pest.raised_at)
     with ros_at(live.url) as ros:
         ros.subscribe()
-        live.peer.observe(look("b"))
-        live.peer.observe(look("a"))
-        live.peer.observe(look("a"))
+        live.peer.observe(inspection("b"))
+        live.peer.observe(inspection("a"))
+        live.peer.observe(inspection("a"))
         wait_for(lambda: not alarms(live, active=1), "it to be cleared")
         # roslib receives the ROS message without alarms.
         ros.send(op="call_service", service="/rosapi/topics", id="the end")

@@ -102,7 +102,7 @@ def fields_at(workers: Workers) -> tuple[int, int]:
     return workers.waiting, workers.running
 
 
-def ask(it: Running, *paths: str) -> list[asyncio.Task[httpx.Response]]:
+def send(it: Running, *paths: str) -> list[asyncio.Task[httpx.Response]]:
     return [asyncio.create_task(it.http.get(path)) for path in paths]
 
 
@@ -113,7 +113,7 @@ async def test_a_flood_of_the_most_expensive_fields_does_not_delay_a_tiny_one(
     domain: int, held: Held
 ) -> None:
     async with greenhouse() as it:
-        flood = ask(it, *(field(f"co2 {n}", LARGE) for n in range(40)))
+        flood = send(it, *(field(f"co2 {n}", LARGE) for n in range(40)))
         # Half of the 24 places are for large ones; the other half is for others.
         await until(lambda: len(held.begun) == LARGE_THREADS, "work")
         await until(lambda: sum(task.done() for task in flood) == 28, "the refusals")
@@ -137,12 +137,12 @@ async def test_a_flood_of_the_most_expensive_fields_does_not_delay_a_tiny_one(
 async def test_a_client_that_disconnects_cancels_its_work(domain: int, held: Held) -> None:
     async with greenhouse() as it:
         paths = [field(f"co2 {n}", LARGE) for n in range(6)]
-        leaving = ask(it, *paths)
+        leaving = send(it, *paths)
         workers = it.bridge.source.workers
         await until(lambda: len(held.begun) == LARGE_THREADS, "work")
         await until(lambda: fields_at(workers)[0] >= 6 - LARGE_THREADS, "the rest behind it")
         at_work = list(held.begun)
-        (staying,) = ask(it, field(at_work[0], LARGE))
+        (staying,) = send(it, field(at_work[0], LARGE))
         await until(lambda: it.bridge.admission.in_flight["127.0.0.1"] == 7, "who stays")
         for task in leaving:
             task.cancel()
@@ -158,7 +158,7 @@ async def test_a_time_out_cancels_the_work_too(domain: int, held: Held) -> None:
     # Long enough for all four to run or wait by then.
     limits = Limits(answers_per_s=10_000.0, answer_timeout_s=3.0)
     async with greenhouse(limits) as it:
-        answers = await asyncio.gather(*ask(it, *(field(f"co2 {n}", LARGE) for n in range(4))))
+        answers = await asyncio.gather(*send(it, *(field(f"co2 {n}", LARGE) for n in range(4))))
         assert [answer.status_code for answer in answers] == [504] * 4
         assert "3 s" in answers[0].json()["detail"]
         workers = it.bridge.source.workers
@@ -174,7 +174,7 @@ async def test_identical_requests_take_one_place_and_one_computation(
     domain: int, held: Held
 ) -> None:
     async with greenhouse() as it:
-        requested = ask(it, *[field("co2", LARGE)] * 6, field("co2", LARGE, "npy"))
+        requested = send(it, *[field("co2", LARGE)] * 6, field("co2", LARGE, "npy"))
         await until(lambda: it.bridge.admission.in_flight["127.0.0.1"] == 7, "all of them")
         await until(lambda: it.bridge.admission.being_computed == 2, "a body each")
         served = [c for c in it.server.server_state.connections if isinstance(c, HttpConnection)]
@@ -207,7 +207,7 @@ async def test_the_state_is_serialised_a_few_times_a_second_and_is_never_old(
         written.clear()
         began_s, before = loop.time(), it.bridge.state_number
         for _ in range(20):
-            await asyncio.gather(*ask(it, *["/api/state"] * 10))
+            await asyncio.gather(*send(it, *["/api/state"] * 10))
         states = it.bridge.state_number - before + 1
         most = states + (loop.time() - began_s) / AGES_HOLD_S + 1
         # Plus the frames' own writes of each state.

@@ -49,7 +49,7 @@ def test_the_service_and_the_formats_give_the_same_numbers(live: Bridge) -> None
 
     def all_until_then() -> Any:
         moment = Time(sec=at["at"])
-        service = live.peer.ask(GetEstimate, "/twin/get_estimate", **QUERY, at=moment)
+        service = live.peer.call(GetEstimate, "/twin/get_estimate", **QUERY, at=moment)
         return service if service.reading_count == 15 else None
 
     service = wait_for(all_until_then, "all of before in the log")

@@ -11,7 +11,7 @@ import pytest
 from lupin_bridge.stream.pollers import Advice, EstimateQualities, ExpectedTags
 from lupin_twin.core.state import Pin, Pose, Write
 from lupin_twin.journal.runs import Clock
-from tests.support.journal import SECOND, kept, scan
+from tests.support.journal import SECOND, append, scan
 from tests.support.processes import limits
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -51,18 +51,18 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
         for n, tag_id in enumerate(PLACES)
     ]
     rows.append(scan("nowhere", begun_ns, co2=1.0))
-    kept(journal, rows, Clock(begun_ns, begun_ns, is_simulated=False))
+    append(journal, rows, Clock(begun_ns, begun_ns, is_simulated=False))
     journaled = ("--ros-args", "-p", f"journal:={journal}")
     with bridge(*limits(answers_per_s=10_000), *journaled) as running:
         yield running
 
 
 def answered(live: Bridge, path: str, accept: Any, **query: Any) -> Any:
-    def look() -> Any:
+    def check() -> Any:
         body = live.json(path, **query)
         return body if accept(body) else None
 
-    return wait_for(look, path)
+    return wait_for(check, path)
 
 
 def test_a_changed_tag_is_reported_left_out_and_judged(live: Bridge) -> None:

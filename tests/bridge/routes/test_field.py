@@ -206,24 +206,24 @@ def test_an_unchanged_field_is_not_sent_again(live: Bridge, path: str) -> None:
 
 
 def test_all_lines_of_a_header_count(live: Bridge) -> None:
-    def ask(*lines: tuple[str, str]) -> httpx.Response:
+    def request(*lines: tuple[str, str]) -> httpx.Response:
         url = f"{live.url}/api/field"
         return httpx.get(url, params=QUERY, headers=lines, timeout=PATIENCE_S, trust_env=False)
 
-    two_types = ask(("Accept", "text/html;q=0.1"), ("Accept", "application/x-npy"))
+    two_types = request(("Accept", "text/html;q=0.1"), ("Accept", "application/x-npy"))
     assert two_types.headers["content-type"] == "application/x-npy"
     tag = etag(live, "/api/field.json")
-    two_tags = ask(("If-None-Match", '"other"'), ("If-None-Match", tag), ("Accept", "*/*"))
+    two_tags = request(("If-None-Match", '"other"'), ("If-None-Match", tag), ("Accept", "*/*"))
     assert two_tags.status_code == 304
 
 
 def test_an_etag_holds_until_the_field_could_have_changed(changing: Bridge) -> None:
     def changed_from(old: str) -> str:
-        def look() -> str | None:
+        def check() -> str | None:
             answer = changing.get("/api/field", {"If-None-Match": old}, **QUERY)
             return answer.headers["etag"] if answer.status_code == 200 else None
 
-        return str(changing.peer.until(look, "a new ETag"))
+        return str(changing.peer.until(check, "a new ETag"))
 
     first = etag(changing)
     changing.peer.observe(scan("1", {"temperature": 20.0}))

@@ -147,7 +147,7 @@ def test_the_first_known_subprotocol_is_chosen(
 
 
 def test_invalid_messages_are_answered_and_the_connection_stays(client: Viewer) -> None:
-    for message, said in (
+    for message, wording in (
         ("{", "the message is not JSON"),
         ("[]", "the message is an array"),
         ('{"op":"subscribe"}', "subscriptions is None, expected an array"),
@@ -156,7 +156,7 @@ def test_invalid_messages_are_answered_and_the_connection_stays(client: Viewer) 
         (b"\x01\xff", "a binary message is refused"),
     ):
         client.connection.send(message)
-        assert client.status().startswith(said)
+        assert client.status().startswith(wording)
     client.subscribe(STATE)
     assert client.data(1)
 

@@ -22,13 +22,13 @@ def built(tmp_path: Path) -> Path:
     return folder
 
 
-def ask(guide_folder: Path, path: str, method: str = "GET", prefix: str = "") -> httpx.Response:
+def query(guide_folder: Path, path: str, method: str = "GET", prefix: str = "") -> httpx.Response:
     return request(create_app(None, guide_folder=guide_folder), method, path, prefix)
 
 
 @pytest.mark.parametrize("path", ["/docs/guide/", "/docs/guide/how-to/server.html"])
 def test_a_page_may_have_its_own_styles_and_no_script(built: Path, path: str) -> None:
-    answer = ask(built, path)
+    answer = query(built, path)
     assert (answer.status_code, answer.text) == (200, PAGE)
     policy = answer.headers["content-security-policy"].split("; ")
     rules = dict(rule.split(" ", 1) for rule in policy)
@@ -40,12 +40,12 @@ def test_a_page_may_have_its_own_styles_and_no_script(built: Path, path: str) ->
 
 def test_only_the_guide_may_have_its_own_styles(built: Path) -> None:
     for path in ("/docs", "/", "/docs/nowhere"):
-        assert "unsafe-inline" not in ask(built, path).headers["content-security-policy"]
+        assert "unsafe-inline" not in query(built, path).headers["content-security-policy"]
 
 
 @pytest.mark.parametrize("prefix", ["", "/gh1"])
 def test_without_its_slash_it_redirects(built: Path, prefix: str) -> None:
-    answer = ask(built, f"{prefix}/docs/guide", prefix=prefix)
+    answer = query(built, f"{prefix}/docs/guide", prefix=prefix)
     assert answer.is_redirect
     assert answer.headers["location"] == f"{prefix}/docs/guide/"
 
@@ -55,18 +55,18 @@ def test_without_its_slash_it_redirects(built: Path, prefix: str) -> None:
 def test_nothing_else_is_served_and_the_answer_says_where_to_look(
     built: Path, path: str, prefix: str
 ) -> None:
-    answer = ask(built, f"{prefix}{path}", prefix=prefix)
+    answer = query(built, f"{prefix}{path}", prefix=prefix)
     assert answer.status_code == 404
     assert answer.json()["detail"].endswith(f"; see {prefix}/docs")
 
 
 def test_it_can_only_be_read(built: Path) -> None:
-    assert ask(built, "/docs/guide/", "POST").status_code == 405
-    assert ask(built, "/docs/guide/", "HEAD").text == ""
+    assert query(built, "/docs/guide/", "POST").status_code == 405
+    assert query(built, "/docs/guide/", "HEAD").text == ""
 
 
 @pytest.mark.parametrize("path", ["/docs/guide/", "/docs/guide/how-to/server.html"])
 def test_a_guide_that_is_not_built_says_how_to_build_it(tmp_path: Path, path: str) -> None:
-    answer = ask(tmp_path, path)
+    answer = query(tmp_path, path)
     assert answer.status_code == 404
     assert "make docs" in ErrorMessage.model_validate_json(answer.content).detail

@@ -9,7 +9,7 @@ from websockets.asyncio.client import connect
 from lupin_bridge.stream import schema
 from lupin_twin.core.state import samples_of
 from tests.support.inprocess import Running, running
-from tests.support.messages import look, scan
+from tests.support.messages import inspection, scan
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, until
 from tests.support.web import ws_url
@@ -38,7 +38,7 @@ async def test_when_the_ros_thread_ends_health_reports_it_and_every_client_is_no
     ):
         assert json.loads(await listener.recv())["reason"] == "live"
         with Peer(domain) as peer:
-            peer.observe(look("known", at=(1.0, 2.0)))
+            peer.observe(inspection("known", at=(1.0, 2.0)))
             peer.observe(scan("known", {"co2": 400.0}))
             await until(lambda: reads(served, "known", "co2"), "the last reading")
         await end_ros_thread(served)

@@ -30,11 +30,11 @@ def put_map(running: Bridge, rows: list[list[int]], origin: Pose | None = None) 
     origin = origin or Pose(position=Point(x=float(next(NOWHERE_YET))))
     running.peer.publish_map(occupancy_grid(rows, 0.05, origin))
 
-    def look() -> str | None:
+    def check() -> str | None:
         tag = running.get("/api/map").headers.get("etag")
         return tag if tag != before else None
 
-    return str(running.peer.until(look, "the new map"))
+    return str(running.peer.until(check, "the new map"))
 
 
 def test_a_map_is_fetched_again_only_when_it_has_changed(mapped: Bridge) -> None:

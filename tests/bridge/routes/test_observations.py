@@ -64,11 +64,11 @@ def post(url: str, body: Any, token: str = TOKENS["esp"], **headers: str) -> htt
 def tag_of(live: Bridge, tag_id: str) -> Any:
     """As soon as a reader has it."""
 
-    def look() -> Any:
+    def check() -> Any:
         tags = live.get("/api/state", {"Authorization": f"Bearer {TOKEN}"}).json()["tags"]
         return next((tag for tag in tags if tag["tag_id"] == tag_id), None)
 
-    return wait_for(look, f"tag {tag_id}")
+    return wait_for(check, f"tag {tag_id}")
 
 
 def rows(folder: Path, tag_id: str) -> list[tuple[Any, ...]]:
@@ -89,8 +89,8 @@ def test_a_posted_reading_is_in_the_state_and_the_journal_once(live: Bridge, fol
     }
     answer = post(live.url, body)
     assert answer.status_code == 202, answer.text
-    said = answer.json()
-    assert (said["tag_id"], said["source"]) == ("bench-1", "http/esp")
+    message = answer.json()
+    assert (message["tag_id"], message["source"]) == ("bench-1", "http/esp")
     tag = tag_of(live, "bench-1")
     assert {it["name"]: it["value"] for it in tag["readings"]} == {
         "temperature": 21.5,
@@ -198,8 +198,8 @@ def test_bodies_are_bounded_and_a_partial_one_times_out(live: Bridge, folder: Pa
         f"POST /api/observations HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
         f"Authorization: Bearer {TOKENS['esp']}\r\nContent-Length: {{}}\r\n\r\n"
     )
-    said = raw_http.answer(live.url, head.format(len(json.dumps(huge))).encode())
-    assert raw_http.status(said) == 413
+    message = raw_http.answer(live.url, head.format(len(json.dumps(huge))).encode())
+    assert raw_http.status(message) == 413
     half = head.format(100).encode() + b'{"tag_id": "half", '
     assert raw_http.status(raw_http.answer(live.url, half)) in (0, 408)
     assert rows(folder, "huge") == rows(folder, "half") == []
@@ -214,13 +214,13 @@ def test_a_flood_slows_only_its_own_client(live: Bridge) -> None:
         f"Authorization: Bearer {TOKENS['flood']}\r\nContent-Length: {len(body)}\r\n"
     )
     last = f"{request}Connection: close\r\n\r\n{body}"
-    said = raw_http.answer(live.url, (f"{request}\r\n{body}" * (number - 1) + last).encode())
-    taken, slowed = said.count(b"HTTP/1.1 202 "), said.count(b"HTTP/1.1 429 ")
+    message = raw_http.answer(live.url, (f"{request}\r\n{body}" * (number - 1) + last).encode())
+    taken, slowed = message.count(b"HTTP/1.1 202 "), message.count(b"HTTP/1.1 429 ")
     assert taken + slowed == number
     assert taken >= Limits().observation_burst
     assert slowed
-    assert b"flood has posted more than 30 observations and 10 a second" in said
-    assert b"retry-after: 1\r\n" in said.lower()
+    assert b"flood has posted more than 30 observations and 10 a second" in message
+    assert b"retry-after: 1\r\n" in message.lower()
     other = {"tag_id": "other", "readings": {"t": 1}}
     wait_for(lambda: post(live.url, other).status_code == 202, "another's turn")
     tag_of(live, "flood")

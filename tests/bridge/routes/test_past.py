@@ -35,11 +35,11 @@ async def remembering(past: MadeUp, limits: Limits | None = None) -> AsyncIterat
         twin = it.twin
         twin.rows = past.rows  # type: ignore[method-assign]
 
-        async def ask(query: PastQuery[Any], cost_s: float) -> Any:
+        async def send(query: PastQuery[Any], cost_s: float) -> Any:
             past.costs.append(cost_s)
             return await look_up(query, past, twin.workers)
 
-        twin.ask = ask  # type: ignore[method-assign]
+        twin.ask = send  # type: ignore[method-assign]
         await until(lambda: it.bridge.latest is not None, "the first state")
         yield it
 

@@ -12,7 +12,7 @@ import pytest
 from lupin_bridge.alarms.board import NOTE_BURST, NOTES_PER_MINUTE
 from lupin_bridge.stream import routes_schema
 from tests.support import raw_http
-from tests.support.messages import look
+from tests.support.messages import inspection
 from tests.support.people import (
     BEARER,
     OWN,
@@ -45,7 +45,9 @@ def live(accounts: Path) -> Iterator[Bridge]:
     options = ("--accounts", str(accounts), "--ros-args", "-p", "journal:=off")
     with bridge(*options) as running:
         running.peer.wait_for_twin()
-        running.peer.observe(look("a", anomaly=True, bug_count=2), look("b", anomaly=True))
+        running.peer.observe(
+            inspection("a", anomaly=True, bug_count=2), inspection("b", anomaly=True)
+        )
         wait_for(lambda: len(alarms(running)) == 2, "the alarms")
         yield running
 
@@ -337,8 +339,8 @@ def test_no_secret_is_logged(live: Bridge) -> None:
         assert sign_in(guesser, "anna", f"not {PASSWORD}").status_code == 401
         assert sign_in(guesser, "anna").status_code == 204
     assert live.get("/api/state", BEARER).status_code == 200
-    said = "a sign-in as 'anna' from 127.0.7.4 was refused"
-    wait_for(lambda: said in live.process.output, "a line of the log")
+    message = "a sign-in as 'anna' from 127.0.7.4 was refused"
+    wait_for(lambda: message in live.process.output, "a line of the log")
     for secret in (PASSWORD, TOKEN):
         assert secret not in live.process.output
 
@@ -346,7 +348,7 @@ def test_no_secret_is_logged(live: Bridge) -> None:
 def test_without_accounts_everything_works_as_before_and_nothing_can_be_written() -> None:
     with bridge("--ros-args", "-p", "journal:=off") as running:
         running.peer.wait_for_twin()
-        running.peer.observe(look("a"))
+        running.peer.observe(inspection("a"))
         wait_for(lambda: running.get("/api/notes").status_code == 200, "the notes")
         assert running.json("/api/notes") == {"notes": []}
         answer = running.http.post(

@@ -18,8 +18,8 @@ from lupin_bridge.routes.writes import MAX_LISTED
 from lupin_twin.core.notes import COMMENT
 from tests.support import raw_http
 from tests.support.access import served
-from tests.support.journal import kept
-from tests.support.messages import look
+from tests.support.journal import append
+from tests.support.messages import inspection
 from tests.support.people import (
     BEARER,
     OWN,
@@ -51,7 +51,7 @@ def accounts(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def live(accounts: Path) -> Iterator[Bridge]:
     with bridge("--accounts", str(accounts), "--ros-args", "-p", "journal:=off") as running:
         running.peer.wait_for_twin()
-        running.peer.observe(look("a", anomaly=True, bug_count=2))
+        running.peer.observe(inspection("a", anomaly=True, bug_count=2))
         wait_for(lambda: running.get("/api/alarms", BEARER).json()["alarms"], "the alarm")
         yield running
 
@@ -205,7 +205,7 @@ def test_open_connections_end_when_the_first_account_is_created_and_when_the_fil
 
 def test_ten_thousand_notes_delay_nothing(accounts: Path, tmp_path: Path) -> None:
     path, now_ns = tmp_path / "j.sqlite", time.time_ns()
-    kept(path, [])
+    append(path, [])
     notes = (
         (f"{number + 1:016x}", now_ns - 10_000 + number, "bert", COMMENT, "site", "x" * 500)
         for number in range(10_000)
@@ -215,7 +215,7 @@ def test_ten_thousand_notes_delay_nothing(accounts: Path, tmp_path: Path) -> Non
     options = ("--accounts", str(accounts), "--ros-args", "-p", f"journal:={path}")
     with bridge(*options) as running, signed_in(running.url, "anna") as browser:
         running.peer.wait_for_twin()
-        running.peer.observe(look("a"))
+        running.peer.observe(inspection("a"))
 
         def answer_of(note: dict[str, str]) -> httpx.Response | None:
             answer = write(browser, **note)

@@ -7,7 +7,7 @@ from tests.support.web import bridge
 
 def test_names_are_those_of_ros() -> None:
     remapping = ("--ros-args", "-r", "/twin/state:=/house/state", "-p", "field_service_name:=field")
-    with bridge(*remapping) as house, ros_at(house.url) as ros:
+    with bridge(*remapping) as greenhouse, ros_at(greenhouse.url) as ros:
         topics = ros.call("/rosapi/topics")["values"]
         assert (topics["topics"][0], topics["types"][0]) == (
             "/house/state",
@@ -21,7 +21,7 @@ def test_names_are_those_of_ros() -> None:
 
 
 def test_the_limits_of_fields_hold_here_too() -> None:
-    with bridge(*limits(answers_per_s=0.01)) as house, ros_at(house.url) as ros:
+    with bridge(*limits(answers_per_s=0.01)) as greenhouse, ros_at(greenhouse.url) as ros:
         assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True
         assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True, "what is kept costs nothing"
         other = {**FIELD_ARGS, "resolution": 0.125}
@@ -30,4 +30,4 @@ def test_the_limits_of_fields_hold_here_too() -> None:
         assert response["values"] == (
             "127.0.0.1 requests more than 0.01 computed answers a second, the limit"
         )
-        assert house.get("/api/field", **other).status_code == 429, "of one client, together"
+        assert greenhouse.get("/api/field", **other).status_code == 429, "of one client, together"

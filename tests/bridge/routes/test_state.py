@@ -10,7 +10,7 @@ from websockets.exceptions import ConnectionClosedError
 
 from lupin_bridge.routes.state import MAX_REASON_BYTES
 from lupin_bridge.stream import schema
-from tests.support.messages import discovered, look, pose, scan
+from tests.support.messages import discovered, inspection, pose, scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge, filled
 
@@ -37,7 +37,7 @@ def test_a_change_is_pushed_before_the_twins_next_publication(live: Bridge) -> N
         listener.until_tag("pushed")
         live.peer.discover(discovered({"seen": pose(3, 3)}))
         listener.until_tag("seen")
-        live.peer.observe(look("looked at", anomaly=True))
+        live.peer.observe(inspection("looked at", anomaly=True))
         listener.until_tag("looked at")
         assert not [frame for frame in rare.rest() if frame["type"] == "state"], "due in 100 s"
 
@@ -111,7 +111,7 @@ def history(live: Bridge, tag_id: str) -> dict[str, list[Any]]:
 def test_a_history_holds_the_last_scans_and_no_inspection(live: Bridge) -> None:
     for value in range(5):
         live.peer.observe(scan("past", {"co2": value}, stamp_s=100.0 + value))
-    live.peer.observe(scan("past", {"light": 900.0}, stamp_s=110.0), look("past"))
+    live.peer.observe(scan("past", {"light": 900.0}, stamp_s=110.0), inspection("past"))
     live.tag("past", lambda tag: tag["species"])
     expected = {"co2": [3.0, 4.0], "light": [900.0]}  # `buffer_len` is 3
     wait_for(lambda: history(live, "past") == expected, "all in the log")
@@ -125,7 +125,7 @@ def test_attempts_and_their_times_are_reported(live: Bridge) -> None:
     failed.status_detail = "not decoded"
     live.peer.observe(
         scan("told", {"co2": 400.0, "light": 1.0}, stamp_s=10.0),
-        look("told", stamp_s=3610.0),
+        inspection("told", stamp_s=3610.0),
         scan("told", {"light": 2.0}, stamp_s=7210.0),
         failed,
         scan("told", {"light": 2.0}, stamp_s=7210.0),

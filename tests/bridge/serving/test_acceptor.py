@@ -61,7 +61,7 @@ def live(shared: tuple[Served, int]) -> Iterator[Served]:
 
 
 @pytest.mark.parametrize(
-    "said",
+    "message",
     [
         b"",
         b"GET /ws/state HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: ",
@@ -69,16 +69,16 @@ def live(shared: tuple[Served, int]) -> Iterator[Served]:
     ],
     ids=["nothing", "half a request", "a request, and no more"],
 )
-def test_an_idle_connection_is_evicted_for_an_active_one(live: Served, said: bytes) -> None:
+def test_an_idle_connection_is_evicted_for_an_active_one(live: Served, message: bytes) -> None:
     with ExitStack() as stack:
-        kept = open_files(live.process.pid)
+        stored = open_files(live.process.pid)
         for _ in range(STUCK):
-            stack.enter_context(raw_http.connect(live.url)).sendall(said)
+            stack.enter_context(raw_http.connect(live.url)).sendall(message)
         for _ in range(20):
             assert raw_http.status(raw_http.answer(live.url, GET)) == 200
         assert live.handshake() == 101
         assert open_files(live.process.pid) <= FILES - SPARE_FILES // 2
-        assert open_files(live.process.pid) >= kept
+        assert open_files(live.process.pid) >= stored
         live.process.wait_for_output("evicted the ")
 
 

@@ -17,45 +17,45 @@ def cached(*bodies: int) -> AnswerCache:
     return AnswerCache(max_bytes=sum(bodies) + len(bodies) * ENTRY_BYTES)
 
 
-def has(kept: AnswerCache, key: object) -> bool:
-    lent = kept.lend(key)
+def has(stored: AnswerCache, key: object) -> bool:
+    lent = stored.lend(key)
     if lent is not None:
         lent[1]()
     return lent is not None
 
 
-def holds(kept: AnswerCache, key: object, expected: Answer) -> bool:
-    lent = kept.lend(key)
+def holds(stored: AnswerCache, key: object, expected: Answer) -> bool:
+    lent = stored.lend(key)
     if lent is not None:
         lent[1]()
     return lent is not None and lent[0] is expected
 
 
 def test_an_answer_being_sent_stays_and_counts_until_it_is_released() -> None:
-    kept = cached(10, 10)
-    kept.put("a", answer(10))
-    lent = [kept.lend("a"), kept.lend("a")]
-    kept.put("b", answer(10))
-    kept.put("c", answer(10))
-    assert [has(kept, key) for key in "abc"] == [True, False, True]
-    kept.put("d", answer(20 + ENTRY_BYTES))
-    assert not has(kept, "d"), "there is no room while anybody reads"
+    stored = cached(10, 10)
+    stored.put("a", answer(10))
+    lent = [stored.lend("a"), stored.lend("a")]
+    stored.put("b", answer(10))
+    stored.put("c", answer(10))
+    assert [has(stored, key) for key in "abc"] == [True, False, True]
+    stored.put("d", answer(20 + ENTRY_BYTES))
+    assert not has(stored, "d"), "there is no room while anybody reads"
     for one in lent:
         assert one is not None
         one[1]()
-    kept.put("d", answer(20 + ENTRY_BYTES))
-    assert [has(kept, key) for key in "abcd"] == [False, False, False, True]
+    stored.put("d", answer(20 + ENTRY_BYTES))
+    assert [has(stored, key) for key in "abcd"] == [False, False, False, True]
 
 
 def test_a_replacement_takes_the_place_of_the_old_answer() -> None:
-    kept = cached(10, 10, 10)
-    kept.put("field", answer(10))
+    stored = cached(10, 10, 10)
+    stored.put("field", answer(10))
     for number in range(100):
-        kept.put(("state", number), answer(10), instead_of=("state", number - 1))
-    assert has(kept, "field"), "the many states in between did not drive it out"
-    kept.put("huge", answer(1_000_000))
-    assert has(kept, "field"), "nor what there is no room for"
-    assert len(kept) == 2
+        stored.put(("state", number), answer(10), instead_of=("state", number - 1))
+    assert has(stored, "field"), "the many states in between did not drive it out"
+    stored.put("huge", answer(1_000_000))
+    assert has(stored, "field"), "nor what there is no room for"
+    assert len(stored) == 2
 
 
 Step = tuple[str, int, int]
@@ -66,30 +66,32 @@ STEPS = st.lists(
 
 @given(STEPS)
 def test_the_bound_always_holds(steps: list[Step]) -> None:
-    kept = AnswerCache(max_bytes=60 + 3 * ENTRY_BYTES)
+    stored = AnswerCache(max_bytes=60 + 3 * ENTRY_BYTES)
     lent: list[Any] = []
     for what, key, size in steps:
         if what == "put":
-            kept.put(key, answer(size))
-        elif what == "lend" and (one := kept.lend(key)) is not None:
+            stored.put(key, answer(size))
+        elif what == "lend" and (one := stored.lend(key)) is not None:
             lent.append(one)
         elif what == "give back" and lent:
             lent.pop()[1]()
-        assert 0 <= kept.bytes <= 60 + 3 * ENTRY_BYTES
+        assert 0 <= stored.bytes <= 60 + 3 * ENTRY_BYTES
         for one, _ in lent:
-            assert any(holds(kept, key, one) for key in range(6))
+            assert any(holds(stored, key, one) for key in range(6))
     for _, give_back in lent:
         give_back()
-    kept.put("all", answer(60 + 2 * ENTRY_BYTES))
-    assert (len(kept), kept.bytes) == (1, 60 + 3 * ENTRY_BYTES), "nobody holds anything any more"
+    stored.put("all", answer(60 + 2 * ENTRY_BYTES))
+    assert (len(stored), stored.bytes) == (1, 60 + 3 * ENTRY_BYTES), (
+        "nobody holds anything any more"
+    )
 
 
 def test_the_newest_tags_are_reported() -> None:
-    kept = AnswerCache()
+    stored = AnswerCache()
     for number in range(MAX_NEWEST + 1):
-        kept.put(f'"{number}"', Answer(b"", "text/plain"))
-    assert kept.newest_tags() == [f'"{number}"' for number in range(MAX_NEWEST, 0, -1)]
-    kept.put(("no", "tag"), Answer(b"", "text/plain"))
-    lent = kept.lend('"1"')
+        stored.put(f'"{number}"', Answer(b"", "text/plain"))
+    assert stored.newest_tags() == [f'"{number}"' for number in range(MAX_NEWEST, 0, -1)]
+    stored.put(("no", "tag"), Answer(b"", "text/plain"))
+    lent = stored.lend('"1"')
     assert lent is not None
-    assert kept.newest_tags()[:2] == ['"1"', f'"{MAX_NEWEST}"']
+    assert stored.newest_tags()[:2] == ['"1"', f'"{MAX_NEWEST}"']

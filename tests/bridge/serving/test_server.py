@@ -94,8 +94,8 @@ def test_it_raises_its_file_limit_for_the_clients_and_reports_where_it_cannot(
     monkeypatch.setattr(resource, "setrlimit", lambda _, both: history.append(both))
     assert allow_connections(5_000) == clients
     assert history[-1] == (expected, hard)
-    said = f"--max-clients is 5000, but this process may open {hard} files"
-    assert (said in caplog.text) == (clients < 5_000) == (f"serving {clients} " in caplog.text)
+    message = f"--max-clients is 5000, but this process may open {hard} files"
+    assert (message in caplog.text) == (clients < 5_000) == (f"serving {clients} " in caplog.text)
 
 
 def test_an_address_in_use_is_refused_and_nothing_stays_open() -> None:
@@ -119,11 +119,11 @@ async def test_a_small_write_is_sent_at_once(domain: int) -> None:
 def waiting_for(url: str, path: str) -> Iterator[Future[httpx.Response]]:
     """A client that sends a request and waits for its answer."""
 
-    def ask() -> httpx.Response:
+    def query() -> httpx.Response:
         return httpx.get(f"{url}{path}", timeout=PATIENCE_S, trust_env=False)
 
     with ThreadPoolExecutor(1) as client:
-        yield client.submit(ask)
+        yield client.submit(query)
 
 
 def assert_sent_away(answer: Future[httpx.Response]) -> None:

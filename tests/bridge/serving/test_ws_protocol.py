@@ -25,13 +25,13 @@ SMALL_FRAME = b"x" * 1_000
 async def joined(served: Running) -> Connection:
     """The connection of the only client, once it is a WebSocket: until then it belongs to HTTP."""
 
-    def look() -> Connection | None:
+    def check() -> Connection | None:
         for connection in served.server.server_state.connections:
             if isinstance(connection, Connection) and connection.on_writable is not None:
                 return connection
         return None
 
-    found = await until(look, "the client to have joined")
+    found = await until(check, "the client to have joined")
     assert found is not None
     return found
 
@@ -140,7 +140,7 @@ async def test_the_close_timeout_runs_from_the_close_frame_for_both_sides(
 
 
 @pytest.mark.parametrize(
-    ("said", "code"),
+    ("message", "code"),
     [
         (masked(BINARY, bytes(65_537)), CloseCode.MESSAGE_TOO_BIG),  # as SECURITY.md says
         (masked(TEXT, b"\xff"), CloseCode.INVALID_DATA),
@@ -148,14 +148,14 @@ async def test_the_close_timeout_runs_from_the_close_frame_for_both_sides(
     ],
 )
 async def test_a_refused_client_can_read_the_reason(
-    domain: int, monkeypatch: pytest.MonkeyPatch, said: bytes, code: CloseCode
+    domain: int, monkeypatch: pytest.MonkeyPatch, message: bytes, code: CloseCode
 ) -> None:
     # However long a busy machine takes to send and to receive it.
     monkeypatch.setattr(ws_protocol, "CLOSE_GRACE_S", PATIENCE_S)
 
     def send_and_receive(url: str) -> None:
         with RawClient(url, "/ws/state") as client:
-            client.socket.sendall(said + masked(BINARY, bytes(1_000)) * 200)
+            client.socket.sendall(message + masked(BINARY, bytes(1_000)) * 200)
             data = client.received
             while not (frames := list(frames_of(data))) or frames[-1][0] != CLOSE:
                 block = client.socket.recv(BLOCK)

@@ -30,10 +30,10 @@ def report(at_ns: int, changed: dict[str, int | None]) -> Report:
     return Report(at_ns, 1, "", Record(None, Tally(), Tally()), tags)
 
 
-def snapshot(**newest: int) -> Snapshot:
+def snapshot(**latest: int) -> Snapshot:
     tags = [
         TagState(name, pose=HERE, readings=(Reading(name, 1.0, at_ns),))
-        for name, at_ns in newest.items()
+        for name, at_ns in latest.items()
     ]
     return Snapshot(100, "map", tuple(tags))
 

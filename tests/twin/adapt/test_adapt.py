@@ -101,7 +101,7 @@ class Robot:
             if status.hardware_id == "/lupin_adapt" and text in status.message
         ]
 
-    def said(self, text: str) -> bool:
+    def reported(self, text: str) -> bool:
         """Whether the adapter reports it on `/diagnostics`."""
         return bool(self._statuses(text))
 
@@ -172,7 +172,7 @@ def test_other_pose_types_locate_the_robot_too(domain: int, config: Path, kind: 
 
         def is_there() -> bool:
             robot.pose.publish(message)
-            return robot.said("at B")
+            return robot.reported("at B")
 
         peer.until(is_there, "the robot at its tag")
 
@@ -199,11 +199,11 @@ def test_bad_messages_are_dropped_counted_and_reported(domain: int, config: Path
         robot = Robot(peer)
         for do, text in WRONG:
 
-            def said(do: Callable[[Robot], None] = do, text: str = text) -> bool:
+            def has_reported(do: Callable[[Robot], None] = do, text: str = text) -> bool:
                 do(robot)
-                return robot.said(text)
+                return robot.reported(text)
 
-            peer.until(said, f"{text!r} on /diagnostics")
+            peer.until(has_reported, f"{text!r} on /diagnostics")
             assert robot.dropped(text) >= 1
         wait_for(lambda: WRONG[0][1] in process.output, "a line of it")
         assert process.exit_code is None
@@ -219,7 +219,7 @@ def test_a_wrong_name_or_type_is_reported_with_the_right_one(domain: int, config
             "nobody publishes it, did you mean /temperature?",
             "it is published as std_msgs/msg/Float32, configured is std_msgs/msg/Float64",
         ):
-            peer.until(lambda text=text: robot.said(text), f"{text!r} on /diagnostics")  # type: ignore[misc]
+            peer.until(lambda text=text: robot.reported(text), f"{text!r} on /diagnostics")  # type: ignore[misc]
             wait_for(lambda text=text: text in process.output, "a line of it")  # type: ignore[misc]
 
 

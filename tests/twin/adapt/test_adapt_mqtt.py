@@ -102,7 +102,7 @@ def test_the_last_will_of_a_dead_sensor_is_a_failed_scan(domain: int, tmp_path: 
     broker = Broker(tmp_path)
     with broker.running(), adapted(domain, broker), Peer(domain) as peer:
         robot = Robot(peer)
-        peer.until(lambda: robot.said("connected"), "the broker")
+        peer.until(lambda: robot.reported("connected"), "the broker")
         sensor = Client(CallbackAPIVersion.VERSION2)
         sensor.will_set("plain/bench", "offline")
         sensor.connect("127.0.0.1", broker.port)
@@ -135,8 +135,8 @@ def test_a_retained_message_counts_by_its_own_time_or_not(domain: int, tmp_path:
             peer.listen()
             tag = peer.tag("bench", lambda tag: tag.readings)
             assert abs(tag.last_observed.sec - then_s) < 2.0
-            peer.until(lambda: robot.said("it is retained and has no time"), "the complaint")
-            peer.until(lambda: robot.said("must be from -inf to 2000"), "the other")
+            peer.until(lambda: robot.reported("it is retained and has no time"), "the complaint")
+            peer.until(lambda: robot.reported("must be from -inf to 2000"), "the other")
             assert readings(peer, "undated") == readings(peer, "hot") == {}
 
 
@@ -153,7 +153,7 @@ def test_a_flood_a_megabyte_and_a_topic_for_each_message_do_no_harm(
     ):
         robot = Robot(peer)
         peer.listen()
-        peer.until(lambda: robot.said("connected"), "the broker")
+        peer.until(lambda: robot.reported("connected"), "the broker")
         client.publish("zigbee2mqtt/large", b"1" * 1_000_000)
         for number in range(3_000):
             client.publish(f"zigbee2mqtt/{number}", b"no number")
@@ -163,7 +163,7 @@ def test_a_flood_a_megabyte_and_a_topic_for_each_message_do_no_harm(
             return bool(readings(peer, "bench"))
 
         peer.until(is_known, "a good reading behind all that")
-        peer.until(lambda: robot.said("it is not JSON"), "the complaint")
+        peer.until(lambda: robot.reported("it is not JSON"), "the complaint")
         assert process.output.count("it is not JSON") < 10
         assert process.exit_code is None
 
@@ -190,7 +190,7 @@ def test_a_topic_that_is_not_utf8_costs_no_other(domain: int, tmp_path: Path) ->
             Peer(domain) as peer,
         ):
             robot = Robot(peer)
-            peer.until(lambda: robot.said("topic is not UTF-8"), "the complaint")
+            peer.until(lambda: robot.reported("topic is not UTF-8"), "the complaint")
             peer.until(lambda: robot.observations, "the good one behind it")
             assert "Traceback" not in process.output
         serving.result()
@@ -222,11 +222,11 @@ def test_a_broker_that_comes_late_or_goes_is_reported_and_found_again(
     broker = Broker(tmp_path)
     with adapted(domain, broker) as process, Peer(domain) as peer:
         robot = Robot(peer)
-        peer.until(lambda: robot.said("nothing answers at 127.0.0.1"), "the broker to be missed")
+        peer.until(lambda: robot.reported("nothing answers at 127.0.0.1"), "no broker")
         with broker.running():
-            peer.until(lambda: robot.said("connected"), "the broker")
+            peer.until(lambda: robot.reported("connected"), "the broker")
         robot.reports.clear()
-        peer.until(lambda: robot.said("127.0.0.1"), "its end to be told")
+        peer.until(lambda: robot.reported("127.0.0.1"), "its end to be told")
         with broker.running(), device(broker) as client:
 
             def is_received() -> bool:

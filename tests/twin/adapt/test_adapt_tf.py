@@ -100,7 +100,7 @@ class Robot:
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._temperature.publish(message)
 
-    def said(self, text: str) -> bool:
+    def reported(self, text: str) -> bool:
         return any(text in it.message for report in self.reports for it in report.status)
 
 
@@ -159,11 +159,11 @@ def test_mistakes_in_tf_are_reported_by_name(domain: int, config: Path) -> None:
         robot = Robot(peer)
         for do, text in WRONG:
 
-            def said(do: Callable[[Robot], object] = do, text: str = text) -> bool:
+            def has_reported(do: Callable[[Robot], object] = do, text: str = text) -> bool:
                 do(robot)
-                return robot.said(text)
+                return robot.reported(text)
 
-            peer.until(said, f"{text!r} on /diagnostics")
+            peer.until(has_reported, f"{text!r} on /diagnostics")
         assert process.exit_code is None
 
 
@@ -189,7 +189,9 @@ def test_a_fixed_sensor_is_where_its_frame_is(domain: int, config: Path) -> None
 
         at = peer.until(is_there, "the sensor where its frame is").pose.position
         assert (at.x, at.y, at.z) == pytest.approx((4.0, 1.5, 0.8))
-        peer.until(lambda: robot.said("TF has no path from 'nowhere' to 'map'"), "the other one")
+        peer.until(
+            lambda: robot.reported("TF has no path from 'nowhere' to 'map'"), "the other one"
+        )
         robot.stand(*frames, robot.step("map", "nowhere", (1.0, 0.0, 0.0)))
         robot.reports.clear()
 

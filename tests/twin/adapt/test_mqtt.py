@@ -16,7 +16,7 @@ def broker(*topics: dict[str, Any], **more: Any) -> Broker:
     return broker_of(Table("mqtt", content), Path())
 
 
-def said(configured: Broker, topic: str, payload: object) -> list[Measured]:
+def message(configured: Broker, topic: str, payload: object) -> list[Measured]:
     raw = payload if isinstance(payload, bytes) else json.dumps(payload).encode()
     return [
         measured(pattern, *found, raw)
@@ -28,8 +28,8 @@ def said(configured: Broker, topic: str, payload: object) -> list[Measured]:
 def test_a_plain_number_is_a_reading_of_the_tag_and_sensor_in_its_topic() -> None:
     configured = broker({"topic": "gh/{tag}/{sensor}", "factor": 0.1})
     assert configured.patterns[0].filter == "gh/+/+"
-    assert said(configured, "gh/A 1/co2", b" 8000 ") == [Measured("A 1", (("co2", 800.0),))]
-    assert said(configured, "gh/A/co2/more", b"1") == []
+    assert message(configured, "gh/A 1/co2", b" 8000 ") == [Measured("A 1", (("co2", 800.0),))]
+    assert message(configured, "gh/A/co2/more", b"1") == []
 
 
 def test_json_is_read_by_paths_with_its_own_time() -> None:
@@ -45,7 +45,7 @@ def test_json_is_read_by_paths_with_its_own_time() -> None:
         }
     )
     payload = {"air": {"t": 212}, "list": [1, 2], "at": "2024-05-01T10:00:00Z"}
-    (found,) = said(configured, "house/x/climate", payload)
+    (found,) = message(configured, "house/x/climate", payload)
     assert dict(found.readings) == pytest.approx({"temperature": 100.0, "co2": 2.0})
     assert found.stamp_s == 1_714_557_600.0
     for at, seconds in (
@@ -54,14 +54,16 @@ def test_json_is_read_by_paths_with_its_own_time() -> None:
         ("2024-05-01T12:00:00+02:00", 1_714_557_600.0),
         ("2024-05-01T10:00:00", 1_714_557_600.0),  # in UTC, in any local zone
     ):
-        assert said(configured, "house/x/climate", {"list": [0, 1], "at": at})[0].stamp_s == seconds
+        assert (
+            message(configured, "house/x/climate", {"list": [0, 1], "at": at})[0].stamp_s == seconds
+        )
 
 
 def test_a_tag_or_a_sensor_as_long_as_a_topic_may_be_is_refused() -> None:
     configured = broker({"topic": "gh/{tag}/{sensor}"})
     for topic in (f"gh/{'x' * 257}/co2", f"gh/A/{'x' * 257}"):
         with pytest.raises(Rejected, match="has 257 characters, the limit is 256"):
-            said(configured, topic, b"1")
+            message(configured, topic, b"1")
 
 
 def test_zigbee2mqtts_payloads_need_no_paths() -> None:
@@ -76,7 +78,7 @@ def test_zigbee2mqtts_payloads_need_no_paths() -> None:
         "last_seen": 1_700_000_000_000,
         "update": {"state": "idle"},
     }
-    (found,) = said(configured, "zigbee2mqtt/bench 3", payload)
+    (found,) = message(configured, "zigbee2mqtt/bench 3", payload)
     assert found.tag == "bench 3"
     assert dict(found.readings) == {
         "temperature": 21.4,
@@ -85,9 +87,9 @@ def test_zigbee2mqtts_payloads_need_no_paths() -> None:
         "light": 1200.0,
     }
     assert found.stamp_s == 1.7e9
-    away = said(configured, "zigbee2mqtt/bench 3/availability", {"state": "offline"})
+    away = message(configured, "zigbee2mqtt/bench 3/availability", {"state": "offline"})
     assert away == [Measured("bench 3", is_away=True)]
-    back = said(configured, "zigbee2mqtt/bench 3/availability", b"online")
+    back = message(configured, "zigbee2mqtt/bench 3/availability", b"online")
     assert back == [Measured("bench 3")]
 
 
@@ -99,11 +101,11 @@ def test_home_assistants_entities_are_tag_and_sensor() -> None:
         ("a_carbon_dioxide", "a", "co2"),
         ("a_illuminance", "a", "light"),
     ):
-        assert said(configured, f"ha/sensor/{entity}/state", b"5") == [
+        assert message(configured, f"ha/sensor/{entity}/state", b"5") == [
             Measured(tag, ((sensor, 5.0),))
         ]
-    assert said(configured, "ha/sensor/north_bay_battery/state", b"5") == []
-    assert said(configured, "ha/sensor/a_humidity/state", b"unknown") == [Measured("a")]
+    assert message(configured, "ha/sensor/north_bay_battery/state", b"5") == []
+    assert message(configured, "ha/sensor/a_humidity/state", b"unknown") == [Measured("a")]
 
 
 def test_a_preset_yields_to_explicit_settings_and_a_topic_may_carry_availability() -> None:
@@ -115,9 +117,9 @@ def test_a_preset_yields_to_explicit_settings_and_a_topic_may_carry_availability
             "availability": "there/{tag}",
         }
     )
-    (found,) = said(configured, "zigbee2mqtt/A", {"lux": 5, "illuminance": 7})
+    (found,) = message(configured, "zigbee2mqtt/A", {"lux": 5, "illuminance": 7})
     assert found.readings == (("light", 5.0),)
-    assert said(configured, "there/A", b"Offline") == [Measured("A", is_away=True)]
+    assert message(configured, "there/A", b"Offline") == [Measured("A", is_away=True)]
 
 
 def test_the_broker_and_its_credentials_are_configurable(tmp_path: Path) -> None:
@@ -167,7 +169,7 @@ def test_a_message_without_a_value_is_named(topic: str, payload: bytes, complain
         {"topic": "{tag}/j", "values": {"temperature": "t"}, "time": "at"},
     )
     with pytest.raises(Rejected) as refused:
-        said(configured, topic, payload)
+        message(configured, topic, payload)
     assert complaint in str(refused.value)
     assert len(str(refused.value)) < 250
 

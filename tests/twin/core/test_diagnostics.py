@@ -158,8 +158,8 @@ def test_an_invalid_number_counts_nothing(text: str) -> None:
 def test_a_long_text_is_cut_at_the_limit() -> None:
     for length in (MAX_SHOWN, MAX_SHOWN + 1):
         word = "x" * length
-        said = found("drops", counts=Counts({"frame": 1}, 0, (Recent("frame", word, 1),)))
-        shown = said.values["last: frame"]
+        wording = found("drops", counts=Counts({"frame": 1}, 0, (Recent("frame", word, 1),)))
+        shown = wording.values["last: frame"]
         assert (len(shown), shown == word) == (MAX_SHOWN, length == MAX_SHOWN)
         [source] = found("stamps", late={word: 1}).values
         assert source == shown

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from lupin_twin.core import ingest
 from lupin_twin.core.history import KNOWN_PER_TAG, Repeats, tag_history
 from lupin_twin.core.state import Inspection, Reading, Scan, TwinStore
-from tests.support.store import S, look, scan
+from tests.support.store import S, inspection, scan
 
 
 def test_a_received_observation_is_known_by_kind_stamp_and_source() -> None:
@@ -20,7 +20,7 @@ def test_a_received_observation_is_known_by_kind_stamp_and_source() -> None:
         scan("2", at_s=5.0, source="a"),
         scan("1", at_s=6.0, source="a"),
         scan("1", at_s=5.0, source="b"),
-        replace(look("1", at_s=5.0), source="a"),
+        replace(inspection("1", at_s=5.0), source="a"),
     ):
         assert repeats.news(other) == other
 
@@ -58,7 +58,7 @@ WRITES = st.lists(
         st.integers(0, 3).map(float),
         st.sampled_from(["a", "b"]),
     )
-    | st.builds(lambda at_s: look("1", at_s), st.integers(1, 12)),
+    | st.builds(lambda at_s: inspection("1", at_s), st.integers(1, 12)),
     max_size=20,
 )
 
@@ -74,8 +74,8 @@ def test_the_history_equals_the_simplest_one(writes: list[Scan | Inspection], co
             readings = {r.name: r.value for r in write.readings}
             scans.setdefault((write.stamp_ns, write.source), {}).update(readings)
     past = tag_history(writes, None, count)
-    newest = sorted(keys, key=lambda key: key[0])[-count:]
-    assert [(each.stamp_ns, each.kind) for each in past.attempts] == [key[:2] for key in newest]
+    latest = sorted(keys, key=lambda key: key[0])[-count:]
+    assert [(each.stamp_ns, each.kind) for each in past.attempts] == [key[:2] for key in latest]
     expected = sorted(scans.items(), key=lambda item: item[0][0])[-count:]
     assert [(each.stamp_ns, {r.name: r.value for r in each.readings}) for each in past.scans] == [
         (stamp_ns, readings) for (stamp_ns, _), readings in expected
@@ -97,7 +97,7 @@ def test_with_a_log_that_lacks_the_last_write_nothing_is_missing(
     for number, (wait_s, sensors, is_inspection) in enumerate(steps, 1):
         at_s += wait_s
         readings = tuple(Reading(name, float(number)) for name in sorted(sensors))
-        every.append(look("1", at_s) if is_inspection else Scan("1", at_s * S, readings))
+        every.append(inspection("1", at_s) if is_inspection else Scan("1", at_s * S, readings))
         assert ingest.apply(every[-1], store, repeats) is None
     for tag in store.snapshot(0, "map").tags:
         found, expected = tag_history(every[:-1], tag, 32), tag_history(every, None, 32)

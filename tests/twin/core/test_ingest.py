@@ -66,13 +66,13 @@ def test_a_failed_inspection_is_a_failed_attempt_without_its_payload() -> None:
     )
 
 
-@pytest.mark.parametrize(("length", "kept"), [(256, 256), (257, 256), (10_000, 256)])
-def test_a_long_text_of_a_producer_is_cut_and_drops_nothing(length: int, kept: int) -> None:
+@pytest.mark.parametrize(("length", "stored"), [(256, 256), (257, 256), (10_000, 256)])
+def test_a_long_text_of_a_producer_is_cut_and_drops_nothing(length: int, stored: int) -> None:
     received = received_reading(source="s" * length, status_detail="d" * length)
     write = ingest.observation(received, "map", NOW_NS)
     assert isinstance(write, Scan)
-    assert (len(write.source), len(write.status_detail)) == (kept, kept)
-    assert write.source.endswith("…") == (length > kept)
+    assert (len(write.source), len(write.status_detail)) == (stored, stored)
+    assert write.source.endswith("…") == (length > stored)
 
 
 @pytest.mark.parametrize(("kind", "name"), [(2, "KIND_ANOMALY"), (77, "an unknown kind")])

@@ -9,7 +9,7 @@ import pytest
 from lupin_twin.core import drops, state
 from lupin_twin.core.drops import Rejected
 from lupin_twin.core.state import Bloom, Inspection, Reading, Scan, TwinStore
-from tests.support.store import S, at, look, scan
+from tests.support.store import S, at, inspection, scan
 
 
 def write(store: TwinStore, observation: Scan | Inspection) -> None:
@@ -32,7 +32,7 @@ def test_the_first_pose_wins_whoever_sends_it() -> None:
         store = TwinStore()
         writes = {
             "scan": lambda x, s=store: s.record(scan("1", pose=at(x))),
-            "look": lambda x, s=store: s.record_inspection(look("1", pose=at(x))),
+            "look": lambda x, s=store: s.record_inspection(inspection("1", pose=at(x))),
             "pin": lambda x, s=store: s.pin("1", at(x)),
         }
         for x, name in enumerate((first, second, third)):
@@ -43,13 +43,13 @@ def test_the_first_pose_wins_whoever_sends_it() -> None:
 def test_a_write_that_changes_nothing_visible_is_no_new_revision() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=20.0, co2=1.0, light=math.nan))
-    store.record_inspection(look("1", at_s=20.0, species="rose", confidence=math.nan))
+    store.record_inspection(inspection("1", at_s=20.0, species="rose", confidence=math.nan))
     before = tag(store, "1")
     store.record(scan("1", at_s=20.0, co2=1.0, light=math.nan))
-    store.record_inspection(look("1", at_s=20.0, species="rose", confidence=math.nan))
+    store.record_inspection(inspection("1", at_s=20.0, species="rose", confidence=math.nan))
     assert tag(store, "1") is before, "who looks for changes compares identities"
     store.record(scan("1", at_s=10.0, co2=9.0))
-    store.record_inspection(look("1", at_s=10.0, species="lupin"))
+    store.record_inspection(inspection("1", at_s=10.0, species="lupin"))
     store.record(scan("1", at_s=30.0, succeeded=False))
     assert store.observation_count == 2
     store.record(scan("1", at_s=10.0, pose=at(1.0), co2=9.0))
@@ -59,7 +59,7 @@ def test_a_write_that_changes_nothing_visible_is_no_new_revision() -> None:
 def test_a_late_scan_with_the_same_value_is_a_new_revision_as_derived_values_may_go() -> None:
     store = TwinStore()
     store.record(scan("1", at_s=10.0, temperature=20.0, humidity=50.0))
-    store.record_inspection(look("1", at_s=30.0, species="rose"))
+    store.record_inspection(inspection("1", at_s=30.0, species="rose"))
     store.record(scan("1", at_s=20.0, temperature=20.0))
     assert store.observation_count == 3
 
@@ -94,17 +94,17 @@ BOUNDED: dict[str, tuple[Callable[[int], Scan | Inspection], int]] = {
         lambda n: Scan("1", S, tuple(Reading(f"s{i}", 0.0) for i in range(n))),
         drops.MAX_SENSORS_PER_TAG,
     ),
-    "blooms": (lambda n: look("1", blooms=(BLOOM,) * n), drops.MAX_BLOOMS_PER_TAG),
+    "blooms": (lambda n: inspection("1", blooms=(BLOOM,) * n), drops.MAX_BLOOMS_PER_TAG),
     "footprint": (
-        lambda n: look("1", footprint=((0.0, 0.0, 0.0),) * n),
+        lambda n: inspection("1", footprint=((0.0, 0.0, 0.0),) * n),
         drops.MAX_FOOTPRINT_POINTS,
     ),
     "the tag_id of a scan": (lambda n: Scan("t" * n, S), drops.MAX_TEXT_LENGTH),
     "a sensor's name": (lambda n: Scan("1", S, (Reading("s" * n, 0.0),)), drops.MAX_TEXT_LENGTH),
-    "the tag_id of a look": (lambda n: look("t" * n), drops.MAX_TEXT_LENGTH),
-    "species": (lambda n: look("1", species="r" * n), drops.MAX_TEXT_LENGTH),
+    "the tag_id of a look": (lambda n: inspection("t" * n), drops.MAX_TEXT_LENGTH),
+    "species": (lambda n: inspection("1", species="r" * n), drops.MAX_TEXT_LENGTH),
     "a bloom's species": (
-        lambda n: look("1", blooms=(dataclasses.replace(BLOOM, species="r" * n),)),
+        lambda n: inspection("1", blooms=(dataclasses.replace(BLOOM, species="r" * n),)),
         drops.MAX_TEXT_LENGTH,
     ),
 }
@@ -146,8 +146,12 @@ def test_the_total_of_all_tags_is_limited_and_known_ones_go_on(
     monkeypatch.setattr(state, "MAX_ITEMS", 4)
     store = TwinStore()
     store.record(scan("1", co2=1.0))
-    store.record_inspection(look("2", blooms=(BLOOM, BLOOM), footprint=((0.0, 0.0, 0.0),)))
-    for one_too_many in (scan("1", light=1.0), scan("3", co2=1.0), look("1", blooms=(BLOOM,))):
+    store.record_inspection(inspection("2", blooms=(BLOOM, BLOOM), footprint=((0.0, 0.0, 0.0),)))
+    for one_too_many in (
+        scan("1", light=1.0),
+        scan("3", co2=1.0),
+        inspection("1", blooms=(BLOOM,)),
+    ):
         with pytest.raises(Rejected, match="of all tags: 5, the limit is 4"):
             write(store, one_too_many)
     assert [t.tag_id for t in store.snapshot(0, "map").tags] == ["1", "2"]
@@ -155,6 +159,6 @@ def test_the_total_of_all_tags_is_limited_and_known_ones_go_on(
     assert tag(store, "1").readings[0].value == 2.0
     store.pin("3", at(1.0))
     # An inspection with one flower less makes room for one more reading.
-    store.record_inspection(look("2", blooms=(BLOOM,), footprint=((0.0, 0.0, 0.0),)))
+    store.record_inspection(inspection("2", blooms=(BLOOM,), footprint=((0.0, 0.0, 0.0),)))
     store.record(scan("3", co2=3.0))
     assert tag(store, "3").readings[0].value == 3.0

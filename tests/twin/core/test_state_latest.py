@@ -18,7 +18,7 @@ from lupin_twin.core.state import (
     TagState,
     TwinStore,
 )
-from tests.support.store import SCAN_FAILED, S, at, look, scan
+from tests.support.store import SCAN_FAILED, S, at, inspection, scan
 
 
 def tag(store: TwinStore, tag_id: str) -> TagState:
@@ -29,7 +29,7 @@ def test_after_a_clock_went_back_ages_count_from_there_and_news_is_news() -> Non
     store = TwinStore()
     store.record(scan("1", at_s=40.0, co2=1.0))
     store.record(scan("1", at_s=3600.0, co2=2.0))
-    store.record_inspection(look("1", at_s=3600.0, species="rose"))
+    store.record_inspection(inspection("1", at_s=3600.0, species="rose"))
     store.record(scan("before", at_s=40.0, co2=1.0))
     store.record(scan("tried", at_s=3600.0, succeeded=False))
     store.pin("never", at(1.0))
@@ -49,10 +49,10 @@ def test_after_a_clock_went_back_ages_count_from_there_and_news_is_news() -> Non
     assert tags["before"].readings == (Reading("co2", 1.0, 40 * S),)
     assert store.observation_count == count
     store.record(scan("1", at_s=55.0, co2=3.0))
-    store.record_inspection(look("1", at_s=55.0, species="lupin"))
-    kept = tag(store, "1")
-    assert (kept.readings[0].value, kept.flower.species) == (3.0, "lupin")
-    assert kept.last_observed_ns == 55 * S
+    store.record_inspection(inspection("1", at_s=55.0, species="lupin"))
+    stored = tag(store, "1")
+    assert (stored.readings[0].value, stored.flower.species) == (3.0, "lupin")
+    assert stored.last_observed_ns == 55 * S
 
 
 # --- against a model ----------------------------------------------------------------------------
@@ -147,9 +147,9 @@ def test_the_store_equals_the_simplest_one(steps: list[Write | int]) -> None:
         after = tag(store, write.tag_id)
         shown = [as_shown(each) for each in (before.get(write.tag_id), after)]
         assert store.observation_count == count + (shown[0] != shown[1])
-    kept = {t.tag_id: t for t in store.snapshot(0, "map").tags}
+    stored = {t.tag_id: t for t in store.snapshot(0, "map").tags}
     for tag_id, expected in plainest(written).items():
-        assert by_name(kept[tag_id]) == by_name(expected)
+        assert by_name(stored[tag_id]) == by_name(expected)
 
 
 def by_name(state_of_tag: TagState) -> TagState:

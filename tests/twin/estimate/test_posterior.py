@@ -101,8 +101,8 @@ def test_a_cancelled_estimate_ends_soon(tags: int) -> None:
     posterior = fit(day).posterior(day, DAY_S, lambda: is_over)
     posterior.points(PLACES)
     is_over = True
-    for ask in (lambda: posterior.points(PLACES), posterior.changes):
+    for query in (lambda: posterior.points(PLACES), posterior.changes):
         with pytest.raises(Abandoned):
-            ask()
+            query()
     with pytest.raises(Abandoned):
         fit(day, should_stop=lambda: True)

@@ -27,15 +27,15 @@ def test_of_more_readings_the_latest_quarter_and_a_sample_of_the_day_count(
     hours = np.linspace(0.0, 23.0, count)
     rows = [(float(hour), tag, float(n)) for n, hour in enumerate(hours) for tag in (1, 0)]
     whole = readings_of(rows, [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)])
-    kept = whole.recent(24 * 3600.0, per_tag=per_tag)
-    newest = min(-(-per_tag // 4), count)
+    stored = whole.recent(24 * 3600.0, per_tag=per_tag)
+    latest = min(-(-per_tag // 4), count)
     for tag in (0, 1):
-        numbers = kept.value[kept.tag == tag]
-        assert newest <= len(numbers) <= per_tag
-        assert numbers[-newest:].tolist() == list(range(count - newest, count))
+        numbers = stored.value[stored.tag == tag]
+        assert latest <= len(numbers) <= per_tag
+        assert numbers[-latest:].tolist() == list(range(count - latest, count))
         gaps_h = np.diff(np.r_[0.0, hours[numbers.astype(int)], 24.0])
-        if per_tag > newest:
-            parts = per_tag - newest
+        if per_tag > latest:
+            parts = per_tag - latest
             assert gaps_h.max() <= 2.0 * 24.0 / parts + 1.0 + 23.0 / max(count - 1, 1)
 
 

@@ -8,14 +8,14 @@ import pytest
 from lupin_twin.journal.checking import find_all_damage
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.schema import DamagedFile, open_reader, open_writer
-from tests.support.journal import NOW, SECOND, kept, look, pin, scan
+from tests.support.journal import NOW, SECOND, append, inspection, pin, scan
 
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     made = tmp_path / "j.sqlite"
     scans = [scan(at_ns=NOW + n * SECOND, a=n / 3, b=float(n)) for n in range(300)]
-    kept(made, [pin(), look(), *scans])
+    append(made, [pin(), inspection(), *scans])
     return made
 
 
@@ -46,7 +46,7 @@ def test_an_interruption_is_no_damage(where: str, path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("sql", "said"),
+    ("sql", "message"),
     [
         ("UPDATE scan SET readings = '[1.0]' WHERE seq = 7", "scan 7 of tag '7' is not what was"),
         ("UPDATE scan SET readings = '[1.0,' WHERE seq = 7", "scan 7 of tag '7' is not what was"),
@@ -63,9 +63,9 @@ def test_an_interruption_is_no_damage(where: str, path: Path) -> None:
         ("UPDATE run SET joins = 3", "run 1 joins run 3, which is missing"),
     ],
 )
-def test_damage_is_reported_by_row(path: Path, sql: str, said: str) -> None:
+def test_damage_is_reported_by_row(path: Path, sql: str, message: str) -> None:
     changed(path, sql)
-    assert any(found.startswith(said) for found in damage(path))
+    assert any(found.startswith(message) for found in damage(path))
 
 
 def test_all_damage_is_found_and_progress_is_reported(path: Path) -> None:

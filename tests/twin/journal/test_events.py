@@ -4,13 +4,13 @@ from sqlite3 import Connection
 from lupin_twin.core.past import EVERY_TAG, Event, SeriesPast, SeriesRequest
 from lupin_twin.journal.counts import SILENCE_NS
 from lupin_twin.journal.queries import series
-from tests.support.journal import SECOND, look, scan
+from tests.support.journal import SECOND, inspection, scan
 from tests.support.log_life import BEGUN, HOUR, LATEST, MINUTE, lived
 
 END = BEGUN + (LATEST + 200) * MINUTE
 
 
-def ask(
+def query(
     connection: Connection,
     event: Event,
     tag_id: str = EVERY_TAG,
@@ -30,11 +30,13 @@ def reported(answer: SeriesPast) -> list[tuple[int, float]]:
 
 def test_of_deleted_inspections_the_presence_of_a_pest_is_known(tmp_path: Path) -> None:
     with lived(tmp_path / "j.sqlite") as life:
-        life.write([look(at_ns=BEGUN, anomaly=True)])
+        life.write([inspection(at_ns=BEGUN, anomaly=True)])
         life.delete(BEGUN + HOUR)
-        life.write([look(at_ns=BEGUN + 2 * HOUR, anomaly=True), look(at_ns=BEGUN + 3 * HOUR)])
-        assert reported(ask(life.connection, Event.PESTS_SEEN)) == [(BEGUN, 1.0)]
-        assert reported(ask(life.connection, Event.PESTS_CLEARED)) == [(BEGUN + 3 * HOUR, 0.0)]
+        life.write(
+            [inspection(at_ns=BEGUN + 2 * HOUR, anomaly=True), inspection(at_ns=BEGUN + 3 * HOUR)]
+        )
+        assert reported(query(life.connection, Event.PESTS_SEEN)) == [(BEGUN, 1.0)]
+        assert reported(query(life.connection, Event.PESTS_CLEARED)) == [(BEGUN + 3 * HOUR, 0.0)]
 
 
 def test_runs_are_intervals_of_the_period(tmp_path: Path) -> None:
@@ -43,14 +45,14 @@ def test_runs_are_intervals_of_the_period(tmp_path: Path) -> None:
         log = life.connection
 
         def runs(start: int, end: int) -> list[tuple[int, float]]:
-            return reported(ask(log, Event.RUNS, start=start, end=end))
+            return reported(query(log, Event.RUNS, start=start, end=end))
 
         assert runs(BEGUN, BEGUN + 200 * MINUTE) == [
             (BEGUN, 30 * 60.0),
             (BEGUN + 30 * MINUTE, 170 * 60.0),
         ]
         assert runs(BEGUN + 40 * MINUTE, BEGUN + 50 * MINUTE) == [(BEGUN + 40 * MINUTE, 600.0)]
-        answer = ask(log, Event.RUNS)
+        answer = query(log, Event.RUNS)
         assert answer.minima == answer.maxima == (1.0,)
 
 
@@ -63,19 +65,19 @@ def test_a_silence_is_longer_than_ten_minutes_and_than_three_usual_intervals(
         life.write(scan(at_ns=BEGUN + second * SECOND) for second in stamps)
         last = BEGUN + stamps[-1] * SECOND
         expected = [(BEGUN + 1203 * SECOND, 601.0)]
-        assert reported(ask(log, Event.SILENCES, now=last + SILENCE_NS)) == expected
+        assert reported(query(log, Event.SILENCES, now=last + SILENCE_NS)) == expected
         # One that continues lasts until now.
-        assert reported(ask(log, Event.SILENCES, now=last + 700 * SECOND))[-1] == (last, 700.0)
-        cut = ask(log, Event.SILENCES, end=last + 9 * SECOND, now=last + 9000 * SECOND)
+        assert reported(query(log, Event.SILENCES, now=last + 700 * SECOND))[-1] == (last, 700.0)
+        cut = query(log, Event.SILENCES, end=last + 9 * SECOND, now=last + 9000 * SECOND)
         assert reported(cut)[-1] == (last, 9.0)
     with lived(tmp_path / "hourly.sqlite") as life:
         log = life.connection
         life.write([scan(at_ns=BEGUN + hour * HOUR) for hour in (0, 1, 2, 5, 9)])
-        assert reported(ask(log, Event.SILENCES, now=BEGUN + 9 * HOUR)) == []
+        assert reported(query(log, Event.SILENCES, now=BEGUN + 9 * HOUR)) == []
         seconds = [hour * 3600 for hour in range(5)]
         seconds += [7 * 3600, 10 * 3600 + 1, 11 * 3600 + 1]
         life.write([scan("9", at_ns=BEGUN + second * SECOND) for second in seconds])
-        silences = reported(ask(log, Event.SILENCES, "9", now=BEGUN + seconds[-1] * SECOND))
+        silences = reported(query(log, Event.SILENCES, "9", now=BEGUN + seconds[-1] * SECOND))
         assert silences == [(BEGUN + 7 * HOUR, 3 * 3600 + 1.0)]
 
 
@@ -84,5 +86,5 @@ def test_silences_in_deleted_years_are_still_reported(tmp_path: Path) -> None:
     with lived(tmp_path / "j.sqlite") as life:
         life.write(scan(at_ns=stamp_ns) for stamp_ns in stamps)
         life.delete(BEGUN + 110 * MINUTE)
-        answer = ask(life.connection, Event.SILENCES, start=BEGUN, now=BEGUN + 121 * MINUTE)
+        answer = query(life.connection, Event.SILENCES, start=BEGUN, now=BEGUN + 121 * MINUTE)
     assert reported(answer) == [(BEGUN + 29 * MINUTE, 61 * 60.0)]

@@ -12,8 +12,8 @@ from lupin_twin.journal.schema import open_writer, set_meta
 from tests.support.journal import (
     CLOCK,
     NOW,
+    append,
     is_whole,
-    kept,
     known,
     opened,
     recording,
@@ -31,7 +31,7 @@ def path(tmp_path: Path) -> Path:
 def test_a_row_that_cannot_be_written_is_lost_alone(path: Path) -> None:
     too_late = scan(at_ns=2**63)
     no_number = replace(scan("8"), readings=(Reading("t", "x"),))  # type: ignore[arg-type]
-    assert kept(path, [scan("1"), too_late, no_number, scan("2")]) == (2, 2)
+    assert append(path, [scan("1"), too_late, no_number, scan("2")]) == (2, 2)
     assert known(path) == {scan("1"), scan("2")}
 
 
@@ -67,7 +67,7 @@ def test_a_lack_of_room_for_scans_beside_the_hours_is_reported(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("lupin_twin.journal.file._PURGE_EVERY_S", 0.0)
-    kept(path, [scan(at_ns=NOW + n) for n in range(500)])
+    append(path, [scan(at_ns=NOW + n) for n in range(500)])
     with recording(path, limits=Limits(days=36_500, max_bytes=10_000)) as journal:
         wait_state(
             journal, JournalState.RECORDING, "no scans are kept: the hours, which are never deleted"
@@ -77,7 +77,7 @@ def test_a_lack_of_room_for_scans_beside_the_hours_is_reported(
 
 @pytest.mark.parametrize("is_there", [True, False])
 def test_a_salvage_that_was_killed_starts_again(path: Path, *, is_there: bool) -> None:
-    kept(path, [scan(at_ns=NOW + n) for n in range(300)])
+    append(path, [scan(at_ns=NOW + n) for n in range(300)])
     aside = quarantine(path, "20261121T141500Z")
     with closing(open_writer(path)) as connection:
         set_meta(connection, "salvage", aside.name)

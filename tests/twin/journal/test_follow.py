@@ -23,7 +23,7 @@ from lupin_twin.journal.schema import (
     set_meta,
     transaction,
 )
-from tests.support.journal import NOW, SECOND, kept, look, pin, scan
+from tests.support.journal import NOW, SECOND, append, inspection, pin, scan
 from tests.support.journal_answers import NAMES, answer, answers, old, same
 
 TABLES = ("run", "series", "scan", "look", "place", "hour", "tally", "event")
@@ -58,9 +58,9 @@ def contents(path: Path) -> dict[str, list[tuple[object, ...]]]:
 @pytest.fixture
 def source(tmp_path: Path) -> Path:
     path = tmp_path / "twin.sqlite"
-    rows: list[Write] = [pin(), look()]
+    rows: list[Write] = [pin(), inspection()]
     rows += [scan(at_ns=NOW + n * 600 * SECOND) for n in range(30)]
-    kept(path, [*rows, scan("8", NOW + 5 * SECOND, co2=400.0), look("8", anomaly=True)])
+    append(path, [*rows, scan("8", NOW + 5 * SECOND, co2=400.0), inspection("8", anomaly=True)])
     return path
 
 
@@ -71,7 +71,7 @@ def test_a_copy_has_the_same_rows_and_counts(source: Path, tmp_path: Path) -> No
     assert (found.journal, found.complete_ns) == (follow.followed(source).journal, NOW)
     assert found.kept_ns == follow.followed(source).kept_ns
     # What comes later goes on from there; what is told again is nothing new.
-    kept(source, [scan(at_ns=NOW + n * 60 * SECOND, co2=1.0) for n in range(500, 540)])
+    append(source, [scan(at_ns=NOW + n * 60 * SECOND, co2=1.0) for n in range(500, 540)])
     with reading(source) as connection:
         first = follow.read(connection, 0, 10)
     follow.write(target, first, None)
@@ -124,7 +124,7 @@ def test_a_copy_is_whole_in_the_end_though_the_journal_deletes_all_the_time(tmp_
     source, target = tmp_path / "twin.sqlite", tmp_path / "web.sqlite"
     first = NOW // HOUR_NS * HOUR_NS
     at = [first + n * 10 * SECOND for n in range(60)]
-    kept(source, [scan(str(n % 12), at_ns) for n, at_ns in enumerate(at)])
+    append(source, [scan(str(n % 12), at_ns) for n, at_ns in enumerate(at)])
     purge(source, at[20])
     after, is_all, lots = 0, False, 0
     while not is_all:
@@ -150,12 +150,12 @@ def test_a_copy_of_a_journal_that_was_put_back_from_a_backup_is_made_anew(
 ) -> None:
     target, backup = tmp_path / "web.sqlite", tmp_path / "backup.sqlite"
     shutil.copy(source, backup)
-    kept(source, [scan(at_ns=NOW + (n + 60) * 600 * SECOND) for n in range(4)])
+    append(source, [scan(at_ns=NOW + (n + 60) * 600 * SECOND) for n in range(4)])
     copy(source, target)
     shutil.copy(backup, source)
     for more in range(6):
         if more:
-            kept(source, [scan(at_ns=NOW + (more + 60) * 600 * SECOND + 1)])
+            append(source, [scan(at_ns=NOW + (more + 60) * 600 * SECOND + 1)])
         with pytest.raises(DamagedFile, match="has other rows by now"):
             copy(source, target)
     target.unlink()
@@ -184,12 +184,12 @@ def test_whatever_happens_to_a_journal_a_whole_copy_has_the_same(  # noqa: C901 
     chance = random.Random(seed)
     source, target = tmp_path / "twin.sqlite", tmp_path / "web.sqlite"
     now_ns = NOW
-    kept(source, [scan(at_ns=now_ns)])
+    append(source, [scan(at_ns=now_ns)])
 
     def some(at_ns: int) -> Write:
         tag, made = chance.choice("789"), chance.randrange(3)
         if made == 0:
-            return look(tag, at_ns, anomaly=chance.random() < 0.5)
+            return inspection(tag, at_ns, anomaly=chance.random() < 0.5)
         return scan(tag, at_ns) if made == 1 else scan(tag, at_ns, co2=400.0)
 
     for _ in range(chance.randrange(4, 20)):
@@ -199,9 +199,9 @@ def test_whatever_happens_to_a_journal_a_whole_copy_has_the_same(  # noqa: C901 
                 for _ in range(chance.randrange(1, 10)):
                     now_ns += chance.choice((1, 60, 700, 3_600, 9_000)) * SECOND
                     rows.append(some(now_ns))
-                kept(source, rows)
+                append(source, rows)
             case "late":
-                kept(source, [some(NOW + chance.randrange(now_ns - NOW + 1))])
+                append(source, [some(NOW + chance.randrange(now_ns - NOW + 1))])
             case "delete":
                 with closing(open_writer(source)) as connection, transaction(connection):
                     purge_step(connection, Limits(1.0, 10**12), chance.randrange(NOW, now_ns + 1))

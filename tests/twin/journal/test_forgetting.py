@@ -10,7 +10,7 @@ import pytest
 from lupin_bridge.cli.command import main
 from lupin_twin.core.state import Write
 from tests.support import messages
-from tests.support.journal import NOW, kept, look, pin, restored, scan, select
+from tests.support.journal import NOW, append, inspection, pin, restored, scan, select
 from tests.support.waiting import wait_for
 from tests.support.web import bridge
 
@@ -35,7 +35,7 @@ def path(tmp_path: Path) -> Path:
     path = tmp_path / "j.sqlite"
     rows: list[Write] = [scan(tag_id, co2=400.0) for tag_id in HOME]
     rows += [pin(tag_id, x=x) for tag_id, x in HOME.items()]
-    kept(path, [*rows, look(LOST), scan(LOST, NOW + 1, co2=500.0), pin(LOST, x=900.0)])
+    append(path, [*rows, inspection(LOST), scan(LOST, NOW + 1, co2=500.0), pin(LOST, x=900.0)])
     return path
 
 
@@ -62,9 +62,9 @@ def exported(journal: Journal) -> list[str]:
 def test_a_pose_is_forgotten_and_the_next_twin_pins_the_tag_anew(
     path: Path, journal: Journal
 ) -> None:
-    said = journal("forget", LOST, "--pose")
-    assert (said.returncode, said.stderr) == (0, "")
-    assert "the pose of tag 'lost' is forgotten" in said.stdout
+    message = journal("forget", LOST, "--pose")
+    assert (message.returncode, message.stderr) == (0, "")
+    assert "the pose of tag 'lost' is forgotten" in message.stdout
     # In a domain of its own, without latched messages from before.
     with bridge("--ros-args", "-p", f"journal:={path}") as running:
         assert not running.tag(LOST)["pose"]["orientation"]["w"]
@@ -87,12 +87,14 @@ def test_a_pose_is_forgotten_and_the_next_twin_pins_the_tag_anew(
 
 def test_all_of_a_tag_is_forgotten_and_later_rows_are_stored(path: Path, journal: Journal) -> None:
     assert exported(journal) == [*HOME, LOST]
-    said = journal("forget", LOST)
-    assert (said.returncode, said.stderr) == (0, "")
-    assert "1 scans, 1 inspections, 1 places; counts of the timeline still have them" in said.stdout
+    message = journal("forget", LOST)
+    assert (message.returncode, message.stderr) == (0, "")
+    assert (
+        "1 scans, 1 inspections, 1 places; counts of the timeline still have them" in message.stdout
+    )
     assert exported(journal) == [*HOME]
     assert {tag.tag_id for tag in restored(path).known.tags} == set(HOME)
-    kept(path, [scan(LOST, NOW + 2, co2=600.0)])
+    append(path, [scan(LOST, NOW + 2, co2=600.0)])
     assert [tag.flower.species for tag in restored(path).known.tags if tag.tag_id == LOST] == [""]
     assert exported(journal) == [*HOME, LOST]
     assert journal("check").returncode == 0

@@ -12,10 +12,10 @@ from tests.support.journal import (
     CLOCK,
     NOW,
     SECOND,
+    append,
+    inspection,
     is_whole,
-    kept,
     known,
-    look,
     pin,
     recording,
     restored,
@@ -29,7 +29,7 @@ START = NOW - 3 * DAY
 PAST: list[Write] = [
     pin(at_ns=START),
     scan(at_ns=START),
-    look(at_ns=NOW - DAY),
+    inspection(at_ns=NOW - DAY),
     scan(at_ns=NOW - SECOND),
 ]
 
@@ -50,22 +50,22 @@ def test_a_missing_journal_gets_a_past_that_continues(tmp_path: Path) -> None:
     assert mark(path) == (START, NOW)
     assert {type(row).__name__ for row in known(path, CLOCK)} == {"Pin", "Scan", "Inspection"}
     # Past and present are one run of the clock.
-    kept(path, [scan(at_ns=NOW + SECOND)], CLOCK)
+    append(path, [scan(at_ns=NOW + SECOND)], CLOCK)
     assert select(path, "SELECT run, begun_stamp_ns FROM run") == [(1, START)]
     assert restored(path).last_seq == 5
 
 
 def test_a_twin_that_received_nothing_leaves_it_empty(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
-    kept(path, [], CLOCK)
+    append(path, [], CLOCK)
     assert filled(path)
     assert select(path, "SELECT run, begun_stamp_ns FROM run") == [(1, START)]
 
 
-@pytest.mark.parametrize("row", [scan(), look(), pin()])
+@pytest.mark.parametrize("row", [scan(), inspection(), pin()])
 def test_a_journal_with_recorded_rows_is_not_filled(tmp_path: Path, row: Write) -> None:
     path = tmp_path / "j.sqlite"
-    kept(path, [row], CLOCK)
+    append(path, [row], CLOCK)
     assert not filled(path)
     assert mark(path) is None
 

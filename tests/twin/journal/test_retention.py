@@ -10,7 +10,17 @@ from lupin_twin.journal.counts import deleted_ns
 from lupin_twin.journal.retention import Limits, horizon_ns, note_lost, purge_step, used_bytes
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import SiteLog, open_writer, transaction
-from tests.support.journal import CLOCK, NOW, SECOND, kept, look, opened, pin, restored, scan
+from tests.support.journal import (
+    CLOCK,
+    NOW,
+    SECOND,
+    append,
+    inspection,
+    opened,
+    pin,
+    restored,
+    scan,
+)
 
 DAY = 24 * HOUR_NS
 ENOUGH = 10**12
@@ -21,7 +31,7 @@ ROWS = 2_000
 def path(tmp_path: Path) -> Path:
     """A journal with a scan every minute."""
     made = tmp_path / "j.sqlite"
-    kept(made, [pin(), look(), *(scan(at_ns=NOW + n * 60 * SECOND) for n in range(ROWS))])
+    append(made, [pin(), inspection(), *(scan(at_ns=NOW + n * 60 * SECOND) for n in range(ROWS))])
     return made
 
 
@@ -71,7 +81,7 @@ def test_numbers_continue_when_everything_is_deleted(path: Path, file: sqlite3.C
     file.execute("DELETE FROM place")
     purge(file, Limits(0.0, ENOUGH), NOW + 99 * DAY)
     file.close()
-    assert kept(path, [scan(at_ns=NOW + 200 * DAY)]) == (1, 0)
+    assert append(path, [scan(at_ns=NOW + 200 * DAY)]) == (1, 0)
     assert restored(path).last_seq == ROWS + 3
 
 

@@ -9,12 +9,22 @@ from lupin_twin.core.state import Write
 from lupin_twin.journal.checking import find_all_damage
 from lupin_twin.journal.salvage import quarantine, salvage
 from lupin_twin.journal.schema import open_reader, open_writer
-from tests.support.journal import NOW, SECOND, is_whole, kept, known, look, pin, scan, select
+from tests.support.journal import (
+    NOW,
+    SECOND,
+    append,
+    inspection,
+    is_whole,
+    known,
+    pin,
+    scan,
+    select,
+)
 
 TAGS = [str(tag) for tag in range(20)]
 ROWS: list[Write] = [
     *(pin(tag) for tag in TAGS),
-    *(look(tag) for tag in TAGS),
+    *(inspection(tag) for tag in TAGS),
     *(scan(tag, NOW + n * SECOND, temperature=n / 7) for n in range(100) for tag in TAGS),
 ]
 SCANS = "SELECT seq, series, stamp_ns, readings FROM scan"
@@ -24,7 +34,7 @@ SCANS = "SELECT seq, series, stamp_ns, readings FROM scan"
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A journal of 2,000 scans."""
     path = tmp_path_factory.mktemp("whole") / "j.sqlite"
-    kept(path, ROWS)
+    append(path, ROWS)
     return path
 
 
@@ -79,7 +89,7 @@ def test_the_rest_of_a_truncated_file_is_read(whole: Path, damaged: Path, share:
 
 def test_deleted_rows_do_not_come_back_but_their_hours_do(tmp_path: Path) -> None:
     path = tmp_path / "damaged.sqlite"
-    kept(path, [scan("7", NOW + n * 60 * SECOND, a=float(n)) for n in range(500)])
+    append(path, [scan("7", NOW + n * 60 * SECOND, a=float(n)) for n in range(500)])
     hours = set(select(path, "SELECT * FROM hour"))
     with closing(open_writer(path)) as connection:
         connection.execute("DELETE FROM scan WHERE seq <= 190")
@@ -127,7 +137,7 @@ def test_an_invalid_row_is_left_out(whole: Path, damaged: Path, text: bytes) -> 
 
 def test_new_numbers_are_beyond_all_that_may_be_lost(damaged: Path) -> None:
     new = salvaged(damaged)
-    kept(new, [scan("new", NOW + 999 * SECOND)])
+    append(new, [scan("new", NOW + 999 * SECOND)])
     ((number,),) = select(
         new, "SELECT seq FROM scan JOIN series USING (site, series) WHERE tag = 'new'"
     )

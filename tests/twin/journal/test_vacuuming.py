@@ -5,7 +5,7 @@ import pytest
 
 from lupin_twin.journal.rebuild import vacuum
 from lupin_twin.journal.schema import Empty, Foreign, NotPossible, open_reader, open_writer
-from tests.support.journal import NOW, SECOND, is_whole, kept, known, pin, scan
+from tests.support.journal import NOW, SECOND, append, is_whole, known, pin, scan
 from tests.twin.journal.conftest import fail_on_a_full_disk
 
 
@@ -13,7 +13,7 @@ from tests.twin.journal.conftest import fail_on_a_full_disk
 def path(tmp_path: Path) -> Path:
     """A journal nine tenths of which are free."""
     made = tmp_path / "j.sqlite"
-    kept(made, [pin(), *(scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(5000))])
+    append(made, [pin(), *(scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(5000))])
     with closing(open_writer(made)) as connection:
         connection.execute("DELETE FROM scan WHERE seq < 4500")
         # As the deletion of rows records it.
@@ -37,7 +37,7 @@ def test_the_file_shrinks_and_its_content_stays(path: Path) -> None:
     assert is_whole(path)
     assert small(path) == (after, after)
     # It can be written as before, with consecutive numbers.
-    assert kept(path, [scan("new")]) == (1, 0)
+    assert append(path, [scan("new")]) == (1, 0)
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_it_is_refused_while_the_file_is_read(path: Path) -> None:
 
 
 def test_a_disk_that_fills_leaves_the_file_unchanged(path: Path) -> None:
-    kept(path, [scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(5000, 9000)])
+    append(path, [scan(at_ns=NOW + n * SECOND, a=n / 3) for n in range(5000, 9000)])
     rows = known(path)
     code = "from lupin_twin.journal.rebuild import vacuum; vacuum(path, 'a test', print)"
     fail_on_a_full_disk(code, path, 100_000)

@@ -92,8 +92,10 @@ def test_a_second_twin_is_refused_by_name_and_takes_over_when_the_first_has_ende
         second = Journal(path, "/second", LIMITS)
         second.begin(CLOCK)
         assert second.take_restored(30.0) is None
-        said = wait_state(second, JournalState.IN_USE).detail
-        assert said == f"the journal {path} is in use by /test/lupin_twin (process {os.getpid()})"
+        message = wait_state(second, JournalState.IN_USE).detail
+        assert (
+            message == f"the journal {path} is in use by /test/lupin_twin (process {os.getpid()})"
+        )
         second.write(scan("2"))
     wait_for(lambda: second.condition.written == 1, "the second's row")
     assert wait_state(second, JournalState.RECORDING).is_well

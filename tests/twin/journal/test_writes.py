@@ -6,7 +6,7 @@ from typing import Any
 from lupin_twin.core.past import PastWrite, PastWrites, RecentRequest, WritesRequest, recent_of
 from lupin_twin.core.state import NO_FLOWER
 from lupin_twin.journal.writes import recent, writes
-from tests.support.journal import SECOND, look, pin, scan
+from tests.support.journal import SECOND, inspection, pin, scan
 from tests.support.log_life import BEGUN, Life, failure, lived
 from tests.twin.journal.conftest import Copied
 
@@ -19,7 +19,7 @@ def requested(connection: Any, **query: Any) -> PastWrites:
 
 def test_writes_come_in_the_order_of_receipt_and_once_each(tmp_path: Path, copied: Copied) -> None:
     with lived(tmp_path / "j.sqlite") as life:
-        life.write([scan("7", BEGUN + 5), pin("7"), look("7", BEGUN + 4, anomaly=True)])
+        life.write([scan("7", BEGUN + 5), pin("7"), inspection("7", BEGUN + 4, anomaly=True)])
         life.write([failure("8", BEGUN + 3)])
         life.write(scan("9", BEGUN + n, co2=400.0 + n, light=1.0) for n in range(7))
         whole = requested(life.connection)
@@ -53,7 +53,7 @@ def test_writes_come_in_the_order_of_receipt_and_once_each(tmp_path: Path, copie
 
 def test_copies_of_known_rows_are_no_writes(tmp_path: Path) -> None:
     with lived(tmp_path / "j.sqlite") as life:
-        life.write([scan(), look()])
+        life.write([scan(), inspection()])
         life.begin(BEGUN - SECOND)
         life.write([scan("8", BEGUN)])
         assert [(w.run, w.tag_id) for w in requested(life.connection).writes] == (
@@ -87,7 +87,7 @@ def test_the_recent_window_has_the_last_nine_scans_and_inspections_of_each_tag(
         life.write(scan("7", BEGUN + n, h=float(n)) for n in range(1, 20, 2))
         life.write([scan("7", BEGUN + 17, source="b", h=5.0), failure("7", BEGUN + 16)])
         life.write([scan("8", BEGUN - 3 * DAY + 16, t=1.0), scan("8", BEGUN - 3 * DAY + 17, t=2.0)])
-        life.write(look("8", BEGUN + n, anomaly=bool(n % 2)) for n in range(20))
+        life.write(inspection("8", BEGUN + n, anomaly=bool(n % 2)) for n in range(20))
         then = RecentRequest(BEGUN + 17)
         found = recent(life.connection, then)
         stamps = {
@@ -109,7 +109,7 @@ def test_the_recent_window_has_the_last_nine_scans_and_inspections_of_each_tag(
 def test_an_uncertain_species_is_left_out(tmp_path: Path) -> None:
     with lived(tmp_path / "j.sqlite") as life:
         for number, confidence in enumerate((0.05, 0.49, 0.5, 1.0)):
-            one = look("7", BEGUN + number)
+            one = inspection("7", BEGUN + number)
             flower = replace(one.flower or NO_FLOWER, confidence=confidence)
             life.write([replace(one, flower=flower)])
         assert [write.species for write in requested(life.connection).writes] == (

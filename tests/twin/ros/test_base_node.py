@@ -102,8 +102,8 @@ def test_warnings_are_limited_per_key_and_counted(utilities: NodeUtilities, logg
     utilities.drop(Drop(Reason.KIND, "no", case="9"), "/t")
     logged.now_s += WARNING_PERIOD_S
     utilities.drop(Drop(Reason.FRAME, "no"), "/t")
-    said = "dropped a message on /t: no"
-    assert logged.lines == [said, said, said, f"{said} (2 more since the last warning)"]
+    wording = "dropped a message on /t: no"
+    assert logged.lines == [wording, wording, wording, f"{wording} (2 more since the last warning)"]
 
 
 def test_an_error_in_a_callback_is_counted_and_logged_with_its_traceback(

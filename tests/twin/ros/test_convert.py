@@ -90,11 +90,11 @@ def over_the_wire(msg: Any) -> Any:
 def test_only_a_changed_tag_is_built_anew_and_every_age_is_current() -> None:
     build = convert.StateMessages().build
     first = build(Snapshot(9 * S, "map", (PINNED, UNPINNED)))
-    kept = list(first.tags)
+    stored = list(first.tags)
     changed = TagState(tag_id="8", readings=(Reading("co2", 1.0),), last_observed_ns=10 * S)
     second = build(Snapshot(12 * S + 7, "map", (PINNED, changed)))
-    assert second.tags[0] is kept[0]
-    assert second.tags[1] is not kept[1]
+    assert second.tags[0] is stored[0]
+    assert second.tags[1] is not stored[1]
     assert second.tags[0].stale_seconds == 7.0
     assert [r.value for r in second.tags[1].readings] == [1.0]
 
@@ -113,7 +113,7 @@ def test_a_tag_reading_is_received_field_by_field() -> None:
 
 @pytest.mark.parametrize(("own", "counts"), [("", "odom"), ("camera", "camera")])
 def test_the_frame_of_a_flowers_own_pose_takes_precedence(own: str, counts: str) -> None:
-    msg = messages.look("1", at=(1.0, 2.0), frame_id="odom", pose_frame_id=own)
+    msg = messages.inspection("1", at=(1.0, 2.0), frame_id="odom", pose_frame_id=own)
     assert convert.received(msg).frame_id == counts
 
 

@@ -54,8 +54,8 @@ def peer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Peer]:
         yield peer
 
 
-def ask(peer: Peer, **changes: Any) -> Any:
-    return peer.ask(GetEstimate, SERVICE, **{**BOX, **changes})
+def request(peer: Peer, **changes: Any) -> Any:
+    return peer.call(GetEstimate, SERVICE, **{**BOX, **changes})
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def ask(peer: Peer, **changes: Any) -> Any:
 def test_an_impossible_estimate_is_refused_by_name(
     peer: Peer, changes: dict[str, Any], complaint: str
 ) -> None:
-    answer = ask(peer, **changes)
+    answer = request(peer, **changes)
     assert complaint in answer.error_message
     assert answer == GetEstimate.Response(error_message=answer.error_message)
 
@@ -169,13 +169,13 @@ def test_a_report_is_reused_for_a_while_and_a_mistake_is_reported_once(
     assert report().fit_problem.startswith("10001 tags have this sensor")
     assert report().places == (), "who asks for no places has none worked out"
     assert len(searches) == 3, "it serves for half a minute"
-    said = service.finding()
-    assert (said.level, said.message) == (WARN, f"co2: {report().fit_problem}")
-    assert said.values == {"fits failed": "1"}
+    wording = service.finding()
+    assert (wording.level, wording.message) == (WARN, f"co2: {report().fit_problem}")
+    assert wording.values == {"fits failed": "1"}
     graded = Record(1, Tally(40, 10), Tally(40, 10))
     narrow = LastResult(Report(at_ns, at_ns, "", graded), Grades(86_400.0))
-    said = replace(service, _known={"light": narrow}).finding()
-    assert (said.level, said.message) == (WARN, "light: the predicted range is too narrow")
+    wording = replace(service, _known={"light": narrow}).finding()
+    assert (wording.level, wording.message) == (WARN, "light: the predicted range is too narrow")
     assert replace(service, _known={}).finding().message == "nothing is wrong"
     assert reported == [f"no new model of co2: {report().fit_problem}"]
     searches.clear()

@@ -18,7 +18,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.field.engine import DEFAULT_RESOLUTION_M
 from tests.support.domains import own_domain
-from tests.support.messages import look, scan
+from tests.support.messages import inspection, scan
 from tests.support.processes import Process, twin_node
 from tests.support.ros import Peer, latched
 
@@ -57,7 +57,7 @@ class Viewer(Peer):
     def unwatch(self, topic: str) -> None:
         self.node.destroy_subscription(self.subscriptions.pop(topic))
 
-    def newest(self, topic: str, accept: Any = lambda _: True) -> Any:
+    def latest(self, topic: str, accept: Any = lambda _: True) -> Any:
         came = self.came[topic]
         return self.until(
             lambda: came[-1] if came and accept(came[-1]) else None, f"a message on {topic}"
@@ -78,7 +78,7 @@ class Viewer(Peer):
 
 
 @pytest.fixture(scope="module")
-def house() -> Iterator[tuple[int, Process, Viewer]]:
+def greenhouse() -> Iterator[tuple[int, Process, Viewer]]:
     args = ("--ros-args", "-r", "__ns:=/gh1", "-p", LAYERS)
     with (
         own_domain() as domain,
@@ -111,16 +111,16 @@ def box_of(low: tuple[float, float], high: tuple[float, float]) -> dict[str, Any
 
 
 def test_a_layer_is_the_field_and_is_computed_only_for_subscribers(
-    house: tuple[int, Process, Viewer],
+    greenhouse: tuple[int, Process, Viewer],
 ) -> None:
-    domain, _, robot = house
+    domain, _, robot = greenhouse
     robot.receive_diagnostics()
     for x in (0, 4):
         observe(robot, scan(f"t{x}", {"co2": 400.0 + x, "soil moisture": 30.0}, (x, 0)))
     box = box_of((0.0, 0.0), (4.0, 0.0))
-    ask: dict[str, Any] = {"sensor_type": "co2", **box}
+    query: dict[str, Any] = {"sensor_type": "co2", **box}
     field = robot.until(
-        lambda: (f := robot.ask(GetField, "/gh1/twin/get_field", **ask)).sample_count == 2 and f,
+        lambda: (f := robot.call(GetField, "/gh1/twin/get_field", **query)).sample_count == 2 and f,
         "both tags",
     )
     # Something is known, without subscribers: nothing was computed.
@@ -130,7 +130,7 @@ def test_a_layer_is_the_field_and_is_computed_only_for_subscribers(
 
     with Viewer(domain, "viewer") as viewer:
         viewer.watch(CO2)
-        msg = viewer.newest(CO2)
+        msg = viewer.latest(CO2)
         values = np.array(field.values).reshape(field.height, field.width)
         rows, columns = np.nonzero(~np.isnan(values))
         assert 0 < rows.size < values.size
@@ -146,30 +146,32 @@ def test_a_layer_is_the_field_and_is_computed_only_for_subscribers(
 
         with Viewer(domain, "late") as late:
             late.watch(CO2)
-            assert late.newest(CO2).header.stamp == msg.header.stamp  # from the latch
+            assert late.latest(CO2).header.stamp == msg.header.stamp  # from the latch
         robot.says(CO2, 1)
         robot.says(SOIL, 0)
 
         observe(robot, scan("t0", {"co2": 900.0}))
-        changed = viewer.newest(CO2, lambda m: cells(m)[:, 3].max() == 900.0)
+        changed = viewer.latest(CO2, lambda m: cells(m)[:, 3].max() == 900.0)
         assert cells(changed).shape == found.shape
         # A sensor whose name is not valid in ROS.
         viewer.watch(SOIL)
-        assert (cells(viewer.newest(SOIL))[:, 3] == 30.0).all()
+        assert (cells(viewer.latest(SOIL))[:, 3] == 30.0).all()
         viewer.unwatch(CO2)
         robot.until(
             lambda: robot.said["message"] == "1 of 8 topics have subscribers", "one who looks"
         )
         observe(robot, scan("t0", {"co2": 700.0}))
-        viewer.newest(SOIL)  # the same tags at another revision
+        viewer.latest(SOIL)  # the same tags at another revision
         viewer.came[CO2].clear()
         viewer.watch(CO2)
-        viewer.newest(CO2, lambda m: cells(m)[:, 3].max() == 700.0)
+        viewer.latest(CO2, lambda m: cells(m)[:, 3].max() == 700.0)
     robot.says(CO2, 3)
 
 
-def test_the_error_is_that_of_the_value_by_the_estimate(house: tuple[int, Process, Viewer]) -> None:
-    domain, _, robot = house
+def test_the_error_is_that_of_the_value_by_the_estimate(
+    greenhouse: tuple[int, Process, Viewer],
+) -> None:
+    domain, _, robot = greenhouse
     now_s = robot.node.get_clock().now().nanoseconds / 1e9
     places = [(x, 8.0) for x in range(5)]
     observe(
@@ -180,7 +182,7 @@ def test_the_error_is_that_of_the_value_by_the_estimate(house: tuple[int, Proces
             for ago_s in (1200.0, 600.0, 1.0)
         ),
     )
-    ask: dict[str, Any] = {"sensor_type": "temperature", **box_of((0.0, 0.0), (4.0, 8.0))}
+    query: dict[str, Any] = {"sensor_type": "temperature", **box_of((0.0, 0.0), (4.0, 8.0))}
     with Viewer(domain, "viewer") as viewer:
         viewer.watch(TEMPERATURE)
 
@@ -188,8 +190,8 @@ def test_the_error_is_that_of_the_value_by_the_estimate(house: tuple[int, Proces
             clouds = viewer.came[TEMPERATURE]
             if not clouds or not len(found := cells(clouds[-1])) or found[0, 4] < 0.0:
                 return False
-            estimate = viewer.ask(GetEstimate, "/gh1/twin/get_estimate", **ask)
-            field = viewer.ask(GetField, "/gh1/twin/get_field", **ask)
+            estimate = viewer.call(GetEstimate, "/gh1/twin/get_estimate", **query)
+            field = viewer.call(GetField, "/gh1/twin/get_field", **query)
             values = np.array(field.values)
             known = ~np.isnan(values)
             off = values[known] - np.array(estimate.mean)[known]
@@ -201,20 +203,22 @@ def test_the_error_is_that_of_the_value_by_the_estimate(house: tuple[int, Proces
         viewer.until(is_as_foretold, "errors as those of the estimate")
 
 
-def test_tags_and_planters_are_marked_by_their_state(house: tuple[int, Process, Viewer]) -> None:
-    domain, _, robot = house
+def test_tags_and_planters_are_marked_by_their_state(
+    greenhouse: tuple[int, Process, Viewer],
+) -> None:
+    domain, _, robot = greenhouse
     observe(
         robot,
         scan("m1", {"light": 1.0}, (1.0, 3.0)),
         scan("m2", {"light": 1.0}, (2.0, 3.0)),
-        look("m1", footprint=BOX),
-        look("m2", footprint=BOX),
+        inspection("m1", footprint=BOX),
+        inspection("m2", footprint=BOX),
         scan("m2", status=Observation.STATUS_SCAN_FAILED),
     )
     with Viewer(domain, "viewer") as viewer:
         viewer.watch(TAGS)
         viewer.watch(PLANTERS)
-        msg = viewer.newest(TAGS, lambda m: any(x.text == "m2 (failed)" for x in m.markers))
+        msg = viewer.latest(TAGS, lambda m: any(x.text == "m2 (failed)" for x in m.markers))
         assert msg.markers[0].action == Marker.DELETEALL
         names = {marker.text: marker for marker in msg.markers if marker.text}
         balls = {m.id: m for m in msg.markers if m.type == Marker.SPHERE and m.ns == "tags"}
@@ -222,16 +226,16 @@ def test_tags_and_planters_are_marked_by_their_state(house: tuple[int, Process, 
         assert (fresh.pose.position.x, fresh.pose.position.y) == (1.0, 3.0)
         assert fresh.color.g > fresh.color.r
         assert failed.color.r > failed.color.g
-        outlines = viewer.newest(PLANTERS, lambda m: len(m.markers) > 1).markers[1:]
+        outlines = viewer.latest(PLANTERS, lambda m: len(m.markers) > 1).markers[1:]
         assert [(o.ns, o.id, len(o.points)) for o in outlines] == [("planters", fresh.id, 4)]
         # Its type stays, and so does its name.
         observe(robot, scan("m2", {"light": 2.0}))
-        msg = viewer.newest(TAGS, lambda m: any(x.text == "m2" for x in m.markers))
+        msg = viewer.latest(TAGS, lambda m: any(x.text == "m2" for x in m.markers))
         assert next(x.id for x in msg.markers if x.text == "m2") == failed.id
 
 
-def test_rviz_shows_what_the_twin_publishes(house: tuple[int, Process, Viewer]) -> None:
-    _, _, robot = house
+def test_rviz_shows_what_the_twin_publishes(greenhouse: tuple[int, Process, Viewer]) -> None:
+    _, _, robot = greenhouse
     manager = yaml.safe_load(RVIZ.read_text(encoding="utf-8"))["Visualization Manager"]
     shown = {each["Name"]: each for each in manager["Displays"] if "Topic" in each}
     # Relative, so that a namespace moves them; latched, or the last one would not arrive.
@@ -260,14 +264,14 @@ def test_rviz_shows_what_the_twin_publishes(house: tuple[int, Process, Viewer]) 
 
 
 def test_a_tag_far_off_widens_no_layer_and_has_its_marker(
-    house: tuple[int, Process, Viewer],
+    greenhouse: tuple[int, Process, Viewer],
 ) -> None:
-    domain, _, robot = house
+    domain, _, robot = greenhouse
     at = {"a": (0.0, 0.0), "b": (1.0, 0.0), "c": (1.0, 0.5), "far": (900.0, 0.0)}
     observe(robot, *(scan(tag_id, {"co2": 1.0}, place) for tag_id, place in at.items()))
     with Viewer(domain, "viewer") as viewer:
         viewer.watch(CO2)
         viewer.watch(TAGS)
-        viewer.newest(TAGS, lambda m: any(x.text == "far" for x in m.markers))
-        layer = cells(viewer.newest(CO2, lambda m: m.width > 0))
+        viewer.latest(TAGS, lambda m: any(x.text == "far" for x in m.markers))
+        layer = cells(viewer.latest(CO2, lambda m: m.width > 0))
         assert layer[:, 0].max() < 100.0

@@ -75,11 +75,11 @@ def test_stamps_and_staleness_follow_the_simulated_clock(domain: int) -> None:
         peer.node.create_timer(0.1, lambda: peer.publish("/clock", clock_at(now_s), depth=1))
 
         def ages(accept: Any = lambda _: True) -> dict[str, float]:
-            def look(state: Any) -> bool:
+            def check(state: Any) -> bool:
                 known = not any(math.isnan(tag.stale_seconds) for tag in state.tags)
                 return state.header.stamp == clock_at(now_s).clock and known and accept(state)
 
-            state = peer.state(look, f"a state at {now_s} s with ages")
+            state = peer.state(check, f"a state at {now_s} s with ages")
             return {tag.tag_id: tag.stale_seconds for tag in state.tags}
 
         peer.set_clock(now_s)

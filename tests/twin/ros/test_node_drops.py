@@ -7,7 +7,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
 from tests.support import messages
-from tests.support.messages import discovered, look, occupancy_grid, scan
+from tests.support.messages import discovered, inspection, occupancy_grid, scan
 from tests.support.processes import OFTEN
 from tests.twin.ros.test_node import Twin, running_twin
 
@@ -21,8 +21,8 @@ def twin() -> Iterator[Twin]:
 def test_a_wrong_frame_is_dropped_on_each_path_with_both_frames_named(twin: Twin) -> None:
     twin.peer.observe(
         scan("scan", {"co2": 1.0}, at=(1, 1), frame_id="odom"),
-        look("flower-own", frame_id="map", pose_frame_id="camera"),
-        look("flower-header", frame_id="base_link"),
+        inspection("flower-own", frame_id="map", pose_frame_id="camera"),
+        inspection("flower-header", frame_id="base_link"),
     )
     twin.peer.discover(discovered({"discovery": messages.pose(1, 1)}, frame_id="laser"))
     twin.peer.publish_map(occupancy_grid([[0]], frame_id="other_map"))
@@ -37,7 +37,7 @@ def test_a_pose_too_far_off_is_dropped_on_each_path_and_the_readings_stay(twin: 
     peer = twin.peer
     peer.observe(
         scan("lost", {"temperature": 21.0}, at=(3.0, -5000.0)),
-        look("flower", "lupin", at=(1e30, 0.0)),
+        inspection("flower", "lupin", at=(1e30, 0.0)),
     )
     peer.discover(
         discovered({"high": messages.pose(1, 1, 1001), "limit": messages.pose(-1000, 1000)})
@@ -64,7 +64,7 @@ def test_the_limit_of_a_pose_can_be_changed_while_the_twin_runs(twin: Twin) -> N
     twin.peer.observe(scan("far", {"co2": 1.0}, at=(1500.0, 0.0)))
     twin.warning("'far'", "its x is 1500 m")
     limit = Parameter("max_pose_m", value=2000.0).to_parameter_msg()
-    answer = twin.peer.ask(SetParameters, "/lupin_twin/set_parameters", parameters=[limit])
+    answer = twin.peer.call(SetParameters, "/lupin_twin/set_parameters", parameters=[limit])
     assert answer.results[0].successful, answer.results[0].reason
     twin.peer.observe(scan("far", {"co2": 2.0}, at=(1500.0, 0.0)))
     twin.peer.tag("far", lambda tag: tag.pose.position.x == 1500.0)

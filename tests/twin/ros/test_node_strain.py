@@ -32,7 +32,7 @@ class Strained:
         """The longest time without a state until `done` returns something true."""
         last_s, longest_s, seen = time.monotonic(), 0.0, len(self.peer.states)
 
-        def look() -> object:
+        def check() -> object:
             nonlocal last_s, longest_s, seen
             if len(self.peer.states) > seen:
                 now_s = time.monotonic()
@@ -43,7 +43,7 @@ class Strained:
                 )
             return done()
 
-        self.peer.until(look, what)
+        self.peer.until(check, what)
         return max(longest_s, time.monotonic() - last_s)
 
 
@@ -89,7 +89,7 @@ def wide() -> Iterator[Strained]:
         yield Strained(process, peer)
 
 
-def ask(strained: Strained, **request: float) -> Any:
+def query(strained: Strained, **request: float) -> Any:
     """Start a call of the service; returns the future of its response."""
     client = strained.peer.node.create_client(GetField, "/twin/get_field")
     strained.peer.until(client.service_is_ready, "the service")
@@ -98,7 +98,7 @@ def ask(strained: Strained, **request: float) -> Any:
 
 def test_a_heavy_field_delays_no_observation_no_state_and_not_the_shutdown(wide: Strained) -> None:
     peer = wide.peer
-    heavy = [ask(wide), ask(wide)]
+    heavy = [query(wide), query(wide)]
     start_s = time.monotonic()
     sent = 0
 
@@ -123,8 +123,8 @@ def test_a_heavy_field_delays_no_observation_no_state_and_not_the_shutdown(wide:
 
     for x in range(4):
         # Another field of the same size.
-        ask(wide, bbox_min_x=-0.25 * x, bbox_max_x=10.0 - 0.25 * x)
-    cheap = ask(wide, resolution=1.0)
+        query(wide, bbox_min_x=-0.25 * x, bbox_max_x=10.0 - 0.25 * x)
+    cheap = query(wide, resolution=1.0)
     peer.until(cheap.done, "the cheap field: the heavy ones are being computed")
     pid = wide.process.pid
     start_s, before_s = time.monotonic(), waited_s(pid)

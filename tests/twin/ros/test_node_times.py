@@ -6,7 +6,7 @@ from typing import Any
 from lupin_msgs.msg import Observation, TwinTimes
 
 from lupin_twin.core.clock import LATCHED_AFTER_S
-from tests.support.messages import look, scan
+from tests.support.messages import inspection, scan
 from tests.support.processes import OFTEN, twin_node
 from tests.support.ros import Peer, latched
 
@@ -34,13 +34,13 @@ def test_a_robot_whose_clock_stepped_back_causes_a_warning_with_its_name(domain:
         robot.until(lambda: "late stamps" in twin.output, "a warning")
         robot.observe(scan("marker"))
         robot.tag("marker")
-        [kept] = [tag for tag in robot.states[-1].tags if tag.tag_id == "1"]
+        [stored] = [tag for tag in robot.states[-1].tags if tag.tag_id == "1"]
         [line] = [line for line in twin.output.splitlines() if "late stamps" in line]
     assert "WARN" in line
     assert "late stamps on /floranova/observations: 6 observations in a row from source" in line
     assert "'test'" in line
     assert "by 596 s" in line
-    assert kept.readings[0].value == 1.0
+    assert stored.readings[0].value == 1.0
 
 
 def test_latched_messages_of_two_robots_with_one_name_cause_no_warning(domain: int) -> None:
@@ -65,7 +65,7 @@ def test_the_times_come_with_the_state_latched_and_with_its_stamp(domain: int) -
         robot.wait_for_twin()
         robot.observe(
             scan("1", {"co2": 400.0, "light": 1.0}, stamp_s=10.0),
-            look("1", stamp_s=3610.0),
+            inspection("1", stamp_s=3610.0),
             scan("1", {"light": 2.0}, stamp_s=7210.0),
             failed,
             scan("marker"),

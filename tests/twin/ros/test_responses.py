@@ -109,8 +109,8 @@ def test_an_answer_without_a_reader_is_dropped_with_a_warning(stage: Stage) -> N
     stage.now_s += PATIENCE_S - 2 * RETRY_S
     assert stage.go_on() == ["a"]
     assert stage.go_on() == []
-    [said] = stage.warned
-    assert said == (
+    [message] = stage.warned
+    assert message == (
         "gave up a response of /ask: for 30 s DDS has found no reader for it; does a "
         "client use a QoS other than the default of services?"
     )
@@ -156,19 +156,19 @@ def test_a_client_that_dds_never_finds_is_reported_and_delays_nobody() -> None:
     # Its reader needs QoS that the service's writer does not offer: they never match, and rclpy
     # behaves as with a reader that is found too late.
     never = QoSProfile(depth=50, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    ask, parameters = "/twin/get_field", "/lupin_twin/get_parameters"
+    query, parameters = "/twin/get_field", "/lupin_twin/get_parameters"
     with own_domain() as domain, twin_node(domain) as twin, Peer(domain, "robot") as robot:
         futures = []
-        for kind, name in ((GetField, ask), (GetParameters, parameters)):
+        for kind, name in ((GetField, query), (GetParameters, parameters)):
             client = robot.node.create_client(kind, name, qos_profile=never)
-            said = f"gave up a response of {name}: too much else waits to be sent again"
+            message = f"gave up a response of {name}: too much else waits to be sent again"
 
-            def is_said(client: Any = client, kind: Any = kind, said: str = said) -> bool:
+            def is_said(client: Any = client, kind: Any = kind, message: str = message) -> bool:
                 # A service queues ten requests: more at once would be lost.
                 futures.append(client.call_async(kind.Request()))
-                return said in twin.output
+                return message in twin.output
 
-            robot.until(is_said, said)
+            robot.until(is_said, message)
         assert robot.get_field(sensor_type="co2").sample_count == 0
         assert not any(future.done() for future in futures)
         assert "Error" not in twin.output

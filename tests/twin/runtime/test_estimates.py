@@ -26,7 +26,7 @@ from lupin_twin.runtime.estimates import (
     readings_at,
 )
 from tests.support.estimates import DAY_S
-from tests.support.journal import NOW, kept, pin, scan
+from tests.support.journal import NOW, append, pin, scan
 from tests.support.maps import map_of
 
 S = NANOSECONDS_PER_SECOND
@@ -36,7 +36,7 @@ HOUR_NS = 3600 * S
 PRODUCERS = (("one", 25.0), ("other", 20.0))
 
 
-def house(until_s: int, *, tags: int = 12, every_s: int = 150) -> list[TagPast]:
+def greenhouse(until_s: int, *, tags: int = 12, every_s: int = 150) -> list[TagPast]:
     """Readings of a warm and of a cool end until then, one tag after the other."""
     chance = np.random.default_rng(1)
     places = chance.uniform((0.0, 0.0), (4.0, 8.0), (tags, 2))
@@ -62,7 +62,7 @@ def with_reading(pasts: list[TagPast], tag: int, at_ns: int, value: float) -> li
 
 def test_among_equal_stamps_it_uses_the_reading_that_the_state_shows(tmp_path: Path) -> None:
     path = tmp_path / "twin.sqlite"
-    kept(path, [pin(), *(scan(source=name, temperature=value) for name, value in PRODUCERS)])
+    append(path, [pin(), *(scan(source=name, temperature=value) for name, value in PRODUCERS)])
     with closing(open_reader(path)) as log:
         [past] = readings_at(log, "temperature", NOW, DAY_S)
         [tag] = state_at(log, NOW, "map").tags
@@ -71,7 +71,7 @@ def test_among_equal_stamps_it_uses_the_reading_that_the_state_shows(tmp_path: P
 
 
 def test_a_report_compares_each_tag_with_all_the_others() -> None:
-    pasts = house(6 * 3600)
+    pasts = greenhouse(6 * 3600)
     known = found(pasts, 6)
     report = known.report
     assert (report.at_ns, report.fitted_at_ns, report.fit_problem) == (6 * HOUR_NS, 6 * HOUR_NS, "")
@@ -85,7 +85,7 @@ def test_a_report_compares_each_tag_with_all_the_others() -> None:
 def test_nine_of_ten_scans_are_where_other_tags_predict_them() -> None:
     known = None
     for hour in range(23, 30):
-        known = found(house(hour * 3600), hour, known)
+        known = found(greenhouse(hour * 3600), hour, known)
     assert known is not None
     week = known.report.record.week
     assert week.scans == 6 * 12
@@ -93,7 +93,7 @@ def test_nine_of_ten_scans_are_where_other_tags_predict_them() -> None:
 
 
 def test_only_new_scans_are_graded_and_a_reading_that_is_off_is_outside() -> None:
-    pasts = house(26 * 3600)
+    pasts = greenhouse(26 * 3600)
     before = found(pasts, 26)
     assert found(pasts, 26.1, before).report.record.week == Tally()
     off = with_reading(pasts, 2, 26 * HOUR_NS + S, 60.0)
@@ -101,14 +101,14 @@ def test_only_new_scans_are_graded_and_a_reading_that_is_off_is_outside() -> Non
     assert found(off, 25.9, before).report.record.week == Tally(), "the clock has gone back"
     known = with_reading(pasts, 2, 26 * HOUR_NS, 21.0)
     assert found(known, 26.1, found(known, 26)).report.record.week == Tally(), "it was there"
-    few = house(6 * 3600, tags=4)
+    few = greenhouse(6 * 3600, tags=4)
     later = with_reading(few, 2, 6 * HOUR_NS + S, 20.0)
     assert found(later, 6.1, found(few, 6)).report.record.week == Tally(), "of so few tags none is"
 
 
 def test_readings_since_a_sensor_changed_are_left_out_and_not_graded() -> None:
-    before = found(house(29 * 3600), 29)
-    pasts = house(30 * 3600)
+    before = found(greenhouse(29 * 3600), 29)
+    pasts = greenhouse(30 * 3600)
     odd = pasts[2]
     since_ns = next(ns for ns, _ in odd.readings if ns > 26 * HOUR_NS)
     moved = tuple((ns, value + (6.0 if ns >= since_ns else 0.0)) for ns, value in odd.readings)
@@ -129,7 +129,7 @@ def test_readings_since_a_sensor_changed_are_left_out_and_not_graded() -> None:
 
 
 def test_a_changed_sensor_does_not_make_other_estimates_less_certain() -> None:
-    pasts = house(30 * 3600)
+    pasts = greenhouse(30 * 3600)
     odd, places = pasts[2], np.array([(2.0, 4.0), (1.0, 1.0)])
     broken = tuple((ns, -127.0 if ns > 26 * HOUR_NS else value) for ns, value in odd.readings)
     _, before = load(pasts, 30 * HOUR_NS, DAY_S)[1].points(places)
@@ -149,19 +149,19 @@ def test_with_too_few_readings_there_is_no_model_and_grades_stay() -> None:
 
 
 def test_a_failed_fit_leaves_earlier_results_and_says_why() -> None:
-    before = found(house(6 * 3600), 6)
+    before = found(greenhouse(6 * 3600), 6)
     crowd = [TagPast(str(n), n / 10.0, 0.0, ((6 * HOUR_NS, 20.0),)) for n in range(10_001)]
     known = found(crowd, 6, before)
     assert known.report.fit_problem.startswith("10001 tags have this sensor")
     assert (known.failed, known.loaded, known.report.tags) == (1, before.loaded, before.report.tags)
-    again = found(house(6 * 3600), 6, known)
+    again = found(greenhouse(6 * 3600), 6, known)
     assert (again.report.fit_problem, again.failed) == ("", 1)
 
 
 def test_cancelled_work_ends_between_two_steps() -> None:
     box = FieldRequest("temperature", 0.5, 0.0, 0.0, 4.0, 8.0)
     with pytest.raises(Abandoned):
-        estimate_at(EstimateRequest(box, 3 * HOUR_NS), house(3 * 3600), DAY_S, lambda: True)
+        estimate_at(EstimateRequest(box, 3 * HOUR_NS), greenhouse(3 * 3600), DAY_S, lambda: True)
 
 
 @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ def test_a_bad_query_is_refused_by_name(sensor_type: str, places: int, complaint
 
 
 def test_advice_is_for_free_floor_with_the_best_first() -> None:
-    loaded = found(house(24 * 3600, tags=5, every_s=2160), 24).loaded
+    loaded = found(greenhouse(24 * 3600, tags=5, every_s=2160), 24).loaded
     assert loaded is not None
     places = advice(loaded, None, 3)
     ratios = [place.error_ratio for place in places]

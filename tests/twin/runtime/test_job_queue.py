@@ -35,7 +35,7 @@ class Stage:
         self.begun: list[Future[int]] = []
         self.answers: list[Any] = []
 
-    def ask(self, make: Any = str, cost_s: float = 0.0) -> Future[int]:
+    def query(self, make: Any = str, cost_s: float = 0.0) -> Future[int]:
         search: Future[int] = Future()
 
         def look_up() -> Future[int]:
@@ -77,13 +77,13 @@ def test_a_failing_query_is_answered_and_delays_nobody(made: Stage) -> None:
 
 def test_a_cancelled_query_is_not_started_and_takes_no_place(made: Stage) -> None:
     are_there = True
-    first = made.ask(cost_s=LARGE_S)
+    first = made.query(cost_s=LARGE_S)
     for _ in range(MAX_QUERIES - 1):
         made.queue.ask(
             Query(pytest.fail, made.answers.append, str, LARGE_S, is_wanted=lambda: are_there)
         )
     are_there = False
-    after = made.ask(cost_s=LARGE_S)
+    after = made.query(cost_s=LARGE_S)
     first.set_result(1)
     assert made.delivered() == "1"
     after.set_result(2)
@@ -98,7 +98,7 @@ def test_an_answer_that_cannot_be_sent_delays_nobody(made: Stage) -> None:
     done: Future[int] = Future()
     done.set_result(1)
     made.queue.ask(Query(lambda: done, reply, str, LARGE_S))
-    after = made.ask(cost_s=LARGE_S)
+    after = made.query(cost_s=LARGE_S)
     wait_for(lambda: made.woken.acquire(blocking=False), "the owner to be woken")
     with pytest.raises(RuntimeError):
         made.queue.deliver()
@@ -109,8 +109,8 @@ def test_an_answer_that_cannot_be_sent_delays_nobody(made: Stage) -> None:
 def test_large_queries_run_one_at_a_time_and_small_ones_do_not_wait(
     made: Stage,
 ) -> None:
-    large = [made.ask(cost_s=LARGE_S) for _ in range(LARGE_AT_ONCE + 2)]
-    small = [made.ask(cost_s=SMALL_S) for _ in range(SMALL_AT_ONCE + 1)]
+    large = [made.query(cost_s=LARGE_S) for _ in range(LARGE_AT_ONCE + 2)]
+    small = [made.query(cost_s=SMALL_S) for _ in range(SMALL_AT_ONCE + 1)]
     assert made.begun == [*large[:LARGE_AT_ONCE], *small[:SMALL_AT_ONCE]]
     large[0].set_result(0)
     wait_for(lambda: made.woken.acquire(blocking=False), "the answer")
@@ -125,7 +125,7 @@ def test_large_queries_run_one_at_a_time_and_small_ones_do_not_wait(
 @pytest.mark.parametrize("cost_s", [SMALL_S, LARGE_S])
 def test_queries_wait_for_observations_except_one_a_second(made: Stage, cost_s: float) -> None:
     made.is_behind = True
-    requested = [made.ask(cost_s=cost_s) for _ in range(4)]
+    requested = [made.query(cost_s=cost_s) for _ in range(4)]
     assert made.begun == requested[:1]
     requested[0].set_result(0)
     assert made.delivered() == "0"
@@ -146,17 +146,17 @@ def test_queries_wait_for_observations_except_one_a_second(made: Stage, cost_s: 
 def test_the_number_of_waiting_queries_is_limited_and_one_more_has_to_retry(
     made: Stage, cost_s: float
 ) -> None:
-    searches = [made.ask(cost_s=cost_s) for _ in range(MAX_QUERIES)]
+    searches = [made.query(cost_s=cost_s) for _ in range(MAX_QUERIES)]
     with pytest.raises(NotRemembered, match=rf"{MAX_QUERIES} requests .* the limit") as refused:
-        made.ask(cost_s=cost_s)
+        made.query(cost_s=cost_s)
     assert isinstance(error_of(message_of(refused.value)), NotRemembered)
     searches[0].set_result(0)
     made.delivered()
-    made.ask(cost_s=cost_s)
+    made.query(cost_s=cost_s)
 
 
 def test_a_flood_of_large_queries_refuses_no_small_one(made: Stage) -> None:
     for _ in range(MAX_QUERIES):
-        made.ask(cost_s=LARGE_S)
-    made.ask().set_result(7)
+        made.query(cost_s=LARGE_S)
+    made.query().set_result(7)
     assert made.delivered() == "7"

@@ -14,7 +14,7 @@ from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
-from tests.support.journal import kept, recording, scan, select, wait_state
+from tests.support.journal import append, recording, scan, select, wait_state
 from tests.support.waiting import PATIENCE_S, wait_for
 
 # Counts for longer than any test waits.
@@ -66,7 +66,7 @@ def test_a_query_runs_while_another_process_writes(path: Path) -> None:
 
 
 def test_a_query_sees_one_moment(path: Path) -> None:
-    kept(path, [scan(at_ns=1)])
+    append(path, [scan(at_ns=1)])
 
     def twice(connection: sqlite3.Connection, should_stop: ShouldStop) -> tuple[int, int]:
         before = count(connection, should_stop)
@@ -81,7 +81,7 @@ def test_a_query_sees_one_moment(path: Path) -> None:
 
 
 def test_the_journal_of_another_twin_is_not_read(path: Path) -> None:
-    kept(path, [scan()])
+    append(path, [scan()])
     reported = Condition(JournalState.IN_USE, "the journal j is in use by /other", str(path))
     recall = Recall(lambda: reported)
     assert "in use by /other: ask that twin" in why_not(recall)
@@ -93,17 +93,17 @@ def test_a_missing_file_is_reported_and_found_when_it_appears(path: Path) -> Non
         assert f"{path} is not there" in why_not(recall)
         path.touch()
         assert f"{path} is not there" in why_not(recall)
-        kept(path, [scan()])
+        append(path, [scan()])
         assert answer(recall) == 1
 
 
 def test_a_replaced_file_is_read_from_then_on(path: Path) -> None:
-    kept(path, [scan()])
+    append(path, [scan()])
     with recalling(path) as recall:
         assert answer(recall) == 1
         path.rename(path.with_name("aside"))
         assert "is not there" in why_not(recall)
-        kept(path, [scan(at_ns=1), scan(at_ns=2)])
+        append(path, [scan(at_ns=1), scan(at_ns=2)])
         assert answer(recall) == 2
 
 
@@ -111,7 +111,7 @@ def test_a_replaced_file_is_read_from_then_on(path: Path) -> None:
 def test_a_damaged_file_is_reported_with_a_remedy_and_read_again_when_it_is_repaired(
     path: Path, where: int
 ) -> None:
-    kept(path, [scan(at_ns=number) for number in range(1, 200)])
+    append(path, [scan(at_ns=number) for number in range(1, 200)])
     whole = path.read_bytes()
     with recalling(path) as recall:
         path.write_bytes(whole[:where] + b"\xff" * (len(whole) - where))
@@ -121,7 +121,7 @@ def test_a_damaged_file_is_reported_with_a_remedy_and_read_again_when_it_is_repa
 
 
 def test_an_error_of_a_query_reaches_its_caller(path: Path) -> None:
-    kept(path, [scan()])
+    append(path, [scan()])
     with recalling(path) as recall:
         wrong = recall.query(lambda connection, _: connection.execute("SELECT x FROM scan"))
         with pytest.raises(sqlite3.OperationalError, match="no such column"):
@@ -130,7 +130,7 @@ def test_an_error_of_a_query_reaches_its_caller(path: Path) -> None:
 
 
 def test_a_cancelled_query_ends(path: Path) -> None:
-    kept(path, [scan()])
+    append(path, [scan()])
     with recalling(path) as recall:
         begun = threading.Event()
 
@@ -147,7 +147,7 @@ def test_a_cancelled_query_ends(path: Path) -> None:
 
 
 def test_a_query_that_takes_too_long_ends(path: Path) -> None:
-    kept(path, [scan()])
+    append(path, [scan()])
     with recalling(path, 0.05) as recall:
         future = recall.query(lambda connection, _: connection.execute(ENDLESS).fetchone())
         with pytest.raises(NotRemembered, match=r"not answer within 0\.05 s"):
@@ -155,7 +155,7 @@ def test_a_query_that_takes_too_long_ends(path: Path) -> None:
 
 
 def test_the_shutdown_ends_running_queries_and_leaves_nothing_open(path: Path) -> None:
-    kept(path, [scan()])
+    append(path, [scan()])
     with recalling(path) as recall:
         assert answer(recall) == 1
         running = recall.query(lambda connection, _: connection.execute(ENDLESS).fetchone())

@@ -17,7 +17,7 @@ from lupin_twin.journal.paths import journal_path, state_folder
 from lupin_twin.journal.runs import Clock
 from lupin_twin.runtime.memory import MAX_NEW_RUNS, Memory, open_journal
 from lupin_twin.runtime.workers import ShouldStop
-from tests.support.journal import is_whole, kept, scan, select
+from tests.support.journal import append, is_whole, scan, select
 from tests.support.waiting import wait_for
 
 S = 1_000_000_000
@@ -64,7 +64,7 @@ def test_a_file_that_replaces_the_journal_is_read_once_the_twin_has_opened_it(
 
     with twin(path, wall(0)) as (memory, _):
         for count in (1, 2, 3):
-            kept(other, [scan(at_ns=n + 1) for n in range(count)])
+            append(other, [scan(at_ns=n + 1) for n in range(count)])
             wait_for(lambda: memory.condition.inode, "the journal to be written")
             other.replace(path)
             wait_for(partial(is_read, count), "the new file")
@@ -84,13 +84,13 @@ def test_damage_found_by_a_reader_quarantines_the_file_while_the_twin_records(
 ) -> None:
     path = tmp_path / "j.sqlite"
     count = 5_000
-    kept(path, [scan(str(n % 30), NOW - (count - n) * S, t=n) for n in range(count)])
+    append(path, [scan(str(n % 30), NOW - (count - n) * S, t=n) for n in range(count)])
 
     def how_many(memory: Memory) -> int:
-        def ask(connection: sqlite3.Connection, _: ShouldStop) -> int:
+        def request(connection: sqlite3.Connection, _: ShouldStop) -> int:
             return len(connection.execute("SELECT readings FROM scan").fetchall())
 
-        return memory.recall.query(ask).result(30.0)
+        return memory.recall.query(request).result(30.0)
 
     with twin(path, wall(5)) as (memory, _):
         # Damage found earlier is handled by the check at the start.
@@ -121,11 +121,11 @@ def test_damage_found_by_a_reader_quarantines_the_file_while_the_twin_records(
 def test_the_restored_state_is_logged_in_one_line(tmp_path: Path) -> None:
     def reported(path: Path, *clocks: Clock, writes: Sequence[Write] = ()) -> list[str | None]:
         memory = Memory(TwinStore(), open_journal(path, "/twin", 1e4, 1e4))
-        said = [memory.follow(clock) for clock in clocks]
+        message = [memory.follow(clock) for clock in clocks]
         for write in writes:
             assert memory.apply(write, NOW) is None
         memory.close()
-        return said
+        return message
 
     path = tmp_path / "j.sqlite"
     nothing = f"journal {path}: nothing to restore"

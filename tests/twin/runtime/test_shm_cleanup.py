@@ -40,7 +40,7 @@ def test_stale_segments_are_removed_and_logged(
 def test_complete_new_foreign_and_other_files_stay(
     tmp_path: Path,
 ) -> None:
-    kept = [
+    stored = [
         leave(tmp_path, MADE),
         leave(tmp_path, BEING_MADE, PORT + 1, old_s=0.0),
         leave(tmp_path, BEING_MADE, 9_149),
@@ -49,13 +49,13 @@ def test_complete_new_foreign_and_other_files_stay(
         tmp_path / f"fastrtps_port{PORT + 3}",
         tmp_path / f"fastrtps_port{PORT + 4}",
     ]
-    kept[4].mkdir()
-    kept[5].symlink_to(kept[2])
-    os.mkfifo(kept[6])
+    stored[4].mkdir()
+    stored[5].symlink_to(stored[2])
+    os.mkfifo(stored[6])
     open_files = len(list(Path("/proc/self/fd").iterdir()))
     assert remove_stale_shared_memory(DOMAIN, tmp_path) == []
     assert len(list(Path("/proc/self/fd").iterdir())) == open_files
-    assert all(path.exists() for path in kept)
+    assert all(path.exists() for path in stored)
     assert remove_stale_shared_memory(DOMAIN, tmp_path / "none") == []
 
 

@@ -62,11 +62,11 @@ def test_the_process_ends_whatever_hangs_at_the_end() -> None:
         assert process.stdout is not None
         assert process.stdout.readline() == "blocked\n"
         process.send_signal(signal.SIGINT)
-    codes, said = {}, {}
+    codes, message = {}, {}
     for what, process in processes.items():
         with process:
-            _, said[what] = process.communicate(timeout=PATIENCE_S)
+            _, message[what] = process.communicate(timeout=PATIENCE_S)
             codes[what] = process.returncode
     assert codes == dict(zip(HANGS, (1, -signal.SIGALRM), strict=True))
     # The hanging place is logged while the interpreter still runs.
-    assert "Timeout (0:00:01)!" in said["a call that keeps the interpreter"]
+    assert "Timeout (0:00:01)!" in message["a call that keeps the interpreter"]

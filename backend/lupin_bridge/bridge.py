@@ -26,7 +26,7 @@ from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limit
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import FrameWriter, Liveness, Status, alarms_message
 from lupin_bridge.stream.hub import Client, Hub
-from lupin_bridge.stream.pollers import EstimateFollower, RobotFollower
+from lupin_bridge.stream.pollers import EstimatePoller, RobotPoller
 from lupin_bridge.viewers.foxglove import Offer
 from lupin_bridge.viewers.rosbridge_session import Writer
 from lupin_twin.core.diagnostics import Origin
@@ -92,7 +92,7 @@ class Bridge:
         self._judged = NOTHING_JUDGED
         self._states_unjudged = 0
         self._is_judge_failing = False
-        self._estimates = EstimateFollower(
+        self._estimates = EstimatePoller(
             source,
             lambda: None if self.latest is None else self.latest.snapshot,
             self._judge.note_changed,
@@ -106,7 +106,7 @@ class Bridge:
             limits.alarm_days,
             note_days=self._judge.note_days,
         )
-        self.robot = RobotFollower(source, self.hub, lambda: self.ros_time_ns, clock)
+        self.robot = RobotPoller(source, self.hub, lambda: self.ros_time_ns, clock)
         self._has_alarms = asyncio.Event()
         self.notes = NoteBoard(source, self._has_alarms.set)
         self.takes_observations = settings.http_observations == "on" and source.takes_observations

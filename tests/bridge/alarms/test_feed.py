@@ -150,7 +150,7 @@ async def test_what_is_written_is_read_also_where_the_state_stays_as_it_is() -> 
 async def test_what_is_older_than_what_is_kept_is_counted_and_told(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    defaults = alarm_fold.AlarmFolder.__init__.__kwdefaults__
+    defaults = alarm_fold.AlarmFold.__init__.__kwdefaults__
     assert defaults is not None
     monkeypatch.setitem(defaults, "kept", 8)
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lupin_bridge.alarms.board import board_of
 from lupin_bridge.judge import alarm_fold, tag_log
-from lupin_bridge.judge.alarm_fold import AlarmFolder
+from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.day import ClockDay, Day
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria, own_sensors
@@ -97,12 +97,12 @@ def follow(
     lots: Iterable[Sequence[PastWrite]], spans: Sequence[RunSpan], now_ns: int
 ) -> tuple[Alarm, ...]:
     """What a bridge does that is asked now and then."""
-    follower = AlarmFolder(BY, spans)
+    fold = AlarmFold(BY, spans)
     for lot in lots:
-        follower.take(lot)
-        follower.found(now_ns)
-    assert follower.missed == 0
-    return board_of(follower.found(now_ns).alarms).alarms
+        fold.take(lot)
+        fold.found(now_ns)
+    assert fold.missed == 0
+    return board_of(fold.found(now_ns).alarms).alarms
 
 
 @settings(max_examples=150)
@@ -143,52 +143,52 @@ def test_what_is_old_is_forgotten_and_changes_nothing_of_what_is_told(seed: int)
     spans, now_ns = chance.choice(SPANS), heard[-1].stamp_ns + chance.randint(0, 300) * MINUTE
     expected = alarms(heard, spans, now_ns, SENSORS, day_of)
     # What there is no room for is kept as what it led to.
-    follower = AlarmFolder(BY, spans, kept=chance.choice([3, 24, 300]))
+    fold = AlarmFold(BY, spans, kept=chance.choice([3, 24, 300]))
     since_ns = 0
     while heard:
         # Late, but not as late as that.
         count = min(len(heard), chance.randint(1, 9))
         lot, heard = heard[:count], heard[count:]
         chance.shuffle(lot)
-        follower.take(lot)
+        fold.take(lot)
         with patch.object(alarm_fold, "FORGET_EVERY_NS", 0):
-            follower.found(now_ns, since_ns)
+            fold.found(now_ns, since_ns)
         since_ns = max(since_ns, lot[0].stamp_ns - chance.randint(0, 60) * MINUTE)
         since_ns = min(since_ns, heard[0].stamp_ns) if heard else since_ns
-    page = board_of(follower.found(now_ns, since_ns).alarms, since_ns)
-    if follower.missed:
+    page = board_of(fold.found(now_ns, since_ns).alarms, since_ns)
+    if fold.missed:
         return
     expected = {one for one in expected if one.cleared_ns is None or one.cleared_ns >= since_ns}
     assert {plain(alarm) for alarm in page.alarms} == expected
 
 
 def test_what_is_older_than_what_is_kept_is_not_taken_in_and_counted() -> None:
-    follower, heard = AlarmFolder(BY, SPANS[0], kept=4), scans([22] * 9)
-    follower.take(heard[:5])
-    follower.take(heard[5:])
+    fold, heard = AlarmFold(BY, SPANS[0], kept=4), scans([22] * 9)
+    fold.take(heard[:5])
+    fold.take(heard[5:])
     late = [replace(one, number=90 + one.number, stamp_ns=one.stamp_ns + S) for one in heard]
-    follower.take(late[5:8])
-    assert follower.missed == 0
-    follower.take(late[3:4])
-    assert follower.missed == 1
+    fold.take(late[5:8])
+    assert fold.missed == 0
+    fold.take(late[3:4])
+    assert fold.missed == 1
     since_ns = START + 2 * alarm_fold.FORGET_EVERY_NS
-    follower.found(since_ns, since_ns)
-    follower.take([replace(heard[0], number=99, stamp_ns=since_ns - 1)])
-    assert follower.missed == 2
-    follower.take([replace(heard[0], number=100, stamp_ns=since_ns)])
-    assert follower.missed == 2
+    fold.found(since_ns, since_ns)
+    fold.take([replace(heard[0], number=99, stamp_ns=since_ns - 1)])
+    assert fold.missed == 2
+    fold.take([replace(heard[0], number=100, stamp_ns=since_ns)])
+    assert fold.missed == 2
 
 
 def test_nothing_grows_with_the_days() -> None:
     """A round a day, and a lamp that goes on and off: gaps, pauses and turns without end."""
-    follower = AlarmFolder(BY, SPANS[0])
+    fold = AlarmFold(BY, SPANS[0])
     for day in range(60):
         for at in (0, 1):
             light, number = (900.0, 0.0)[at], 2 * day + at
             stamp_ns = START + day * DAY_NS + at * MINUTE
-            follower.take([PastWrite(number, 1, "a", stamp_ns, SCAN, 0, ("light",), (light,))])
-        follower.found(stamp_ns, max(0, stamp_ns - 7 * DAY_NS))
-    (run,) = follower._runs.values()
+            fold.take([PastWrite(number, 1, "a", stamp_ns, SCAN, 0, ("light",), (light,))])
+        fold.found(stamp_ns, max(0, stamp_ns - 7 * DAY_NS))
+    (run,) = fold._runs.values()
     trail = run.tags["a"].trail
     assert (len(trail.gaps), len(trail.turns)) == (7, 15)
     assert len([*run.stretches.pauses()]) == 7
@@ -263,30 +263,30 @@ def test_whatever_a_verdict_can_be_of_becomes_an_alarm_but_what_the_estimate_say
 
 
 def test_it_says_when_it_will_be_another_by_itself() -> None:
-    follower = AlarmFolder(BY, SPANS[0])
+    fold = AlarmFold(BY, SPANS[0])
     heard = scans([22, 22])
-    follower.take(heard)
+    fold.take(heard)
     last_ns = heard[-1].stamp_ns
-    due_ns = follower.found(last_ns).due_ns
-    assert follower.found(due_ns - 1).alarms == ()
-    assert [one.reason.kind for one in follower.found(due_ns).alarms] == ["stopped"]
-    assert follower.found(due_ns).due_ns == FOREVER
+    due_ns = fold.found(last_ns).due_ns
+    assert fold.found(due_ns - 1).alarms == ()
+    assert [one.reason.kind for one in fold.found(due_ns).alarms] == ["stopped"]
+    assert fold.found(due_ns).due_ns == FOREVER
 
 
 def test_what_stays_as_it_is_is_the_very_same() -> None:
-    follower = AlarmFolder(BY, SPANS[0])
+    fold = AlarmFold(BY, SPANS[0])
     heard = scans([17, 17, 16, 22, 22])
-    follower.take(heard[:2])
+    fold.take(heard[:2])
     now_ns = heard[-1].stamp_ns
-    first = follower.found(now_ns).alarms
+    first = fold.found(now_ns).alarms
     assert [one.worst for one in first] == [17]
-    assert follower.found(now_ns).alarms is first
-    follower.take(heard[2:])
-    assert [one.worst for one in follower.found(now_ns).alarms] == [16]
+    assert fold.found(now_ns).alarms is first
+    fold.take(heard[2:])
+    assert [one.worst for one in fold.found(now_ns).alarms] == [16]
     # It was warm between the two.
     late = [replace(heard[0], number=90 + n, stamp_ns=START + n, values=(900, 22)) for n in (1, 2)]
-    follower.take(late)
-    assert first[0].id not in {one.id for one in follower.found(now_ns).alarms}
+    fold.take(late)
+    assert first[0].id not in {one.id for one in fold.found(now_ns).alarms}
 
 
 def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false() -> None:

@@ -11,7 +11,7 @@ from lupin_bridge.stream import pollers
 from lupin_bridge.stream.pollers import (
     MAX_SENSORS,
     Changed,
-    EstimateFollower,
+    EstimatePoller,
     changed_of,
     sensors_of,
 )
@@ -53,7 +53,7 @@ def test_changed_tags_are_told_by_tag_and_sensor() -> None:
 
 
 class Stage:
-    """What a follower asks, and tells."""
+    """What a poller asks, and tells."""
 
     def __init__(self) -> None:
         self.asked: list[str] = []
@@ -61,7 +61,7 @@ class Stage:
         self.snapshot: Snapshot | None = None
         self.answers: dict[str, Report] = {}
         stage: Any = self
-        self.follower = EstimateFollower(stage, lambda: self.snapshot, self.told.append)
+        self.poller = EstimatePoller(stage, lambda: self.snapshot, self.told.append)
 
     async def estimate_report(self, request: ReportRequest) -> Report:
         self.asked.append(request.sensor_type)
@@ -72,28 +72,28 @@ class Stage:
 
 async def test_what_has_changed_is_passed_on_as_it_is_now() -> None:
     stage = Stage()
-    await stage.follower.update()
+    await stage.poller.update()
     assert stage.asked == [], "there is no state yet"
     stage.snapshot = snapshot(co2=5, light=6)
     stage.answers = {"co2": report(9, {"co2": None}), "light": report(4, {})}
-    await stage.follower.update()
+    await stage.poller.update()
     assert stage.asked == ["co2", "light"]
     assert stage.told == [{}]
     stage.answers["co2"] = report(9, {"co2": 5})
     for _ in range(2):
-        await stage.follower.update()
+        await stage.poller.update()
         assert stage.told[-1] == {"co2": {"co2": 5}}
     stage.snapshot = snapshot(light=6)
-    await stage.follower.update()
+    await stage.poller.update()
     assert stage.told[-1] == {}, "no tag has that sensor any more"
 
 
 async def test_of_a_sensor_that_cannot_be_reported_just_now_the_last_report_stands() -> None:
     stage = Stage()
     stage.snapshot, stage.answers = snapshot(co2=5), {"co2": report(9, {"co2": 5})}
-    await stage.follower.update()
+    await stage.poller.update()
     stage.answers = {}
-    await stage.follower.update()
+    await stage.poller.update()
     assert stage.told[-1] == {"co2": {"co2": 5}}
 
 
@@ -102,7 +102,7 @@ def test_of_many_sensors_so_many_are_asked_after() -> None:
     names = [f"s{number:02}" for number in range(MAX_SENSORS + 1)]
     stage.snapshot = snapshot(**dict.fromkeys(names, 1))
     stage.answers = dict.fromkeys(names, report(9, {}))
-    asyncio.run(stage.follower.update())
+    asyncio.run(stage.poller.update())
     assert stage.asked == names[:-1]
 
 
@@ -110,8 +110,8 @@ async def test_what_cannot_be_answered_ends_nothing(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(pollers, "PERIOD_S", 0.0)
     stage = Stage()
     stage.snapshot = snapshot(co2=1)
-    stage.follower.start()
+    stage.poller.start()
     await until(lambda: len(stage.asked) > 1, "it to be asked again")
     stage.answers = {"co2": report(9, {"co2": 1})}
     await until(lambda: stage.told[-1], "the answer")
-    await stage.follower.stop()
+    await stage.poller.stop()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Final, TypeVar
@@ -167,6 +167,8 @@ class AlarmFeed:
         self._last_ns: int | None = None
         self._alarms: tuple[Alarm, ...] = ()
         self._newest_board, self._board_of = Board(), _NOTHING
+        # Errors since the last reading that succeeded.
+        self._logged: set[str] = set()
         self._again: asyncio.TimerHandle | None = None
         self._task: asyncio.Task[None] | None = None
 
@@ -246,28 +248,35 @@ class AlarmFeed:
 
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
-        why, answered_s = "", loop.time()
+        answered_s = loop.time()
         while True:
             await self._wake.wait()
             await asyncio.sleep(JOURNAL_S)
             self._wake.clear()
-            try:
-                await (self._take_received() if self._origin == "heard" else self._follow())
-            except Exception as error:  # nobody awaits this task: it goes on after any error
-                if not isinstance(error, (NotRemembered, PastRefused, TwinUnavailableError)):
-                    log.exception("the alarms stay unchanged, and are computed again")
-                    self._begin(self._origin)
-                elif str(error) != why:
-                    log.info("the alarms stay unchanged: %s", error)
-                why = str(error)
-                self._ask_again(RETRY_S)
-                try:
-                    await self._publish_silence(loop.time() - answered_s)
-                except Exception:  # as above
-                    log.exception("alarms are as they were, and are worked out anew")
+            if await self._guarded(
+                self._take_received() if self._origin == "heard" else self._follow()
+            ):
+                self._logged.clear()
+                answered_s = loop.time()
             else:
-                why, answered_s = "", loop.time()
+                self._ask_again(RETRY_S)
+                await self._guarded(self._publish_silence(loop.time() - answered_s))
             await asyncio.sleep(REST_S)
+
+    async def _guarded(self, work: Awaitable[None]) -> bool:
+        """Whether the work was done; each error is logged once, as nobody awaits this task."""
+        try:
+            await work
+        except Exception as error:
+            is_known = isinstance(error, (NotRemembered, PastRefused, TwinUnavailableError))
+            if not is_known:
+                self._begin(self._origin)
+            if repr(error) not in self._logged:
+                level = logging.INFO if is_known else logging.ERROR
+                log.log(level, "the alarms stay unchanged: %s", error, exc_info=not is_known)
+            self._logged.add(repr(error))
+            return False
+        return True
 
     def _ask_again(self, wait_s: float) -> None:
         if self._again is not None:

@@ -36,6 +36,7 @@ class Journal:
         self.writes_now: list[PastWrite] = []
         self.name, self.asked = "a", 0
         self.is_removed = False
+        self.fault: Exception | None = None
         self.written = 0
 
     def journal(self) -> Condition:
@@ -45,6 +46,8 @@ class Journal:
     async def writes(self, request: WritesRequest) -> PastWrites:
         """The next of them."""
         self.asked += 1
+        if self.fault is not None:
+            raise self.fault
         if self.is_removed:
             raise TwinUnavailableError("no twin offers /twin/get_writes")
         found = [write for write in self.writes_now if write.number > request.after]
@@ -117,17 +120,22 @@ async def test_it_reads_the_past_once_then_what_is_new_and_another_journal_from_
         assert [alarm.worst for alarm in board.now.alarms] == [4.0]
 
 
-async def test_an_error_over_a_silence_does_not_end_the_alarms() -> None:
+async def test_errors_that_stay_are_logged_once_and_do_not_end_the_alarms(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     async with following() as (feed, board, source):
 
-        def fail_once(_: Change) -> None:
-            board.on_change = lambda _: None
-            raise RuntimeError("a fault of a test")
+        def fail(_: Change) -> None:
+            raise ZeroDivisionError("over a silence")
 
-        board.on_change, source.is_removed = fail_once, True
-        feed.on_silence(is_silent=True, last_ns=NOW)
-        await changed(board)
-        source.is_removed, source.writes_now = False, [pest(1, 4)]
+        board.on_change, source.fault = fail, RuntimeError("in the journal")
+        for number in range(1, 4):
+            feed.on_silence(is_silent=number % 2 > 0, last_ns=NOW - number)
+            await until(lambda n=number: board.now.number == n, "the silence")  # type: ignore[misc]
+        logged = [record.getMessage() for record in caplog.records]
+        assert [text.partition(": ")[2] for text in logged] == ["in the journal", "over a silence"]
+        board.on_change, source.fault = lambda _: None, None
+        source.writes_now = [pest(1, 4)]
         feed.on_state(told(1))
         await changed(board)
         assert len(board.now.active) == 2

@@ -124,13 +124,17 @@ class People:
         known = Person(name, "viewer") if found is None else found[0]
         return replace(known, by="proxy")
 
-    def still(self, person: Person) -> bool:
-        """Whether a session or token is still as it was when its connection began.
+    def may_stay(self, person: Person | None) -> bool:
+        """Whether a connection may stay: its session or token is as it was when it began.
+
+        None: it needed no credentials then.
 
         Raises:
             AccountError: the file cannot be read.
 
         """
+        if person is None:
+            return not self.is_on
         if person.by == "shared token":
             return self.shared is not None and self.shared.still(person, time.time())
         if person.by == "proxy":

@@ -195,9 +195,9 @@ def test_whom_a_proxy_names_is_asked_after_again(path: Path) -> None:
     people = People(path, is_proxied=True)
     anna = people.by_proxy("anna")
     assert anna is not None
-    assert people.still(anna)
+    assert people.may_stay(anna)
     remove(path, "anna")
-    assert not people.still(anna)
+    assert not people.may_stay(anna)
 
 
 def test_notified_are_devices_of_who_may_read_the_site(path: Path) -> None:

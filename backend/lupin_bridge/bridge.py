@@ -30,7 +30,7 @@ from lupin_bridge.stream.pollers import EstimatePoller, RobotPoller
 from lupin_bridge.viewers.foxglove import Offer
 from lupin_bridge.viewers.rosbridge_session import Writer
 from lupin_twin.core.diagnostics import Origin
-from lupin_twin.core.drops import LATE, LOST, Reason
+from lupin_twin.core.drops import Reason
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 
 log = logging.getLogger(__name__)
@@ -264,7 +264,7 @@ class Bridge:
             ("lupin_web_dropped", None if latest is None else latest.own_counts),
         ):
             if counts is not None:
-                yield name, {str(why): counts.dropped.get(why, 0) for why in (*Reason, LOST, LATE)}
+                yield name, {str(why): counts.dropped.get(why, 0) for why in Reason}
         if journal.state == "unknown":  # absent, not zero
             return
         yield "lupin_journal_recording", journal.state == "recording"

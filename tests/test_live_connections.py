@@ -92,8 +92,8 @@ def test_a_refusal_says_why(plain: Served) -> None:
     said = {
         "this is no request for a WebSocket: ": asked(b"Cookie: " + b"x" * 9_000),
         "the request has a body (content-length: 1), and none": asked(b"Content-Length: 1"),
-        "the request has more headers than the limit of 128": asked(*[b"a:"] * 128),
-        "the request's head is longer than 32768 bytes": asked(b"a: " + b"x" * 40_000),
+        "the request's head has more than 128 headers, the limit": asked(*[b"a:"] * 128),
+        "the request's head has more than 32768 bytes, the limit": asked(b"a: " + b"x" * 40_000),
     }
     for why, request in said.items():
         body = raw_http.answer(plain.url, request).partition(b"\r\n\r\n")[2]

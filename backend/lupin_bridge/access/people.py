@@ -258,7 +258,7 @@ class People:
         try:
             inode = self._path.stat().st_ino
         except OSError as error:
-            raise AccountError(f"the file of accounts {self._path}: {error.strerror}") from error
+            raise AccountError(f"the file of accounts cannot be read: {error}") from error
         if self._accounts is None or inode != self._inode:
             found = Accounts(self._path)
             if self._accounts is not None:

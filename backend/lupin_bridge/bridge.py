@@ -16,7 +16,7 @@ from typing import Final
 from lupin_bridge.alarms.board import AlarmBoard, Change, NoteBoard
 from lupin_bridge.alarms.feed import AlarmFeed, learn_recent
 from lupin_bridge.feed.source import TwinSource, TwinUpdate
-from lupin_bridge.feed.tasks import Periodic, Shared, end
+from lupin_bridge.feed.tasks import Guard, Periodic, Shared, end
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Criteria, Judge, Judged, silenced, unjudged
 from lupin_bridge.metrics import Metrics, Sample, route_class
 from lupin_bridge.notify.channels import Channels
@@ -347,23 +347,24 @@ class Bridge:
 
     async def _publish_alarms(self) -> None:
         """Send the alarms after each change; a worker writes the frame, which may hold 1,000."""
+        guard = Guard("the newest alarms could not be sent")
         while True:
             await self._has_alarms.wait()
             self._has_alarms.clear()
-            write = self._alarms_writer()
-            try:
-                wire = await asyncio.wrap_future(self.source.workers.submit(write, ALARMS_S))
-                self.hub.publish_alarms(wire, self._clock())
-            except Exception:  # nobody awaits this task: it goes on with the next change
-                log.exception("the newest alarms could not be sent")
-                continue
-            # If many alarms change all the time, send no more than a browser can take.
-            await asyncio.sleep(max(ALARMS_REST_S, len(wire) / ALARM_BYTES_PER_S))
+            size = await guard.run(self._send_alarms())
+            if isinstance(size, int):
+                # If many alarms change all the time, send no more than a browser can take.
+                await asyncio.sleep(max(ALARMS_REST_S, size / ALARM_BYTES_PER_S))
 
-    def _alarms_writer(self) -> Callable[[object], bytes]:
+    async def _send_alarms(self) -> int:
+        """Send the alarms; returns the size of the frame, bytes."""
         board, now_ns, notes = self.alarms.now, self.ros_time_ns, self.notes.notes or ()
         count = self.notes.count
-        return lambda _: alarms_message(board, now_ns, notes, count)
+        wire = await asyncio.wrap_future(
+            self.workers.submit(lambda _: alarms_message(board, now_ns, notes, count), ALARMS_S)
+        )
+        self.hub.publish_alarms(wire, self._clock())
+        return len(wire)
 
     def _on_death(self) -> None:
         self.liveness.thread_dead = True

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Final, TypeVar
@@ -23,7 +23,7 @@ from lupin_bridge.alarms.board import (
 )
 from lupin_bridge.feed.query import as_found
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
-from lupin_bridge.feed.tasks import end
+from lupin_bridge.feed.tasks import Guard, end
 from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, AlarmFold, Found
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge
@@ -118,6 +118,7 @@ _NOT_RECORDED: Final = frozenset({JournalState.FAILING, JournalState.IN_USE, Jou
 _FIRST_RECEIVED: Final = 2**62
 _ALL_TIME: Final = (RunSpan(RUN, 0, FOREVER_NS),)
 _SILENCES: Final = 100
+_UNREADABLE: Final = (NotRemembered, PastRefused, TwinUnavailableError)
 
 # What a board is made of: alarms of the log, silences, and since when cleared alarms are kept.
 _NOTHING: Final[tuple[tuple[Alarm, ...], tuple[Alarm, ...], int]] = ((), (), 0)
@@ -167,8 +168,6 @@ class AlarmFeed:
         self._last_ns: int | None = None
         self._alarms: tuple[Alarm, ...] = ()
         self._newest_board, self._board_of = Board(), _NOTHING
-        # Errors since the last reading that succeeded.
-        self._logged: set[str] = set()
         self._again: asyncio.TimerHandle | None = None
         self._task: asyncio.Task[None] | None = None
 
@@ -249,34 +248,20 @@ class AlarmFeed:
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
         answered_s = loop.time()
+        reading, publishing = (Guard("the alarms stay unchanged", *_UNREADABLE) for _ in range(2))
         while True:
             await self._wake.wait()
             await asyncio.sleep(JOURNAL_S)
             self._wake.clear()
-            if await self._guarded(
-                self._take_received() if self._origin == "heard" else self._follow()
-            ):
-                self._logged.clear()
+            read = self._take_received() if self._origin == "heard" else self._follow()
+            if (error := await reading.run(read)) is None:
                 answered_s = loop.time()
             else:
+                if not isinstance(error, _UNREADABLE):
+                    self._begin(self._origin)
                 self._ask_again(RETRY_S)
-                await self._guarded(self._publish_silence(loop.time() - answered_s))
+                await publishing.run(self._publish_silence(loop.time() - answered_s))
             await asyncio.sleep(REST_S)
-
-    async def _guarded(self, work: Awaitable[None]) -> bool:
-        """Whether the work was done; each error is logged once, as nobody awaits this task."""
-        try:
-            await work
-        except Exception as error:
-            is_known = isinstance(error, (NotRemembered, PastRefused, TwinUnavailableError))
-            if not is_known:
-                self._begin(self._origin)
-            if repr(error) not in self._logged:
-                level = logging.INFO if is_known else logging.ERROR
-                log.log(level, "the alarms stay unchanged: %s", error, exc_info=not is_known)
-            self._logged.add(repr(error))
-            return False
-        return True
 
     def _ask_again(self, wait_s: float) -> None:
         if self._again is not None:

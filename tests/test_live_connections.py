@@ -95,8 +95,10 @@ def test_a_refusal_has_its_reason(plain: Served) -> None:
     message = {
         "this is no request for a WebSocket: ": requested(b"Cookie: " + b"x" * 9_000),
         "the request has a body (content-length: 1), and none": requested(b"Content-Length: 1"),
-        "the request has more headers than the limit of 128": requested(*[b"a:"] * 128),
-        "the request's head is longer than 32768 bytes": requested(b"a: " + b"x" * 40_000),
+        "the request's head has more than 128 headers, the limit": requested(*[b"a:"] * 128),
+        "the request's head has more than 32768 bytes, the limit": requested(
+            b"a: " + b"x" * 40_000
+        ),
     }
     for why, request in message.items():
         body = raw_http.answer(plain.url, request).partition(b"\r\n\r\n")[2]

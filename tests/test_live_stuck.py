@@ -203,7 +203,7 @@ def test_a_flood_ends_its_sender_alone(server: Server, healthy: Listener, frame:
             reads.until("never", lambda _: False)
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 1008
-        assert closed.value.rcvd.reason == "more than 100 messages a second after 500 at once"
+        assert closed.value.rcvd.reason == "sent more than 100 messages a second after 500 at once"
         wait_reading(healthy, lambda: is_over(deaf), "the end of the one that does not read")
 
 

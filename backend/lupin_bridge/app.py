@@ -73,9 +73,9 @@ def create_app(
     app.add_middleware(PieceByPiece)
     app.add_middleware(ReadOnly)
     app.add_middleware(AccessControl, access=access)
-    app.add_middleware(BehindProxies, proxies=proxies or Proxies())
     if bridge is not None:
         app.add_middleware(Metered, note=bridge.note_answer)
+    app.add_middleware(BehindProxies, proxies=proxies or Proxies())
     app.add_exception_handler(404, _not_found)
     add_refusals(app)
     pages.add_guide(app, guide_folder)

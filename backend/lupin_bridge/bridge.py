@@ -16,7 +16,7 @@ from typing import Final
 from lupin_bridge.alarms.board import AlarmBoard, Change, NoteBoard
 from lupin_bridge.alarms.feed import AlarmFeed, learn_recent
 from lupin_bridge.feed.source import TwinSource, TwinUpdate
-from lupin_bridge.feed.tasks import Periodic, Shared, end
+from lupin_bridge.feed.tasks import Guard, Periodic, Shared, end
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Criteria, Judge, Judged, silenced, unjudged
 from lupin_bridge.metrics import Metrics, Sample, route_class
 from lupin_bridge.notify.channels import Channels
@@ -26,11 +26,11 @@ from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limit
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import FrameWriter, Liveness, Status, alarms_message
 from lupin_bridge.stream.hub import Client, Hub
-from lupin_bridge.stream.pollers import EstimateFollower, RobotFollower
+from lupin_bridge.stream.pollers import EstimatePoller, RobotPoller
 from lupin_bridge.viewers.foxglove import Offer
 from lupin_bridge.viewers.rosbridge_session import Writer
 from lupin_twin.core.diagnostics import Origin
-from lupin_twin.core.drops import LATE, LOST, Reason
+from lupin_twin.core.drops import Reason
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 
 log = logging.getLogger(__name__)
@@ -92,7 +92,7 @@ class Bridge:
         self._judged = NOTHING_JUDGED
         self._states_unjudged = 0
         self._is_judge_failing = False
-        self._estimates = EstimateFollower(
+        self._estimates = EstimatePoller(
             source,
             lambda: None if self.latest is None else self.latest.snapshot,
             self._judge.note_changed,
@@ -106,7 +106,7 @@ class Bridge:
             limits.alarm_days,
             note_days=self._judge.note_days,
         )
-        self.robot = RobotFollower(source, self.hub, lambda: self.ros_time_ns, clock)
+        self.robot = RobotPoller(source, self.hub, lambda: self.ros_time_ns, clock)
         self._has_alarms = asyncio.Event()
         self.notes = NoteBoard(source, self._has_alarms.set)
         self.takes_observations = settings.http_observations == "on" and source.takes_observations
@@ -264,7 +264,7 @@ class Bridge:
             ("lupin_web_dropped", None if latest is None else latest.own_counts),
         ):
             if counts is not None:
-                yield name, {str(why): counts.dropped.get(why, 0) for why in (*Reason, LOST, LATE)}
+                yield name, {str(why): counts.dropped.get(why, 0) for why in Reason}
         if journal.state == "unknown":  # absent, not zero
             return
         yield "lupin_journal_recording", journal.state == "recording"
@@ -347,23 +347,24 @@ class Bridge:
 
     async def _publish_alarms(self) -> None:
         """Send the alarms after each change; a worker writes the frame, which may hold 1,000."""
+        guard = Guard("the newest alarms could not be sent")
         while True:
             await self._has_alarms.wait()
             self._has_alarms.clear()
-            write = self._alarms_writer()
-            try:
-                wire = await asyncio.wrap_future(self.source.workers.submit(write, ALARMS_S))
-                self.hub.publish_alarms(wire, self._clock())
-            except Exception:  # nobody awaits this task: it goes on with the next change
-                log.exception("the newest alarms could not be sent")
-                continue
-            # If many alarms change all the time, send no more than a browser can take.
-            await asyncio.sleep(max(ALARMS_REST_S, len(wire) / ALARM_BYTES_PER_S))
+            size = await guard.run(self._send_alarms())
+            if isinstance(size, int):
+                # If many alarms change all the time, send no more than a browser can take.
+                await asyncio.sleep(max(ALARMS_REST_S, size / ALARM_BYTES_PER_S))
 
-    def _alarms_writer(self) -> Callable[[object], bytes]:
+    async def _send_alarms(self) -> int:
+        """Send the alarms; returns the size of the frame, bytes."""
         board, now_ns, notes = self.alarms.now, self.ros_time_ns, self.notes.notes or ()
         count = self.notes.count
-        return lambda _: alarms_message(board, now_ns, notes, count)
+        wire = await asyncio.wrap_future(
+            self.workers.submit(lambda _: alarms_message(board, now_ns, notes, count), ALARMS_S)
+        )
+        self.hub.publish_alarms(wire, self._clock())
+        return len(wire)
 
     def _on_death(self) -> None:
         self.liveness.thread_dead = True

@@ -168,7 +168,7 @@ def route_class(path: str) -> str:
 
 
 class Metered:
-    """The outermost ASGI middleware: notes each HTTP answer as it begins, refusals included."""
+    """ASGI middleware around access control: notes each HTTP answer as it begins, and refusals."""
 
     def __init__(self, app: ASGIApp, note: Note) -> None:
         self._app = app
@@ -180,7 +180,7 @@ class Metered:
             await self._app(scope, receive, send)
             return
         began_s = time.monotonic()
-        path: str = scope["path"]
+        path: str = scope["path"][len(scope.get("root_path", "")) :]
 
         async def send_and_note(message: Message) -> None:
             if message["type"] == "http.response.start":

@@ -17,7 +17,7 @@ from random import Random
 from lupin_bridge.alarms.board import AlarmBoard, board_of, change_between
 from lupin_bridge.alarms.feed import LOT, REACH_COUNT
 from lupin_bridge.feed.source import TwinUpdate
-from lupin_bridge.judge.alarm_fold import AlarmFolder
+from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.judging import Judge, own_sensors
 from lupin_bridge.notify.messages import GreenhouseState, Topics
 from lupin_bridge.notify.mqtt import Mirror
@@ -64,15 +64,15 @@ def ms_since(start: float) -> float:
 def alarms_of(tags: int) -> None:
     received = list(past_of(tags))
     before_mb = resident_mb(os.getpid())
-    follower = AlarmFolder(BY_LIGHT, SPANS)
+    fold = AlarmFold(BY_LIGHT, SPANS)
     lots = []
     for first in range(0, len(received), LOT):
         start = time.thread_time()
-        follower.take(received[first : first + LOT])
+        fold.take(received[first : first + LOT])
         lots.append(ms_since(start))
     now_ns = received[-1].stamp_ns
     start = time.thread_time()
-    found = follower.found(now_ns)
+    found = fold.found(now_ns)
     row(tags, f"start: {len(received):,} scans", sum(lots) + ms_since(start), max(lots))
     row(tags, f"start: all {len(found.alarms):,} alarms told", ms_since(start))
     took_mb = resident_mb(os.getpid()) - before_mb
@@ -82,8 +82,8 @@ def alarms_of(tags: int) -> None:
         now_ns += S
         one = write(len(received) + change + 1, str(change), now_ns, [*MIDDLE.values()])
         start = time.thread_time()
-        follower.take([one])
-        follower.found(now_ns)
+        fold.take([one])
+        fold.found(now_ns)
         took.append(ms_since(start))
     row(tags, "alarms: one scan", statistics.median(took), max(took))
     took = []
@@ -91,8 +91,8 @@ def alarms_of(tags: int) -> None:
         late_ns = received[-1].stamp_ns - (change + 1) * (received[-1].stamp_ns // 100)
         one = write(2 * len(received) + change, str(change), late_ns, [*MIDDLE.values()])
         start = time.thread_time()
-        follower.take([one])
-        follower.found(now_ns)
+        fold.take([one])
+        fold.found(now_ns)
         took.append(ms_since(start))
     row(tags, "alarms: one scan, hours to days late", statistics.median(took), max(took))
 
@@ -155,9 +155,9 @@ def row(tags: int, name: str, took_ms: float, most_ms: float | None = None) -> N
 
 def ordinary() -> None:
     received = ordinary_days()
-    follower = AlarmFolder(BY_LIGHT, SPANS)
-    follower.take(received)
-    raised = follower.found(received[-1].stamp_ns).alarms
+    fold = AlarmFold(BY_LIGHT, SPANS)
+    fold.take(received)
+    raised = fold.found(received[-1].stamp_ns).alarms
     spells = (received[-1].stamp_ns - received[0].stamp_ns) / (600 * S)
     kinds = Counter(alarm.reason.kind.value for alarm in raised)
     reported = ", ".join(f"{kind} {count}" for kind, count in kinds.most_common())

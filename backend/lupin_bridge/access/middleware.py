@@ -25,7 +25,6 @@ from websockets.frames import CloseCode
 
 from lupin_bridge.access.accounts import accounts_path
 from lupin_bridge.access.credentials import (
-    SHARED,
     WRITER,
     AccountError,
     CookieTooLong,
@@ -271,7 +270,7 @@ class AccessControl:
         if person is not None:
             scope["state"] = {**scope.get("state", {}), PERSON_KEY: person}
         people = self._access.people
-        if people is None or person == SHARED or scope["type"] == "http":
+        if people is None or scope["type"] == "http":
             await self._app(scope, receive, send)
             return
         connection: Connection = scope["state"][CONNECTION_KEY]
@@ -402,7 +401,7 @@ def _with_cors(send: Send, foreign: str | None) -> Send:
 async def _end_with(people: People, person: Person | None, connection: Connection) -> None:
     """Close the connection when the session ends; without a person, at the first account."""
     try:
-        while not people.is_on if person is None else people.still(person):
+        while people.may_stay(person):
             await asyncio.sleep(_POLL_S)
     except AccountError as error:
         log.warning("%s: the open connections of %s are closed", error, person and person.name)

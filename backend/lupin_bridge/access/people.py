@@ -124,13 +124,17 @@ class People:
         known = Person(name, "viewer") if found is None else found[0]
         return replace(known, by="proxy")
 
-    def still(self, person: Person) -> bool:
-        """Whether a session or token is still as it was when its connection began.
+    def may_stay(self, person: Person | None) -> bool:
+        """Whether a connection may stay: its session or token is as it was when it began.
+
+        None: it needed no credentials then.
 
         Raises:
             AccountError: the file cannot be read.
 
         """
+        if person is None:
+            return not self.is_on
         if person.by == "shared token":
             return self.shared is not None and self.shared.still(person, time.time())
         if person.by == "proxy":
@@ -254,7 +258,7 @@ class People:
         try:
             inode = self._path.stat().st_ino
         except OSError as error:
-            raise AccountError(f"the file of accounts {self._path}: {error.strerror}") from error
+            raise AccountError(f"the file of accounts cannot be read: {error}") from error
         if self._accounts is None or inode != self._inode:
             found = Accounts(self._path)
             if self._accounts is not None:

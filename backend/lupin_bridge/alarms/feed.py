@@ -23,8 +23,8 @@ from lupin_bridge.alarms.board import (
 )
 from lupin_bridge.feed.query import as_found
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
-from lupin_bridge.feed.tasks import end
-from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, AlarmFolder, Found
+from lupin_bridge.feed.tasks import Guard, end
+from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, AlarmFold, Found
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge
 from lupin_twin.core.diagnostics import JournalState
@@ -118,6 +118,7 @@ _NOT_RECORDED: Final = frozenset({JournalState.FAILING, JournalState.IN_USE, Jou
 _FIRST_RECEIVED: Final = 2**62
 _ALL_TIME: Final = (RunSpan(RUN, 0, FOREVER_NS),)
 _SILENCES: Final = 100
+_UNREADABLE: Final = (NotRemembered, PastRefused, TwinUnavailableError)
 
 # What a board is made of: alarms of the log, silences, and since when cleared alarms are kept.
 _NOTHING: Final[tuple[tuple[Alarm, ...], tuple[Alarm, ...], int]] = ((), (), 0)
@@ -149,7 +150,7 @@ class AlarmFeed:
         self._note_days = note_days
         self._reach_ns = int(days * DAY_NS)
         self._wake = asyncio.Event()
-        self._follower: AlarmFolder | None = None
+        self._fold: AlarmFold | None = None
         self._journal = ""
         self._last = 0
         self._written = 0
@@ -240,33 +241,26 @@ class AlarmFeed:
         """Forget all that was read, to read it again."""
         self._generation += 1
         self._origin = says
-        self._follower, self._last, self._journal = None, 0, ""
+        self._fold, self._last, self._journal = None, 0, ""
         self._received, self._seen = [], None
         self._since_ns, self._is_caught_up = None, False
 
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
-        why, answered_s = "", loop.time()
+        answered_s = loop.time()
+        reading, publishing = (Guard("the alarms stay unchanged", *_UNREADABLE) for _ in range(2))
         while True:
             await self._wake.wait()
             await asyncio.sleep(JOURNAL_S)
             self._wake.clear()
-            try:
-                await (self._take_received() if self._origin == "heard" else self._follow())
-            except Exception as error:  # nobody awaits this task: it goes on after any error
-                if not isinstance(error, (NotRemembered, PastRefused, TwinUnavailableError)):
-                    log.exception("the alarms stay unchanged, and are computed again")
-                    self._begin(self._origin)
-                elif str(error) != why:
-                    log.info("the alarms stay unchanged: %s", error)
-                why = str(error)
-                self._ask_again(RETRY_S)
-                try:
-                    await self._publish_silence(loop.time() - answered_s)
-                except Exception:  # as above
-                    log.exception("alarms are as they were, and are worked out anew")
+            read = self._take_received() if self._origin == "heard" else self._follow()
+            if (error := await reading.run(read)) is None:
+                answered_s = loop.time()
             else:
-                why, answered_s = "", loop.time()
+                if not isinstance(error, _UNREADABLE):
+                    self._begin(self._origin)
+                self._ask_again(RETRY_S)
+                await publishing.run(self._publish_silence(loop.time() - answered_s))
             await asyncio.sleep(REST_S)
 
     def _ask_again(self, wait_s: float) -> None:
@@ -276,8 +270,8 @@ class AlarmFeed:
 
     async def _take_received(self) -> None:
         lot, self._received = self._received, []
-        if self._follower is None:
-            self._follower = AlarmFolder(self._criteria, _ALL_TIME)
+        if self._fold is None:
+            self._fold = AlarmFold(self._criteria, _ALL_TIME)
         for first in range(0, len(lot), LOT):
             await self._take(lot[first : first + LOT])
         await self._publish()
@@ -293,8 +287,8 @@ class AlarmFeed:
             if self._is_another(past):
                 self._begin("journal")
                 continue
-            if self._follower is None:
-                self._follower = AlarmFolder(self._criteria, past.spans)
+            if self._fold is None:
+                self._fold = AlarmFold(self._criteria, past.spans)
             self._journal, self._last = past.journal, past.last
             await self._take(past.writes)
             if generation != self._generation:
@@ -307,35 +301,35 @@ class AlarmFeed:
 
     def _is_another(self, past: PastWrites) -> bool:
         """Whether it is another journal than the one read so far, or the clock began a new run."""
-        is_other_axis = self._follower is not None and self._follower.spans != past.spans
+        is_other_axis = self._fold is not None and self._fold.spans != past.spans
         is_other = bool(self._journal) and past.journal != self._journal
         return is_other or past.last < self._last or is_other_axis
 
     async def _take(self, lot: Sequence[PastWrite]) -> None:
-        follower = self._follower
-        if follower is None or not lot:
+        fold = self._fold
+        if fold is None or not lot:
             return
         oldest_ns = min(write.stamp_ns for write in lot)
         if self._since_ns is None or oldest_ns < self._since_ns:
             self._since_ns = oldest_ns
-        missed = self.missed - follower.missed
-        await self._on_worker(lambda _: follower.take(lot))
-        if follower.missed and not self.missed:
+        missed = self.missed - fold.missed
+        await self._on_worker(lambda _: fold.take(lot))
+        if fold.missed and not self.missed:
             log.warning(
                 "an observation arrived too late for its alarms; lupin_alarms_missed counts these"
             )
-        self.missed = missed + follower.missed
+        self.missed = missed + fold.missed
 
     async def _publish(self) -> None:
-        follower, now_ns = self._follower, self._now_ns()
-        if follower is None or now_ns is None:
+        fold, now_ns = self._fold, self._now_ns()
+        if fold is None or now_ns is None:
             await self._publish_silence(0.0)
             return
         moment_ns, since_ns = now_ns, max(0, now_ns - self._reach_ns)
         beside = tuple(self._silences)
 
         def find(_: object) -> tuple[Board, Change, Found]:
-            found = follower.found(moment_ns, since_ns)
+            found = fold.found(moment_ns, since_ns)
             self._alarms = found.alarms
             return *self._newest(beside, since_ns), found
 

@@ -241,8 +241,8 @@ def _position(topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Position | 
     assert topic.how is not None
     at = POSES[topic.how[0]](message)
     x, y, turned = at.position.x, at.position.y, at.orientation
-    if not _is_near(x, y):
-        return Drop(Reason.POSE, f"its position is ({x:g}, {y:g}) m")
+    if (far := _far("its position", x, y)) is not None:
+        return far
     length = math.hypot(turned.x, turned.y, turned.z, turned.w)
     has_heading = 0.5 < length < 2.0  # all zeros: none was given; false for NaN too
     return Position(x, y, convert.yaw(turned) if has_heading else None, stamp_ns)
@@ -251,8 +251,8 @@ def _position(topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Position | 
 def _plan(_topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Plan | Drop:
     points = message.points
     for x, y in points:
-        if not _is_near(x, y):
-            return Drop(Reason.POSE, f"a position of it is ({x:g}, {y:g}) m")
+        if (far := _far("a position of it", x, y)) is not None:
+            return far
     steps = -(-(len(points) - 1) // (SHOWN_POINTS - 1)) if len(points) > 1 else 1
     shown = points[:-1:steps] + points[-1:]
     return Plan(tuple(shown), stamp_ns)
@@ -269,8 +269,10 @@ def _battery(_topic: _ReceivedTopic, message: Any, stamp_ns: int) -> Battery | D
     return Battery(100.0 * share, stamp_ns)
 
 
-def _is_near(x: float, y: float) -> bool:
-    return abs(x) < FARTHEST_M and abs(y) < FARTHEST_M  # false for NaN
+def _far(what: str, x: float, y: float) -> Drop | None:
+    if abs(x) < FARTHEST_M and abs(y) < FARTHEST_M:  # false for NaN
+        return None
+    return Drop(Reason.POSE, f"{what} is ({x:g}, {y:g}) m, the limit is {FARTHEST_M:g} m")
 
 
 # --- the source -----------------------------------------------------------------------------------

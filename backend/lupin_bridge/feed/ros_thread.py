@@ -92,7 +92,7 @@ class RosThread(Generic[NodeT, EventT]):
         self._newest: EventT | None = None
         # Calls whose answer has not come yet.
         self.calls_waiting = 0
-        # Failed when the thread is stopped: nothing else would end them.
+        # Failed when the thread ends: nothing else would end them.
         self._unanswered: set[asyncio.Future[Any]] = set()
         # Errors met by the node's callbacks, as of the last heartbeat.
         self.callback_errors = 0
@@ -134,8 +134,7 @@ class RosThread(Generic[NodeT, EventT]):
             self._is_joining = False
         if self._thread.is_alive():
             log.warning("the ROS thread did not end within %s s: left running", STOP_TIMEOUT_S)
-        for result in self._unanswered:
-            _settle(result, None, TwinUnavailableError(_NOT_RUNNING))
+        self._refuse_unanswered()
 
     @property
     def is_alive(self) -> bool:
@@ -226,6 +225,10 @@ class RosThread(Generic[NodeT, EventT]):
                 self._executor.create_task(end)
             raise
 
+    def _refuse_unanswered(self) -> None:
+        for result in self._unanswered:
+            _settle(result, None, TwinUnavailableError(_NOT_RUNNING))
+
     async def _beat(self) -> None:
         while self._executor is not None:
             back: asyncio.Future[int] = self._loop.create_future()
@@ -289,6 +292,7 @@ class RosThread(Generic[NodeT, EventT]):
             self.to_loop(_settle, self._started, None, failure)
         elif not self._is_stopping:
             log.critical("the ROS thread has ended", exc_info=error)
+            self.to_loop(self._refuse_unanswered)
             self.to_loop(self._on_death)
 
     def to_loop(self, callback: Callable[..., None], *args: Any) -> None:

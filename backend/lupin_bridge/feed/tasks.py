@@ -1,4 +1,4 @@
-"""Asyncio helpers: run identical work once (`Shared`), repeat work (`Periodic`), end tasks."""
+"""Asyncio helpers: guard and repeat work (`Periodic`), run identical work once, end tasks."""
 
 from __future__ import annotations
 
@@ -20,10 +20,34 @@ async def end(*tasks: asyncio.Task[Any] | None) -> None:
     await asyncio.gather(*begun, return_exceptions=True)
 
 
+class Guard:
+    """Runs work of a task that nobody awaits: an error ends nothing, and is logged under `what`.
+
+    An error that stays is logged once. `known` are the errors that need no traceback.
+    """
+
+    def __init__(self, what: str, *known: type[Exception]) -> None:
+        self._what, self._known, self._last = what, known, ""
+
+    async def run(self, work: Awaitable[ResultT]) -> ResultT | Exception:
+        """The result of the work, or its error."""
+        try:
+            result = await work
+        except Exception as error:
+            last, self._last = self._last, repr(error)
+            if last != self._last:
+                is_known = isinstance(error, self._known)
+                level = logging.INFO if is_known else logging.ERROR
+                log.log(level, "%s: %s", self._what, error, exc_info=not is_known)
+            return error
+        self._last = ""
+        return result
+
+
 class Periodic:
     """Repeats `work` with pauses of `every_s`, from `start` to `stop`; the first is `first_s`.
 
-    An error is logged under the name `what`, and it goes on: nobody awaits it.
+    After an error, it goes on; see `Guard`.
     """
 
     def __init__(
@@ -47,12 +71,10 @@ class Periodic:
         await end(self._task)
 
     async def _repeat(self) -> None:
+        guard = Guard(f"{self._what} had an error and continues")
         await asyncio.sleep(self._first_s)
         while True:
-            try:
-                await self._work()
-            except Exception:
-                log.exception("%s had an error and continues", self._what)
+            await guard.run(self._work())
             await asyncio.sleep(self._every_s)
 
 

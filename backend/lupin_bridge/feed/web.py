@@ -26,7 +26,7 @@ from lupin_msgs.srv import GetEstimateReport, GetWrites
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
-from lupin_bridge.feed.tasks import Periodic, end
+from lupin_bridge.feed.tasks import Guard, Periodic, end
 from lupin_bridge.feed.web_node import WebNode, check_ok
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.parameters import World
@@ -144,21 +144,12 @@ class FollowedLog:
         return self._folder / f"{journal}.sqlite"
 
     async def _keep(self) -> None:
-        why = ""
+        guard = Guard("the twin's journal is not followed", *_ERRORS)
         while True:
             if self.condition is not None:
                 self._is_known.set()
-            try:
-                await asyncio.sleep(await self._look())
-                why = ""
-            except _ERRORS as error:
-                if str(error) != why:
-                    why = str(error)
-                    log.info("the twin's journal is not followed: %s", why)
-                await asyncio.sleep(RETRY_S)
-            except Exception:  # nobody waits for this task, and all of the past depends on it
-                log.exception("the twin's journal is not followed")
-                await asyncio.sleep(RETRY_S)
+            pause_s = await guard.run(self._look())
+            await asyncio.sleep(RETRY_S if isinstance(pause_s, Exception) else pause_s)
 
     async def _look(self) -> float:
         """Find the log, or copy its new rows; returns the time to wait before the next call, s."""

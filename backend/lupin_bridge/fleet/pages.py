@@ -128,7 +128,7 @@ class SitePages:
     def _close(self, name: str) -> None:
         opened = self._open.pop(name)
         opened.bridge.announce_shutdown()
-        opened.bridge.hub.turn_out_all(f"{self._limit} sites are open here, the limit")
+        opened.bridge.hub.evict_all(f"{self._limit} sites are open here, the limit")
 
         async def end() -> None:
             await asyncio.wait((opened.ready,))

@@ -25,7 +25,7 @@ from lupin_bridge.archive.database import (
 from lupin_bridge.feed.query import Child, Now, Search
 from lupin_bridge.feed.query import main as serve
 from lupin_bridge.fleet.overview import LIVE_S, Site, dots
-from lupin_bridge.judge.alarm_fold import AlarmFolder
+from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge
 from lupin_bridge.serving.admission import Limits
@@ -95,7 +95,7 @@ class _Judged:
     note_count: int = 0
     snapshot: Snapshot | None = None
     is_simulated: bool = False
-    follower: AlarmFolder | None = None
+    alarm_fold: AlarmFold | None = None
     after: int = 0
     seq: int = -1
     is_caught_up: bool = False
@@ -274,12 +274,12 @@ class Watcher:
     def _follow(self, log: Any, judged: _Judged) -> None:
         request = WritesRequest(judged.after, Limits().alarm_days * 86_400, _REACH_COUNT, _LOT)
         past = writes(log, request)
-        if judged.follower is None or judged.follower.spans != past.spans:
-            if judged.follower is not None:
-                judged.follower, judged.after, judged.is_caught_up = None, 0, False
+        if judged.alarm_fold is None or judged.alarm_fold.spans != past.spans:
+            if judged.alarm_fold is not None:
+                judged.alarm_fold, judged.after, judged.is_caught_up = None, 0, False
                 past = writes(log, replace(request, after=0))
-            judged.follower = AlarmFolder(self._criteria, past.spans)
-        judged.follower.take(past.writes)
+            judged.alarm_fold = AlarmFold(self._criteria, past.spans)
+        judged.alarm_fold.take(past.writes)
         judged.after, judged.is_caught_up = past.last, past.is_all
 
 
@@ -290,8 +290,8 @@ def _alarms(site: Site, judged: _Judged, moment_ns: int) -> list[Alarm]:
     """
     reach_ns = int(Limits().alarm_days * 86_400e9)
     found: list[Alarm] = []
-    if judged.follower is not None:
-        of_log = judged.follower.found(moment_ns, max(0, moment_ns - reach_ns))
+    if judged.alarm_fold is not None:
+        of_log = judged.alarm_fold.found(moment_ns, max(0, moment_ns - reach_ns))
         judged.judge.note_days(of_log.days)
         found += of_log.alarms
     if site.heartbeat_ns and not site.is_live:

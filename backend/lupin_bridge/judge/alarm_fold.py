@@ -59,10 +59,10 @@ class _Run:
     due: dict[str, int] = field(default_factory=dict)
 
 
-class AlarmFolder:
+class AlarmFold:
     """Derives the alarms from the writes that it takes. Belongs to one thread at a time.
 
-    `spans` are the runs of the clock; when they change, a new follower is needed. It keeps about
+    `spans` are the runs of the clock; when they change, a new fold is needed. It keeps about
     `kept` writes, and `max_episodes` cleared alarms of each tag.
 
     `missed` counts writes that were ignored because they were older than what is kept of their tag.

@@ -20,7 +20,7 @@ import orjson
 
 from lupin_bridge.alarms.board import active_first, notes_of_alarms
 from lupin_bridge.feed.query import Find
-from lupin_bridge.judge.alarm_fold import AlarmFolder
+from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.episodes import SITE, Alarm, readings_of
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.scans import SHORTEST_NS, TIMES_MEDIAN
@@ -171,7 +171,7 @@ class _Fold:
     def __init__(self, of: Report, alarms_ns: int) -> None:
         self._of = of
         self._alarms_ns = alarms_ns
-        self._follower: AlarmFolder | None = None
+        self._alarm_fold: AlarmFold | None = None
         self._sensors: dict[str, _Extremes] = {}
         self._counts = Counter({"scans": 0, "failed": 0, "inspections": 0})
         self._scanned: set[str] = set()
@@ -188,18 +188,18 @@ class _Fold:
                 mine.append(write.stamp_ns)
             if write.stamp_ns >= self._of.start_ns:
                 self._count(write)
-        if self._follower is None:
-            self._follower = self._new(found.spans)
-        self._follower.take(it for it in found.writes if it.stamp_ns >= self._alarms_ns)
+        if self._alarm_fold is None:
+            self._alarm_fold = self._new(found.spans)
+        self._alarm_fold.take(it for it in found.writes if it.stamp_ns >= self._alarms_ns)
         if found.writes:
             # The result is not used, but so the work is done lot by lot.
-            self._follower.found(found.writes[-1].stamp_ns)
+            self._alarm_fold.found(found.writes[-1].stamp_ns)
 
-    def _new(self, spans: Sequence[RunSpan]) -> AlarmFolder:
+    def _new(self, spans: Sequence[RunSpan]) -> AlarmFold:
         by, end_ns = self._of.criteria, self._of.end_ns
         # Without what came later: it was not known then.
         cut = [replace(it, end_ns=min(it.end_ns, end_ns)) for it in spans if it.start_ns < end_ns]
-        return AlarmFolder(by, cut, kept=2 * MAX_WRITES, max_episodes=MAX_EPISODES)
+        return AlarmFold(by, cut, kept=2 * MAX_WRITES, max_episodes=MAX_EPISODES)
 
     def _count(self, write: PastWrite) -> None:
         if write.status != STATUS_OK:
@@ -273,11 +273,11 @@ class _Fold:
     def _alarms(self) -> list[Alarm]:
         """The alarms that were active at any time of the period, as they were at its end."""
         start_ns, end_ns = self._of.start_ns, self._of.end_ns
-        if self._follower is None:
+        if self._alarm_fold is None:
             return []
         return [
             alarm
-            for alarm in self._follower.found(self._of.known_ns - 1).alarms
+            for alarm in self._alarm_fold.found(self._of.known_ns - 1).alarms
             if alarm.raised_at_ns < end_ns
             and (alarm.cleared_at_ns is None or alarm.cleared_at_ns >= start_ns)
         ]

@@ -119,7 +119,8 @@ async def read_body(request: Request, model: type[ModelT]) -> ModelT:
     """A request's JSON body, which the server limits to a few kB.
 
     Raises:
-        Refused: not JSON, not valid for the model, or not there within `BODY_S`.
+        Refused: not JSON, not valid for the model, or not there within `BODY_S`; or the session of
+            the request has ended meanwhile.
 
     """
     media_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
@@ -132,6 +133,9 @@ async def read_body(request: Request, model: type[ModelT]) -> ModelT:
         raise Refused(f"the body did not arrive within {BODY_S:g} s", 408) from None
     except ClientDisconnect:
         raise Refused("the client left before its body arrived", CLIENT_DISCONNECTED) from None
+    people, person = request.app.state.access.people, person_of(request)
+    if people is not None and person is not None and not people.may_stay(person):
+        raise Refused("the session has ended: sign in again", 401)
     try:
         return model.model_validate(orjson.loads(body))
     except orjson.JSONDecodeError as error:

@@ -115,10 +115,6 @@ async def write_note(request: Request) -> Response:
     bridge = bridge_of(request)
     person = _writer(request, bridge)
     draft = await read_body(request, routes_schema.NoteDraft)
-    # The session may have ended while the body was sent.
-    people = request.app.state.access.people
-    if people is not None and not people.still(person):
-        raise Refused("the session has ended: sign in again", 401)
     note = await _write(request, bridge, _checked(draft, person, bridge))
     return json_response(orjson.dumps(note_json(note, {})), 201)
 

@@ -238,9 +238,13 @@ class HttpConnection(H11Protocol):
             blank = _BLANK_LINE.search(self._unparsed, 0, MAX_HEAD_BYTES)
             end = min(len(self._unparsed), MAX_HEAD_BYTES) if blank is None else blank.end()
             if self._unparsed.count(b"\n", 0, end) > MAX_LINES:
-                self._refuse(431, f"the request has more headers than the limit of {MAX_HEADERS}")
+                self._refuse(
+                    431, f"the request's head has more than {MAX_HEADERS} headers, the limit"
+                )
             elif blank is None and end == MAX_HEAD_BYTES:
-                self._refuse(431, f"the request's head is longer than {MAX_HEAD_BYTES} bytes")
+                self._refuse(
+                    431, f"the request's head has more than {MAX_HEAD_BYTES} bytes, the limit"
+                )
             elif blank is None and self._unparsed[0] > 0x20:
                 return  # the rest is on its way; a byte up to 0x20 begins no request, but maybe TLS
             else:

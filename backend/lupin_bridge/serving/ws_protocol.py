@@ -205,7 +205,7 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
             super().handle_events()
         else:
             self._dismiss_for(
-                f"more than {FRAMES_PER_S} messages a second after {FRAMES_AT_ONCE} at once"
+                f"sent more than {FRAMES_PER_S} messages a second after {FRAMES_AT_ONCE} at once"
             )
 
     def pause_writing(self) -> None:

@@ -190,7 +190,7 @@ class Hub:
         self.clients_dismissed += 1
         client.connection.dismiss(CLOSE_TRY_AGAIN_LATER, reason)
 
-    def turn_out_all(self, reason: str) -> None:
+    def evict_all(self, reason: str) -> None:
         """Close every client; each may try again."""
         for client in list(self._clients):
             self.evict(client, reason)

@@ -172,7 +172,7 @@ MAX_SENSORS: Final = 32
 Changed = Mapping[str, Mapping[str, int]]
 
 
-class EstimateFollower(Periodic):
+class EstimatePoller(Periodic):
     """Fetches every sensor's estimate report, from `start` to `stop`. Belongs to the event loop.
 
     `snapshot` returns the newest state; `on_changed` gets the tags whose sensors have changed.
@@ -263,7 +263,7 @@ def _point(at: Position) -> dict[str, Any]:
 ROBOT_PERIOD_S: Final = 1.0
 
 
-class RobotFollower(Periodic):
+class RobotPoller(Periodic):
     """Keeps what is known of the robot, and publishes a frame when any of it has changed.
 
     `now_ns()` is the twin's time; None: not known. `clock` returns monotonic seconds. Belongs to

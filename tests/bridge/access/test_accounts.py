@@ -195,9 +195,9 @@ def test_a_name_from_a_proxy_is_checked_again_on_every_use(path: Path) -> None:
     people = People(path, is_proxied=True)
     anna = people.by_proxy("anna")
     assert anna is not None
-    assert people.still(anna)
+    assert people.may_stay(anna)
     remove(path, "anna")
-    assert not people.still(anna)
+    assert not people.may_stay(anna)
 
 
 def test_only_devices_of_people_who_may_read_the_site_are_notified(path: Path) -> None:

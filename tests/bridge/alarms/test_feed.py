@@ -36,6 +36,7 @@ class Journal:
         self.writes_now: list[PastWrite] = []
         self.name, self.requested = "a", 0
         self.is_removed = False
+        self.fault: Exception | None = None
         self.written = 0
 
     def journal(self) -> Condition:
@@ -45,6 +46,8 @@ class Journal:
     async def writes(self, request: WritesRequest) -> PastWrites:
         """The next write of the log."""
         self.requested += 1
+        if self.fault is not None:
+            raise self.fault
         if self.is_removed:
             raise TwinUnavailableError("no twin offers /twin/get_writes")
         found = [write for write in self.writes_now if write.number > request.after]
@@ -115,17 +118,22 @@ async def test_it_reads_the_past_once_then_new_writes_and_a_new_journal_whole() 
         assert [alarm.worst for alarm in board.now.alarms] == [4.0]
 
 
-async def test_an_error_in_a_silence_does_not_end_the_alarms() -> None:
+async def test_errors_that_stay_are_logged_once_and_do_not_end_the_alarms(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     async with following() as (feed, board, source):
 
-        def fail_once(_: Change) -> None:
-            board.on_change = lambda _: None
-            raise RuntimeError("a fault of a test")
+        def fail(_: Change) -> None:
+            raise ZeroDivisionError("over a silence")
 
-        board.on_change, source.is_removed = fail_once, True
-        feed.on_silence(is_silent=True, last_ns=NOW)
-        await changed(board)
-        source.is_removed, source.writes_now = False, [pest(1, 4)]
+        board.on_change, source.fault = fail, RuntimeError("in the journal")
+        for number in range(1, 4):
+            feed.on_silence(is_silent=number % 2 > 0, last_ns=NOW - number)
+            await until(lambda n=number: board.now.number == n, "the silence")  # type: ignore[misc]
+        logged = [record.getMessage() for record in caplog.records]
+        assert [text.partition(": ")[2] for text in logged] == ["in the journal", "over a silence"]
+        board.on_change, source.fault = lambda _: None, None
+        source.writes_now = [pest(1, 4)]
         feed.on_state(reported(1))
         await changed(board)
         assert len(board.now.active) == 2
@@ -148,7 +156,7 @@ async def test_writes_are_read_also_when_the_state_does_not_change() -> None:
 async def test_writes_older_than_the_window_are_counted_and_reported(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    defaults = alarm_fold.AlarmFolder.__init__.__kwdefaults__
+    defaults = alarm_fold.AlarmFold.__init__.__kwdefaults__
     assert defaults is not None
     monkeypatch.setitem(defaults, "kept", 8)
 

@@ -19,7 +19,7 @@ from tests.support.inprocess import ros_domain
 from tests.support.messages import scan
 from tests.support.processes import faults, lupin_twin, url_of
 from tests.support.ros import Peer
-from tests.support.waiting import until
+from tests.support.waiting import PATIENCE_S, until
 
 
 class Probe(Node):  # type: ignore[misc]  # rclpy is not typed
@@ -220,8 +220,11 @@ async def test_the_end_of_the_thread_is_reported_once_and_logged(
     domain: int, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with Stage() as stage:
+        asked = asyncio.create_task(stage.ros.ask(lambda _: Future(), lambda *_: None))
         await stage.ros.call(lambda node: node.create_timer(0.01, lambda: sys.exit("the end")))
         await until(lambda: stage.deaths, "the death")
+        with pytest.raises(TwinUnavailableError, match="not running"):
+            await asyncio.wait_for(asked, PATIENCE_S)
         await until(lambda: not stage.ros.is_alive, "the end of the thread")
         with pytest.raises(TwinUnavailableError, match="not running"):
             await stage.ros.call(lambda _: None)

@@ -1,8 +1,10 @@
-"""Work that is done once for all equal requests, and only while one of them waits."""
+"""Work that is done once for all equal requests; and work that is repeated."""
 
 import asyncio
 
-from lupin_bridge.feed.tasks import Shared
+import pytest
+
+from lupin_bridge.feed.tasks import Periodic, Shared
 from tests.support.waiting import until
 
 
@@ -38,3 +40,23 @@ async def test_an_error_reaches_all_waiters_and_is_not_cached() -> None:
     found = await asyncio.gather(*(shared.get("a", work) for _ in "ab"), return_exceptions=True)
     assert [type(error) for error in found] == [MemoryError] * 2
     assert await shared.get("a", work) == 2
+
+
+async def test_an_error_that_stays_ends_no_repetition_and_is_logged_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    errors, done = [ValueError("a"), ValueError("a"), ValueError("b"), None, ValueError("b")], 0
+
+    async def work() -> None:
+        nonlocal done
+        error = errors[min(done, 4)]
+        done += 1
+        if error is not None:
+            raise error
+
+    periodic = Periodic(work, 0.0, "the work")
+    periodic.start()
+    await until(lambda: done > len(errors), "all of them")
+    await periodic.stop()
+    logged = [record.getMessage() for record in caplog.records]
+    assert logged == [f"the work had an error and continues: {name}" for name in "abb"]

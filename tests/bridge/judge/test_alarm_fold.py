@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lupin_bridge.alarms.board import board_of
 from lupin_bridge.judge import alarm_fold, tag_log
-from lupin_bridge.judge.alarm_fold import AlarmFolder
+from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.day import ClockDay, Day
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria, own_sensors
@@ -97,12 +97,12 @@ def follow(
     lots: Iterable[Sequence[PastWrite]], spans: Sequence[RunSpan], now_ns: int
 ) -> tuple[Alarm, ...]:
     """As a bridge does that is queried now and then."""
-    follower = AlarmFolder(BY, spans)
+    fold = AlarmFold(BY, spans)
     for lot in lots:
-        follower.take(lot)
-        follower.found(now_ns)
-    assert follower.missed == 0
-    return board_of(follower.found(now_ns).alarms).alarms
+        fold.take(lot)
+        fold.found(now_ns)
+    assert fold.missed == 0
+    return board_of(fold.found(now_ns).alarms).alarms
 
 
 @settings(max_examples=150)
@@ -143,52 +143,52 @@ def test_old_writes_are_dropped_and_change_no_result(seed: int) -> None:
     spans, now_ns = chance.choice(SPANS), received[-1].stamp_ns + chance.randint(0, 300) * MINUTE
     expected = alarms(received, spans, now_ns, SENSORS, day_of)
     # Writes beyond the limit are stored only as their result.
-    follower = AlarmFolder(BY, spans, kept=chance.choice([3, 24, 300]))
+    fold = AlarmFold(BY, spans, kept=chance.choice([3, 24, 300]))
     since_ns = 0
     while received:
         # Late, but not too late.
         count = min(len(received), chance.randint(1, 9))
         lot, received = received[:count], received[count:]
         chance.shuffle(lot)
-        follower.take(lot)
+        fold.take(lot)
         with patch.object(alarm_fold, "FORGET_EVERY_NS", 0):
-            follower.found(now_ns, since_ns)
+            fold.found(now_ns, since_ns)
         since_ns = max(since_ns, lot[0].stamp_ns - chance.randint(0, 60) * MINUTE)
         since_ns = min(since_ns, received[0].stamp_ns) if received else since_ns
-    page = board_of(follower.found(now_ns, since_ns).alarms, since_ns)
-    if follower.missed:
+    page = board_of(fold.found(now_ns, since_ns).alarms, since_ns)
+    if fold.missed:
         return
     expected = {one for one in expected if one.cleared_ns is None or one.cleared_ns >= since_ns}
     assert {plain(alarm) for alarm in page.alarms} == expected
 
 
 def test_writes_older_than_the_window_are_counted_and_not_used() -> None:
-    follower, received = AlarmFolder(BY, SPANS[0], kept=4), scans([22] * 9)
-    follower.take(received[:5])
-    follower.take(received[5:])
+    fold, received = AlarmFold(BY, SPANS[0], kept=4), scans([22] * 9)
+    fold.take(received[:5])
+    fold.take(received[5:])
     late = [replace(one, number=90 + one.number, stamp_ns=one.stamp_ns + S) for one in received]
-    follower.take(late[5:8])
-    assert follower.missed == 0
-    follower.take(late[3:4])
-    assert follower.missed == 1
+    fold.take(late[5:8])
+    assert fold.missed == 0
+    fold.take(late[3:4])
+    assert fold.missed == 1
     since_ns = START + 2 * alarm_fold.FORGET_EVERY_NS
-    follower.found(since_ns, since_ns)
-    follower.take([replace(received[0], number=99, stamp_ns=since_ns - 1)])
-    assert follower.missed == 2
-    follower.take([replace(received[0], number=100, stamp_ns=since_ns)])
-    assert follower.missed == 2
+    fold.found(since_ns, since_ns)
+    fold.take([replace(received[0], number=99, stamp_ns=since_ns - 1)])
+    assert fold.missed == 2
+    fold.take([replace(received[0], number=100, stamp_ns=since_ns)])
+    assert fold.missed == 2
 
 
 def test_memory_does_not_grow_with_the_days() -> None:
     """One round a day, and a lamp that switches: gaps, pauses and turns without end."""
-    follower = AlarmFolder(BY, SPANS[0])
+    fold = AlarmFold(BY, SPANS[0])
     for day in range(60):
         for at in (0, 1):
             light, number = (900.0, 0.0)[at], 2 * day + at
             stamp_ns = START + day * DAY_NS + at * MINUTE
-            follower.take([PastWrite(number, 1, "a", stamp_ns, SCAN, 0, ("light",), (light,))])
-        follower.found(stamp_ns, max(0, stamp_ns - 7 * DAY_NS))
-    (run,) = follower._runs.values()
+            fold.take([PastWrite(number, 1, "a", stamp_ns, SCAN, 0, ("light",), (light,))])
+        fold.found(stamp_ns, max(0, stamp_ns - 7 * DAY_NS))
+    (run,) = fold._runs.values()
     trail = run.tags["a"].trail
     assert (len(trail.gaps), len(trail.turns)) == (7, 15)
     assert len([*run.stretches.pauses()]) == 7
@@ -267,32 +267,32 @@ def test_every_kind_of_reason_becomes_an_alarm_except_those_of_the_estimate() ->
 
 
 def test_the_fold_reports_when_it_will_change_without_news() -> None:
-    follower = AlarmFolder(BY, SPANS[0])
+    fold = AlarmFold(BY, SPANS[0])
     received = scans([22, 22])
-    follower.take(received)
+    fold.take(received)
     last_ns = received[-1].stamp_ns
-    due_ns = follower.found(last_ns).due_ns
-    assert follower.found(due_ns - 1).alarms == ()
-    assert [one.reason.kind for one in follower.found(due_ns).alarms] == ["stopped"]
-    assert follower.found(due_ns).due_ns == FOREVER
+    due_ns = fold.found(last_ns).due_ns
+    assert fold.found(due_ns - 1).alarms == ()
+    assert [one.reason.kind for one in fold.found(due_ns).alarms] == ["stopped"]
+    assert fold.found(due_ns).due_ns == FOREVER
 
 
 def test_unchanged_alarms_are_the_same_objects() -> None:
-    follower = AlarmFolder(BY, SPANS[0])
+    fold = AlarmFold(BY, SPANS[0])
     received = scans([17, 17, 16, 22, 22])
-    follower.take(received[:2])
+    fold.take(received[:2])
     now_ns = received[-1].stamp_ns
-    first = follower.found(now_ns).alarms
+    first = fold.found(now_ns).alarms
     assert [one.worst for one in first] == [17]
-    assert follower.found(now_ns).alarms is first
-    follower.take(received[2:])
-    assert [one.worst for one in follower.found(now_ns).alarms] == [16]
+    assert fold.found(now_ns).alarms is first
+    fold.take(received[2:])
+    assert [one.worst for one in fold.found(now_ns).alarms] == [16]
     # It was warm between the two.
     late = [
         replace(received[0], number=90 + n, stamp_ns=START + n, values=(900, 22)) for n in (1, 2)
     ]
-    follower.take(late)
-    assert first[0].id not in {one.id for one in follower.found(now_ns).alarms}
+    fold.take(late)
+    assert first[0].id not in {one.id for one in fold.found(now_ns).alarms}
 
 
 def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false() -> None:

@@ -8,7 +8,7 @@ from itertools import count
 
 import pytest
 
-from lupin_bridge.judge.alarm_fold import AlarmFolder
+from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.day import COUNTS_NS, SINCE_NS, ClockDay, Day, days_of
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria, own_sensors
@@ -53,14 +53,14 @@ def day_number(at_ns: int) -> int:
     return (at_ns - DAWN * HOUR) // DAY_NS
 
 
-def new_follower() -> AlarmFolder:
-    return AlarmFolder(DawnToDusk(own_sensors(), None, ClockDay(None)), SPANS)
+def new_fold() -> AlarmFold:
+    return AlarmFold(DawnToDusk(own_sensors(), None, ClockDay(None)), SPANS)
 
 
 def found(received: Iterable[PastWrite]) -> list[Alarm]:
-    follower = new_follower()
-    follower.take(received)
-    alarms = [one for one in follower.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]
+    fold = new_fold()
+    fold.take(received)
+    alarms = [one for one in fold.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]
     return sorted(alarms, key=lambda one: (one.raised_at_ns, one.id))
 
 
@@ -114,11 +114,11 @@ def test_a_late_scan_corrects_its_day() -> None:
     late = [one for one in received if dawn(0) + 4 * HOUR < one.stamp_ns < dawn(0) + 15 * HOUR]
     early = [one for one in received if one not in late]
     assert [one.raised_at_ns for one in found(early)] == [dawn(2)]
-    follower = new_follower()
-    follower.take(early)
-    follower.found(40 * DAY_NS)
-    follower.take(late)
-    after = follower.found(40 * DAY_NS).alarms
+    fold = new_fold()
+    fold.take(early)
+    fold.found(40 * DAY_NS)
+    fold.take(late)
+    after = fold.found(40 * DAY_NS).alarms
     assert [one for one in after if one.reason.sensor in DAILY] == found(received)
     assert [one.raised_at_ns for one in found(received)] == [dawn(1)]
 
@@ -142,9 +142,9 @@ def test_a_sensor_that_reads_the_quantity_itself_takes_precedence() -> None:
 
 
 def test_without_a_clock_a_day_is_24_hours_of_ros_time() -> None:
-    follower = AlarmFolder(Criteria(own_sensors(), None, ClockDay(None)), SPANS)
-    follower.take(scans({"temperature": [14.0] * 3}, first_h=DAWN + 5))
-    [cold] = [one for one in follower.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]
+    fold = AlarmFold(Criteria(own_sensors(), None, ClockDay(None)), SPANS)
+    fold.take(scans({"temperature": [14.0] * 3}, first_h=DAWN + 5))
+    [cold] = [one for one in fold.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]
     assert (cold.reason.sensor, cold.raised_at_ns) == (MEAN, 2 * DAY_NS)
 
 
@@ -165,10 +165,10 @@ def test_at_any_moment_the_recent_window_gives_the_days_that_the_whole_log_gives
         by_then = [one for one in received if one.stamp_ns <= at_ns]
         last = [one for one in by_then if at_ns - SINCE_NS <= one.stamp_ns]
         past = days_of(last, own_sensors(), is_day, day_number)
-        follower = new_follower()
+        fold = new_fold()
         chance.shuffle(by_then)
-        follower.take(by_then)
-        assert counting(past, at_ns) == counting(follower.found(at_ns).days, at_ns)
+        fold.take(by_then)
+        assert counting(past, at_ns) == counting(fold.found(at_ns).days, at_ns)
         known += len(counting(past, at_ns))
     assert known
 
@@ -183,9 +183,9 @@ def test_the_last_whole_days_value_holds_until_the_next_scan_after_a_dawn() -> N
     received = scans({"temperature": [14.0, 20.0, 20.0]})
 
     def mean(at_ns: int) -> float | None:
-        follower = new_follower()
-        follower.take(one for one in received if one.stamp_ns <= at_ns)
-        days = follower.found(at_ns).days.get("a", ())
+        fold = new_fold()
+        fold.take(one for one in received if one.stamp_ns <= at_ns)
+        days = fold.found(at_ns).days.get("a", ())
         return next((day.value for day in days if day.name == MEAN), None)
 
     assert mean(dawn(1) - 1) is None

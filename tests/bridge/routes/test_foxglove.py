@@ -182,7 +182,7 @@ def test_a_flood_closes_its_own_connection_and_subscribes_nothing(
             loud.reported("never")
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 1008
-        assert closed.value.rcvd.reason == "more than 100 messages a second after 500 at once"
+        assert closed.value.rcvd.reason == "sent more than 100 messages a second after 500 at once"
     assert topics() <= 8.0, "as many as there are"
     client.subscribe(STATE)
     assert client.data(1)

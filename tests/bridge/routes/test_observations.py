@@ -16,7 +16,7 @@ from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.http_protocol import MAX_BODY_BYTES
 from tests.support import raw_http
 from tests.support.journal import select
-from tests.support.people import OWN, TOKEN, add, signed_in
+from tests.support.people import OWN, TOKEN, add, remove, signed_in
 from tests.support.processes import constants, limits, lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -203,6 +203,23 @@ def test_bodies_are_bounded_and_a_partial_one_times_out(live: Bridge, folder: Pa
     half = head.format(100).encode() + b'{"tag_id": "half", '
     assert raw_http.status(raw_http.answer(live.url, half)) in (0, 408)
     assert rows(folder, "huge") == rows(folder, "half") == []
+
+
+def test_a_token_that_is_revoked_amid_a_body_posts_nothing(live: Bridge, folder: Path) -> None:
+    token, accounts = f"gone-{TOKEN}", folder / "accounts.sqlite"
+    add(accounts, "token", digest(token), gone="writer")
+    body = json.dumps({"tag_id": "gone", "readings": {"co2": 1.0}})
+    head = (
+        "POST /api/observations HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+        f"Authorization: Bearer {token}\r\nContent-Length: {len(body)}\r\nConnection: close\r\n"
+        "Expect: 100-continue\r\n\r\n"
+    )
+    with raw_http.connect(live.url) as client:
+        client.sendall(head.encode())
+        assert client.recv(65536).startswith(b"HTTP/1.1 100"), "let in, and the body is waited for"
+        remove(accounts, "gone", "token")
+        client.sendall(body.encode())
+        assert raw_http.status(raw_http.received(client)) == 401
 
 
 def test_a_flood_slows_only_its_own_client(live: Bridge) -> None:

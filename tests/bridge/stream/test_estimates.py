@@ -11,7 +11,7 @@ from lupin_bridge.stream import pollers
 from lupin_bridge.stream.pollers import (
     MAX_SENSORS,
     Changed,
-    EstimateFollower,
+    EstimatePoller,
     changed_of,
     sensors_of,
 )
@@ -53,7 +53,7 @@ def test_changed_tags_are_listed_by_tag_and_sensor() -> None:
 
 
 class Stage:
-    """The queries of a follower, and its updates."""
+    """The queries of a poller, and its updates."""
 
     def __init__(self) -> None:
         self.requested: list[str] = []
@@ -61,7 +61,7 @@ class Stage:
         self.snapshot: Snapshot | None = None
         self.answers: dict[str, Report] = {}
         stage: Any = self
-        self.follower = EstimateFollower(stage, lambda: self.snapshot, self.reported.append)
+        self.poller = EstimatePoller(stage, lambda: self.snapshot, self.reported.append)
 
     async def estimate_report(self, request: ReportRequest) -> Report:
         self.requested.append(request.sensor_type)
@@ -72,28 +72,28 @@ class Stage:
 
 async def test_changes_are_passed_on_in_their_current_form() -> None:
     stage = Stage()
-    await stage.follower.update()
+    await stage.poller.update()
     assert stage.requested == [], "there is no state yet"
     stage.snapshot = snapshot(co2=5, light=6)
     stage.answers = {"co2": report(9, {"co2": None}), "light": report(4, {})}
-    await stage.follower.update()
+    await stage.poller.update()
     assert stage.requested == ["co2", "light"]
     assert stage.reported == [{}]
     stage.answers["co2"] = report(9, {"co2": 5})
     for _ in range(2):
-        await stage.follower.update()
+        await stage.poller.update()
         assert stage.reported[-1] == {"co2": {"co2": 5}}
     stage.snapshot = snapshot(light=6)
-    await stage.follower.update()
+    await stage.poller.update()
     assert stage.reported[-1] == {}, "no tag has that sensor any more"
 
 
 async def test_where_a_report_fails_the_last_one_holds() -> None:
     stage = Stage()
     stage.snapshot, stage.answers = snapshot(co2=5), {"co2": report(9, {"co2": 5})}
-    await stage.follower.update()
+    await stage.poller.update()
     stage.answers = {}
-    await stage.follower.update()
+    await stage.poller.update()
     assert stage.reported[-1] == {"co2": {"co2": 5}}
 
 
@@ -102,7 +102,7 @@ def test_the_number_of_queried_sensors_is_limited() -> None:
     names = [f"s{number:02}" for number in range(MAX_SENSORS + 1)]
     stage.snapshot = snapshot(**dict.fromkeys(names, 1))
     stage.answers = dict.fromkeys(names, report(9, {}))
-    asyncio.run(stage.follower.update())
+    asyncio.run(stage.poller.update())
     assert stage.requested == names[:-1]
 
 
@@ -110,8 +110,8 @@ async def test_a_failed_query_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(pollers, "PERIOD_S", 0.0)
     stage = Stage()
     stage.snapshot = snapshot(co2=1)
-    stage.follower.start()
+    stage.poller.start()
     await until(lambda: len(stage.requested) > 1, "it to be asked again")
     stage.answers = {"co2": report(9, {"co2": 1})}
     await until(lambda: stage.reported[-1], "the answer")
-    await stage.follower.stop()
+    await stage.poller.stop()

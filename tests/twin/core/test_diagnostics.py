@@ -84,7 +84,7 @@ def test_the_numbers_are_there() -> None:
     counts = Counts({"frame": 40, "lost": 5}, 0, (FRAME,))
     values = {
         "frame": "40",
-        "lately: frame": "12",
+        "recently: frame": "12",
         "last: frame": "its frame is 'odom'",
         "callback errors": "0",
     }
@@ -151,7 +151,7 @@ def test_a_missing_report_is_not_read_as_no_drops() -> None:
 
 @pytest.mark.parametrize("text", ["", "-1", "1.5", "many", "²", "9" * 16])
 def test_an_invalid_number_counts_nothing(text: str) -> None:
-    values = {"frame": text, "lately: frame": text, "callback errors": text, "spoons": "7"}
+    values = {"frame": text, "recently: frame": text, "callback errors": text, "spoons": "7"}
     assert self_report([Finding("drops", OK, "", values)]).counts == Counts()
 
 

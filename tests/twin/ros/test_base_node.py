@@ -12,7 +12,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy
 from rclpy.serialization import serialize_message
 
-from lupin_twin.core.drops import LOST, Drop, Reason
+from lupin_twin.core.drops import Drop, Reason
 from lupin_twin.ros.base_node import (
     BEHIND_S,
     BELIEVED_S,
@@ -181,7 +181,7 @@ def test_waiting_messages_are_taken_one_right_after_the_other(
         publish(range(40, 90))
         utilities.drain()
         assert received == list(map(float, range(90)))
-        assert utilities.counts().dropped.get(LOST, 0) == 0
+        assert utilities.counts().dropped.get(Reason.LOST, 0) == 0
     executor.shutdown()
 
 

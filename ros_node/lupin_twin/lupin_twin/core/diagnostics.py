@@ -11,7 +11,7 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Final, Literal, get_args
 
-from lupin_twin.core.drops import LATE, LOST, Counts, Reason, Recent
+from lupin_twin.core.drops import Counts, Reason, Recent
 from lupin_twin.core.state import ClockState
 
 # Longer texts are cut: a source's name, for example, may have any length.
@@ -21,8 +21,9 @@ MAX_SHOWN: Final = 500
 # do: DDS sends it only once, and not again after a gap in the link longer than its lease.
 STATE_TOPIC: Final = "state topic"
 
-_REASONS: Final = (*(reason.value for reason in Reason), LOST, LATE)
-_RECENTLY: Final = "lately: "
+_REASONS: Final = tuple(reason.value for reason in Reason)
+_LOST: Final = Reason.LOST.value
+_RECENTLY: Final = "recently: "
 _LAST: Final = "last: "
 _ERRORS: Final = "callback errors"
 _MAX_DIGITS: Final = 15
@@ -168,24 +169,24 @@ def findings(health: Health) -> Iterator[Finding]:
     yield Finding("origin", OK, _ORIGIN[health.origin], {"origin": health.origin})
     yield _inputs(health)
     counts = health.counts
-    recent = [drop for drop in counts.recent if drop.reason != LOST]
+    recent = [drop for drop in counts.recent if drop.reason != _LOST]
     yield Finding(
         "drops",
         WARN if recent or counts.callback_errors else OK,
         "; ".join(f"{drop.count} recently: {shown(drop.message)}" for drop in recent)
         or "nothing recently",
         {
-            **{str(why): str(count) for why, count in counts.dropped.items() if why != LOST},
+            **{str(why): str(count) for why, count in counts.dropped.items() if why != _LOST},
             **_recent_readings(recent),
             _ERRORS: str(counts.callback_errors),
         },
     )
-    lost = [drop for drop in counts.recent if drop.reason == LOST]
+    lost = [drop for drop in counts.recent if drop.reason == _LOST]
     yield Finding(
         "queues",
         WARN if lost else OK,
         f"{lost[0].count} messages lost recently" if lost else "nothing lost recently",
-        {LOST: str(counts.dropped.get(LOST, 0)), **_recent_readings(lost)},
+        {_LOST: str(counts.dropped.get(_LOST, 0)), **_recent_readings(lost)},
     )
     late = {shown(source): str(count) for source, count in health.late.items()}
     yield Finding(

@@ -50,8 +50,25 @@ def check_length(what: str, length: int, limit: int) -> None:
 # How long a drop is reported to the operator as recent, s.
 RECENT_S: Final = 300.0
 _BUCKET_S: Final = 10.0
-LOST: Final = "lost"
-LATE: Final = "late_stamp"
+
+
+class Reason(StrEnum):
+    """Why a message, or an entry of one, was dropped. Drops are counted by reason.
+
+    The last two are counted with them: messages that were lost before they were read, and those
+    with a stamp behind their source's earlier ones, which only enter the history.
+    """
+
+    KIND = "kind"
+    FRAME = "frame"
+    TAG_ID = "tag_id"
+    POSE = "pose"
+    MAP = "map"
+    SIZE = "size"
+    UNREADABLE = "unreadable"
+    REJECTED = "rejected"
+    LOST = "lost"
+    LATE_STAMP = "late_stamp"
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +112,7 @@ class DropCounts:
         )
 
     def add(self, reason: str, text: str, now_s: float, count: int = 1) -> None:
-        """Count what was dropped for a `Reason`, `LOST` or `LATE`; `text` is for a person."""
+        """Count what was dropped for a `Reason`; `text` is for a person."""
         self._dropped[reason] = self._dropped.get(reason, 0) + count
         self._texts[reason] = text
         buckets = self._buckets.setdefault(reason, deque())
@@ -115,19 +132,6 @@ class DropCounts:
     def _forget(buckets: deque[tuple[float, int]], now_s: float) -> None:
         while buckets and buckets[0][0] + RECENT_S <= now_s:
             buckets.popleft()
-
-
-class Reason(StrEnum):
-    """Why a message, or an entry of one, was dropped. Drops are counted by reason."""
-
-    KIND = "kind"
-    FRAME = "frame"
-    TAG_ID = "tag_id"
-    POSE = "pose"
-    MAP = "map"
-    SIZE = "size"
-    UNREADABLE = "unreadable"
-    REJECTED = "rejected"
 
 
 @dataclass(frozen=True, slots=True)

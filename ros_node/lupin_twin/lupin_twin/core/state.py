@@ -210,17 +210,17 @@ class TagState:
     def clamped_to(self, now_ns: int) -> TagState:
         """The tag with no stamp later than `now_ns`."""
 
-        def held(stamp_ns: int | None) -> int | None:
+        def clamped(stamp_ns: int | None) -> int | None:
             return None if stamp_ns is None else min(stamp_ns, now_ns)
 
         last = self.last_try
         return replace(
             self,
             readings=tuple(
-                replace(r, observed_at_ns=held(r.observed_at_ns)) for r in self.readings
+                replace(r, observed_at_ns=clamped(r.observed_at_ns)) for r in self.readings
             ),
-            last_observed_ns=held(self.last_observed_ns),
-            looked_at_ns=held(self.looked_at_ns),
+            last_observed_ns=clamped(self.last_observed_ns),
+            looked_at_ns=clamped(self.looked_at_ns),
             last_try=last and replace(last, stamp_ns=min(last.stamp_ns, now_ns)),
         )
 

@@ -29,7 +29,7 @@ from rclpy.signals import SignalHandlerOptions
 from lupin_twin.core import ingest
 from lupin_twin.core.clock import Late
 from lupin_twin.core.diagnostics import MAX_PROBLEMS
-from lupin_twin.core.drops import LATE, LOST, Counts, Drop, DropCounts, Reason, Throttle
+from lupin_twin.core.drops import Counts, Drop, DropCounts, Reason, Throttle
 from lupin_twin.core.interfaces import SERVICE_DEPTH, Topic
 from lupin_twin.core.parameters import ParameterError
 from lupin_twin.field.explored import OccupancyMap
@@ -105,7 +105,7 @@ class NodeUtilities:
     """Subscriptions, warnings and counts of one node; belongs to its thread."""
 
     def __init__(self, node: Node) -> None:
-        self.tally = DropCounts()
+        self._drops = DropCounts()
         # When the current message was published, by its publisher's clock, and how long before its
         # arrival that was, s, by the two clocks.
         self.published_ns = 0
@@ -300,29 +300,29 @@ class NodeUtilities:
 
     def drop(self, drop: Drop, topic: str) -> None:
         """Count and report something that was dropped."""
-        self.tally.add(drop.reason.value, drop.on(topic), time.monotonic())
+        self._drops.add(drop.reason.value, drop.on(topic), time.monotonic())
         self.warn((drop.reason, (topic, drop.case)), drop.on(topic))
 
     @property
     def callback_errors(self) -> int:
         """Number of errors in callbacks so far."""
-        return self.tally.callback_errors
+        return self._drops.callback_errors
 
     def counts(self) -> Counts:
         """Return all drops, losses and errors so far."""
-        return self.tally.value(time.monotonic())
+        return self._drops.value(time.monotonic())
 
     def lose(self, count: int, topic: str) -> None:
         """Count and report messages that came faster than they were read."""
         text = f"messages on {topic}: they arrived too fast"
-        self.tally.add(LOST, f"lost {text}", time.monotonic(), count)
-        self.warn((LOST, topic), f"lost {count} {text} to be read")
+        self._drops.add(Reason.LOST.value, f"lost {text}", time.monotonic(), count)
+        self.warn((Reason.LOST, topic), f"lost {count} {text} to be read")
 
     def late(self, late: Late, topic: str) -> None:
         """Count and report a producer whose stamps stay behind its own earlier ones."""
         text = f"late stamps on {topic}: {late}"
-        self.tally.add(LATE, text, time.monotonic(), late.news)
-        self.warn(("late", late.counted_as), text)
+        self._drops.add(Reason.LATE_STAMP.value, text, time.monotonic(), late.news)
+        self.warn((Reason.LATE_STAMP, late.counted_as), text)
 
     def warn(self, key: tuple[str, object], text: str) -> None:
         """Log a warning, at most one a period for each key, and how many were held back."""
@@ -344,7 +344,7 @@ class NodeUtilities:
 
     def report(self, what: str, error: Exception) -> None:
         """Count and log an error of a callback, with its trace, throttled."""
-        self.tally.callback_errors += 1
+        self._drops.callback_errors += 1
         if self._throttle.allow(("error", what), time.monotonic()) is not None:
             trace = "".join(traceback.format_exception(error))
             self.node.get_logger().error(

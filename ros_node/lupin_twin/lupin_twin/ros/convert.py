@@ -107,7 +107,7 @@ def nanoseconds(stamp: Any) -> int:
 
 
 def time_msg(stamp_ns: int) -> Time:
-    """Nanoseconds of ROS time as builtin_interfaces/Time; held to the message's range."""
+    """Nanoseconds of ROS time as builtin_interfaces/Time; clamped to the message's range."""
     sec, nanosec = divmod(max(0, stamp_ns), NANOSECONDS_PER_SECOND)
     return Time(sec=min(sec, INT32_MAX), nanosec=nanosec)
 

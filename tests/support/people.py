@@ -52,6 +52,15 @@ def remove(path: Path, name: str, kind: Kind = "account") -> None:
         accounts.remove(name, kind, by="a test", now_s=int(time.time()))
 
 
+def begin_session(accounts: Accounts, now_s: int = 1_800_000_000) -> str:
+    """Anna's, as signing in begins it; returns its cookie."""
+    anna = accounts.of_name("anna")
+    assert anna is not None
+    cookie = accounts.begin_session(anna, "192.0.2.7", now_s)
+    assert cookie is not None
+    return cookie
+
+
 def sign_in(client: httpx.Client, name: str, password: str = PASSWORD) -> httpx.Response:
     """As the page does it."""
     return client.post("/api/signin", json={"name": name, "password": password}, headers=OWN)

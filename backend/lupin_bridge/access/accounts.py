@@ -13,7 +13,7 @@ import sqlite3
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 from urllib.parse import quote
 
 from lupin_bridge.access.credentials import (
@@ -174,6 +174,13 @@ class Accounts:
         except sqlite3.Error as error:
             raise AccountError(f"the file of accounts cannot be written: {error}") from error
 
+    def _rows(self, sql: str, *values: object) -> list[Any]:
+        """What a query finds; errors of SQLite become `AccountError`."""
+        try:
+            return self._connection.execute(sql, values).fetchall()
+        except sqlite3.Error as error:
+            raise AccountError(f"the file of accounts cannot be read: {error}") from error
+
     # --- accounts and tokens ------------------------------------------------------------------
 
     def add(
@@ -222,56 +229,51 @@ class Accounts:
 
     def listed(self, kind: Kind) -> list[Listed]:
         """All accounts or tokens, by name."""
-        found = self._connection.execute(
-            "SELECT name, role, made_at_s, sites FROM person WHERE kind = ? ORDER BY name", (kind,)
-        )
-        return [Listed(*row) for row in found]
+        sql = "SELECT name, role, made_at_s, sites FROM person WHERE kind = ? ORDER BY name"
+        return [Listed(*row) for row in self._rows(sql, kind)]
 
     # --- who is it ----------------------------------------------------------------------------
 
-    def of_name(self, name: str) -> tuple[Person, str] | None:
-        """An account and its password's hash."""
-        found = self._connection.execute(
-            "SELECT role, secret, sites FROM person WHERE name = ? AND kind = 'account'", (name,)
-        ).fetchone()
-        if found is None:
-            return None
-        role, secret, sites = found
-        return Person(name, role, sites=_lines(sites)), secret
+    def of_name(self, name: str) -> Person | None:
+        """The person of an account; None: unknown."""
+        return self._person("kind = 'account' AND name = ?", name)
 
     def of_token(self, secret: str) -> Person | None:
         """The person of a token, by its digest; None: unknown."""
-        found = self._connection.execute(
-            "SELECT name, role, sites FROM person WHERE secret = ? AND kind = 'token'", (secret,)
-        ).fetchone()
-        if found is None:
-            return None
-        name, role, sites = found
-        return Person(name, role, by="token", token=secret, sites=_lines(sites))
+        return self._person("kind = 'token' AND secret = ?", secret)
+
+    def _person(self, which: str, value: str) -> Person | None:
+        sql = f"SELECT name, role, kind, secret, sites FROM person WHERE {which}"  # noqa: S608
+        for name, role, kind, secret, sites in self._rows(sql, value):
+            return Person(name, role, kind, secret=secret, sites=_lines(sites))
+        return None
 
     def of_session(self, session: str, now_s: float) -> Person | None:
         """The person of a session, by its id in the file; None: it has ended."""
-        found = self._connection.execute(_OF_SESSION, (session, int(now_s))).fetchone()
-        if found is None:
-            return None
-        name, role, sites, ends_at_s = found
-        return Person(name, role, session=session, ends_at_s=ends_at_s, sites=_lines(sites))
+        for name, role, sites, ends_at_s in self._rows(_OF_SESSION, session, int(now_s)):
+            return Person(name, role, session=session, ends_at_s=ends_at_s, sites=_lines(sites))
+        return None
 
     # --- sessions -----------------------------------------------------------------------------
 
     def begin_session(
-        self, name: str, address: str, now_s: int, *, ends_others: bool = False
-    ) -> str:
+        self, person: Person, address: str, now_s: int, *, ends_others: bool = False
+    ) -> str | None:
         """Begin a session of an account or token; returns its cookie.
 
-        `ends_others`: end the other sessions of that name.
+        None: it was removed meanwhile, or has another secret. `ends_others`: end the other sessions
+        of that name.
 
         Raises:
-            AccountError: the name has gone meanwhile, or the file cannot be written.
+            AccountError: the file cannot be written.
 
         """
-        cookie = secrets.token_urlsafe(32)
+        cookie, name = secrets.token_urlsafe(32), person.name
         with self._writing() as connection:
+            if not self._rows(
+                "SELECT 1 FROM person WHERE (name, secret) = (?, ?)", name, person.secret
+            ):
+                return None
             connection.execute("DELETE FROM session WHERE ends_at_s <= ?", (now_s,))
             # Past the limit, the oldest ends: many people may know one password.
             connection.execute(
@@ -335,7 +337,7 @@ class Accounts:
 
     def devices(self, site: str) -> list[Device]:
         """The devices of everybody who may read this site."""
-        found = self._connection.execute(
+        found = self._rows(
             "SELECT endpoint, public_key, device.secret, language, sites FROM device"
             " JOIN person USING (name) ORDER BY endpoint"
         )
@@ -371,11 +373,8 @@ class Accounts:
 
     def audited(self, most: int = -1) -> list[Audited]:
         """The audit trail, newest first."""
-        found = self._connection.execute(
-            "SELECT at_s, who, what, subject, address FROM audit ORDER BY number DESC LIMIT ?",
-            (most,),
-        )
-        return [Audited(*row) for row in found]
+        sql = "SELECT at_s, who, what, subject, address FROM audit ORDER BY number DESC LIMIT ?"
+        return [Audited(*row) for row in self._rows(sql, most)]
 
 
 def _lines(text: str) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import hmac
 import re
 import secrets
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 from itsdangerous import BadSignature, Signer
@@ -39,9 +39,9 @@ class AccountError(Exception):
 class Person:
     """Who makes a request, what they may do, and how they are known.
 
-    `session` is their session's id, `ends_at_s` its end, s since the epoch. `token` is the digest
-    of the request's token. `name` is empty for the shared token. `sites` are those whose data they
-    may read; empty: all.
+    `session` is their session's id, `ends_at_s` its end, s since the epoch. `secret` is a password
+    or token as it is stored. `name` is empty for the shared token. `sites` are those whose data
+    they may read; empty: all.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Person:
     by: Literal["account", "token", "proxy", "shared token"] = "account"
     session: str = ""
     ends_at_s: int = 0
-    token: str = ""
+    secret: str = field(default="", compare=False, repr=False)
     sites: tuple[str, ...] = ()
 
     def may(self, role: Role) -> bool:

@@ -10,7 +10,6 @@ import asyncio
 import logging
 import math
 import secrets
-import sqlite3
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -92,13 +91,9 @@ class People:
                     return person
         if not self.has_file:
             return None
-        names = [digest(cookie) for cookie in cookies_of(self._cookie_name(), headers)]
-
-        def find(accounts: Accounts) -> Person | None:
-            found = (accounts.of_session(name, now_s) for name in names)
-            return next((person for person in found if person is not None), None)
-
-        return self._ask(find)
+        sessions = map(digest, cookies_of(self._cookie_name(), headers))
+        found = (self._file().of_session(session, now_s) for session in sessions)
+        return next((person for person in found if person is not None), None)
 
     def by_token(self, token: str) -> Person | None:
         """The person of a token; None: it is unknown.
@@ -109,7 +104,7 @@ class People:
         """
         if self.shared is not None and self.shared.accepts(token):
             return SHARED
-        return self._ask(lambda it: it.of_token(digest(token))) if self.has_file else None
+        return self._file().of_token(digest(token)) if self.has_file else None
 
     def by_proxy(self, name: str) -> Person | None:
         """The person whom a trusted proxy names; without such an account, they are a viewer.
@@ -120,9 +115,8 @@ class People:
         """
         if not is_name(name):
             return None
-        found = self._ask(lambda it: it.of_name(name)) if self.has_file else None
-        known = Person(name, "viewer") if found is None else found[0]
-        return replace(known, by="proxy")
+        found = self._file().of_name(name) if self.has_file else None
+        return replace(found or Person(name, "viewer"), by="proxy")
 
     def may_stay(self, person: Person | None) -> bool:
         """Whether a connection may stay: its session or token is as it was when it began.
@@ -140,9 +134,9 @@ class People:
         if person.by == "proxy":
             return self.by_proxy(person.name) == person
         if person.session:
-            return self._ask(lambda it: it.of_session(person.session, time.time())) == person
+            return self._file().of_session(person.session, time.time()) == person
         # By its digest: a new token of the same name does not count for a revoked one.
-        return self._ask(lambda it: it.of_token(person.token)) == person
+        return self._file().of_token(person.secret) == person
 
     def has_account(self, person: Person) -> bool:
         """Whether it is somebody with an account, however they signed in.
@@ -151,7 +145,7 @@ class People:
             AccountError: the file cannot be read.
 
         """
-        return self.has_file and self._ask(lambda it: it.of_name(person.name)) is not None
+        return self.has_file and self._file().of_name(person.name) is not None
 
     async def check(self, name: str, password: str, address: str) -> Person | None:
         """The person who signs in; None: there is no such account, or the password is wrong.
@@ -185,14 +179,16 @@ class People:
     async def _check(self, name: str, password: str) -> Person | None:
         if not is_name(name):
             return None
-        known = self._ask(lambda it: it.of_name(name))
-        is_right = await self._on_thread(lambda: verify(known[1] if known else "", password))
-        return known[0] if known is not None and is_right else None
+        known = self._file().of_name(name)
+        kept = known.secret if known else ""
+        return known if await self._on_thread(lambda: verify(kept, password)) else None
 
     async def sign_in(
         self, person: Person, address: str, *, ends_others: bool = False
-    ) -> tuple[str, str, int]:
+    ) -> tuple[str, str, int] | None:
         """Begin a session; returns its cookie's name and value, and how long it lasts, s.
+
+        None: the account was removed while its password was checked, or has another one now.
 
         Raises:
             ClientLimitError, AccountError: see `write`.
@@ -201,9 +197,9 @@ class People:
         if self.shared is not None and person.by == "shared token":
             return self.shared.cookie_name, self.shared.cookie(time.time()), SHARED_SESSION_S
         cookie = await self.write(
-            lambda it, now_s: it.begin_session(person.name, address, now_s, ends_others=ends_others)
+            lambda it, now_s: it.begin_session(person, address, now_s, ends_others=ends_others)
         )
-        return self._cookie_name(), cookie, SESSION_S
+        return None if cookie is None else (self._cookie_name(), cookie, SESSION_S)
 
     async def sign_out(self, person: Person, address: str) -> str:
         """End the session that a request came with; returns its cookie's name.
@@ -247,12 +243,6 @@ class People:
     def _cookie_name(self) -> str:
         """Browsers keep one jar for all ports of a host, so each file has a cookie of its own."""
         return f"lupin_person_{self._file().id[:8]}"
-
-    def _ask(self, work: Callable[[Accounts], ResultT]) -> ResultT:
-        try:
-            return work(self._file())
-        except sqlite3.Error as error:
-            raise AccountError(f"the file of accounts cannot be read: {error}") from error
 
     def _file(self) -> Accounts:
         try:

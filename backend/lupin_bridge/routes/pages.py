@@ -21,7 +21,6 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.field import weighted
 from lupin_bridge.routes.answers import (
-    CLIENT_DISCONNECTED,
     NEVER_STORE,
     computed,
     error_response,
@@ -263,13 +262,12 @@ async def sign_in(request: Request) -> Response:
             request, people.check(given.name, given.password, address)
         )
         ends_others = given.ends_others
-    if person is None:
-        return error_response("there is no such account, or the password is wrong", 401)
-    begun = await while_client_waits(
-        request, people.sign_in(person, address, ends_others=ends_others)
-    )
+    begun = None
+    if person is not None:
+        signing_in = people.sign_in(person, address, ends_others=ends_others)
+        begun = await while_client_waits(request, signing_in)
     if begun is None:
-        return Response(status_code=CLIENT_DISCONNECTED)
+        return error_response("there is no such account, or the password is wrong", 401)
     name, cookie, lasts_s = begun
     response = Response(status_code=204, headers=NEVER_STORE)
     _set_cookie(request, response, name, cookie, lasts_s)

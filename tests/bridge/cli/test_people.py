@@ -12,7 +12,7 @@ import pytest
 from lupin_bridge.access.accounts import Accounts
 from lupin_bridge.access.credentials import Person, digest
 from lupin_bridge.access.people import verify
-from tests.support.people import PASSWORD
+from tests.support.people import PASSWORD, begin_session
 from tests.support.processes import run_here
 
 NOW = r"20\d\d-\d\d-\d\dT\d\d:\d\d:\d\dZ"
@@ -58,10 +58,9 @@ def test_a_user_is_added_listed_and_removed(file: Path) -> None:
     with closing(Accounts(file, is_writer=True)) as accounts:
         found = accounts.of_name("anna")
         assert found is not None
-        person, stored = found
-        assert person == Person("anna", "operator", sites=("gh1", "gh2"))
-        assert verify(stored, PASSWORD)
-        session = digest(accounts.begin_session("anna", "::1", int(time.time())))
+        assert found == Person("anna", "operator", sites=("gh1", "gh2"))
+        assert verify(found.secret, PASSWORD)
+        session = digest(begin_session(accounts, int(time.time())))
     assert printed(file, "user remove anna") == "account anna is removed\n"
     assert printed(file, "user list").startswith("bert ")
     with closing(Accounts(file)) as accounts:
@@ -91,7 +90,7 @@ def test_the_audit_trail_is_csv_with_the_latest_row_first(file: Path) -> None:
     printed(file, "user add anna --role admin --no-password")
     token = printed(file, "token add scada --role viewer").strip()
     with closing(Accounts(file, is_writer=True)) as accounts:
-        accounts.begin_session("anna", "192.0.2.7", int(time.time()))
+        begin_session(accounts, int(time.time()))
     printed(file, "token revoke scada")
     text = printed(file, "audit")
     header, *rows = csv.reader(text.splitlines())

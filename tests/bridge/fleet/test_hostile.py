@@ -302,12 +302,24 @@ def test_an_unreadable_or_slow_site_costs_no_other_site_its_status(
 def test_nothing_that_a_site_writes_stops_the_overview_of_the_others(
     archive: Archive, tmp_path: Path
 ) -> None:
-    forward(archive, tmp_path / "journal", scans_lately())
+    forward(
+        archive, tmp_path / "journal", [*scans_lately(), inspection("1", time.time_ns() - 10**9)]
+    )
     archive.copy_site("gh2")
     archive.keep_live()
     archive.add_user("gh2")
+    # PostgreSQL holds it in the text of JSON, and JSON that is answered cannot.
+    lone, size = "\\ud800", '"width": 0, "height": 0, "resolution": 1, "stamp_ns": 1, "cells": ""'
+    origin = '"origin_x": 0, "origin_y": 0, "origin_yaw": 0'
+    archive.do(f"""UPDATE series SET sensors = '["{lone}"]' WHERE (site, tag) = ('gh2', '1')""")
+    archive.do(f"""UPDATE look SET blooms = '[[0, 0, 0, 0, "{lone}", 0, 0]]' WHERE site = 'gh2'""")
+    plan = f'{{"frame_id": "{lone}", {origin}, {size}}}'
+    archive.do(f"INSERT INTO meta VALUES ('gh2', 'map', '{plan}')")
     with fleet(archive) as running:
         running.site("gh2", is_live=True)
+        for path in ("state", "tags/1", f"state?at={time.time():.0f}", "report", "map"):
+            found = running.http.get(f"/sites/gh2/api/{path}")
+            assert (found.status_code, '"?"' in found.text) == (200, True), found.text
         with psycopg.connect(archive.url("gh2"), autocommit=True) as site:
             for at in ("infinity", "0001-01-01"):
                 site.execute("UPDATE forwarder SET heard_at = %s", (at,))

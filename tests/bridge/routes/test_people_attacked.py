@@ -6,7 +6,8 @@ import socket
 import sqlite3
 import time
 from collections.abc import Iterator
-from contextlib import closing
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -29,6 +30,7 @@ from tests.support.people import (
     in_s,
     notes,
     remove,
+    sign_in,
     signed_in,
     write,
 )
@@ -168,6 +170,26 @@ def test_a_disconnect_or_a_shutdown_during_a_body_is_no_error(accounts: Path) ->
         assert "ERROR" not in running.process.output
 
 
+def test_who_is_removed_or_replaced_amid_a_sign_in_gets_no_session(
+    live: Bridge, accounts: Path
+) -> None:
+    # What the hash says of itself decides: seconds, for which the others wait behind it.
+    add(accounts, secret=f"$argon2id$v=19$m=65536,t=30,p=1${'A' * 22}${'A' * 43}", slow="viewer")
+    add(accounts, gone="operator", new="operator")
+    with ExitStack() as open_, ThreadPoolExecutor() as clients:
+        answers = []
+        for name in ("slow", "gone", "new"):
+            client = open_.enter_context(httpx.Client(base_url=live.url, timeout=PATIENCE_S))
+            answers.append(clients.submit(sign_in, client, name))
+            assert client.get("/healthz").status_code == 200  # and the sign-in before it is read
+        for name in ("gone", "new"):
+            remove(accounts, name)
+        add(accounts, secret="of another password", new="operator")
+        assert not any(answer.done() for answer in answers)
+        for answer in answers:
+            assert (answer.result().status_code, [*answer.result().cookies]) == (401, [])
+
+
 def test_a_shutdown_during_a_sign_in_is_no_error(tmp_path: Path) -> None:
     path = tmp_path / "accounts.sqlite"
     # The parameters in the hash decide the work: minutes for this one.
@@ -196,6 +218,11 @@ def test_open_connections_end_when_the_first_account_is_created_and_when_the_fil
         with open_websocket(ws) as stream:
             add(path, "token", scada="viewer")
             assert "sign in again" in end_of(stream)
+        add(path, "token", digest(f"boss-{TOKEN}"), boss="admin")
+        with closing(sqlite3.connect(path)) as file:
+            file.execute("DROP TABLE audit")
+        refused = live.get("/api/audit", {"Authorization": f"Bearer boss-{TOKEN}"})
+        assert (refused.status_code, "cannot be read" in refused.text) == (503, True)
         with open_websocket(ws, additional_headers=BEARER) as stream:
             path.unlink()
             refused = live.get("/api/state", BEARER)

@@ -1,4 +1,5 @@
 import os
+import shutil
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -144,6 +145,23 @@ def test_a_removed_file_is_created_anew(path: Path) -> None:
         journal.write(scan("2"))
         wait_for(lambda: journal.condition.written == 2, "the row after it")
     assert known(path) == {scan("2")}
+
+
+def test_a_removed_log_is_reported_and_a_kill_after_it_loses_nothing(
+    path: Path, tmp_path: Path
+) -> None:
+    with recording(path) as journal:
+        journal.write(scan("1"))
+        wait_for(lambda: journal.condition.written == 1, "the row")
+        path.with_name("j.sqlite-wal").unlink()
+        wait_state(journal, JournalState.FAILING, "j.sqlite-wal was removed: restart the twin")
+        journal.write(scan("2"))
+        # As a killed process leaves it.
+        left = tmp_path / "left.sqlite"
+        wait_for(lambda: known(Path(shutil.copy(path, left))) == {scan("1"), scan("2")}, "both")
+    with recording(path) as journal:
+        wait_state(journal, JournalState.RECORDING)
+    assert known(path) == {scan("1"), scan("2")}
 
 
 def test_beyond_the_limit_the_oldest_writes_are_lost_and_counted(

@@ -41,6 +41,11 @@ def too_long(what: str, text: str) -> str:
     return f"{what} {text[:24]!r}… has {len(text)} characters, the limit is {MAX_TEXT_LENGTH}"
 
 
+def valid_text(text: str) -> str:
+    """The text without lone surrogates, which JSON may hold, but neither SQLite nor an answer."""
+    return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")
+
+
 def check_length(what: str, length: int, limit: int) -> None:
     """Raise `Rejected` if the `length` of `what` is above `limit`."""
     if length > limit:

@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from lupin_twin.core.drops import valid_text
 from lupin_twin.field.grid import BoolArray, FloatArray, cell_centres, reach_of
 
 # A site of 350 m by 350 m at 5 cm. The bound keeps memory finite when a producer is broken.
@@ -252,9 +253,10 @@ def map_of(text: str, revision: int) -> OccupancyMap:
         size = int(about["width"]) * int(about["height"])
         if not 0 <= size <= MAX_PACKED_CELLS:
             raise ValueError(f"it has {size} cells, the limit is {MAX_PACKED_CELLS}")
+        about |= {"frame_id": valid_text(about["frame_id"]), "stamp_ns": int(about["stamp_ns"])}
         # At most one byte more than the stated size, whatever was packed.
         packed = base64.b64decode(about.pop("cells"), validate=True)
         cells = zlib.decompressobj().decompress(packed, size + 1)
         return OccupancyMap(**about, cells=np.frombuffer(cells, np.int8), revision=revision)
-    except (AttributeError, KeyError, TypeError, zlib.error) as error:
+    except (AttributeError, KeyError, TypeError, ArithmeticError, zlib.error) as error:
         raise ValueError(f"it is not a map: {error}") from None

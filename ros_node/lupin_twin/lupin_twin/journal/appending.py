@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
+from lupin_twin.core.drops import valid_text
 from lupin_twin.core.history import KIND_FLOWER, KNOWN_BY_NOTHING, kind_of
 from lupin_twin.core.state import Flower, Inspection, Pin, Scan, Write
 from lupin_twin.journal.counts import count_rows
@@ -121,7 +122,7 @@ class Appender:
     # --- the three kinds ----------------------------------------------------------------------
 
     def _append(self, run: int, row: Write, is_copy: int) -> bool:
-        tag = _unicode(row.tag_id)
+        tag = valid_text(row.tag_id)
         if isinstance(row, Pin):
             pose = row.pose
             numbers = (pose.x, pose.y, pose.z, pose.qx, pose.qy, pose.qz, pose.qw)
@@ -138,8 +139,8 @@ class Appender:
         """A scan, or an attempt of either kind that failed."""
         kind = kind_of(scan)
         sent = scan.readings if isinstance(scan, Scan) else ()
-        readings = {_unicode(reading.name): reading.value for reading in sent}
-        stamp_ns, own_ns, source = scan.stamp_ns, _own_ns(scan), _unicode(scan.source)
+        readings = {valid_text(reading.name): reading.value for reading in sent}
+        stamp_ns, own_ns, source = scan.stamp_ns, _own_ns(scan), valid_text(scan.source)
         known = self._known((run, tag, kind), own_ns or stamp_ns, source, is_copy)
         if known is not None:
             known_ns, own_ns, sensors = known
@@ -158,8 +159,8 @@ class Appender:
                 scan.arrival_ns,
                 scan.status,
                 source,
-                _unicode(scan.mission),
-                _unicode(scan.status_detail),
+                valid_text(scan.mission),
+                valid_text(scan.status_detail),
                 is_copy,
                 _numbers(readings.values()),
             )
@@ -170,7 +171,7 @@ class Appender:
         self, run: int, tag: str, inspection: Inspection, flower: Flower, is_copy: int
     ) -> bool:
         at = (run, tag, KIND_FLOWER)
-        source, key = _unicode(inspection.source), inspection.own_stamp_ns or inspection.stamp_ns
+        source, key = valid_text(inspection.source), inspection.own_stamp_ns or inspection.stamp_ns
         if self._known(at, key, source, is_copy) is not None:
             return False
         self.last_seq += 1
@@ -184,8 +185,8 @@ class Appender:
                 _own_ns(inspection),
                 inspection.arrival_ns,
                 source,
-                _unicode(inspection.mission),
-                _unicode(flower.species),
+                valid_text(inspection.mission),
+                valid_text(flower.species),
                 flower.confidence,
                 int(flower.anomaly),
                 flower.flower_count,
@@ -293,18 +294,13 @@ def _blooms(flower: Flower) -> str:
         [
             [
                 *map(_finite, (bloom.x, bloom.y, bloom.z, bloom.height_m)),
-                bloom.species,
+                valid_text(bloom.species),
                 _finite(bloom.confidence),
                 int(bloom.anomaly),
             ]
             for bloom in flower.blooms
         ]
     )
-
-
-def _unicode(text: str) -> str:
-    """The text as SQLite accepts it: a row must not be lost because of invalid Unicode."""
-    return text if text.isascii() else text.encode("utf-8", "replace").decode("utf-8")
 
 
 def _held(row: Write, begun_ns: int, *, retains_key: bool) -> Write:

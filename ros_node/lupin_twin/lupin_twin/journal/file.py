@@ -90,7 +90,9 @@ class JournalFile:
         self.simulated: tuple[int, int] | None = None
         # The limit that is exceeded although nothing more can be deleted, in words.
         self.unmet_limit = ""
-        self._path = path
+        # What is wrong if the write-ahead log (WAL) was removed; then readers may fail.
+        self.lost_log = ""
+        self._path, self._log = path, path.with_name(path.name + "-wal")
         self._limits = limits
         self._map: object = None
         self._map_rests_until_s = 0.0
@@ -128,7 +130,7 @@ class JournalFile:
         except BaseException:  # whatever it was: the caller gets no object to close
             self._connection.close()
             raise
-        self.inode = self._path.stat().st_ino
+        self.inode, self._log_inode = _inode(self._path), _inode(self._log)
 
     def _salvage(self) -> None:
         """Copy what is readable of a file that was quarantined now, or before the last stop."""
@@ -334,9 +336,13 @@ class JournalFile:
         now_s = time.monotonic()
         if now_s - self._polled_s >= _POLL_EVERY_S:
             self._polled_s = now_s
-            if not self._path.exists() or self._path.stat().st_ino != self.inode:
+            if _inode(self._path) != self.inode:
                 raise FileNotFoundError(f"{self._path} was removed or replaced")
-        if self._log_bytes() > _LOG_BYTES:
+            if _inode(self._log) != self._log_inode:
+                self.lost_log = f"{self._log} was removed: restart the twin, nothing is lost so far"
+        # Without its name, the WAL is lost with the process. Opened anew, it would be another one
+        # for us than for the readers that have it open.
+        if self.lost_log or self._log_bytes() > _LOG_BYTES:
             self._connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
         return may_purge and self._purge(now_s)
 
@@ -361,7 +367,7 @@ class JournalFile:
         return self._purges_before_ns is not None or self._is_shrinking
 
     def _log_bytes(self) -> int:
-        return size_of(self._path.with_name(self._path.name + "-wal"))
+        return size_of(self._log)
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
@@ -372,3 +378,10 @@ class JournalFile:
             self._appender = Appender(self._connection)
             raise
         self._syncing.has_written()
+
+
+def _inode(path: Path) -> int:
+    try:
+        return path.stat().st_ino
+    except FileNotFoundError:
+        return 0

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any, Final
 
+from lupin_twin.core.drops import valid_text
 from lupin_twin.core.history import KIND_FLOWER, LatestRequest
 from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import STATUS_OK, Bloom, Flower, Inspection, Reading, Scan, Write
@@ -183,11 +184,11 @@ def sensor_names(text: str) -> tuple[str, ...]:
     """
     try:
         names = json.loads(text)
-    except (ValueError, RecursionError):
-        names = None
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise DamagedFile(f"{text[:64]!r} is not a list of sensors")
-    return tuple(names)
+        if isinstance(names, list):
+            return tuple(map(valid_text, names))
+    except (AttributeError, ValueError, RecursionError):
+        pass
+    raise DamagedFile(f"{text[:64]!r} is not a list of sensors")
 
 
 def flower_of(row: Sequence[Any]) -> Flower:
@@ -208,14 +209,14 @@ def flower_of(row: Sequence[Any]) -> Flower:
             () if blooms == "[]" else tuple(_bloom(*bloom) for bloom in json.loads(blooms)),
             () if box == "[]" else tuple(_point(*point) for point in json.loads(box)),
         )
-    except (ValueError, TypeError, RecursionError):
+    except (AttributeError, ArithmeticError, ValueError, TypeError, RecursionError):
         raise DamagedFile("flowers or a box in the journal are invalid") from None
 
 
 def _bloom(*of: Any) -> Bloom:
     *at, species, confidence, anomaly = of
     x, y, z, height_m = map(_number, at)
-    return Bloom(x, y, z, height_m, species, _number(confidence), bool(anomaly))
+    return Bloom(x, y, z, height_m, valid_text(species), _number(confidence), bool(anomaly))
 
 
 def _point(x: Any, y: Any, z: Any) -> tuple[float, float, float]:

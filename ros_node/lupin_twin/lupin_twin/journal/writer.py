@@ -405,6 +405,8 @@ class Journal:
     def _report_well(self, file: JournalFile) -> None:
         state = JournalState.OFF if self._is_temporary else JournalState.RECORDING
         detail = self._summary(file.unmet_limit)
+        if file.lost_log:
+            state, detail = JournalState.FAILING, file.lost_log
         if self._doubted_ns is not None:
             state = JournalState.DOUBTING
             until = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self._doubted_ns // 10**9))

@@ -43,7 +43,7 @@ export const nameText = (alarm: Alarm, speech: Speech): string =>
 /** An alarm's values in words, rounded so that they contradict neither each other nor the limit. */
 export interface Values {
   readonly what: string;
-  /** What to do about it; empty: nothing. */
+  /** What to do about it. */
   readonly todo: string;
   /** Null: the alarm has no value, or is resolved. */
   readonly now: string | null;

@@ -223,11 +223,11 @@ describe('a reason in words', () => {
     );
   });
 
-  test('back in its ideal range, nothing has to be done; within what is critical alone, it has', () => {
+  test('back in its ideal range, it is watched; within what is critical alone, it is not enough', () => {
     expect(todoText(reason({ verdict: 'stressed', value: 18.1, limit: 18, ...held(18.4) }))).toBe(
-      '',
+      'Keep an eye on it',
     );
-    expect(todoText(reason({ value: 10.1, limit: 10, ...held(10.4) }))).not.toBe('');
+    expect(todoText(reason({ value: 10.1, limit: 10, ...held(10.4) }))).toMatch(/^Heat/);
   });
 
   test('beside its mark, it does not say again how bad it is', () => {

@@ -204,14 +204,11 @@ export function beyondText(sensors: Catalogue, reason: OfRange, unit: Temperatur
   return `${shown(sensor.label, LONGEST_NAME)} ${said}`;
 }
 
-/**
- * What to do about it; for what is healthy again, what its alarm still waits for. Empty: nothing to
- * do, as the value is back in range and the reason says what ends it.
- */
+/** What to do about it; for what is healthy again, what its alarm still waits for. */
 export function todoText(reason: HealthReason): string {
   if (reason.verdict === 'healthy') return reason.kind === 'pest' ? S.todoPestAgain : S.todoWell;
   const { sensors, ...kinds } = S.todo;
-  if (isBack(reason)) return '';
+  if (isBack(reason)) return S.todo.watch;
   if (isOfRange(reason) && reason.sensor in sensors) {
     return sensors[reason.sensor as keyof typeof sensors][sideOf(reason)];
   }

@@ -111,11 +111,11 @@ function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.
   );
 }
 
-/** What to do about the reasons, without duplicates; some have nothing to do. */
+/** What to do about the reasons, without duplicates. */
 function Todo({ reasons }: { reasons: readonly HealthReason[] }): JSX.Element {
   return (
     <strong>
-      <Dotted texts={[...new Set(reasons.map(todoText))].filter(Boolean)} />
+      <Dotted texts={[...new Set(reasons.map(todoText))]} />
     </strong>
   );
 }

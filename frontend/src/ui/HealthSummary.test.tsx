@@ -145,13 +145,13 @@ test('of a robot that stands still what is critical is told first', () => {
   ]);
 });
 
-test('of what is back in its range nothing is ordered', () => {
+test('what is back in its range is to be watched', () => {
   const back = reason({ verdict: 'stressed', value: 18.1, limit: 18, ...held(18.5) });
   showTags(TAGS, judgement({ 1: 'healthy', 5: [back] }));
   render(<HealthSummary kiosk={false} />);
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect(todo.textContent.trim()).toBe(
-    'StressedTag 5: Temperature 18.1\u00a0°C, stressed until 18.5',
+    'StressedTag 5: Temperature 18.1\u00a0°C, stressed until 18.5Keep an eye on it',
   );
 });
 

@@ -163,6 +163,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       vpd: { below: 'Lüften und heizen', above: 'Befeuchten oder schattieren' },
     },
     range: 'Klimaregelung prüfen',
+    watch: 'Beobachten',
     reading_failed: 'Sensor prüfen',
     scan_failed: 'Weg und Messpunkt prüfen',
     pest: 'Prüfen und bekämpfen',

@@ -171,6 +171,8 @@ export const HEALTH = {
       vpd: { below: 'Ventilate and heat', above: 'Mist or shade' },
     },
     range: 'Check the climate settings',
+    /** For a value that is back in its range, but not far enough inside yet. */
+    watch: 'Keep an eye on it',
     reading_failed: 'Check the sensor',
     scan_failed: 'Check the path and the tag',
     pest: 'Inspect and treat the plants',

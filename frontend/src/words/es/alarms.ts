@@ -170,6 +170,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       vpd: { below: 'Ventilar y calefactar', above: 'Humidificar o sombrear' },
     },
     range: 'Revisar el control del clima',
+    watch: 'Vigilar',
     reading_failed: 'Revisar el sensor',
     scan_failed: 'Revisar el acceso y el punto',
     pest: 'Revisar y tratar',

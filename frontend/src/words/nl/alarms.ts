@@ -158,6 +158,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       vpd: { below: 'Luchten en stoken', above: 'Bevochtigen of schermen' },
     },
     range: 'Klimaatregeling controleren',
+    watch: 'In de gaten houden',
     reading_failed: 'Sensor controleren',
     scan_failed: 'Pad en meetpunt controleren',
     pest: 'Controleren en bestrijden',

@@ -11,7 +11,14 @@ import {
 import { beyondText, isOfRange, reasonText, sideOf, todoText } from '../domain/health';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
-import { dayFormat, hasDate, secondsOf, shortRosText, type When } from '../domain/time';
+import {
+  dayFormat,
+  hasDate,
+  secondsOf,
+  secondsSince,
+  shortRosText,
+  type When,
+} from '../domain/time';
 import { S } from '../strings';
 
 /** Longest tag name, characters: names come from the robot. */
@@ -118,7 +125,8 @@ export function spanText({ raised_at, cleared_at }: Alarm, nowS: number | null):
   const from = secondsOf(raised_at);
   const begin = whenText(from, nowS);
   if (cleared_at === null) {
-    return S.alarmSince(begin, nowS === null ? null : lengthText(nowS - from));
+    const length = nowS === null ? null : secondsSince(from, nowS);
+    return S.alarmSince(begin, length === null ? null : lengthText(length));
   }
   const until = secondsOf(cleared_at);
   const end = isSameDay(from, until) ? clockOf(until) : whenText(until, nowS);
@@ -133,7 +141,9 @@ export function timesOf(
 ): { readonly length: string; readonly note: string } {
   const from = secondsOf(raised_at);
   const until = cleared_at ? secondsOf(cleared_at) : nowS;
-  if (until === null) return { length: whenText(from, nowS), note: '' };
+  if (until === null || secondsSince(from, until) === null) {
+    return { length: whenText(from, nowS), note: '' };
+  }
   const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? until);
   const day = isOfToday ? '' : dayFormat.format(from * 1000);
   const note = isOver ? `${S.alarmResolved} ${whenText(until, nowS)}` : day;

@@ -3,7 +3,7 @@ import { beforeEach, expect, test } from 'vitest';
 
 import type { StatusFrame } from '../contract/types';
 import { act, receive, store } from '../store/app';
-import { selectOrigin } from '../store/moment';
+import { latestWord, selectOrigin } from '../store/moment';
 import { NO_HOUSE, withPast } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
@@ -49,6 +49,13 @@ test('a simulation is live, and told at first sight; one by /clock is not green'
   expect(screen.getByTestId('origin').textContent).toMatch(/^Simulated time/);
   expect(badge().dataset['ofNow']).toBe('false');
   expect(screen.queryByTestId('recorded-frame')).toBeNull();
+});
+
+test('while its time is paused, nothing is live', () => {
+  shows('simulated', 'paused');
+  expect(badge().textContent).toBe('Connection: Paused');
+  expect(badge().dataset['ofNow']).toBe('false');
+  expect(latestWord()).toBe('Paused');
 });
 
 test('what is still shown stays simulated at a bridge that has received nothing yet', () => {

@@ -82,11 +82,11 @@ test('while the twin is silent, the shown state keeps its own time', async () =>
   clock.mockReturnValue(performance.now() + 60_000);
   act({ compare: { by: 'ago', seconds: 10 } });
   await settled();
-  expect(at()).toBeGreaterThanOrEqual(60);
+  expect(at()).toBeGreaterThanOrEqual(160);
   clock.mockReturnValue(performance.now() + 5_000);
   goLive(status({ twin: 'offline', reason: 'stale' }));
   await vi.advanceTimersByTimeAsync(5_000);
-  expect(at()).toBe(0);
+  expect(at()).toBeLessThan(160);
   clock.mockRestore();
 });
 

@@ -197,7 +197,7 @@ export type Now =
       readonly kind: 'unknown';
       readonly last: number | null;
       readonly lastAt: When;
-      /** Value when the twin fell silent; null: unknown then too. */
+      /** As last judged, of an old reading or a silent twin; null: unknown then too. */
       readonly before?: Extract<Now, { kind: 'known' }> | null;
     };
 
@@ -250,8 +250,12 @@ export function nowOf(
   if (isDerived && !said && !reasons.some(lacks)) {
     return { kind: 'known', value: null, verdict, reason: null, trend: null };
   }
-  if (last === null || isOldReading(sensor, tag)) {
-    return unknown(last, readAt.get(sensor) ?? 'unknown');
+  if (last === null) return unknown(null, readAt.get(sensor) ?? 'unknown');
+  if (isOldReading(sensor, tag)) {
+    // It is not of now, but its status is that of its tag: a bad one still counts.
+    const judged = { value: last, verdict: said?.verdict ?? 'unknown', reason: said ?? null };
+    const at = readAt.get(sensor) ?? tag.tag.scannedAt;
+    return unknown(last, at, { kind: 'known', ...judged, trend: null });
   }
   const trend = trendOf(sensor, tag, hourAgo);
   return {
@@ -263,7 +267,7 @@ export function nowOf(
   };
 }
 
-/** The value now, or when the twin fell silent; null or undefined: unknown. */
+/** The value now, or as last judged; null or undefined: unknown. */
 export const lastKnown = (now: Now | null): Extract<Now, { kind: 'known' }> | null | undefined =>
   now?.kind === 'unknown' ? now.before : now;
 

@@ -209,6 +209,8 @@ export function todoText(reason: HealthReason): string {
   if (reason.verdict === 'healthy') return reason.kind === 'pest' ? S.todoPestAgain : S.todoWell;
   const { sensors, ...kinds } = S.todo;
   if (isBack(reason)) return S.todo.watch;
+  // Its last reading was in range, and is too old now.
+  if (isOfRange(reason) && reason.verdict === 'unknown') return S.todo.old;
   if (isOfRange(reason) && reason.sensor in sensors) {
     return sensors[reason.sensor as keyof typeof sensors][sideOf(reason)];
   }

@@ -201,7 +201,7 @@ function Todo({
   also: readonly Urgent[];
   id: string | undefined;
 }): JSX.Element {
-  const why = S.healthDriver(shown(tagId, 24), useReasonText(reason, true));
+  const why = S.healthDriver(shown(tagId, 24), useReasonText(reason, true, tagId));
   const since = useSince(tagId, reason);
   // A past moment's action is not an instruction for now.
   const isNow = useApp((state) => selectShown(state).moment === null);

@@ -8,8 +8,8 @@ import { act as look, receive, store } from '../store/app';
 import { NO_HOUSE, withPast } from '../store/twin';
 import { alarm, alarms, reportAlarms } from '../testing/alarms';
 import { held, judgement, reason } from '../testing/health';
-import { goLost, showTags } from '../testing/page';
-import { wireTag } from '../testing/tags';
+import { goLost, nextStamp, showTags } from '../testing/page';
+import { readings, wireTag } from '../testing/tags';
 import { AttentionList } from './AttentionList';
 import { HealthStrip } from './DoNow';
 import { HealthSummary } from './HealthSummary';
@@ -142,6 +142,24 @@ test('of a robot that stands still what is critical is told first', () => {
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
     expect.stringMatching(/^CriticalTag 5: .*also tag 1 /),
     expect.stringMatching(/^No tag is being scanned.* Check the robot$/),
+  ]);
+});
+
+test('a value that is too old says its age, and an attempt that of the last one', () => {
+  const at = nextStamp() - 2_400;
+  const cold = wireTag({ tag_id: '5', readings: readings({ temperature: 6.6 }, at) });
+  const old = { kind: 'old', verdict: 'unknown', sensor: '', value: null } as const;
+  const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
+  const attempt = { last_try: { sec: at + 2_340, nanosec: 0 }, last_try_status: 1 };
+  const tags = [cold, wireTag({ tag_id: '6', ...attempt })];
+  showTags(tags, judgement({ 5: [reason(), reason(old)], 6: [failed] }));
+  render(<HealthSummary kiosk={false} />);
+  const todo = screen.getByRole('list', { name: 'Do this now' });
+  expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
+    expect.stringMatching(
+      /^CriticalTag 5: Temperature 6.6\u00a0°C 40\u00a0min ago, below 10.0Heat/,
+    ),
+    expect.stringMatching(/^UnknownTag 6: Last scan failed: not reachable, 1\u00a0min ago/),
   ]);
 });
 

@@ -161,6 +161,12 @@ test('a value that is too old says its age, and an attempt that of the last one'
     ),
     expect.stringMatching(/^UnknownTag 6: Last scan failed: not reachable, 1\u00a0min ago/),
   ]);
+  // Of a silent twin, each value is one of then.
+  act(() => {
+    showTags([cold], judgement({ 5: [reason()] }));
+    goLost();
+  });
+  expect(todo.textContent).toMatch(/^CriticalTag 5: Temperature 6.6\u00a0°C 40\u00a0min ago, /);
 });
 
 test('what is back in its range is to be watched', () => {

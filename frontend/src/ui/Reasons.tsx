@@ -10,7 +10,7 @@ import { whenOf } from '../domain/twin';
 import { useApp, type AppState } from '../store/app';
 import { useSelected } from '../store/create';
 import { selectCatalogue, selectHealth } from '../store/derived';
-import { selectShown, selectTag } from '../store/moment';
+import { selectIsReceiving, selectShown, selectTag } from '../store/moment';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
 import { HealthShape } from './HealthMark';
@@ -25,13 +25,14 @@ export function useReasonText(
   const { snapshot, ageing } = useApp(selectShown);
   const tag = useApp((state) => selectTag(state, tagId));
   const health = useApp((state) => selectHealth(state).byTag.get(tagId));
+  const isReceiving = useApp(selectIsReceiving);
   const unit = useApp((state) => state.settings.unit);
   const catalogue = useApp(selectCatalogue);
   return useTicking((now) => {
     if (!reason) return '';
     const when =
       tag && health
-        ? whenShown(reason, { tag, health })
+        ? whenShown(reason, { tag, health }, isReceiving)
         : reason.since && snapshot
           ? whenOf(reason.since, snapshot)
           : 'unknown';
@@ -40,11 +41,17 @@ export function useReasonText(
 }
 
 /** When the attempt or reading behind a tag's reason was made; null: the text needs no age. */
-function whenShown({ kind, sensor, since }: HealthReason, then: TagThen): When | null {
+function whenShown(
+  { kind, sensor, since }: HealthReason,
+  then: TagThen,
+  isReceiving: boolean,
+): When | null {
   const { failedAttempt, readAt, scannedAt } = then.tag;
   if (kind === 'scan_failed') return failedAttempt?.at ?? 'unknown';
-  const isDated = kind === 'old' ? since !== null : sensor !== '' && isOldReading(sensor, then);
-  return isDated ? (readAt.get(sensor) ?? scannedAt) : null;
+  const isRecent = isReceiving && !isOldReading(sensor, then);
+  return (kind === 'old' ? since !== null : sensor !== '' && !isRecent)
+    ? (readAt.get(sensor) ?? scannedAt)
+    : null;
 }
 
 /** A reason's text, for use beside its mark. */

@@ -28,6 +28,11 @@ test('the reading of now, as bad as the bridge says it is now', () => {
   expect(nowOf(cold, state(20), null, true)).toMatchObject({ value: 20, verdict: 'healthy' });
 });
 
+test('a reading from before the alarm is none of now', () => {
+  const later = alarm('a', { raised: 101 });
+  expect(nowOf(later, state(20), null, true)).toMatchObject({ kind: 'unknown', last: null });
+});
+
 test('its trend is that against an hour before', () => {
   const before = {
     ...state(11),

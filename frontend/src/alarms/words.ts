@@ -251,6 +251,9 @@ export function nowOf(
     return { kind: 'known', value: null, verdict, reason: null, trend: null };
   }
   if (last === null) return unknown(null, readAt.get(sensor) ?? 'unknown');
+  // An alarm may arrive before its reading.
+  const read = tag.tag.wire.readings.find(({ name }) => name === sensor)?.observed_at;
+  if (read && secondsOf(read) < secondsOf(alarm.raised_at)) return unknown(null, 'unknown');
   if (isOldReading(sensor, tag)) {
     // It is not of now, but its status is that of its tag: a bad one still counts.
     const judged = { value: last, verdict: said?.verdict ?? 'unknown', reason: said ?? null };

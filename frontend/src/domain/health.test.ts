@@ -195,7 +195,7 @@ describe('a reason in words', () => {
     [
       { ...old, limit: 5_400, since: null },
       null,
-      `No scan with a known time (readings are valid for 1${NBSP}h 30${NBSP}min)`,
+      `No reading of known age (readings are valid for 1${NBSP}h 30${NBSP}min)`,
     ],
     [
       { kind: 'changed', value: 22, limit: null } as const,

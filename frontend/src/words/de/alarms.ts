@@ -136,8 +136,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
-          ? 'Keine Messung mit bekannter Zeit'
-          : 'kein Messwert mit bekannter Zeit'
+          ? 'Kein Messwert mit bekanntem Alter'
+          : 'kein Messwert mit bekanntem Alter'
         : age === null
           ? sensor === ''
             ? 'Schon länger nicht gemessen'

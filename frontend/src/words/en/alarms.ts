@@ -145,8 +145,8 @@ export const HEALTH = {
     old: (sensor: string, age: string | null, holds: string | null, isDated: boolean): string => {
       const since = !isDated
         ? sensor === ''
-          ? 'No scan with a known time'
-          : 'no reading with a known time'
+          ? 'No reading of known age'
+          : 'no reading of known age'
         : age === null
           ? `${sensor === '' ? 'Not' : 'not'} scanned recently`
           : sensor === ''

@@ -140,8 +140,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
-          ? 'Ninguna medición con hora conocida'
-          : 'ninguna lectura con hora conocida'
+          ? 'Ninguna lectura de antigüedad conocida'
+          : 'ninguna lectura de antigüedad conocida'
         : age === null
           ? sensor === ''
             ? 'Sin medir últimamente'

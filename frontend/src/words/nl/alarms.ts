@@ -131,8 +131,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
-          ? 'Geen meting met bekende tijd'
-          : 'geen meetwaarde met bekende tijd'
+          ? 'Geen meetwaarde met bekende leeftijd'
+          : 'geen meetwaarde met bekende leeftijd'
         : age === null
           ? sensor === ''
             ? 'Al een tijd niet gemeten'

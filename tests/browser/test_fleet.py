@@ -184,13 +184,15 @@ def test_one_sensor_of_several_greenhouses_with_the_outlier_first(
             ],
         )
         forward_once(archive.of_site(site), journal)
+    archive.do("UPDATE forwarder SET heard_at = now() - INTERVAL '1 hour'")
     with fleet(archive) as served:
         for site in temperatures:
-            served.site(site, active_alarms=0 if site != "odd" else 1)
+            served.site(site, active_alarms=1 if site != "odd" else 2)
         with opened(browser, served.url) as page:
             page.get_by_role("button", name="Compare").click()
             rows = page.locator(".fleet-table tbody tr")
-            expect(rows.locator("th")).to_have_text(["odd", "gh1", "gh2", "gh3"])
+            expect(rows.locator("th a")).to_have_text(["odd", "gh1", "gh2", "gh3"])
+            expect(rows.first).to_contain_text("odd (last known)")
             expect(rows.first).to_contain_text("35.0\u00a0°C")
             expect(rows.first).to_contain_text("11.5\u00a0°C")
             expect(page.get_by_test_id("plot").locator("canvas")).to_be_visible()
@@ -200,9 +202,9 @@ def test_one_sensor_of_several_greenhouses_with_the_outlier_first(
             expect(page.get_by_role("checkbox", name="Show gh3")).to_be_checked()
             # The same choice of greenhouses as for the cards.
             page.get_by_role("searchbox").fill("gh")
-            expect(rows.locator("th")).to_have_text(["gh1", "gh3", "gh2"])
+            expect(rows.locator("th a")).to_have_text(["gh1", "gh3", "gh2"])
             page.get_by_role("button", name="Last week").click()
-            expect(rows.locator("th")).to_have_text(["gh1", "gh3", "gh2"])
+            expect(rows.locator("th a")).to_have_text(["gh1", "gh3", "gh2"])
             page.get_by_label("Sensor").select_option("Humidity")
             expect(rows.locator("td").nth(1)).to_have_text("–")
             expect_no_wider_than_a_phone(page)
@@ -230,6 +232,7 @@ def test_a_row_for_each_greenhouse_leads_to_its_shift_report(
         assert scans > 0
         expect(rows.first.locator("td").first).to_have_text(str(scans))
         expect(rows.first.locator("td").nth(4)).to_have_text("5")
+        expect(rows.nth(1).locator("td").nth(4)).to_have_text("1 (last known)")
         # The choice of greenhouses and of the period.
         page.get_by_role("searchbox").fill("warm")
         expect(rows).to_have_count(1)

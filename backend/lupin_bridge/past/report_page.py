@@ -23,8 +23,9 @@ from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.plans import Plan, of_content
 from lupin_bridge.past.report import Report
 from lupin_bridge.serving.admission import content_answer
+from lupin_bridge.stream.state_json import stamp
 from lupin_twin.core.diagnostics import Origin
-from lupin_twin.core.state import TagState
+from lupin_twin.core.state import Reading, TagState
 
 HTML_TYPE: Final = "text/html; charset=utf-8"
 _POLICY: Final = (
@@ -220,12 +221,14 @@ class _Page:
         raised, cleared, limit = alarm["raised_at"], alarm["cleared_at"], reason["limit"]
         numbers = reason["kind"] == "range"
         unit = self._criteria.sensors.named(reason["sensor"]).unit if numbers else ""
-        number, at_end = partial(self._number, sensor=reason["sensor"]), None
-        if tag is not None and numbers:
-            readings = (*tag.readings, *derive(tag.readings))
-            at_end = next((it.value for it in readings if it.name == reason["sensor"]), None)
-        elif tag is not None and reason["kind"] == "pest":
-            at_end = float(tag.flower.bug_count)
+        number, at_end = partial(self._number, sensor=reason["sensor"]), ""
+        if tag is not None:
+            pests = Reading("pest", float(tag.flower.bug_count), tag.looked_at_ns)
+            name = reason["sensor"] if numbers else reason["kind"]
+            for it in (*tag.readings, *derive(tag.readings), pests):
+                if it.name == name:
+                    read = self._clock(stamp(it.observed_at_ns or 0))
+                    at_end = f"{number(it.value, limit=limit)} ({read})"
         span = self._span(reason, tag) if numbers else None
         low = "" if span is None else number(span.low).removesuffix(f"\u00a0{unit}") + "–"
         return {
@@ -234,7 +237,7 @@ class _Page:
             "when": self._clock(raised),
             "end": "" if cleared is None else self._clock(cleared),
             "length": "" if cleared is None else self._length(cleared["sec"] - raised["sec"]),
-            "at_end": number(at_end, limit=limit),
+            "at_end": at_end,
             "worst": number(alarm["worst"], limit=limit),
             "limits": low + number(limit if span is None else span.high) if numbers else "",
             "who": self._who(alarm),
@@ -325,7 +328,7 @@ class _Page:
             for column, kind in zip(columns, kinds, strict=True)
         )
         rows = "".join(
-            f"<tr{_emphasis(entry)}>"
+            ('<tr class="critical">' if _is_critical(entry) else "<tr>")
             + "".join(
                 f"<td{kind}>{escape(cell)}</td>"
                 for cell, kind in zip(cells(entry), kinds, strict=True)
@@ -429,6 +432,5 @@ class _Page:
         return f"{name} ({', '.join(sorted(offsets))})" if offsets else name
 
 
-def _emphasis(entry: Entry) -> str:
-    is_critical = entry.get("reason", {}).get("verdict") == "critical"
-    return ' class="critical"' if is_critical else ""
+def _is_critical(entry: Entry) -> bool:
+    return bool(entry.get("reason", {}).get("verdict") == "critical")

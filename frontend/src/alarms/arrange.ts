@@ -10,6 +10,7 @@ import { S } from '../strings';
 import { causeOf, MOST_LOOSE, type AlarmList, type Item, type Wrong } from './list';
 import {
   inOnePiece,
+  lastKnown,
   nameText,
   valuesOf,
   whatText,
@@ -114,8 +115,8 @@ export function causeFacts(
   const all = items.map(({ alarm, verdict }) => {
     const now = nowOf(alarm);
     const known = now?.kind === 'known' ? now : null;
-    // An alarm without a value keeps its verdict; otherwise an unknown value means an unknown verdict.
-    const current = known?.verdict ?? (now === null ? verdict : 'unknown');
+    // As in its row: an alarm without a value keeps its verdict.
+    const current = lastKnown(now)?.verdict ?? verdict;
     return { alarm, now, verdict: current, value: known?.value ?? null };
   });
   const [one] = items;

@@ -2,6 +2,7 @@ import { expect, test } from 'vitest';
 
 import type { HealthReason } from '../contract/types';
 import type { TagThen } from '../domain/difference';
+import { todoText } from '../domain/health';
 import { alarm } from '../testing/alarms';
 import { reason } from '../testing/health';
 import { readings, tag } from '../testing/tags';
@@ -25,6 +26,11 @@ test('the reading of now, as bad as the bridge says it is now', () => {
     trend: null,
   });
   expect(nowOf(cold, state(20), null, true)).toMatchObject({ value: 20, verdict: 'healthy' });
+});
+
+test('a reading from before the alarm is none of now', () => {
+  const later = alarm('a', { raised: 101 });
+  expect(nowOf(later, state(20), null, true)).toMatchObject({ kind: 'unknown', last: null });
 });
 
 test('its trend is that against an hour before', () => {
@@ -52,11 +58,16 @@ test.each([
 test.each([
   [state(8, { verdict: 'stressed' }), 'stressed'],
   [state(20), 'healthy'],
-  [state(8, { ...old, sensor: 'temperature' }), 'critical'],
+  [state(8, { verdict: 'stressed' }, { ...old, sensor: '' }), 'stressed'],
+  [state(20, { ...old, sensor: 'temperature' }), 'unknown'],
   [unjudged, 'critical'],
-] as const)('of a silent twin it counts as bad as it was last', (then, verdict) => {
+] as const)('of a silent twin, or an old reading, it is as bad as last judged', (then, verdict) => {
   const raised = alarm('a', { reason: { verdict: 'critical' } });
-  expect(reasonNow(raised, nowOf(raised, then, null, false)).verdict).toBe(verdict);
+  const last = reasonNow(raised, nowOf(raised, then, null, false));
+  expect(last.verdict).toBe(verdict);
+  if (verdict === 'unknown') expect(todoText(last)).toBe('Check the route of the robot');
+  const isOld = then.health.reasons.some(({ kind }) => kind === 'old');
+  if (isOld) expect(reasonNow(raised, nowOf(raised, then, null, true))).toEqual(last);
 });
 
 test('another sensor’s age does not matter, but of what is derived', () => {

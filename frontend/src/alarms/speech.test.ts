@@ -32,5 +32,5 @@ const todo = (...now: readonly (readonly [value: number, release?: number])[]): 
 test('nothing is ordered where all are back in their range, and something as soon as one is not', () => {
   expect(todo([17.5], [17.8])).toBe('Heat, or close the vents');
   expect(todo([18.1, 18.5], [17.8])).toBe('Heat, or close the vents');
-  expect(todo([18.1, 18.5], [18.2, 18.5])).toBe('');
+  expect(todo([18.1, 18.5], [18.2, 18.5])).toBe('Keep an eye on it');
 });

@@ -3,7 +3,7 @@ import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import type { AppState } from '../store/app';
 import { selectCatalogue, selectLatestHealth } from '../store/derived';
 import { hourAgo, selectHourAgoNow, thenOf, type HourAgo } from '../store/hourAgo';
-import { todoText, VERDICTS } from '../domain/health';
+import { isBack, todoText, VERDICTS } from '../domain/health';
 import { memoLast } from '../domain/memo';
 import { isReceivingNow, selectLatestTag } from '../store/moment';
 import { causesFirst, type Item } from './list';
@@ -41,11 +41,10 @@ export function worstNow(state: AppState, items: readonly Item[]): Verdict | nul
 /** What to do first about some alarms that share a cause, by their current values. */
 export function todoNow(state: AppState, items: readonly Item[]): string {
   const verdict = worstNow(state, items);
-  const todos = items
-    .map(({ alarm }) => reasonIn(state, alarm))
-    .filter((reason) => reason.verdict === verdict)
-    .map(todoText);
-  return todos.find((text) => text !== '') ?? '';
+  const reasons = items.map(({ alarm }) => reasonIn(state, alarm));
+  const worst = reasons.filter((reason) => reason.verdict === verdict);
+  const first = worst.find((reason) => !isBack(reason)) ?? worst[0];
+  return first ? todoText(first) : '';
 }
 
 /** Sorted by current verdict, the worst first; alarms that share a cause stay together. */

@@ -11,7 +11,14 @@ import {
 import { beyondText, isOfRange, reasonText, sideOf, todoText } from '../domain/health';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
-import { dayFormat, hasDate, secondsOf, shortRosText, type When } from '../domain/time';
+import {
+  dayFormat,
+  hasDate,
+  secondsOf,
+  secondsSince,
+  shortRosText,
+  type When,
+} from '../domain/time';
 import { S } from '../strings';
 
 /** Longest tag name, characters: names come from the robot. */
@@ -43,7 +50,7 @@ export const nameText = (alarm: Alarm, speech: Speech): string =>
 /** An alarm's values in words, rounded so that they contradict neither each other nor the limit. */
 export interface Values {
   readonly what: string;
-  /** What to do about it; empty: nothing. */
+  /** What to do about it. */
   readonly todo: string;
   /** Null: the alarm has no value, or is resolved. */
   readonly now: string | null;
@@ -118,7 +125,8 @@ export function spanText({ raised_at, cleared_at }: Alarm, nowS: number | null):
   const from = secondsOf(raised_at);
   const begin = whenText(from, nowS);
   if (cleared_at === null) {
-    return S.alarmSince(begin, nowS === null ? null : lengthText(nowS - from));
+    const length = nowS === null ? null : secondsSince(from, nowS);
+    return S.alarmSince(begin, length === null ? null : lengthText(length));
   }
   const until = secondsOf(cleared_at);
   const end = isSameDay(from, until) ? clockOf(until) : whenText(until, nowS);
@@ -133,7 +141,9 @@ export function timesOf(
 ): { readonly length: string; readonly note: string } {
   const from = secondsOf(raised_at);
   const until = cleared_at ? secondsOf(cleared_at) : nowS;
-  if (until === null) return { length: whenText(from, nowS), note: '' };
+  if (until === null || secondsSince(from, until) === null) {
+    return { length: whenText(from, nowS), note: '' };
+  }
   const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? until);
   const day = isOfToday ? '' : dayFormat.format(from * 1000);
   const note = isOver ? `${S.alarmResolved} ${whenText(until, nowS)}` : day;
@@ -187,7 +197,7 @@ export type Now =
       readonly kind: 'unknown';
       readonly last: number | null;
       readonly lastAt: When;
-      /** Value when the twin fell silent; null: unknown then too. */
+      /** As last judged, of an old reading or a silent twin; null: unknown then too. */
       readonly before?: Extract<Now, { kind: 'known' }> | null;
     };
 
@@ -240,8 +250,15 @@ export function nowOf(
   if (isDerived && !said && !reasons.some(lacks)) {
     return { kind: 'known', value: null, verdict, reason: null, trend: null };
   }
-  if (last === null || isOldReading(sensor, tag)) {
-    return unknown(last, readAt.get(sensor) ?? 'unknown');
+  if (last === null) return unknown(null, readAt.get(sensor) ?? 'unknown');
+  // An alarm may arrive before its reading.
+  const read = tag.tag.wire.readings.find(({ name }) => name === sensor)?.observed_at;
+  if (read && secondsOf(read) < secondsOf(alarm.raised_at)) return unknown(null, 'unknown');
+  if (isOldReading(sensor, tag)) {
+    // It is not of now, but its status is that of its tag: a bad one still counts.
+    const judged = { value: last, verdict: said?.verdict ?? 'unknown', reason: said ?? null };
+    const at = readAt.get(sensor) ?? tag.tag.scannedAt;
+    return unknown(last, at, { kind: 'known', ...judged, trend: null });
   }
   const trend = trendOf(sensor, tag, hourAgo);
   return {
@@ -253,7 +270,7 @@ export function nowOf(
   };
 }
 
-/** The value now, or when the twin fell silent; null or undefined: unknown. */
+/** The value now, or as last judged; null or undefined: unknown. */
 export const lastKnown = (now: Now | null): Extract<Now, { kind: 'known' }> | null | undefined =>
   now?.kind === 'unknown' ? now.before : now;
 

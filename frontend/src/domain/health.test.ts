@@ -195,7 +195,7 @@ describe('a reason in words', () => {
     [
       { ...old, limit: 5_400, since: null },
       null,
-      `No scan with a known time (readings are valid for 1${NBSP}h 30${NBSP}min)`,
+      `No reading of known age (readings are valid for 1${NBSP}h 30${NBSP}min)`,
     ],
     [
       { kind: 'changed', value: 22, limit: null } as const,
@@ -223,11 +223,11 @@ describe('a reason in words', () => {
     );
   });
 
-  test('back in its ideal range, nothing has to be done; within what is critical alone, it has', () => {
+  test('back in its ideal range, it is watched; within what is critical alone, it is not enough', () => {
     expect(todoText(reason({ verdict: 'stressed', value: 18.1, limit: 18, ...held(18.4) }))).toBe(
-      '',
+      'Keep an eye on it',
     );
-    expect(todoText(reason({ value: 10.1, limit: 10, ...held(10.4) }))).not.toBe('');
+    expect(todoText(reason({ value: 10.1, limit: 10, ...held(10.4) }))).toMatch(/^Heat/);
   });
 
   test('beside its mark, it does not say again how bad it is', () => {

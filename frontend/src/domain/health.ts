@@ -123,7 +123,7 @@ const LONGEST_NAME = 32;
 
 /**
  * A reason as a sentence without its full stop. `age` is that of the observation behind it, seconds;
- * null: shown elsewhere, or not known. `isMarked`: a sign beside it shows the severity.
+ * null: it is recent, shown elsewhere, or not known. `isMarked`: a sign beside it shows the severity.
  */
 export function reasonText(
   sensors: Catalogue,
@@ -136,6 +136,7 @@ export function reasonText(
   const sensor = sensors.named(name);
   const label = name === '' ? '' : shown(sensor.label, LONGEST_NAME);
   const R = S.reasons;
+  const ago = age === null ? '' : ` ${S.agoSuffix(shortAgeText(age))}`;
   if (isOfRange(reason)) {
     const edge = reason.release ?? reason.limit;
     const reading = beyondLimitText(sensor, reason.value, edge, unit);
@@ -146,7 +147,7 @@ export function reasonText(
     const limit = held ?? `${side} ${valueText(sensor, reason.limit, unit)}`;
     const isRated = reason.verdict === 'critical' && !isMarked && !held;
     const rated = isRated ? ` (${S.alarmStatus.critical})` : '';
-    return `${label} ${reading}${isNear ? '' : `, ${limit}`}${rated}`;
+    return `${label} ${reading}${ago}${isNear ? '' : `, ${limit}`}${rated}`;
   }
   switch (kind) {
     case 'range':
@@ -175,7 +176,9 @@ export function reasonText(
     case 'stopped':
       return R.stopped;
     case 'changed':
-      return R.changed(value === null ? label : `${label} ${readingText(sensor, value, unit)}`);
+      return R.changed(
+        value === null ? label : `${label} ${readingText(sensor, value, unit)}${ago}`,
+      );
     default:
       // A kind from a later server.
       return R.other(shown((kind as string).replaceAll('_', ' '), LONGEST_NAME), label);
@@ -204,14 +207,13 @@ export function beyondText(sensors: Catalogue, reason: OfRange, unit: Temperatur
   return `${shown(sensor.label, LONGEST_NAME)} ${said}`;
 }
 
-/**
- * What to do about it; for what is healthy again, what its alarm still waits for. Empty: nothing to
- * do, as the value is back in range and the reason says what ends it.
- */
+/** What to do about it; for what is healthy again, what its alarm still waits for. */
 export function todoText(reason: HealthReason): string {
   if (reason.verdict === 'healthy') return reason.kind === 'pest' ? S.todoPestAgain : S.todoWell;
   const { sensors, ...kinds } = S.todo;
-  if (isBack(reason)) return '';
+  if (isBack(reason)) return S.todo.watch;
+  // Its last reading was in range, and is too old now.
+  if (isOfRange(reason) && reason.verdict === 'unknown') return S.todo.old;
   if (isOfRange(reason) && reason.sensor in sensors) {
     return sensors[reason.sensor as keyof typeof sensors][sideOf(reason)];
   }

@@ -34,6 +34,13 @@ export function ageSeconds(
   return Math.max(0, asOf - observedAt) / 1000;
 }
 
+/** A state comes up to this long after newer stamps, seconds. */
+const AHEAD_S = 10;
+
+/** Seconds since a moment; null: it is still to come, so the clock was set back. */
+export const secondsSince = (at: number, now: number): number | null =>
+  at > now + AHEAD_S ? null : Math.max(0, now - at);
+
 /** Age steps for text, which cannot fade as a picture does. */
 export function ageStep(age: number | null): 'fresh' | 'fading' | 'old' {
   if (age === null || age >= FADE_TO_S) return 'old';

@@ -1,7 +1,7 @@
 import type { Latest, TwinTagState, WirePoint, WireTime } from '../contract/types';
 import { mapPoint, type MapPoint } from '../geometry/coordinates';
 import type { Shared } from './memo';
-import type { When } from './time';
+import { secondsSince, type When } from './time';
 
 export interface FailedAttempt {
   readonly at: When;
@@ -37,12 +37,12 @@ type TakenState = Pick<Snapshot, 'at' | 'takenAt'>;
 
 /**
  * A ROS time on the monotonic clock: the wall clock would be wrong in simulation, and on a tablet whose
- * clock is off. Nothing can be dated by a state without its own time (0).
+ * clock is off. A state without its own time (0) dates nothing, nor what is still to come.
  */
 export function whenOf(time: WireTime, { at, takenAt }: TakenState): When {
   if (at.sec === 0 && at.nanosec === 0) return 'unknown';
-  const age = at.sec - time.sec + (at.nanosec - time.nanosec) / 1e9;
-  return takenAt - Math.max(0, age) * 1000;
+  const age = secondsSince(time.sec - at.sec + (time.nanosec - at.nanosec) / 1e9, 0);
+  return age === null ? 'unknown' : takenAt - age * 1000;
 }
 
 /** Below it the bridge judges by the ranges for all species: the twin's `sure_species`. */

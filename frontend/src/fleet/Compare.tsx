@@ -58,6 +58,8 @@ export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Elem
       },
     [found, drawn, sensors, unit],
   );
+  const isSilent = (name: string): boolean =>
+    compared.some(({ site, is_live: isLive }) => site === name && !isLive);
   const toggle = (site: string): void => {
     setPicked(drawn.includes(site) ? drawn.filter((each) => each !== site) : [...drawn, site]);
   };
@@ -121,6 +123,7 @@ export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Elem
                   </td>
                   <th scope="row">
                     <a href={`${siteLink(site)}#sensor=${encodeURIComponent(name)}`}>{site.name}</a>
+                    {isSilent(site.site) && ` (${W.wasLive})`}
                   </th>
                   <td>{readingOrNone(model.sensor, valueAt(found, site, at), speech)}</td>
                   <td>{deviationText(model.sensor, site, speech)}</td>

@@ -2,7 +2,12 @@ import { render, screen } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
 import { Overview } from './Overview';
-import { words } from './sites';
+import { type Site, type Sites, words } from './sites';
+
+const GREENHOUSE: Site = {
+  ...{ site: 'gh1', name: 'One', verdict: 'healthy', last_verdict: 'healthy', active_alarms: 0 },
+  ...{ last_received: null, lag_s: 1, is_live: true, origin: 'robot', map: null },
+};
 
 test('before anything has come nothing is counted', () => {
   const seen = { sites: new Map(), archive: null, lostAt: null };
@@ -13,4 +18,19 @@ test('before anything has come nothing is counted', () => {
   const archive = { is_reachable: true, since: null, message: '' };
   rerender(<Overview seen={{ ...seen, archive }} isKiosk />);
   expect(screen.getByRole('banner').textContent).toContain(words.noAlarms);
+});
+
+test('of a silent greenhouse, and without a connection, nobody knows that there is no alarm', () => {
+  const site = (over: Partial<Site>): Sites => new Map([['gh1', { ...GREENHOUSE, ...over }]]);
+  const archive = { is_reachable: true, since: null, message: '' };
+  const text = (sites: Sites, lostAt: number | null = null): string | null => {
+    const { container, unmount } = render(<Overview seen={{ sites, archive, lostAt }} isKiosk />);
+    const { textContent } = container;
+    unmount();
+    return textContent;
+  };
+  expect(text(site({}))).toContain(words.noAlarms);
+  expect(text(site({}), 1)).not.toContain(words.noAlarms);
+  expect(text(site({ is_live: false }))).not.toContain(words.noAlarms);
+  expect(text(site({ active_alarms: null }))).not.toContain(words.noAlarms);
 });

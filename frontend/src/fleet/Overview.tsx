@@ -59,6 +59,11 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
   const alarms = useMemo(() => alarmCount(sites.values()), [sites]);
   // Until then there is nothing to count.
   const hasArchive = seen.archive !== null;
+  // Only then does no alarm mean that there is none.
+  const isKnown =
+    hasArchive &&
+    asOfWhen(seen) === null &&
+    [...sites.values()].every((site) => site.is_live && site.active_alarms !== null);
   const groups = useMemo(() => groupNames(sites.values()), [sites]);
   const shown = useMemo(() => chosen(sites, filter, search, group), [sites, filter, search, group]);
 
@@ -84,7 +89,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
         <h1>{words.sites}</h1>
         {isKiosk && (
           <span className="fleet-alarms" data-any={alarms > 0}>
-            {!hasArchive ? '' : alarms === 0 ? words.noAlarms : S.alarmCount(alarms)}
+            {alarms > 0 ? S.alarmCount(alarms) : isKnown && words.noAlarms}
           </span>
         )}
         {!isKiosk && (
@@ -267,7 +272,7 @@ const SiteCard = memo(function SiteCard({ site, asOf }: Listed & { site: Site })
           <span className="fleet-line">{words.lastKnown(S.health[last])}</span>
         )}
         <span className="fleet-alarms" data-any={(site.active_alarms ?? 0) > 0}>
-          {countText(site.active_alarms)}
+          {(isLive || site.active_alarms !== 0) && countText(site.active_alarms)}
         </span>
         <span className="fleet-line">
           {site.last_received

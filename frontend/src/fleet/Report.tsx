@@ -72,9 +72,9 @@ export default function Report({ shown }: { shown: readonly Site[] }): JSX.Eleme
               </tr>
             </thead>
             <tbody>
-              {shown.map(({ site }) => {
+              {shown.map(({ site, is_live: isLive }) => {
                 const row = found.get(site);
-                return row && <Row key={site} row={row} />;
+                return row && <Row key={site} row={row} isLive={isLive} />;
               })}
             </tbody>
           </table>
@@ -117,7 +117,7 @@ const pageOf = ({ report }: SiteReport): string => {
   return `${report.replace('/api/report?', '/api/report.html?')}&${query.toString()}`;
 };
 
-function Row({ row }: { row: SiteReport }): JSX.Element {
+function Row({ row, isLive }: { row: SiteReport; isLive: boolean }): JSX.Element {
   return (
     <tr>
       <th scope="row">
@@ -126,7 +126,10 @@ function Row({ row }: { row: SiteReport }): JSX.Element {
       {COUNTED.map((each) => (
         <td key={each}>{row[each]}</td>
       ))}
-      <td>{row.active_alarms ?? S.noValue}</td>
+      <td>
+        {row.active_alarms ?? S.noValue}
+        {!isLive && ` (${W.wasLive})`}
+      </td>
       <td>{timeText(ms(row.complete_to))}</td>
     </tr>
   );

@@ -345,7 +345,7 @@ describe('nothing is drawn anew but what changed', () => {
     const { snapshot } = store.get().twin.latest;
     const tags = (snapshot?.tags ?? []).map(({ wire }) => structuredClone(wire));
     const later = { sec: (snapshot?.at.sec ?? 0) + 1, revision: snapshot?.revision ?? '' };
-    receive(withState(stateFrame(tags, later), performance.now()));
+    receive(withState(stateFrame(tags, later), performance.now() + 1_000));
     expect(store.get().twin.latest.snapshot).not.toBe(snapshot);
     expect(frames).toEqual([]);
   });

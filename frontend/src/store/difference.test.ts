@@ -2,7 +2,7 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { readings, wireTag } from '../testing/tags';
 import { npy } from '../testing/field';
-import { showTags } from '../testing/page';
+import { goLive, showTags, status } from '../testing/page';
 import { act, store } from './app';
 import { selectHeat } from './derived';
 import { startDifference } from './difference';
@@ -74,6 +74,20 @@ test('where memory has nothing of then, there is no heat map and it is told', as
   await settled();
   expect(store.get().twin.difference).toMatchObject({ state: 'ready', value: { field: null } });
   expect(selectHeat(store.get())).toBeNull();
+});
+
+test('while the twin is silent, the shown state keeps its own time', async () => {
+  const at = (): number | undefined => store.get().twin.difference.value?.at;
+  const clock = vi.spyOn(performance, 'now');
+  clock.mockReturnValue(performance.now() + 60_000);
+  act({ compare: { by: 'ago', seconds: 10 } });
+  await settled();
+  expect(at()).toBeGreaterThanOrEqual(160);
+  clock.mockReturnValue(performance.now() + 5_000);
+  goLive(status({ twin: 'offline', reason: 'stale' }));
+  await vi.advanceTimersByTimeAsync(5_000);
+  expect(at()).toBeLessThan(160);
+  clock.mockRestore();
 });
 
 test('before all time nothing is asked for', async () => {

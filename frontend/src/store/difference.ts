@@ -9,7 +9,7 @@ import type { Bounds } from '../geometry/coordinates';
 import { keepFetched, receive, type AppState } from './app';
 import { sourceOf } from './derived';
 import { boxOfPins, fetchHeat, fieldResolution } from './heat';
-import { rosNow, selectLatest, selectShown } from './moment';
+import { isReceivingNow, rosNow, selectLatest, selectShown } from './moment';
 import { DRAG_PACE_MS, failed, NOTHING, ready, type FetchTask } from './fetcher';
 import { type Difference } from './twin';
 
@@ -49,7 +49,8 @@ export function startDifference(): () => void {
 function taskFor(state: AppState, compare: Compare): FetchTask<Difference> | undefined {
   const { moment, snapshot } = selectShown(state);
   const { epoch, socket } = state.twin.connection;
-  const nowS = rosNow(state, now());
+  // Of a silent twin, the last state is shown, and keeps its own time.
+  const nowS = rosNow(state, isReceivingNow(state) ? now() : -Infinity);
   const resolution = fieldResolution(selectLatest(state).snapshot);
   const box = boxOf(snapshot, resolution);
   if (!snapshot || !box || nowS === null || socket.kind !== 'open') return undefined;

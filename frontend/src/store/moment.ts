@@ -66,6 +66,9 @@ export const selectShown = ({ twin, view }: AppState): Shown => shownAt(twin, vi
 /** Whether the current time is known, whatever is shown. */
 export const selectHasTime = ({ twin }: AppState): boolean => clockOf(twin) !== 'unknown';
 
+export const selectIsPaused = ({ twin }: AppState): boolean =>
+  twin.connection.status?.reason === 'paused';
+
 /** The latest state, whatever is shown: for the connection's status, and for what to fetch. */
 export const selectLatest = ({ twin }: AppState): House => twin.latest;
 
@@ -165,6 +168,7 @@ export const twinNow = (): number | null => rosNow(store.get(), now());
 export const latestWord = (): string => {
   const { phase } = store.get().twin;
   if (phase !== 'live') return S.phase[phase];
+  if (selectIsPaused(store.get())) return S.recordedIs.paused;
   return selectIsRecorded(store.get()) ? S.origin.recorded : S.timebarLive;
 };
 

@@ -10,10 +10,7 @@ type Given = Partial<Omit<Alarm, 'reason' | 'raised_at' | 'cleared_at'>> & {
   readonly cleared?: number | null;
 };
 
-export const alarm = (
-  id: string,
-  { raised = 900, cleared = null, ...over }: Given = {},
-): Alarm => ({
+export const alarm = (id: string, { raised = 90, cleared = null, ...over }: Given = {}): Alarm => ({
   id,
   tag_id: '1',
   raised_at: { sec: raised, nanosec: 0 },

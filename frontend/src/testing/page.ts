@@ -27,7 +27,8 @@ export const status = (over: Partial<StatusFrame> = {}): StatusFrame => ({
   ...over,
 });
 
-let stamp = 1;
+/** Soon after that of the readings of `testing/tags`. */
+let stamp = 100;
 
 /** The defaults, and a state with these tags and this judgement, just received. */
 export function showTags(tags: readonly TwinTagState[], health: Judgement = NOBODY): void {

@@ -3,7 +3,7 @@ import { beforeEach, expect, test } from 'vitest';
 
 import type { StatusFrame } from '../contract/types';
 import { act, receive, store } from '../store/app';
-import { selectOrigin } from '../store/moment';
+import { latestWord, selectOrigin } from '../store/moment';
 import { NO_HOUSE, withPast } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
@@ -51,6 +51,13 @@ test('a simulation is live, and told at first sight; one by /clock is not green'
   expect(screen.queryByTestId('recorded-frame')).toBeNull();
 });
 
+test('while its time is paused, nothing is live', () => {
+  shows('simulated', 'paused');
+  expect(badge().textContent).toBe('Connection: Paused');
+  expect(badge().dataset['ofNow']).toBe('false');
+  expect(latestWord()).toBe('Paused');
+});
+
 test('what is still shown stays simulated at a bridge that has received nothing yet', () => {
   shows('simulated');
   shows('unknown', 'never_seen');
@@ -73,10 +80,10 @@ test('a day of the greenhouse that is a short one is told', () => {
 test('a recording is never live: header, badge, frame and the way back say so, and of when', () => {
   shows('recorded');
   expect(screen.getByTestId('origin').textContent).toMatch(/^Recording.*nothing here is current/);
-  expect(screen.getByTestId('origin').querySelector('strong')?.textContent).toMatch(/^sim 00:00:/);
+  expect(screen.getByTestId('origin').querySelector('strong')?.textContent).toMatch(/^sim 00:01:/);
   expect(badge().textContent).toBe('Connection: Playing');
   expect(badge().dataset['ofNow']).toBe('false');
-  expect(screen.getByTestId('recorded-frame').textContent).toMatch(/^Recording: sim 00:00:/);
+  expect(screen.getByTestId('recorded-frame').textContent).toMatch(/^Recording: sim 00:01:/);
   expect(screen.getByRole('button').textContent).toBe('Back to the recording');
   shows('recorded', 'paused');
   expect(badge().textContent).toBe('Connection: Paused');

@@ -2,7 +2,7 @@ import type { JSX } from 'react';
 
 import { DAY_S } from '../domain/difference';
 import { ageText, intervalText } from '../domain/format';
-import { rosText } from '../domain/time';
+import { rosText, secondsSince } from '../domain/time';
 import { store, useApp } from '../store/app';
 import {
   backToLive,
@@ -24,7 +24,8 @@ export function PastHeader(): JSX.Element | null {
   // Without the twin's time, it is unknown how long ago.
   const ago = useTicking((now) => {
     const nowS = rosNow(store.get(), now);
-    return nowS === null || moment === null ? null : ageText(Math.max(0, nowS - moment));
+    const since = nowS === null || moment === null ? null : secondsSince(moment, nowS);
+    return since === null ? null : ageText(since);
   });
   const origin = useApp(selectOrigin);
   const hasTime = useApp(selectHasTime);

@@ -69,6 +69,12 @@ test.each([
       goLive(status({ reason: 'paused' }), 60_000);
     },
   ],
+  [
+    'of a clock that went back',
+    () => {
+      receive(withState(stateFrame([wireTag()], { sec: 2_400 }), performance.now()));
+    },
+  ],
 ])('how long ago is not told where nobody knows what time it is: %s', (_, lose) => {
   look(2_500, 2_500);
   lose();

@@ -4,7 +4,7 @@ import { expect, test } from 'vitest';
 import { shelveAlarm } from '../alarms/own';
 import { startAlarms } from '../alarms/watch';
 import { alarm, reportAlarms } from '../testing/alarms';
-import { judgement, reason } from '../testing/health';
+import { held, judgement, reason } from '../testing/health';
 import { showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { AttentionList } from './AttentionList';
@@ -24,16 +24,18 @@ const warm = reason({ verdict: 'stressed', value: 30, limit: 26 });
 test('lists who needs somebody and why, the worst first', () => {
   const failed = reason({ kind: 'reading_failed', verdict: 'stressed', value: null, limit: null });
   const twice = [failed, { ...failed, sensor: 'humidity' }];
+  const back = { ...warm, value: 25.8, ...held(25.6) };
   show({
     well: 'healthy',
+    back: [back],
     warm: [warm],
     far: 'unknown',
     bug: [pest],
     both: [reason(), pest],
     twice,
   });
-  expect(ids()).toEqual(['both', 'bug', 'warm', 'twice']);
-  const [first, , , last] = rows();
+  expect(ids()).toEqual(['both', 'bug', 'warm', 'twice', 'back']);
+  const [first, , , failing, last] = rows();
   if (!first) throw new Error('no row');
   const why = within(first).getAllByRole('listitem');
   expect(why.map((each) => each.textContent)).toEqual([
@@ -46,7 +48,9 @@ test('lists who needs somebody and why, the worst first', () => {
     'Inspect and treat the plants',
     'Heat, or close the vents',
   ]);
-  expect(last?.querySelector('.attention-do strong')?.textContent).toBe('Check the sensor');
+  const todo = (row?: HTMLElement) => row?.querySelector('.attention-do strong')?.textContent;
+  expect(todo(failing)).toBe('Check the sensor');
+  expect(todo(last)).toBe('Keep an eye on it');
 });
 
 test('of many, what ails more than a few has one line, and the rest a line each', () => {

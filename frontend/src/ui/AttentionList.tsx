@@ -82,7 +82,7 @@ function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.
   const { tagId, reasons } = worst;
   const [reason] = reasons;
   const { verdict } = reason;
-  const why = S.healthDriver(shown(tagId, 16), useReasonText(reason, true));
+  const why = S.healthDriver(shown(tagId, 16), useReasonText(reason, true, tagId));
   const since = useSince(tagId, reason);
   const isOne = cause === null;
   const all = isOne ? reasons.slice(0, MOST_REASONS) : tags.map((each) => each.reasons[0]);
@@ -94,7 +94,7 @@ function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.
       </strong>
       <span className="attention-why">
         {isOne ? (
-          <Reasons health={{ verdict, reasons }} most={MOST_REASONS} />
+          <Reasons health={{ verdict, reasons }} tagId={tagId} most={MOST_REASONS} />
         ) : (
           <span>
             <HealthShape verdict={verdict} /> {cause}
@@ -111,11 +111,11 @@ function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.
   );
 }
 
-/** What to do about the reasons, without duplicates; some have nothing to do. */
+/** What to do about the reasons, without duplicates. */
 function Todo({ reasons }: { reasons: readonly HealthReason[] }): JSX.Element {
   return (
     <strong>
-      <Dotted texts={[...new Set(reasons.map(todoText))].filter(Boolean)} />
+      <Dotted texts={[...new Set(reasons.map(todoText))]} />
     </strong>
   );
 }

@@ -5,7 +5,15 @@ import { alarmOf, isAwaited, type Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import { now } from '../clock';
 import type { HealthReason, Verdict } from '../contract/types';
-import { type HouseHealth, isBad, isSilent, severity, todoText, VERDICTS } from '../domain/health';
+import {
+  type HouseHealth,
+  isBack,
+  isBad,
+  isSilent,
+  severity,
+  todoText,
+  VERDICTS,
+} from '../domain/health';
 import { secondsOf } from '../domain/time';
 import { rowsOf } from '../domain/table';
 import { shown } from '../domain/text';
@@ -50,8 +58,7 @@ export function useUrgent(): readonly Urgent[] {
         const rank = (reason: HealthReason): number => {
           const own = reason.verdict;
           if (reason.kind === 'old' || !(isBad(own) || own === verdict)) return 0;
-          const isBack = todoText(reason) === '';
-          const judged = { verdict: isBack ? 'healthy' : own, reasons: [reason] };
+          const judged = { verdict: isBack(reason) ? 'healthy' : own, reasons: [reason] };
           return severity(judged, has(acknowledged, id, reason));
         };
         const [first, ...rest] = reasons
@@ -151,8 +158,7 @@ export function DoNow({
 function byTodo(urgent: readonly Urgent[]): readonly (readonly [Urgent, ...Urgent[]])[] {
   const found = new Map<string, [Urgent, ...Urgent[]]>();
   for (const each of urgent) {
-    const todo = todoText(each.reasons[0]);
-    const key = todo === '' ? each.tagId : `${todo}|${String(each.isAcknowledged)}`;
+    const key = `${todoText(each.reasons[0])}|${String(each.isAcknowledged)}`;
     const line = found.get(key);
     if (line) line.push(each);
     else found.set(key, [each]);
@@ -195,7 +201,7 @@ function Todo({
   also: readonly Urgent[];
   id: string | undefined;
 }): JSX.Element {
-  const why = S.healthDriver(shown(tagId, 24), useReasonText(reason, true));
+  const why = S.healthDriver(shown(tagId, 24), useReasonText(reason, true, tagId));
   const since = useSince(tagId, reason);
   // A past moment's action is not an instruction for now.
   const isNow = useApp((state) => selectShown(state).moment === null);

@@ -50,6 +50,17 @@ test.each([
   else expect(details).toBeNull();
 });
 
+test.each(['no_clock', 'clock_stopped', 'clock_doubted'] as const)(
+  'data without a time of their own are not dated: %s',
+  (reason) => {
+    showTags([wireTag()]);
+    goLive(status({ twin: 'offline', reason }));
+    render(<FrozenBanner />);
+    expect(text()).toMatch(/^The twin.+age of the readings is unknown/);
+    expect(text()).not.toMatch(/Last data|ago/);
+  },
+);
+
 test('each state of the connection has a word of its own', () => {
   showTags([wireTag()]);
   const words = new Set<string>();

@@ -2,7 +2,13 @@ import type { JSX, ReactNode } from 'react';
 
 import { rosText, secondsOf } from '../domain/time';
 import { useApp, type AppState } from '../store/app';
-import { selectHasOwnTime, selectIsRecorded, selectOrigin, selectShown } from '../store/moment';
+import {
+  selectHasOwnTime,
+  selectIsPaused,
+  selectIsRecorded,
+  selectOrigin,
+  selectShown,
+} from '../store/moment';
 import { S } from '../strings';
 import { OriginNote, PastHeader } from '../timebar/Past';
 import { Disclosure, Icon } from '../widgets/controls';
@@ -40,10 +46,10 @@ export function ConnectionBadge(): JSX.Element {
   const phase = useApp((state) => state.twin.phase);
   const isPast = useApp((state) => selectShown(state).moment !== null);
   const isRecorded = useApp(selectIsRecorded);
-  const isOfNow = !useApp(selectHasOwnTime);
-  const isPaused = useApp((state) => state.twin.connection.status?.reason === 'paused');
+  const isPaused = useApp(selectIsPaused);
+  const isOfNow = !useApp(selectHasOwnTime) && !isPaused;
   const word =
-    isRecorded && phase === 'live' && !isPast
+    (isRecorded || isPaused) && phase === 'live' && !isPast
       ? S.recordedIs[isPaused ? 'paused' : 'playing']
       : (isPast ? S.phasePast : S.phase)[phase];
   return (

@@ -8,8 +8,8 @@ import { act as look, receive, store } from '../store/app';
 import { NO_HOUSE, withPast } from '../store/twin';
 import { alarm, alarms, reportAlarms } from '../testing/alarms';
 import { held, judgement, reason } from '../testing/health';
-import { goLost, showTags } from '../testing/page';
-import { wireTag } from '../testing/tags';
+import { goLost, nextStamp, showTags } from '../testing/page';
+import { readings, wireTag } from '../testing/tags';
 import { AttentionList } from './AttentionList';
 import { HealthStrip } from './DoNow';
 import { HealthSummary } from './HealthSummary';
@@ -145,13 +145,37 @@ test('of a robot that stands still what is critical is told first', () => {
   ]);
 });
 
-test('of what is back in its range nothing is ordered', () => {
+test('a value that is too old says its age, and an attempt that of the last one', () => {
+  const at = nextStamp() - 2_400;
+  const cold = wireTag({ tag_id: '5', readings: readings({ temperature: 6.6 }, at) });
+  const old = { kind: 'old', verdict: 'unknown', sensor: '', value: null } as const;
+  const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
+  const attempt = { last_try: { sec: at + 2_340, nanosec: 0 }, last_try_status: 1 };
+  const tags = [cold, wireTag({ tag_id: '6', ...attempt })];
+  showTags(tags, judgement({ 5: [reason(), reason(old)], 6: [failed] }));
+  render(<HealthSummary kiosk={false} />);
+  const todo = screen.getByRole('list', { name: 'Do this now' });
+  expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
+    expect.stringMatching(
+      /^CriticalTag 5: Temperature 6.6\u00a0°C 40\u00a0min ago, below 10.0Heat/,
+    ),
+    expect.stringMatching(/^UnknownTag 6: Last scan failed: not reachable, 1\u00a0min ago/),
+  ]);
+  // Of a silent twin, each value is one of then.
+  act(() => {
+    showTags([cold], judgement({ 5: [reason()] }));
+    goLost();
+  });
+  expect(todo.textContent).toMatch(/^CriticalTag 5: Temperature 6.6\u00a0°C 40\u00a0min ago, /);
+});
+
+test('what is back in its range is to be watched', () => {
   const back = reason({ verdict: 'stressed', value: 18.1, limit: 18, ...held(18.5) });
   showTags(TAGS, judgement({ 1: 'healthy', 5: [back] }));
   render(<HealthSummary kiosk={false} />);
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect(todo.textContent.trim()).toBe(
-    'StressedTag 5: Temperature 18.1\u00a0°C, stressed until 18.5',
+    'StressedTag 5: Temperature 18.1\u00a0°C, stressed until 18.5Keep an eye on it',
   );
 });
 
@@ -228,7 +252,7 @@ test('beside an active alarm, healthy says why', () => {
     reportAlarms(alarm('a'));
   });
   expect(house().dataset['health']).toBe('healthy');
-  expect(driver().textContent).toBe('1 alarm is still active: two good scans resolve it');
+  expect(driver().textContent).toBe('1 alarm is still active: the next good scan resolves it');
   act(() => {
     reportAlarms(alarm('a', { cleared: 950 }));
   });

@@ -1,10 +1,10 @@
 import { beforeEach, describe, expect, test } from 'vitest';
 
 import { act, receive, store } from '../store/app';
-import { NO_HOUSE, NO_TWIN, type House, withField, withPast } from '../store/twin';
+import { NO_HOUSE, NO_TWIN, type House, withField, withPast, withState } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { timelineOf } from '../domain/timeline';
-import { readings, snapshot, tag, wireTag } from '../testing/tags';
+import { readings, snapshot, stateFrame, tag, wireTag } from '../testing/tags';
 import { wireTimeline } from '../testing/timeline';
 import { noticeFor } from './Notices';
 
@@ -92,6 +92,8 @@ describe('of a moment in the past', () => {
   test('that cannot be had, the reason is told', () => {
     come(NO_HOUSE);
     receive({ pastFault: { at, message: 'no journal is kept', isLasting: true } });
+    expect(noticeFor(store.get())?.hint).toBe('This moment is still to come.');
+    receive(withState(stateFrame([wireTag()], { sec: at + 1 }), performance.now()));
     expect(noticeFor(store.get())).toMatchObject({ id: 'past-failed', hint: 'no journal is kept' });
   });
 

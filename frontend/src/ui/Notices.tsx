@@ -1,6 +1,6 @@
 import type { JSX } from 'react';
 
-import { rosText } from '../domain/time';
+import { rosText, secondsOf } from '../domain/time';
 import { shown } from '../domain/text';
 import type { Snapshot } from '../domain/twin';
 import { useApp, type AppState } from '../store/app';
@@ -78,7 +78,7 @@ export function noticeFor(state: AppState): Notice | null {
 
 /** A past moment has nothing to show: still loading, failed, or no tag was known then. */
 function pastNotice({ twin }: AppState, moment: number, came: Snapshot | null): Notice {
-  const { pastFault, remembered } = twin;
+  const { pastFault, remembered, latest } = twin;
   const when = rosText(moment);
   if (came) {
     const reach = remembered.value?.reach;
@@ -88,7 +88,8 @@ function pastNotice({ twin }: AppState, moment: number, came: Snapshot | null): 
     return { id: 'past-nothing', title: S.pastNothing(when), hint, large: true };
   }
   if (pastFault) {
-    const hint = shown(pastFault.message, 160);
+    const isFuture = latest.snapshot !== null && moment > secondsOf(latest.snapshot.at);
+    const hint = isFuture && pastFault.isLasting ? S.pastFuture : shown(pastFault.message, 160);
     return { id: 'past-failed', title: S.pastFailed(when), hint, large: true };
   }
   return {

@@ -3,44 +3,74 @@ import type { JSX } from 'react';
 import { alarmOf, isAwaited } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import type { HealthReason, TagHealth } from '../contract/types';
-import { ageSeconds } from '../domain/time';
+import { isOldReading, type TagThen } from '../domain/difference';
+import { ageSeconds, type When } from '../domain/time';
 import { reasonText, todoText } from '../domain/health';
 import { whenOf } from '../domain/twin';
 import { useApp, type AppState } from '../store/app';
 import { useSelected } from '../store/create';
-import { selectCatalogue } from '../store/derived';
-import { selectShown } from '../store/moment';
+import { selectCatalogue, selectHealth } from '../store/derived';
+import { selectIsReceiving, selectShown, selectTag } from '../store/moment';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
 import { HealthShape } from './HealthMark';
 
-/** A reason in words, with its age at the shown moment. */
-export function useReasonText(reason: HealthReason | null, isMarked = false): string {
+/** A reason in words, with the age at the shown moment of what it is about. */
+export function useReasonText(
+  reason: HealthReason | null,
+  isMarked = false,
+  /** Empty: the greenhouse. */
+  tagId = '',
+): string {
   const { snapshot, ageing } = useApp(selectShown);
+  const tag = useApp((state) => selectTag(state, tagId));
+  const health = useApp((state) => selectHealth(state).byTag.get(tagId));
+  const isReceiving = useApp(selectIsReceiving);
   const unit = useApp((state) => state.settings.unit);
   const catalogue = useApp(selectCatalogue);
   return useTicking((now) => {
     if (!reason) return '';
-    const when = reason.since && snapshot ? whenOf(reason.since, snapshot) : 'unknown';
+    const when =
+      tag && health
+        ? whenShown(reason, { tag, health }, isReceiving)
+        : reason.since && snapshot
+          ? whenOf(reason.since, snapshot)
+          : 'unknown';
     return reasonText(catalogue, reason, unit, ageSeconds(when, now, ageing), isMarked);
   });
 }
 
+/** When the attempt or reading behind a tag's reason was made; null: the text needs no age. */
+function whenShown(
+  { kind, sensor, since }: HealthReason,
+  then: TagThen,
+  isReceiving: boolean,
+): When | null {
+  const { failedAttempt, readAt, scannedAt } = then.tag;
+  if (kind === 'scan_failed') return failedAttempt?.at ?? 'unknown';
+  const isRecent = isReceiving && !isOldReading(sensor, then);
+  return (kind === 'old' ? since !== null : sensor !== '' && !isRecent)
+    ? (readAt.get(sensor) ?? scannedAt)
+    : null;
+}
+
 /** A reason's text, for use beside its mark. */
-export function Reason({ reason }: { reason: HealthReason }): JSX.Element {
-  return <>{useReasonText(reason, true)}</>;
+function Reason({ reason, tagId }: { reason: HealthReason; tagId: string }): JSX.Element {
+  return <>{useReasonText(reason, true, tagId)}</>;
 }
 
 /** Reasons for a tag's verdict, the worst first. */
 export function Reasons({
   health,
+  tagId,
   most = Infinity,
-  todoAt,
+  hasTodo = false,
 }: {
   health: TagHealth;
+  tagId: string;
   most?: number;
-  /** The tag's id, to add what to do about each reason. */
-  todoAt?: string | undefined;
+  /** Whether to add what to do about each reason. */
+  hasTodo?: boolean;
 }): JSX.Element | null {
   const { reasons } = health;
   if (reasons.length === 0) return null;
@@ -50,9 +80,9 @@ export function Reasons({
         <li key={`${reason.kind} ${reason.sensor}`} data-kind={reason.kind}>
           <HealthShape verdict={reason.verdict} />
           <span>
-            <Reason reason={reason} />
+            <Reason reason={reason} tagId={tagId} />
           </span>
-          {todoAt !== undefined && <Todo tagId={todoAt} reason={reason} />}
+          {hasTodo && <Todo tagId={tagId} reason={reason} />}
         </li>
       ))}
       {reasons.length > most && <li className="faint">{S.cardMore(reasons.length - most)}</li>}

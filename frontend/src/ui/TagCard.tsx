@@ -112,7 +112,7 @@ function CardBody({
   return (
     <div className="card-body">
       {health && (
-        <Reasons health={health} todoAt={isBad(health.verdict) && isNow ? tag.id : undefined} />
+        <Reasons health={health} tagId={tag.id} hasTodo={isBad(health.verdict) && isNow} />
       )}
       {isNow && <CardAlarms tagId={tag.id} />}
       {tag.readings.size === 0 && <p className="faint">{S.cardNoReadings}</p>}

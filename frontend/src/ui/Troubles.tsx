@@ -8,7 +8,7 @@ import { rosText } from '../domain/time';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { retryConnection } from '../store/live';
-import { selectLatest, selectShown } from '../store/moment';
+import { selectHasTime, selectLatest, selectShown } from '../store/moment';
 import type { TwinState } from '../store/twin';
 import { LANGUAGE_TROUBLE, S } from '../strings';
 import { More } from '../widgets/controls';
@@ -154,13 +154,19 @@ export function FrozenBanner(): JSX.Element | null {
   const isTimeLost = useApp((state) => state.twin.isTimeLost);
   const connection = useApp((state) => state.twin.connection);
   const isPast = useApp((state) => selectShown(state).moment !== null);
+  // Data may still arrive from a twin without a clock.
+  const isDated = useApp(selectHasTime) || isTimeLost || phase !== 'offline';
   const now = useNow();
   if (phase === 'live' || takenAt === undefined) return null;
   return (
     <div className="frozen" role="alert" data-testid="frozen">
-      <strong>{(isPast ? S.frozenBehindPast : S.frozenSince)(clockText(epochOf(takenAt)))}</strong>
+      {isDated && (
+        <strong>
+          {(isPast ? S.frozenBehindPast : S.frozenSince)(clockText(epochOf(takenAt)))}
+        </strong>
+      )}
       {/* A running count must not be read out every second. */}
-      {!isTimeLost && (
+      {isDated && !isTimeLost && (
         <span aria-hidden="true" className="frozen-age">
           {S.agoSuffix(ageText(Math.max(0, now - takenAt) / 1000))}
         </span>

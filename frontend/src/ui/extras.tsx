@@ -103,7 +103,7 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
         </strong>
         {health && <HealthMark verdict={health.verdict} />}
       </header>
-      {health && <Reasons health={health} most={MOST_REASONS} />}
+      {health && <Reasons health={health} tagId={tag.id} most={MOST_REASONS} />}
       <dl>
         {names.slice(0, MOST_READINGS).map((name) => {
           const sensor = catalogue.named(name);

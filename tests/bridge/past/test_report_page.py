@@ -187,10 +187,13 @@ def test_open_alarms_come_first_with_value_and_both_limits() -> None:
     dry = {"verdict": "stressed", "kind": "range", "sensor": "vpd", "value": 1.5, "limit": 1.3}
     orchid = {**cold, "value": 12.0, "limit": 13.0}
     warm = {**cold, "verdict": "stressed", "limit": 26.0}
+    read = at(600)["sec"] * 10**9
     tags = [
-        TagState("7", readings=(Reading("temperature", 9.5, 1), Reading("humidity", 30.0, 1))),
-        TagState("8", readings=(Reading("temperature", 12.5, 1),), flower=Flower("Orchid", 0.9)),
-        TagState("9", readings=(Reading("temperature", 9.97, 1),)),
+        TagState(
+            "7", readings=(Reading("temperature", 9.5, read), Reading("humidity", 30.0, read))
+        ),
+        TagState("8", readings=(Reading("temperature", 12.5, read),), flower=Flower("Orchid", 0.9)),
+        TagState("9", readings=(Reading("temperature", 9.97, read),)),
     ]
     alarms = [
         alarm(tag_id="7", reason=cold, worst=8.0),
@@ -208,18 +211,20 @@ def test_open_alarms_come_first_with_value_and_both_limits() -> None:
     page = page_of(alarms=alarms, tags=tags)
     active, _, resolved = page.partition("Alarms still active ")[2].partition(" Alarms resolved ")
     assert active.startswith("Alarm Tag Raised At the end Worst value Limits ")
-    assert "7 06:01 9.5 °C 8.0 °C 10.0–35.0 °C" in active
-    assert "8 06:01 12.5 °C 11.0 °C 13.0–35.0 °C" in active
-    assert "9 06:01 10.0 °C 31.0 °C 8.0–30.0 °C" in active
-    assert "8 06:01 12.5 °C 27.0 °C 18.0–26.0 °C" in active
-    assert "8 06:01 12.5 °C 36.0 °C 10.0–35.0 °C" in active
-    assert "7 06:01 0.83 kPa 1.50 kPa 0.20–1.30 kPa" in active
-    assert "9 06:01 just below 10.0 °C 8.0 °C 10.0–35.0 °C" in active
+    assert "7 06:01 9.5 °C (06:10) 8.0 °C 10.0–35.0 °C" in active
+    assert "8 06:01 12.5 °C (06:10) 11.0 °C 13.0–35.0 °C" in active
+    assert "9 06:01 10.0 °C (06:10) 31.0 °C 8.0–30.0 °C" in active
+    assert "8 06:01 12.5 °C (06:10) 27.0 °C 18.0–26.0 °C" in active
+    assert "8 06:01 12.5 °C (06:10) 36.0 °C 10.0–35.0 °C" in active
+    assert "7 06:01 0.83 kPa (06:10) 1.50 kPa 0.20–1.30 kPa" in active
+    assert "9 06:01 just below 10.0 °C (06:10) 8.0 °C 10.0–35.0 °C" in active
     assert "7 06:01 07:19 1 h 18 min 1.60 kPa 0.20–1.30 kPa" in resolved
     # The file of sensors has another range by now.
     assert "7 06:01 06:01 37 s 2.0 °C 3.5 °C" in resolved
-    page = page_of(alarms=[alarm()], tags=[TagState("7", flower=Flower(bug_count=2))])
-    assert "7 06:01 2 3" in page
+    page = page_of(
+        alarms=[alarm()], tags=[replace(tags[0], flower=Flower(bug_count=2), looked_at_ns=read)]
+    )
+    assert "7 06:01 2 (06:10) 3" in page
 
 
 @pytest.mark.parametrize(

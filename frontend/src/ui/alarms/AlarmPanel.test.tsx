@@ -62,13 +62,13 @@ const act = (tag: string, name: string): void => {
 
 test('each in words: for how long, what, where, now, at worst; what is resolved when asked for', () => {
   report(
-    alarm('a', { tag_id: '5', raised: 500, worst: 4.2 }),
+    alarm('a', { tag_id: '5', raised: 80, worst: 4.2 }),
     alarm('b', { tag_id: '', raised: 100, cleared: 160, reason: { kind: 'stopped', sensor: '' } }),
   );
   const active = first('active');
   expect(active.textContent).toContain('Tag 5: Temperature below 10.0\u00a0°C');
   expect(fact(active, 'since').textContent).toMatch(/^\d+\u00a0\w+ Critical$/);
-  expect(fact(active, 'since').title).toContain('since sim 00:08:20');
+  expect(fact(active, 'since').title).toContain('since sim 00:01:20');
   expect(fact(active, 'since').title).toContain('6.6\u00a0°C when raised');
   expect(fact(active, 'worst').textContent).toContain('worst 4.2\u00a0°C');
   expect(fact(active, 'worst').dataset['status']).toBe('critical');

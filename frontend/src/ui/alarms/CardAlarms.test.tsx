@@ -88,7 +88,9 @@ test('of one alarm it says who has acknowledged it, and when', () => {
 test('of two reasons it is said which waits for a second scan; what the deadband alone holds does not', () => {
   const damp = reason({ sensor: 'humidity', value: 90, limit: 85 });
   const back = reason({ sensor: 'co2', value: 1_450, limit: 1_500, ...held(1_400) });
-  render(<Reasons health={{ verdict: 'critical', reasons: [reason(), damp, back] }} todoAt="7" />);
+  render(
+    <Reasons health={{ verdict: 'critical', reasons: [reason(), damp, back] }} tagId="7" hasTodo />,
+  );
   const lines = (): (string | null)[] =>
     [...screen.getByTestId('reasons').children].map(({ textContent }) => textContent);
   expect(lines().filter((text) => text?.includes('second scan'))).toEqual([]);
@@ -104,7 +106,7 @@ test('of two reasons it is said which waits for a second scan; what the deadband
 
 test('what is shelved says until when and why, has its way back, and is no order meanwhile', () => {
   const cold = reason();
-  render(<Reasons health={{ verdict: 'critical', reasons: [cold] }} todoAt="7" />);
+  render(<Reasons health={{ verdict: 'critical', reasons: [cold] }} tagId="7" hasTodo />);
   const order = (): string | undefined =>
     screen.getByTestId('reasons').querySelector('strong')?.textContent;
   flush(() => {

@@ -136,8 +136,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
-          ? 'Keine Messung mit bekannter Zeit'
-          : 'kein Messwert mit bekannter Zeit'
+          ? 'Kein Messwert mit bekanntem Alter'
+          : 'kein Messwert mit bekanntem Alter'
         : age === null
           ? sensor === ''
             ? 'Schon länger nicht gemessen'
@@ -163,6 +163,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       vpd: { below: 'Lüften und heizen', above: 'Befeuchten oder schattieren' },
     },
     range: 'Klimaregelung prüfen',
+    watch: 'Beobachten',
     reading_failed: 'Sensor prüfen',
     scan_failed: 'Weg und Messpunkt prüfen',
     pest: 'Prüfen und bekämpfen',
@@ -194,8 +195,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthAllWell: 'Alle beurteilten Messwerte liegen im Idealbereich',
   healthDespite: (alarms) =>
     alarms === 1
-      ? '1 Alarm steht noch an: nach zwei guten Messungen behoben'
-      : `${alarms} Alarme stehen noch an: nach je zwei guten Messungen behoben`,
+      ? '1 Alarm steht noch an: mit der nächsten guten Messung behoben'
+      : `${alarms} Alarme stehen noch an: mit der nächsten guten Messung behoben`,
   healthAcknowledged: 'quittiert',
   healthNotCurrent: 'Nicht aktuell',
   healthNothing: 'Noch kein Messwert zu beurteilen',

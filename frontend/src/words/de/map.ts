@@ -132,7 +132,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   },
   pest: 'Schädling',
   pestCount: (count) => counted(count, 'Schädling', 'Schädlinge'),
-  notOnMap: 'Keine Position',
+  notOnMap: 'Ohne Ort',
   notOnMapLong: 'Die Position ist noch nicht bekannt; der Messpunkt fehlt auf der Karte.',
   farOff: 'Zu weit entfernt, nicht auf der Karte',
   farOffLong: (place) =>

@@ -225,6 +225,7 @@ export const PAST: In<typeof EN.PAST> = {
   pastFetching: (moment) => `${moment} wird geladen`,
   pastFetchingHint: 'Bis dahin wird nichts angezeigt.',
   pastFailed: (moment) => `${moment} kann nicht angezeigt werden`,
+  pastFuture: 'Dieser Zeitpunkt liegt in der Zukunft.',
   pastNothing: (moment) => `Keine Daten für ${moment}`,
   pastReach: (from) => `Aufzeichnung ab ${from}.`,
   pastReachNothing: 'Noch ist nichts aufgezeichnet.',

@@ -145,8 +145,8 @@ export const HEALTH = {
     old: (sensor: string, age: string | null, holds: string | null, isDated: boolean): string => {
       const since = !isDated
         ? sensor === ''
-          ? 'No scan with a known time'
-          : 'no reading with a known time'
+          ? 'No reading of known age'
+          : 'no reading of known age'
         : age === null
           ? `${sensor === '' ? 'Not' : 'not'} scanned recently`
           : sensor === ''
@@ -171,6 +171,8 @@ export const HEALTH = {
       vpd: { below: 'Ventilate and heat', above: 'Mist or shade' },
     },
     range: 'Check the climate settings',
+    /** For a value that is back in its range, but not far enough inside yet. */
+    watch: 'Keep an eye on it',
     reading_failed: 'Check the sensor',
     scan_failed: 'Check the path and the tag',
     pest: 'Inspect and treat the plants',
@@ -204,8 +206,8 @@ export const HEALTH = {
   healthAllWell: 'All assessed readings are within their ideal ranges',
   healthDespite: (alarms: number): string =>
     alarms === 1
-      ? '1 alarm is still active: two good scans resolve it'
-      : `${alarms} alarms are still active: two good scans resolve each`,
+      ? '1 alarm is still active: the next good scan resolves it'
+      : `${alarms} alarms are still active: the next good scan resolves each`,
   healthAcknowledged: 'acknowledged',
   /** Replaces the verdict while the current status is unknown. */
   healthNotCurrent: 'Not current',

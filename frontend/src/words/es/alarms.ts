@@ -140,8 +140,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
-          ? 'Ninguna medición con hora conocida'
-          : 'ninguna lectura con hora conocida'
+          ? 'Ninguna lectura de antigüedad conocida'
+          : 'ninguna lectura de antigüedad conocida'
         : age === null
           ? sensor === ''
             ? 'Sin medir últimamente'
@@ -170,6 +170,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       vpd: { below: 'Ventilar y calefactar', above: 'Humidificar o sombrear' },
     },
     range: 'Revisar el control del clima',
+    watch: 'Vigilar',
     reading_failed: 'Revisar el sensor',
     scan_failed: 'Revisar el acceso y el punto',
     pest: 'Revisar y tratar',
@@ -200,8 +201,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthAllWell: 'Todas las lecturas evaluadas están en su rango ideal',
   healthDespite: (alarms) =>
     alarms === 1
-      ? 'Aún hay 1 alarma activa: dos mediciones buenas la resuelven'
-      : `Aún hay ${alarms} alarmas activas: cada una se resuelve con dos mediciones buenas`,
+      ? 'Aún hay 1 alarma activa: queda resuelta con la próxima medición buena'
+      : `Aún hay ${alarms} alarmas activas: quedan resueltas con la próxima medición buena`,
   healthAcknowledged: 'reconocida',
   healthNotCurrent: 'Desactualizado',
   healthNothing: 'Aún no hay lecturas que evaluar',

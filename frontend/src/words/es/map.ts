@@ -130,7 +130,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   },
   pest: 'Plaga',
   pestCount: (count) => counted(count, 'individuo', 'individuos'),
-  notOnMap: 'Sin posición',
+  notOnMap: 'Sin lugar',
   notOnMapLong: 'Aún no se conoce su posición, así que el punto no está en el mapa.',
   farOff: 'Demasiado lejos, fuera del mapa',
   farOffLong: (place) =>

@@ -220,6 +220,7 @@ export const PAST: In<typeof EN.PAST> = {
   pastFetching: (moment) => `Cargando ${moment}`,
   pastFetchingHint: 'No se muestra nada hasta que se cargue.',
   pastFailed: (moment) => `No se puede mostrar ${moment}`,
+  pastFuture: 'Ese momento aún no ha llegado.',
   pastNothing: (moment) => `Sin datos de ${moment}`,
   pastReach: (from) => `Hay datos registrados desde ${from}.`,
   pastReachNothing: 'Aún no hay nada registrado.',

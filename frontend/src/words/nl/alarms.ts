@@ -131,8 +131,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''
-          ? 'Geen meting met bekende tijd'
-          : 'geen meetwaarde met bekende tijd'
+          ? 'Geen meetwaarde met bekende leeftijd'
+          : 'geen meetwaarde met bekende leeftijd'
         : age === null
           ? sensor === ''
             ? 'Al een tijd niet gemeten'
@@ -158,6 +158,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       vpd: { below: 'Luchten en stoken', above: 'Bevochtigen of schermen' },
     },
     range: 'Klimaatregeling controleren',
+    watch: 'In de gaten houden',
     reading_failed: 'Sensor controleren',
     scan_failed: 'Pad en meetpunt controleren',
     pest: 'Controleren en bestrijden',
@@ -188,8 +189,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthAllWell: 'Alle beoordeelde meetwaarden liggen binnen het ideale bereik',
   healthDespite: (alarms) =>
     alarms === 1
-      ? '1 alarm is nog actief: na twee goede metingen is het opgelost'
-      : `${alarms} alarmen zijn nog actief: elk is na twee goede metingen opgelost`,
+      ? '1 alarm is nog actief: opgelost bij de volgende goede meting'
+      : `${alarms} alarmen zijn nog actief: opgelost bij de volgende goede meting`,
   healthAcknowledged: 'bevestigd',
   healthNotCurrent: 'Niet actueel',
   healthNothing: 'Nog geen meetwaarde om te beoordelen',

@@ -130,7 +130,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   },
   pest: 'Plaag',
   pestCount: (count) => counted(count, 'plaagdier', 'plaagdieren'),
-  notOnMap: 'Geen positie',
+  notOnMap: 'Geen plek',
   notOnMapLong: 'De positie is nog niet bekend; het meetpunt staat niet op de kaart.',
   farOff: 'Te ver weg, niet op de kaart',
   farOffLong: (place) =>

@@ -224,6 +224,7 @@ export const PAST: In<typeof EN.PAST> = {
   pastFetching: (moment) => `${moment} wordt geladen`,
   pastFetchingHint: 'Tot het geladen is, wordt niets getoond.',
   pastFailed: (moment) => `${moment} kan niet worden getoond`,
+  pastFuture: 'Dit moment ligt in de toekomst.',
   pastNothing: (moment) => `Geen gegevens van ${moment}`,
   pastReach: (from) => `Er zijn vastgelegde gegevens vanaf ${from}.`,
   pastReachNothing: 'Er is nog niets vastgelegd.',

@@ -24,7 +24,7 @@ import {
 import { selectLatest, selectShown, selectTag, type Shown } from '../store/moment';
 import { isPrinting, onThemeChange } from '../store/theme';
 import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
-import { keyAction, type MapActions, pinUnderMouse, pointedAt, theMap } from './commands';
+import { keyAction, type MapActions, pinUnderMouse, pointedAt, robotBox, theMap } from './commands';
 import { Painter, type Canvases } from './painter';
 
 /** A finger hits a pin within this distance, a mouse within a bit less; CSS pixels. */
@@ -95,7 +95,8 @@ export function runMap(
       painter.paintStill(state, view, at, parts.has('still'));
     }
     if (parts.has('pins') || parts.has('view')) {
-      painter.paintPins(state, view, at, parts.has('pins'), camera.isHeld ? null : covered);
+      const boxes = camera.isHeld ? null : covered;
+      painter.paintPins(state, view, at, parts.has('pins'), boxes, robotBox.get());
     }
     if (parts.has('overlay') || parts.has('view')) {
       pulses = pulses.filter(({ since }) => at - since < PULSE_MS);
@@ -340,6 +341,9 @@ export function runMap(
 
   const stops = [
     store.subscribe(guarded(update)),
+    robotBox.subscribe(() => {
+      spoil('pins');
+    }),
     onThemeChange(() => {
       painter.recolour();
       spoil('still', 'pins', 'overlay');

@@ -1,4 +1,4 @@
-import type { Box, CanvasPoint, MapPoint, Size } from '../geometry/coordinates';
+import type { CanvasPoint, MapPoint, Size } from '../geometry/coordinates';
 import { createStore } from '../store/create';
 
 /** Actions on the map for the rest of the page. */
@@ -58,6 +58,3 @@ export interface PinUnderMouse {
 }
 
 export const pinUnderMouse = createStore<PinUnderMouse | null>(null);
-
-/** Where labels keep clear of the robot's mark, pixels relative to the map's origin; null: none shown. */
-export const robotBox = createStore<Box | null>(null);

@@ -13,6 +13,7 @@ import {
   type View,
 } from '../geometry/coordinates';
 import { act, moveViewport, store, type AppState } from '../store/app';
+import { robotBox } from '../store/create';
 import { withTag } from '../store/view';
 import {
   selectAreaOf,
@@ -24,7 +25,7 @@ import {
 import { selectLatest, selectShown, selectTag, type Shown } from '../store/moment';
 import { isPrinting, onThemeChange } from '../store/theme';
 import { type Content, contentOf, coveredBoxes, MapCamera, together, watchCovered } from './camera';
-import { keyAction, type MapActions, pinUnderMouse, pointedAt, robotBox, theMap } from './commands';
+import { keyAction, type MapActions, pinUnderMouse, pointedAt, theMap } from './commands';
 import { Painter, type Canvases } from './painter';
 
 /** A finger hits a pin within this distance, a mouse within a bit less; CSS pixels. */

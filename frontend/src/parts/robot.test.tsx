@@ -1,9 +1,8 @@
 import { render, act as rendered, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { robotBox } from '../map/commands';
 import { moveViewport } from '../store/app';
-import { robotFrame } from '../store/create';
+import { robotBox, robotFrame } from '../store/create';
 import { goLive, goLost, nextStamp, showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import {

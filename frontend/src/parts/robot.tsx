@@ -8,10 +8,9 @@ import type { Robot, RobotNow, WireTime } from '../contract/types';
 import { ageText, percentText, written } from '../domain/format';
 import { ageSeconds, ageStep, secondsOf } from '../domain/time';
 import { mapPoint, toCanvas } from '../geometry/coordinates';
-import { robotBox } from '../map/commands';
 import { act, type AppState, keepFetched, store, useApp } from '../store/app';
 import { withLayer } from '../store/view';
-import { robotFrame, useSelected } from '../store/create';
+import { robotBox, robotFrame, useSelected } from '../store/create';
 import {
   isReceivingNow,
   rosNow,

@@ -124,6 +124,14 @@ describe('painter', () => {
     expect(named(canvases.pins, 'drawImage')).toHaveLength(0);
   });
 
+  test('blooms are a layer of their own', () => {
+    const bloom = { height_m: 0, species: 'rose', confidence: 1, anomaly: false };
+    showTags([wireTag({ flowers: [{ ...bloom, position: { x: 1, y: 2, z: 0 } }] })]);
+    show('blooms');
+    painter.paintPins(store.get(), view, 0, true, []);
+    expect(named(canvases.pins, 'drawImage')).toHaveLength(1);
+  });
+
   test('a label gives way to the robot', () => {
     show('pins', 'labels');
     // Where tag 1's label begins, pixels: its sprite is the last that is drawn.

@@ -120,6 +120,10 @@ def test_the_word_for_now_has_one_line_of_the_time_bar(house: Bridge, open_page:
     now = hmi.test_id("timebar-when")
     expect(now).to_have_text("En directo")
     assert place(now).bottom - place(now).top < 24
+    # A moment of the past takes two, beside the choices.
+    hmi.go("at=1795970265", "?lang=de")
+    expect(now).to_contain_text("Nov.")
+    assert words_below(hmi, ".timebar-when", ".timebar-period") == []
 
 
 # By how much a choice is narrower than its words, px.

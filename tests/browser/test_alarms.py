@@ -212,6 +212,16 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
         expect(fact(row, "now")).to_contain_text("now 42.0")
         hmi.page.locator(".alarm-go").click()
         expect(hmi.app).to_have_attribute("data-moment", "now")
+        # A new one while somebody looks back: nothing gives way to it.
+        hmi.turn(f"list=alarms&at={int(raised_s) + 1}")
+        expect(rows(hmi, "active")).to_have_count(1)
+        before = places(hmi, ".map-frame", ".alarms")
+        robot.observe(*[warm("b", 43.5, at=(2, 1))] * 2)
+        news = hmi.test_id("meanwhile").locator("visible=true")
+        expect(news).to_contain_text("New alarm: Tag b")
+        assert places(hmi, ".map-frame", ".alarms") == before
+        news.get_by_role("button", name="Back to live, show tag b").click()
+        expect(hmi.card("b")).to_be_visible()
 
 
 def test_nothing_moves_while_a_finger_rests_on_the_list(domain: int, open_page: OpenPage) -> None:

@@ -129,16 +129,20 @@ describe('pins', () => {
   });
 });
 
-test('blooms share a sprite a colour', () => {
+test('blooms share a sprite a colour, each in its place; what is out of sight is left out', () => {
   const copies = new FakeContext();
   const dot = (x: number, red: number): Parameters<typeof drawBlooms>[1][number] => ({
     at: mapPoint(x, 1),
     look: { colour: [red, 0, 0], shape: 'circle' },
   });
-  drawBlooms(penOn(copies), [dot(1, 1), dot(2, 1), dot(3, 2)]);
-  const canvases = copies.named('drawImage').map(({ args }) => args[0]);
-  expect(canvases).toHaveLength(3);
-  expect(new Set(canvases).size).toBe(2);
+  drawBlooms(penOn(copies), [dot(1, 1), dot(2, 1), dot(3, 2), dot(50, 1)]);
+  const drawn = copies.named('drawImage').map(({ args }) => args);
+  // In the middle of a sprite; 40 pixels are a metre.
+  const middles = drawn.map(([, x, y, size]) => [x, y].map((it) => Number(it) + Number(size) / 2));
+  expect(middles.map((at) => at.map(Math.round))).toEqual([90, 130, 170].map((x) => [x, 210]));
+  const sprites = [...new Set(drawn.map(([sprite]) => sprite as HTMLCanvasElement))];
+  const fills = sprites.map((it) => FakeContext.recordOf(it)?.named('fill')[0]?.state['fillStyle']);
+  expect(fills).toEqual(['rgb(1 0 0)', 'rgb(2 0 0)']);
 });
 
 test('the chosen pin’s label comes before all others', () => {

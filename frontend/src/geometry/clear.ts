@@ -94,6 +94,8 @@ export interface Room {
   /** The visible part; labels of pins inside it are not cut off. */
   readonly within: Box;
   readonly covered: readonly Box[];
+  /** The robot's mark: labels keep clear of it, and a pin below it has one all the same. */
+  readonly robot?: Box | null;
 }
 
 const GAP = 4;
@@ -107,7 +109,8 @@ export function placeLabels(
   room: Room | null = null,
 ) {
   const taken = new Buckets();
-  for (const box of room?.covered ?? []) taken.add(box);
+  const robot = room?.robot ?? null;
+  for (const box of [...(room?.covered ?? []), ...(robot ? [robot] : [])]) taken.add(box);
   const ordered = requests
     .map((request, index) => {
       const { x, y } = request;
@@ -120,7 +123,7 @@ export function placeLabels(
 
   return ordered.flatMap(({ request, pin }) => {
     // Among overlapping pins only warnings get labels: more would be unreadable.
-    if (request.priority < URGENT && !taken.isFree(pin, pin)) return [];
+    if (request.priority < URGENT && !taken.isFree(pin, [pin, robot])) return [];
     const spot = firstFree(request, height, taken, room?.within ?? null);
     if (!spot) return [];
     const { text, box, width } = spot;
@@ -137,6 +140,8 @@ function firstFree(
   sight: Box | null,
 ): { text: string; width: number; box: Box } | null {
   const reach = radius + GAP;
+  // From a round pin to a corner of its label.
+  const near = reach * Math.SQRT1_2;
   const within = sight && contains(sight, { left: x, top: y, right: x, bottom: y }) ? sight : null;
   for (const { text, width } of texts) {
     const corners: readonly (readonly [number, number])[] = [
@@ -144,6 +149,10 @@ function firstFree(
       [x - reach - width, y - height / 2],
       [x - width / 2, y - reach - height],
       [x - width / 2, y + reach],
+      [x + near, y - near - height],
+      [x + near, y + near],
+      [x - near - width, y - near - height],
+      [x - near - width, y + near],
     ];
     for (const [left, top] of corners) {
       const box = { left, top, right: left + width, bottom: top + height };
@@ -171,12 +180,11 @@ class Buckets {
     }
   }
 
-  /** `own`: a box that is ignored. */
-  isFree(box: Box, own: Box | null = null): boolean {
+  isFree(box: Box, ignored: readonly (Box | null)[] = []): boolean {
     for (const key of keys(box)) {
       for (const other of this.#boxes.get(key) ?? []) {
         const apart =
-          other === own ||
+          ignored.includes(other) ||
           box.right <= other.left ||
           other.right <= box.left ||
           box.bottom <= other.top ||

@@ -13,6 +13,7 @@ import {
   type View,
 } from '../geometry/coordinates';
 import { act, moveViewport, store, type AppState } from '../store/app';
+import { robotBox } from '../store/create';
 import { withTag } from '../store/view';
 import {
   selectAreaOf,
@@ -95,7 +96,8 @@ export function runMap(
       painter.paintStill(state, view, at, parts.has('still'));
     }
     if (parts.has('pins') || parts.has('view')) {
-      painter.paintPins(state, view, at, parts.has('pins'), camera.isHeld ? null : covered);
+      const boxes = camera.isHeld ? null : covered;
+      painter.paintPins(state, view, at, parts.has('pins'), boxes, robotBox.get());
     }
     if (parts.has('overlay') || parts.has('view')) {
       pulses = pulses.filter(({ since }) => at - since < PULSE_MS);
@@ -340,6 +342,9 @@ export function runMap(
 
   const stops = [
     store.subscribe(guarded(update)),
+    robotBox.subscribe(() => {
+      spoil('pins');
+    }),
     onThemeChange(() => {
       painter.recolour();
       spoil('still', 'pins', 'overlay');

@@ -1,6 +1,7 @@
 import { beforeEach, describe, expect, test } from 'vitest';
 
 import { cataloguesOf } from '../domain/sensors';
+import type { Box } from '../geometry/coordinates';
 import { act, prefer, receive, store } from '../store/app';
 import { withField } from '../store/twin';
 import { type Layer, withTag } from '../store/view';
@@ -121,6 +122,28 @@ describe('painter', () => {
     painter.paintPins(store.get(), view, 0, true, []);
     expect(named(canvases.still, 'drawImage')).toHaveLength(0);
     expect(named(canvases.pins, 'drawImage')).toHaveLength(0);
+  });
+
+  test('blooms are a layer of their own', () => {
+    const bloom = { height_m: 0, species: 'rose', confidence: 1, anomaly: false };
+    showTags([wireTag({ flowers: [{ ...bloom, position: { x: 1, y: 2, z: 0 } }] })]);
+    show('blooms');
+    painter.paintPins(store.get(), view, 0, true, []);
+    expect(named(canvases.pins, 'drawImage')).toHaveLength(1);
+  });
+
+  test('a label gives way to the robot', () => {
+    show('pins', 'labels');
+    // Where tag 1's label begins, pixels: its sprite is the last that is drawn.
+    const labelAt = (robot: Box | null): number[] => {
+      painter.paintPins(store.get(), view, 0, true, [], robot);
+      return named(canvases.pins, 'drawImage').at(-1)?.args.slice(1, 3) as number[];
+    };
+    const [x = NaN, y = NaN] = labelAt(null);
+    const [left, top] = [x - view.x, y - view.y];
+    // It lies over half of the pin too.
+    const [away = NaN] = labelAt({ left: left - 12, top, right: left + 30, bottom: top + 40 });
+    expect(away).toBeLessThan(x);
   });
 
   test('the chosen and the hovered tag are marked', () => {

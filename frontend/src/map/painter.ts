@@ -193,13 +193,17 @@ export class Painter {
     this.#hatching.draw(pen, inside, placedField(field, knownPart(field)));
   }
 
-  /** `covered`: elements over the map; null while the map moves, and labels with it. */
+  /**
+   * `covered`: elements over the map; null while the map moves, and labels with it. `robot`: its mark,
+   * relative to the map's origin.
+   */
   paintPins(
     state: AppState,
     view: View,
     now: number,
     isNew: boolean,
     covered: readonly Box[] | null,
+    robot: Box | null = null,
   ): void {
     const pen = this.#penOn(this.canvases.pins, view);
     if (covered) {
@@ -213,6 +217,7 @@ export class Painter {
         scale: view.scale,
         within: moved({ left: 0, top: 0, right: width, bottom: height }),
         covered: covered.map(moved),
+        robot,
       });
     }
     if (isNew) this.#pinBuffer.spoil();

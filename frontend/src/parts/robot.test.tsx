@@ -1,7 +1,8 @@
 import { render, act as rendered, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
-import { robotFrame } from '../store/create';
+import { moveViewport } from '../store/app';
+import { robotBox, robotFrame } from '../store/create';
 import { goLive, goLost, nextStamp, showTags } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import {
@@ -43,13 +44,20 @@ test('of a robot that says nothing there is no line', () => {
   expect(container.textContent).toBe('');
 });
 
-test('a robot is marked on the map where it said that it is', () => {
+test('a robot is marked on the map where it said that it is, and labels keep clear of it', () => {
   document.body.innerHTML = '<div id="map-view"></div>';
-  render(<RobotLayer />);
+  moveViewport({ view: { x: 300, y: 200, scale: 100 } });
+  const { unmount } = render(<RobotLayer />);
   rendered(() => {
     robotFrame.set({ type: 'robot', ...robot });
   });
-  expect(screen.getByTestId('robot-mark')).toBeTruthy();
+  expect(screen.getByTestId('robot-mark').getAttribute('transform')).toBe('translate(514 540)');
+  const { left = NaN, top = NaN, right = NaN, bottom = NaN } = robotBox.get() ?? {};
+  expect([left < 214 - 16, top < 340 - 16, right > 214 + 16, bottom > 340 + 16]).toEqual(
+    Array(4).fill(true),
+  );
+  unmount();
+  expect(robotBox.get()).toBeNull();
 });
 
 test.each([

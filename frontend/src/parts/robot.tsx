@@ -10,7 +10,7 @@ import { ageSeconds, ageStep, secondsOf } from '../domain/time';
 import { mapPoint, toCanvas } from '../geometry/coordinates';
 import { act, type AppState, keepFetched, store, useApp } from '../store/app';
 import { withLayer } from '../store/view';
-import { robotFrame, useSelected } from '../store/create';
+import { robotBox, robotFrame, useSelected } from '../store/create';
 import {
   isReceivingNow,
   rosNow,
@@ -53,6 +53,7 @@ export function RobotLayer(): ReactPortal | null {
   );
   const looks = isLive === 'live' && isReceiving ? 'live' : 'old';
   const at = position && toCanvas(view, mapPoint(position.x, position.y));
+  useClearOfLabels(at && [at.x - view.x, at.y - view.y], isLive === 'old');
   const text = (points: readonly (readonly [number, number])[]): string =>
     points.map((point) => point.join(',')).join(' ');
   const map = document.getElementById('map-view');
@@ -95,6 +96,29 @@ export function RobotLayer(): ReactPortal | null {
     </>,
     map,
   );
+}
+
+/** Half the mark and width of its age, pixels. */
+const MARK_PX = 17;
+const AGE_PX = 84;
+/** Labels move in steps: they do not jump with each position. */
+const CLEAR_STEP_PX = 12;
+
+/** Keeps labels off the mark; `at`: its middle, pixels from the map's origin. */
+function useClearOfLabels(at: Place | null, hasAge: boolean): void {
+  const start = (value: number): number =>
+    Math.floor((value - MARK_PX) / CLEAR_STEP_PX) * CLEAR_STEP_PX;
+  const left = at && start(at[0]);
+  const top = at && start(at[1]);
+  useEffect(() => {
+    const size = 2 * MARK_PX + CLEAR_STEP_PX;
+    if (left !== null && top !== null) {
+      robotBox.set({ left, top, right: left + size + (hasAge ? AGE_PX : 0), bottom: top + size });
+    }
+    return () => {
+      robotBox.set(null);
+    };
+  }, [left, top, hasAge]);
 }
 
 const metres = (value: number): string => written(value.toFixed(1));

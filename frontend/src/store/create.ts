@@ -2,6 +2,7 @@ import { useSyncExternalStore } from 'react';
 
 import type { RobotFrame, Session } from '../contract/types';
 import { withParts } from '../domain/memo';
+import type { Box } from '../geometry/coordinates';
 
 export interface Store<State> {
   readonly get: () => State;
@@ -88,3 +89,6 @@ export const pointedBy =
 
 /** The robot's latest frame; null: none received. */
 export const robotFrame = createStore<RobotFrame | null>(null);
+
+/** Where labels keep clear of the robot's mark, pixels relative to the map's origin; null: none shown. */
+export const robotBox = createStore<Box | null>(null);

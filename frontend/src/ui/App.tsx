@@ -57,7 +57,6 @@ export function App({
         <FrozenBanner />
         <Troubles />
         <SimulatedNote />
-        <WithParts>{(parts) => <parts.Meanwhile />}</WithParts>
       </div>
       <WithParts>{(parts) => <parts.PaperLine />}</WithParts>
       <main className="panels">
@@ -66,6 +65,8 @@ export function App({
         {selected !== null && !kiosk && (
           <WithParts>{(parts) => <parts.TagCard key={selected} tagId={selected} />}</WithParts>
         )}
+        {/* The map has its own. */}
+        <WithParts>{(parts) => <parts.Meanwhile />}</WithParts>
       </main>
       {!kiosk && <PaneTabs />}
       <WithParts>{(parts) => <parts.HelpDialog />}</WithParts>

@@ -19,6 +19,7 @@ import { selectCatalogue, selectHealth } from '../store/derived';
 import { selectShown, selectTag, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { Age, AgeFact } from './Age';
+import { Meanwhile } from './alarms/AlarmNotes';
 import { HealthMark, HealthShape } from './HealthMark';
 import { lazyPart } from './lazyParts';
 import { Reasons } from './Reasons';
@@ -42,6 +43,7 @@ export const OnMap = (): JSX.Element => (
   <>
     {useRobot() && <RobotLayer />}
     <HoverCard />
+    <Meanwhile />
   </>
 );
 

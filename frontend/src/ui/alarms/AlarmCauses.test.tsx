@@ -4,6 +4,7 @@ import { afterEach, beforeEach, expect, test } from 'vitest';
 import { acknowledge, NO_LOCAL_ALARMS, own } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
 import type { Alarm } from '../../contract/types';
+import { store } from '../../store/app';
 import { alarm, reportAlarms } from '../../testing/alarms';
 import { showTags } from '../../testing/page';
 import { wireTag } from '../../testing/tags';
@@ -77,4 +78,12 @@ test('many of one cause that are resolved have nothing to do, and say when the l
   expect(heading.querySelector('small')?.textContent).toBe('resolved sim 00:15:54');
   // The empty tools cell stays, to align the columns.
   expect(heading.parentElement?.querySelector('.alarm-tools')?.children).toHaveLength(0);
+});
+
+test('an alarm’s menu leads to its start', () => {
+  report(alarm('a', { tag_id: '5', raised: 1 }));
+  fireEvent.click(screen.getByRole('button', { name: /^Actions: Tag 5/ }));
+  fireEvent.click(screen.getByRole('button', { name: 'Go to start' }));
+  expect(store.get().view).toMatchObject({ moment: 1, selected: '5' });
+  expect(document.querySelector('.row-actions')).toBeNull();
 });

@@ -20,6 +20,7 @@ import { selectLatestHealth } from '../../store/derived';
 import { selectIsDisconnected, selectLatest, selectShown } from '../../store/moment';
 import { S } from '../../strings';
 import { Check } from '../../widgets/controls';
+import { HealthMark } from '../HealthMark';
 import { selectAreAlarmsKnown } from '../Reasons';
 import { ignoreDoubleClick } from './AlarmRow';
 import { sharingText } from './people';
@@ -89,6 +90,7 @@ export function Meanwhile(): JSX.Element | null {
   const { alarm } = worst;
   return (
     <div className="meanwhile" data-testid="meanwhile" data-health={worst.verdict}>
+      <HealthMark verdict={worst.verdict} word={false} />
       <strong>{S.alarmsMeanwhile(text, items.length - 1)}</strong>
       <button
         type="button"

@@ -101,7 +101,7 @@ def test_on_a_phone_what_is_to_be_done_comes_first_whole_and_the_page_scrolls(
 
     def are_in_order() -> bool:
         line, first, last, plan = places(
-            wall, ".house-line", ".attention h3", ".attention > ul > li:last-child", ".map-view"
+            wall, ".patrol-line", ".attention h3", ".attention > ul > li:last-child", ".map-view"
         )
         return line.bottom <= first.top and last.bottom <= plan.top
 

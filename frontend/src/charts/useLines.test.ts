@@ -7,7 +7,7 @@ import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { wireTime } from '../testing/timeline';
 import { pairKey } from './model';
-import { useLines, type RequestedLines } from './useLines';
+import { useLines, type FetchedLines } from './useLines';
 
 const pair = { tagId: '1', sensor: 'co2' };
 /** From here on, the last hour is refetched every 15 s. */
@@ -66,7 +66,7 @@ const sinceOf = (path: string): number[] =>
     .map(({ searchParams }) => Number(searchParams.get('from')));
 const histories = (): number[] => sinceOf('/api/history');
 
-function show(hasDayBefore = false): { readonly current: RequestedLines } {
+function show(hasDayBefore = false): { readonly current: FetchedLines } {
   const pairs = [pair];
   return renderHook(() => useLines(pairs, 300, hasDayBefore)).result;
 }

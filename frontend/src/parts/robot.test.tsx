@@ -68,7 +68,7 @@ test.each([
   });
   const { textContent } = screen.getByTestId('robot-mark');
   expect(textContent.replaceAll('\u00a0', ' ') || undefined).toBe(said);
-  expect(screen.getByTestId('robot').dataset['looks']).toBe('old');
+  expect(screen.getByTestId('robot').dataset['freshness']).toBe('old');
 });
 
 const at = (x: number, seconds: number): TrailPoint => ({ x, y: 0, at: seconds });

@@ -20,7 +20,6 @@ test('what was kept comes back', () => {
     unit: 'F',
     shortcuts: false,
     hidden: ['pest', 'co2'],
-    density: 'compact',
     byArea: true,
     dayBefore: true,
   } as const;

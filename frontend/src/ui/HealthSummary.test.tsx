@@ -14,7 +14,7 @@ import { AttentionList } from './AttentionList';
 import { HealthStrip } from './DoNow';
 import { HealthSummary } from './HealthSummary';
 
-const house = (): HTMLElement => screen.getByTestId('house-health');
+const house = (): HTMLElement => screen.getByTestId('greenhouse-health');
 const driver = (): HTMLElement => screen.getByTestId('health-driver');
 const TAGS = ['1', '5'].map((tag_id) => wireTag({ tag_id }));
 
@@ -272,7 +272,7 @@ test('while a moment loads nothing is said of it, and nothing is counted', () =>
     </>,
   );
   expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: ');
-  expect(screen.getByTestId('house-health').dataset).not.toHaveProperty('health');
+  expect(screen.getByTestId('greenhouse-health').dataset).not.toHaveProperty('health');
   for (const each of screen.getAllByRole('list', { name: 'Do this now' })) {
     expect(each.textContent).toBe('');
   }

@@ -14,7 +14,7 @@ const line = (patrol: Judgement['house']['patrol']): string | undefined => {
   const health = judgement({ '1': 'healthy' }, undefined, patrol);
   showTags([wireTag()], health);
   render(<HouseLine />);
-  return screen.queryByTestId('house-line')?.textContent;
+  return screen.queryByTestId('patrol-line')?.textContent;
 };
 
 test('tells the rhythm, the last scan and who is overdue', () => {
@@ -45,19 +45,19 @@ test('nothing is told of readings of which nobody knows when they were', () => {
   const lineText = [{ name: 'temperature', value: 22, observed_at: null }];
   showTags([wireTag({ readings: lineText })], judgement({ '1': 'unknown' }, undefined, patrol));
   render(<HouseLine />);
-  expect(screen.queryByTestId('house-line')).toBeNull();
+  expect(screen.queryByTestId('patrol-line')).toBeNull();
 });
 
 test('nothing is told of a house without tags', () => {
   showTags([], judgement({}));
   render(<HouseLine />);
-  expect(screen.queryByTestId('house-line')).toBeNull();
+  expect(screen.queryByTestId('patrol-line')).toBeNull();
 });
 
 test('nothing is told of a house that is not heard of', () => {
   expect(line({ interval_s: 40, last_scan: null, overdue: 0 })).toBeDefined();
   act(goLost);
-  expect(screen.queryByTestId('house-line')).toBeNull();
+  expect(screen.queryByTestId('patrol-line')).toBeNull();
 });
 
 test.each([
@@ -80,7 +80,7 @@ test.each([
       receive(withState(latest, performance.now()));
       goLive(bridge);
     });
-    return screen.getByTestId('house-line').textContent;
+    return screen.getByTestId('patrol-line').textContent;
   };
   showTags([wireTag()]);
   render(<HouseLine />);
@@ -92,7 +92,7 @@ test.each([
     view({ moment: 1 + late });
     receive(withPast({ at: 1 + late, house: then }));
   });
-  expect(screen.getByTestId('house-line').textContent).toMatch(/^no tag overdue/);
+  expect(screen.getByTestId('patrol-line').textContent).toMatch(/^no tag overdue/);
 });
 
 test('where the house has a reason of its own, that says what to do', () => {
@@ -105,5 +105,5 @@ test('where the house has a reason of its own, that says what to do', () => {
     receive(withState(latest, performance.now()));
   });
   render(<HouseLine />);
-  expect(screen.getByTestId('house-line').textContent).toMatch(/^No scan for .+\)$/);
+  expect(screen.getByTestId('patrol-line').textContent).toMatch(/^No scan for .+\)$/);
 });

@@ -160,7 +160,7 @@ export function SignOut({
         {session.name && (
           <>
             {' '}
-            <bdi data-testid="person">({session.name})</bdi>
+            <bdi>({session.name})</bdi>
           </>
         )}
       </button>

@@ -181,8 +181,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   trendSame: 'kein neuer Wert',
   trendLevel: 'stabil',
   trendUnknown: 'vor einer Stunde: unbekannt',
-  density: 'Zeilen',
-  densities: { usual: 'Normal', compact: 'Kompakt' },
 
   card: (tag) => `Messpunkt ${tag}`,
   cardClose: 'Schließen',

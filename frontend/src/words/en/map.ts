@@ -179,8 +179,6 @@ export const TAGS = {
   trendSame: 'no new reading',
   trendLevel: 'steady',
   trendUnknown: 'an hour ago: unknown',
-  density: 'Rows',
-  densities: { usual: 'Normal', compact: 'Compact' },
 
   card: (tag: string): string => `Tag ${tag}`,
   cardClose: 'Close',

@@ -179,8 +179,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   trendSame: 'sin dato nuevo',
   trendLevel: 'estable',
   trendUnknown: 'hace una hora: desconocido',
-  density: 'Filas',
-  densities: { usual: 'Normales', compact: 'Compactas' },
 
   card: (tag) => `Punto ${tag}`,
   cardClose: 'Cerrar',

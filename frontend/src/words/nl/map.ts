@@ -179,8 +179,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   trendSame: 'niets nieuws',
   trendLevel: 'gelijk',
   trendUnknown: 'een uur geleden: onbekend',
-  density: 'Rijen',
-  densities: { usual: 'Normaal', compact: 'Compact' },
 
   card: (tag) => `Meetpunt ${tag}`,
   cardClose: 'Sluiten',

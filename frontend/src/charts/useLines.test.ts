@@ -196,4 +196,17 @@ describe('where there is nothing', () => {
     await passed(5_000);
     expect(shown.current).toMatchObject({ state: 'ready', message: '' });
   });
+
+  test('lines of the last period do not stay if those of the next cannot be fetched', async () => {
+    const shown = show();
+    await passed(100);
+    expect(shown.current.lines.series.size).toBe(1);
+    refuse = Response.json({ detail: 'busy' }, { status: 503 });
+    flush(() => {
+      act({ period: { kind: 'own', from: 2_000, to: 2_100 } });
+    });
+    await passed(4_000);
+    expect(shown.current).toMatchObject({ state: 'failed', message: 'busy' });
+    expect(shown.current.lines.series.size).toBe(0);
+  });
 });

@@ -2,10 +2,11 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { readings, wireTag } from '../testing/tags';
 import { npy } from '../testing/field';
-import { showTags } from '../testing/page';
-import { act, store } from './app';
+import { goLost, showTags } from '../testing/page';
+import { act, receive, store } from './app';
 import { selectHeat } from './derived';
 import { startDifference } from './difference';
+import { withPast } from './twin';
 
 let requests: URLSearchParams[] = [];
 /** The bridge's data of the shown moment, and of the one before. */
@@ -90,6 +91,18 @@ test('no difference of one sensor is shown as that of another, nor after it ends
   expect(selectHeat(store.get())).toBeNull();
   act({ sensor: 'temperature' });
   act({ compare: null });
+  expect(store.get().twin.difference.value).toBeNull();
+});
+
+test('no difference of the past is shown live', async () => {
+  const { latest } = store.get().twin;
+  act({ moment: 600 });
+  receive(withPast({ at: 600, house: latest }));
+  act({ compare: { by: 'ago', seconds: 100 } });
+  await settled();
+  expect(store.get().twin.difference.value?.at).toBe(600);
+  goLost();
+  act({ moment: null });
   expect(store.get().twin.difference.value).toBeNull();
 });
 

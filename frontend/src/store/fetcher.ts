@@ -212,7 +212,8 @@ export function useFetched<T>(task: FetchTask<T> | null, paceMs: number): Fetche
         setFetched(ready(value));
       },
       onError: (message) => {
-        setFetched(({ value }) => failed(message, value));
+        // What another group's fetch brought says nothing about this one.
+        setFetched(({ value, state }) => failed(message, state === 'waiting' ? null : value));
       },
     }),
   );

@@ -89,7 +89,7 @@ afterAll(() => {
   vi.useRealTimers();
 });
 
-test('a line is asked for once, with its tag’s timeline', async () => {
+test('a line is fetched once, with its tag’s timeline', async () => {
   const shown = show();
   expect(shown.current.state).toBe('waiting');
   await passed(100);
@@ -103,7 +103,7 @@ test('a line is asked for once, with its tag’s timeline', async () => {
 });
 
 describe('the day before', () => {
-  test('is asked for where it is wanted, and stands a day later than it was', async () => {
+  test('is fetched if enabled, and shifted by a day', async () => {
     const shown = show(true);
     await passed(100);
     const [today = 0, yesterday = 0] = histories();
@@ -113,7 +113,7 @@ describe('the day before', () => {
     expect(before.get(pairKey(pair))?.points).toMatchObject([{ value: 600 }]);
   });
 
-  test('is not asked for where the time of a simulation had not begun', async () => {
+  test('is not fetched from before a simulation began', async () => {
     flush(() => {
       goLive(status({ day_length_s: NOW_S + 3_600 }));
     });
@@ -124,7 +124,7 @@ describe('the day before', () => {
   });
 });
 
-describe('the server is asked anew', () => {
+describe('lines are fetched again', () => {
   test('after a visit, once the journal has it, and at most once in three seconds', async () => {
     show();
     await passed(100);
@@ -140,7 +140,7 @@ describe('the server is asked anew', () => {
     expect(histories()).toHaveLength(2);
   });
 
-  test('now and then, as the time bar is, where nobody comes', async () => {
+  test('at the time bar’s interval without visits', async () => {
     show();
     await passed(100);
     await passed(64_000);

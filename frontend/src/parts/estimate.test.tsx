@@ -72,7 +72,7 @@ describe('readout', () => {
     });
   };
 
-  test('tells the estimate, plus or minus what, how many tags are near, and how old', async () => {
+  test('shows the estimate with its error, the number of tags nearby, and their age', async () => {
     showField(estimated([22.4, NaN], [0.79, 1.6]));
     render(<Readout />);
     point(0.5);
@@ -90,7 +90,7 @@ describe('readout', () => {
     expect(text('readout')).toContain(`72.3${NBSP}±${NBSP}2.3${NBSP}°F`);
   });
 
-  test('the error alone is told where the value is not known', async () => {
+  test('the error alone is shown where the value is not known', async () => {
     showField(estimated([22.4, NaN], [0.79, 2]));
     act({ heat: 'error' });
     render(<Readout />);
@@ -102,7 +102,7 @@ describe('readout', () => {
 });
 
 describe('legend', () => {
-  test('says how sure, and how well it has foretold, in words', async () => {
+  test('shows the certainty, and how many predictions held', async () => {
     showField(estimated([22.4], [0.5]));
     render(<Legend kiosk={false} />);
     expect((await screen.findByTestId('prediction')).textContent).toBe(
@@ -137,7 +137,7 @@ describe('legend', () => {
     expect(warning.textContent).toContain('only 4 of 10 scans were');
   });
 
-  test('says neither where the twin cannot tell', async () => {
+  test('shows no grade if the twin has none', async () => {
     grades = { temperature: grade({ day: { scans: 12, inside: 3 }, is_trusted: null }) };
     showField(estimated([22.4], [0.5]));
     render(<EstimateFacts />);
@@ -186,7 +186,7 @@ describe('card', () => {
     if (tag) render(<CardEstimate tag={tag} health={store.get().twin.latest.health?.tags['7']} />);
   };
 
-  test('tells what was measured against what was expected', async () => {
+  test('shows the measured beside the expected value', async () => {
     expected = { '7': expectedReading() };
     card();
     expect((await screen.findByTestId('card-estimate')).textContent).toBe(

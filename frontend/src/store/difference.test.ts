@@ -52,7 +52,7 @@ test('nothing is fetched while nothing is compared', async () => {
   expect(requests).toEqual([]);
 });
 
-test('both fields are asked for on one box, and their difference is the heat map', async () => {
+test('both fields are fetched on one box, and their difference is the heat map', async () => {
   act({ compare: { by: 'moment', at: 500 } });
   // Until then nothing is shown as a difference.
   expect(selectHeat(store.get())).toBeNull();
@@ -69,7 +69,7 @@ test('both fields are asked for on one box, and their difference is the heat map
   expect(heat?.difference?.against).toBe(500);
 });
 
-test('where memory has nothing of then, there is no heat map and it is told', async () => {
+test('without data of then, there is no heat map, and the legend says so', async () => {
   known.samplesThen = 0;
   act({ compare: { by: 'moment', at: 500 } });
   await settled();
@@ -77,7 +77,7 @@ test('where memory has nothing of then, there is no heat map and it is told', as
   expect(selectHeat(store.get())).toBeNull();
 });
 
-test('before all time nothing is asked for', async () => {
+test('before ROS time 0 nothing is fetched', async () => {
   act({ compare: { by: 'ago', seconds: 1e12 } });
   await settled();
   expect(requests).toHaveLength(1);

@@ -69,7 +69,7 @@ test.each([
       goLive(status({ reason: 'paused' }), 60_000);
     },
   ],
-])('how long ago is not told where nobody knows what time it is: %s', (_, lose) => {
+])('how long ago is not shown without the twin’s time: %s', (_, lose) => {
   look(2_500, 2_500);
   lose();
   render(<PastHeader />);

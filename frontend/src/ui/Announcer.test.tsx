@@ -51,7 +51,7 @@ const press = (key: string): void => {
   });
 };
 
-test('the tag that a key chose is told, with its health and place in the table', () => {
+test('the tag chosen by a key is announced, with its health and place in the table', () => {
   expect(said('announced-choice')).toBe('');
   press('n');
   expect(said('announced-choice')).toBe('Tag 1, Critical, 1 of 6');

@@ -236,7 +236,7 @@ test('beside an active alarm, healthy says why', () => {
   stop();
 });
 
-test('a house that is not heard of is unknown, whatever was said last', () => {
+test('a silent greenhouse is unknown, whatever its last verdict', () => {
   showTags(TAGS, judgement({ 1: 'healthy', 5: 'healthy' }));
   goLost();
   render(<HealthSummary kiosk={false} />);

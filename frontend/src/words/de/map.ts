@@ -28,7 +28,6 @@ export const MAP: In<typeof EN.MAP> = {
     map: 'Grundriss',
     field: 'Heatmap',
     unknown: 'Bereiche ohne Daten',
-    smooth: 'Heatmap glätten',
     grid: 'Meterraster',
     boxes: 'Pflanzkästen',
     blooms: 'Blüten',

@@ -23,7 +23,6 @@ export const MAP = {
     map: 'Floor plan',
     field: 'Heat map',
     unknown: 'Areas without data',
-    smooth: 'Smooth heat map',
     grid: 'Metre grid',
     boxes: 'Planter boxes',
     blooms: 'Blooms',

@@ -26,7 +26,6 @@ export const MAP: In<typeof EN.MAP> = {
     map: 'Plano',
     field: 'Mapa de calor',
     unknown: 'Zonas sin datos',
-    smooth: 'Mapa de calor suavizado',
     grid: 'Cuadrícula métrica',
     boxes: 'Jardineras',
     blooms: 'Flores',

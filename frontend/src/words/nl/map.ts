@@ -26,7 +26,6 @@ export const MAP: In<typeof EN.MAP> = {
     map: 'Plattegrond',
     field: 'Heatmap',
     unknown: 'Gebieden zonder gegevens',
-    smooth: 'Vloeiende heatmap',
     grid: 'Meterraster',
     boxes: 'Plantenbakken',
     blooms: 'Bloemen',

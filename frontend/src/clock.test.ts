@@ -63,7 +63,7 @@ describe('a lapse', () => {
     expect(lapses).toBe(0);
   });
 
-  test('is told before the time is, and once, whoever looks again in between', () => {
+  test('is reported before the time is returned, and once', () => {
     const seen: number[] = [];
     clock.onLapse(() => seen.push(clock.now()));
     wall += HOUR;
@@ -72,7 +72,7 @@ describe('a lapse', () => {
     expect(lapses).toBe(1);
   });
 
-  test('is not told to who no longer listens', () => {
+  test('is not reported to a removed listener', () => {
     const listener = vi.fn();
     clock.onLapse(listener)();
     wall += HOUR;

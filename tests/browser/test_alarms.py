@@ -75,7 +75,7 @@ def test_an_alarm_appears_is_acknowledged_and_resolved(domain: int, open_page: O
         row = rows(hmi, "active")
         expect(row).to_contain_text("Tag a: Temperature above 35.0\u00a0°C")
         expect(hmi.page).to_have_title("(1) Lupin twin")
-        expect(hmi.test_id("said-critical")).to_contain_text("New: Tag a: Temperature above")
+        expect(hmi.test_id("announced-critical")).to_contain_text("New: Tag a: Temperature above")
         expect(row).to_have_attribute("data-acknowledged", "false")
 
         hmi.page.get_by_role("button", name="Acknowledge: Tag a").click()

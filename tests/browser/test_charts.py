@@ -178,7 +178,7 @@ def test_a_gap_stays_open_and_the_table_equals_the_api(garden: Garden, open_page
     for row, each in zip(readings, reported["readings"], strict=True):
         assert f"|{each['value']:.1f}\u00a0°C|" in row["text"]
     kinds = [row["kind"] for row in found]
-    assert (kinds.count("gap"), kinds.count("failure"), kinds.count("look")) == (1, 1, 1)
+    assert (kinds.count("gap"), kinds.count("failure"), kinds.count("inspection")) == (1, 1, 1)
     assert any("no data for" in row["text"] for row in found if row["kind"] == "gap")
 
 

@@ -106,7 +106,7 @@ def test_on_a_phone_open_actions_come_first_in_full_and_the_page_scrolls(
 
     def are_in_order() -> bool:
         line, first, last, plan = places(
-            wall, ".house-line", ".attention h3", ".attention > ul > li:last-child", ".map-view"
+            wall, ".patrol-line", ".attention h3", ".attention > ul > li:last-child", ".map-view"
         )
         return line.bottom <= first.top and last.bottom <= plan.top
 

@@ -421,7 +421,7 @@ def test_every_language_has_room_on_a_phone(greenhouse: Bridge, open_page: OpenP
         assert row.bottom - row.top < 2.75 * 44, language
         hmi.page.locator(".pane-tabs button").nth(1).click()
         expect(hmi.cell("1", "temperature")).to_contain_text(reading)
-        line = place(hmi.test_id("house-line"))
+        line = place(hmi.test_id("patrol-line"))
         assert line.bottom - line.top < 24, language
         assert hmi.page.evaluate(_TOO_LONG) == []
         # Three letters, and the arrow beside them: a word that cannot be broken.

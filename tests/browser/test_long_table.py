@@ -68,7 +68,7 @@ def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(
     expect(hmi.row(str(TAGS - 3))).to_be_in_viewport()
     hmi.page.keyboard.press("n")
     expect(hmi.row(str(TAGS - 2))).to_be_in_viewport()
-    expect(hmi.test_id("said-choice")).to_contain_text(f"{TAGS - 2:d} of {TAGS:d}")
+    expect(hmi.test_id("announced-choice")).to_contain_text(f"{TAGS - 2:d} of {TAGS:d}")
     # With the Tab key from row to row, further than the page's first rows.
     hmi.page.keyboard.press("Escape")
     hmi.page.locator(".table-scroll").evaluate("e => { e.scrollTop = 0; }")

@@ -81,7 +81,7 @@ def test_nothing_covers_the_label_of_a_stopped_robot(site: Bridge, open_page: Op
 
     hmi.page.route_web_socket(re.compile("/ws/state"), meet)
     hmi.go(query="?lang=nl")
-    todo = hmi.page.get_by_test_id("house-health")
+    todo = hmi.page.get_by_test_id("greenhouse-health")
     expect(todo.locator(".do-more")).to_be_visible()
     order = todo.locator(".do-now p strong")
     expect(order).to_have_text("Bij de robot gaan kijken")

@@ -96,7 +96,7 @@ def test_the_robot_and_its_trail_plan_and_battery_are_shown_in_the_live_view(
     expect(fact).to_have_text(re.compile(r"Robot: 3\.2 m, 1\.5 m; \d+\ss ago; battery 64\s%"))
     layer = hmi.test_id("robot")
     place(robot, 3.2, 1.6, math.pi / 2)
-    expect(layer).to_have_attribute("data-looks", "live")
+    expect(layer).to_have_attribute("data-freshness", "live")
     hmi.expect(lambda: mark(hmi) == pytest.approx((3.2, 1.6), abs=0.05), "the mark where it is")
     # Pins' labels are readable over it.
     heights = [

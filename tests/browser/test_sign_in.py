@@ -86,7 +86,7 @@ def test_with_a_name_the_page_says_who_sees_what_is_done_to_alarms(
                 page.keyboard.press("Enter")
                 expect_live(page)
                 page.keyboard.press("a")
-                expect(page.locator(".alarms-mine")).to_contain_text(words)
+                expect(page.locator(".sharing-note")).to_contain_text(words)
 
 
 def test_a_wrong_token_can_be_corrected_and_nothing_of_the_right_one_is_stored(

@@ -114,7 +114,7 @@ test('the newest first, or by tag: in one row', () => {
   expect(tags('tag')).toEqual([['2', '3', '10']]);
 });
 
-test('the worst cause first, then what nobody has seen to, then what most have', () => {
+test('the worst cause first, then unacknowledged ones, then the most frequent', () => {
   const worst = alarm('worst', { reason: { sensor: 'light', verdict: 'critical' } });
   const dry = (tag: number) =>
     alarm(`dry${tag}`, {

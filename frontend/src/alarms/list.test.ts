@@ -58,7 +58,7 @@ describe('order', () => {
 describe('acknowledged and shelved', () => {
   const mild = { alarm: alarm('a', { reason: stressed }), verdict: 'stressed' } as const;
 
-  test('what was acknowledged calls for nobody, until it gets worse', () => {
+  test('an acknowledged alarm does not call until it gets worse', () => {
     const local = acknowledge(NO_LOCAL_ALARMS, [mild], AT);
     expect(calling(list([mild.alarm]))).toHaveLength(1);
     expect(calling(list([mild.alarm], local))).toEqual([]);

@@ -96,7 +96,7 @@ describe('icon', () => {
     link.remove();
   });
 
-  test('beyond nine it says so', () => {
+  test('above nine it shows 9+', () => {
     expect(badgeOf(0, 'critical')).toBeNull();
     expect(decodeURIComponent(badgeOf(9, 'critical') ?? '')).toContain('>9<');
     expect(decodeURIComponent(badgeOf(10, 'critical') ?? '')).toContain('>9+<');
@@ -123,7 +123,7 @@ describe('voices', () => {
     expect(keys()).toBe(before + 2);
   });
 
-  test('what is resolved is told once, in the same breath as what is new', () => {
+  test('a resolved alarm is announced once, together with new ones', () => {
     start(startVoices);
     reportAlarms(warm);
     reportAlarms(
@@ -173,7 +173,7 @@ describe('sound', () => {
       alarm(`a${at}`, { tag_id: String(at), reason: STRESSED }),
     );
 
-  test('only on wish, at once when it is wished, and then at most one in ten seconds', async () => {
+  test('only if enabled: a sample at once, then at most one sound in ten seconds', async () => {
     const audio = new Audio(true);
     const make = (): AudioContext => audio as unknown as AudioContext;
     const at = Math.ceil(performance.now()); // otherwise ten seconds later rounds to slightly less
@@ -200,7 +200,7 @@ describe('sound', () => {
     expect(audio.notes).toBe(8);
   });
 
-  test('kept from another day it waits for a click, and says so', async () => {
+  test('enabled on an earlier visit, it waits for a click, and says so', async () => {
     const audio = new Audio(false);
     own.set({ ...NO_LOCAL_ALARMS, sound: true });
     start(() => startSound(() => audio as unknown as AudioContext));
@@ -267,7 +267,7 @@ describe('notification', () => {
     vi.spyOn(document, 'hasFocus').mockReturnValue(false);
   });
 
-  test('is asked for by the click alone, and tells of all that is new in one', async () => {
+  test('permission is requested by a click alone; one notification for all new alarms', async () => {
     const log = browser('default', 'granted');
     start(startNotify);
     reportAlarms(warm);
@@ -293,7 +293,7 @@ describe('notification', () => {
     expect(new Set(tags).size).toBe(2);
   });
 
-  test('not while somebody looks', async () => {
+  test('not while the page is in use', async () => {
     browser('granted');
     start(startNotify);
     await setNotify(true);
@@ -312,7 +312,7 @@ describe('notification', () => {
     expect([own.get().notify, notifyState.get()]).toEqual([false, 'insecure']);
   });
 
-  test('a browser that lets no page make them is found out, and said', async () => {
+  test('a browser that refuses the constructor is reported', async () => {
     browser('granted');
     start(startNotify);
     await setNotify(true);

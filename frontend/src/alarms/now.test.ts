@@ -18,7 +18,7 @@ const state = (value: number | null, ...reasons: readonly Partial<HealthReason>[
 const unjudged: TagThen = { ...state(8), health: { verdict: 'unknown', reasons: [] } };
 const old = { kind: 'old', verdict: 'unknown', value: null } as const;
 
-test('the reading of now, as bad as the bridge says it is now', () => {
+test('the current reading with the current verdict', () => {
   expect(nowOf(cold, state(8, { verdict: 'stressed' }), null, true)).toMatchObject({
     kind: 'known',
     value: 8,
@@ -85,7 +85,7 @@ test('another sensor’s age does not matter, but of what is derived', () => {
   expect(nowOf(dry, state(8, failed), null, true)).toMatchObject({ kind: 'unknown', last: null });
 });
 
-test('of a pest how many were seen last', () => {
+test('the last count of a pest', () => {
   const pest = { kind: 'pest', sensor: '', value: 3, limit: null } as const;
   const seen = alarm('a', { reason: pest });
   const infested = {

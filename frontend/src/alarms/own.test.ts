@@ -40,7 +40,7 @@ test('what was acknowledged, shelved and wished for comes back after a reload', 
 });
 
 test.each([null, '', '{', 'null', '7', '{"acknowledged":7,"shelved":{}}'])(
-  '%j counts as nothing kept',
+  '%j counts as nothing stored',
   (text) => {
     expect(readStored({ getItem: () => text })).toEqual(NO_LOCAL_ALARMS);
   },
@@ -85,7 +85,7 @@ test('a clock that is set back makes no shelf longer than any', () => {
   expect(isShelfHeld(shelf, 'stressed', AT - 1)).toBe(false);
 });
 
-test('a critical alarm is shelved for an hour at most, whatever the storage says', () => {
+test('a critical alarm is shelved for an hour at most, whatever is stored', () => {
   expect(Math.max(...shelfMinutes('critical'))).toBe(60);
   expect(shelfMinutes('stressed')).toContain(480);
   const shelf = { verdict: 'critical', until: AT + 3_600_000, reason: 'x' } as const;

@@ -176,7 +176,7 @@ export const own = createStore<LocalAlarms>(NO_LOCAL_ALARMS);
 export const UNDO_MS = 10_000;
 
 /** The operator's last action. */
-export interface LastAction {
+interface LastAction {
   readonly what: 'acknowledge' | 'unacknowledge' | 'shelve' | 'unshelve';
   /** Number of alarms affected. */
   readonly count: number;

@@ -46,13 +46,13 @@ test('one of another key gives way', async () => {
   expect(log).toEqual([options, 'unsubscribe', options, subscribed]);
 });
 
-test('who wants it no more is taken off the list, at both', async () => {
+test('turned off, it is unsubscribed at the browser and the bridge', async () => {
   const log = stage('KEY', { known: true });
   await setPush(false);
   expect(log).toEqual([{ endpoint: 'https://push.example/1' }, 'unsubscribe']);
 });
 
-test('nothing is asked of the browser where the bridge offers none', async () => {
+test('without Web Push at the bridge, the browser is not subscribed', async () => {
   const log = stage(null);
   await setPush(true);
   expect(log).toEqual([]);

@@ -65,7 +65,7 @@ const item = (id: string): ReturnType<typeof calling>[number] => {
   return found;
 };
 
-test('what the page opens with is no news; what comes later is, once', () => {
+test('alarms of the first frame are not announced; later ones are, once', () => {
   reportAlarms(alarm('a'));
   expect(announced).toEqual([]);
   expect(ids()).toEqual(['a']);
@@ -76,7 +76,7 @@ test('what the page opens with is no news; what comes later is, once', () => {
   expect(announced).toEqual(['b', '-b']);
 });
 
-test('a bridge that starts anew and goes through the past tells nothing twice', () => {
+test('a restarted bridge that replays the past announces nothing twice', () => {
   reportAlarms(alarm('a'));
   receive({ alarms: alarms([], { source: 'starting', since: null }) });
   expect(ids()).toEqual([]);
@@ -84,7 +84,7 @@ test('a bridge that starts anew and goes through the past tells nothing twice', 
   expect(announced).toEqual(['b']);
 });
 
-test('what gets worse is told again, acknowledged or not', () => {
+test('a worse alarm is announced again, acknowledged or not', () => {
   reportAlarms(alarm('a', { reason: STRESSED }));
   acknowledgeAlarms([item('a')]);
   expect(ids()).toEqual([]);
@@ -93,7 +93,7 @@ test('what gets worse is told again, acknowledged or not', () => {
   expect(announced).toEqual(['a']);
 });
 
-test('acknowledged holds after a reload, and what is done here is no news', () => {
+test('acknowledgements survive a reload, and own actions are not announced', () => {
   reportAlarms(alarm('a'), alarm('b', { tag_id: '2' }));
   acknowledgeAlarms([item('a')]);
   shelveAlarm(item('b'), 15, 'x');
@@ -121,7 +121,7 @@ test('acknowledged long ago, a lasting alarm stays so while the list is not ther
   expect(ids()).toEqual([]);
 });
 
-test('what was shelved comes back by itself when its time is over, and is told', () => {
+test('a shelved alarm returns when its time is over, and is announced', () => {
   reportAlarms(alarm('a'));
   shelveAlarm(item('a'), 15, 'x');
   expect(alarmList.get().shelved).toHaveLength(1);
@@ -172,7 +172,7 @@ test('what another tab of the browser has acknowledged is so here', () => {
   expect(ids()).toEqual([]);
 });
 
-test('while another moment is shown, what comes is told apart until it is acknowledged or resolved', () => {
+test('while a past moment is shown, new alarms are listed apart until acknowledged or resolved', () => {
   const now = (): string[] => meanwhile.get().map(({ alarm: { id } }) => id);
   reportAlarms(alarm('a'));
   act({ moment: 50 });

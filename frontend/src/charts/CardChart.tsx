@@ -22,8 +22,8 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
     () => (sensor === undefined ? [] : [{ sensor, tagIds: [tagId] }]),
     [sensor, tagId],
   );
-  const { requested, models } = useCharts(plans, pointsFor(width));
-  const { lines, state } = requested;
+  const { fetched, models } = useCharts(plans, pointsFor(width));
+  const { lines, state } = fetched;
   const [model] = models;
   if (sensor === undefined) return null;
   return (
@@ -41,7 +41,7 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
           <MarksKey marks={[...lines.marks.values()].flat()} />
         </>
       ) : (
-        <ChartState requested={requested} hasLines={false} lacks={null} />
+        <ChartState fetched={fetched} hasLines={false} lacks={null} />
       )}
       <button
         type="button"

@@ -52,8 +52,8 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const sensors = useSensorsOf(tagId);
 
   const plans = useMemo(() => plansOf(charted, sensors, sensor), [charted, sensors, sensor]);
-  const { requested, models } = useCharts(plans, pointsFor(size.width), hasDayBefore);
-  const { lines, span } = requested;
+  const { fetched, models } = useCharts(plans, pointsFor(size.width), hasDayBefore);
+  const { lines, span } = fetched;
   const withLines = models.filter(({ lines }) => lines.length > 0);
   const room = (size.height - TIMES_HEIGHT) / Math.max(1, plans.length);
   const least = LEAST_HEIGHT[charted.by];
@@ -113,7 +113,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
       {charted.by === 'sensor' && <TagChoice tagIds={charted.tagIds} model={withLines[0]} />}
       <div className="chart-body" ref={body}>
         <ChartState
-          requested={requested}
+          fetched={fetched}
           hasLines={withLines.length > 0}
           lacks={plans.length === 0 ? S.chartNoSensors : null}
         />

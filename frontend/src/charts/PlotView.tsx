@@ -19,7 +19,7 @@ import { Select } from '../widgets/controls';
 import { isStroked, lookOf, markerPath } from './layers';
 import type { Line, PlotModel } from './model';
 import { type PlotHandlers, usePlot } from './plot';
-import { type RequestedLines, useSensorsOf } from './useLines';
+import { type FetchedLines, useSensorsOf } from './useLines';
 import { zoomTo } from './zoom';
 import { DAY_S } from '../domain/difference';
 
@@ -60,7 +60,7 @@ export function PlotView({
       className="plot-view"
       aria-label={S.chartOf(shown(model.sensor.label, 32))}
       data-alone={isAlone}
-      data-told={at !== null}
+      data-has-readout={at !== null}
       style={{ '--sensor': rgbText(sensorColour(model.sensor)) } as CSSProperties}
     >
       <header>
@@ -148,7 +148,7 @@ export function LineSign({ look: index }: { look: number }): JSX.Element {
       style={{ color: `var(--chart-${colour + 1})` }}
     >
       <path d="M0 6H30" strokeDasharray={dash.join(' ')} />
-      <path d={markerPath(marker, 15, 6, 7)} className={isStroked(marker) ? 'stroked' : 'filled'} />
+      <path d={markerPath(marker, 15, 6, 7)} className={isStroked(marker) ? undefined : 'filled'} />
     </svg>
   );
 }
@@ -157,13 +157,13 @@ export function LineSign({ look: index }: { look: number }): JSX.Element {
 export function MarksKey({ marks }: { marks: readonly Mark[] }): JSX.Element | null {
   const count = (kind: Mark['kind']): number =>
     marks.reduce((sum, mark) => sum + (mark.kind === kind ? mark.count : 0), 0);
-  const [looks, failures] = [count('look'), count('failure')];
-  if (looks + failures === 0) return null;
+  const [inspections, failures] = [count('inspection'), count('failure')];
+  if (inspections + failures === 0) return null;
   return (
     <p className="marks-key" data-testid="marks-key">
-      {looks > 0 && (
-        <span data-mark="look">
-          <span aria-hidden="true">○</span> {S.chartInspections(looks)}
+      {inspections > 0 && (
+        <span data-mark="inspection">
+          <span aria-hidden="true">○</span> {S.chartInspections(inspections)}
         </span>
       )}
       {failures > 0 && (
@@ -176,11 +176,11 @@ export function MarksKey({ marks }: { marks: readonly Mark[] }): JSX.Element | n
 }
 
 export function ChartState({
-  requested: { state, message, span },
+  fetched: { state, message, span },
   hasLines,
   lacks,
 }: {
-  requested: RequestedLines;
+  fetched: FetchedLines;
   hasLines: boolean;
   /** What has no data to chart; null: there is some. */
   lacks: string | null;

@@ -134,7 +134,7 @@ function eventText({ kind, at, to, n }: SeriesRow): string {
       return S.missing[kind];
     case 'failure':
       return S.chartFailures(n ?? 0);
-    case 'look':
+    case 'inspection':
       return S.chartInspections(n ?? 0);
   }
 }

@@ -185,9 +185,9 @@ export const MARKS_LANE = 24;
 export function drawMarks({ context, ratio, x, box, colour }: Frame, { marks }: Line): void {
   const bottom = box.top + box.height;
   context.lineWidth = 1.75 * ratio;
-  for (const kind of ['look', 'failure'] as const) {
+  for (const kind of ['inspection', 'failure'] as const) {
     const isFailure = kind === 'failure';
-    context.strokeStyle = isFailure ? colour('chart-failure') : colour('chart-look');
+    context.strokeStyle = isFailure ? colour('chart-failure') : colour('chart-inspection');
     const y = bottom + (isFailure ? 20 : 8) * ratio;
     let last = -Infinity;
     for (const mark of marks) {

@@ -7,7 +7,7 @@ import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
 import { wireTime } from '../testing/timeline';
 import { pairKey } from './model';
-import { useLines, type RequestedLines } from './useLines';
+import { useLines, type FetchedLines } from './useLines';
 
 const pair = { tagId: '1', sensor: 'co2' };
 /** From here on, the last hour is refetched every 15 s. */
@@ -66,7 +66,7 @@ const sinceOf = (path: string): number[] =>
     .map(({ searchParams }) => Number(searchParams.get('from')));
 const histories = (): number[] => sinceOf('/api/history');
 
-function show(hasDayBefore = false): { readonly current: RequestedLines } {
+function show(hasDayBefore = false): { readonly current: FetchedLines } {
   const pairs = [pair];
   return renderHook(() => useLines(pairs, 300, hasDayBefore)).result;
 }
@@ -89,7 +89,7 @@ afterAll(() => {
   vi.useRealTimers();
 });
 
-test('a line is asked for once, with its tag’s timeline', async () => {
+test('a line is fetched once, with its tag’s timeline', async () => {
   const shown = show();
   expect(shown.current.state).toBe('waiting');
   await passed(100);
@@ -103,7 +103,7 @@ test('a line is asked for once, with its tag’s timeline', async () => {
 });
 
 describe('the day before', () => {
-  test('is asked for where it is wanted, and stands a day later than it was', async () => {
+  test('is fetched if enabled, and shifted by a day', async () => {
     const shown = show(true);
     await passed(100);
     const [today = 0, yesterday = 0] = histories();
@@ -113,7 +113,7 @@ describe('the day before', () => {
     expect(before.get(pairKey(pair))?.points).toMatchObject([{ value: 600 }]);
   });
 
-  test('is not asked for where the time of a simulation had not begun', async () => {
+  test('is not fetched from before a simulation began', async () => {
     flush(() => {
       goLive(status({ day_length_s: NOW_S + 3_600 }));
     });
@@ -124,7 +124,7 @@ describe('the day before', () => {
   });
 });
 
-describe('the server is asked anew', () => {
+describe('lines are fetched again', () => {
   test('after a visit, once the journal has it, and at most once in three seconds', async () => {
     show();
     await passed(100);
@@ -140,7 +140,7 @@ describe('the server is asked anew', () => {
     expect(histories()).toHaveLength(2);
   });
 
-  test('now and then, as the time bar is, where nobody comes', async () => {
+  test('at the time bar’s interval without visits', async () => {
     show();
     await passed(100);
     await passed(64_000);
@@ -195,5 +195,18 @@ describe('where there is nothing', () => {
     refuse = null;
     await passed(5_000);
     expect(shown.current).toMatchObject({ state: 'ready', message: '' });
+  });
+
+  test('lines of the last period do not stay if those of the next cannot be fetched', async () => {
+    const shown = show();
+    await passed(100);
+    expect(shown.current.lines.series.size).toBe(1);
+    refuse = Response.json({ detail: 'busy' }, { status: 503 });
+    flush(() => {
+      act({ period: { kind: 'own', from: 2_000, to: 2_100 } });
+    });
+    await passed(4_000);
+    expect(shown.current).toMatchObject({ state: 'failed', message: 'busy' });
+    expect(shown.current.lines.series.size).toBe(0);
   });
 });

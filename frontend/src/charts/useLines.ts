@@ -18,7 +18,7 @@ const PACE_A_LINE_MS = 1_000;
 /** Received data are in the journal within 100 ms, and in another host's copy soon after. */
 const WRITTEN_MS = 1_000;
 
-export type RequestedLines = ReturnType<typeof useLines>;
+export type FetchedLines = ReturnType<typeof useLines>;
 
 /**
  * These lines over the time bar's period: refetched after a visit to one of the tags, on each
@@ -47,11 +47,8 @@ export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = 
             if (answered.current === group) await pause(WRITTEN_MS);
             // The twin's time has advanced since the task was made.
             const atS = rosNow(store.get(), now()) ?? nowS;
-            const requested = spanOf(period, atS, oldest);
-            const lines = await fetchLines(
-              { pairs, span: requested, nowS: atS, points, dayS },
-              signal,
-            );
+            const query = { pairs, span: spanOf(period, atS, oldest), nowS: atS, points, dayS };
+            const lines = await fetchLines(query, signal);
             answered.current = group;
             return lines;
           },
@@ -81,8 +78,8 @@ export function useCharts(plans: readonly Plan[], points: number, hasDayBefore =
     () => plans.flatMap(({ sensor, tagIds }) => tagIds.map((tagId) => ({ tagId, sensor }))),
     [plans],
   );
-  const requested = useLines(pairs, points, hasDayBefore);
-  const { lines, span, nowS } = requested;
+  const fetched = useLines(pairs, points, hasDayBefore);
+  const { lines, span, nowS } = fetched;
   const models = useMemo(
     () =>
       span
@@ -92,7 +89,7 @@ export function useCharts(plans: readonly Plan[], points: number, hasDayBefore =
         : [],
     [catalogue, both, plans, species, lines, span, unit, moment, nowS],
   );
-  return { requested, models };
+  return { fetched, models };
 }
 
 /** Changes when one of the tags is visited; not in the past, nor for a period that has ended. */

@@ -74,7 +74,7 @@ describe('phases', () => {
     expect(phaseOf(again, 4_001)).toBe('live');
   });
 
-  test('the bridge says that the twin is gone, and that it is back', () => {
+  test('the bridge reports that the twin is gone, and that it is back', () => {
     const gone = step(live, { type: 'frame', now: 100, status: status('offline') }).connection;
     expect(phaseOf(gone, 101)).toBe('offline');
     const heartbeat = step(gone, { type: 'frame', now: 1_000, status: null }).connection;
@@ -123,7 +123,7 @@ describe('phases', () => {
     expect(phaseOf(step(connection, statusEvent).connection, 10_004)).toBe('live');
   });
 
-  test('a state alone is not live: how old it is its status says', () => {
+  test('a state alone is not live: its status has its age', () => {
     const { connection } = run(...started.slice(0, 2), { type: 'frame', now: 24, status: null });
     expect(phaseOf(connection, 30)).toBe('connecting');
   });

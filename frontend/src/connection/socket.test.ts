@@ -85,27 +85,27 @@ describe('socket shell', () => {
     expect(refusals).toBe(1);
   });
 
-  test('a dropped socket is not heard any more', () => {
+  test('frames of a dropped socket are ignored', () => {
     socket(0).onopen?.();
     vi.advanceTimersByTime(20_000);
     socket(0).speak(stateFrame([]));
     expect(frames).toEqual([]);
   });
 
-  test.each(['online', 'pageshow'])('%s tries at once', (event) => {
+  test.each(['online', 'pageshow'])('%s starts an attempt at once', (event) => {
     socket(0).onclose?.({ code: 1006 });
     expect(FakeSocket.made).toHaveLength(1);
     window.dispatchEvent(new Event(event));
     expect(FakeSocket.made).toHaveLength(2);
   });
 
-  test('the tab becoming visible tries at once', () => {
+  test('the tab becoming visible starts an attempt at once', () => {
     socket(0).onclose?.({ code: 1006 });
     document.dispatchEvent(new Event('visibilitychange'));
     expect(FakeSocket.made).toHaveLength(2);
   });
 
-  test('what is no frame is dropped and told, and the connection goes on', () => {
+  test('an invalid frame is dropped and reported, and the connection stays', () => {
     socket(0).onopen?.();
     socket(0).speak(status());
     socket(0).speak(stateFrame([]));
@@ -140,7 +140,7 @@ describe('socket shell', () => {
     expect(phases.at(-1)).toBe('stale');
   });
 
-  test('a delta that is lost asks for a full state by a new connection', () => {
+  test('a lost delta makes a new connection, for a full state', () => {
     socket(0).onopen?.();
     socket(0).speak(status());
     socket(0).speak(stateFrame([]));
@@ -151,7 +151,7 @@ describe('socket shell', () => {
     expect(FakeSocket.made).toHaveLength(2);
   });
 
-  test('what waits in a socket as the machine wakes is not heard: a new connection is made', () => {
+  test('frames waiting in a socket after sleep are ignored: a new connection is made', () => {
     vi.useFakeTimers({ toFake: ['setTimeout', 'clearTimeout', 'performance', 'Date'] });
     const unsubscribe = onLapse(() => {
       link.dispatch('start');
@@ -186,7 +186,7 @@ const answering = (status: number): void => {
   vi.stubGlobal('fetch', () => Promise.resolve(new Response(null, { status })));
 };
 
-test('a server that wants a token is one to sign in at', async () => {
+test('a server that requires a token leads to its sign-in page', async () => {
   const leave = vi.fn<(url: URL) => void>();
   answering(401);
   await signInIfRequired(leave);

@@ -21,7 +21,7 @@ describe('the state of a moment', () => {
   const { state } = stateFrame([], { sec: 1_794_000_000 });
   const half = { ...state, header: { ...state.header, stamp: { sec: 12, nanosec: 500_000_000 } } };
 
-  test('is asked for to the millisecond, with the verdicts of that moment', async () => {
+  test('is requested to the millisecond, with the verdicts of that moment', async () => {
     const health = judgement({ 1: [reason()] });
     const requests = answering(half, health);
     await expect(fetchStateAt(12.5, signal)).resolves.toMatchObject({ state: half, health });
@@ -32,7 +32,7 @@ describe('the state of a moment', () => {
     ]);
   });
 
-  test('of any other moment is none: a server that knows no past gives the present', async () => {
+  test('an answer about another moment is an error', async () => {
     answering(state);
     await expect(fetchStateAt(12.5, signal)).rejects.toThrow(
       'the answer is about 1794000000.000 s, requested was 12.500 s',
@@ -52,7 +52,7 @@ describe('the state of a moment', () => {
   });
 });
 
-test('what happened is asked for over a period, or over all there is', async () => {
+test('the timeline is requested for a period, or for the whole history', async () => {
   const wire = wireTimeline({ from: 5, to: 9.5 });
   const requests = answering(wire);
   await expect(fetchTimeline({ from: 5, to: 9.5 }, 240, signal)).resolves.toEqual(wire);

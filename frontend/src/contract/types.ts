@@ -13,7 +13,7 @@ export interface Judgement {
   readonly house: Required<Schemas['HouseHealth']>;
   readonly tags: Readonly<Record<string, TagHealth>>;
 }
-export type TwinState = Omit<Schemas['TwinState'], 'tags'> & {
+type TwinState = Omit<Schemas['TwinState'], 'tags'> & {
   readonly tags: readonly TwinTagState[];
 };
 export type StateFrame = Omit<Schemas['StateFrame'], 'state' | 'health'> & {
@@ -30,7 +30,7 @@ export type DeltaFrame = Omit<Schemas['DeltaFrame'], 'changed' | 'health'> & {
   readonly health: Judgement;
 };
 export type RobotFrame = Schemas['RobotFrame'];
-export type Frame = StateFrame | DeltaFrame | StatusFrame | AlarmsFrame | RobotFrame;
+export type Frame = (StateFrame | DeltaFrame | StatusFrame) | (Schemas['AlarmsFrame'] | RobotFrame);
 export type OccupancyGrid = Schemas['OccupancyGrid'];
 export type FieldQuality = Schemas['FieldQuality'];
 export type PastAttempt = Schemas['PastAttempt'];
@@ -41,17 +41,12 @@ export type Timeline = Schemas['Timeline'];
 export type Alarm = Schemas['Alarm'];
 export type Session = Schemas['Session'];
 export type Note = Schemas['Note'];
-export type Notes = Schemas['Notes'];
-export type AlarmsFrame = Schemas['AlarmsFrame'];
 /** A frame also has the number of notes in the log. */
 export type Alarms = Schemas['Alarms'] & { readonly notes?: number };
 export type HealthReason = Schemas['HealthReason'];
 export type Verdict = TagHealth['verdict'];
 export type Grade = Schemas['EstimateQualities']['sensors'][string];
-/** Each tag's measured value, and the value expected from all other tags. */
-export type ExpectedTags = Schemas['ExpectedTags'];
 /** Where another tag would help. */
-export type Advice = Schemas['Advice'];
 export type Place = Schemas['AdvisedPlace'];
 /** The robot's own report, and its track. */
 export type RobotNow = Omit<RobotFrame, 'type'>;
@@ -106,12 +101,6 @@ export interface Sureness {
   readonly sdKnown: number;
 }
 
-/** Why a field is not the requested estimate. */
-export interface NoEstimate {
-  readonly status: number;
-  readonly message: string;
-}
-
 export interface Field {
   readonly sensor: string;
   /** Cells. */
@@ -131,6 +120,6 @@ export interface Field {
   readonly values: Float32Array;
   /** Only in an estimate. */
   readonly sureness?: Sureness;
-  /** Only for nearest readings in place of an estimate. */
-  readonly noEstimate?: NoEstimate;
+  /** Only for nearest readings in place of an estimate: why there is none. */
+  readonly noEstimate?: string;
 }

@@ -83,7 +83,7 @@ describe('its colours', () => {
   });
 });
 
-test('a difference is told with its sign and unit, and has no offset of 32 °F', () => {
+test('a difference has its sign and unit, and no offset of 32 °F', () => {
   const temperature = sensorNamed('temperature');
   expect(differenceText(temperature, 1.3, 'C')).toBe('+1.3\u00a0°C');
   expect(differenceText(temperature, -1, 'F')).toBe('\u22121.8\u00a0°F');
@@ -149,6 +149,6 @@ test.each([
   ['light', -12.2, 'C', 'down', '\u221212\u00a0lx'],
   ['ph', 0.2, 'C', 'up', '+0.20'],
   ['vpd', -0.012, 'C', 'down', '\u22120.01\u00a0kPa'],
-] as const)('of %s a difference of %d is told in °%s: %s, %s', (name, by, unit, way, text) => {
+] as const)('a difference of %s by %d in °%s: %s, %s', (name, by, unit, way, text) => {
   expect(differenceShown(sensorNamed(name), by, unit)).toEqual({ way, text });
 });

@@ -29,68 +29,16 @@ export function resolutionFor(bounds: Bounds, maxCells: number): number {
   return finest;
 }
 
-/**
- * Colours a field. Not-a-number is fully transparent. The picture's top row is the grid's last
- * row. With `detail` above 1 every cell becomes detail x detail pixels whose values are
- * interpolated between cell centres. Values are interpolated, not colours: a picture scaled by the
- * browser would let colour bleed into unknown cells.
- */
-export function fieldPixels(field: Field, shade: Shade, detail: number) {
-  const width = field.width * detail;
-  const height = field.height * detail;
+/** Colours a field. Not-a-number is transparent. The picture's top row is the grid's last row. */
+export function fieldPixels({ width, height, values }: Field, shade: Shade) {
   const data = new Uint8ClampedArray(width * height * 4);
-  let at = 0;
-  for (let top = 0; top < height; top++) {
-    const y = height - 1 - top;
-    const row = Math.floor(y / detail) * field.width;
-    for (let x = 0; x < width; x++, at += 4) {
-      const value =
-        detail === 1
-          ? (field.values[y * field.width + x] ?? NaN)
-          : interpolate(field, (x + 0.5) / detail - 0.5, (y + 0.5) / detail - 0.5);
-      if (Number.isNaN(value)) continue;
-      const { rgb, alpha } = shade(value, row + Math.floor(x / detail));
-      data[at] = rgb[0];
-      data[at + 1] = rgb[1];
-      data[at + 2] = rgb[2];
-      data[at + 3] = 255 * alpha;
-    }
-  }
+  values.forEach((value, cell) => {
+    if (Number.isNaN(value)) return;
+    const { rgb, alpha } = shade(value, cell);
+    const at = ((height - 1 - Math.floor(cell / width)) * width + (cell % width)) * 4;
+    data.set([...rgb, 255 * alpha], at);
+  });
   return { width, height, data };
-}
-
-/**
- * Value between cell centres, `u` and `v` in cells with the first centre at 0. Not-a-number
- * if the cell that contains the point is; unknown neighbours are ignored.
- */
-export function interpolate(field: Field, u: number, v: number): number {
-  const { width, height, values } = field;
-  const own = values[Math.round(v) * width + Math.round(u)] ?? NaN;
-  if (Number.isNaN(own)) return NaN;
-  const column = Math.floor(u);
-  const row = Math.floor(v);
-  let sum = 0;
-  let weights = 0;
-  for (let dr = 0; dr < 2; dr++) {
-    const r = row + dr;
-    if (r < 0 || r >= height) continue;
-    for (let dc = 0; dc < 2; dc++) {
-      const c = column + dc;
-      if (c < 0 || c >= width) continue;
-      const value = values[r * width + c] ?? NaN;
-      if (Number.isNaN(value)) continue;
-      const weight = (1 - Math.abs(u - c)) * (1 - Math.abs(v - r));
-      sum += weight * value;
-      weights += weight;
-    }
-  }
-  return weights > 0 ? sum / weights : own;
-}
-
-/** Pixels per cell edge of a smooth picture, which stays under two million pixels. */
-export function smoothDetail(field: Field): number {
-  const cells = Math.max(1, field.width * field.height);
-  return Math.max(1, Math.min(8, Math.floor(Math.sqrt(2_000_000 / cells))));
 }
 
 export function fieldCorners(field: Field): readonly [MapPoint, MapPoint] {

@@ -32,20 +32,20 @@ describe('house', () => {
     4: 'unknown',
   } as const;
 
-  test('is what the bridge says, tag by tag and as a whole', () => {
+  test('is as judged by the bridge, for each tag and as a whole', () => {
     const { verdict, counts, byTag } = house(mixed);
     expect(verdict).toBe('critical');
     expect(counts).toEqual({ critical: 2, stressed: 0, unknown: 1, healthy: 1 });
     expect(byTag.get('4')).toEqual({ verdict: 'unknown', reasons: [] });
   });
 
-  test('nothing that is read makes a verdict: only what is said does', () => {
+  test('readings make no verdict: the bridge’s judgement does', () => {
     const lethal = tag({ readings: readings({ temperature: -40 }) });
     expect(houseHealth([lethal], judgement({ 1: 'healthy' }), true).verdict).toBe('healthy');
     expect(houseHealth([lethal], null, true).verdict).toBe('unknown');
   });
 
-  test('that is not heard of is unknown and says why; of its tags stands what was said', () => {
+  test('a silent one is unknown, with the reason; its tags keep their last verdicts', () => {
     const silent = house(mixed, false);
     expect(silent).toMatchObject({ verdict: 'unknown' });
     expect(silent.reasons.map(({ kind }) => kind)).toEqual(['silent']);
@@ -91,7 +91,7 @@ test('what is beyond its limit is worse than what only the deadband still holds'
   expect(worstReason({ verdict: 'critical', reasons: [back, beyond] })).toBe(beyond);
 });
 
-test('a value is out of its range where a reason says so', () => {
+test('a value is out of its range if a reason says so', () => {
   const health = { verdict: 'critical', reasons: [reason(), reason({ kind: 'old' })] } as const;
   const found = rangeReason(health, 'temperature');
   expect(found && sideOf(found)).toBe('below');
@@ -100,7 +100,7 @@ test('a value is out of its range where a reason says so', () => {
   expect(rangeReason(undefined, 'temperature')).toBeNull();
 });
 
-test('what is said again is the very same', () => {
+test('a repeated judgement is the same object', () => {
   const before = judgement({ 1: 'healthy' });
   expect(sharedJudgement(before, { ...before, house: { ...before.house } })).toBe(before);
   const night = { is_day: false, source: 'light' } as const;
@@ -236,7 +236,7 @@ describe('a reason in words', () => {
     );
   });
 
-  test('what is well waits for a scan; pests, for another look at the flowers', () => {
+  test('a healthy value waits for a scan; pests, for another inspection', () => {
     const well = { verdict: 'healthy' } as const;
     expect(todoText(reason(well))).toBe(S.todoWell);
     expect(todoText(reason({ ...well, kind: 'pest', value: 0 }))).toBe(S.todoPestAgain);

@@ -124,7 +124,7 @@ test('no value is ever outside of it', () => {
   }
 });
 
-test('an ideal house is in the middle of its colours, and its noise moves nothing', () => {
+test('an ideal greenhouse is in the middle of its colours, and noise moves nothing', () => {
   expect(withIdeal({ low: 21.8, high: 22.2 }, [18, 26])).toEqual({ low: 18, high: 26 });
   expect(withIdeal({ low: 21.8, high: 31 }, [18, 26])).toEqual({ low: 18, high: 31 });
   expect(withIdeal({ low: 21.8, high: 31 }, null)).toEqual({ low: 21.8, high: 31 });

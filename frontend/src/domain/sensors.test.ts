@@ -98,7 +98,7 @@ describe('ranges', () => {
     expect(rangesFor(day.named('heat'), 'rose').ideal).toEqual([18, 26]);
   });
 
-  test('before the bridge has told, nothing is judged', () => {
+  test('before the bridge has answered, nothing is judged', () => {
     expect(NO_CATALOGUES.day.all).toEqual([]);
     expect(NO_CATALOGUES.day.named('temperature')).toMatchObject({
       label: 'temperature',

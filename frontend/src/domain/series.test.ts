@@ -96,7 +96,7 @@ describe('the rows of a chart', () => {
 describe('as CSV', () => {
   const lines = (text: string): string[] => text.trimEnd().split('\r\n');
 
-  test('each row tells what it is, and no tag becomes a formula', () => {
+  test('each row has its kind, and no tag id becomes a formula', () => {
     expect(lines(chartCsv(CATALOGUE, [{ series, marks: [failure(NOON)] }], 'C'))).toEqual([
       '\ufefftime_iso,stamp,until,tag_id,sensor,unit,kind,n,value,min,max',
       `2026-11-21T12:00:00.000Z,${NOON},,'=2+5,temperature,°C,reading,1,20,,`,

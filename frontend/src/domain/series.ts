@@ -69,7 +69,7 @@ export const marksOf = ({ buckets, bucket_s: widthS }: Timeline) =>
   buckets.flatMap(({ start, failures, looks }) =>
     [
       { kind: 'failure' as const, count: failures },
-      { kind: 'look' as const, count: looks },
+      { kind: 'inspection' as const, count: looks },
     ].flatMap(({ kind, count }) =>
       count > 0 ? [{ at: secondsOf(start), widthS, kind, count }] : [],
     ),

@@ -25,7 +25,7 @@ export function timelineOf(wire: WireTimeline, nowS: number) {
     /** Sorted by time, without empty buckets. */
     buckets: wire.buckets.map((bucket) => ({ ...bucket, start: secondsOf(bucket.start) })),
     silences: wire.silences.map(spanOfWire),
-    /** Nights by the clock. */
+    /** From each start of the twin's clock to the next: it may begin anew. */
     runs: wire.runs.map(spanOfWire),
     missing: missingOf(wire, nowS),
   };

@@ -66,7 +66,7 @@ describe('snapshot', () => {
     expect(compareIds('01', '1')).not.toBe(0);
   });
 
-  test('a repeated state does not look fresh again', () => {
+  test('a repeated state is not fresh again', () => {
     const first = snapshotOf(stateFrame([wireTag()], { sec: 5 }), 1000, null);
     const heartbeat = snapshotOf(stateFrame([wireTag()], { sec: 5, seq: 2 }), 9000, first);
     expect(heartbeat.takenAt).toBe(1000);
@@ -141,7 +141,7 @@ describe('times of their own', () => {
     expect(scannedAt).toBe(70_000);
   });
 
-  test('what the twin does not tell is not known, and never young', () => {
+  test('what the twin does not report is unknown, and never fresh', () => {
     const scanned = (list: TwinTagState['readings'], age: number | null = 1): unknown =>
       tagOf(wireTag({ readings: list, stale_seconds: age }), { at, takenAt: 0 }).scannedAt;
     expect(scanned([unknown])).toBe('unknown');
@@ -154,7 +154,7 @@ describe('times of their own', () => {
     expect(scanned(readings({ b: 1 }, 6_000))).toBe('unknown');
   });
 
-  test('a look and a try by the state’s time; of a success no more is told', () => {
+  test('inspection and attempt are dated by the state; a success has no failed attempt', () => {
     const wire = wireTag({
       looked_at: { sec: 4_990, nanosec: 500_000_000 },
       last_try: { sec: 4_880, nanosec: 0 },
@@ -194,7 +194,7 @@ describe('a tag that is far off', () => {
   const wire = [at('1', 0), at('2', 1), at('3', 2), at('lost', 5000)];
   const first = snapshotOf(stateFrame(wire, { sec: 5 }), 1000, null);
 
-  test('has no place on the map, and is told where it is', () => {
+  test('has no place on the map, but its position', () => {
     expect(first.tags.map((tag) => tag.at?.x)).toEqual([0, 1, 2, undefined]);
     expect(first.tags.map((tag) => tag.farOff?.x)).toEqual([undefined, undefined, undefined, 5000]);
   });
@@ -210,7 +210,7 @@ describe('a tag that is far off', () => {
   });
 });
 
-describe('the cases that the twin knows too', () => {
+describe('the cases of the twin’s own tests', () => {
   test.each(Object.entries(cases))('%s', (_, { at, far }) => {
     const places = at.map(([x, y]) => mapPoint(x ?? NaN, y ?? NaN));
     const reach = reachOf(places);

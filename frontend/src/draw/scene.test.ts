@@ -119,7 +119,7 @@ describe('pins', () => {
     expect(strength(600_000)).toBeGreaterThan(0);
   });
 
-  test('by the reading of the sensor in view, not by a later look at the flowers', () => {
+  test('by the reading of the sensor in view, not by a later inspection', () => {
     const old = readings({ temperature: 20 }, -3_495);
     const [pin] = scene([tag({ readings: [...old, ...readings({ humidity: 20 }, 104)] })]).pins;
     expect(pin?.strength).toBeLessThan(0.5);

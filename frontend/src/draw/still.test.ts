@@ -14,7 +14,6 @@ import {
   hatchedOf,
   Hatching,
   knownOf,
-  placedField,
 } from './still';
 import { canvasOfPixels, newCanvas } from './surface';
 
@@ -33,13 +32,6 @@ describe('a picture in the map', () => {
     drawPicture(penOn(context), { picture, placement: { ...placement, resolution: 0.01 } });
     expect(context.named('drawImage')[0]?.state['imageSmoothingEnabled']).toBe(true);
   });
-});
-
-test('a field lies where it says, whatever its picture’s detail', () => {
-  const over = { width: 10, height: 20, originX: -1, originY: 2, resolution: 0.1 };
-  const { placement } = placedField(fieldWith([], over), newCanvas(40, 80));
-  expect(placement).toMatchObject({ originX: -1, originY: 2, yaw: 0, width: 40, height: 80 });
-  expect(placement.resolution * placement.width).toBeCloseTo(1);
 });
 
 test('boxes close their outline at the right place', () => {
@@ -99,7 +91,7 @@ test('what is known is so top row first, and the floor is what is no wall', () =
   expect(pixelsOf(floorOf(new ImageData(map, 3, 1)))).toEqual([0, 255, 0]);
 });
 
-test('hatching is cut to the inside of the house, and out of what is known', () => {
+test('hatching covers the unknown inside of the greenhouse alone', () => {
   const picture = canvasOfPixels({ data: new Uint8ClampedArray(4), width: 1, height: 1 });
   const placement = { originX: 0, originY: 0, yaw: 0, resolution: 1, width: 1, height: 1 };
   const context = new FakeContext();

@@ -80,11 +80,12 @@ function place({ context, view }: Pen, { picture, placement }: Placed, isSmooth 
   context.restore();
 }
 
-/** A picture of a field, in any resolution, at the field's place. */
-export function placedField(field: Field, picture: HTMLCanvasElement): Placed {
-  const { originX, originY } = field;
+/** A picture of a field's cells at the field's place. */
+export function placedField(
+  { originX, originY, resolution }: Field,
+  picture: HTMLCanvasElement,
+): Placed {
   const { width, height } = picture;
-  const resolution = (field.resolution * Math.max(1, field.width)) / width;
   return { picture, placement: { originX, originY, yaw: 0, resolution, width, height } };
 }
 

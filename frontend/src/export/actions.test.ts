@@ -6,7 +6,8 @@ import { act, prefer, receive, store } from '../store/app';
 import { withSort } from '../store/view';
 import { NO_HOUSE, withPast } from '../store/twin';
 import { FakeContext } from '../testing/canvas';
-import { nextStamp, showTags } from '../testing/page';
+import { estimated } from '../testing/field';
+import { nextStamp, showField, showTags } from '../testing/page';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { drawFooter, type Footer, FOOTER_PX, saveMap, saveTable } from './actions';
 import { fileName } from './save';
@@ -103,10 +104,8 @@ test('a picture is taken of layers that are as on paper', async () => {
     callback(new Blob(['png']));
   });
   const height = (): number => result?.height ?? 0;
-  const drawn = (): number => {
-    const canvas = result;
-    return canvas ? (FakeContext.recordOf(canvas)?.named('drawImage').length ?? 0) : 0;
-  };
+  const calls = (name: string) => (result && FakeContext.recordOf(result)?.named(name)) ?? [];
+  const drawn = (): number => calls('drawImage').length;
   await saveMap();
   // No map is mounted, so there was nothing to draw.
   expect(drawn()).toBe(0);
@@ -115,11 +114,18 @@ test('a picture is taken of layers that are as on paper', async () => {
   };
   theMap.set({ take } as MapActions);
   await saveMap();
-  theMap.set(null);
-  layer.remove();
   expect(drawn()).toBe(1);
   expect(height()).toBe(20 + 2 * FOOTER_PX);
   expect(names).toHaveLength(2);
+  // The footer has the legend of what the map shows.
+  act({ heat: 'error' });
+  showField(estimated([22], [1]));
+  await saveMap();
+  theMap.set(null);
+  layer.remove();
+  const texts = calls('fillText').map(({ args }) => args[0]);
+  expect(texts).toEqual(expect.arrayContaining(['Temperature: Uncertainty', '±\u00a00']));
+  expect(texts).toContain('±\u00a01.6\u00a0°C');
 });
 
 describe('of another moment', () => {
@@ -142,6 +148,8 @@ test('a file’s name sorts by time and is legal everywhere', () => {
   expect(fileName('map', 'png', Date.UTC(2026, 4, 1, 8, 33, 22))).toBe(
     'lupin-twin-map-2026-05-01T14-03-22.png',
   );
+  // A simulation has no dates.
+  expect(fileName('chart', 'csv', 5_025_000)).toBe('lupin-twin-chart-sim-01-23-45.csv');
 });
 
 const colours = { ink: 'black', surface: 'white' };

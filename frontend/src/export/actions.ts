@@ -1,7 +1,8 @@
 /** Export actions, for buttons and the menu. */
 import { epochOf, now as pageNow, timeZone } from '../clock';
 import { differenceText, divergingColours, signedText } from '../domain/difference';
-import { readingText, valueText, written } from '../domain/format';
+import { errorColours } from '../domain/field';
+import { differenceNumber, readingText, valueText, withUnit, written } from '../domain/format';
 import { IDEAL_ALPHA, idealParts } from '../domain/ideal';
 import { rgbText, sensorColour } from '../domain/ramp';
 import { tableCsv } from '../domain/table';
@@ -11,7 +12,7 @@ import { contextOf, newCanvas } from '../draw/surface';
 import { lengthText, scaleBar } from '../geometry/coordinates';
 import { theMap } from '../map/commands';
 import { toFragment } from '../store/address';
-import { store } from '../store/app';
+import { type AppState, store } from '../store/app';
 import {
   selectCatalogue,
   selectColouring,
@@ -74,44 +75,20 @@ export async function saveMap(): Promise<void> {
     for (const layer of layers) context.drawImage(layer, 0, 0);
   });
 
-  const sensor = selectSensor(state);
-  const range = selectRange(state);
-  const isIdeal = selectColouring(state) === 'ideal';
   const takenAt = epochOf(snapshot.takenAt);
-  const { unit } = state.settings;
-  const label = shown(sensor.label, 32);
-  const { difference, range: change } = selectHeat(state) ?? {};
-  const origin = selectOrigin(state);
   // A recording or simulation has its own time: use that, not when the data arrived.
   const then = moment ?? (selectHasOwnTime(state) ? secondsOf(snapshot.at) : null);
-  const time = then === null ? dateText(takenAt) : S.asOf(rosText(then));
-  const colour = sensorColour(sensor);
+  const { difference } = selectHeat(state) ?? {};
+  const time = difference
+    ? S.differenceTimes(rosText(difference.at), rosText(difference.against))
+    : then === null
+      ? dateText(takenAt)
+      : S.asOf(rosText(then));
+  const origin = selectOrigin(state);
   const footer: Footer = {
+    ...legendOf(state),
     scale: state.viewport.view.scale,
-    // Pin colours above heat-map colours, as in the page's legend.
-    ramps: [1, sensor.maxAlpha].map((most) => [rgbText(colour, 0), rgbText(colour, most)]),
-    ...(difference && change
-      ? {
-          title: S.difference(label),
-          time: S.differenceTimes(rosText(difference.at), rosText(difference.against)),
-          ends: [signedText(sensor, change.low, unit), differenceText(sensor, change.high, unit)],
-          ramps: [divergingColours()],
-        }
-      : {
-          title: isIdeal ? S.legendAgainst(label) : label,
-          time: origin === null ? time : `${S.origin[origin]}, ${time}`,
-          ...(isIdeal
-            ? {
-                ends: [S.below, S.above] as const,
-                ramps: [Object.values(idealParts(IDEAL_ALPHA)).flat()],
-              }
-            : {
-                ends: range && [
-                  valueText(sensor, range.low, unit),
-                  readingText(sensor, range.high, unit),
-                ],
-              }),
-        }),
+    time: origin === null ? time : `${S.origin[origin]}, ${time}`,
   };
   context.setTransform(ratio, 0, 0, ratio, 0, first.height);
   drawFooter(context, first.width / ratio, footer, {
@@ -123,6 +100,42 @@ export async function saveMap(): Promise<void> {
     canvas.toBlob(resolve, 'image/png');
   });
   if (blob) save(blob, fileName('map', 'png', takenAt, moment));
+}
+
+/** What the map's colours show, as in the page's legend. */
+function legendOf(state: AppState): Pick<Footer, 'title' | 'ends' | 'ramps'> {
+  const sensor = selectSensor(state);
+  const { unit } = state.settings;
+  const label = shown(sensor.label, 32);
+  const heat = selectHeat(state);
+  if (heat?.difference) {
+    const { low, high } = heat.range;
+    return {
+      title: S.difference(label),
+      ends: [signedText(sensor, low, unit), differenceText(sensor, high, unit)],
+      ramps: [divergingColours()],
+    };
+  }
+  if (heat?.isError) {
+    const most = withUnit(sensor, differenceNumber(sensor, heat.range.high, unit), unit);
+    return {
+      title: `${label}: ${S.heats.error}`,
+      ends: ['±\u00a00', `±\u00a0${most}`],
+      ramps: [errorColours()],
+    };
+  }
+  if (selectColouring(state) === 'ideal') {
+    const colours = Object.values(idealParts(IDEAL_ALPHA)).flat();
+    return { title: S.legendAgainst(label), ends: [S.below, S.above], ramps: [colours] };
+  }
+  const range = selectRange(state);
+  const colour = sensorColour(sensor);
+  return {
+    title: label,
+    ends: range && [valueText(sensor, range.low, unit), readingText(sensor, range.high, unit)],
+    // Pin colours above heat-map colours.
+    ramps: [1, sensor.maxAlpha].map((most) => [rgbText(colour, 0), rgbText(colour, most)]),
+  };
 }
 
 /** Height of the footer below a saved map. */
@@ -208,10 +221,11 @@ function drawRamp(
 }
 
 /** The current view's URL; the address bar lags behind it, and waits during playback. */
-export function viewAddress(): URL {
+export function viewAddress(parameters: Readonly<Record<string, string>> = {}): string {
   const url = new URL(window.location.href);
+  for (const [name, value] of Object.entries(parameters)) url.searchParams.set(name, value);
   url.hash = toFragment(store.get().view);
-  return url;
+  return url.href;
 }
 
 /** Copies the view's URL; false if there is no clipboard or it refused. */
@@ -220,7 +234,7 @@ export async function copyLink(): Promise<boolean> {
   // that it always exists.
   const clipboard = navigator.clipboard as Clipboard | undefined;
   if (!clipboard) return false;
-  return clipboard.writeText(viewAddress().href).then(
+  return clipboard.writeText(viewAddress()).then(
     () => true,
     () => false,
   );

@@ -5,9 +5,9 @@ import { withState } from '../store/twin';
 import { withTag } from '../store/view';
 import { stateFrame, wireTag } from '../testing/tags';
 import { timelineWith } from '../testing/timeline';
-import { copyLink, reported, reportLink } from './actions';
+import { copyLink, reported, reportLink, viewAddress } from './actions';
 
-test('without a clipboard copying says no instead of failing', async () => {
+test('without a clipboard, copying reports it instead of failing', async () => {
   expect(await copyLink()).toBe(false);
   const writeText = vi.fn(() => Promise.resolve());
   vi.stubGlobal('navigator', { clipboard: { writeText } });
@@ -19,6 +19,7 @@ test('without a clipboard copying says no instead of failing', async () => {
   await copyLink();
   const { origin, pathname } = window.location;
   expect(writeText).toHaveBeenLastCalledWith(`${origin}${pathname}#at=9&tag=a%2Fb+%23`);
+  expect(viewAddress({ lang: 'es' })).toBe(`${origin}${pathname}?lang=es#at=9&tag=a%2Fb+%23`);
 });
 
 const HOUR = 3_600;

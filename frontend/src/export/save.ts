@@ -34,8 +34,8 @@ export function fileName(
   epochMs: number,
   moment: number | null = null,
 ): string {
-  const at = moment === null ? epochMs : moment * 1000;
-  const time = moment === null || hasDate(moment) ? momentText(at) : rosText(moment);
+  const at = moment ?? epochMs / 1000;
+  const time = hasDate(at) ? momentText(at * 1000) : rosText(at);
   const stamp = time.replace(' ', /^\d/.test(time) ? 'T' : '-').replaceAll(':', '-');
   return `lupin-twin-${kind}${moment === null ? '' : '-past'}-${stamp}.${extension}`;
 }

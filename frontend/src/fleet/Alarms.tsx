@@ -70,7 +70,7 @@ function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Eleme
           {S.alarmSince(whenText(raised, timeOfDay() / 1000), null)}
           {!alarm.is_live && ` (${W.wasLive})`}
           {saidOf(alarm).map((said) => (
-            <span key={said} className="fleet-said">
+            <span key={said} className="fleet-alarm-status">
               {said}
             </span>
           ))}

@@ -1,7 +1,7 @@
 import { afterEach, beforeEach, describe, expect, test, vi, type Mock } from 'vitest';
 
 import { isClear } from '../geometry/clear';
-import { corners, mapPoint, toCanvas, type Camera } from '../geometry/coordinates';
+import { corners, type MapPoint, mapPoint, toCanvas, type Camera } from '../geometry/coordinates';
 import { act, moveViewport, NO_VIEWPORT, onChange, store, type Viewport } from '../store/app';
 import { MapCamera } from './camera';
 import { startGestures } from './gestures';
@@ -100,6 +100,17 @@ describe('camera', () => {
     const shown = toCanvas(viewport().view, mapPoint(2, 40));
     expect(shown.x).toBeCloseTo(300);
     expect(shown.y).toBeCloseTo(200);
+  });
+
+  test('brings a pin near the edge into the middle once the operator has chosen a view', () => {
+    act({ camera: { x: 2, y: 4, span: 8 } });
+    camera.goTo({ x: 2, y: 4, span: 8 }, null);
+    const { view } = viewport();
+    const at = (x: number): MapPoint => mapPoint((x - view.x) / view.scale, 4);
+    camera.show(at(41));
+    expect(viewport().view).toBe(view);
+    camera.show(at(39));
+    expect(toCanvas(viewport().view, at(39)).x).toBeCloseTo(300);
   });
 
   test('a pin near the edge stays where it is while everything is shown', () => {

@@ -181,7 +181,7 @@ describe('pulses', () => {
 });
 
 describe('mouse and finger', () => {
-  test('the mouse on a pin marks the tag and tells where the pin is, until it leaves', () => {
+  test('the mouse on a pin marks the tag and its place, until it leaves', () => {
     start();
     const [x, y] = place(3, 2);
     pointer('pointermove', x + 3, y - 2);
@@ -340,7 +340,7 @@ describe('nothing is drawn anew but what changed', () => {
     expect(overlayAfter).toBeGreaterThan(overlayBefore);
   });
 
-  test('a heartbeat that changes nothing asks for no frame', () => {
+  test('a heartbeat that changes nothing draws no frame', () => {
     start();
     const { snapshot } = store.get().twin.latest;
     const tags = (snapshot?.tags ?? []).map(({ wire }) => structuredClone(wire));

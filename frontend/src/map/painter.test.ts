@@ -171,17 +171,6 @@ describe('painter', () => {
     expect(new Set(grounds).size).toBe(2);
   });
 
-  test('smooth on demand: more pixels a cell, in the same place', () => {
-    const width = (): unknown =>
-      (named(canvases.still, 'drawImage').at(-1)?.args[0] as HTMLCanvasElement).width;
-    show('field');
-    painter.paintStill(store.get(), view, 0, true);
-    expect(width()).toBe(2);
-    show('field', 'smooth');
-    painter.paintStill(store.get(), view, 0, true);
-    expect(width()).toBe(16);
-  });
-
   test('areas are drawn where the table is grouped by them', () => {
     const value = cataloguesOf({ ...FILE, areas: { 'Bay 1': ['1'], 'Bay 2': ['2'] } });
     receive({ sensors: { value, state: 'ready', message: '' } });

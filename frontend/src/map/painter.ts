@@ -1,6 +1,6 @@
 import type { Field } from '../contract/types';
 import { divergingShade } from '../domain/difference';
-import { edgesOf, errorShade, fieldPixels, smoothDetail } from '../domain/field';
+import { edgesOf, errorShade, fieldPixels } from '../domain/field';
 import { fieldShade } from '../domain/ramp';
 import { cellsWhere, idealShade, withOld } from '../domain/ideal';
 import type { Sensor } from '../domain/sensors';
@@ -172,8 +172,7 @@ export class Painter {
     if (layers.has('boxes')) drawBoxes(pen, this.scene(state, now).boxes);
     const heat = selectHeat(state);
     if (heat && layers.has('field')) {
-      const detail = layers.has('smooth') ? smoothDetail(heat.field) : 1;
-      const coloured = this.#heatPicture(heat, selectSensor(state), detail, isUnknownMarked);
+      const coloured = this.#heatPicture(heat, selectSensor(state), isUnknownMarked);
       drawPicture(pen, placedField(heat.field, coloured));
       if (isUnknownMarked && !heat.isError) {
         for (const { cells, gap } of hatched(heat.field, heat.old)) {
@@ -314,7 +313,6 @@ export class Painter {
     (
       { field, range, zones, difference, isError, old }: Heat,
       sensor: Sensor,
-      detail: number,
       isUnknownMarked: boolean,
     ) => {
       const shade = difference
@@ -324,9 +322,7 @@ export class Painter {
           : zones
             ? idealShade(zones)
             : fieldShade(sensor, range);
-      return canvasOfPixels(
-        fieldPixels(field, old ? withOld(shade, old, isUnknownMarked) : shade, detail),
-      );
+      return canvasOfPixels(fieldPixels(field, old ? withOld(shade, old, isUnknownMarked) : shade));
     },
   );
 }

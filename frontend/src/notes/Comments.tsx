@@ -32,7 +32,7 @@ export function Comments({
         <button
           ref={button}
           type="button"
-          className="say"
+          className="comment-button"
           aria-label={C.commentOf(name)}
           aria-expanded={isOpen}
           onClick={() => {
@@ -93,7 +93,7 @@ function CommentRow({
 }): JSX.Element {
   const [fault, setFault] = useState('');
   return (
-    <li data-comment={id}>
+    <li>
       <strong>
         <bdi>{by}</bdi>
       </strong>{' '}
@@ -185,7 +185,7 @@ export function SiteComment(): JSX.Element | null {
     <Disclosure
       label={C.commentOf(C.site)}
       button={C.comment}
-      className="say-site"
+      className="site-comment"
       look="text-button"
     >
       <OfMoment />

@@ -62,7 +62,7 @@ export function clustersOf(found: readonly StandingNote[], { from, to }: Span) {
 export const C = COMMENTS[LANGUAGE];
 
 /** The tag of a note's subject; null: the greenhouse, or an alarm unknown to the page. */
-export function tagIdOf(subject: string, alarms: readonly Alarm[]): string | null {
+function tagIdOf(subject: string, alarms: readonly Alarm[]): string | null {
   const [kind, id] = [
     subject.slice(0, subject.indexOf(':')),
     subject.slice(subject.indexOf(':') + 1),
@@ -115,7 +115,7 @@ export function NoteMarks({
   }, [all, alarms, ids, from, to]);
   if (clusters.length === 0) return null;
   return (
-    <ul className="comment-marks" aria-label={C.title} data-testid="comment-marks">
+    <ul className="comment-marks" aria-label={C.title}>
       {clusters.map(({ at, notes: found }) => {
         const share = (at - from) / (to - from);
         const texts = found.slice(-MOST_NOTES).map((one) => (
@@ -125,7 +125,7 @@ export function NoteMarks({
           </span>
         ));
         return (
-          <li key={found[0]?.id} style={{ left: `${100 * share}%` }} data-at={at}>
+          <li key={found[0]?.id} style={{ left: `${100 * share}%` }}>
             <button
               type="button"
               onClick={() => {

@@ -70,7 +70,7 @@ test('marks that would cover each other are one, and those outside of the span n
   ]);
 });
 
-test('what is said is fetched when there is more of it, and shown with name and time', async () => {
+test('comments are fetched when their number grows, and shown with name and time', async () => {
   const stop = startNotes();
   render(<Comments subject="tag:7" name="Tag 7" />);
   report(0);
@@ -113,7 +113,7 @@ test('Escape leaves the field, and not what it stands in', () => {
   expect(document.activeElement).toBe(screen.getByRole('button', { name: 'Comment: Tag 7' }));
 });
 
-test('who looks back says it about the moment that is shown', async () => {
+test('a comment written in the past is about the shown moment', async () => {
   person.set(ANNA);
   flush(() => {
     act({ moment: 500 });
@@ -130,7 +130,7 @@ test('who looks back says it about the moment that is shown', async () => {
   });
 });
 
-test('a mark tells on its own who said what of which tag', () => {
+test('a mark has who commented what on which tag', () => {
   const hidden = 'a\u202ecod';
   standingNotes.set(
     standing([said('n', 500, { text: hidden }), said('s', 90, { subject: 'site' })]),
@@ -145,7 +145,7 @@ test('a mark tells on its own who said what of which tag', () => {
   );
 });
 
-test('a mark tells who acknowledged or shelved an alarm when, and the card lists comments alone', () => {
+test('a mark has who acknowledged or shelved an alarm when; the card lists comments alone', () => {
   receive({ alarms: alarms([alarm('cold')]) });
   const subject = `alarm:${alarm('cold').id}`;
   standingNotes.set(

@@ -72,7 +72,7 @@ describe('readout', () => {
     });
   };
 
-  test('tells the estimate, plus or minus what, how many tags are near, and how old', async () => {
+  test('shows the estimate with its error, the number of tags nearby, and their age', async () => {
     showField(estimated([22.4, NaN], [0.79, 1.6]));
     render(<Readout />);
     point(0.5);
@@ -90,7 +90,7 @@ describe('readout', () => {
     expect(text('readout')).toContain(`72.3${NBSP}±${NBSP}2.3${NBSP}°F`);
   });
 
-  test('the error alone is told where the value is not known', async () => {
+  test('the error alone is shown where the value is not known', async () => {
     showField(estimated([22.4, NaN], [0.79, 2]));
     act({ heat: 'error' });
     render(<Readout />);
@@ -102,10 +102,10 @@ describe('readout', () => {
 });
 
 describe('legend', () => {
-  test('says how sure, and how well it has foretold, in words', async () => {
+  test('shows the certainty, and how many predictions held', async () => {
     showField(estimated([22.4], [0.5]));
     render(<Legend kiosk={false} />);
-    expect((await screen.findByTestId('foretold')).textContent).toBe(
+    expect((await screen.findByTestId('prediction')).textContent).toBe(
       '9 of 10 scans within the predicted range',
     );
     expect(text('estimate-key')).toContain(`less certain than ±1.6${NBSP}°C`);
@@ -124,7 +124,7 @@ describe('legend', () => {
     grades = { temperature: grade({ day: { scans: 9, inside: 7 }, share_day: 7 / 9 }) };
     showField(estimated([22.4], [0.5]));
     render(<EstimateFacts />);
-    const prediction = await screen.findByTestId('foretold');
+    const prediction = await screen.findByTestId('prediction');
     expect(prediction.textContent).toBe('7 of 9 scans within the predicted range');
   });
 
@@ -137,22 +137,20 @@ describe('legend', () => {
     expect(warning.textContent).toContain('only 4 of 10 scans were');
   });
 
-  test('says neither where the twin cannot tell', async () => {
+  test('shows no grade if the twin has none', async () => {
     grades = { temperature: grade({ day: { scans: 12, inside: 3 }, is_trusted: null }) };
     showField(estimated([22.4], [0.5]));
     render(<EstimateFacts />);
-    await screen.findByTestId('foretold');
+    await screen.findByTestId('prediction');
     expect(screen.queryByTestId('estimate-warning')).toBeNull();
   });
 
   test.each([
-    [404, grade(), 'This twin makes no estimate'],
-    [503, grade(), 'No estimate at the moment'],
-    [503, grade({ fitted_at: null, share_day: null }), 'it needs ten scans of a sensor'],
-  ])('refused with %d it says why the nearest readings are shown', async (status, said, words) => {
+    [grade(), 'No estimate at the moment'],
+    [grade({ fitted_at: null, share_day: null }), 'it needs ten scans of a sensor'],
+  ])('without an estimate, the legend says why: %#', async (said, words) => {
     grades = { temperature: said };
-    const why = { status, message: 'the reason <b>' };
-    showField(nearest(estimated([22.4], [0.5], { noEstimate: why })));
+    showField(nearest(estimated([22.4], [0.5], { noEstimate: 'the reason <b>' })));
     render(<EstimateFacts />);
     await vi.waitFor(() => {
       expect(text('estimate-missing')).toContain(words);
@@ -188,7 +186,7 @@ describe('card', () => {
     if (tag) render(<CardEstimate tag={tag} health={store.get().twin.latest.health?.tags['7']} />);
   };
 
-  test('tells what was measured against what was expected', async () => {
+  test('shows the measured beside the expected value', async () => {
     expected = { '7': expectedReading() };
     card();
     expect((await screen.findByTestId('card-estimate')).textContent).toBe(

@@ -3,7 +3,7 @@ import '../styles/estimate.css';
 import type { JSX } from 'react';
 
 import { answer } from '../contract/api';
-import type { Field, Grade, NoEstimate, Place, Schemas, TagHealth } from '../contract/types';
+import type { Field, Grade, Place, Schemas, TagHealth } from '../contract/types';
 import { cellAt, errorColours, NINE_OF_TEN, plusMinus } from '../domain/field';
 import {
   differenceNumber,
@@ -31,8 +31,6 @@ import { More } from '../widgets/controls';
 import { useTicking } from '../widgets/useNow';
 import { estimateWordsOf } from '../words/estimate';
 
-const NOT_FOUND = 404;
-
 /** The shown estimate's uncertainty and prediction record; or why there is no estimate. */
 export function EstimateFacts(): JSX.Element {
   const sensor = useApp(selectSensor);
@@ -50,12 +48,13 @@ export function EstimateFacts(): JSX.Element {
     );
   }
   const ofSensor = field?.sensor === sensor.name ? field : null;
-  if (ofSensor?.noEstimate) return <Missing why={ofSensor.noEstimate} grade={grade} />;
+  if (ofSensor?.noEstimate !== undefined)
+    return <Missing why={ofSensor.noEstimate} grade={grade} />;
   if (!ofSensor?.sureness) return <span role="status">{E.onItsWay}</span>;
   return (
     <>
       {!isError && (
-        <span className="estimate-key" data-testid="estimate-key">
+        <span data-testid="estimate-key">
           {E.unsure(errorText(sensor, ofSensor.sureness.sdKnown, unit))}
         </span>
       )}
@@ -64,14 +63,12 @@ export function EstimateFacts(): JSX.Element {
   );
 }
 
-function Missing({ why, grade }: { why: NoEstimate; grade: Grade | null }): JSX.Element {
-  const text =
-    why.status === NOT_FOUND ? E.noService : grade?.fitted_at === null ? E.noModel : E.noneNow;
-  const reason = grade?.fit_problem ? E.fitProblem(shown(grade.fit_problem, 160)) : why.message;
+function Missing({ why, grade }: { why: string; grade: Grade | null }): JSX.Element {
+  const reason = grade?.fit_problem ? E.fitProblem(shown(grade.fit_problem, 160)) : why;
   return (
     <>
       <span role="status" className="estimate-missing" data-testid="estimate-missing">
-        {text}
+        {grade?.fitted_at === null ? E.noModel : E.noneNow}
       </span>
       <More label={S.more} text={shown(reason, 300)} />
     </>
@@ -102,7 +99,7 @@ function Prediction({ grade, isNow }: { grade: Grade; isNow: boolean }): JSX.Ele
         </strong>
       )}
       {/* The grade is always current: beside a past moment, it would be taken for that moment's. */}
-      {isNow && <span data-testid="foretold">{predictionText(grade)}</span>}
+      {isNow && <span data-testid="prediction">{predictionText(grade)}</span>}
       <More label={E.about} text={details.join(' ')} />
     </>
   );

@@ -28,7 +28,7 @@ beforeEach(() => {
   vi.stubGlobal('fetch', () => new Promise(() => undefined));
 });
 
-test('all of a robot is told in words, each as old as it is', () => {
+test('the robot’s position and battery in words, each with its age', () => {
   const said = (now: number | null): string => robotText(robot, now).replaceAll('\u00a0', ' ');
   expect(said(1_000)).toBe('Robot: 2.1 m, −3.4 m; 12 s ago; battery 64 %');
   expect(said(1_180)).toBe('Robot: 2.1 m, −3.4 m; 3 min ago; battery 64 %, reported 3 min ago');
@@ -36,7 +36,7 @@ test('all of a robot is told in words, each as old as it is', () => {
   expect(robotText({ ...robot, position: null }, 981)).toMatch(/^Robot: position unknown; battery/);
 });
 
-test('of a robot that says nothing there is no line', () => {
+test('a robot that reports nothing has no line', () => {
   const { container } = render(<RobotFact />);
   rendered(() => {
     robotFrame.set({ type: 'robot', position: null, plan: null, battery: null });
@@ -44,7 +44,7 @@ test('of a robot that says nothing there is no line', () => {
   expect(container.textContent).toBe('');
 });
 
-test('a robot is marked on the map where it said that it is, and labels keep clear of it', () => {
+test('the robot is marked at its reported position, and labels keep clear of it', () => {
   document.body.innerHTML = '<div id="map-view"></div>';
   moveViewport({ view: { x: 300, y: 200, scale: 100 } });
   const { unmount } = render(<RobotLayer />);
@@ -76,7 +76,7 @@ test.each([
   });
   const { textContent } = screen.getByTestId('robot-mark');
   expect(textContent.replaceAll('\u00a0', ' ') || undefined).toBe(said);
-  expect(screen.getByTestId('robot').dataset['looks']).toBe('old');
+  expect(screen.getByTestId('robot').dataset['freshness']).toBe('old');
 });
 
 const at = (x: number, seconds: number): TrailPoint => ({ x, y: 0, at: seconds });
@@ -127,7 +127,7 @@ describe('trail', () => {
     ]);
   });
 
-  test('is broken where nothing was heard for long and it is elsewhere then', () => {
+  test('is broken after a long silence if the robot has moved', () => {
     const still = [at(0, 100), at(0.5, 200), at(1, 210)];
     const ends = trailLines(still, 210).map(({ points }) => points.map(([x]) => x));
     expect(ends).toEqual([

@@ -61,7 +61,7 @@ export function RobotLayer(): ReactPortal | null {
   // Inside the map, below everything drawn over it.
   return createPortal(
     <>
-      <svg className="robot-layer" aria-hidden="true" data-testid="robot" data-looks={looks}>
+      <svg className="robot-layer" aria-hidden="true" data-testid="robot" data-freshness={looks}>
         <g transform={`translate(${view.x} ${view.y}) scale(${view.scale} ${-view.scale})`}>
           {lines.map(({ points, step }, index) => (
             <polyline key={index} className="robot-trail" data-step={step} points={text(points)} />
@@ -72,7 +72,7 @@ export function RobotLayer(): ReactPortal | null {
         </g>
       </svg>
       {position && at && (
-        <svg className="robot-layer robot-now" aria-hidden="true" data-looks={looks}>
+        <svg className="robot-layer robot-now" aria-hidden="true" data-freshness={looks}>
           <g transform={`translate(${at.x} ${at.y})`} data-testid="robot-mark">
             <circle className="robot-ring" r="16" />
             <circle className="robot-body" r="11" />

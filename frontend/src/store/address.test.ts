@@ -226,7 +226,7 @@ describe('permalink', () => {
         ['soil_moisture', { low: -3, high: 12.5 }],
         ['a,b=&c', { low: 400, high: 1200 }],
       ]),
-      layers: new Set(['map', 'field', 'smooth', 'pins']),
+      layers: new Set(['map', 'field', 'pins']),
       sort: { column: 'soil_moisture', descending: true },
       filter: 'basil & "pest"',
       health: 'unknown',

@@ -2,7 +2,7 @@ import { expect, test, vi } from 'vitest';
 
 import { createStore } from './create';
 
-test('tells of changes only, and only those who still listen', () => {
+test('notifies of changes only, and only current listeners', () => {
   const store = createStore(1);
   const listener = vi.fn();
   const stop = store.subscribe(listener);
@@ -16,7 +16,7 @@ test('tells of changes only, and only those who still listen', () => {
   expect(store.get()).toBe(3);
 });
 
-test('one listener that fails keeps the news from nobody else, and its failure is told', () => {
+test('a failing listener does not stop the others, and is reported', () => {
   const failures: unknown[] = [];
   vi.spyOn(globalThis, 'queueMicrotask').mockImplementation((task) => {
     try {

@@ -184,7 +184,7 @@ function selectField(state: AppState): Field | null {
   const { value } = field;
   // The previous field is another one, and must not appear under this name.
   if (value?.sensor !== state.view.sensor) return null;
-  const isEstimate = Boolean(value.sureness ?? value.noEstimate);
+  const isEstimate = value.sureness !== undefined || value.noEstimate !== undefined;
   if (isEstimate !== (sourceOf(state) === 'estimate')) return null;
   return onMap(value)(map.value);
 }

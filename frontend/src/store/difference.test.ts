@@ -2,10 +2,11 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { readings, wireTag } from '../testing/tags';
 import { npy } from '../testing/field';
-import { goLive, showTags, status } from '../testing/page';
-import { act, store } from './app';
+import { goLive, goLost, showTags, status } from '../testing/page';
+import { act, receive, store } from './app';
 import { selectHeat } from './derived';
 import { startDifference } from './difference';
+import { withPast } from './twin';
 
 let requests: URLSearchParams[] = [];
 /** The bridge's data of the shown moment, and of the one before. */
@@ -51,7 +52,7 @@ test('nothing is fetched while nothing is compared', async () => {
   expect(requests).toEqual([]);
 });
 
-test('both fields are asked for on one box, and their difference is the heat map', async () => {
+test('both fields are fetched on one box, and their difference is the heat map', async () => {
   act({ compare: { by: 'moment', at: 500 } });
   // Until then nothing is shown as a difference.
   expect(selectHeat(store.get())).toBeNull();
@@ -68,7 +69,7 @@ test('both fields are asked for on one box, and their difference is the heat map
   expect(heat?.difference?.against).toBe(500);
 });
 
-test('where memory has nothing of then, there is no heat map and it is told', async () => {
+test('without data of then, there is no heat map, and the legend says so', async () => {
   known.samplesThen = 0;
   act({ compare: { by: 'moment', at: 500 } });
   await settled();
@@ -90,7 +91,7 @@ test('while the twin is silent, the shown state keeps its own time', async () =>
   clock.mockRestore();
 });
 
-test('before all time nothing is asked for', async () => {
+test('before ROS time 0 nothing is fetched', async () => {
   act({ compare: { by: 'ago', seconds: 1e12 } });
   await settled();
   expect(requests).toHaveLength(1);
@@ -104,6 +105,18 @@ test('no difference of one sensor is shown as that of another, nor after it ends
   expect(selectHeat(store.get())).toBeNull();
   act({ sensor: 'temperature' });
   act({ compare: null });
+  expect(store.get().twin.difference.value).toBeNull();
+});
+
+test('no difference of the past is shown live', async () => {
+  const { latest } = store.get().twin;
+  act({ moment: 600 });
+  receive(withPast({ at: 600, house: latest }));
+  act({ compare: { by: 'ago', seconds: 100 } });
+  await settled();
+  expect(store.get().twin.difference.value?.at).toBe(600);
+  goLost();
+  act({ moment: null });
   expect(store.get().twin.difference.value).toBeNull();
 });
 

@@ -33,18 +33,21 @@ export function startDifference(): () => void {
     },
     (state) => {
       const { compare, sensor } = state.view;
-      // A difference of another sensor, source or moment must not stay.
+      // A difference of another sensor, source or comparison must not stay; nor one of the past, live.
       const isOther =
         compare === null ||
         before?.view.compare !== compare ||
         before.view.sensor !== sensor ||
-        sourceOf(before) !== sourceOf(state);
+        sourceOf(before) !== sourceOf(state) ||
+        isPast(before) !== isPast(state);
       before = state;
       if (isOther && state.twin.difference !== NOTHING) receive({ difference: NOTHING });
       return compare && taskFor(state, compare);
     },
   );
 }
+
+const isPast = (state: AppState): boolean => selectShown(state).moment !== null;
 
 function taskFor(state: AppState, compare: Compare): FetchTask<Difference> | undefined {
   const { moment, snapshot } = selectShown(state);

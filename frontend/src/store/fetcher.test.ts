@@ -62,15 +62,15 @@ const fail = async (key: string, error: Error): Promise<void> => {
 };
 const open = (): string[] => [...fetches].filter(([, { over }]) => !over).map(([key]) => key);
 
-test('the first wish is fetched at once', async () => {
+test('the first task is fetched at once', async () => {
   fetcher.want(task('a'));
   expect(started).toEqual(['a']);
   await answer('a');
   expect(received).toEqual(['a']);
 });
 
-describe('while somebody drags', () => {
-  test('two fetches run, the newest wish is the next, and those between are dropped', async () => {
+describe('while dragging', () => {
+  test('two fetches run, the latest task is next, and those between are dropped', async () => {
     for (const key of ['a', 'b', 'c', 'd', 'e']) {
       fetcher.want(task(key));
       await pass(100);
@@ -96,7 +96,7 @@ describe('while somebody drags', () => {
     expect(received.at(-1)).toBe('99');
   });
 
-  test('what is overtaken is never told, and its fetch ends', async () => {
+  test('an overtaken answer is dropped, and its fetch ends', async () => {
     fetcher.want(task('a'));
     await pass(100);
     fetcher.want(task('b'));
@@ -105,7 +105,7 @@ describe('while somebody drags', () => {
     expect(received).toEqual(['b']);
   });
 
-  test('but what is wanted again goes on, and is told', async () => {
+  test('but a fetch wanted again goes on, and is handed on', async () => {
     fetcher.want(task('a'));
     await pass(100);
     fetcher.want(task('b'));
@@ -144,7 +144,7 @@ test('what came a moment ago is there at once, but not for ever', async () => {
   expect(started).toEqual(['a', 'b', 'b']);
 });
 
-test('so many are kept, and the oldest goes', async () => {
+test('the cache is bounded, and the oldest goes', async () => {
   for (let index = 0; index <= 60; index++) {
     fetcher.want(task(`${index}`));
     await pass(100);
@@ -169,7 +169,7 @@ test('nothing wanted ends all, and leaves nothing behind', async () => {
 });
 
 describe('a failure', () => {
-  test('is told, and tried again ever more slowly', async () => {
+  test('is reported, and retried ever more slowly', async () => {
     fetcher.want(task('a'));
     for (const pause of [2_000, 4_000, 8_000]) {
       await fail('a', new Error('down'));
@@ -184,15 +184,15 @@ describe('a failure', () => {
     expect(received).toEqual(['a']);
   });
 
-  test.each([400, 404])('that will last (%i) is not tried again', async (status) => {
+  test('that will last is not retried', async () => {
     fetcher.want(task('a'));
-    await fail('a', new Refusal(status, 'never'));
+    await fail('a', new Refusal(400, 'never'));
     await pass(120_000);
     expect(errors).toEqual([{ message: 'never', isLasting: true }]);
     expect(started).toEqual(['a']);
   });
 
-  test('of what nobody wants any more is no news, but a server that asks for peace gets it', async () => {
+  test('of an unwanted task is not reported, but Retry-After is honoured', async () => {
     fetcher.want(task('a'));
     await pass(100);
     fetcher.want(task('b'));
@@ -217,7 +217,7 @@ describe('a failure', () => {
     [503, 3, 3_000],
     [503, 3_600, 60_000],
   ])(
-    'for load (%i) is told in plain words, and tried again in %i s, soon at the latest',
+    'for load (%i) is reported in plain words, and retried in %i s at the latest',
     async (...of) => {
       const [status, retryAfterS, waitMs] = of;
       fetcher.want(task('a'));
@@ -237,7 +237,7 @@ describe('a failure', () => {
   });
 });
 
-describe('what keeps itself up to date', () => {
+describe('a value kept up to date', () => {
   beforeEach(() => {
     fetcher = make({ paceMs: 500 });
   });
@@ -274,7 +274,7 @@ describe('what keeps itself up to date', () => {
     for (const [index, pause] of [2_000, 4_000, 8_000].entries()) {
       fetcher.want(task(`${index}`));
       await pass(0);
-      await fail(`${index}`, new Refusal(404, 'not yet'));
+      await fail(`${index}`, new Refusal(400, 'not yet'));
       fetcher.want(task(`${index + 1}`));
       await pass(pause - 1);
       expect(started).toHaveLength(index + 1);

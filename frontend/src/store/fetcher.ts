@@ -61,10 +61,6 @@ export interface FetcherOptions<T> {
   readonly onError?: (message: string, isLasting: boolean) => void;
 }
 
-/** Whether the same request would be refused again. */
-const isRefused = (error: unknown): boolean =>
-  error instanceof Refusal && (error.status === 400 || error.status === 404);
-
 export function createFetcher<T>({
   paceMs,
   isDragged = false,
@@ -160,7 +156,8 @@ export function createFetcher<T>({
       },
       (error: unknown) => {
         if (isOver()) return;
-        const isLasting = isDragged && isRefused(error);
+        // The same query would be refused again.
+        const isLasting = isDragged && error instanceof Refusal && error.status === 400;
         const waitMs = error instanceof Refusal ? (error.retryAfterS ?? 0) * 1_000 : 0;
         calmUntil = now() + Math.min(CALM_LONGEST_MS, Math.max(CALM_MS, waitMs));
         // A task that is no longer wanted needs no retry.
@@ -215,7 +212,8 @@ export function useFetched<T>(task: FetchTask<T> | null, paceMs: number): Fetche
         setFetched(ready(value));
       },
       onError: (message) => {
-        setFetched(({ value }) => failed(message, value));
+        // What another group's fetch brought says nothing about this one.
+        setFetched(({ value, state }) => failed(message, state === 'waiting' ? null : value));
       },
     }),
   );

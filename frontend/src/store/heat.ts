@@ -1,7 +1,7 @@
 /** Fetches the heat map's source: the nearest readings, or the chosen estimate. */
 import { now } from '../clock';
 import { fetchEstimate, fetchField, Refusal, type FieldQuery } from '../contract/api';
-import type { Field, NoEstimate } from '../contract/types';
+import type { Field } from '../contract/types';
 import { estimatedField, resolutionFor } from '../domain/field';
 import { memoOne } from '../domain/memo';
 import type { Snapshot, Tag } from '../domain/twin';
@@ -12,7 +12,7 @@ import type { Source } from './derived';
 const CALM_MS = 10_000;
 const TOO_MANY_REQUESTS = 429;
 
-let refused: { readonly sensor: string; readonly why: NoEstimate; readonly until: number } | null =
+let refused: { readonly sensor: string; readonly why: string; readonly until: number } | null =
   null;
 
 /** If the twin has no estimate, the nearest readings, with the reason. */
@@ -32,13 +32,12 @@ export async function fetchHeat(
   } catch (error) {
     // After 429, a second request would make it worse.
     if (!(error instanceof Refusal) || error.status === TOO_MANY_REQUESTS) throw error;
-    const why = { status: error.status, message: error.message };
-    refused = { sensor: query.sensor, why, until: now() + CALM_MS };
-    return inPlace(why, query, signal);
+    refused = { sensor: query.sensor, why: error.message, until: now() + CALM_MS };
+    return inPlace(error.message, query, signal);
   }
 }
 
-const inPlace = (noEstimate: NoEstimate, query: FieldQuery, signal: AbortSignal): Promise<Field> =>
+const inPlace = (noEstimate: string, query: FieldQuery, signal: AbortSignal): Promise<Field> =>
   fetchField(query, signal).then((field) => ({ ...field, noEstimate }));
 
 /** The server's box contains the pinned tags, widened by its max_distance_m. */

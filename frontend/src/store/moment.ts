@@ -153,7 +153,7 @@ export function ownTime(state: AppState, at: number): number | null {
   return rosNow(state, isReceivingNow(state) ? at : -Infinity);
 }
 
-/** The source of the drawn field; until one arrives, the requested one. */
+/** The span of the drawn timeline; until one arrives, that of the requested period. */
 export function barSpan(state: AppState, nowS: number): Span {
   const { value } = state.twin.remembered;
   if (value && value.to > value.from) return value;

@@ -180,9 +180,9 @@ describe('what cannot be had', () => {
     expect(store.get().twin.pastFault).toBeNull();
   });
 
-  test('at all shows nothing, least of all now', async () => {
+  test('of the moment shows no state, and not the current one', async () => {
     go(50);
-    await requests[0]?.answer(Response.json({ detail: 'no journal is kept' }, { status: 404 }));
+    await requests[0]?.answer(Response.json({ detail: 'at is later than now' }, { status: 400 }));
     expect(shown()).toEqual([50, null, null]);
     expect(store.get().twin.pastFault).toMatchObject({ at: 50, isLasting: true });
     go(null);

@@ -20,7 +20,6 @@ test('what was kept comes back', () => {
     unit: 'F',
     shortcuts: false,
     hidden: ['pest', 'co2'],
-    density: 'compact',
     byArea: true,
     dayBefore: true,
   } as const;
@@ -29,7 +28,7 @@ test('what was kept comes back', () => {
 });
 
 test.each([null, '', '{', 'null', '7', '[]', '{"hidden":5}', '{"hidden":null}'])(
-  '%j counts as nothing kept',
+  '%j counts as nothing stored',
   (text) => {
     expect(readSettings(storage(text))).toEqual(DEFAULT_SETTINGS);
   },

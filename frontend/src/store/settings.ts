@@ -8,7 +8,6 @@ export interface Settings {
   readonly shortcuts: boolean;
   /** Ids of hidden table columns; a sensor's id is its name. */
   readonly hidden: readonly string[];
-  readonly density: 'usual' | 'compact';
   /** Whether the table's rows are grouped by area, if there are areas. */
   readonly byArea: boolean;
   readonly dayBefore: boolean;
@@ -19,7 +18,6 @@ export const DEFAULT_SETTINGS: Settings = {
   unit: 'C',
   shortcuts: true,
   hidden: [],
-  density: 'usual',
   byArea: false,
   dayBefore: false,
 };

@@ -48,7 +48,7 @@ interface PastFault {
   /** ROS seconds. */
   readonly at: number;
   readonly message: string;
-  /** Retrying would not help: there is no history, or the moment is in the future. */
+  /** Retrying would not help: the moment is in the future. */
   readonly isLasting: boolean;
 }
 

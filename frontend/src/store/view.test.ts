@@ -38,8 +38,8 @@ test('a column sorts upwards first, then downwards, then upwards', () => {
   expect([once, twice, thrice].map(({ sort }) => sort.descending)).toEqual([false, true, false]);
 });
 
-test('smooth is on demand, everything else is on', () => {
-  expect(DEFAULT_VIEW.layers.has('smooth')).toBe(false);
+test('suggested positions are on demand, all other layers are on', () => {
+  expect(DEFAULT_VIEW.layers.has('advice')).toBe(false);
   expect(DEFAULT_VIEW.layers.has('field')).toBe(true);
 });
 

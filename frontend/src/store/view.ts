@@ -9,7 +9,6 @@ export const LAYERS = [
   'map',
   'field',
   'unknown',
-  'smooth',
   'grid',
   'boxes',
   'blooms',
@@ -76,7 +75,7 @@ export interface ViewState {
 }
 
 export const DEFAULT_LAYERS: ReadonlySet<Layer> = new Set(
-  LAYERS.filter((layer) => layer !== 'smooth' && layer !== 'advice'),
+  LAYERS.filter((layer) => layer !== 'advice'),
 );
 
 export const DEFAULT_VIEW: ViewState = {

@@ -1,5 +1,5 @@
 /** A 2D context that draws nothing and records its calls. */
-export interface Call {
+interface Call {
   readonly name: string;
   readonly args: readonly unknown[];
   /** The drawing state at the time of the call. */

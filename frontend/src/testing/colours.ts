@@ -7,7 +7,7 @@ import type { Rgb } from '../domain/ramp';
 const CSS = readFileSync(join(import.meta.dirname, '../styles/tokens.css'), 'utf8');
 const [light = '', dark = ''] = CSS.split("[data-theme='dark']");
 
-export type Token = (name: string) => Rgb;
+type Token = (name: string) => Rgb;
 
 const tokenIn =
   (css: string): Token =>

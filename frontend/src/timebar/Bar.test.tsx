@@ -61,7 +61,7 @@ test('a pest is no ring, one that is gone is; who needs somebody is on top', () 
   expect(marks(drawn({ bucketS: 0.1, buckets: close }))).toEqual(['pest', 'cleared']);
 });
 
-test('silence and what is not remembered are hatched, each in its own way', () => {
+test('silences and missing data are hatched, each in its own way', () => {
   const bar = drawn({
     silences: [{ from: 120, to: 130 }],
     reach: { from: 110, to: 200 },

@@ -75,7 +75,7 @@ test.each([
       receive(withState(stateFrame([wireTag()], { sec: 2_400 }), performance.now()));
     },
   ],
-])('how long ago is not told where nobody knows what time it is: %s', (_, lose) => {
+])('how long ago is not shown without the twin’s time: %s', (_, lose) => {
   look(2_500, 2_500);
   lose();
   render(<PastHeader />);

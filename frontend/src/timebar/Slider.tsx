@@ -101,7 +101,6 @@ export function Slider({
       aria-valuemax={Math.ceil(Math.max(to, cursor))}
       aria-valuenow={Math.max(Math.floor(from), Math.round(cursor))}
       aria-valuetext={valueText(moment, columnAt(columns, xOf(axis, cursor)), newest)}
-      data-testid="timebar-slider"
       data-span={`${from},${to}`}
       style={{ height: `${BAR_PX}px` }}
       onPointerDown={onPointerDown}
@@ -130,7 +129,6 @@ export function Slider({
         <span
           className="timebar-pointed"
           data-testid="timebar-pointed"
-          data-at={ofChart}
           style={{ left: `${place(ofChart)}px` }}
         />
       )}

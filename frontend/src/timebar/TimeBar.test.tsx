@@ -61,7 +61,7 @@ describe('the mouse on a chart and on the bar', () => {
     expect(pointed()).toBeNull();
   });
 
-  test('what is pointed at on the bar is told to the charts, and not drawn twice', () => {
+  test('the time pointed at on the bar is marked in the charts, and not drawn twice', () => {
     render(<TimeBar />);
     fireEvent.pointerMove(slider(), { clientX: 250 });
     expect(pointedTime.get()).toEqual({ at: 9_250, by: 'bar' });
@@ -209,7 +209,7 @@ describe('the period', () => {
   });
 });
 
-test('what could not be loaded is told, beside what is known', () => {
+test('a failed fetch is reported beside what is known', () => {
   const { remembered } = store.get().twin;
   receive({ remembered: { ...remembered, state: 'failed', message: 'too busy' } });
   render(<TimeBar />);
@@ -220,7 +220,7 @@ test('what could not be loaded is told, beside what is known', () => {
   expect(screen.getByTestId('timebar').textContent).not.toContain('too busy');
 });
 
-test('before the twin has told its time there is no bar', () => {
+test('before the twin’s time is known there is no bar', () => {
   vi.spyOn(store, 'get').mockReturnValue({ ...store.get(), twin: NO_TWIN });
   const { container } = render(<TimeBar />);
   expect(container.childElementCount).toBe(0);

@@ -96,7 +96,6 @@ function When(): JSX.Element {
 function PeriodChoice({ period, nowS }: { period: Period; nowS: number }): JSX.Element {
   return (
     <Select
-      className="timebar-period"
       aria-label={S.timebarPeriod}
       title={S.timebarPeriod}
       value={period.kind}

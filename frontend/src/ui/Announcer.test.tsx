@@ -42,43 +42,44 @@ const judged = (temperatures: readonly number[]): ReturnType<typeof judgement> =
     ),
   );
 
-const said = (what: 'said-choice' | 'said-alarms' | 'said-critical'): string | null =>
-  screen.getByTestId(what).textContent;
+const said = (
+  what: 'announced-choice' | 'announced-alarms' | 'announced-critical',
+): string | null => screen.getByTestId(what).textContent;
 const press = (key: string): void => {
   settle(() => {
     fireEvent.keyDown(document.body, { key });
   });
 };
 
-test('the tag that a key chose is told, with its health and place in the table', () => {
-  expect(said('said-choice')).toBe('');
+test('the tag chosen by a key is announced, with its health and place in the table', () => {
+  expect(said('announced-choice')).toBe('');
   press('n');
-  expect(said('said-choice')).toBe('Tag 1, Critical, 1 of 6');
+  expect(said('announced-choice')).toBe('Tag 1, Critical, 1 of 6');
   press('n');
-  expect(said('said-choice')).toBe('Tag 2, Healthy, 2 of 6');
+  expect(said('announced-choice')).toBe('Tag 2, Healthy, 2 of 6');
   press('p');
   press('p');
-  expect(said('said-choice')).toBe('Tag 6, Healthy, 6 of 6');
+  expect(said('announced-choice')).toBe('Tag 6, Healthy, 6 of 6');
 });
 
 test('only what is critical cuts in: it has a voice of its own', () => {
-  expect(screen.getByTestId('said-alarms').getAttribute('role')).toBe('status');
-  expect(screen.getByTestId('said-critical').getAttribute('role')).toBe('alert');
+  expect(screen.getByTestId('announced-alarms').getAttribute('role')).toBe('status');
+  expect(screen.getByTestId('announced-critical').getAttribute('role')).toBe('alert');
   settle(() => {
     announce(urgentVoice, 'New: Tag 2');
   });
-  expect(said('said-critical')).toBe('New: Tag 2');
-  expect(said('said-alarms')).toBe('');
+  expect(said('announced-critical')).toBe('New: Tag 2');
+  expect(said('announced-alarms')).toBe('');
 });
 
 test('the same words said again are another change for a reader to hear', () => {
   settle(() => {
     announce(politeVoice, 'New: Tag 3');
   });
-  const before = screen.getByTestId('said-alarms').firstChild;
+  const before = screen.getByTestId('announced-alarms').firstChild;
   settle(() => {
     announce(politeVoice, 'New: Tag 3');
   });
-  expect(said('said-alarms')).toBe('New: Tag 3');
-  expect(screen.getByTestId('said-alarms').firstChild).not.toBe(before);
+  expect(said('announced-alarms')).toBe('New: Tag 3');
+  expect(screen.getByTestId('announced-alarms').firstChild).not.toBe(before);
 });

@@ -7,9 +7,9 @@ import { createVoice, useSelected, type Announcement, type Store } from '../stor
 export function Announcer(): JSX.Element {
   return (
     <div className="unseen">
-      <Voice of={chosenTag} testId="said-choice" />
-      <Voice of={politeVoice} testId="said-alarms" />
-      <Voice of={urgentVoice} testId="said-critical" role="alert" />
+      <Voice of={chosenTag} testId="announced-choice" />
+      <Voice of={politeVoice} testId="announced-alarms" />
+      <Voice of={urgentVoice} testId="announced-critical" role="alert" />
     </div>
   );
 }

@@ -109,7 +109,7 @@ describe('page', () => {
     expect(screen.getByTestId('row-count').textContent).toBe('1 of 2 tags');
   });
 
-  test('the read-out tells the field’s value under the pointer, or that it is not known', () => {
+  test('the read-out shows the field’s value under the pointer, or that it is not known', () => {
     showField(fieldWith([[21, NaN]]));
     render(<App kiosk={false} />);
     const readout = (x: number): string => {

@@ -105,7 +105,7 @@ test('says so when nobody does, and when that is not known', () => {
   expect(screen.queryByRole('heading')).toBeNull();
 });
 
-test('where all is shelved, or the robot stands still, nobody says that nothing needs attention', () => {
+test('if all is shelved, or the robot stands still, it does not say that nothing needs attention', () => {
   const said = judgement({ bug: [pest] });
   showTags([wireTag({ tag_id: 'bug' })], said);
   const stop = startAlarms();

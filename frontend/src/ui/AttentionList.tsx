@@ -162,7 +162,7 @@ export function KioskNote({ cycle }: { cycle: CycleSetting }): JSX.Element {
         </span>
       )}
       {next && left !== null && (
-        <span className="kiosk-round" data-testid="cycle">
+        <span className="kiosk-cycle" data-testid="cycle">
           <strong>{shown(sensor.label, 24)}</strong>{' '}
           <span>{S.cycleNext(shown(next.sensor.label, 24), left)}</span>
         </span>

@@ -108,9 +108,9 @@ export function DifferenceLegend(): JSX.Element | null {
             }}
           />
           <div className="difference-ends">
-            <span data-testid="difference-low">{signedText(sensor, range.low, unit)}</span>
+            <span>{signedText(sensor, range.low, unit)}</span>
             <span>{S.differenceNone}</span>
-            <span data-testid="difference-high">{differenceText(sensor, range.high, unit)}</span>
+            <span>{differenceText(sensor, range.high, unit)}</span>
           </div>
         </>
       ) : (

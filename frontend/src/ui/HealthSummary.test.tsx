@@ -14,7 +14,7 @@ import { AttentionList } from './AttentionList';
 import { HealthStrip } from './DoNow';
 import { HealthSummary } from './HealthSummary';
 
-const house = (): HTMLElement => screen.getByTestId('house-health');
+const house = (): HTMLElement => screen.getByTestId('greenhouse-health');
 const driver = (): HTMLElement => screen.getByTestId('health-driver');
 const TAGS = ['1', '5'].map((tag_id) => wireTag({ tag_id }));
 
@@ -260,7 +260,7 @@ test('beside an active alarm, healthy says why', () => {
   stop();
 });
 
-test('a house that is not heard of is unknown, whatever was said last', () => {
+test('a silent greenhouse is unknown, whatever its last verdict', () => {
   showTags(TAGS, judgement({ 1: 'healthy', 5: 'healthy' }));
   goLost();
   render(<HealthSummary kiosk={false} />);
@@ -296,7 +296,7 @@ test('while a moment loads nothing is said of it, and nothing is counted', () =>
     </>,
   );
   expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: ');
-  expect(screen.getByTestId('house-health').dataset).not.toHaveProperty('health');
+  expect(screen.getByTestId('greenhouse-health').dataset).not.toHaveProperty('health');
   for (const each of screen.getAllByRole('list', { name: 'Do this now' })) {
     expect(each.textContent).toBe('');
   }

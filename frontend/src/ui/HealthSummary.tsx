@@ -22,10 +22,10 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
     <section
       className="health"
       aria-label={S.healthHeading}
-      data-testid="house-health"
+      data-testid="greenhouse-health"
       data-health={hasSnapshot ? health.verdict : undefined}
     >
-      <div className="health-house">
+      <div className="health-greenhouse">
         <h2 title={dayText(health)}>
           <span className="unseen">{S.healthHeading}: </span>
           {hasSnapshot && (
@@ -108,7 +108,7 @@ export function HouseLine(): JSX.Element | null {
   if (lastScan === null && snapshot.tags.some(({ readings }) => readings.size > 0)) return null;
   if (isLate && last !== null) {
     return (
-      <p className="house-line" data-testid="house-line">
+      <p className="patrol-line" data-testid="patrol-line">
         <span data-overdue>{S.houseLate(last, intervalText(interval))}</span>
         {/* Otherwise the greenhouse's own reason says so. */}
         {health.reasons.length === 0 && <strong> · {S.todo.stopped}</strong>}
@@ -120,7 +120,7 @@ export function HouseLine(): JSX.Element | null {
     hasInterval ? S.scanInterval(intervalText(interval)) : null,
   ].filter((part) => part !== null);
   return (
-    <p className="house-line" data-testid="house-line">
+    <p className="patrol-line" data-testid="patrol-line">
       {/* First: a narrow screen cuts the end. */}
       <span data-overdue={overdue > 0}>{S.houseOverdue(overdue)}</span>
       {rest.map((part, index) => (

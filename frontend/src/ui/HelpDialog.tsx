@@ -7,7 +7,7 @@ import { announce } from '../store/create';
 import { selectRows, selectSensors } from '../store/derived';
 import { backToLive } from '../store/moment';
 import { isDark } from '../store/theme';
-import { type ViewState, withChart, withLayer, withList, withTag } from '../store/view';
+import { type ViewState, withChart, withList, withTag } from '../store/view';
 import { S } from '../strings';
 import { togglePlayback } from '../timebar/playback';
 import { Check, Icon } from '../widgets/controls';
@@ -146,9 +146,6 @@ function runKey(key: string): boolean {
       return true;
     case 'p':
       stepTag(-1);
-      return true;
-    case 's':
-      act(withLayer('smooth', !view.layers.has('smooth')));
       return true;
     case 'l':
       if (view.moment === null) return false;

@@ -14,10 +14,10 @@ const line = (patrol: Judgement['house']['patrol']): string | undefined => {
   const health = judgement({ '1': 'healthy' }, undefined, patrol);
   showTags([wireTag()], health);
   render(<HouseLine />);
-  return screen.queryByTestId('house-line')?.textContent;
+  return screen.queryByTestId('patrol-line')?.textContent;
 };
 
-test('tells the rhythm, the last scan and who is overdue', () => {
+test('shows the scan interval, the last scan and overdue tags', () => {
   // Built states are seconds old, whatever their stamp.
   const lineText = line({ interval_s: 40, last_scan: { sec: 0, nanosec: 1 }, overdue: 2 });
   expect(lineText).toMatch(/^2 tags overdue · last scan .+ ago · a scan every 40\u00a0s$/);
@@ -36,7 +36,7 @@ test.each([
   );
 });
 
-test.each([null, 0.04])('without a rhythm it has none to tell: %s', (interval_s) => {
+test.each([null, 0.04])('without a scan interval none is shown: %s', (interval_s) => {
   expect(line({ interval_s, last_scan: null, overdue: 1 })).toBe('1 tag overdue · no scan yet');
 });
 
@@ -45,19 +45,19 @@ test('nothing is told of readings of which nobody knows when they were', () => {
   const lineText = [{ name: 'temperature', value: 22, observed_at: null }];
   showTags([wireTag({ readings: lineText })], judgement({ '1': 'unknown' }, undefined, patrol));
   render(<HouseLine />);
-  expect(screen.queryByTestId('house-line')).toBeNull();
+  expect(screen.queryByTestId('patrol-line')).toBeNull();
 });
 
-test('nothing is told of a house without tags', () => {
+test('there is none for a greenhouse without tags', () => {
   showTags([], judgement({}));
   render(<HouseLine />);
-  expect(screen.queryByTestId('house-line')).toBeNull();
+  expect(screen.queryByTestId('patrol-line')).toBeNull();
 });
 
-test('nothing is told of a house that is not heard of', () => {
+test('there is none for a silent greenhouse', () => {
   expect(line({ interval_s: 40, last_scan: null, overdue: 0 })).toBeDefined();
   act(goLost);
-  expect(screen.queryByTestId('house-line')).toBeNull();
+  expect(screen.queryByTestId('patrol-line')).toBeNull();
 });
 
 test.each([
@@ -80,7 +80,7 @@ test.each([
       receive(withState(latest, performance.now()));
       goLive(bridge);
     });
-    return screen.getByTestId('house-line').textContent;
+    return screen.getByTestId('patrol-line').textContent;
   };
   showTags([wireTag()]);
   render(<HouseLine />);
@@ -92,10 +92,10 @@ test.each([
     view({ moment: 1 + late });
     receive(withPast({ at: 1 + late, house: then }));
   });
-  expect(screen.getByTestId('house-line').textContent).toMatch(/^no tag overdue/);
+  expect(screen.getByTestId('patrol-line').textContent).toMatch(/^no tag overdue/);
 });
 
-test('where the house has a reason of its own, that says what to do', () => {
+test('if the greenhouse has its own reason, that says what to do', () => {
   const patrol = { interval_s: 1.2, last_scan: { sec: 1, nanosec: 0 }, overdue: 0 };
   const { house, tags } = judgement({ '1': 'healthy' }, undefined, patrol);
   const health = { house: { ...house, reasons: [reason({ kind: 'stopped' })] }, tags };
@@ -105,5 +105,5 @@ test('where the house has a reason of its own, that says what to do', () => {
     receive(withState(latest, performance.now()));
   });
   render(<HouseLine />);
-  expect(screen.getByTestId('house-line').textContent).toMatch(/^No scan for .+\)$/);
+  expect(screen.getByTestId('patrol-line').textContent).toMatch(/^No scan for .+\)$/);
 });

@@ -48,7 +48,7 @@ beforeEach(() => {
 });
 
 describe('card of the pin under the mouse', () => {
-  test('tells in short what the tag’s card tells, the chosen sensor first', () => {
+  test('shows the tag’s card in short, the chosen sensor first', () => {
     render(<HoverCard />);
     expect(card()).toBeNull();
     point('7');

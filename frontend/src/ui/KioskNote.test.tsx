@@ -26,7 +26,7 @@ test('says which sensor is shown, which comes next and when', () => {
   expect(screen.getByTestId('cycle').textContent).toBe('Temperature next: Humidity in 23\u00a0s');
 });
 
-test('a wish that cannot be had is said, with its limits and no more of it than fits', () => {
+test('an invalid cycle is reported, with its limits and cut to fit', () => {
   showTags([]);
   render(<KioskNote cycle={{ seconds: null, refused: 'x'.repeat(500) }} />);
   const said = screen.getByRole('status').textContent;

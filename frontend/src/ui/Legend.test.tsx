@@ -78,7 +78,7 @@ describe('legend', () => {
     [18, 30, 'below 26.0'],
     [12, 26, 'above 18.0'],
     [18, 26, ''],
-  ])('of an ideal range from %d to %d no limit is told twice', (low, high, limits) => {
+  ])('of an ideal range from %d to %d no limit is shown twice', (low, high, limits) => {
     act(withRange({ low, high }));
     render(<Legend kiosk={false} />);
     expect(at('legend')).toContain(`daytime ideal${limits && ` ${limits}`}`);

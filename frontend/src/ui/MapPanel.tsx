@@ -137,7 +137,7 @@ export function Readout(): JSX.Element | null {
           )}
         </strong>
       )}
-      {value !== null && isOld && <span data-testid="readout-old">{S.readoutOld}</span>}
+      {value !== null && isOld && <span>{S.readoutOld}</span>}
       {how && <span data-testid="readout-ideal">{how}</span>}
       <span>{S.position(metresText(point.x), metresText(point.y))}</span>
     </output>
@@ -155,7 +155,7 @@ function sinceText(against: string, compare: Compare | null): string {
 const LONGEST_BAR_PX = 110;
 
 /** A round length, drawn to the map's scale. */
-export function ScaleBar(): JSX.Element {
+function ScaleBar(): JSX.Element {
   const scale = useApp((state) => state.viewport.view.scale);
   const bar = scaleBar(scale, LONGEST_BAR_PX);
   const length = written(lengthText(bar.metres));

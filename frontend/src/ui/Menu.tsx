@@ -9,7 +9,7 @@ import { prefer, useApp } from '../store/app';
 import type { Settings } from '../store/settings';
 import { LANGUAGE, S } from '../strings';
 import { Segmented, useClose } from '../widgets/controls';
-import { inLanguage, LANGUAGE_NAMES, LANGUAGES, type Language } from '../words/languages';
+import { LANGUAGE_NAMES, LANGUAGES } from '../words/languages';
 import { openHelp } from './HelpDialog';
 import { say } from './toast';
 
@@ -69,7 +69,7 @@ export function Menu(): JSX.Element {
           </a>
         </li>
         <li>
-          <a href={kioskLink()}>{S.kiosk}</a>
+          <a href={viewAddress({ kiosk: '1' })}>{S.kiosk}</a>
         </li>
         {entry(
           <>
@@ -81,13 +81,6 @@ export function Menu(): JSX.Element {
       </ul>
     </>
   );
-}
-
-/** The wall-screen URL of the same view and language. */
-function kioskLink(): string {
-  const url = viewAddress();
-  url.searchParams.set('kiosk', '1');
-  return url.href;
 }
 
 async function copyAndSay(): Promise<void> {
@@ -102,7 +95,7 @@ async function saveMapOrSay(): Promise<void> {
   }
 }
 
-/** Chooses the language by loading the same link with another language. */
+/** Chooses the language by loading the same view with another language. */
 function LanguageChoice(): JSX.Element {
   return (
     <label className="language">
@@ -111,7 +104,7 @@ function LanguageChoice(): JSX.Element {
         value={LANGUAGE}
         data-testid="language"
         onChange={(event) => {
-          window.location.assign(inLanguage(window.location, event.target.value as Language));
+          window.location.assign(viewAddress({ lang: event.target.value }));
         }}
       >
         {LANGUAGES.map((each) => (
@@ -160,7 +153,7 @@ export function SignOut({
         {session.name && (
           <>
             {' '}
-            <bdi data-testid="person">({session.name})</bdi>
+            <bdi>({session.name})</bdi>
           </>
         )}
       </button>

@@ -25,7 +25,7 @@ describe('before the first state', () => {
   });
 });
 
-describe('the most basic lack is told first', () => {
+describe('the most basic problem is shown first', () => {
   beforeEach(() => {
     showTags([wireTag({ readings: readings({ temperature: 20 }) })]);
   });

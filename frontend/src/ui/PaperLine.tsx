@@ -2,22 +2,12 @@ import { useEffect, useState, type JSX } from 'react';
 import { flushSync } from 'react-dom';
 
 import { epochOf, timeOfDay } from '../clock';
-import { rangeText } from '../domain/format';
-import { idealsText } from '../domain/ideal';
 import { dateText, rosText, secondsOf } from '../domain/time';
-import { shown } from '../domain/text';
 import { useApp } from '../store/app';
-import { selectColouring, selectRange, selectSensor } from '../store/derived';
-import {
-  selectHasOwnTime,
-  selectOrigin,
-  selectShown,
-  selectSnapshot,
-  selectTags,
-} from '../store/moment';
+import { selectHasOwnTime, selectOrigin, selectShown, selectSnapshot } from '../store/moment';
 import { S } from '../strings';
 
-/** Printed only: what is shown, and as of when; "Live" and "5 s" mean nothing an hour later. */
+/** Printed only: as of when; the legend says what is shown. "Live" and "5 s" mean nothing an hour later. */
 export function PaperLine(): JSX.Element | null {
   const [printedAt, setPrintedAt] = useState(() => timeOfDay());
   const takenAt = useApp((state) => selectSnapshot(state)?.takenAt);
@@ -28,12 +18,6 @@ export function PaperLine(): JSX.Element | null {
     const snapshot = selectHasOwnTime(state) ? selectSnapshot(state) : null;
     return snapshot && secondsOf(snapshot.at);
   });
-  const sensor = useApp(selectSensor);
-  const range = useApp(selectRange);
-  const isIdeal = useApp((state) => selectColouring(state) === 'ideal');
-  const { ideal } = sensor;
-  const unit = useApp((state) => state.settings.unit);
-  const ideals = useApp((state) => idealsText(sensor, selectTags(state), unit));
   useEffect(() => {
     const onPrint = (): void => {
       // Render synchronously: a page being printed gets no further frame.
@@ -47,8 +31,6 @@ export function PaperLine(): JSX.Element | null {
     };
   }, []);
   if (takenAt === undefined) return null;
-  const label = shown(sensor.label, 32);
-  const scale = isIdeal && ideal ? { low: ideal[0], high: ideal[1] } : range;
   const then = moment ?? ownAt;
   // Data may still arrive while the print dialog is open.
   const printed = then === null && printedAt < epochOf(takenAt) ? epochOf(takenAt) : printedAt;
@@ -56,11 +38,7 @@ export function PaperLine(): JSX.Element | null {
   const taken = origin === null ? time : `${time} (${S.origin[origin]})`;
   return (
     <p className="paper-line" data-testid="paper-line">
-      <strong>{S.paper(taken, dateText(printed))}</strong>{' '}
-      <span>
-        {isIdeal ? S.legendAgainst(label) : label}{' '}
-        {(isIdeal && ideals) || rangeText(sensor, scale, unit)}
-      </span>
+      <strong>{S.paper(taken, dateText(printed))}</strong>
     </p>
   );
 }

@@ -70,7 +70,7 @@ test.each(CASES)('$name', (state) => {
       <TagTable />
     </>,
   );
-  expect(screen.getByTestId('house-health').dataset['health']).toBe(state.verdict);
+  expect(screen.getByTestId('greenhouse-health').dataset['health']).toBe(state.verdict);
   expect(screen.getByTestId('tag-card').querySelector('header')?.textContent).toContain(
     WORDS[state.verdict],
   );

@@ -4,16 +4,15 @@ import { shown } from '../domain/text';
 import { prefer, useApp } from '../store/app';
 import { selectCatalogue, selectColumns } from '../store/derived';
 import { selectTags } from '../store/moment';
-import { isColumnShown, withColumn, type Settings } from '../store/settings';
+import { isColumnShown, withColumn } from '../store/settings';
 import { S } from '../strings';
-import { Check, Segmented } from '../widgets/controls';
+import { Check } from '../widgets/controls';
 
-/** Table settings: columns, grouping by area, and row height. */
+/** Table settings: columns, and grouping by area. */
 export function TableChoices(): JSX.Element {
   const sensors = useApp(selectColumns);
   const chosen = useApp((state) => state.view.sensor);
   const hidden = useApp((state) => state.settings.hidden);
-  const density = useApp((state) => state.settings.density);
   const isByArea = useApp((state) => state.settings.byArea);
   const hasAreas = useApp((state) => {
     const { areaOf } = selectCatalogue(state);
@@ -58,17 +57,6 @@ export function TableChoices(): JSX.Element {
           }}
         />
       )}
-      <Segmented<Settings['density']>
-        legend={S.density}
-        value={density}
-        options={[
-          { value: 'usual', label: S.densities.usual },
-          { value: 'compact', label: S.densities.compact },
-        ]}
-        onChange={(value) => {
-          prefer({ density: value });
-        }}
-      />
     </>
   );
 }

@@ -50,7 +50,7 @@ describe('card', () => {
     expect(document.activeElement).toBe(screen.getByText('row'));
   });
 
-  test('tells everything about its tag', () => {
+  test('shows everything about its tag', () => {
     render(<TagCard tagId="7" />);
     const card = screen.getByRole('complementary', { name: 'Tag 7' });
     for (const text of [
@@ -170,7 +170,7 @@ describe('card', () => {
     expect(texts[1]).toMatch(/scanOK$/);
   });
 
-  test('each reading is as old as it is itself, and the look at the flowers apart', () => {
+  test('each reading has its own age, and the inspection another', () => {
     showTags([
       wireTag({
         tag_id: '7',
@@ -191,7 +191,7 @@ describe('card', () => {
     expect(screen.getByTestId('tag-card').textContent).toContain('Flowers inspected');
   });
 
-  test('a try that came to nothing is told with its reason', () => {
+  test('a failed attempt is shown with its reason', () => {
     const now = { sec: 5_000, nanosec: 0 };
     const failing = wireTag({
       tag_id: '7',

@@ -254,18 +254,18 @@ function CardReading({
 const LONGEST = 5;
 
 /** A tag's last scans and inspections, newest first, failed ones included. */
-export function Attempts({ attempts }: { attempts: readonly PastAttempt[] }): JSX.Element | null {
+function Attempts({ attempts }: { attempts: readonly PastAttempt[] }): JSX.Element | null {
   const snapshot = useApp(selectSnapshot);
   if (!snapshot || attempts.length === 0) return null;
   return (
-    <section className="card-tries" aria-label={S.cardAttempts}>
+    <section className="card-attempts" aria-label={S.cardAttempts}>
       <h3>{S.cardAttempts}</h3>
       <ol>
         {attempts
           .slice(-LONGEST)
           .reverse()
           .map((each, index) => (
-            <li key={index} data-status={each.status}>
+            <li key={index}>
               <Age when={whenOf(each.stamp, snapshot)} />
               <span>{kindOf(each.kind)}</span>
               <span>

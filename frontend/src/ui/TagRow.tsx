@@ -73,7 +73,7 @@ export const TagRow = memo(function TagRow({
   );
   if (tag.failedAttempt) {
     const attempt = (
-      <span className="tried">
+      <span className="failed-attempt">
         <FailedAttemptText failed={tag.failedAttempt} />
       </span>
     );

@@ -42,7 +42,6 @@ export function TagTable(): JSX.Element {
     selectTags(state).reduce((most, { id }) => Math.max(most, id.length), 0),
   );
   const isByArea = useApp((state) => state.settings.byArea);
-  const density = useApp((state) => state.settings.density);
   const hidden = useApp((state) => state.settings.hidden);
   const last = useSelected(hourAgo);
   const then = useApp((state) => selectHourAgo(state, last));
@@ -69,7 +68,6 @@ export function TagTable(): JSX.Element {
     // eslint-disable-next-line jsx-a11y/click-events-have-key-events, jsx-a11y/no-noninteractive-element-interactions
     <table
       className={lines.length > SHORT_TABLE ? 'tags long' : 'tags'}
-      data-density={density}
       data-testid="tag-table"
       aria-rowcount={lines.length + 1}
       onFocus={(event) => {

@@ -36,7 +36,7 @@ test('messages that could not be read are counted, and the last is named', () =>
   expect(lines()).toEqual([]);
 });
 
-test('a part of the page that has not arrived is told', () => {
+test('a part of the page that has not arrived is reported', () => {
   render(<Troubles />);
   flush(() => {
     deferred.set({ parts: null, isLate: true });
@@ -48,7 +48,7 @@ test('a part of the page that has not arrived is told', () => {
   expect(lines()).toEqual([]);
 });
 
-test('what the twin dropped is told with its count, and a pause as one', () => {
+test('what the twin dropped is reported with its count, and a pause as one', () => {
   goLive(
     status({
       reason: 'paused',
@@ -118,7 +118,7 @@ test.each([
     /Give the twin another file/,
   ],
   ['off', 'Nothing is recorded.', /After a restart, all earlier data is lost/],
-] as const)('a journal that is %s is told, with why and what to do', (state, title, hint) => {
+] as const)('a journal that is %s is reported, with why and what to do', (state, title, hint) => {
   render(<Troubles />);
   journal({ state, detail: 'database or disk is full' });
   expect(lines()).toHaveLength(1);
@@ -141,7 +141,7 @@ test('a journal that does well, starts, or is not told of is no trouble', () => 
   expect(lines()).toEqual([]);
 });
 
-test('a damaged journal that was set aside is told by its name', () => {
+test('a quarantined journal is reported by its name', () => {
   render(<Troubles />);
   journal({ set_aside: '/home/x/j.sqlite.damaged-20261121T141500Z' });
   expect(lines()).toEqual([
@@ -155,7 +155,7 @@ test.each([
   ['webhook', 'The webhook receives no alarms. '],
   ['push', 'Phones receive no alarms. '],
   ['constructor', 'constructor receives no updates. '],
-])('that %s does not reach its receiver is told until it does', (channel, title) => {
+])('that %s does not reach its receiver is reported until it does', (channel, title) => {
   render(<Troubles />);
   const outward = (isFailing: boolean, detail: string): void => {
     flush(() => {

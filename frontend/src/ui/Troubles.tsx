@@ -129,7 +129,7 @@ export function Troubles(): JSX.Element {
     // Rendered even when empty: screen readers announce only changes in an existing region.
     <div role="status" className="troubles" data-testid="troubles">
       {troublesOf(twin, moment, isLate).map(({ id, title, detail, more }) => (
-        <div key={id} data-trouble={id}>
+        <div key={id}>
           <strong>{title}</strong> {detail && <span>{detail}</span>}
           {more && <More label={S.more} text={more} />}
         </div>

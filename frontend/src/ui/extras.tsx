@@ -149,7 +149,7 @@ export function Keys(): JSX.Element {
     // eslint-disable-next-line jsx-a11y/no-noninteractive-tabindex
     <ul className="legend-keys" aria-label={S.legend} tabIndex={0}>
       {VERDICTS.map((verdict) => (
-        <li key={verdict} data-verdict={verdict}>
+        <li key={verdict}>
           <HealthShape verdict={verdict} />
           {S.health[verdict]}
         </li>

@@ -15,7 +15,7 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-test('they are asked for once, however many wait for them', async () => {
+test('they are loaded once, however many wait for them', async () => {
   const load = vi.fn(() => Promise.resolve(PARTS));
   const all = await Promise.all([loadParts(load), loadParts(load), loadParts(load)]);
   expect(all).toEqual([PARTS, PARTS, PARTS]);

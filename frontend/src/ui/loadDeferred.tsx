@@ -8,7 +8,7 @@ import type * as everyPart from './deferred';
 export type Parts = typeof everyPart;
 
 /** State of loading. */
-export interface Deferred {
+interface Deferred {
   readonly parts: Parts | null;
   /** The last attempt to load failed. */
   readonly isLate: boolean;

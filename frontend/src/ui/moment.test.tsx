@@ -68,7 +68,7 @@ test('table, card, legend, health and map are those of the moment', () => {
   expect(text('tag-table')).toContain('22.0');
   expect(text('tag-card')).toContain('22.0');
   expect(text('range-high')).toContain('26.0');
-  expect(screen.getByTestId('house-health').dataset['health']).toBe('healthy');
+  expect(screen.getByTestId('greenhouse-health').dataset['health']).toBe('healthy');
   expect(pin()).toEqual(['a · 22.0\u00a0°C', 1, 'healthy']);
 
   go(500);
@@ -77,7 +77,7 @@ test('table, card, legend, health and map are those of the moment', () => {
     expect(text(part)).not.toContain('22.0');
   }
   expect(text('tag-table')).toContain('2\u00a0h');
-  expect(screen.getByTestId('house-health').dataset['health']).toBe('critical');
+  expect(screen.getByTestId('greenhouse-health').dataset['health']).toBe('critical');
   expect(pin()).toEqual(['a · 40.0\u00a0°C', 3, 'critical']);
 
   go(null);

@@ -53,11 +53,9 @@ describe('keys', () => {
     expect(store.get().view.selected).toBeNull();
   });
 
-  test('f, s, u and t', () => {
+  test('f, u and t', () => {
     press('f');
     expect(fit).toHaveBeenCalledTimes(1);
-    press('s');
-    expect(store.get().view.layers.has('smooth')).toBe(true);
     press('u');
     expect(store.get().settings.unit).toBe('F');
     press('t');

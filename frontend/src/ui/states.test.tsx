@@ -207,7 +207,7 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
       </>,
     );
 
-    const summary = container.querySelector<HTMLElement>('[data-testid=house-health]');
+    const summary = container.querySelector<HTMLElement>('[data-testid=greenhouse-health]');
     expect(summary?.dataset['health']).toBe(house.verdict);
     expect(summary?.textContent).toContain(words.verdicts[house.verdict]);
     // "Most unknown" only if most are unknown.

@@ -3,7 +3,7 @@ import { expect, test } from 'vitest';
 import { wireTime } from '../testing/timeline';
 import { asOf } from './TagCard';
 
-test('of another moment the card tells what had been tried by then', () => {
+test('at a past moment the card has the attempts until then', () => {
   const history = {
     tag_id: '1',
     source: null,

@@ -119,8 +119,7 @@ const SAME: Readonly<Record<string, readonly string[]>> = {
       'sensors',
     ],
     ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'legendMore'],
-    ...['keys.global.12.0', 'idealParts.any', 'colourings.ideal', 'differenceTimes'],
-    'densities.usual',
+    ...['keys.global.11.0', 'idealParts.any', 'colourings.ideal', 'differenceTimes'],
   ],
   nl: [
     ...[
@@ -133,12 +132,12 @@ const SAME: Readonly<Record<string, readonly string[]>> = {
       'alarmCount',
     ],
     ...['rangeAuto', 'saveCsvShort', 'trend', 'legendMore', 'robotLayer', 'robotAt'],
-    ...['keys.global.12.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
-    ...['speciesNames.gerbera', 'densities.compact', 'phase.offline', 'reasons.wasBeyond'],
+    ...['keys.global.11.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
+    ...['speciesNames.gerbera', 'phase.offline', 'reasons.wasBeyond'],
   ],
   es: [
     ...['robotLayer', 'robotAt', 'attemptOutcomes.ok', 'sensors', 'rangeAuto', 'saveCsvShort'],
-    ...['speciesNames.gerbera', 'keys.global.12.0', 'idealParts.any', 'colourings.ideal'],
+    ...['speciesNames.gerbera', 'keys.global.11.0', 'idealParts.any', 'colourings.ideal'],
   ],
 };
 

@@ -33,7 +33,7 @@ const ENGLISH = {
   shown: (count: number, all: number): string => `${count} of ${all} greenhouses shown`,
 };
 
-export type FleetWords = In<typeof ENGLISH>;
+type FleetWords = In<typeof ENGLISH>;
 
 const GERMAN: FleetWords = {
   search: 'Suchen',

@@ -3,7 +3,7 @@ import { join } from 'node:path';
 
 import { expect, test } from 'vitest';
 
-import { chosenLanguage, inLanguage, LANGUAGE_NAMES, LANGUAGES } from './languages';
+import { chosenLanguage, LANGUAGE_NAMES, LANGUAGES } from './languages';
 
 test.each([
   ['', ['de-AT', 'en'], { language: 'de', locale: 'de-AT', unknown: null }],
@@ -23,12 +23,6 @@ test.each([
   ['?lang=de-!', [], { language: 'de', locale: 'de-DE', unknown: null }],
 ])('“%s” and a browser that prefers %j: %j', (search, preferred, choice) => {
   expect(chosenLanguage(search, preferred)).toEqual(choice);
-});
-
-test('another language keeps all else of the link', () => {
-  const here = { pathname: '/twin/', search: '?kiosk=1&lang=nl', hash: '#tag=12&at=5' };
-  expect(inLanguage(here, 'es')).toBe('/twin/?kiosk=1&lang=es#tag=12&at=5');
-  expect(inLanguage({ pathname: '/', search: '', hash: '' }, 'en')).toBe('/?lang=en');
 });
 
 test.each(LANGUAGES)('the shift report in “%s” has dates as the page writes them', (language) => {

@@ -60,13 +60,3 @@ function localeFor(language: Language, preferred: readonly string[]): string {
     return LOCALES[language];
   }
 }
-
-/** The URL of the same view in another language. */
-export function inLanguage(
-  { pathname, search, hash }: Pick<Location, 'pathname' | 'search' | 'hash'>,
-  language: Language,
-): string {
-  const query = new URLSearchParams(search);
-  query.set('lang', language);
-  return `${pathname}?${query.toString()}${hash}`;
-}

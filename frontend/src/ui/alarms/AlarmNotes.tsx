@@ -78,7 +78,7 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
 /** Below the list: whether actions stay in this browser or are shared. */
 export function SharingNote(): JSX.Element {
   const who = useSelected(person);
-  return <p className="alarms-mine faint">{sharingText(who)}</p>;
+  return <p className="sharing-note faint">{sharingText(who)}</p>;
 }
 
 /** Says that alarms were raised while a past moment is shown, and links back to live. */
@@ -160,7 +160,6 @@ export function NotifySettings(): JSX.Element {
   return (
     <>
       <Way
-        name="sound"
         label={S.alarmSound}
         isOn={local.sound && sound !== 'none'}
         isPossible={sound !== 'none'}
@@ -169,7 +168,6 @@ export function NotifySettings(): JSX.Element {
         onChange={setSound}
       />
       <Way
-        name="notify"
         label={S.alarmNotify}
         isOn={local.notify && notify === 'granted'}
         isPossible={notify === 'granted' || notify === 'prompt'}
@@ -181,14 +179,12 @@ export function NotifySettings(): JSX.Element {
 }
 
 function Way({
-  name,
   label,
   isOn,
   isPossible,
   hint,
   onChange,
 }: {
-  name: string;
   label: string;
   isOn: boolean;
   isPossible: boolean;
@@ -197,7 +193,7 @@ function Way({
 }): JSX.Element {
   const id = useId();
   return (
-    <div data-way={name}>
+    <div>
       <Check
         label={label}
         isOn={isOn}

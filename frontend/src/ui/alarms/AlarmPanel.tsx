@@ -128,7 +128,7 @@ export function AlarmPanel(): JSX.Element {
         {isAble && (
           <button
             type="button"
-            className="text-button all-seen"
+            className="text-button acknowledge-all"
             disabled={waiting.length === 0 || isRefused}
             onClick={ignoreDoubleClick(() => {
               acknowledgeAlarms(waiting);
@@ -137,7 +137,11 @@ export function AlarmPanel(): JSX.Element {
             <Icon name="check" size={18} /> {S.alarmAcknowledgeAll(waiting.length)}
           </button>
         )}
-        <Disclosure label={S.alarmNotifyMe} button={<Icon name="bell" />} className="tell-me">
+        <Disclosure
+          label={S.alarmNotifyMe}
+          button={<Icon name="bell" />}
+          className="notify-settings"
+        >
           <NotifySettings />
         </Disclosure>
       </LastActionLine>

@@ -124,7 +124,7 @@ test('what a viewer had acknowledged by themselves holds no more', async () => {
   expect(requests).toEqual([]);
 });
 
-test('what is done here is said to the bridge, and taken back there', async () => {
+test('own actions are sent to the bridge, and withdrawn there', async () => {
   await signedIn();
   reportAlarms(COLD);
   acknowledgeAlarms([{ alarm: COLD, verdict: 'stressed' }]);

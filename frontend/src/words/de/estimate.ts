@@ -10,7 +10,6 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     'Das ± hängt von Entfernung und Alter der Messwerte und von der Tageszeit ab. Je länger nicht ' +
     'gemessen wird, desto größer wird das ±.',
   onItsWay: 'Die Schätzung wird geladen',
-  noService: 'Dieser Zwilling schätzt nicht: Angezeigt werden die nächstgelegenen Messwerte',
   noneNow: 'Zurzeit keine Schätzung: Angezeigt werden die nächstgelegenen Messwerte',
   computed:
     'Eine berechnete Größe wird nicht geschätzt: Angezeigt werden die nächstgelegenen Messwerte',

@@ -28,7 +28,6 @@ export const MAP: In<typeof EN.MAP> = {
     map: 'Grundriss',
     field: 'Heatmap',
     unknown: 'Bereiche ohne Daten',
-    smooth: 'Heatmap glätten',
     grid: 'Meterraster',
     boxes: 'Pflanzkästen',
     blooms: 'Blüten',
@@ -181,8 +180,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   trendSame: 'kein neuer Wert',
   trendLevel: 'stabil',
   trendUnknown: 'vor einer Stunde: unbekannt',
-  density: 'Zeilen',
-  densities: { usual: 'Normal', compact: 'Kompakt' },
 
   card: (tag) => `Messpunkt ${tag}`,
   cardClose: 'Schließen',

@@ -187,7 +187,6 @@ export const PAGE: In<typeof EN.PAGE> = {
       ['/', 'Tabelle filtern'],
       ['F', 'Auf der Karte alles anzeigen'],
       ['N, P', 'Nächster und voriger Messpunkt'],
-      ['S', 'Heatmap glätten'],
       ['Y', 'Ebenen'],
       ['A', 'Alarme'],
       ['C', 'Verlauf des gewählten Messpunkts'],

@@ -8,7 +8,6 @@ export const ESTIMATE = {
     'depends on the distance and age of the readings, and on the time of day. The longer nothing ' +
     'is measured, the larger the ±.',
   onItsWay: 'Loading the estimate',
-  noService: 'This twin makes no estimate: the nearest readings are shown',
   noneNow: 'No estimate at the moment: the nearest readings are shown',
   computed: 'A computed quantity has no estimate: the nearest readings are shown',
   noModel: 'No estimate yet: it needs ten scans of a sensor',

@@ -23,7 +23,6 @@ export const MAP = {
     map: 'Floor plan',
     field: 'Heat map',
     unknown: 'Areas without data',
-    smooth: 'Smooth heat map',
     grid: 'Metre grid',
     boxes: 'Planter boxes',
     blooms: 'Blooms',
@@ -179,8 +178,6 @@ export const TAGS = {
   trendSame: 'no new reading',
   trendLevel: 'steady',
   trendUnknown: 'an hour ago: unknown',
-  density: 'Rows',
-  densities: { usual: 'Normal', compact: 'Compact' },
 
   card: (tag: string): string => `Tag ${tag}`,
   cardClose: 'Close',

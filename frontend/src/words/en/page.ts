@@ -183,7 +183,6 @@ export const PAGE = {
       ['/', 'Filter the table'],
       ['F', 'Fit the map to view'],
       ['N, P', 'Next and previous tag'],
-      ['S', 'Smooth the heat map'],
       ['Y', 'Layers'],
       ['A', 'Alarms'],
       ['C', 'Charts of the chosen tag'],

@@ -10,7 +10,6 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     'El ± depende de la distancia y la antigüedad de las lecturas y de la hora del día. ' +
     'Cuanto más tiempo sin medir, mayor es el ±.',
   onItsWay: 'Cargando la estimación',
-  noService: 'Este gemelo no hace estimaciones: se muestran las lecturas más cercanas',
   noneNow: 'Ahora no hay estimación: se muestran las lecturas más cercanas',
   computed: 'Una magnitud calculada no se estima: se muestran las lecturas más cercanas',
   noModel: 'Aún no hay estimación: hacen falta diez mediciones de un sensor',

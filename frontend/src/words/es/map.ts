@@ -26,7 +26,6 @@ export const MAP: In<typeof EN.MAP> = {
     map: 'Plano',
     field: 'Mapa de calor',
     unknown: 'Zonas sin datos',
-    smooth: 'Mapa de calor suavizado',
     grid: 'Cuadrícula métrica',
     boxes: 'Jardineras',
     blooms: 'Flores',
@@ -179,8 +178,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   trendSame: 'sin dato nuevo',
   trendLevel: 'estable',
   trendUnknown: 'hace una hora: desconocido',
-  density: 'Filas',
-  densities: { usual: 'Normales', compact: 'Compactas' },
 
   card: (tag) => `Punto ${tag}`,
   cardClose: 'Cerrar',

@@ -182,7 +182,6 @@ export const PAGE: In<typeof EN.PAGE> = {
       ['/', 'Filtrar la tabla'],
       ['F', 'Mostrar todo en el mapa'],
       ['N, P', 'Punto siguiente y anterior'],
-      ['S', 'Suavizar el mapa de calor'],
       ['Y', 'Capas'],
       ['A', 'Alarmas'],
       ['C', 'Gráficas del punto elegido'],

@@ -10,7 +10,6 @@ export const ESTIMATE: In<typeof ENGLISH> = {
     'Die hangt af van hoe ver weg en hoe oud de metingen zijn, en van het tijdstip. ' +
     'Hoe langer er niet wordt gemeten, hoe groter de ±.',
   onItsWay: 'De schatting wordt geladen',
-  noService: 'Deze digital twin maakt geen schatting: u ziet de dichtstbijzijnde waarden',
   noneNow: 'Er is nu geen schatting: u ziet de dichtstbijzijnde waarden',
   computed: 'Van een berekende waarde is er geen schatting: u ziet de dichtstbijzijnde waarden',
   noModel: 'Nog geen schatting: er zijn tien metingen van een sensor nodig',

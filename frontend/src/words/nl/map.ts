@@ -26,7 +26,6 @@ export const MAP: In<typeof EN.MAP> = {
     map: 'Plattegrond',
     field: 'Heatmap',
     unknown: 'Gebieden zonder gegevens',
-    smooth: 'Vloeiende heatmap',
     grid: 'Meterraster',
     boxes: 'Plantenbakken',
     blooms: 'Bloemen',
@@ -179,8 +178,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   trendSame: 'niets nieuws',
   trendLevel: 'gelijk',
   trendUnknown: 'een uur geleden: onbekend',
-  density: 'Rijen',
-  densities: { usual: 'Normaal', compact: 'Compact' },
 
   card: (tag) => `Meetpunt ${tag}`,
   cardClose: 'Sluiten',

@@ -186,7 +186,6 @@ export const PAGE: In<typeof EN.PAGE> = {
       ['/', 'De tabel filteren'],
       ['F', 'Alles tonen op de kaart'],
       ['N, P', 'Volgend en vorig meetpunt'],
-      ['S', 'Vloeiende heatmap'],
       ['Y', 'Lagen'],
       ['A', 'Alarmen'],
       ['C', 'Grafieken van het gekozen meetpunt'],

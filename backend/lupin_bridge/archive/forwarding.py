@@ -15,7 +15,7 @@ import os
 import socket
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -35,39 +35,44 @@ from lupin_bridge.archive.database import (
     explaining,
     place_of,
 )
-from lupin_bridge.archive.journal_reader import Batch, Epoch, Row, Source, arrival_of
+from lupin_bridge.archive.journal_reader import Batch, Epoch, Source, without_nul
 from lupin_bridge.console import CommandError
 from lupin_bridge.feed.tasks import end
 from lupin_bridge.settings import Settings, option, variable
 from lupin_twin.core.past import DAY_NS
 from lupin_twin.journal.retention import RECORD
-from lupin_twin.journal.schema import FILE_ERRORS, Foreign, SiteLog
+from lupin_twin.journal.schema import FILE_ERRORS, WRITTEN, Foreign, SiteLog, columns
 
-# The column of the stamp, in tables that are partitioned by month.
-_STAMP: Final = {"scan": 3, "look": 4}
-# By table: its key, and the columns to update if the row exists; rows of other tables never change.
-_SAID_ANEW: Final = {
-    "run": ("site, run", "joins ended_stamp_ns"),
-    "hour": ("site, series, hour", "n total low high"),
-    "tally": ("site, run, event, hour", "n total low high first_ns last_ns"),
+# By table: its key, if rows change; rows of other tables never do.
+_CHANGING: Final = {
+    "run": "site, run",
+    "hour": "site, series, hour",
+    "tally": "site, run, event, hour",
 }
 
 
 @cache
-def _insert(table: str, columns: int) -> str:
-    marks = ", ".join(["%s"] * columns)
+def _insert(table: str) -> str:
+    names = columns(table)
+    insert = f"INSERT INTO {table} VALUES ({', '.join(['%s'] * len(names))})"
     if table == "meta":
-        return f"INSERT INTO meta VALUES ({marks}) {META_AGAIN}"
-    if table not in _SAID_ANEW:
-        return f"INSERT INTO {table} VALUES ({marks}) ON CONFLICT DO NOTHING"
-    key, again = _SAID_ANEW[table]
-    news = ", ".join(f"{column} = excluded.{column}" for column in again.split())
-    return f"INSERT INTO {table} VALUES ({marks}) ON CONFLICT ({key}) DO UPDATE SET {news}"
+        return f"{insert} {META_AGAIN}"
+    if table not in _CHANGING:
+        return f"{insert} ON CONFLICT DO NOTHING"
+    key = _CHANGING[table]
+    news = ", ".join(f"{name} = excluded.{name}" for name in names if name not in key.split(", "))
+    return f"{insert} ON CONFLICT ({key}) DO UPDATE SET {news}"
 
 
 _EPOCH: Final = (
     "SELECT journal_id, epoch, seq_offset, run_offset, forwarded_seq FROM epoch WHERE site = %s"
     " ORDER BY epoch DESC LIMIT 1"
+)
+_NEWEST: Final = "SELECT seq, arrival_ns FROM ({}) AS row ORDER BY seq DESC LIMIT 1".format(
+    " UNION ALL ".join(
+        f"SELECT seq, arrival_ns FROM {table} WHERE site = :site AND seq > :begun AND seq <= :upto"
+        for table in (*WRITTEN, "place")
+    )
 )
 _HERE: Final = (
     "INSERT INTO forwarder VALUES (%s, %s, %s, now(), now()) ON CONFLICT (site) DO UPDATE SET"
@@ -147,16 +152,14 @@ class Sink:
     def _goes_on(self, source: Source, last: Epoch) -> bool:
         if source.last_seq() < last.forwarded_seq:
             return False
-        log = SiteLog(self._connection, self._site)
-        here = arrival_of(log, last.seq_offset + last.forwarded_seq)
-        there = source.arrival_of(last.forwarded_seq)
-        # A row that is missing here or there was deleted.
-        return here is None or there is None or here == there
+        within = {"begun": last.seq_offset, "upto": last.seq_offset + last.forwarded_seq}
+        newest = SiteLog(self._connection, self._site).execute(_NEWEST, within).fetchone()
+        # What is missing here or there was deleted.
+        if newest is None:
+            return True
+        return source.arrival_of(newest[0] - last.seq_offset) in {None, newest[1]}
 
     def _new_epoch(self, source: Source, epoch: Epoch) -> Epoch:
-        # Before the epoch: if this is interrupted, it is repeated with the same numbers.
-        for table, rows in source.counted(epoch):
-            self._put({table: rows})
         self._connection.execute(
             "INSERT INTO epoch VALUES (%s, %s, %s, now(), %s, %s, 0)",
             (self._site, epoch.number, source.journal_id, epoch.seq_offset, epoch.run_offset),
@@ -165,34 +168,34 @@ class Sink:
 
     def put(self, batch: Batch, epoch: Epoch) -> Epoch:
         """Append a batch, all or nothing; returns the epoch as it is now."""
-        upto = max(batch.upto, epoch.forwarded_seq)
         self._make_months(batch)
         with self._connection.pipeline(), self._connection.transaction():
             # First: later rows may be of a series with the same tag and sensors.
             for _, key, value in batch.rows.get("meta", ()):
                 if key.startswith(RECORD):
                     record = json.loads(value)
-                    gone = (_text(record["tag"]), record["seq"], record["what"] == "pose")
+                    gone = (without_nul(record["tag"]), record["seq"], record["what"] == "pose")
                     self._connection.execute("SELECT forget_tag(%s, %s, %s)", gone)
-            self._put(batch.rows)
-            for (run, since_ns), rows in batch.events.items():
+            for run, since_ns in batch.replaced:
                 self._connection.execute(
                     "DELETE FROM event WHERE site = %s AND run = %s AND stamp_ns >= %s",
                     (self._site, run, since_ns),
                 )
-                self._put({"event": rows})
+            with self._connection.cursor() as cursor:
+                for table, rows in batch.rows.items():
+                    cursor.executemany(_insert(table), rows)
             self._connection.execute(
                 "UPDATE epoch SET forwarded_seq = %s WHERE site = %s AND epoch = %s",
-                (upto, self._site, epoch.number),
+                (batch.upto, self._site, epoch.number),
             )
             self._connection.execute("SELECT pg_notify(%s, %s)", (CHANNEL, self._site))
-        return replace(epoch, forwarded_seq=upto)
+        return replace(epoch, forwarded_seq=batch.upto)
 
     def _make_months(self, batch: Batch) -> None:
         """Create the partitions of the batch's months, and of the month after each."""
         days = {
-            row[column] // DAY_NS
-            for table, column in _STAMP.items()
+            row[columns(table).index("stamp_ns")] // DAY_NS
+            for table in WRITTEN
             for row in batch.rows.get(table, ())
         }
         for day in days:
@@ -200,18 +203,6 @@ class Sink:
             if month not in self._months:
                 self._connection.execute("SELECT make_months(%s)", (day * 86_400,))
                 self._months.add(month)
-
-    def _put(self, rows: dict[str, list[Row]] | dict[str, Sequence[Row]]) -> None:
-        with self._connection.cursor() as cursor:
-            for table, of_table in rows.items():
-                if of_table:
-                    values = ([_text(value) for value in row] for row in of_table)
-                    cursor.executemany(_insert(table, len(of_table[0])), values)
-
-
-def _text(value: Any) -> Any:
-    """The value without NUL, which PostgreSQL's text cannot hold: the batch would never go in."""
-    return value.replace("\0", "\ufffd") if isinstance(value, str) else value
 
 
 # --- again and again ------------------------------------------------------------------------------
@@ -285,7 +276,7 @@ class Forwarder:
                     batch = source.batch(epoch)
                     if batch:
                         epoch = sink.put(batch, epoch)
-                    source.was_sent(batch, epoch)
+                    source.note(epoch.forwarded_seq)
                     is_full = batch.is_full
                 if not is_said:  # not earlier: a reachable archive may still refuse every batch
                     self._last_problem, self._wait_s, is_said = "", FIRST_WAIT_S, True

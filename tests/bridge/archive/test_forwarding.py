@@ -10,7 +10,7 @@ from pathlib import Path
 import psycopg
 import pytest
 
-from lupin_twin.core.notes import NotesRequest
+from lupin_twin.core.notes import COMMENT, Note, NotesRequest
 from lupin_twin.core.state import Write
 from lupin_twin.journal.paths import mark_of
 from lupin_twin.journal.rebuild import vacuum
@@ -171,7 +171,11 @@ def test_a_backup_that_is_put_back_loses_and_overwrites_nothing(
 ) -> None:
     kept(journal, scans(0, 50))
     backup = shutil.copy(journal, tmp_path / "backup")
-    forward(archive, journal, scans(50, 10))
+    kept(journal, scans(50, 10))
+    # Numbered after the scans, and by itself no sign of a backup.
+    with opened(journal) as file:
+        file.put_note(Note("", NOW, "anna", COMMENT, "tag:7", "dry"))
+    forward_once(archive, journal)
     before = archive.rows()
     shutil.copy(backup, journal)
     forward(archive, journal, scans(100, 30))

@@ -335,6 +335,15 @@ def _own_tables() -> frozenset[bytes]:
         return frozenset(sql for (sql,) in new.execute(_SCHEMA))
 
 
+@cache
+def columns(table: str) -> tuple[str, ...]:
+    """The names of a table's columns, in their order; of another table, none."""
+    with closing(sqlite3.connect(":memory:")) as new:
+        new.executescript(SQLITE_TABLES)
+        found = new.execute("SELECT name FROM pragma_table_info(?) ORDER BY cid", (table,))
+        return tuple(name for (name,) in found)
+
+
 # Keys of facts: the origin of the observations, and the length of a day, see `World`.
 ORIGIN: Final = "origin"
 DAY_LENGTH: Final = "day_length_s"
@@ -344,6 +353,7 @@ MAP: Final = "map"
 # --- one site's rows ------------------------------------------------------------------------------
 
 
+Row = tuple[Any, ...]
 _NOTHING: Final[Mapping[str, Any]] = {}
 _META: Final = "SELECT value FROM meta WHERE site = :site AND key = :key"
 _SET_META: Final = (

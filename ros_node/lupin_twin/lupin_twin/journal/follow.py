@@ -41,10 +41,12 @@ from lupin_twin.journal.schema import (
     SiteLog,
     columns,
     get_meta,
+    insert_into,
     open_reader,
     open_writer,
     set_meta,
     transaction,
+    upsert_into,
 )
 from lupin_twin.journal.writes import id_behind, number_of
 
@@ -312,21 +314,18 @@ def _put(connection: sqlite3.Connection, lot: Lot) -> None:
         if table in _COUNTED:
             counted.append((table, row))
         elif table not in WRITTEN or row[0] > after:
-            _insert(connection, table, row, replaces=table in {"run", "meta"})
+            is_anew = table in {"run", "meta"}
+            sql = upsert_into(table) if is_anew else f"{insert_into(table)} ON CONFLICT DO NOTHING"
+            connection.execute(sql, (LOCAL_SITE, *row))
     # Another process may have written later counts.
     if lot.last >= after:
         log.execute(_OTHER_EVENTS, {"after": after, "last": lot.last, "every": False})
         for table, row in counted:
-            _insert(connection, table, row, replaces=True)
+            connection.execute(upsert_into(table), (LOCAL_SITE, *row))
     # Then count the other rows: whether their pests are new depends on what was before.
     counted_ns = {run: (hour + 1) * HOUR_NS - 1 for run, hour in _purged(log).items()}
     count_rows(log, after, lot.last, counted_ns)
     delete_up_to(connection, _purged_seq(connection))
-
-
-def _insert(connection: sqlite3.Connection, table: str, row: list[Any], *, replaces: bool) -> None:
-    way, marks = "REPLACE" if replaces else "IGNORE", ", ?" * len(row)
-    connection.execute(f"INSERT OR {way} INTO {table} VALUES ('{LOCAL_SITE}'{marks})", row)
 
 
 def _purged_seq(connection: sqlite3.Connection) -> int:

@@ -5,6 +5,9 @@ A row may be sent several times, but is stored once: a lot is one transaction, a
 recognised by their numbers. A file holds one journal, and has its id; another journal gets another
 file. Hourly counts are made from the rows that arrive; where the journal has deleted rows, its own
 counts are copied. What the journal deletes or forgets meanwhile is deleted here too.
+
+Forwarding to an archive reads the same rows, see `rows_behind`. An archive takes all counts from
+the journal, because it keeps rows that the journal deletes.
 """
 
 from __future__ import annotations

@@ -42,7 +42,8 @@ _SESSION: Final = (
 # The stamp up to which something was deleted or lost never decreases.
 META_AGAIN: Final = (
     "ON CONFLICT (site, key) DO UPDATE SET value = CASE WHEN meta.key ~ '_ns:' THEN"
-    " greatest(meta.value::bigint, excluded.value::bigint)::text ELSE excluded.value END"
+    " CAST(greatest(CAST(meta.value AS BIGINT), CAST(excluded.value AS BIGINT)) AS TEXT)"
+    " ELSE excluded.value END"
 )
 # What libpq adds to the reason: advice to programmers, and where it failed.
 _NOISE: Final = tuple(

@@ -15,11 +15,9 @@ import os
 import socket
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import closing
-from dataclasses import replace
-from datetime import UTC, datetime
-from functools import cache
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -35,42 +33,52 @@ from lupin_bridge.archive.database import (
     explaining,
     place_of,
 )
-from lupin_bridge.archive.journal_reader import Batch, Epoch, Row, Source, arrival_of
+from lupin_bridge.archive.journal_reader import Batch, Epoch, Source, without_nul
 from lupin_bridge.console import CommandError
 from lupin_bridge.feed.tasks import end
 from lupin_bridge.settings import Settings, option, variable
 from lupin_twin.core.past import DAY_NS
 from lupin_twin.journal.retention import RECORD
-from lupin_twin.journal.schema import FILE_ERRORS, Foreign, SiteLog
+from lupin_twin.journal.schema import (
+    FILE_ERRORS,
+    WRITTEN,
+    Foreign,
+    SiteLog,
+    columns,
+    insert_into,
+    upsert_into,
+)
 
-# The column of the stamp, in tables that are partitioned by month.
-_STAMP: Final = {"scan": 3, "look": 4}
-# By table: its key, and the columns to update if the row exists; rows of other tables never change.
-_SAID_ANEW: Final = {
-    "run": ("site, run", "joins ended_stamp_ns"),
-    "hour": ("site, series, hour", "n total low high"),
-    "tally": ("site, run, event, hour", "n total low high first_ns last_ns"),
+# How to write the tables whose rows change.
+_CHANGING: Final = {
+    **{table: upsert_into(table) for table in ("run", "hour", "tally")},
+    "meta": f"{insert_into('meta')} {META_AGAIN}",
 }
-
-
-@cache
-def _insert(table: str, columns: int) -> str:
-    marks = ", ".join(["%s"] * columns)
-    if table == "meta":
-        return f"INSERT INTO meta VALUES ({marks}) {META_AGAIN}"
-    if table not in _SAID_ANEW:
-        return f"INSERT INTO {table} VALUES ({marks}) ON CONFLICT DO NOTHING"
-    key, again = _SAID_ANEW[table]
-    news = ", ".join(f"{column} = excluded.{column}" for column in again.split())
-    return f"INSERT INTO {table} VALUES ({marks}) ON CONFLICT ({key}) DO UPDATE SET {news}"
-
-
 _EPOCH: Final = (
-    "SELECT journal_id, epoch, seq_offset, run_offset, forwarded_seq FROM epoch WHERE site = %s"
-    " ORDER BY epoch DESC LIMIT 1"
+    "SELECT journal_id, epoch, seq_offset, run_offset, forwarded_seq FROM epoch"
+    " WHERE site = :site ORDER BY epoch DESC LIMIT 1"
+)
+_NEWEST: Final = "SELECT seq, arrival_ns FROM ({}) AS row ORDER BY seq DESC LIMIT 1".format(
+    " UNION ALL ".join(
+        f"SELECT seq, arrival_ns FROM {table} WHERE site = :site AND seq > :begun AND seq <= :upto"
+        for table in (*WRITTEN, "place")
+    )
+)
+_RUNS: Final = "SELECT coalesce(max(run), 0) FROM run WHERE site = :site"
+_NEW_EPOCH: Final = (
+    "INSERT INTO epoch VALUES (:site, :number, :journal, now(), :seq_offset, :run_offset, 0)"
+)
+_FORWARDED: Final = (
+    "UPDATE epoch SET forwarded_seq = :forwarded_seq WHERE site = :site AND epoch = :number"
+)
+_NO_EVENTS: Final = "DELETE FROM event WHERE site = :site AND run = :run AND stamp_ns >= :since"
+_LOCK: Final = "SELECT pg_try_advisory_lock(hashtextextended(:name, 0))"
+_OTHER: Final = (
+    "SELECT machine, process, date_trunc('second', since) FROM forwarder WHERE site = :site"
 )
 _HERE: Final = (
-    "INSERT INTO forwarder VALUES (%s, %s, %s, now(), now()) ON CONFLICT (site) DO UPDATE SET"
+    "INSERT INTO forwarder VALUES (:site, :machine, :process, now(), now())"
+    " ON CONFLICT (site) DO UPDATE SET"
     " machine = excluded.machine, process = excluded.process, since = excluded.since,"
     " heard_at = excluded.heard_at"
 )
@@ -88,7 +96,9 @@ class Sink:
     def __init__(self, url: str, site: str) -> None:
         self._site = site
         self._connection: Any = connect(url, f"lupin-twin forward {site}")
-        self._months: set[int] = set()
+        self._log = SiteLog(self._connection, site)
+        # Days since 1970 whose months have their partitions.
+        self._days: set[int] = set()
 
     def close(self) -> None:
         """Close the connection, so that others may write the site."""
@@ -96,28 +106,19 @@ class Sink:
 
     def _lock(self) -> None:
         check_version(self._connection)
-        execute = self._connection.execute
+        execute = self._log.execute
         # The server releases the lock when the connection ends, for whatever reason.
-        name = f"lupin-twin forward {self._site}"
-        (is_ours,) = execute(
-            "SELECT pg_try_advisory_lock(hashtextextended(%s, 0))", (name,)
-        ).fetchone()
+        (is_ours,) = execute(_LOCK, {"name": f"lupin-twin forward {self._site}"}).fetchone()
         if not is_ours:
-            other = execute(
-                "SELECT machine, process, since::timestamptz(0)::text FROM forwarder"
-                " WHERE site = %s",
-                (self._site,),
-            ).fetchone()
+            other = execute(_OTHER).fetchone()
             told = "{} (process {}) since {}".format(*other) if other else "another machine"
             raise ArchiveError(f"site {self._site} is already forwarded by {told}: only one may")
-        execute(_HERE, (self._site, socket.gethostname(), os.getpid()))
-        execute("INSERT INTO site VALUES (%s, '') ON CONFLICT DO NOTHING", (self._site,))
+        execute(_HERE, {"machine": socket.gethostname(), "process": os.getpid()})
+        execute("INSERT INTO site VALUES (:site, '') ON CONFLICT DO NOTHING")
 
     def beat(self) -> None:
         """Note in the archive that this forwarder is alive."""
-        self._connection.execute(
-            "UPDATE forwarder SET heard_at = now() WHERE site = %s", (self._site,)
-        )
+        self._log.execute("UPDATE forwarder SET heard_at = now() WHERE site = :site")
 
     def begin(self, source: Source, say: Callable[[str], None]) -> Epoch:
         """Lock the site; returns the epoch in which the journal goes on.
@@ -130,88 +131,59 @@ class Sink:
 
         """
         self._lock()
-        found = self._connection.execute(_EPOCH, (self._site,)).fetchone()
-        if found is None:
-            return self._new_epoch(source, Epoch(self._site, 1, 0, 0, 0))
-        journal_id, *numbers = found
-        last = Epoch(self._site, *numbers)
-        if journal_id == source.journal_id and self._goes_on(source, last):
-            return last
-        say(f"site {self._site} has a different journal than before: all of it is forwarded")
-        (runs,) = self._connection.execute(
-            "SELECT coalesce(max(run), 0) FROM run WHERE site = %s", (self._site,)
-        ).fetchone()
-        seqs = last.seq_offset + last.forwarded_seq
-        return self._new_epoch(source, Epoch(self._site, last.number + 1, seqs, runs, 0))
+        epoch = Epoch(self._site, 1, 0, 0, 0)
+        if (found := self._log.execute(_EPOCH).fetchone()) is not None:
+            journal_id, *numbers = found
+            last = Epoch(self._site, *numbers)
+            if journal_id == source.journal_id and self._goes_on(source, last):
+                return last
+            say(f"site {self._site} has a different journal than before: all of it is forwarded")
+            (runs,) = self._log.execute(_RUNS).fetchone()
+            seqs = last.seq_offset + last.forwarded_seq
+            epoch = Epoch(self._site, last.number + 1, seqs, runs, 0)
+        self._log.execute(_NEW_EPOCH, {**asdict(epoch), "journal": source.journal_id})
+        return epoch
 
     def _goes_on(self, source: Source, last: Epoch) -> bool:
         if source.last_seq() < last.forwarded_seq:
             return False
-        log = SiteLog(self._connection, self._site)
-        here = arrival_of(log, last.seq_offset + last.forwarded_seq)
-        there = source.arrival_of(last.forwarded_seq)
-        # A row that is missing here or there was deleted.
-        return here is None or there is None or here == there
-
-    def _new_epoch(self, source: Source, epoch: Epoch) -> Epoch:
-        # Before the epoch: if this is interrupted, it is repeated with the same numbers.
-        for table, rows in source.counted(epoch):
-            self._put({table: rows})
-        self._connection.execute(
-            "INSERT INTO epoch VALUES (%s, %s, %s, now(), %s, %s, 0)",
-            (self._site, epoch.number, source.journal_id, epoch.seq_offset, epoch.run_offset),
-        )
-        return epoch
+        within = {"begun": last.seq_offset, "upto": last.seq_offset + last.forwarded_seq}
+        newest = self._log.execute(_NEWEST, within).fetchone()
+        if newest is None:
+            return True
+        # A row that is not in the journal was deleted there.
+        return source.arrival_of(newest[0] - last.seq_offset) in {None, newest[1]}
 
     def put(self, batch: Batch, epoch: Epoch) -> Epoch:
         """Append a batch, all or nothing; returns the epoch as it is now."""
-        upto = max(batch.upto, epoch.forwarded_seq)
         self._make_months(batch)
         with self._connection.pipeline(), self._connection.transaction():
             # First: later rows may be of a series with the same tag and sensors.
             for _, key, value in batch.rows.get("meta", ()):
                 if key.startswith(RECORD):
                     record = json.loads(value)
-                    gone = (_text(record["tag"]), record["seq"], record["what"] == "pose")
+                    gone = (without_nul(record["tag"]), record["seq"], record["what"] == "pose")
                     self._connection.execute("SELECT forget_tag(%s, %s, %s)", gone)
-            self._put(batch.rows)
-            for (run, since_ns), rows in batch.events.items():
-                self._connection.execute(
-                    "DELETE FROM event WHERE site = %s AND run = %s AND stamp_ns >= %s",
-                    (self._site, run, since_ns),
-                )
-                self._put({"event": rows})
-            self._connection.execute(
-                "UPDATE epoch SET forwarded_seq = %s WHERE site = %s AND epoch = %s",
-                (upto, self._site, epoch.number),
-            )
-            self._connection.execute("SELECT pg_notify(%s, %s)", (CHANNEL, self._site))
-        return replace(epoch, forwarded_seq=upto)
+            for run, since_ns in batch.replaced:
+                self._log.execute(_NO_EVENTS, {"run": run, "since": since_ns})
+            for table, rows in batch.rows.items():
+                sql = _CHANGING.get(table, f"{insert_into(table)} ON CONFLICT DO NOTHING")
+                self._log.execute_many(sql, rows)
+            epoch = replace(epoch, forwarded_seq=batch.upto)
+            self._log.execute(_FORWARDED, asdict(epoch))
+            self._log.execute("SELECT pg_notify(:channel, :site)", {"channel": CHANNEL})
+        return epoch
 
     def _make_months(self, batch: Batch) -> None:
         """Create the partitions of the batch's months, and of the month after each."""
         days = {
-            row[column] // DAY_NS
-            for table, column in _STAMP.items()
+            row[columns(table).index("stamp_ns")] // DAY_NS
+            for table in WRITTEN
             for row in batch.rows.get(table, ())
         }
-        for day in days:
-            month = int(f"{datetime.fromtimestamp(day * 86_400, UTC):%Y%m}")
-            if month not in self._months:
-                self._connection.execute("SELECT make_months(%s)", (day * 86_400,))
-                self._months.add(month)
-
-    def _put(self, rows: dict[str, list[Row]] | dict[str, Sequence[Row]]) -> None:
-        with self._connection.cursor() as cursor:
-            for table, of_table in rows.items():
-                if of_table:
-                    values = ([_text(value) for value in row] for row in of_table)
-                    cursor.executemany(_insert(table, len(of_table[0])), values)
-
-
-def _text(value: Any) -> Any:
-    """The value without NUL, which PostgreSQL's text cannot hold: the batch would never go in."""
-    return value.replace("\0", "\ufffd") if isinstance(value, str) else value
+        for day in days - self._days:
+            self._log.execute("SELECT make_months(:moment)", {"moment": day * 86_400})
+            self._days.add(day)
 
 
 # --- again and again ------------------------------------------------------------------------------
@@ -285,7 +257,7 @@ class Forwarder:
                     batch = source.batch(epoch)
                     if batch:
                         epoch = sink.put(batch, epoch)
-                    source.was_sent(batch, epoch)
+                    source.note(epoch.forwarded_seq)
                     is_full = batch.is_full
                 if not is_said:  # not earlier: a reachable archive may still refuse every batch
                     self._last_problem, self._wait_s, is_said = "", FIRST_WAIT_S, True

@@ -9,119 +9,54 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from lupin_bridge.archive.database import ArchiveError
-from lupin_twin.core.past import HOUR_NS, Event
+from lupin_twin.core.past import Event
 from lupin_twin.journal.appending import PURGED_SEQ, Appender
+from lupin_twin.journal.follow import rows_behind
 from lupin_twin.journal.paths import forwarded_seq, note_forwarded
 from lupin_twin.journal.retention import RECORD
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
-    LOCAL_SITE,
     MAP,
     ORIGIN,
+    WRITTEN,
+    Row,
     SiteLog,
-    get_meta,
+    columns,
     one_view,
     open_named,
 )
 
-Row = tuple[Any, ...]
-
-# Rows of each table in one transaction; looks are larger.
-_SCANS: Final = 5_000
-_INSPECTIONS: Final = 500
-_APPENDED: Final = {"scan": _SCANS, "look": _INSPECTIONS, "place": _SCANS}
-_WITHIN: Final = f"site = '{LOCAL_SITE}' AND seq > :after AND seq <= :upto"
-
-# Each with the archive's site and numbers: `seqs` and `runs` are the offsets of these.
-_ROWS: Final = {
-    "series": (
-        "SELECT :site, series + :seqs, run + :runs, tag, kind, sensors FROM series"
-        f" WHERE site = '{LOCAL_SITE}' AND series > :after AND series <= :upto"
-    ),
-    "scan": (
-        "SELECT :site, seq + :seqs, series + :seqs, stamp_ns, own_stamp_ns, arrival_ns, status,"
-        f" source, mission, detail, is_copy, readings FROM scan WHERE {_WITHIN}"
-    ),
-    "look": (
-        "SELECT :site, seq + :seqs, run + :runs, tag, stamp_ns, own_stamp_ns, arrival_ns, source,"
-        " mission, species, confidence, anomaly, flower_count, bug_count, is_copy, blooms, box"
-        f" FROM look WHERE {_WITHIN}"
-    ),
-    "place": (
-        "SELECT :site, seq + :seqs, run + :runs, tag, stamp_ns, arrival_ns, x, y, z, qx, qy, qz,"
-        f" qw, is_copy FROM place WHERE {_WITHIN}"
-    ),
-    # The counts that include those rows, as they are now.
-    "hour": (
-        "SELECT :site, hour.series + :seqs, hour.hour, n, total, low, high FROM"
-        f" (SELECT DISTINCT series, stamp_ns / {HOUR_NS} AS hour FROM scan WHERE {_WITHIN}"
-        "  AND is_copy = 0) AS touched"
-        f" CROSS JOIN hour ON hour.site = '{LOCAL_SITE}' AND hour.series = touched.series"
-        " AND hour.hour = touched.hour"
-    ),
-    "tally": (
-        "SELECT :site, tally.run + :runs, event, tally.hour, n, total, low, high, first_ns, last_ns"
-        f" FROM (SELECT DISTINCT run, stamp_ns / {HOUR_NS} AS hour FROM scan"
-        f"  CROSS JOIN series USING (site, series) WHERE {_WITHIN} AND is_copy = 0"
-        f"  UNION SELECT DISTINCT run, stamp_ns / {HOUR_NS} FROM look WHERE {_WITHIN}"
-        "  AND is_copy = 0) AS touched"
-        f" CROSS JOIN tally ON tally.site = '{LOCAL_SITE}' AND tally.run = touched.run"
-        " AND tally.hour = touched.hour"
-    ),
-}
-_ARRIVAL: Final = " UNION ALL ".join(
-    f"SELECT arrival_ns FROM {table} WHERE site = :site AND seq = :seq" for table in _APPENDED
-)
+# Rows of one transaction, about.
+_ROWS: Final = 5_000
 # Small tables: all rows are read each time, and those that have changed are sent.
-_SMALL: Final = {
-    "run": (
-        "SELECT :site, run + :runs, is_simulated, begun_stamp_ns, begun_arrival_ns,"
-        f" begun_seq + :seqs, joins + :runs, ended_stamp_ns FROM run WHERE site = '{LOCAL_SITE}'"
-    ),
-    "note": (
-        "SELECT :site, id, made_at_ns, made_by, kind, subject, text, until_ns FROM note"
-        f" WHERE site = '{LOCAL_SITE}'"
-    ),
-}
-_EVENTS: Final = (
-    "SELECT :site, run + :runs, event, stamp_ns, CASE seq WHEN 0 THEN 0 ELSE seq + :seqs END, tag,"
-    f" value FROM event WHERE site = '{LOCAL_SITE}' AND run = :run AND stamp_ns >= :since"
+_SMALL: Final = ("run", "meta")
+# Columns with numbers of the journal, in whatever table.
+_SEQS: Final = ("seq", "series", "begun_seq")
+_RUNS: Final = ("run", "joins")
+_ARRIVAL: Final = " UNION ALL ".join(
+    f"SELECT arrival_ns FROM {table} WHERE site = :site AND seq = :seq"
+    for table in (*WRITTEN, "place")
 )
-_TOUCHED_SINCE: Final = (
-    f"SELECT run, min(stamp_ns) FROM (SELECT run, stamp_ns FROM scan"
-    f" CROSS JOIN series USING (site, series) WHERE {_WITHIN} UNION ALL"
-    f" SELECT run, stamp_ns FROM look WHERE {_WITHIN}) GROUP BY run"
+# By run, from when on events may be others because of those rows. The last silence that began
+# before them may go on past them.
+_EVENTS_SINCE: Final = (
+    "SELECT run, coalesce((SELECT max(stamp_ns) FROM event WHERE site = :site"
+    f" AND event.run = new.run AND event = '{Event.SILENCES}' AND stamp_ns < since_ns), since_ns)"
+    " FROM (SELECT run, min(stamp_ns) AS since_ns FROM"
+    "  (SELECT run, stamp_ns FROM scan CROSS JOIN series USING (site, series)"
+    "   WHERE site = :site AND seq > :after AND seq <= :upto UNION ALL SELECT run, stamp_ns"
+    "   FROM look WHERE site = :site AND seq > :after AND seq <= :upto) GROUP BY run) AS new"
 )
-# The last event that began before a stamp may go on past it.
-_EVENT_OVER: Final = (
-    f"SELECT max(stamp_ns) FROM event WHERE site = '{LOCAL_SITE}' AND run = :run"
-    " AND event = :event AND stamp_ns < :since"
-)
-# All counts of a series (`hour`) or a run (`tally`): the numbers of these, and the rows of one.
-_COUNTED: Final = {
-    "hour": (
-        f"SELECT series FROM series WHERE site = '{LOCAL_SITE}'",
-        (
-            "SELECT :site, series + :seqs, hour, n, total, low, high FROM hour"
-            f" WHERE site = '{LOCAL_SITE}' AND series = :number"
-        ),
-    ),
-    "tally": (
-        f"SELECT run FROM run WHERE site = '{LOCAL_SITE}'",
-        (
-            "SELECT :site, run + :runs, event, hour, n, total, low, high, first_ns, last_ns"
-            f" FROM tally WHERE site = '{LOCAL_SITE}' AND run = :number"
-        ),
-    ),
-}
+_EVERY_EVENT: Final = "SELECT run, 0 FROM run WHERE site = :site"
+_EVENTS: Final = "SELECT * FROM event WHERE site = :site AND run = :run AND stamp_ns >= :since"
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,29 +69,39 @@ class Epoch:
     run_offset: int
     forwarded_seq: int
 
+    def moved(self, table: str, rows: Iterable[Row]) -> list[list[Any]]:
+        """Rows of the journal as the archive has them: of its site, and with its numbers."""
+        offsets = {**dict.fromkeys(_SEQS, self.seq_offset), **dict.fromkeys(_RUNS, self.run_offset)}
+        numbers = [
+            (place, offsets[name]) for place, name in enumerate(columns(table)) if name in offsets
+        ]
+        found = [[self.site, *map(without_nul, row[1:])] for row in rows]
+        for row in found:
+            for place, offset in numbers:
+                # None and 0 refer to no row.
+                row[place] = row[place] and row[place] + offset
+        return found
 
-@dataclass(slots=True)
+
+def without_nul(value: Any) -> Any:
+    """The value without NUL, which PostgreSQL's text cannot hold: the batch would never go in."""
+    return value.replace("\0", "\ufffd") if isinstance(value, str) else value
+
+
+@dataclass(frozen=True, slots=True)
 class Batch:
     """Rows by table for one transaction, up to the number `upto` of the journal.
 
-    `events` are, by run (the archive's number) and stamp, all from that stamp on: they replace
-    those of the archive. `small` are all rows of the small tables, new or not.
+    Its events replace those of the archive that are of a run and not before a stamp (`replaced`).
     """
 
     upto: int
     is_full: bool
-    rows: dict[str, list[Row]] = field(default_factory=dict)
-    events: dict[tuple[int, int], list[Row]] = field(default_factory=dict)
-    small: dict[str, frozenset[Row]] = field(default_factory=dict)
+    rows: dict[str, list[list[Any]]]
+    replaced: list[tuple[int, int]]
 
     def __bool__(self) -> bool:
-        return any(self.rows.values()) or bool(self.events)
-
-
-def arrival_of(log: SiteLog, seq: int) -> int | None:
-    """When the row of a number was received, in a journal or in the archive; None: it is gone."""
-    found = log.execute(_ARRIVAL, {"seq": seq}).fetchone()
-    return None if found is None else int(found[0])
+        return bool(self.rows or self.replaced)
 
 
 class Source:
@@ -171,19 +116,20 @@ class Source:
         self._path = path
         self._inode = path.stat().st_ino
         self._connection = open_named(path)
+        self._log = SiteLog(self._connection)
         self._version = -1
-        self._sent: dict[str, frozenset[Row]] = {}
-        # From which stamp on events of a run are to be sent; None: all of every run.
-        self._events_since: dict[int, int] | None = None
+        self._sent: frozenset[tuple[str, Row]] = frozenset()
+        # Whether the archive may lack events of rows that it has.
+        self._is_behind = True
 
     def close(self) -> None:
         """Close the journal."""
         self._connection.close()
 
-    @cached_property
+    @property
     def journal_id(self) -> str:
         """The journal's id."""
-        return get_meta(self._connection, "journal_id") or ""
+        return self._log.journal_id
 
     def is_replaced(self) -> bool:
         """Whether its path is now that of another file, or of none."""
@@ -204,7 +150,8 @@ class Source:
 
     def arrival_of(self, seq: int) -> int | None:
         """When the row of a number was received; None: it is not there."""
-        return arrival_of(SiteLog(self._connection), seq)
+        found = self._log.execute(_ARRIVAL, {"seq": seq}).fetchone()
+        return None if found is None else int(found[0])
 
     def batch(self, epoch: Epoch) -> Batch:
         """The next batch, as of one moment, and synced to the disk.
@@ -213,36 +160,28 @@ class Source:
             ArchiveError: the journal is being salvaged.
 
         """
+        after = epoch.forwarded_seq
         with one_view(self._connection):
             self._refuse_salvaged()
-            upto, is_full = self._upto(epoch.forwarded_seq)
-            parameters = {
-                "site": epoch.site,
-                "seqs": epoch.seq_offset,
-                "runs": epoch.run_offset,
-                "epoch": epoch.number,
-                "after": epoch.forwarded_seq,
-                "upto": upto,
-            }
-            found = Batch(upto, is_full)
-            if upto > epoch.forwarded_seq:
-                for table, sql in _ROWS.items():
-                    found.rows[table] = self._connection.execute(sql, parameters).fetchall()
-            small = {table: self._rows(sql, parameters) for table, sql in _SMALL.items()}
-            for table, rows in {**small, "meta": self._facts(parameters)}.items():
-                found.small[table] = frozenset(rows)
-                sent = self._sent.get(table, frozenset())
-                found.rows[table] = [row for row in rows if row not in sent]
-            self._see_events(found, parameters)
+            found, upto, is_all = rows_behind(self._log, after, _ROWS, every=True)
+            found += [("meta", row) for row in self._facts(epoch)]
+            since: list[tuple[int, int]] = []
+            if is_all:  # rows go first, because late ones change events
+                sql = _EVERY_EVENT if self._is_behind else _EVENTS_SINCE
+                since = self._log.execute(sql, {"after": after, "upto": upto}).fetchall()
+            for run, since_ns in since:
+                of_run = self._log.execute(_EVENTS, {"run": run, "since": since_ns})
+                found += [("event", row) for row in of_run]
         self._sync()
-        return found
-
-    def was_sent(self, batch: Batch, epoch: Epoch) -> None:
-        """Note, here and beside the journal, that a batch is in the archive."""
-        self._sent = batch.small
-        if batch.events:
-            self._events_since = {}
-        self._note(max(batch.upto, epoch.forwarded_seq))
+        self._is_behind = not is_all
+        small = frozenset(each for each in found if each[0] in _SMALL)
+        by_table: dict[str, list[Row]] = defaultdict(list)
+        for table, row in found:
+            if table not in _SMALL or (table, row) not in self._sent:
+                by_table[table].append(row)
+        self._sent = small
+        rows = {table: epoch.moved(table, of_table) for table, of_table in by_table.items()}
+        return Batch(upto, not is_all, rows, [(run + epoch.run_offset, at) for run, at in since])
 
     def claim(self) -> None:
         """Have the twin keep what is not in the archive yet.
@@ -254,83 +193,35 @@ class Source:
         """
         self._refuse_salvaged()
         if not forwarded_seq(self._path, self.journal_id):
-            self._note(0)
+            self.note(0)
 
-    def _note(self, seq: int) -> None:
+    def note(self, seq: int) -> None:
+        """Note beside the journal that its rows up to a number are in the archive."""
         if forwarded_seq(self._path, self.journal_id) != seq:
             note_forwarded(self._path, self.journal_id, seq)
 
-    def counted(self, epoch: Epoch) -> Iterator[tuple[str, list[Row]]]:
-        """Yield all counts in lots, also those of rows deleted before they were forwarded."""
-        moved = {"site": epoch.site, "seqs": epoch.seq_offset, "runs": epoch.run_offset}
-        for table, (numbers, sql) in _COUNTED.items():
-            for (number,) in self._connection.execute(numbers).fetchall():
-                yield table, self._rows(sql, {**moved, "number": number})
-
     def _refuse_salvaged(self) -> None:
         # Then rows come in any order.
-        if get_meta(self._connection, "salvage"):
+        if self._log.meta("salvage"):
             raise ArchiveError(f"the journal {self._path} is being saved from damage")
 
-    # --- one batch --------------------------------------------------------------------------------
-
-    def _rows(self, sql: str, parameters: Mapping[str, object]) -> list[Row]:
-        return self._connection.execute(sql, parameters).fetchall()
-
-    def _upto(self, after: int) -> tuple[int, bool]:
-        """The last number of the next batch, and whether there is more after it."""
-        last, ends = after, []
-        for table, most in _APPENDED.items():
-            (count, end) = self._connection.execute(
-                f"SELECT count(*), max(seq) FROM (SELECT seq FROM {table} WHERE site = ?"
-                " AND seq > ? ORDER BY seq LIMIT ?)",
-                (LOCAL_SITE, after, most),
-            ).fetchone()
-            last = max(last, end or 0)
-            if count == most:
-                ends.append(end)
-        return (min(ends), True) if ends else (last, False)
-
-    def _facts(self, parameters: Mapping[str, Any]) -> list[Row]:
+    def _facts(self, epoch: Epoch) -> Iterator[Row]:
         """The rows of the file's `meta` that are true of the archive too.
 
         Rows that were deleted here stay there, except those that were never forwarded.
         """
-        purged = int(get_meta(self._connection, PURGED_SEQ) or 0)
-        of_runs = ("lost_ns:", "purged_ns:") if purged > parameters["after"] else ("lost_ns:",)
-        found = []
-        for key, value in self._connection.execute(
-            "SELECT key, value FROM meta WHERE site = ? ORDER BY key", (LOCAL_SITE,)
-        ):
-            name, _, run = key.partition(":")
-            if f"{name}:" in of_runs:
-                found.append((parameters["site"], f"{name}:{int(run) + parameters['runs']}", value))
-            elif f"{name}:" == RECORD:
+        purged = int(self._log.meta(PURGED_SEQ) or 0)
+        of_runs = ("lost_ns", "purged_ns") if purged > epoch.forwarded_seq else ("lost_ns",)
+        for site, key, value in self._log.execute("SELECT * FROM meta WHERE site = :site"):
+            name, _, number = key.partition(":")
+            if name in of_runs:
+                yield site, f"{name}:{int(number) + epoch.run_offset}", value
+            elif key.startswith(RECORD):
                 record = json.loads(value)
-                record["seq"] = record.get("seq", 0) + parameters["seqs"]
-                moved = f"{key}:{parameters['epoch']}"
-                found.append((parameters["site"], moved, json.dumps(record)))
+                record["seq"] = record.get("seq", 0) + epoch.seq_offset
+                yield site, f"{key}:{epoch.number}", json.dumps(record)
             elif key in {ORIGIN, DAY_LENGTH, MAP} or key.startswith("simulated_"):
-                found.append((parameters["site"], key, value))
-        return found
-
-    def _see_events(self, found: Batch, parameters: Mapping[str, Any]) -> None:
-        """Add the events to a batch that is not full: late rows change them, so rows go first."""
-        since = self._events_since
-        if since is not None and found.upto > parameters["after"]:
-            for run, stamp_ns in self._rows(_TOUCHED_SINCE, parameters):
-                since[run] = min(stamp_ns, since.get(run, stamp_ns))
-        if found.is_full:
-            return
-        if since is None:
-            runs = self._connection.execute("SELECT run FROM run WHERE site = ?", (LOCAL_SITE,))
-            since = dict.fromkeys((run for (run,) in runs), 0)
-        for run, stamp_ns in since.items():
-            within = {**parameters, "run": run, "since": stamp_ns, "event": Event.SILENCES}
-            (over_ns,) = self._rows(_EVENT_OVER, within)[0]
-            within["since"] = stamp_ns if over_ns is None else over_ns
-            key = (run + parameters["runs"], within["since"])
-            found.events[key] = self._rows(_EVENTS, within)
+                yield site, key, value
 
     def _sync(self) -> None:
         # Only the write-ahead log: closing a descriptor of the file would drop SQLite's locks.

@@ -102,12 +102,6 @@ def test_check_tells_rows_that_fit_no_other(two_sites: Archive) -> None:
     assert "1 hours without a series" in done.stdout
 
 
-def test_an_archive_is_made_once(archive: Archive) -> None:
-    again = command("init", archive.owner)
-    assert (again.returncode, len(again.stderr.splitlines())) == (1, 1)
-    assert "already has an archive" in again.stderr
-
-
 def test_migrating_gives_the_roles_back_what_they_may(two_sites: Archive) -> None:
     two_sites.do("REVOKE ALL ON scan FROM lupin_page")
     assert command("migrate", two_sites.owner).returncode == 0
@@ -115,18 +109,19 @@ def test_migrating_gives_the_roles_back_what_they_may(two_sites: Archive) -> Non
         assert len(connection.execute("SELECT site FROM scan").fetchall()) == 2
 
 
-def test_an_archive_of_another_version_is_left_alone(archive: Archive) -> None:
+def test_what_is_no_archive_or_another_one_is_named_and_left_alone(
+    archive: Archive, postgresql: Postgres
+) -> None:
     archive.do("UPDATE archive SET version = 9")
-    for action in ("migrate", "info", "check"):
-        done = command(action, archive.owner)
-        assert done.returncode == 1
-        assert "is of version 9, expected 1: update lupin-twin here" in done.stderr
-
-
-def test_a_database_without_an_archive_is_named_so(postgresql: Postgres) -> None:
-    done = command("info", postgresql.url_of("postgres"))
-    assert done.returncode == 1
-    assert "the database has no archive: lupin-twin archive init creates it" in done.stderr
+    for action, url, said in (
+        ("init", archive.owner, "already has an archive"),
+        ("migrate", archive.owner, "is of version 9, expected 1: update lupin-twin here"),
+        ("check", archive.owner, "is of version 9, expected 1: update lupin-twin here"),
+        ("info", postgresql.url_of("postgres"), "has no archive: lupin-twin archive init"),
+    ):
+        done = command(action, url)
+        assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
+        assert said in done.stderr
 
 
 def test_a_wrong_password_is_said_and_not_repeated(archive: Archive) -> None:

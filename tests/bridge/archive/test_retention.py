@@ -103,7 +103,9 @@ def test_a_months_end_takes_nothing_from_a_forwarder(archive: Archive) -> None:
                 forwarder.execute(sql.format(month(NOW)))
 
 
-def test_what_is_older_goes_with_its_months_and_what_was_counted_stays(sites: Archive) -> None:
+def test_what_is_older_goes_for_good_with_its_months_and_what_was_counted_stays(
+    sites: Archive, tmp_path: Path
+) -> None:
     before = sites.rows()
     told = retain(sites, 60)
     after = sites.rows()
@@ -118,6 +120,9 @@ def test_what_is_older_goes_with_its_months_and_what_was_counted_stays(sites: Ar
     assert f"deleted {month(stamps(*AGES)[0])[5:].replace('_', '-')}: the whole month" in told
     assert run("archive", "check", "--archive-url", sites.owner).returncode == 0
     assert retain(sites, 60) == "deleted nothing\n"
+    kept(tmp_path / "gh1", [scan("7", NOW)])
+    forward_once(sites, tmp_path / "gh1")
+    assert len(sites.rows()["scan"]) == len(after["scan"]) + 1
 
 
 def test_of_one_site_alone(sites: Archive) -> None:
@@ -139,16 +144,6 @@ def test_a_month_in_which_another_site_has_rows_stays(sites: Archive) -> None:
     for table, stamp in (("scan", 2), ("look", 3)):
         assert sorted(row[stamp] for row in sites.rows("gh3")[table]) == stamps(*AGES)
     assert exists(sites, month(stamps(*AGES)[0]))
-
-
-def test_what_was_deleted_is_not_forwarded_again(sites: Archive, tmp_path: Path) -> None:
-    retain(sites, 60)
-    before = sites.rows()
-    forward_once(sites, tmp_path / "gh1")
-    assert sites.rows() == before
-    append(tmp_path / "gh1", [scan("7", NOW)])
-    forward_once(sites, tmp_path / "gh1")
-    assert len(sites.rows()["scan"]) == len(before["scan"]) + 1
 
 
 def test_a_full_disk_is_said_in_one_line_and_holds_until_there_is_room(

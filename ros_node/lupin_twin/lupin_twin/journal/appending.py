@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import sqlite3
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -26,6 +27,7 @@ from lupin_twin.journal.schema import (
     LOCAL_SITE,
     SiteLog,
     get_meta,
+    insert_into,
     json_text,
     open_writer,
     set_meta,
@@ -41,10 +43,6 @@ _MAX_AT_HAND: Final = 100_000
 # Readings, flowers and rows that wait for `flush`: a few MB.
 _MAX_WAITING_WEIGHT: Final = 20_000
 
-_ADD: Final = {
-    table: f"INSERT INTO {table} VALUES ('{LOCAL_SITE}'{', ?' * columns})"  # noqa: S608
-    for table, columns in (("scan", 11), ("look", 16), ("place", 13))
-}
 # The indices are named because SQLite assumes that `site` is selective, and would scan the table.
 _KNOWN_SCAN: Final = (
     "SELECT stamp_ns, own_stamp_ns FROM scan INDEXED BY scan_at WHERE site = :site"
@@ -92,7 +90,7 @@ class Appender:
         # By run, for some of them: the time up to which all rows are counted already.
         self.counted_ns: dict[int, int] = {}
         self._groups: dict[tuple[int, str, int], _Group] = {}
-        self._waiting: dict[str, list[tuple[object, ...]]] = {table: [] for table in _ADD}
+        self._waiting: dict[str, list[tuple[object, ...]]] = defaultdict(list)
         self._waiting_weight = 0
         self._counted_seq = self.last_seq
 
@@ -111,9 +109,8 @@ class Appender:
         """Write the added rows into the tables, and count them."""
         self._waiting_weight = 0
         for table, rows in self._waiting.items():
-            if rows:
-                self._connection.executemany(_ADD[table], rows)
-                rows.clear()
+            self._connection.executemany(insert_into(table), rows)
+        self._waiting.clear()
         if self.last_seq > self._counted_seq:
             log = SiteLog(self._connection)
             count_rows(log, self._counted_seq, self.last_seq, self.counted_ns)
@@ -127,9 +124,8 @@ class Appender:
             pose = row.pose
             numbers = (pose.x, pose.y, pose.z, pose.qx, pose.qy, pose.qz, pose.qw)
             self.last_seq += 1
-            self._waiting["place"].append(
-                (self.last_seq, run, tag, row.stamp_ns, row.arrival_ns, *numbers, is_copy)
-            )
+            at = (LOCAL_SITE, self.last_seq, run, tag, row.stamp_ns, row.arrival_ns)
+            self._waiting["place"].append((*at, *numbers, is_copy))
             return True
         if isinstance(row, Inspection) and row.flower is not None:
             return self._put_inspection(run, tag, row, row.flower, is_copy)
@@ -152,6 +148,7 @@ class Appender:
         series = self._series((run, tag, kind), tuple(readings))
         self._waiting["scan"].append(
             (
+                LOCAL_SITE,
                 self.last_seq,
                 series,
                 stamp_ns,
@@ -178,6 +175,7 @@ class Appender:
         self._series(at, ())
         self._waiting["look"].append(
             (
+                LOCAL_SITE,
                 self.last_seq,
                 run,
                 tag,
@@ -266,10 +264,8 @@ class Appender:
         series = of_group.get(names)
         if series is None:
             series = of_group[names] = self.last_seq
-            self._connection.execute(
-                "INSERT INTO series VALUES (?, ?, ?, ?, ?, ?)",
-                (LOCAL_SITE, series, *at, json_text(names)),
-            )
+            row = (LOCAL_SITE, series, *at, json_text(names))
+            self._connection.execute(insert_into("series"), row)
         return series
 
 

@@ -1,4 +1,3 @@
-# ruff: noqa: S608  # SQL is put together of constants
 """Counts for long views of the past, upserted in the transaction that writes the counted rows.
 
 By the hour: readings of each sensor (`hour`), the site's scans, failures and inspections (`tally`).
@@ -17,7 +16,7 @@ from lupin_twin.core.history import KIND_TAG_READING
 from lupin_twin.core.past import HOUR_NS, Event
 from lupin_twin.core.state import STATUS_OK
 from lupin_twin.journal.rows import numbers_of
-from lupin_twin.journal.schema import DamagedFile, SiteLog, json_text
+from lupin_twin.journal.schema import DamagedFile, SiteLog, insert_into, json_text, upsert_into
 
 # A shorter time without an attempt is no silence, whatever interval is usual.
 SILENCE_NS: Final = 600 * 1_000_000_000
@@ -112,19 +111,12 @@ _LEAST: Final = "CASE WHEN excluded.{0} < tally.{0} THEN excluded.{0} ELSE tally
 _MOST: Final = "CASE WHEN excluded.{0} > tally.{0} THEN excluded.{0} ELSE tally.{0} END"
 
 
-_HOUR: Final = (
-    "INSERT INTO hour (site, series, hour, n, total, low, high) VALUES (?, ?, ?, ?, ?, ?, ?)"
-    " ON CONFLICT (site, series, hour) DO UPDATE SET n = excluded.n, total = excluded.total,"
-    " low = excluded.low, high = excluded.high"
-)
 _OF_HOUR: Final = (
     "SELECT series, hour, CAST(n AS TEXT), CAST(total AS TEXT), CAST(low AS TEXT),"
     " CAST(high AS TEXT) FROM hour WHERE site = :site AND series IN ({}) AND hour = :hour"
 )
 _TALLY: Final = (
-    "INSERT INTO tally (site, run, event, hour, n, total, low, high, first_ns, last_ns)"
-    " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"
-    " ON CONFLICT (site, run, event, hour) DO UPDATE SET"
+    f"{insert_into('tally')} ON CONFLICT (site, run, event, hour) DO UPDATE SET"
     " n = tally.n + excluded.n, total = tally.total + excluded.total,"
     f" low = {_LEAST.format('low')}, high = {_MOST.format('high')},"
     f" first_ns = {_LEAST.format('first_ns')},"
@@ -158,7 +150,7 @@ def _upsert_hours(log: SiteLog, hours: dict[tuple[int, int], list[Sequence[float
         sums = ",".join([f"{number:.15g}" for number in total])
         texts = json_text(n), f"[{sums}]", json_text(low), json_text(high)
         rows.append((log.site, series, hour, *texts))
-    log.execute_many(_HOUR, rows)
+    log.execute_many(upsert_into("hour"), rows)
 
 
 def _hours_of(log: SiteLog, keys: Iterable[tuple[int, int]]) -> dict[tuple[int, int], Any]:

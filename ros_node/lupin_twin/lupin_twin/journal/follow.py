@@ -5,6 +5,9 @@ A row may be sent several times, but is stored once: a lot is one transaction, a
 recognised by their numbers. A file holds one journal, and has its id; another journal gets another
 file. Hourly counts are made from the rows that arrive; where the journal has deleted rows, its own
 counts are copied. What the journal deletes or forgets meanwhile is deleted here too.
+
+Forwarding to an archive reads the same rows, see `rows_behind`. An archive takes all counts from
+the journal, because it keeps rows that the journal deletes.
 """
 
 from __future__ import annotations
@@ -37,12 +40,16 @@ from lupin_twin.journal.schema import (
     ORIGIN,
     WRITTEN,
     DamagedFile,
+    Row,
     SiteLog,
+    columns,
     get_meta,
+    insert_into,
     open_reader,
     open_writer,
     set_meta,
     transaction,
+    upsert_into,
 )
 from lupin_twin.journal.writes import id_behind, number_of
 
@@ -50,6 +57,7 @@ MAX_ROWS: Final = 2_000
 _MAX_BYTES: Final = 1_000_000
 # Ordered as rows with the same number have to be written.
 _NUMBERED: Final = ("series", "scan", "look", "place", "note")
+_COPIED: Final = {*_NUMBERED, "run", "meta", "hour", "tally", "event"}
 _FACTS: Final = (
     *(DELETED, FORGOTTEN, "lost_ns:", PURGED_SEQ, "simulated_", RECORD, ORIGIN, DAY_LENGTH),
 )
@@ -58,15 +66,12 @@ _COMPLETE: Final = "followed_to_ns"
 _UP_TO: Final = "followed_row"
 # The last number of the journal when the first lot was read.
 _BEGUN: Final = "followed_from_seq"
-_COLUMNS: Final = {
-    "run": 7, "meta": 2, "series": 5, "scan": 11, "look": 16, "place": 13, "note": 7,
-    "hour": 6, "tally": 9, "event": 6,
-}  # fmt: skip
-# For each run, the hour up to which rows were deleted, or may have been.
+# For each run, the hour up to which counts are read: rows were deleted, or may have been.
 _PURGED: Final = (
     "SELECT CAST(substr(key, instr(key, ':') + 1) AS INTEGER) AS run,"
     f" max(CAST(value AS INTEGER)) / {HOUR_NS} AS hour FROM meta WHERE site = :site"
     f" AND (key LIKE '{DELETED}%' OR key LIKE '{FORGOTTEN}%') GROUP BY 1"
+    f" UNION ALL SELECT run, {FOREVER_NS} FROM run WHERE site = :site AND :every"
 )
 _ATTEMPTS: Final = (
     f"SELECT series, run, stamp_ns / {HOUR_NS} AS hour FROM scan JOIN series USING (site, series)"
@@ -146,36 +151,52 @@ class NotALotError(ValueError):
 
 
 def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lot:
-    """Read the rows after a number, in the order of numbers, and all rows of small tables."""
+    """Read a lot for a copy: rows, and facts about the whole journal."""
     log = SiteLog(connection)
-    texts = [_text("run", row) for row in _all(log, "run")]
-    texts += [_text("meta", row) for row in _all(log, "meta") if row[1].startswith(_FACTS)]
+    found, last, is_all = rows_behind(log, after, most)
+    found += [("meta", row) for row in _all(log, "meta") if row[1].startswith(_FACTS)]
+    found.append(("meta", ("", _UP_TO, _up_to(connection, after))))
     if after == 0:
         begun = max(_newest(connection)[0], _gone_seq(connection))
-        texts.append(_text("meta", ("", _BEGUN, str(begun))))
-    found = [
+        found.append(("meta", ("", _BEGUN, str(begun))))
+    texts = (
+        json.dumps([table, *row[1:]], separators=(",", ":"), ensure_ascii=False)
+        for table, row in found
+    )
+    return Lot(log.journal_id, tuple(texts), last, is_all)
+
+
+def rows_behind(
+    log: SiteLog, after: int, most: int, *, every: bool = False
+) -> tuple[list[tuple[str, Row]], int, bool]:
+    """Read the next rows after a number with their tables: all runs, and about `most` others.
+
+    Counts are read of hours of which rows were deleted; if `every`, of all hours, but no events.
+    Also returns the number after which to continue, and whether nothing more was written yet.
+    """
+    found = [("run", row) for row in _all(log, "run")]
+    numbered = [
         (number_of(row[1]) if table == "note" else row[1], rank, row)
         for rank, table in enumerate(_NUMBERED)
         for row in _behind(log, table, after, most)
     ]
-    found.sort(key=lambda entry: entry[:2])
-    purged = _purged(connection)
+    numbered.sort(key=lambda entry: entry[:2])
+    purged = _purged(log, every=every)
     last, weight, is_all = after, 0, True
-    for place, (number, rank, row) in enumerate(found):
+    for place, (number, rank, row) in enumerate(numbered):
         if (place >= most or weight > _MAX_BYTES) and number != last:
             is_all = False
             break
-        texts.append(_text(_NUMBERED[rank], row))
-        last, weight = number, weight + len(texts[-1])
+        found.append((_NUMBERED[rank], row))
+        last, weight = number, weight + len(str(row))
         if _NUMBERED[rank] == "series" and row[2] in purged:
             of_series = {"series": number, "hour": purged[row[2]]}
             weight += log.execute(_HOURS_OF, of_series).fetchone()[0] * _HOUR_BYTES
-    texts.append(_text("meta", ("", _UP_TO, _up_to(connection, after))))
     if purged:
-        for table, sql in _COUNTED.items():
-            rows = log.execute(sql, {"after": after, "last": last}).fetchall()
-            texts += [_text(table, row) for row in rows]
-    return Lot(log.journal_id, tuple(texts), last, is_all)
+        within = {"after": after, "last": last, "every": every}
+        for table in ("hour", "tally") if every else _COUNTED:
+            found += [(table, row) for row in log.execute(_COUNTED[table], within).fetchall()]
+    return found, last, is_all
 
 
 def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Followed:
@@ -193,7 +214,7 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     with closing(open_writer(path)) as connection:
         with transaction(connection):
-            last, purged = _last(connection), _purged(connection)
+            last, purged = _last(connection), _purged(SiteLog(connection))
             if last < behind:
                 raise NotALotError(f"rows behind number {behind} for a file that ends before it")
             try:
@@ -210,7 +231,7 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
                 raise DamagedFile("the journal has other rows by now")
             # Rows from before the copy began are in the counts of those hours. Without this rule,
             # no copy of a journal that deletes every minute would ever be complete.
-            is_counted = gone <= begun and _purged(connection) == purged
+            is_counted = gone <= begun and _purged(SiteLog(connection)) == purged
             if 0 < last < gone and not is_counted:
                 raise DamagedFile("rows that it does not have yet were deleted in the journal")
             set_meta(connection, _FOLLOWED, max(lot.last, last))
@@ -261,11 +282,11 @@ def _newest(connection: sqlite3.Connection, upto: int = FOREVER_NS) -> tuple[int
 # --- reading a journal ----------------------------------------------------------------------------
 
 
-def _all(log: SiteLog, table: str) -> list[tuple[Any, ...]]:
+def _all(log: SiteLog, table: str) -> list[Row]:
     return list(log.execute(f"SELECT * FROM {table} WHERE site = :site").fetchall())
 
 
-def _behind(log: SiteLog, table: str, after: int, most: int) -> list[tuple[Any, ...]]:
+def _behind(log: SiteLog, table: str, after: int, most: int) -> list[Row]:
     number = {"series": "series", "note": "id"}.get(table, "seq")
     return list(
         log.execute(
@@ -282,11 +303,6 @@ def _up_to(connection: sqlite3.Connection, after: int) -> str:
     return f"{after} {seq} {arrival_ns}"
 
 
-def _text(table: str, row: Iterable[Any]) -> str:
-    _, *columns = row
-    return json.dumps([table, *columns], separators=(",", ":"), ensure_ascii=False)
-
-
 # --- writing a copy -------------------------------------------------------------------------------
 
 
@@ -301,29 +317,26 @@ def _put(connection: sqlite3.Connection, lot: Lot) -> None:
         if table in _COUNTED:
             counted.append((table, row))
         elif table not in WRITTEN or row[0] > after:
-            _insert(connection, table, row, replaces=table in {"run", "meta"})
+            is_anew = table in {"run", "meta"}
+            sql = upsert_into(table) if is_anew else f"{insert_into(table)} ON CONFLICT DO NOTHING"
+            connection.execute(sql, (LOCAL_SITE, *row))
     # Another process may have written later counts.
     if lot.last >= after:
-        log.execute(_OTHER_EVENTS, {"after": after, "last": lot.last})
+        log.execute(_OTHER_EVENTS, {"after": after, "last": lot.last, "every": False})
         for table, row in counted:
-            _insert(connection, table, row, replaces=True)
+            connection.execute(upsert_into(table), (LOCAL_SITE, *row))
     # Then count the other rows: whether their pests are new depends on what was before.
-    counted_ns = {run: (hour + 1) * HOUR_NS - 1 for run, hour in _purged(connection).items()}
+    counted_ns = {run: (hour + 1) * HOUR_NS - 1 for run, hour in _purged(log).items()}
     count_rows(log, after, lot.last, counted_ns)
     delete_up_to(connection, _purged_seq(connection))
-
-
-def _insert(connection: sqlite3.Connection, table: str, row: list[Any], *, replaces: bool) -> None:
-    way, marks = "REPLACE" if replaces else "IGNORE", ", ?" * len(row)
-    connection.execute(f"INSERT OR {way} INTO {table} VALUES ('{LOCAL_SITE}'{marks})", row)
 
 
 def _purged_seq(connection: sqlite3.Connection) -> int:
     return int(get_meta(connection, PURGED_SEQ) or 0)
 
 
-def _purged(connection: sqlite3.Connection) -> dict[int, int]:
-    return dict(SiteLog(connection).execute(_PURGED).fetchall())
+def _purged(log: SiteLog, *, every: bool = False) -> dict[int, int]:
+    return dict(log.execute(_PURGED, {"every": every}).fetchall())
 
 
 def _gone_seq(connection: sqlite3.Connection) -> int:
@@ -335,8 +348,10 @@ def _gone_seq(connection: sqlite3.Connection) -> int:
 def _rows(texts: Iterable[str]) -> Iterator[list[Any]]:
     for text in texts:
         row = json.loads(text)
-        if len(row) - 1 != _COLUMNS[row[0]] or not all(
-            column is None or isinstance(column, str | int | float) for column in row
+        if (
+            row[0] not in _COPIED
+            or len(row) != len(columns(row[0]))
+            or not all(column is None or isinstance(column, str | int | float) for column in row)
         ):
             raise ValueError(text[:64])
         yield row

@@ -1,4 +1,3 @@
-# ruff: noqa: S608  # SQL is put together of constants
 """Upgrades a journal of version 3, and vacuums a journal.
 
 An upgrade builds a new file beside the journal, syncs it, and renames it: if the process is killed
@@ -10,7 +9,7 @@ from __future__ import annotations
 import os
 import shutil
 import sqlite3
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import closing
 from itertools import islice
 from pathlib import Path
@@ -30,6 +29,7 @@ from lupin_twin.journal.schema import (
     LOCAL_SITE,
     DamagedFile,
     NotPossible,
+    insert_into,
     json_text,
     open_writer,
     set_meta,
@@ -189,14 +189,10 @@ class _Upgrade:
         hour = purged_ns // HOUR_NS
         self._appender.counted_ns[run] = (hour + 1) * HOUR_NS - 1
         set_meta(self._target, f"{DELETED}{run}", purged_ns)
-        self._add("hour", 7, self._hours(run, hour))
-        for table, columns in (("tally", 10), ("event", 7)):
-            rows = getattr(self._old, table)(run, hour)
-            self._add(table, columns, [(LOCAL_SITE, run, *row) for row in rows])
-
-    def _add(self, table: str, columns: int, rows: Iterable[tuple[object, ...]]) -> None:
-        marks = ", ".join("?" * columns)
-        self._target.executemany(f"INSERT INTO {table} VALUES ({marks})", rows)
+        self._target.executemany(insert_into("hour"), self._hours(run, hour))
+        for table in ("tally", "event"):
+            rows = ((LOCAL_SITE, run, *row) for row in getattr(self._old, table)(run, hour))
+            self._target.executemany(insert_into(table), rows)
 
     def _hours(self, run: int, until: int) -> list[tuple[object, ...]]:
         """Rows of `hour`; series of the old file that differ only by source become one."""
@@ -208,7 +204,7 @@ class _Upgrade:
                 self._appender.last_seq += 1
                 numbers[key] = self._appender.last_seq
                 row = (LOCAL_SITE, numbers[key], run, tag_id, kind, json_text(sensors))
-                self._add("series", 6, [row])
+                self._target.execute(insert_into("series"), row)
             at = (numbers[key], hour)
             found[at] = list(map(_joined, found[at], buckets)) if at in found else buckets
         return [

@@ -20,7 +20,7 @@ from typing import Any, Final
 from lupin_twin.core.diagnostics import origin_of
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import FOREVER_NS
-from lupin_twin.journal.schema import DAY_LENGTH, LOCAL_SITE, ORIGIN, SiteLog
+from lupin_twin.journal.schema import DAY_LENGTH, LOCAL_SITE, ORIGIN, SiteLog, insert_into
 
 # A wall clock that is set back by at most this was only corrected: the run goes on.
 CORRECTION_NS: Final = 300 * 1_000_000_000
@@ -160,7 +160,7 @@ def cut(axis: Iterable[Span], start_ns: int, end_ns: int) -> list[Span]:
 def put_run(connection: Any, run: Run) -> None:
     """Write a run into the file."""
     connection.execute(
-        "INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+        insert_into("run"),
         (
             LOCAL_SITE,
             run.id,

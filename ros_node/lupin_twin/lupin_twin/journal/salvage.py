@@ -29,6 +29,7 @@ from lupin_twin.journal.schema import (
     WRITTEN,
     SiteLog,
     empty_file,
+    insert_into,
     is_damage_error,
     set_meta,
     transaction,
@@ -282,5 +283,4 @@ def _put(new: sqlite3.Connection, table: str, rows: Iterable[Record]) -> None:
         for _, _, kind, is_needed, *_ in new.execute(f"PRAGMA table_info({table})").fetchall()
     ]
     fitting = [row for row in rows if row[0] == LOCAL_SITE and all(map(isinstance, row, types))]
-    marks = ", ".join("?" * len(types))
-    new.executemany(f"INSERT OR IGNORE INTO {table} VALUES ({marks})", fitting)
+    new.executemany(f"{insert_into(table)} ON CONFLICT DO NOTHING", fitting)

@@ -335,6 +335,30 @@ def _own_tables() -> frozenset[bytes]:
         return frozenset(sql for (sql,) in new.execute(_SCHEMA))
 
 
+@cache
+def columns(table: str, *, of_key: bool = False) -> tuple[str, ...]:
+    """The names of a table's columns, or of its key's, in their order."""
+    with closing(sqlite3.connect(":memory:")) as new:
+        new.executescript(SQLITE_TABLES)
+        which = "pk > 0 ORDER BY pk" if of_key else "true ORDER BY cid"
+        found = new.execute(f"SELECT name FROM pragma_table_info(?) WHERE {which}", (table,))  # noqa: S608
+        return tuple(name for (name,) in found)
+
+
+@cache
+def insert_into(table: str) -> str:
+    """The statement that writes a row, with a `?` for each column."""
+    return f"INSERT INTO {table} VALUES ({', '.join('?' * len(columns(table)))})"  # noqa: S608
+
+
+@cache
+def upsert_into(table: str) -> str:
+    """The statement that writes a row, maybe over the one with its key."""
+    key = columns(table, of_key=True)
+    news = (f"{name} = excluded.{name}" for name in columns(table) if name not in key)
+    return f"{insert_into(table)} ON CONFLICT ({', '.join(key)}) DO UPDATE SET {', '.join(news)}"
+
+
 # Keys of facts: the origin of the observations, and the length of a day, see `World`.
 ORIGIN: Final = "origin"
 DAY_LENGTH: Final = "day_length_s"
@@ -344,6 +368,7 @@ MAP: Final = "map"
 # --- one site's rows ------------------------------------------------------------------------------
 
 
+Row = tuple[Any, ...]
 _NOTHING: Final[Mapping[str, Any]] = {}
 _META: Final = "SELECT value FROM meta WHERE site = :site AND key = :key"
 _SET_META: Final = (
@@ -368,7 +393,7 @@ class SiteLog:
         """Execute SQL; returns a cursor whose rows are tuples."""
         return self.connection.execute(self._of_engine(sql), {**values, "site": self.site})
 
-    def execute_many(self, sql: str, rows: Sequence[tuple[Any, ...]]) -> None:
+    def execute_many(self, sql: str, rows: Sequence[Sequence[Any]]) -> None:
         """Execute a statement for many rows of values, one for each `?`."""
         if rows:
             self.connection.cursor().executemany(self._of_engine(sql), rows)

@@ -404,5 +404,5 @@ async def _end_with(people: People, person: Person | None, connection: Connectio
         while people.may_stay(person):
             await asyncio.sleep(_POLL_S)
     except AccountError as error:
-        log.warning("%s: the open connections of %s are closed", error, person and person.name)
+        log.warning("%s: an open connection is closed", error)
     connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")

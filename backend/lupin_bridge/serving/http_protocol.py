@@ -268,7 +268,7 @@ class HttpConnection(H11Protocol):
         if self._deadline is not None:
             self._deadline.cancel()
         self._idle_since_s = self.loop.time()
-        self._deadline = self.loop.call_later(self.timeout_keep_alive, self._parse_request)
+        self._deadline = self.loop.call_later(self.timeout_keep_alive, self._abort_if_idle)
 
     def _stop_waiting(self) -> None:
         for deadline in (self._deadline, self._reader_deadline):
@@ -276,7 +276,7 @@ class HttpConnection(H11Protocol):
                 deadline.cancel()
         self._deadline = self._reader_deadline = None
 
-    def _parse_request(self) -> None:
+    def _abort_if_idle(self) -> None:
         if not self._is_at_work:
             self.abort()
 

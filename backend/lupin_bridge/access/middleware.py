@@ -39,7 +39,9 @@ from lupin_bridge.access.policy import (
     parse_origin,
     path_of,
 )
+from lupin_bridge.serving import http_protocol
 from lupin_bridge.serving.admission import RateLimit, client_key
+from lupin_bridge.serving.http_protocol import HttpConnection
 from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
 from lupin_bridge.settings import SettingError, Settings
 
@@ -270,11 +272,10 @@ class AccessControl:
         if person is not None:
             scope["state"] = {**scope.get("state", {}), PERSON_KEY: person}
         people = self._access.people
-        if people is None or scope["type"] == "http":
+        if people is None:
             await self._app(scope, receive, send)
             return
-        connection: Connection = scope["state"][CONNECTION_KEY]
-        looking = asyncio.create_task(_end_with(people, person, connection))
+        looking = asyncio.create_task(_end_with(people, person, scope))
         try:
             await self._app(scope, receive, send)
         finally:
@@ -398,11 +399,17 @@ def _with_cors(send: Send, foreign: str | None) -> Send:
     return send_with_cors
 
 
-async def _end_with(people: People, person: Person | None, connection: Connection) -> None:
-    """Close the connection when the session ends; without a person, at the first account."""
+async def _end_with(people: People, person: Person | None, scope: Scope) -> None:
+    """End the connection with the session; without a person, at the first account."""
     try:
+        await asyncio.sleep(_POLL_S)
         while people.may_stay(person):
             await asyncio.sleep(_POLL_S)
     except AccountError as error:
         log.warning("%s: an open connection is closed", error)
+    if scope["type"] == "http":
+        answering: HttpConnection = scope["state"][http_protocol.CONNECTION_KEY]
+        answering.break_off()
+        return
+    connection: Connection = scope["state"][CONNECTION_KEY]
     connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")

@@ -39,10 +39,10 @@ from lupin_bridge.access.policy import (
     parse_origin,
     path_of,
 )
-from lupin_bridge.serving import http_protocol
 from lupin_bridge.serving.admission import RateLimit, client_key
+from lupin_bridge.serving.connections import CONNECTION_KEY
 from lupin_bridge.serving.http_protocol import HttpConnection
-from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
+from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import SettingError, Settings
 
 log = logging.getLogger(__name__)
@@ -407,9 +407,5 @@ async def _end_with(people: People, person: Person | None, scope: Scope) -> None
             await asyncio.sleep(_POLL_S)
     except AccountError as error:
         log.warning("%s: an open connection is closed", error)
-    if scope["type"] == "http":
-        answering: HttpConnection = scope["state"][http_protocol.CONNECTION_KEY]
-        answering.break_off()
-        return
-    connection: Connection = scope["state"][CONNECTION_KEY]
+    connection: HttpConnection | Connection = scope["state"][CONNECTION_KEY]
     connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")

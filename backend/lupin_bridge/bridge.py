@@ -381,7 +381,7 @@ class Bridge:
         before = self._published
         # A fleet closes pages that nobody reads any more: nothing to log.
         is_end = status.reason == "shutting_down"
-        if not is_end and (status.has_more_detail_than(before) if before else not is_good):
+        if not is_end and (status.message != before.message if before else not is_good):
             # A fleet has many bridges.
             message = f"site {self.site}: {status.message}" if self.site else status.message
             log.log(logging.INFO if is_good else logging.WARNING, "%s", message)

@@ -40,7 +40,9 @@ from lupin_bridge.access.policy import (
     path_of,
 )
 from lupin_bridge.serving.admission import RateLimit, client_key
-from lupin_bridge.serving.ws_protocol import CONNECTION_KEY, Connection
+from lupin_bridge.serving.connections import CONNECTION_KEY
+from lupin_bridge.serving.http_protocol import HttpConnection
+from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import SettingError, Settings
 
 log = logging.getLogger(__name__)
@@ -270,11 +272,10 @@ class AccessControl:
         if person is not None:
             scope["state"] = {**scope.get("state", {}), PERSON_KEY: person}
         people = self._access.people
-        if people is None or scope["type"] == "http":
+        if people is None:
             await self._app(scope, receive, send)
             return
-        connection: Connection = scope["state"][CONNECTION_KEY]
-        looking = asyncio.create_task(_end_with(people, person, connection))
+        looking = asyncio.create_task(_end_with(people, person, scope))
         try:
             await self._app(scope, receive, send)
         finally:
@@ -398,11 +399,13 @@ def _with_cors(send: Send, foreign: str | None) -> Send:
     return send_with_cors
 
 
-async def _end_with(people: People, person: Person | None, connection: Connection) -> None:
-    """Close the connection when the session ends; without a person, at the first account."""
+async def _end_with(people: People, person: Person | None, scope: Scope) -> None:
+    """End the connection with the session; without a person, at the first account."""
     try:
+        await asyncio.sleep(_POLL_S)
         while people.may_stay(person):
             await asyncio.sleep(_POLL_S)
     except AccountError as error:
-        log.warning("%s: the open connections of %s are closed", error, person and person.name)
+        log.warning("%s: an open connection is closed", error)
+    connection: HttpConnection | Connection = scope["state"][CONNECTION_KEY]
     connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended: sign in again")

@@ -125,21 +125,15 @@ class BehindProxies:
         self._proxies = proxies
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass the request on with its client, scheme and path."""
+        """Pass the request on with its client, scheme, user and path."""
         if scope["type"] in ("http", "websocket"):
-            scope = {
-                **scope,
-                **self._forwarded(scope),
-                **self._path(scope),
-                **self._user(scope),
-            }
+            is_trusted = self._proxies.trusts((scope.get("client") or ("", 0))[0])
+            forwarded = {**self._forwarded(scope), **self._user(scope)} if is_trusted else {}
+            scope = {**scope, **forwarded, **self._path(scope)}
         await self._app(scope, receive, send)
 
     def _forwarded(self, scope: Scope) -> dict[str, object]:
-        peer = (scope.get("client") or ("", 0))[0]
-        if not self._proxies.trusts(peer):
-            return {}
-        headers = Headers(scope=scope)
+        peer, headers = (scope.get("client") or ("", 0))[0], Headers(scope=scope)
         client = self._proxies.client(peer, headers.getlist("x-forwarded-for"))
         forwarded: dict[str, object] = {"client": (client, 0)}
         # Of several, the last: it is from the nearest proxy, which is the one that we trust.
@@ -152,10 +146,8 @@ class BehindProxies:
     def _user(self, scope: Scope) -> dict[str, object]:
         """Whom the proxy names, for the state: nothing else reads the header."""
         header = self._proxies.user_header.lower().encode()
-        if not header:
-            return {}
         named = [value for name, value in scope["headers"] if name == header]
-        if not named or not self._proxies.trusts((scope.get("client") or ("", 0))[0]):
+        if not named:
             return {}
         # There are two if the proxy adds its line to the client's instead of replacing that.
         name = named[0].decode("latin-1").strip() if len(named) == 1 else ""

@@ -159,7 +159,7 @@ class AlarmFeed:
         self._is_caught_up = False
         self._generation = 0
         self.missed = 0
-        self._origin: AlarmSource = "journal"
+        self._alarm_source: AlarmSource = "journal"
         self._seen: Snapshot | None = None
         self._received: list[PastWrite] = []
         self._received_number = _FIRST_RECEIVED
@@ -190,7 +190,7 @@ class AlarmFeed:
         self._withdraw_silences()
         is_new = before is None or before.tags != now.tags
         is_kept = update.journal.state not in _NOT_RECORDED
-        if is_kept == (self._origin == "heard"):
+        if is_kept == (self._alarm_source == "heard"):
             self._begin("journal" if is_kept else "heard")
             before, is_new = None, True
         if is_new:
@@ -240,7 +240,7 @@ class AlarmFeed:
     def _begin(self, says: AlarmSource) -> None:
         """Forget all that was read, to read it again."""
         self._generation += 1
-        self._origin = says
+        self._alarm_source = says
         self._fold, self._last, self._journal = None, 0, ""
         self._received, self._seen = [], None
         self._since_ns, self._is_caught_up = None, False
@@ -253,12 +253,12 @@ class AlarmFeed:
             await self._wake.wait()
             await asyncio.sleep(JOURNAL_S)
             self._wake.clear()
-            read = self._take_received() if self._origin == "heard" else self._follow()
+            read = self._take_received() if self._alarm_source == "heard" else self._follow()
             if (error := await reading.run(read)) is None:
                 answered_s = loop.time()
             else:
                 if not isinstance(error, _UNREADABLE):
-                    self._begin(self._origin)
+                    self._begin(self._alarm_source)
                 self._ask_again(RETRY_S)
                 await publishing.run(self._publish_silence(loop.time() - answered_s))
             await asyncio.sleep(REST_S)
@@ -338,7 +338,7 @@ class AlarmFeed:
         self._note_days(found.days)
         is_past, self._is_caught_up = not self._is_caught_up, True
         begins_ns = moment_ns if self._since_ns is None else self._since_ns
-        self._board.put(board, replace(change, is_past=is_past), self._origin, begins_ns)
+        self._board.put(board, replace(change, is_past=is_past), self._alarm_source, begins_ns)
 
     async def _publish_silence(self, unanswered_s: float) -> None:
         """Publish silences with the last known alarms: nothing else reports that a twin is gone.

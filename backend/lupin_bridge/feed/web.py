@@ -80,7 +80,7 @@ class FollowedLog:
         self._folder: Path | None = None
         self.world = World("unknown")
         self._reported = UNKNOWN_JOURNAL
-        self._is_heard = False
+        self._has_report = False
         self._own: Path | None = None
         self._followed: Followed | None = None
         self._is_known = asyncio.Event()
@@ -107,7 +107,7 @@ class FollowedLog:
     def on_update(self, journal: Condition) -> None:
         """Take the twin's report on its journal; the last one stays valid until a new one comes."""
         if journal.state is not JournalState.UNKNOWN and journal.journal_id:
-            self._reported, self._is_heard = journal, True
+            self._reported, self._has_report = journal, True
 
     async def explain(self, error: NotRemembered) -> NotRemembered:
         """The error; if it is about a copy, one that says so, as this process makes that anew."""
@@ -155,7 +155,7 @@ class FollowedLog:
         """Find the log, or copy its new rows; returns the time to wait before the next call, s."""
         own = self._named or Path(self._reported.path)
         found = await self._on_worker(lambda: _found(own))
-        if found is not None and self._named is not None and not self._is_heard:
+        if found is not None and self._named is not None and not self._has_report:
             self._reported = Condition(
                 JournalState.RECORDING,
                 complete_ns=found.complete_ns,

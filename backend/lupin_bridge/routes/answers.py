@@ -353,20 +353,6 @@ async def computed(
 # --- answers of the past --------------------------------------------------------------------------
 
 
-async def respond_newest(request: Request, field: Field) -> Response:
-    """A field of the newest state.
-
-    Raises:
-        AdmissionError: past a limit.
-        Exception: what the field raised.
-
-    """
-    bridge = bridge_of(request)
-    etag = field.newest_etag(bridge.source.revision())
-    client = client_of(request)
-    return await respond(request, etag, lambda: newest_field(bridge, client, field, etag), etag)
-
-
 async def newest_field(bridge: Bridge, client: str, field: Field, etag: str) -> Answer:
     """A field of the newest state, which is computed in this process, and cached.
 

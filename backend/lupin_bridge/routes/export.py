@@ -33,7 +33,8 @@ from lupin_bridge.routes.answers import (
     within_time,
 )
 from lupin_bridge.serving.admission import Admission, Export, Limits
-from lupin_bridge.serving.http_protocol import CONNECTION_KEY, HttpConnection
+from lupin_bridge.serving.connections import CONNECTION_KEY
+from lupin_bridge.serving.http_protocol import HttpConnection
 from lupin_twin.core.past import NotRemembered, PastRefused, PastRow
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.runtime.workers import Workers
@@ -146,7 +147,7 @@ async def respond_export(
 
     def evict() -> None:
         log.warning("the export of %s is slow and is ended for another one", client)
-        connection.break_off()
+        connection.dismiss()
 
     facts = {"title": "lupin-twin: readings and failed attempts", **_facts(known, given, now_ns)}
 
@@ -223,7 +224,7 @@ class ExportResponse(StreamingResponse):
             is_known = isinstance(error, (NotRemembered, PastRefused, TwinUnavailableError))
             log.warning("an export ended early: %s", error, exc_info=not is_known)
             connection: HttpConnection = scope["state"][CONNECTION_KEY]
-            connection.break_off()
+            connection.dismiss()
             await client_left(request)  # or the server would log an answer without an end
         finally:
             self._release()

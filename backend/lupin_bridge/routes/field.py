@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any, Final, TypeVar
 
 from annotated_types import Interval
@@ -25,6 +26,7 @@ from lupin_bridge.routes.answers import (
     error_response,
     json_response,
     list_header,
+    newest_field,
     newest_of,
     on_worker,
     read_route,
@@ -32,7 +34,6 @@ from lupin_bridge.routes.answers import (
     refusing,
     respond,
     respond_as_of,
-    respond_newest,
     respond_past,
 )
 from lupin_bridge.serving.admission import Answer, ClientLimitError, content_answer
@@ -159,7 +160,9 @@ async def _answer(request: Request, field_format: FieldFormat | None) -> Respons
     field = Field(at_ns, query, field_format, source.rules, source.occupancy_map(), bridge.criteria)
     field.check()
     if at_ns is None:
-        return await respond_newest(request, field)
+        etag, client = field.newest_etag(source.revision()), client_of(request)
+        compute = partial(newest_field, bridge, client, field, etag)
+        return await respond(request, etag, compute, etag)
     return await respond_as_of(request, field)
 
 

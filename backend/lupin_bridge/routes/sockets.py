@@ -33,7 +33,8 @@ from lupin_bridge.field import JSON, FieldQuery, refusal_json
 from lupin_bridge.past.fields import Field
 from lupin_bridge.routes.answers import error_response, newest_field
 from lupin_bridge.serving.admission import AdmissionError
-from lupin_bridge.serving.ws_protocol import BINARY, CONNECTION_KEY, Connection, frame_head
+from lupin_bridge.serving.connections import CONNECTION_KEY
+from lupin_bridge.serving.ws_protocol import BINARY, Connection, frame_head
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.hub import CLOSE_TRY_AGAIN_LATER, Client, Hub
 from lupin_bridge.stream.schema import GetFieldResponse

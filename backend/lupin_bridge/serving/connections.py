@@ -60,6 +60,9 @@ def refusal(status: int, detail: str, *headers: str) -> bytes:
     return "\r\n".join((*head, "", "")).encode() + body
 
 
+# The key of the connection in the state of a request's scope.
+CONNECTION_KEY: Final = "connection"
+
 # Unsent bytes that the kernel may buffer, apart from those in flight. Its default is 4 MB
 # (tcp_wmem): for a slow reader, minutes of old states.
 UNSENT_BYTES: Final = 128 * 1024

@@ -26,7 +26,14 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 
 from lupin_bridge.serving.admission import client_key
-from lupin_bridge.serving.connections import CLOSE_GRACE_S, bound_unsent, refusal, reset, tear_down
+from lupin_bridge.serving.connections import (
+    CLOSE_GRACE_S,
+    CONNECTION_KEY,
+    bound_unsent,
+    refusal,
+    reset,
+    tear_down,
+)
 
 log = logging.getLogger(__name__)
 
@@ -43,8 +50,6 @@ HIGH_WATER_BYTES: Final = 64 * 1024
 # readings.
 BODIES: Final = (b"/api/notes", b"/api/observations", b"/api/push", b"/api/signin")
 MAX_BODY_BYTES: Final = 8 * 1024
-# The key of the connection in the state of a request's scope.
-CONNECTION_KEY: Final = "http_connection"
 
 # h11's own: where a head ends.
 _BLANK_LINE: Final = re.compile(rb"\n\r?\n")
@@ -190,7 +195,7 @@ class HttpConnection(H11Protocol):
         """Tear the connection down and forget what was still to be sent."""
         tear_down(self.transport)
 
-    def break_off(self) -> None:
+    def dismiss(self, _code: int = 0, _reason: str = "") -> None:
         """Abort an answer, so that its client does not take the part for the whole.
 
         In HTTP/1.0, where the end of the connection ends an answer, only a reset can show that.
@@ -268,7 +273,7 @@ class HttpConnection(H11Protocol):
         if self._deadline is not None:
             self._deadline.cancel()
         self._idle_since_s = self.loop.time()
-        self._deadline = self.loop.call_later(self.timeout_keep_alive, self._parse_request)
+        self._deadline = self.loop.call_later(self.timeout_keep_alive, self._abort_if_idle)
 
     def _stop_waiting(self) -> None:
         for deadline in (self._deadline, self._reader_deadline):
@@ -276,7 +281,7 @@ class HttpConnection(H11Protocol):
                 deadline.cancel()
         self._deadline = self._reader_deadline = None
 
-    def _parse_request(self) -> None:
+    def _abort_if_idle(self) -> None:
         if not self._is_at_work:
             self.abort()
 

@@ -18,7 +18,7 @@ from websockets.frames import CloseCode, Frame
 from websockets.protocol import State
 
 from lupin_bridge.serving.admission import RateLimit, client_key
-from lupin_bridge.serving.connections import CLOSE_GRACE_S, refusal, tear_down
+from lupin_bridge.serving.connections import CLOSE_GRACE_S, CONNECTION_KEY, refusal, tear_down
 
 # --- a client's JSON ------------------------------------------------------------------------------
 
@@ -103,8 +103,6 @@ def frame_head(first: int, length: int) -> bytes:
 
 
 # --- a connection ---------------------------------------------------------------------------------
-
-CONNECTION_KEY = "connection"
 
 # Limits on input: clients send little, and all others wait while it is parsed, 3 ms for
 # `READ_BYTES` of the smallest frames. A page subscribes a few times as it opens, a layout with

@@ -109,10 +109,6 @@ class Status:
         """Whether clients that were sent `before` must be notified."""
         return before is None or before.news() != self.news()
 
-    def has_more_detail_than(self, before: Status) -> bool:
-        """Whether people who were shown `before` must be notified."""
-        return (before.reason, before.message) != (self.reason, self.message)
-
     def news(self) -> tuple[object, ...]:
         """What is sent at once when it changes; not a journal's backlog, which always changes."""
         now, journal = self.update, self.update.journal

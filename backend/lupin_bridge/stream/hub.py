@@ -186,9 +186,12 @@ class Hub:
 
     def evict(self, client: Client, reason: str) -> None:
         """Close a client to make room for others; it may try again."""
+        self._close(client, CLOSE_TRY_AGAIN_LATER, reason)
+
+    def _close(self, client: Client, code: int, reason: str) -> None:
         self.leave(client)
         self.clients_dismissed += 1
-        client.connection.dismiss(CLOSE_TRY_AGAIN_LATER, reason)
+        client.connection.dismiss(code, reason)
 
     def evict_all(self, reason: str) -> None:
         """Close every client; each may try again."""
@@ -317,11 +320,8 @@ class Hub:
             and now_s - client.blocked_since_s >= self.client_timeout_s
         ]
         for client in stuck:
-            self.leave(client)
-            client.connection.dismiss(
-                CLOSE_POLICY, f"accepted no frame for {self.client_timeout_s:g} s"
-            )
-        self.clients_dismissed += len(stuck)
+            reason = f"accepted no frame for {self.client_timeout_s:g} s"
+            self._close(client, CLOSE_POLICY, reason)
         return len(stuck)
 
     def _status_at_once(self, now_s: float) -> bytes:

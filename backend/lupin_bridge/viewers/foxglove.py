@@ -28,7 +28,7 @@ import orjson
 
 from lupin_bridge.feed.relay import Sample, TwinNames, schema_text, topics_of
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
-from lupin_bridge.feed.tasks import Periodic
+from lupin_bridge.feed.tasks import Periodic, Shared
 from lupin_bridge.serving.ws_protocol import members_of, shown
 from lupin_twin.core import interfaces
 from lupin_twin.core.interfaces import Topic
@@ -306,7 +306,7 @@ class Offer:
         self._missing: set[str] = set()
         self._followers: dict[Callable[[int | None], None], None] = {}
         self._following: tuple[Periodic, ...] = ()
-        self._looking: asyncio.Task[None] | None = None
+        self._looking: Shared[None] = Shared()
 
     @asynccontextmanager
     async def followed(self, on_news: Callable[[int | None], None]) -> AsyncIterator[None]:
@@ -334,9 +334,7 @@ class Offer:
 
     async def look(self) -> None:
         """Bring the channels up to date; concurrent callers share one look."""
-        if self._looking is None or self._looking.done():
-            self._looking = asyncio.create_task(self._look(), name="foxglove look")
-        await asyncio.shield(self._looking)
+        await self._looking.get("look", self._look)
 
     async def _look(self) -> None:
         names = self._source.names

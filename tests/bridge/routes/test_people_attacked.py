@@ -1,5 +1,6 @@
 """Notes and accounts under attack. A real server, real sockets."""
 
+import errno
 import json
 import signal
 import socket
@@ -90,7 +91,14 @@ def test_a_revoked_token_opens_nothing_even_when_another_has_its_name(
     with (
         httpx.Client(base_url=live.url, timeout=PATIENCE_S, headers=OWN) as program,
         open_websocket(ws, additional_headers=theirs) as thief,
+        raw_http.connect(live.url, room=4_096) as reader,
     ):
+        reader.sendall(
+            b"GET /api/field.npy?sensor_type=co2&resolution=0.01&bbox_min_x=0&bbox_min_y=0"
+            b"&bbox_max_x=9&bbox_max_y=9 HTTP/1.1\r\nHost: localhost\r\n"
+            + f"Authorization: Bearer {leaked}\r\n\r\n".encode()
+        )
+        assert reader.recv(16) == b"HTTP/1.1 200 OK\r", "the rest waits for its reader"
         assert program.post("/api/signin", headers=theirs).status_code == 204
         assert program.get("/api/session").json()["name"] == "plc"
         assert thief.recv(timeout=PATIENCE_S)
@@ -99,6 +107,8 @@ def test_a_revoked_token_opens_nothing_even_when_another_has_its_name(
         assert program.get("/api/state").status_code == 401
         assert program.get("/api/state", headers=theirs).status_code == 401
         assert "the session has ended" in end_of(thief)
+        error = wait_for(lambda: reader.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR), "its end")
+        assert error == errno.ECONNRESET
     assert live.get("/api/session", ours).json()["name"] == "plc"
 
 

@@ -8,7 +8,7 @@ from contextlib import ExitStack, suppress
 import httpx
 import pytest
 
-from lupin_bridge.routes import answers as answers_of
+from lupin_bridge.routes import field as field_routes
 from lupin_bridge.serving.admission import (
     BURST_S,
     EXPORTS,
@@ -226,7 +226,7 @@ async def test_a_place_is_held_until_the_answer_exists_and_is_then_released(
         await time_is_up.wait()
         raise TimeoutError
 
-    monkeypatch.setattr(answers_of, "newest_field", never)
+    monkeypatch.setattr(field_routes, "newest_field", never)
     async with running(Limits(concurrency=3)) as it:
         fields = [f"/api/field{QUERY.replace('co2', f'{n}')}" for n in range(8)]
         requested = [asyncio.create_task(it.http.get(field)) for field in fields]

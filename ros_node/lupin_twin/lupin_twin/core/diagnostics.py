@@ -295,14 +295,13 @@ def self_report(reported: Iterable[Finding]) -> SelfReport:
         if (key := f"{_PROBLEM}{number}") in inputs
     )
     both = {**values.get("drops", {}), **values.get("queues", {})}
-    dropped = {reason: _number(both, reason) for reason in _REASONS}
     recent = tuple(
         Recent(reason, shown(both.get(_LAST + reason, "")), count)
         for reason in _REASONS
         if (count := _number(both, _RECENTLY + reason))
     )
     counts = Counts(
-        MappingProxyType({reason: count for reason, count in dropped.items() if count}),
+        MappingProxyType({why: count for why in _REASONS if (count := _number(both, why))}),
         _number(both, _ERRORS),
         recent,
     )

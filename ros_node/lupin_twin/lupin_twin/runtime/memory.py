@@ -114,7 +114,9 @@ class Memory:
             self._clock, self._lead_ns = now, lead_ns
             if turn is not None:
                 self.journal.begin(now, turn=turn, before_ns=before.stamp_ns)
-                self._clamp_places(now)
+                self._placed_ns = {
+                    tag_id: min(at_ns, now.stamp_ns) for tag_id, at_ns in self._placed_ns.items()
+                }
         return self._take(self.journal.take_restored(), now)
 
     def apply(self, write: Write, arrival_ns: int) -> Drop | None:
@@ -168,11 +170,6 @@ class Memory:
                 self.journal.write(pin, now_ns)
         if not isinstance(write, Pin):
             self.journal.write(write, now_ns)
-
-    def _clamp_places(self, now: Clock) -> None:
-        self._placed_ns = {
-            tag_id: min(at_ns, now.stamp_ns) for tag_id, at_ns in self._placed_ns.items()
-        }
 
     # --- what was known before ----------------------------------------------------------------
 

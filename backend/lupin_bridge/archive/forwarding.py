@@ -71,8 +71,7 @@ _EPOCH: Final = (
 )
 _HERE: Final = (
     "INSERT INTO forwarder VALUES (%s, %s, %s, now(), now()) ON CONFLICT (site) DO UPDATE SET"
-    " machine = excluded.machine, process = excluded.process, since = excluded.since,"
-    " heard_at = excluded.heard_at"
+    " machine = excluded.machine, process = excluded.process, since = excluded.since"
 )
 
 
@@ -114,7 +113,7 @@ class Sink:
         execute("INSERT INTO site VALUES (%s, '') ON CONFLICT DO NOTHING", (self._site,))
 
     def beat(self) -> None:
-        """Note in the archive that this forwarder is alive."""
+        """Note in the archive that this forwarder is alive, and can write."""
         self._connection.execute(
             "UPDATE forwarder SET heard_at = now() WHERE site = %s", (self._site,)
         )
@@ -279,7 +278,7 @@ class Forwarder:
         source.claim()
         with closing(Sink(self._url, self._site)) as sink:
             epoch = sink.begin(source, self._say)
-            is_full, is_said, received_s = True, False, time.monotonic()
+            is_full, is_said, beaten_s = True, False, 0.0
             while not source.is_replaced():
                 if source.has_changed() or is_full:
                     batch = source.batch(epoch)
@@ -290,11 +289,12 @@ class Forwarder:
                 if not is_said:  # not earlier: a reachable archive may still refuse every batch
                     self._last_problem, self._wait_s, is_said = "", FIRST_WAIT_S, True
                     self._say(f"site {self._site} is forwarded to {place_of(self._url)}")
+                # Not earlier either: who cannot write is not live.
+                if time.monotonic() - beaten_s >= _HEARTBEAT_S:
+                    beaten_s = time.monotonic()
+                    sink.beat()
                 if once and not is_full:
                     return
-                if time.monotonic() - received_s >= _HEARTBEAT_S:
-                    received_s = time.monotonic()
-                    sink.beat()
                 if not is_full:
                     time.sleep(_POLL_S)
 

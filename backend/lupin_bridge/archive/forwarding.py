@@ -79,8 +79,7 @@ _OTHER: Final = (
 _HERE: Final = (
     "INSERT INTO forwarder VALUES (:site, :machine, :process, now(), now())"
     " ON CONFLICT (site) DO UPDATE SET"
-    " machine = excluded.machine, process = excluded.process, since = excluded.since,"
-    " heard_at = excluded.heard_at"
+    " machine = excluded.machine, process = excluded.process, since = excluded.since"
 )
 
 
@@ -117,7 +116,7 @@ class Sink:
         execute("INSERT INTO site VALUES (:site, '') ON CONFLICT DO NOTHING")
 
     def beat(self) -> None:
-        """Note in the archive that this forwarder is alive."""
+        """Note in the archive that this forwarder is alive, and can write."""
         self._log.execute("UPDATE forwarder SET heard_at = now() WHERE site = :site")
 
     def begin(self, source: Source, say: Callable[[str], None]) -> Epoch:
@@ -251,7 +250,7 @@ class Forwarder:
         source.claim()
         with closing(Sink(self._url, self._site)) as sink:
             epoch = sink.begin(source, self._say)
-            is_full, is_said, received_s = True, False, time.monotonic()
+            is_full, is_said, beaten_s = True, False, 0.0
             while not source.is_replaced():
                 if source.has_changed() or is_full:
                     batch = source.batch(epoch)
@@ -262,11 +261,12 @@ class Forwarder:
                 if not is_said:  # not earlier: a reachable archive may still refuse every batch
                     self._last_problem, self._wait_s, is_said = "", FIRST_WAIT_S, True
                     self._say(f"site {self._site} is forwarded to {place_of(self._url)}")
+                # Not earlier either: who cannot write is not live.
+                if time.monotonic() - beaten_s >= _HEARTBEAT_S:
+                    beaten_s = time.monotonic()
+                    sink.beat()
                 if once and not is_full:
                     return
-                if time.monotonic() - received_s >= _HEARTBEAT_S:
-                    received_s = time.monotonic()
-                    sink.beat()
                 if not is_full:
                     time.sleep(_POLL_S)
 

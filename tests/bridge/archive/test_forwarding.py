@@ -273,6 +273,7 @@ def test_an_archive_that_is_reached_and_takes_nothing_is_said_once(
     archive.do("REVOKE INSERT ON scan FROM lupin_forwarder")
     with forwarder(archive, journal) as process:
         process.wait_for_output("is not forwarded: the archive does not permit it")
+        heard = archive.select("SELECT heard_at FROM forwarder")
         for _ in range(2):
             here = archive.select("SELECT since FROM forwarder")
             wait_for(
@@ -280,6 +281,7 @@ def test_an_archive_that_is_reached_and_takes_nothing_is_said_once(
                 "another try",
             )
         assert process.output.count("\n") == 1
+        assert archive.select("SELECT heard_at FROM forwarder") == heard, "it is not live"
         archive.do("GRANT INSERT ON scan TO lupin_forwarder")
         wait_until_equal(archive, journal)
         process.wait_for_output(f"site {archive.site} is forwarded to")

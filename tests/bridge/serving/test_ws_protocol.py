@@ -51,10 +51,12 @@ async def test_a_socket_that_is_writable_again_reports_it_by_itself(domain: int)
             assert (taken, freed[0]) == ([False], True)
 
 
-async def test_after_an_answer_that_nobody_reads_a_handshake_ends_at_the_timeout(
-    domain: int,
+@pytest.mark.parametrize("is_dismissed", [False, True])
+async def test_after_an_answer_that_nobody_reads_a_handshake_ends_at_the_timeout_or_when_dismissed(
+    domain: int, is_dismissed: bool
 ) -> None:
-    async with running(Limits(client_timeout_s=3.0), SILENT) as served:
+    limits = Limits(client_timeout_s=5 * PATIENCE_S if is_dismissed else 3.0)
+    async with running(limits, SILENT) as served:
         connections = served.server.server_state.connections
 
         def handed_over() -> Connection | None:
@@ -68,6 +70,8 @@ async def test_after_an_answer_that_nobody_reads_a_handshake_ends_at_the_timeout
             connection = await until(handed_over, "its handover")
             assert connection is not None
             assert not connection.can_take
+            if is_dismissed:  # as when its session has ended
+                connection.dismiss(CloseCode.POLICY_VIOLATION, "the session has ended")
             await until(lambda: not connections, "its end")
 
 

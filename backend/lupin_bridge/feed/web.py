@@ -54,10 +54,7 @@ RETAINED_S: Final = 90 * 86_400.0
 # Estimated time to write a lot into the file, s.
 _WRITE_S: Final = 0.05
 _FILE_ERRORS: Final = (Foreign, OSError, *FILE_ERRORS)
-_ERRORS: Final = (
-    *(NotALotError, NotRemembered, PastRefused, TwinUnavailableError),
-    *_FILE_ERRORS,
-)
+_ERRORS: Final = (NotALotError, NotRemembered, PastRefused, TwinUnavailableError, *_FILE_ERRORS)
 
 
 class FollowedLog:
@@ -79,6 +76,8 @@ class FollowedLog:
         self._workers = workers
         self._folder: Path | None = None
         self.world = World("unknown")
+        # Why the copy cannot be written; empty: it can be, as far as known.
+        self.fault = ""
         self._reported = UNKNOWN_JOURNAL
         self._is_heard = False
         self._own: Path | None = None
@@ -93,16 +92,7 @@ class FollowedLog:
             return replace(self._reported, path=str(self._own))
         if self._followed is None:
             return None
-        # A copy can be read even if its twin is gone, or cannot write its journal.
-        return replace(
-            self._reported,
-            state=JournalState.RECORDING,
-            path=str(self._path(self._followed.journal)),
-            written=self._followed.last,
-            complete_ns=self._followed.complete_ns,
-            kept_ns=self._followed.kept_ns,
-            simulated_ns=self._followed.simulated_ns,
-        )
+        return _readable(self._reported, self._followed, self._path(self._followed.journal))
 
     def on_update(self, journal: Condition) -> None:
         """Take the twin's report on its journal; the last one stays valid until a new one comes."""
@@ -150,11 +140,13 @@ class FollowedLog:
                 self._is_known.set()
             try:
                 await asyncio.sleep(await self._look())
-                why = ""
+                why = self.fault = ""
             except _ERRORS as error:
                 if str(error) != why:
                     why = str(error)
                     log.info("the twin's journal is not followed: %s", why)
+                elif isinstance(error, _FILE_ERRORS):
+                    self.fault = f"This bridge's copy of the twin's journal: {why}"
                 await asyncio.sleep(RETRY_S)
             except Exception:  # nobody waits for this task, and all of the past depends on it
                 log.exception("the twin's journal is not followed")
@@ -165,12 +157,8 @@ class FollowedLog:
         own = self._named or Path(self._reported.path)
         found = await self._on_worker(lambda: _found(own))
         if found is not None and self._named is not None and not self._is_heard:
-            self._reported = Condition(
-                JournalState.RECORDING,
-                complete_ns=found.complete_ns,
-                kept_ns=found.kept_ns,
-                journal_id=found.journal,
-                simulated_ns=found.simulated_ns,
+            self._reported = replace(
+                _readable(self._reported, found, own), journal_id=found.journal
             )
         twin = self._reported
         if not twin.journal_id:
@@ -203,6 +191,19 @@ class FollowedLog:
         return await asyncio.wrap_future(self._workers.submit(lambda _: work(), _WRITE_S))
 
 
+def _readable(reported: Condition, found: Followed, path: Path) -> Condition:
+    """The condition of a file that can be read, even if its twin is gone, or cannot write it."""
+    return replace(
+        reported,
+        state=JournalState.RECORDING,
+        path=str(path),
+        written=found.last,
+        complete_ns=found.complete_ns,
+        kept_ns=found.kept_ns,
+        simulated_ns=found.simulated_ns,
+    )
+
+
 def _newest(folder: Path) -> Followed | None:
     """The copy that was written last; old ones among the others are deleted."""
     files = sorted(folder.glob("*.sqlite"), key=lambda it: it.stat().st_mtime)
@@ -229,10 +230,9 @@ def _last(path: Path) -> int:
 
 def _found(path: Path) -> Followed | None:
     """A file's journal id and extent; None: it does not exist, or cannot be read."""
-    try:
+    with contextlib.suppress(*_FILE_ERRORS):
         return followed(path)
-    except _FILE_ERRORS:
-        return None
+    return None
 
 
 # --- the source -----------------------------------------------------------------------------------
@@ -324,8 +324,11 @@ class WebTwin(RosSource[WebNode]):
             return node
 
         def on_update(update: TwinUpdate) -> None:
-            self._log.on_update(update.journal)
-            on_state(update)
+            journal, fault = update.journal, self._log.fault
+            self._log.on_update(journal)
+            if fault:  # or alarms would come from a copy that lags, and nobody would know
+                journal = replace(journal, state=JournalState.FAILING, detail=fault)
+            on_state(replace(update, journal=journal))
 
         self._join = partial(self._start_thread, make_node, on_update, on_death)
         await self._join()

@@ -218,7 +218,7 @@ def test_accounts_on_a_disk_that_was_read_only_at_the_start_can_be_written_after
         accounts.listed("account")
         disk.be("readonly")
         with (
-            served("--accounts", str(path), afresh=True, **disk.env) as live,
+            served("--accounts", str(path), trust=False, afresh=True, **disk.env) as live,
             live.client() as browser,
         ):
             refused = sign_in(browser, "anna")

@@ -1,5 +1,6 @@
 """`web` reads its twin's file, or a copy that follows it: the same answers, also without a twin."""
 
+import os
 import sqlite3
 import sys
 import time
@@ -11,6 +12,7 @@ from typing import Any
 import httpx
 import pytest
 
+from tests.support.disk import Disk, build
 from tests.support.domains import own_domain, ros_env
 from tests.support.journal import select
 from tests.support.live import attached, wait_until_ready
@@ -75,12 +77,21 @@ class Apart:
         options = (*OFTEN, "-p", f"journal:={JOURNAL}")
         return self.stack.enter_context(Process([*command, *options], ros_env(self.domain)))
 
-    def start_web(self, *more: str, beside: bool = False, state: Path | None = None) -> Bridge:
+    def start_web(
+        self,
+        *more: str,
+        beside: bool = False,
+        state: Path | None = None,
+        disk: Disk | None = None,
+    ) -> Bridge:
         program = [sys.executable, "-m", "tests.support.limited", "web", "--port", "0"]
         held = limits(alarm_days=3_652, answers_per_s=10_000)
         options = [*held, "--day-hours", "00:00-00:00", *more]
         where = ["env", "-C", str(self.folder)] if beside else []
-        env = ros_env(self.domain, XDG_STATE_HOME=str(state or self.state), PYTHONPATH=str(ROOT))
+        folder = str(state or self.state)
+        path = f"{ROOT}:{os.environ.get('PYTHONPATH', '')}"
+        others = {} if disk is None else disk.env
+        env = ros_env(self.domain, XDG_STATE_HOME=folder, PYTHONPATH=path, **others)
         process = self.stack.enter_context(Process([*where, *program, *options], env))
         return self.stack.enter_context(attached(process, self.peer))
 
@@ -250,3 +261,30 @@ def test_a_damaged_copy_is_made_anew(apart: Apart, harm: str) -> None:
     apart.peer.observe(scan(harm, {"co2": 1.0}, stamp_s=at_s))
     requested(apart.following, f"/api/tags/{harm}", at=at_s)
     assert apart.followed() == [file]
+
+
+def test_a_copy_on_a_full_disk_is_reported_and_alarms_go_on(own: Apart, tmp_path: Path) -> None:
+    folder = tmp_path / "full"
+    folder.mkdir()
+    disk = Disk(folder, build(tmp_path), tmp_path / "control")
+    live = own.start_web(state=folder, disk=disk)
+
+    def is_told(state: str) -> bool:
+        # What is written again and again in its place needs no room.
+        own.peer.observe(*(scan(f"{n}", {"co2": 1.0, "x" * 200: 1.0}) for n in range(40)))
+        told = live.get("/readyz").json().get("journal", {"state": "", "detail": ""})
+        return bool(told["state"] == state and ("copy" in told["detail"]) == (state == "failing"))
+
+    def has_alarm(source: str) -> bool:
+        own.peer.observe(scan("hot", {"temperature": 60.0}))
+        told = live.json("/api/alarms")
+        return bool(told["source"] == source) and "hot" in {it["tag_id"] for it in told["alarms"]}
+
+    wait_for(lambda: is_told("recording"), "a copy")
+    wait_for(lambda: live.json("/api/alarms")["source"] == "journal", "its alarms")
+    disk.be("full")
+    wait_for(lambda: is_told("failing"), "the full disk")
+    wait_for(lambda: has_alarm("heard"), "the alarm, from what is received")
+    disk.be("well")
+    wait_for(lambda: is_told("recording"), "the copy to go on")
+    wait_for(lambda: has_alarm("journal"), "the alarm, from the copy")

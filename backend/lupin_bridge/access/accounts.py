@@ -16,14 +16,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 from urllib.parse import quote
 
-from lupin_bridge.access.credentials import (
-    AccountError,
-    Kind,
-    Person,
-    Role,
-    check_name,
-    digest,
-)
+from lupin_bridge.access.credentials import AccountError, Kind, Person, Role, check_name, digest
 from lupin_bridge.settings import Settings
 from lupin_twin.journal.paths import state_folder
 

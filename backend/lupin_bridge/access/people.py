@@ -227,7 +227,12 @@ class People:
             with closing(Accounts(self._path, is_writer=True)) as accounts:
                 return work(accounts, int(time.time()))
 
-        return await self._on_thread(do, 2 * MAX_WAITING)
+        try:
+            return await self._on_thread(do, 2 * MAX_WAITING)
+        except AccountError:
+            # SQLite shares what was read-only when it was opened: the next reader opens it again.
+            self._inode = 0
+            raise
 
     async def _on_thread(self, work: Callable[[], ResultT], most: int = MAX_WAITING) -> ResultT:
         if self._waiting >= most:
@@ -250,10 +255,10 @@ class People:
         except OSError as error:
             raise AccountError(f"the file of accounts cannot be read: {error}") from error
         if self._accounts is None or inode != self._inode:
-            found = Accounts(self._path)
             if self._accounts is not None:
                 self._accounts.close()
-            self._accounts, self._inode = found, inode
+            self._accounts = None
+            self._accounts, self._inode = Accounts(self._path), inode
         return self._accounts
 
 

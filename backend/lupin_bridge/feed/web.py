@@ -54,10 +54,7 @@ RETAINED_S: Final = 90 * 86_400.0
 # Estimated time to write a lot into the file, s.
 _WRITE_S: Final = 0.05
 _FILE_ERRORS: Final = (Foreign, OSError, *FILE_ERRORS)
-_ERRORS: Final = (
-    *(NotALotError, NotRemembered, PastRefused, TwinUnavailableError),
-    *_FILE_ERRORS,
-)
+_ERRORS: Final = (NotALotError, NotRemembered, PastRefused, TwinUnavailableError, *_FILE_ERRORS)
 
 
 class FollowedLog:
@@ -79,6 +76,8 @@ class FollowedLog:
         self._workers = workers
         self._folder: Path | None = None
         self.world = World("unknown")
+        # Why the copy cannot be written; empty: it can be, as far as known.
+        self.fault = ""
         self._reported = UNKNOWN_JOURNAL
         self._has_report = False
         self._own: Path | None = None
@@ -93,16 +92,7 @@ class FollowedLog:
             return replace(self._reported, path=str(self._own))
         if self._followed is None:
             return None
-        # A copy can be read even if its twin is gone, or cannot write its journal.
-        return replace(
-            self._reported,
-            state=JournalState.RECORDING,
-            path=str(self._path(self._followed.journal)),
-            written=self._followed.last,
-            complete_ns=self._followed.complete_ns,
-            kept_ns=self._followed.kept_ns,
-            simulated_ns=self._followed.simulated_ns,
-        )
+        return _readable(self._reported, self._followed, self._path(self._followed.journal))
 
     def on_update(self, journal: Condition) -> None:
         """Take the twin's report on its journal; the last one stays valid until a new one comes."""
@@ -145,10 +135,18 @@ class FollowedLog:
 
     async def _keep(self) -> None:
         guard = Guard("the twin's journal is not followed", *_ERRORS)
+        is_failing = False
         while True:
             if self.condition is not None:
                 self._is_known.set()
             pause_s = await guard.run(self._look())
+            # Not the first: a copy that is damaged or foreign is deleted, and made anew.
+            was_failing, is_failing = is_failing, isinstance(pause_s, _FILE_ERRORS)
+            self.fault = (
+                f"This bridge's copy of the twin's journal: {pause_s}"
+                if was_failing and is_failing
+                else ""
+            )
             await asyncio.sleep(RETRY_S if isinstance(pause_s, Exception) else pause_s)
 
     async def _look(self) -> float:
@@ -156,12 +154,8 @@ class FollowedLog:
         own = self._named or Path(self._reported.path)
         found = await self._on_worker(lambda: _found(own))
         if found is not None and self._named is not None and not self._has_report:
-            self._reported = Condition(
-                JournalState.RECORDING,
-                complete_ns=found.complete_ns,
-                kept_ns=found.kept_ns,
-                journal_id=found.journal,
-                simulated_ns=found.simulated_ns,
+            self._reported = replace(
+                _readable(self._reported, found, own), journal_id=found.journal
             )
         twin = self._reported
         if not twin.journal_id:
@@ -194,6 +188,19 @@ class FollowedLog:
         return await asyncio.wrap_future(self._workers.submit(lambda _: work(), _WRITE_S))
 
 
+def _readable(reported: Condition, found: Followed, path: Path) -> Condition:
+    """The condition of a file that can be read, even if its twin is gone, or cannot write it."""
+    return replace(
+        reported,
+        state=JournalState.RECORDING,
+        path=str(path),
+        written=found.last,
+        complete_ns=found.complete_ns,
+        kept_ns=found.kept_ns,
+        simulated_ns=found.simulated_ns,
+    )
+
+
 def _newest(folder: Path) -> Followed | None:
     """The copy that was written last; old ones among the others are deleted."""
     files = sorted(folder.glob("*.sqlite"), key=lambda it: it.stat().st_mtime)
@@ -220,10 +227,9 @@ def _last(path: Path) -> int:
 
 def _found(path: Path) -> Followed | None:
     """A file's journal id and extent; None: it does not exist, or cannot be read."""
-    try:
+    with contextlib.suppress(*_FILE_ERRORS):
         return followed(path)
-    except _FILE_ERRORS:
-        return None
+    return None
 
 
 # --- the source -----------------------------------------------------------------------------------
@@ -315,8 +321,11 @@ class WebTwin(RosSource[WebNode]):
             return node
 
         def on_update(update: TwinUpdate) -> None:
-            self._log.on_update(update.journal)
-            on_state(update)
+            journal, fault = update.journal, self._log.fault
+            self._log.on_update(journal)
+            if fault:  # or alarms would come from a copy that lags, and nobody would know
+                journal = replace(journal, state=JournalState.FAILING, detail=fault)
+            on_state(replace(update, journal=journal))
 
         self._join = partial(self._start_thread, make_node, on_update, on_death)
         await self._join()

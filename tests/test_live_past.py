@@ -201,6 +201,6 @@ def test_a_flood_of_expensive_queries_loses_no_observation(domain: int, tmp_path
         wait_for(lambda: select(journal, last), "the last of them in the journal", meanwhile=query)
         assert select(journal, "SELECT count(*) FROM scan") == [(SITE + OBSERVED,)]
         assert "they arrived too fast" not in twin.output
-        assert len(answers) > before + 2, "asked all the while"
+        assert len(answers) > before + 2, "queries all the while"
         assert {len(answer.state.tags) for answer in answers if answer.ok} <= {SITE, SITE + 1}
         assert all(answer.ok for answer in answers)

@@ -50,7 +50,7 @@ def replicas() -> Iterator[tuple[Bridge, Bridge]]:
         for running in (first, second):
             running.tag("b")
             running.tag("a", lambda tag: tag["flowers"])
-        wait_for(lambda: pictures_agree(first, second), "the newest map at both")
+        wait_for(lambda: pictures_agree(first, second), "the latest map at both")
         yield first, second
 
 

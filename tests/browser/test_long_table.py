@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 from playwright.sync_api import expect
 
-from tests.bench.house_double import greenhouse_of
+from tests.bench.greenhouse_double import greenhouse_of
 from tests.browser.hmi import PHONE, WIDE, Hmi, OpenPage
 from tests.browser.places import place
 from tests.browser.test_accessibility import violations
@@ -25,7 +25,7 @@ OpenHouse = Callable[..., Hmi]
 
 # A server that is silent for 3 s causes a message above the table, which has less room then.
 GOES_ON = """
-setInterval(() => { if (document.querySelector('tr[data-tag-id]')) house.idle(); }, 500);
+setInterval(() => { if (document.querySelector('tr[data-tag-id]')) greenhouse.idle(); }, 500);
 """
 
 
@@ -105,7 +105,7 @@ def test_axe_and_windows_of_any_size(open_greenhouse: OpenHouse) -> None:
 def test_all_rows_have_the_same_height_whatever_they_contain(open_greenhouse: OpenHouse) -> None:
     """Otherwise the table would jump as it scrolls."""
     hmi = open_greenhouse(300)
-    hmi.page.evaluate("house.unpin(3)")
+    hmi.page.evaluate("greenhouse.unpin(3)")
     expect(hmi.row("3")).to_have_attribute("data-pinned", "false")
     heights = hmi.page.locator("tr[data-tag-id]").evaluate_all(
         "rows => rows.map(row => row.getBoundingClientRect().height)"

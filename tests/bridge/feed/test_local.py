@@ -19,7 +19,7 @@ from lupin_twin.ros.node import TwinNode
 from lupin_twin.runtime.estimates import ReportRequest
 from tests.support.inprocess import started
 from tests.support.journal import SECOND, append, scan
-from tests.support.looking import Endless
+from tests.support.past_queries import Endless
 from tests.support.waiting import PATIENCE_S, until
 
 

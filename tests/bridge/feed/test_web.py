@@ -69,7 +69,7 @@ async def test_without_a_twin_the_missing_service_is_named(domain: int) -> None:
     async with started(WebTwin) as (twin, _):
         with pytest.raises(TwinUnavailableError, match=f"no twin offers {NAME}: is it running"):
             await twin.estimate_report(ReportRequest("co2"))
-    assert all(task.get_name() != LOOK for task in asyncio.all_tasks()), "it looks on"
+    assert all(task.get_name() != LOOK for task in asyncio.all_tasks()), "it goes on searching"
 
 
 async def test_after_a_silence_a_new_node_recovers_everything(domain: int) -> None:

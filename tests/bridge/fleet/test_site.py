@@ -201,7 +201,7 @@ def test_killing_a_replica_interrupts_no_client(replicas: Replicas) -> None:
         replicas.pages[0].process.send(signal.SIGKILL)
         with httpx.Client(base_url=replicas.url, trust_env=False, timeout=PATIENCE_S) as client:
             for path in ("/api/sites", f"/{ANSWERS[1]}") * 10:
-                assert client.get(path).status_code in (200, 429), "nginx asks another replica"
+                assert client.get(path).status_code in (200, 429), "nginx tries another replica"
         for _ in range(2):
             write(replicas.journal, [scan("new", time.time_ns(), temperature=50.0)])
         returns = 0

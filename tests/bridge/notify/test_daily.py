@@ -121,7 +121,7 @@ async def begun(
 async def looks(greenhouse: Greenhouse, count: int = 5) -> None:
     """Wait until it has checked that often and found nothing to do."""
     before = greenhouse.looks
-    await until(lambda: greenhouse.looks >= before + count, "more looks")
+    await until(lambda: greenhouse.looks >= before + count, "more checks")
 
 
 async def test_each_day_is_sent_once_from_the_first_hour_on_also_after_restarts(
@@ -188,7 +188,7 @@ async def test_a_report_that_is_not_accepted_is_sent_again_also_by_the_next_proc
 ) -> None:
     async with begun(tmp_path, status(500)) as (greenhouse, at):
         greenhouse.ros_time_ns = ns("2026-05-02T07:00Z")
-        await until(lambda: len(at.posted) >= 3, "some tries")
+        await until(lambda: len(at.posted) >= 3, "some attempts")
     with receiver(status(503), status(200), port=at.port) as again:
         async with sending(greenhouse, tmp_path, at.port):
             await until(lambda: len(again.posted) == 2, "the report")
@@ -313,7 +313,7 @@ async def test_a_broker_gets_it_once_reachable_and_retains_it(
             with Subscriber(broker) as received:
                 await until(lambda: received.last("lt/house/report"), "the report")
             with Subscriber(broker, "lt/house/report") as later:
-                await until(lambda: later.last("lt/house/report"), "that it is kept")
+                await until(lambda: later.last("lt/house/report"), "that it is retained")
                 found = later.last("lt/house/report")
         assert found["id"] == "report.20260502T060000Z"
         assert found["report"] == [ns("2026-05-01T06:00Z"), ns("2026-05-02T06:00Z")]

@@ -200,7 +200,7 @@ async def test_a_broker_that_is_absent_appears_and_is_killed_gets_the_latest_sta
 ) -> None:
     broker, greenhouse = Broker(tmp_path), Greenhouse()
     async with telling(broker, greenhouse) as channel:
-        await until(lambda: channel.condition.failed > 2, "some tries")
+        await until(lambda: channel.condition.failed > 2, "some attempts")
         assert channel.condition.detail == f"[Errno 111] Connection refused ({broker.url})"
         for _ in range(2):
             with broker.running() as process, Subscriber(broker) as received:
@@ -210,7 +210,7 @@ async def test_a_broker_that_is_absent_appears_and_is_killed_gets_the_latest_sta
                 process.kill()
             await until(lambda: not channel.condition.is_connected, "the end of the broker")
             greenhouse.scan()
-        await until(lambda: channel.condition.waiting == 2, "the tag and the house")
+        await until(lambda: channel.condition.waiting == 2, "the tag and the greenhouse")
 
 
 async def test_after_a_failure_to_read_the_greenhouse_everything_is_sent_again(
@@ -236,7 +236,7 @@ async def test_a_broker_that_hangs_is_reconnected_and_gets_the_latest_state(tmp_
             greenhouse.scan()
             failed = channel.condition.failed
             # Once while connected, and then without accepting a connection.
-            await until(lambda: channel.condition.failed > failed + 2, "some tries")
+            await until(lambda: channel.condition.failed > failed + 2, "some attempts")
             assert not channel.condition.is_connected
             last = greenhouse.scan()
             process.thaw()

@@ -202,7 +202,7 @@ async def test_a_browser_that_unsubscribes_meanwhile_is_not_tried_again(tmp_path
         on.subscribe(one)
         on.board.show([alarm("7")])
         await until(lambda: on.service.posted, "the first try")
-        await until(lambda: on.push.condition.waiting == 0, "the end of its tries")
+        await until(lambda: on.push.condition.waiting == 0, "the end of its attempts")
         on.subscribe(other)
         on.board.show([alarm("7"), alarm("8")])
         await until(lambda: on.posted_to(other), "the next alarm")

@@ -267,7 +267,7 @@ def test_a_rate_holds_on_average_and_a_status_does_not_wait_for_it(stage: Stage)
     stage.hub.serve_all(5.9)
     assert socket.got[-1] == "stale"
     stage.hub.serve_all(6.0)
-    assert socket.got[-1] == 55, "the newest, when its time has come"
+    assert socket.got[-1] == 55, "the latest, when its time has come"
 
 
 def test_a_late_frame_does_not_delay_those_after_it_unless_the_interval_is_strict(

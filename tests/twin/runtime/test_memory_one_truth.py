@@ -259,9 +259,7 @@ def test_a_clock_that_contradicts_the_log_begins_nothing_and_is_reported(path: P
     before = path.read_bytes()
     with twin(path, BOOT) as life:
         assert life.doubts()
-        wait_for(
-            lambda: life.memory.condition.state is JournalState.DOUBTING, "the doubt to be told"
-        )
+        wait_for(lambda: life.memory.condition.state is JournalState.DOUBTING, "the reported doubt")
         assert "contradicts the journal" in life.memory.condition.detail
         assert life.live["7"].readings[0].value == 1.0
         assert life.live["7"].pose == HERE

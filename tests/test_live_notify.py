@@ -17,9 +17,7 @@ from tests.support.web import bridge, filled
 READING = "farm/gh1/tags/a_2Fb/readings/temperature"
 
 
-def test_an_observation_reaches_the_broker_and_a_killed_bridge_is_offline(
-    tmp_path: Path,
-) -> None:
+def test_an_observation_reaches_the_broker_and_a_killed_bridge_is_offline(tmp_path: Path) -> None:
     broker = Broker(tmp_path, wants_password=True)
     options = ("--mqtt-url", broker.url, "--mqtt-user", USER, "--mqtt-prefix", "farm/gh1")
     secrets: Any = {"LUPIN_MQTT_PASSWORD": PASSWORD, "LUPIN_WEBHOOK_SECRET": "s" * 16}
@@ -60,9 +58,7 @@ def test_an_observation_reaches_the_broker_and_a_killed_bridge_is_offline(
         wait_for(lambda: received.of("farm/gh1/status")[-1:] == [b"offline"], "the will")
 
 
-def test_a_flood_at_home_assistants_topic_costs_no_memory(
-    tmp_path: Path,
-) -> None:
+def test_a_flood_at_home_assistants_topic_costs_no_memory(tmp_path: Path) -> None:
     broker = Broker(tmp_path)
     with (
         broker.running() as process,

@@ -64,9 +64,7 @@ def is_recording(running: Bridge) -> bool:
     return bool(running.json("/readyz")["journal"]["state"] == "recording")
 
 
-def test_both_serve_the_same(
-    replicas: tuple[Bridge, Bridge],
-) -> None:
+def test_both_serve_the_same(replicas: tuple[Bridge, Bridge]) -> None:
     first, second = replicas
     for running in replicas:
         # The twin reports its journal's state once a second, in /diagnostics.

@@ -228,9 +228,7 @@ async def test_a_status_is_sent_when_it_changes_and_only_then() -> None:
     ]
 
 
-async def test_a_busy_memory_at_the_start_is_queried_again(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+async def test_a_busy_memory_at_the_start_is_queried_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lupin_bridge.alarms.feed.LEARN_AGAIN_S", 0.01)
     hour_ns = 3_600 * 10**9
     async with Stage() as stage:

@@ -280,9 +280,7 @@ def test_with_json_logging_every_line_of_a_bridge_is_an_object(domain: int) -> N
     assert "Traceback" in reported["error"]["message"], "a trace of many lines is in one"
 
 
-def test_every_severity_is_passed_on_once_with_its_level(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_every_severity_is_passed_on_once_with_its_level(caplog: pytest.LogCaptureFixture) -> None:
     forward()
     forward()
     logger = get_logger("probe")

@@ -181,9 +181,7 @@ async def test_a_node_is_replaced_after_ever_longer_silences_of_five_minutes_at_
     assert joined == [begun + each for begun in (1_000.0, 3_000.0) for each in after]
 
 
-async def test_refusals_are_the_services_and_no_wait_is_endless(
-    domain: int,
-) -> None:
+async def test_refusals_are_the_services_and_no_wait_is_endless(domain: int) -> None:
     def answer(request: Any, response: Any) -> Any:
         response.error_message = SAYS[request.sensor_type]
         return response

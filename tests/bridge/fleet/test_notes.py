@@ -200,9 +200,7 @@ def names(page: Page, headers: dict[str, str]) -> set[str]:
     return {it["site"] for it in page.http.get("/api/sites", headers=headers).json()["sites"]}
 
 
-def test_on_a_bridge_of_another_or_an_unnamed_site_they_may_do_nothing(
-    accounts: Path,
-) -> None:
+def test_on_a_bridge_of_another_or_an_unnamed_site_they_may_do_nothing(accounts: Path) -> None:
     with served("--accounts", str(accounts)) as live:
         wait_for(lambda: live.get("/api/state", ALL).status_code == 200, "the state")
         answer = live.get("/api/state", OURS)

@@ -293,9 +293,7 @@ def test_days_follow_each_other_without_a_gap_for_a_year() -> None:
                 end_ns = next_ns
 
 
-async def test_a_broker_gets_it_once_reachable_and_retains_it(
-    tmp_path: Path,
-) -> None:
+async def test_a_broker_gets_it_once_reachable_and_retains_it(tmp_path: Path) -> None:
     broker = Broker(tmp_path)
     target = Targets.of(Settings(mqtt_url=broker.url, mqtt_prefix="lt"), Secrets()).mqtt
     assert target is not None

@@ -82,9 +82,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
         yield broker
 
 
-async def test_a_broker_gets_the_state_and_then_its_changes(
-    shared: Broker,
-) -> None:
+async def test_a_broker_gets_the_state_and_then_its_changes(shared: Broker) -> None:
     greenhouse = Greenhouse()
     greenhouse.now = seen(tag("a", temperature=20.0), alarms=(alarm("a"),))
     with Subscriber(shared) as received:
@@ -103,9 +101,7 @@ async def test_a_broker_gets_the_state_and_then_its_changes(
     assert {message.qos for message in received.received} == {1}
 
 
-async def test_only_the_status_is_retained_and_that_of_removed_tags_is_not(
-    shared: Broker,
-) -> None:
+async def test_only_the_status_is_retained_and_that_of_removed_tags_is_not(shared: Broker) -> None:
     greenhouse = Greenhouse()
     greenhouse.now = seen(tag("a", temperature=20.0), tag("gone", temperature=20.0))
     async with telling(shared, greenhouse) as channel:

@@ -121,9 +121,7 @@ def test_large_computations_have_few_places(total: int) -> None:
 
 
 @pytest.mark.parametrize("is_large", [False, True])
-def test_six_clients_at_their_limit_each_get_a_place(
-    is_large: bool,
-) -> None:
+def test_six_clients_at_their_limit_each_get_a_place(is_large: bool) -> None:
     limits = Limits()
     admission = Admission(limits)
     places: Counter[str] = Counter()

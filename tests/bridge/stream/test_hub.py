@@ -312,9 +312,7 @@ def test_a_new_client_gets_the_alarms_after_the_first_state_and_not_before(stage
     assert late.got == ["live", 1, {"b"}]
 
 
-def test_the_robot_comes_after_a_state_once_and_no_more_often_than_states(
-    stage: Stage,
-) -> None:
+def test_the_robot_comes_after_a_state_once_and_no_more_often_than_states(stage: Stage) -> None:
     usual, seldom = Socket(), Socket()
     stage.join(usual, wants_status=False)
     stage.join(seldom, wants_status=False, min_interval_s=10.0)

@@ -35,9 +35,7 @@ def robot() -> Robot:
     return Robot(Lateness())
 
 
-def test_a_clock_that_stepped_back_is_reported_after_a_few_messages(
-    robot: Robot,
-) -> None:
+def test_a_clock_that_stepped_back_is_reported_after_a_few_messages(robot: Robot) -> None:
     robot.says(1000.0, 1001.0)
     assert robot.says(*(400.0 + i for i in range(FEW))) == []
     assert robot.lateness.counts == {}

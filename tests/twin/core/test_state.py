@@ -111,9 +111,7 @@ BOUNDED: dict[str, tuple[Callable[[int], Scan | Inspection], int]] = {
 
 
 @pytest.mark.parametrize("what", BOUNDED)
-def test_exactly_the_limit_is_allowed_and_one_more_is_refused_with_both_numbers(
-    what: str,
-) -> None:
+def test_exactly_the_limit_is_allowed_and_one_more_is_refused_with_both_numbers(what: str) -> None:
     make, limit = BOUNDED[what]
     store = TwinStore()
     write(store, make(limit))

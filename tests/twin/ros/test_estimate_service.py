@@ -76,9 +76,7 @@ def test_an_impossible_estimate_is_refused_by_name(
     assert answer == GetEstimate.Response(error_message=answer.error_message)
 
 
-def test_a_flood_of_expensive_requests_delays_no_observation_and_no_field(
-    peer: Peer,
-) -> None:
+def test_a_flood_of_expensive_requests_delays_no_observation_and_no_field(peer: Peer) -> None:
     dearest = {**BOX, "resolution": 0.003}
     clients = [
         peer.node.create_client(kind, name)

@@ -71,7 +71,7 @@ def test_a_flood_at_home_assistants_topic_costs_no_memory(tmp_path: Path) -> Non
         before_mb = resident_mb(live.process.pid)
         reset_peak(live.process.pid)
         for retain in (False, True):
-            received.say("homeassistant/status", "x" * 64_000_000, retain=retain)
+            received.publish("homeassistant/status", "x" * 64_000_000, retain=retain)
         live.peer.observe(scan("a", {"co2": 500.0}, at=(1, 1)))
         wait_for(lambda: received.last(reading)["value"] == 500.0, "the next one")
         assert peak_mb(live.process.pid) - before_mb < 32

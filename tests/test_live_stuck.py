@@ -224,9 +224,9 @@ def test_a_message_has_a_limit_of_pieces_however_small(server: Server, path: str
     begin = masked(TEXT, b"", fin=False) + piece * (MAX_PIECES - 2)
     bye = masked(CLOSE, b"\x03\xe8")
     with RawClient(url(server), path) as most:
-        assert most.say(begin + masked(CONT, b"") + bye)[-1] == (CLOSE, b"\x03\xe8")
+        assert most.exchange(begin + masked(CONT, b"") + bye)[-1] == (CLOSE, b"\x03\xe8")
     with RawClient(url(server), path) as endless:
-        message = endless.say(begin + piece + masked(CONT, b""))
+        message = endless.exchange(begin + piece + masked(CONT, b""))
         assert message[-1] == (CLOSE, b"\x03\xf0sent a message in more than %d pieces" % MAX_PIECES)
 
 

@@ -32,7 +32,7 @@ def has_mapped(process: Process, name: str) -> Callable[[], bool]:
     return lambda: name in maps.read_text()
 
 
-def said_beside_its_start(process: Process) -> list[str]:
+def output_after_start(process: Process) -> list[str]:
     """The twin's output without the lines of its start, if it got so far."""
     starts = ("lupin_twin in ROS domain", "[lupin_twin]: journal /")
     return [
@@ -47,7 +47,7 @@ def test_a_signal_during_the_start_ends_it_without_errors(domain: int, moment: s
         wait_for(lambda: holds_back(process), "signals to be held back")
         wait_for(has_mapped(process, name), moment)
         assert process.stop(number) == 0
-        assert said_beside_its_start(process) == []
+        assert output_after_start(process) == []
 
 
 def test_a_signal_between_many_callbacks_ends_it_without_errors(domain: int) -> None:
@@ -55,7 +55,7 @@ def test_a_signal_between_many_callbacks_ends_it_without_errors(domain: int) -> 
     with twin_node(domain, *fast) as process, Peer(domain) as peer:
         peer.state(lambda _: True, "a state")
         assert process.stop(signal.SIGTERM) == 0
-        assert said_beside_its_start(process) == []
+        assert output_after_start(process) == []
 
 
 def test_it_goes_on_after_it_was_stopped_for_a_while(domain: int) -> None:

@@ -113,7 +113,7 @@ async def test_only_the_status_is_retained_and_that_of_removed_tags_is_not(share
             await until(lambda: received.of(gone) == [b""], "the end of its entity")
         with Subscriber(shared) as late:
             # Sent in order: whoever has this has all that was retained.
-            late.say("marker", "x")
+            late.publish("marker", "x")
             await until(lambda: late.of("marker"), "the marker")
             retained = {it.topic: it.payload for it in late.received if it.retain}
             assert retained == {"lt/status": b"online"}
@@ -127,8 +127,8 @@ async def test_at_home_assistants_birth_everything_is_sent_again(
         await until(lambda: channel.condition.sent > 1, "the first time")
         await until(lambda: channel.condition.waiting == 0, "the first time")
         with Subscriber(shared) as later:
-            later.say("homeassistant/status", "offline")
-            later.say("homeassistant/status", "online")
+            later.publish("homeassistant/status", "offline")
+            later.publish("homeassistant/status", "online")
             await reported(later, 20.0)
             await until(lambda: later.last("lt/tags/a/health"), "the verdict")
             assert later.last(CONFIG)["expire_after"] == 600
@@ -146,8 +146,8 @@ async def test_a_flood_of_wills_and_births_is_answered_at_a_limited_rate(
             await until(lambda: received.of("lt/status")[-1:] == [b"online"], "that it has come")
             before, sent = len(received.of("lt/status")), channel.condition.sent
             for _ in range(100):
-                received.say("lt/status", "offline", retain=True)
-                received.say("homeassistant/status", "online")
+                received.publish("lt/status", "offline", retain=True)
+                received.publish("homeassistant/status", "online")
             await until(lambda: received.of("lt/status")[-1:] == [b"online"], "that it is there")
             await until(lambda: channel.condition.sent > sent, "all of it, again")
             wording = received.of("lt/status")[before:]

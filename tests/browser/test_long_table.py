@@ -102,9 +102,7 @@ def test_axe_and_windows_of_any_size(open_greenhouse: OpenGreenhouse) -> None:
     assert hmi.row("3").evaluate("row => getComputedStyle(row).outlineWidth") == "3px"
 
 
-def test_all_rows_have_the_same_height_whatever_they_contain(
-    open_greenhouse: OpenGreenhouse,
-) -> None:
+def test_all_rows_have_the_same_height(open_greenhouse: OpenGreenhouse) -> None:
     """Otherwise the table would jump as it scrolls."""
     hmi = open_greenhouse(300)
     hmi.page.evaluate("greenhouse.unpin(3)")

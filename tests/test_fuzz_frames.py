@@ -135,20 +135,20 @@ def test_unexpected_frames_change_nothing(
     with live.listen() as healthy:
         before = healthy.until("state")["seq"]
         with RawClient(live.url, path) as client:
-            client.say(masked(CLOSE, b"\x03\xe8"))
+            client.exchange(masked(CLOSE, b"\x03\xe8"))
         memory, files = resident_mb(pid), open_files(pid)
         reset_peak(pid)
         for _ in range(frames // at_once):
             with RawClient(live.url, path) as client:
                 message = b"".join(anything(chance) for _ in range(at_once))
-                received = client.say(message + masked(CLOSE, struct.pack("!H", NORMAL)))
+                received = client.exchange(message + masked(CLOSE, struct.pack("!H", NORMAL)))
                 # A message in pieces has more than one frame: some connections send too much.
                 assert closing_code(received) in (NORMAL, POLICY)
             healthy.rest()
         for _ in range(BROKEN_CONNECTIONS):
             with RawClient(live.url, path) as client:
                 message = anything(chance) + broken(chance)
-                assert closing_code(client.say(message)) in (
+                assert closing_code(client.exchange(message)) in (
                     *(None, NORMAL, PROTOCOL_ERROR, NO_UTF8, TOO_BIG),
                 )
         healthy.rest()

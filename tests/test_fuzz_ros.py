@@ -135,9 +135,7 @@ def test_observations_past_every_bound_are_survived(both: tuple[Bridge, Bridge])
     survive(both, lambda _: None)
 
 
-def test_a_discovery_of_more_tags_than_allowed_is_survived(
-    both: tuple[Bridge, Bridge],
-) -> None:
+def test_a_discovery_of_more_tags_than_allowed_is_survived(both: tuple[Bridge, Bridge]) -> None:
     # As a batch, and as one message that is too large: 30,000 tags of long names have 11 MB.
     survive(both, lambda peer: peer.discover(discovered({"": pose(), "twice": pose(NAN)})))
     before = len(both[0].json("/api/state")["tags"])

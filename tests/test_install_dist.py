@@ -108,9 +108,7 @@ def test_a_demo_runs_from_the_wheels_without_compiler_and_node(
         assert field.content.startswith(b"\x89PNG")
 
 
-def test_the_image_copies_from_its_context_and_builds_from_the_sdist(
-    dist: Path,
-) -> None:
+def test_the_image_copies_from_its_context_and_builds_from_the_sdist(dist: Path) -> None:
     text = (dist / "Containerfile").read_text(encoding="utf-8").replace("\\\n", " ")
     copied = [line.split()[1:-1] for line in text.splitlines() if line.startswith("COPY ")]
     sources = [source for words in copied for source in words if not words[0].startswith("--from")]

@@ -25,9 +25,7 @@ def test_kills_at_any_moment_lose_and_double_nothing(postgresql: Postgres, tmp_p
     assert kill_and_compare(postgresql, tmp_path, MOMENTS, seed=23) > MOMENTS * 20
 
 
-def test_a_promoted_standby_is_used_and_has_what_was_acknowledged(
-    tmp_path: Path,
-) -> None:
+def test_a_promoted_standby_is_used_and_has_what_was_acknowledged(tmp_path: Path) -> None:
     journal = tmp_path / "journal.sqlite"
     with server() as primary:
         archive = Archive(primary)

@@ -143,9 +143,7 @@ def goes_back_during_a_query_of_the_past(twin: Bridge, live: Bridge, seconds: in
     assert [reading["value"] for reading in tag["readings"]] == [2.0]
 
 
-def test_a_clock_that_contradicts_the_journal_is_reported(
-    tmp_path: Path,
-) -> None:
+def test_a_clock_that_contradicts_the_journal_is_reported(tmp_path: Path) -> None:
     """As on a board that starts years ago; `test_memory_one_truth` has what a twin does then."""
     journal = tmp_path / "journal.sqlite"
     append(journal, [row("1", time.time_ns() + 86_400 * SECOND, co2=5.0)])

@@ -145,7 +145,7 @@ def test_no_process_imports_a_module_of_the_working_folder(tmp_path: Path) -> No
         wait_for(lambda: patrols_of(process.pid), "the patrol")
         wait_until_ready(live)
         at_s = now_s(live) - 600
-        wait_for(lambda: as_of(live, "/api/state", at_s).status_code == 200, "a look back")
+        wait_for(lambda: as_of(live, "/api/state", at_s).status_code == 200, "the past")
         reported = imported.read_text() if imported.exists() else ""
         assert reported == ""
         assert as_of(live, "/api/state", at_s).json()["tags"], "the past that was filled in"

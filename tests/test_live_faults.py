@@ -218,7 +218,7 @@ def goes_on_after(live: Bridge, fault: Callable[[], object], counted: int) -> No
     ("fault", "counted"),
     [
         pytest.param(lambda peer: peer.observe(scan("boom-scan")), 1, id="a scan"),
-        pytest.param(lambda peer: peer.observe(inspection("boom-look")), 1, id="a look at flowers"),
+        pytest.param(lambda peer: peer.observe(inspection("boom-look")), 1, id="an inspection"),
         pytest.param(lambda peer: peer.discover(discovered({"boom-find": pose()})), 1, id="a find"),
         pytest.param(lambda peer: peer.publish_map(occupancy_grid([[0] * 13])), 1, id="a map"),
         pytest.param(lambda peer: peer.observe(scan("boom-state")), 2, id="the state's timer"),

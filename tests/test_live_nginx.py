@@ -226,7 +226,7 @@ def stop_under_load(greenhouse: Greenhouse, number: signal.Signals) -> None:
         for thread in threads:
             thread.join()
     assert [screen.problem for screen in screens] == [None] * CLIENTS
-    assert load.refused == [], "nginx asks another replica"
+    assert load.refused == [], "nginx tries another replica"
 
 
 @dataclass

@@ -158,11 +158,11 @@ def own(tmp_path: Path) -> Iterator[Apart]:
 def requested(live: Bridge, path: str, **query: Any) -> Any:
     """The JSON, as soon as the twin's service was found."""
 
-    def look_for() -> Any:
+    def find() -> Any:
         response = live.get(path, **query)
         return response if response.status_code == 200 else None
 
-    return wait_for(look_for, f"{path} {query}").json()
+    return wait_for(find, f"{path} {query}").json()
 
 
 def test_without_its_twin_web_still_answers_and_goes_on_with_the_next(own: Apart) -> None:

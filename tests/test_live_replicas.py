@@ -50,7 +50,7 @@ def replicas() -> Iterator[tuple[Bridge, Bridge]]:
         for running in (first, second):
             running.tag("b")
             running.tag("a", lambda tag: tag["flowers"])
-        wait_for(lambda: pictures_agree(first, second), "the newest map at both")
+        wait_for(lambda: pictures_agree(first, second), "the latest map at both")
         yield first, second
 
 
@@ -64,9 +64,7 @@ def is_recording(running: Bridge) -> bool:
     return bool(running.json("/readyz")["journal"]["state"] == "recording")
 
 
-def test_both_serve_the_same(
-    replicas: tuple[Bridge, Bridge],
-) -> None:
+def test_both_serve_the_same(replicas: tuple[Bridge, Bridge]) -> None:
     first, second = replicas
     for running in replicas:
         # The twin reports its journal's state once a second, in /diagnostics.

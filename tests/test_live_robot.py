@@ -244,7 +244,7 @@ def test_a_flood_of_poses_costs_the_ros_thread_no_more_than_one_a_second(alone: 
     assert took_s > 2.5
     assert sent[0] > 100
     first, *_, last = (frame["position"]["x"] for frame in frames)
-    assert last - first > 20, "the newest, and none that waited"
+    assert last - first > 20, "the latest, and none that waited"
     reported = robot(alone)
     assert len(reported["trail"]) <= took_s + 3
 

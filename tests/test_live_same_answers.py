@@ -46,9 +46,7 @@ def test_a_fleet_answers_for_a_site_byte_for_byte_as_its_serve(
     assert different == [], different
 
 
-def test_a_past_moment_depends_only_on_the_log_up_to_then_on_every_server(
-    tmp_path: Path,
-) -> None:
+def test_a_past_moment_depends_only_on_the_log_up_to_then_on_every_server(tmp_path: Path) -> None:
     """Judged by no interval, day or plants of later; and with the same ETags."""
     journal = Path(shutil.copy(JOURNALS / "day.sqlite", tmp_path / "j.sqlite"))
     requested = [f"/api/health?at={T0 + minutes * 60 + 0.5}" for minutes in range(-30, 14 * 60, 31)]

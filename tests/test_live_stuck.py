@@ -182,11 +182,6 @@ def test_a_request_that_arrives_byte_by_byte_is_gone_after_the_timeout(
         wait_reading(healthy, lambda: all(map(is_removed, every)), "their end")
 
 
-def wait_for_the_answer(client: socket.socket) -> None:
-    """Wait until the WebSocket is there; a client must not send before that."""
-    assert client.recv(1) == b"H"
-
-
 @pytest.mark.parametrize("frame", [PING, EMPTY_TEXT])
 def test_a_flood_ends_its_sender_alone(server: Server, healthy: Listener, frame: bytes) -> None:
     with (
@@ -195,7 +190,7 @@ def test_a_flood_ends_its_sender_alone(server: Server, healthy: Listener, frame:
     ):
         reads.until("state")
         deaf = stack.enter_context(deaf_client(url(server)))
-        wait_for_the_answer(deaf)
+        assert deaf.recv(1) == b"H", "a client must not send before the answer"
         for sender in (reads.connection.socket, deaf):
             # As many as take a server seconds.
             sender.sendall(frame * 20 * FRAMES_AT_ONCE)
@@ -224,9 +219,9 @@ def test_a_message_has_a_limit_of_pieces_however_small(server: Server, path: str
     begin = masked(TEXT, b"", fin=False) + piece * (MAX_PIECES - 2)
     bye = masked(CLOSE, b"\x03\xe8")
     with RawClient(url(server), path) as most:
-        assert most.say(begin + masked(CONT, b"") + bye)[-1] == (CLOSE, b"\x03\xe8")
+        assert most.exchange(begin + masked(CONT, b"") + bye)[-1] == (CLOSE, b"\x03\xe8")
     with RawClient(url(server), path) as endless:
-        message = endless.say(begin + piece + masked(CONT, b""))
+        message = endless.exchange(begin + piece + masked(CONT, b""))
         assert message[-1] == (CLOSE, b"\x03\xf0sent a message in more than %d pieces" % MAX_PIECES)
 
 

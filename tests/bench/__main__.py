@@ -16,7 +16,7 @@ BENCHES = (
     "bench_log",
     "bench_alarms",
     "bench_page",
-    "bench_house",
+    "bench_greenhouse",
     "bench_import",
     "bench_forward",
     "bench_fleet",

@@ -74,9 +74,9 @@ def alarms_of(tags: int) -> None:
     start = time.thread_time()
     found = fold.found(now_ns)
     row(tags, f"start: {len(received):,} scans", sum(lots) + ms_since(start), max(lots))
-    row(tags, f"start: all {len(found.alarms):,} alarms told", ms_since(start))
+    row(tags, f"start: all {len(found.alarms):,} alarms reported", ms_since(start))
     took_mb = resident_mb(os.getpid()) - before_mb
-    print(f"{'':>7}  memory of that, without the scans heard: {took_mb:.0f} MB")
+    print(f"{'':>7}  memory of that, without the scans received: {took_mb:.0f} MB")
     took = []
     for change in range(CHANGES):
         now_ns += S

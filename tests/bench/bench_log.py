@@ -49,7 +49,7 @@ def main() -> None:
 
 
 def report(what: str, figure: str, requested: str) -> None:
-    print(f"{what:58}{figure:>26}   (asked {requested})", flush=True)
+    print(f"{what:58}{figure:>26}   (limit {requested})", flush=True)
 
 
 def write(folder: Path) -> None:

@@ -13,7 +13,7 @@ from playwright.sync_api import Page as BrowserPage
 from lupin_twin.core.state import Write
 from tests.bench.bench_page import chromium
 from tests.support.archive import Archive, forward_once
-from tests.support.fleet import Page, fleet, scans_lately, write
+from tests.support.fleet import Page, fleet, recent_scans, write
 from tests.support.journal import SECOND, scan
 from tests.support.postgres import server
 from tests.support.waiting import wait_for
@@ -36,7 +36,7 @@ def rows() -> list[Write]:
     """Tags in a row, one of them too warm."""
     now_ns = time.time_ns()
     hot = [scan("3", now_ns - ago * SECOND, temperature=45.0) for ago in (2, 1)]
-    return [*scans_lately(tags=TAGS, scans=SCANS), *hot]
+    return [*recent_scans(tags=TAGS, scans=SCANS), *hot]
 
 
 def serve(page: Page) -> None:

@@ -78,14 +78,14 @@ class Greenhouse:
                     tag_id, at_ns, readings, None, 0, "", "robot", at_ns, "patrol", arrival_ns
                 )
                 if self.inspection_days and turn % inspections_every == tag % inspections_every:
-                    yield _look(tag, at_ns, has_pest=(turn + tag) % 97 == 0)
+                    yield _inspection(tag, at_ns, has_pest=(turn + tag) % 97 == 0)
 
 
 def _place(tag: int) -> Pose:
     return Pose(tag % 100 * 0.5, tag // 100 * 0.5, 0.3, 0.0, 0.0, 0.0, 1.0)
 
 
-def _look(tag: int, at_ns: int, *, has_pest: bool) -> Inspection:
+def _inspection(tag: int, at_ns: int, *, has_pest: bool) -> Inspection:
     place = _place(tag)
     blooms = tuple(
         Bloom(place.x + n / 10, place.y + 0.1, 0.4, 0.25, "lupin", 0.9, anomaly=False)

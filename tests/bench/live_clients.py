@@ -83,13 +83,13 @@ class Clients:
                     self._poll.unregister(fd)
             if not has_reported and len(self._joined) == count:
                 has_reported = True
-                tell(joined_s=self._joined)
+                report(joined_s=self._joined)
             if time.monotonic() > self._window[1] + DRAIN_S:
                 self._report()
 
     def _report(self) -> None:
         frames = sum(self._received.values())
-        tell(
+        report(
             delays_s=[round(delay, 5) for delay in self._delays],
             received=self._received,
             frame_bytes=self._bytes / frames if frames else 0,
@@ -187,7 +187,7 @@ def _number(data: bytes, start: int) -> float:
     return float(data[start:end])
 
 
-def tell(**what: object) -> None:
+def report(**what: object) -> None:
     print(json.dumps(what), flush=True)
 
 

@@ -185,7 +185,7 @@ async def test_a_frame_carries_the_latest_of_all_changes_since_the_last() -> Non
     async with Stage(frames_per_s=50.0) as stage:
         for number in range(1, 101):
             stage.script.tell(state(number))
-        await until(lambda: stage.ear.states[-1]["revision"] == "r100", "the newest")
+        await until(lambda: stage.ear.states[-1]["revision"] == "r100", "the latest")
         assert stage.ear.states[0]["revision"] == "r1"
         assert len(stage.ear.states) <= 4
         assert stage.bridge.latest == state(100)
@@ -228,9 +228,7 @@ async def test_a_status_is_sent_when_it_changes_and_only_then() -> None:
     ]
 
 
-async def test_a_busy_memory_at_the_start_is_queried_again(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+async def test_a_busy_memory_at_the_start_is_queried_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lupin_bridge.alarms.feed.LEARN_AGAIN_S", 0.01)
     hour_ns = 3_600 * 10**9
     async with Stage() as stage:
@@ -279,7 +277,7 @@ async def test_the_watch_survives_an_error(
             raise RuntimeError("a defect")
 
         monkeypatch.setattr(stage.bridge.hub, "dismiss_stuck", fail)
-        await until(lambda: looks >= 2, "a second look")
+        await until(lambda: looks >= 2, "a second check")
         assert "the watch had an error and continues" in caplog.text
 
 
@@ -292,7 +290,7 @@ async def test_a_client_with_a_low_rate_gets_the_latest_although_nothing_more_ha
         for number in range(1, 6):
             stage.script.tell(state(number))
         now_s += 0.1
-        await until(lambda: stage.ear.states[-1]["revision"] == "r5", "the newest")
+        await until(lambda: stage.ear.states[-1]["revision"] == "r5", "the latest")
         assert [frame["revision"] for frame in rare.states] == ["r1"]
         now_s += 0.3
         await until(lambda: rare.states[-1]["revision"] == "r5", "the newest in its time")
@@ -323,7 +321,7 @@ async def test_alarms_are_sent_at_once_and_those_right_after_once_a_second() -> 
             put("abcde"[:count])
             for _ in range(5):  # as a frame would, if it were written now
                 await asyncio.wrap_future(stage.script.workers.submit(lambda _: None))
-        await until(lambda: reported()[-1] == 5, "the newest")
+        await until(lambda: reported()[-1] == 5, "the latest")
         assert reported() == [1, 5]
         assert loop.time() - first_s > 0.8 * ALARMS_REST_S
 

@@ -63,13 +63,13 @@ def test_writes_during_the_backup_do_not_get_in_and_do_not_restart_it(tmp_path: 
         writer.execute("PRAGMA journal_mode = WAL")
         writer.execute("CREATE TABLE large AS SELECT zeroblob(20000000) AS bytes")
 
-        def tell(share: float) -> None:
+        def report(share: float) -> None:
             shares.append(share)
             assert len(shares) < 100, "begun anew, again and again"
             writer.execute(f"CREATE TABLE meanwhile_{len(shares)} (number)")
 
         with closing(sqlite3.connect(source, isolation_level=None)) as reader:
-            assert backup(reader, copy, tell) == copy.stat().st_size > 20_000_000
+            assert backup(reader, copy, report) == copy.stat().st_size > 20_000_000
     assert len(shares) > 2
     assert shares == sorted(set(shares))
     with closing(sqlite3.connect(copy)) as found:

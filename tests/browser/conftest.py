@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, expect, sync_playwright
 
+from tests.browser.greenhouse import TAGS, furnish
 from tests.browser.hmi import Hmi, OpenPage, open_hmi
-from tests.browser.house import TAGS, furnish
 from tests.support.domains import own_domain
 from tests.support.ros import Peer, clock_at
 from tests.support.waiting import PATIENCE_S

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import expect
 
+from tests.browser.greenhouse import TAGS
 from tests.browser.hmi import AXE, PHONE, SERVER_GONE, WIDE, Hmi, OpenPage
-from tests.browser.house import TAGS
 from tests.support.messages import scan
 from tests.support.web import Bridge, bridge
 

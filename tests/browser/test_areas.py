@@ -2,8 +2,8 @@
 
 from playwright.sync_api import Route, expect
 
+from tests.browser.greenhouse import TAGS
 from tests.browser.hmi import WIDE, OpenPage
-from tests.browser.house import TAGS
 from tests.browser.places import place
 from tests.browser.test_accessibility import violations
 from tests.support.web import Bridge

@@ -12,7 +12,7 @@ from playwright.sync_api import Page as BrowserPage
 
 from lupin_twin.core.parameters import World
 from tests.support.archive import Archive, forward_once, forwarder
-from tests.support.fleet import Page, fleet, scans_lately, wall, write
+from tests.support.fleet import Page, fleet, recent_scans, wall, write
 from tests.support.journal import recording, scan
 from tests.support.postgres import server
 from tests.support.waiting import wait_for
@@ -47,7 +47,7 @@ def three_sites(archive: Archive, folder: Path) -> Iterator[Page]:
             archive.add_user(site)
             archive.site = site
             journal = folder / f"{site}.sqlite"
-            write(journal, scans_lately(temperature))
+            write(journal, recent_scans(temperature))
             if site == "silent":
                 forward_once(archive, journal)
                 archive.do("UPDATE forwarder SET heard_at = now() - INTERVAL '1 hour'")
@@ -273,7 +273,7 @@ def test_groups_fold_and_can_be_chosen(browser: Browser, archive: Archive) -> No
 def test_simulated_data_are_marked(browser: Browser, archive: Archive, tmp_path: Path) -> None:
     journal = tmp_path / "journal.sqlite"
     with recording(journal, wall(), world=World("simulated")) as twin:
-        for row in scans_lately():
+        for row in recent_scans():
             twin.write(row)
     forward_once(archive, journal)
     with fleet(archive) as served:

@@ -63,12 +63,12 @@ def test_a_wall_screen_rotates_and_the_named_key_leaves_it(
     assert since.right == row.right
     all_of_it = wall.page.locator("li[data-fits]")
 
-    def says_how_many_are_left() -> bool:
+    def shows_how_many_are_left() -> bool:
         left = all_of_it.count() - listed.count()
         more = wall.page.locator(".attention-more")
         return left > 0 and more.all_inner_texts() == [f"+ {left} more"]
 
-    wall.expect(says_how_many_are_left, "how many are left")
+    wall.expect(shows_how_many_are_left, "how many are left")
     wall.expect(lambda: wall.page.evaluate(_NONE_IS_CUT) is True, "each of the list whole")
     expect(legend).to_contain_text("Humidity %")
     wall.page.keyboard.press("Escape")

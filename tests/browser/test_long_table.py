@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 from playwright.sync_api import expect
 
-from tests.bench.house_double import greenhouse_of
+from tests.bench.greenhouse_double import greenhouse_of
 from tests.browser.hmi import PHONE, WIDE, Hmi, OpenPage
 from tests.browser.places import place
 from tests.browser.test_accessibility import violations
@@ -21,17 +21,17 @@ MOST = 100
 IS_ON_THE_SCREEN = """row => { const { x, y, height } = row.getBoundingClientRect();
   return document.elementFromPoint(x + 90, y + height / 2)?.closest('tr') === row; }"""
 
-OpenHouse = Callable[..., Hmi]
+OpenGreenhouse = Callable[..., Hmi]
 
 # A server that is silent for 3 s causes a message above the table, which has less room then.
 GOES_ON = """
-setInterval(() => { if (document.querySelector('tr[data-tag-id]')) house.idle(); }, 500);
+setInterval(() => { if (document.querySelector('tr[data-tag-id]')) greenhouse.idle(); }, 500);
 """
 
 
 @pytest.fixture
-def open_greenhouse(greenhouse: Bridge, open_page: OpenPage) -> OpenHouse:
-    """`open_house(tags, fragment, **options)`: the page with a greenhouse of that many tags."""
+def open_greenhouse(greenhouse: Bridge, open_page: OpenPage) -> OpenGreenhouse:
+    """`open_greenhouse(tags, fragment, **options)`: the page of that many tags."""
 
     def open_one(tags: int = TAGS, fragment: str = "", **options: object) -> Hmi:
         hmi = open_page(greenhouse.url, go=False, **options)
@@ -43,7 +43,7 @@ def open_greenhouse(greenhouse: Bridge, open_page: OpenPage) -> OpenHouse:
     return open_one
 
 
-def test_the_page_renders_few_rows_and_shows_any(open_greenhouse: OpenHouse) -> None:
+def test_the_page_renders_few_rows_and_shows_any(open_greenhouse: OpenGreenhouse) -> None:
     hmi = open_greenhouse()
     expect(hmi.page.get_by_role("table")).to_have_attribute("aria-rowcount", str(TAGS + 1))
     frame = hmi.page.locator(".table-scroll")
@@ -62,7 +62,7 @@ def test_the_page_renders_few_rows_and_shows_any(open_greenhouse: OpenHouse) -> 
 
 
 def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(
-    open_greenhouse: OpenHouse,
+    open_greenhouse: OpenGreenhouse,
 ) -> None:
     hmi = open_greenhouse(fragment=f"tag={TAGS - 3}")
     expect(hmi.row(str(TAGS - 3))).to_be_in_viewport()
@@ -88,7 +88,7 @@ def test_the_chosen_row_comes_into_view_and_the_focus_is_never_lost(
     expect(focused).to_be_in_viewport()
 
 
-def test_axe_and_windows_of_any_size(open_greenhouse: OpenHouse) -> None:
+def test_axe_and_windows_of_any_size(open_greenhouse: OpenGreenhouse) -> None:
     hmi = open_greenhouse(1_000, "tag=3", bypass_csp=True)
     for viewport in (WIDE, PHONE):
         hmi.resize(**viewport)
@@ -102,10 +102,10 @@ def test_axe_and_windows_of_any_size(open_greenhouse: OpenHouse) -> None:
     assert hmi.row("3").evaluate("row => getComputedStyle(row).outlineWidth") == "3px"
 
 
-def test_all_rows_have_the_same_height_whatever_they_contain(open_greenhouse: OpenHouse) -> None:
+def test_all_rows_have_the_same_height(open_greenhouse: OpenGreenhouse) -> None:
     """Otherwise the table would jump as it scrolls."""
     hmi = open_greenhouse(300)
-    hmi.page.evaluate("house.unpin(3)")
+    hmi.page.evaluate("greenhouse.unpin(3)")
     expect(hmi.row("3")).to_have_attribute("data-pinned", "false")
     heights = hmi.page.locator("tr[data-tag-id]").evaluate_all(
         "rows => rows.map(row => row.getBoundingClientRect().height)"

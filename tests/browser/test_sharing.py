@@ -8,8 +8,8 @@ from functools import partial
 from PIL import Image, ImageStat
 from playwright.sync_api import Download, ViewportSize, expect
 
+from tests.browser.greenhouse import TAGS
 from tests.browser.hmi import PHONE, Hmi, OpenPage, changed_box
-from tests.browser.house import TAGS
 from tests.support.web import Bridge
 
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import pytest
 from playwright.sync_api import expect
 
+from tests.browser.greenhouse import TAGS
 from tests.browser.hmi import PHONE, Hmi, OpenPage
-from tests.browser.house import TAGS
 from tests.browser.places import places
 from tests.support.web import Bridge
 

@@ -87,7 +87,7 @@ def test_one_round_shows_the_whole_greenhouse_and_ends(domain: int) -> None:
                 "29 discovered tags",
             )
             peer.until(lambda: received.read_tags == set(tags), "a reading of every tag")
-            peer.until(lambda: received.seen_tags == set(tags), "a look at every tag")
+            peer.until(lambda: received.seen_tags == set(tags), "an inspection of every tag")
             peer.until(lambda: process.exit_code is not None, "the end of the process")
             peer.until(lambda: len(received.observations) >= 2 * 29 + 2, "what came last")
             assert process.exit_code == 0
@@ -182,7 +182,7 @@ def test_topics_and_frame_are_parameters_and_stamps_follow_simulated_time(domain
 def test_a_signal_ends_it_without_errors_even_while_it_waits_for_long(domain: int) -> None:
     with Peer(domain) as peer, patrol(domain, "--speed", "0.1") as process:
         received = Received().listen(peer)
-        peer.until(lambda: received.maps, "the first look around")
+        peer.until(lambda: received.maps, "the first map")
         assert process.stop(signal.SIGINT) == 0
         assert "Traceback" not in process.output
 

@@ -24,7 +24,7 @@ def wall() -> Clock:
     return Clock(now_ns, now_ns, is_simulated=False)
 
 
-def scans_lately(temperature: float = 22.0, tags: int = 5, scans: int = 6) -> list[Write]:
+def recent_scans(temperature: float = 22.0, tags: int = 5, scans: int = 6) -> list[Write]:
     """Tags with their positions, each scanned once a minute until now."""
     now_ns = time.time_ns()
     pins: list[Write] = [pin(str(tag), now_ns - 600 * SECOND, float(tag)) for tag in range(tags)]

@@ -151,10 +151,10 @@ def recording(
 def wait_state(journal: Journal, state: JournalState, part: str = "") -> Condition:
     """Wait until the journal is in a state, with a part of its message."""
 
-    def look_at() -> Condition | None:
+    def check() -> Condition | None:
         condition = journal.condition
         return condition if condition.state is state and part in condition.detail else None
 
-    found = wait_for(look_at, f"a journal that is {state.value} ({part}): {journal.condition}")
+    found = wait_for(check, f"a journal that is {state.value} ({part}): {journal.condition}")
     assert found is not None
     return found

@@ -101,7 +101,7 @@ class Twin:
         )
         return by_id(requested.result(20.0))
 
-    def says(self, name: str = "t", tag: str = "7") -> tuple[float, float | None]:
+    def reading(self, name: str = "t", tag: str = "7") -> tuple[float, float | None]:
         """A sensor's value and age, the same live and in the log."""
         # A clock that has just gone back may not have its run in the log yet.
         wait_for(lambda: self.live == self.past(), "the log to say what is known live")

@@ -80,7 +80,7 @@ class Subscriber:
         self._client.disconnect()
         self._client.loop_stop()
 
-    def say(self, topic: str, payload: str, *, retain: bool = False) -> None:
+    def publish(self, topic: str, payload: str, *, retain: bool = False) -> None:
         """Publish something."""
         self._client.publish(topic, payload, 1, retain).wait_for_publish(60.0)
 

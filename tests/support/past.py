@@ -63,7 +63,7 @@ class MadeUp:
         if isinstance(need, NotesRequest):
             return PastNotes("", 0, ())  # no notes
         if isinstance(need, WritesRequest):
-            raise NotRemembered("what was heard is asked of the journal")
+            raise NotRemembered("the log is not read here")
         return self.state_at(need)
 
     def state_at(self, at_ns: int) -> Snapshot:

@@ -58,7 +58,7 @@ class RawClient:
     def __exit__(self, *_: object) -> None:
         self.socket.close()
 
-    def say(self, data: bytes) -> list[tuple[int, bytes]]:
+    def exchange(self, data: bytes) -> list[tuple[int, bytes]]:
         """Send only this, and return all frames up to the end of the connection."""
         blocks = [self.received]
         # An error: the server reset the connection before it had read everything.

@@ -140,10 +140,10 @@ class Peer:
 
     def call(self, kind: Any, service: str, **request: Any) -> Any:
         """Call a service and return the response."""
-        [answer] = self.ask_all(kind, service, [kind.Request(**request)])
+        [answer] = self.call_all(kind, service, [kind.Request(**request)])
         return answer
 
-    def ask_all(self, kind: Any, service: str, requests: Sequence[Any]) -> list[Any]:
+    def call_all(self, kind: Any, service: str, requests: Sequence[Any]) -> list[Any]:
         """Call a service with all of these at once, and return the responses in order."""
         client = self.node.create_client(kind, service)
         self.until(client.service_is_ready, f"the service {service}")

@@ -101,7 +101,7 @@ class Template:
         program, *arguments = command[2:]
         request = {"program": program, "arguments": arguments, "env": dict(env)}
         return Forked(
-            command, self._ask(request, [output.fileno() for output in outputs]), self._ask
+            command, self._request(request, [output.fileno() for output in outputs]), self._request
         )
 
     @property
@@ -114,7 +114,7 @@ class Template:
         self._process.wait()
         self._output.close()
 
-    def _ask(self, request: Mapping[str, Any], files: Sequence[int] = ()) -> int:
+    def _request(self, request: Mapping[str, Any], files: Sequence[int] = ()) -> int:
         with self._lock:
             try:
                 socket.send_fds(self._link, [json.dumps(request).encode()], files)
@@ -133,18 +133,18 @@ class Forked:
     """The part of `subprocess.Popen` that tests need."""
 
     def __init__(self, args: Sequence[str], pid: int, query: Callable[[Mapping[str, Any]], int]):
-        self.args, self.pid, self._ask = args, pid, query
+        self.args, self.pid, self._request = args, pid, query
         self._lock = threading.Lock()
         self._ended: int | None = None
-        self._handle = os.pidfd_open(pid)  # it exists until `_ask` has fetched its end
+        self._handle = os.pidfd_open(pid)  # it exists until `_request` has fetched its end
 
     def poll(self) -> int | None:
         """Its exit code, as from `Popen`, once it has ended."""
-        return self._look(0.0)
+        return self._poll(0.0)
 
     def wait(self, timeout_s: float | None = None) -> int:
         """Wait for its end; returns the exit code."""
-        code = self._look(timeout_s)
+        code = self._poll(timeout_s)
         if code is None:
             raise subprocess.TimeoutExpired(self.args, timeout_s or 0.0)
         return code
@@ -154,14 +154,14 @@ class Forked:
         if self.poll() is None:
             signal.pidfd_send_signal(self._handle, number)
 
-    def _look(self, timeout_s: float | None) -> int | None:
+    def _poll(self, timeout_s: float | None) -> int | None:
         if self._ended is None:
             poll = select.poll()
             poll.register(self._handle, select.POLLIN)
             if poll.poll(None if timeout_s is None else timeout_s * 1_000):
                 with self._lock:  # a second request for one end would end the template
                     if self._ended is None:
-                        self._ended = self._ask({"ended": self.pid})
+                        self._ended = self._request({"ended": self.pid})
                         os.close(self._handle)
         return self._ended
 

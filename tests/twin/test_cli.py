@@ -2,7 +2,6 @@
 
 import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -27,12 +26,7 @@ def holds_back(process: Process) -> bool:
     return all(blocked >> (number - 1) & 1 for number in (signal.SIGINT, signal.SIGTERM))
 
 
-def has_mapped(process: Process, name: str) -> Callable[[], bool]:
-    maps = Path(f"/proc/{process.pid}/maps")
-    return lambda: name in maps.read_text()
-
-
-def said_beside_its_start(process: Process) -> list[str]:
+def output_after_start(process: Process) -> list[str]:
     """The twin's output without the lines of its start, if it got so far."""
     starts = ("lupin_twin in ROS domain", "[lupin_twin]: journal /")
     return [
@@ -45,9 +39,10 @@ def test_a_signal_during_the_start_ends_it_without_errors(domain: int, moment: s
     name, number = MOMENTS[moment]
     with twin_node(domain, afresh=True) as process:
         wait_for(lambda: holds_back(process), "signals to be held back")
-        wait_for(has_mapped(process, name), moment)
+        maps = Path(f"/proc/{process.pid}/maps")
+        wait_for(lambda: name in maps.read_text(), moment)
         assert process.stop(number) == 0
-        assert said_beside_its_start(process) == []
+        assert output_after_start(process) == []
 
 
 def test_a_signal_between_many_callbacks_ends_it_without_errors(domain: int) -> None:
@@ -55,7 +50,7 @@ def test_a_signal_between_many_callbacks_ends_it_without_errors(domain: int) -> 
     with twin_node(domain, *fast) as process, Peer(domain) as peer:
         peer.state(lambda _: True, "a state")
         assert process.stop(signal.SIGTERM) == 0
-        assert said_beside_its_start(process) == []
+        assert output_after_start(process) == []
 
 
 def test_it_goes_on_after_it_was_stopped_for_a_while(domain: int) -> None:

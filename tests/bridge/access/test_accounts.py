@@ -179,9 +179,7 @@ def test_a_deleted_accounts_file_opens_nothing(path: Path) -> None:
     assert people.by_token(TOKEN) is None
 
 
-def test_an_accounts_file_that_was_deleted_or_is_unreadable_opens_nothing(
-    path: Path,
-) -> None:
+def test_an_accounts_file_that_was_deleted_or_is_unreadable_opens_nothing(path: Path) -> None:
     add(path, "token", scada="viewer")
     people = People(path)
     path.unlink()

@@ -138,7 +138,7 @@ def test_a_picture_in_a_foreign_page_is_not_computed(open_bridge: Served) -> Non
 def test_any_page_may_link_to_the_bridge(open_bridge: Served, path: str) -> None:
     linked = {**PAGE, "Referer": "http://wiki.example/greenhouse"}
     assert open_bridge.get(path, linked).status_code in (200, 303)
-    assert open_bridge.get("/api/state", linked).status_code == 403, "a frame looks the same"
+    assert open_bridge.get("/api/state", linked).status_code == 403, "a frame gets the same"
 
 
 def test_a_request_target_has_a_length_limit(open_bridge: Served) -> None:

@@ -198,7 +198,7 @@ def behind(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         yield running
 
 
-def who(live: Served, address: str, *headers: tuple[str, str]) -> str:
+def identity(live: Served, address: str, *headers: tuple[str, str]) -> str:
     """The name and the role of a request from an address, or its status."""
     with live.client(address) as client:
         answer = client.get("/api/session", headers=list(headers))
@@ -210,21 +210,23 @@ def who(live: Served, address: str, *headers: tuple[str, str]) -> str:
 
 def test_only_the_proxys_user_header_is_trusted(behind: Served) -> None:
     anna = ("Remote-User", "anna@example.org")
-    assert who(behind, PROXY, anna) == "anna@example.org operator"
-    assert who(behind, PROXY, ("remote-user", "new@example.org")) == "new@example.org viewer"
-    assert who(behind, STRANGER, anna) == "401"
-    assert who(behind, STRANGER, anna, ("X-Forwarded-For", PROXY)) == "401"
-    assert who(behind, STRANGER, anna, ("Authorization", f"Bearer {SCADA}")) == "scada operator"
-    assert who(behind, PROXY, ("Remote-User", "scada")) == "scada viewer", "no token's right"
-    assert who(behind, PROXY) == "401", "who has not signed in there"
+    assert identity(behind, PROXY, anna) == "anna@example.org operator"
+    assert identity(behind, PROXY, ("remote-user", "new@example.org")) == "new@example.org viewer"
+    assert identity(behind, STRANGER, anna) == "401"
+    assert identity(behind, STRANGER, anna, ("X-Forwarded-For", PROXY)) == "401"
+    assert (
+        identity(behind, STRANGER, anna, ("Authorization", f"Bearer {SCADA}")) == "scada operator"
+    )
+    assert identity(behind, PROXY, ("Remote-User", "scada")) == "scada viewer", "no token's right"
+    assert identity(behind, PROXY) == "401", "who has not signed in there"
 
 
 def test_a_user_header_that_the_client_adds_is_ignored(behind: Served) -> None:
     anna = ("Remote-User", "anna@example.org")
-    assert who(behind, PROXY, anna, ("Remote-User", "boss")) == "401"
-    assert who(behind, PROXY, anna, anna) == "401"
+    assert identity(behind, PROXY, anna, ("Remote-User", "boss")) == "401"
+    assert identity(behind, PROXY, anna, anna) == "401"
     for name in ("", "a b", "anna@example.org, boss", "x" * 65, "<script>"):
-        assert who(behind, PROXY, ("Remote-User", name)) == "401", name
+        assert identity(behind, PROXY, ("Remote-User", name)) == "401", name
 
 
 def test_proxy_settings_that_depend_on_each_other_are_checked_together() -> None:

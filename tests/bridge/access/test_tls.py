@@ -190,9 +190,7 @@ def test_a_renewed_pair_is_served_to_every_new_connection(
         assert stored.get("/healthz").status_code == 200
 
 
-def test_a_broken_new_pair_is_logged_once_and_the_old_one_served(
-    tmp_path: Path,
-) -> None:
+def test_a_broken_new_pair_is_logged_once_and_the_old_one_served(tmp_path: Path) -> None:
     ours = certificate(tmp_path)
     key = ours.key.read_bytes()
     with served(*ours.options, trust=ours.trust) as live:

@@ -158,9 +158,7 @@ def test_a_shelf_ends_at_its_time_or_by_a_later_note_or_by_withdrawal() -> None:
 
 
 @pytest.mark.parametrize("message", [SHELF, FOUND], ids=["shelved", "acknowledged"])
-def test_notes_end_when_their_alarm_gets_worse_and_later_ones_hold(
-    message: Note,
-) -> None:
+def test_notes_end_when_their_alarm_gets_worse_and_later_ones_hold(message: Note) -> None:
     bad = replace(COLD.reason, verdict=Verdict.CRITICAL)
     worse = replace(COLD, reason=bad, raised_as=Verdict.STRESSED, worse_at_ns=NOW + 1)
     assert "a" in notes_of_alarms([COLD], [message], NOW + 1)

@@ -8,7 +8,7 @@ import psycopg
 import pytest
 
 from tests.support.archive import Archive, forward_once, run
-from tests.support.fleet import scans_lately, write
+from tests.support.fleet import recent_scans, write
 from tests.support.journal import append, scan
 from tests.support.postgres import Postgres, server
 from tests.support.tls import certificate
@@ -154,7 +154,7 @@ def test_part_of_a_password_is_never_taken_for_a_host() -> None:
 
 def test_the_servers_certificate_is_checked(tmp_path: Path) -> None:
     journal = tmp_path / "journal.sqlite"
-    write(journal, scans_lately())
+    write(journal, recent_scans())
     made, other = certificate(tmp_path), certificate(tmp_path, "other")
     trusted, foreign = tmp_path / "trusted.pem", tmp_path / "foreign.pem"
     made.authority.cert_pem.write_to_path(str(trusted))
@@ -178,4 +178,4 @@ def test_the_servers_certificate_is_checked(tmp_path: Path) -> None:
         assert archive.rows()["scan"] == []
         done = forwarded(trusted)
         assert done.returncode == 0, done.stderr
-        assert len(archive.rows()["scan"]) == len(scans_lately()) - 5
+        assert len(archive.rows()["scan"]) == len(recent_scans()) - 5

@@ -116,9 +116,7 @@ def now_s(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return now_s
 
 
-def test_json_is_one_object_a_line_with_the_error(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_json_is_one_object_a_line_with_the_error(capsys: pytest.CaptureFixture[str]) -> None:
     command.set_up_log("json")
     log = logging.getLogger("lupin_bridge.test")
     log.info("tag %s\nsecond line", "7°")

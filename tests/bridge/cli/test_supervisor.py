@@ -51,9 +51,7 @@ def manager(tmp_path: Path) -> Iterator[Manager]:
     manager.socket.close()
 
 
-def test_it_sends_what_the_manager_requests_and_no_child_inherits_it(
-    manager: Manager,
-) -> None:
+def test_it_sends_what_the_manager_requests_and_no_child_inherits_it(manager: Manager) -> None:
     environment = {"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": "30000000", "HOME": "/"}
     supervisor = Supervisor(environment)
     assert environment == {"HOME": "/"}

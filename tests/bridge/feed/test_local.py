@@ -19,13 +19,11 @@ from lupin_twin.ros.node import TwinNode
 from lupin_twin.runtime.estimates import ReportRequest
 from tests.support.inprocess import started
 from tests.support.journal import SECOND, append, scan
-from tests.support.looking import Endless
+from tests.support.past_queries import Endless
 from tests.support.waiting import PATIENCE_S, until
 
 
-async def test_a_busy_thread_ends_a_request_after_the_configured_timeout(
-    domain: int,
-) -> None:
+async def test_a_busy_thread_ends_a_request_after_the_configured_timeout(domain: int) -> None:
     busy, gate = threading.Event(), threading.Event()
 
     def hold(_: TwinNode) -> bool:

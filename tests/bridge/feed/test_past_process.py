@@ -23,8 +23,8 @@ from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.writes import Export
 from tests.support.journal import NOW, SECOND, append, scan
-from tests.support.looking import Body, Count, Endless, Failing, MapCells, Running
 from tests.support.maps import map_of
+from tests.support.past_queries import Body, Count, Endless, Failing, MapCells, Running
 from tests.support.waiting import until
 
 pytestmark = pytest.mark.usefixtures("children_know_the_tests")
@@ -167,7 +167,7 @@ async def test_a_process_that_dies_or_cannot_start_is_reported_and_replaced(
         with pytest.raises(NotRemembered, match="was killed by SIGKILL"):
             await waiting
         await until(lambda: not past.why_down, "the next one")
-        assert past.pid is None, "nobody asked"
+        assert past.pid is None, "no query"
         assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
         reported = [r.getMessage() for r in caplog.records if r.levelno == logging.ERROR]
         assert reported[-1] == "the process that reads the past was killed by SIGKILL"

@@ -160,10 +160,10 @@ async def test_listeners_that_come_and_go_cause_no_work_in_ros(ros: Ros, relay: 
         gone.append(weakref.ref(close))
     del close
     await ros.publish(b"1")
-    assert not any(ref() for ref in gone), "nothing is kept of them"
+    assert not any(ref() for ref in gone), "they leave nothing"
     ear = Ear()
     await relay.listen(STATE, ear)
-    assert ear.received == [b"1"], "it was heard all the while"
+    assert ear.received == [b"1"], "it was received all the while"
     assert (ros.subscribed, ros.calls, len(relay)) == (["/twin/state"], 1, 1)
 
 

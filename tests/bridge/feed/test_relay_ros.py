@@ -64,7 +64,7 @@ async def test_a_twins_topics_are_relayed_byte_for_byte(
         peer.publish_map(grid)
         peer.observe(seen)
         await until(lambda: reported and reported[-1].snapshot.tags, "the tag")
-        assert len(relay) == 0, "nobody has asked"
+        assert len(relay) == 0, "nobody has subscribed"
 
         received: dict[str, list[Sample]] = {}
         listening = [

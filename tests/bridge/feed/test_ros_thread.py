@@ -125,7 +125,7 @@ async def test_the_loop_receives_the_latest_event_and_skips_those_before_it(doma
                 node.post(number)
 
         await stage.ros.call(post_many)
-        await until(lambda: stage.events and stage.events[-1] == 1_000, "the newest event")
+        await until(lambda: stage.events and stage.events[-1] == 1_000, "the latest event")
         assert len(stage.events) < 1_000
         assert stage.events == sorted(stage.events)
         assert stage.reported_by == {threading.current_thread()}
@@ -173,7 +173,7 @@ async def test_a_cancelled_future_is_released_in_the_thread_of_the_nodes(domain:
         )
         # Only then has the call returned the future, and its result is awaited.
         await stage.ros.call(lambda _: None)
-        await until(lambda: stage.ros.calls_waiting == 0, "the question to be asked")
+        await until(lambda: stage.ros.calls_waiting == 0, "the call to start")
         waiting.cancel()
         await until(lambda: given_up, "the future to be given up")
         assert given_up == [(requested, stage.ros.require_node().thread)]
@@ -283,9 +283,7 @@ def test_with_json_logging_every_line_of_a_bridge_is_an_object(domain: int) -> N
     assert "Traceback" in reported["error"]["message"], "a trace of many lines is in one"
 
 
-def test_every_severity_is_passed_on_once_with_its_level(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_every_severity_is_passed_on_once_with_its_level(caplog: pytest.LogCaptureFixture) -> None:
     forward()
     forward()
     logger = get_logger("probe")
@@ -294,8 +292,8 @@ def test_every_severity_is_passed_on_once_with_its_level(
     logger.error("broken")
     logger.fatal("gone")
     for _ in range(2):
-        logger.warning("told once", once=True)
-    logger.debug("not told")
+        logger.warning("logged once", once=True)
+    logger.debug("not logged")
     reported = [
         (record.levelno, record.message) for record in caplog.records if record.name == "probe"
     ]
@@ -304,5 +302,5 @@ def test_every_severity_is_passed_on_once_with_its_level(
         (logging.WARNING, "careful"),
         (logging.ERROR, "broken"),
         (logging.CRITICAL, "gone"),
-        (logging.WARNING, "told once"),
+        (logging.WARNING, "logged once"),
     ]

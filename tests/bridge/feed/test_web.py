@@ -69,7 +69,7 @@ async def test_without_a_twin_the_missing_service_is_named(domain: int) -> None:
     async with started(WebTwin) as (twin, _):
         with pytest.raises(TwinUnavailableError, match=f"no twin offers {NAME}: is it running"):
             await twin.estimate_report(ReportRequest("co2"))
-    assert all(task.get_name() != LOOK for task in asyncio.all_tasks()), "it looks on"
+    assert all(task.get_name() != LOOK for task in asyncio.all_tasks()), "it goes on searching"
 
 
 async def test_after_a_silence_a_new_node_recovers_everything(domain: int) -> None:
@@ -181,9 +181,7 @@ async def test_a_node_is_replaced_after_ever_longer_silences_of_five_minutes_at_
     assert joined == [begun + each for begun in (1_000.0, 3_000.0) for each in after]
 
 
-async def test_refusals_are_the_services_and_no_wait_is_endless(
-    domain: int,
-) -> None:
+async def test_refusals_are_the_services_and_no_wait_is_endless(domain: int) -> None:
     def answer(request: Any, response: Any) -> Any:
         response.error_message = SAYS[request.sensor_type]
         return response

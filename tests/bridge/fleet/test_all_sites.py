@@ -12,7 +12,7 @@ from lupin_bridge.fleet.overview import MAX_LISTED
 from lupin_bridge.fleet.watcher import MAX_ALARMS
 from lupin_twin.core.state import Write
 from tests.support.archive import Archive
-from tests.support.fleet import Page, fleet, forward, scans_lately, wall
+from tests.support.fleet import Page, fleet, forward, recent_scans, wall
 from tests.support.journal import SECOND, scan
 from tests.support.waiting import wait_for
 
@@ -50,12 +50,12 @@ def every(shared_archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> 
     """Sites that no test changes, except "over" and "noted": one test each."""
     archive, folder = shared_archive, tmp_path_factory.mktemp("sites")
     sites: dict[str, Sequence[Write]] = {
-        "gh1": scans_lately(temperature=28.0, tags=2),
+        "gh1": recent_scans(temperature=28.0, tags=2),
         # Raised before the others.
-        "gh2": scans_lately(temperature=45.0, tags=1, scans=9),
-        "well": scans_lately(temperature=22.0),
-        "over": scans_lately(temperature=45.0, tags=1),
-        "noted": scans_lately(temperature=45.0, tags=2),
+        "gh2": recent_scans(temperature=45.0, tags=1, scans=9),
+        "well": recent_scans(temperature=22.0),
+        "over": recent_scans(temperature=45.0, tags=1),
+        "noted": recent_scans(temperature=45.0, tags=2),
         "a": day(20.0),
         "b": day(21.0),
         "c": day(22.0),
@@ -117,7 +117,7 @@ def test_alarms_are_limited_per_site_and_in_all_and_the_rest_is_counted(
     archive: Archive, tmp_path: Path
 ) -> None:
     many = MAX_LISTED // MAX_ALARMS + 1
-    add_site(archive, tmp_path, "gh1", scans_lately(temperature=45.0, tags=MAX_ALARMS + 1))
+    add_site(archive, tmp_path, "gh1", recent_scans(temperature=45.0, tags=MAX_ALARMS + 1))
     hot = [f"gh{n}" for n in range(1, many + 1)]
     archive.copy_site(*hot[1:])
     archive.do("INSERT INTO site SELECT 'more' || n, '' FROM generate_series(1, 50) AS n")

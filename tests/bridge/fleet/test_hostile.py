@@ -20,7 +20,7 @@ from websockets.exceptions import ConnectionClosed
 
 from tests.support import raw_http
 from tests.support.archive import Archive, forward_once, forwarder, run
-from tests.support.fleet import Page, fleet, forward, frames, scans_lately, wall, write
+from tests.support.fleet import Page, fleet, forward, frames, recent_scans, wall, write
 from tests.support.journal import append, inspection, scan
 from tests.support.postgres import Postgres, server
 from tests.support.processes import children_of, constants, limits, lupin_twin
@@ -39,7 +39,7 @@ HISTORY = "api/history?tag_id=0&sensor_type=temperature"
 def made(server: Postgres, journal: Path, *sites: str) -> Archive:
     archive = Archive(server)
     archive.add_user("page", "lupin_page")
-    forward(archive, journal, scans_lately())
+    forward(archive, journal, recent_scans())
     archive.copy_site(*sites)
     return archive
 
@@ -240,7 +240,7 @@ def test_unreadable_rows_are_reported_on_the_page_of_their_site(
 ) -> None:
     journal = tmp_path / "journal"
     now_ns = time.time_ns()
-    write(journal, [*scans_lately(), inspection("1", now_ns - 10**9)])
+    write(journal, [*recent_scans(), inspection("1", now_ns - 10**9)])
     with forwarder(archive, journal), fleet(archive, *limits(answer_timeout_s=2)) as running:
         running.site(is_live=True, last_verdict="healthy")
         archive.copy_site("gh2")
@@ -275,7 +275,7 @@ def test_an_unreadable_or_slow_site_costs_no_other_site_its_status(
     archive: Archive, tmp_path: Path
 ) -> None:
     journal = tmp_path / "journal"
-    forward(archive, journal, scans_lately())
+    forward(archive, journal, recent_scans())
     archive.copy_site("gh2", "gh3")
     archive.keep_live()
     archive.do("UPDATE scan SET readings = '{\"no\": \"list\"}' WHERE site = 'gh3'")
@@ -303,7 +303,7 @@ def test_nothing_that_a_site_writes_stops_the_overview_of_the_others(
     archive: Archive, tmp_path: Path
 ) -> None:
     forward(
-        archive, tmp_path / "journal", [*scans_lately(), inspection("1", time.time_ns() - 10**9)]
+        archive, tmp_path / "journal", [*recent_scans(), inspection("1", time.time_ns() - 10**9)]
     )
     archive.copy_site("gh2")
     archive.keep_live()

@@ -13,7 +13,7 @@ import pytest
 from lupin_bridge.access.credentials import digest
 from tests.support.access import served
 from tests.support.archive import Archive, forward_once, rows_of
-from tests.support.fleet import Page, fleet, forward, scans_lately
+from tests.support.fleet import Page, fleet, forward, recent_scans
 from tests.support.people import OWN, TOKEN, add, changing, signed_in
 from tests.support.waiting import wait_for
 from tests.support.ws_client import open_websocket
@@ -35,7 +35,7 @@ def here(shared_archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> I
     archive, folder = shared_archive, tmp_path_factory.mktemp("notes")
     accounts, journal = folder / "accounts.sqlite", folder / "journal.sqlite"
     add(accounts, anna="operator", vera="viewer")
-    forward(archive, journal, scans_lately(temperature=45.0, tags=1))
+    forward(archive, journal, recent_scans(temperature=45.0, tags=1))
     with fleet(archive, "--accounts", str(accounts)) as page:
         yield Here(page, archive, accounts, journal)
 
@@ -158,7 +158,7 @@ def test_a_person_of_one_site_sees_that_site_alone_on_every_route(
     archive: Archive, tmp_path: Path, accounts: Path
 ) -> None:
     for site in ("gh1", "gh2"):
-        forward(archive.of_site(site), tmp_path / f"{site}.sqlite", scans_lately(temperature=45.0))
+        forward(archive.of_site(site), tmp_path / f"{site}.sqlite", recent_scans(temperature=45.0))
     archive.keep_live()
     with fleet(archive, "--accounts", str(accounts)) as page:
         page.http.headers.update(ALL)
@@ -200,9 +200,7 @@ def names(page: Page, headers: dict[str, str]) -> set[str]:
     return {it["site"] for it in page.http.get("/api/sites", headers=headers).json()["sites"]}
 
 
-def test_on_a_bridge_of_another_or_an_unnamed_site_they_may_do_nothing(
-    accounts: Path,
-) -> None:
+def test_on_a_bridge_of_another_or_an_unnamed_site_they_may_do_nothing(accounts: Path) -> None:
     with served("--accounts", str(accounts)) as live:
         wait_for(lambda: live.get("/api/state", ALL).status_code == 200, "the state")
         answer = live.get("/api/state", OURS)

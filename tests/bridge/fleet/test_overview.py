@@ -16,7 +16,7 @@ from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.parameters import World
 from lupin_twin.core.state import Pose, TagState
 from tests.support.archive import Archive, forward_once, forwarder
-from tests.support.fleet import fleet, forward, frames, scans_lately, wall, write
+from tests.support.fleet import fleet, forward, frames, recent_scans, wall, write
 from tests.support.journal import append, recording, scan
 from tests.support.waiting import wait_for
 
@@ -29,7 +29,7 @@ def journal(tmp_path: Path) -> Path:
 def test_a_site_is_live_and_judged_and_new_scans_are_pushed(
     archive: Archive, journal: Path
 ) -> None:
-    write(journal, scans_lately())
+    write(journal, recent_scans())
     with forwarder(archive, journal), fleet(archive) as page:
         before = page.site(is_live=True, verdict="healthy", active_alarms=0)
         assert before.keys() == {
@@ -58,7 +58,7 @@ def test_a_site_is_live_and_judged_and_new_scans_are_pushed(
 def test_a_site_that_is_not_forwarded_is_silent_and_keeps_its_last_state(
     archive: Archive, journal: Path
 ) -> None:
-    write(journal, scans_lately(temperature=45.0))
+    write(journal, recent_scans(temperature=45.0))
     with fleet(archive) as page:
         with forwarder(archive, journal):
             before = page.site(is_live=True, verdict="critical")
@@ -115,7 +115,7 @@ def test_the_last_state_of_a_silent_site_does_not_age(archive: Archive, journal:
 
 
 def test_each_site_has_a_small_map(archive: Archive, journal: Path, tmp_path: Path) -> None:
-    write(journal, scans_lately(tags=30))
+    write(journal, recent_scans(tags=30))
     bare = archive.of_site("bare")
     forward(bare, tmp_path / "bare", [scan("0", wall().stamp_ns)])  # no tag has a position
     with forwarder(archive, journal), fleet(archive) as page:
@@ -160,7 +160,7 @@ def record(archive: Archive, journal: Path, origin: Origin, *, is_simulated: boo
     with recording(
         journal, replace(wall(), is_simulated=is_simulated), world=World(origin)
     ) as twin:
-        for row in scans_lately():
+        for row in recent_scans():
             twin.write(row)
     forward_once(archive, journal)
 
@@ -168,7 +168,7 @@ def record(archive: Archive, journal: Path, origin: Origin, *, is_simulated: boo
 def test_the_source_is_read_from_the_log(archive: Archive, tmp_path: Path) -> None:
     for site, origin, is_simulated, _ in SITES:
         record(archive.of_site(site), tmp_path / site, origin, is_simulated=is_simulated)
-    forward(archive, tmp_path / "gh1", scans_lately())  # which does not contain it
+    forward(archive, tmp_path / "gh1", recent_scans())  # which does not contain it
     with fleet(archive) as page:
         for site, message in [
             *((site, message) for site, _, _, message in SITES),

@@ -12,7 +12,7 @@ from pyarrow import parquet
 
 from lupin_twin.core.state import Scan, Write
 from tests.support.archive import Archive
-from tests.support.fleet import fleet, forward, scans_lately
+from tests.support.fleet import fleet, forward, recent_scans
 from tests.support.journal import SECOND, inspection, scan
 from tests.support.waiting import wait_for
 
@@ -115,7 +115,7 @@ def test_the_latest_notes_of_all_sites_and_who_withdrew_one(
 
 
 def test_sites_are_exported_together_or_by_name(archive: Archive, tmp_path: Path) -> None:
-    forward(archive, tmp_path / "journal", scans_lately(tags=2, scans=3))
+    forward(archive, tmp_path / "journal", recent_scans(tags=2, scans=3))
     archive.copy_site("gh2", "gh3")
     with fleet(archive) as page:
         wait_for(lambda: len(page.sites()) == 3, "all sites")

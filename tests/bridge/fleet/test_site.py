@@ -19,7 +19,7 @@ from lupin_twin.field.explored import OccupancyMap, text_of
 from tests.support import maps
 from tests.support.archive import Archive, forwarder
 from tests.support.docs import block_named
-from tests.support.fleet import Page, fleet, forward, scans_lately, write
+from tests.support.fleet import Page, fleet, forward, recent_scans, write
 from tests.support.journal import opened, scan
 from tests.support.nginx import nginx
 from tests.support.waiting import PATIENCE_S, wait_for
@@ -51,7 +51,7 @@ def test_a_sites_page_is_below_its_path_and_follows_its_log(
 ) -> None:
     """`test_live_same_answers` compares it with `serve`, answer by answer."""
     journal = tmp_path / "journal.sqlite"
-    write(journal, scans_lately())
+    write(journal, recent_scans())
     with forwarder(archive, journal), fleet(archive) as page:
         page.site(is_live=True, verdict="healthy")
         moved = page.http.get("/sites/gh1")
@@ -82,7 +82,7 @@ def test_the_floor_plan_is_the_same_as_the_twins(archive: Archive, tmp_path: Pat
     # One half is unexplored: tags 0 to 2 stand in the other.
     floor = maps.map_of([[0] * 6 + [-1] * 6] * 8, resolution=0.5)
     journal = tmp_path / "journal.sqlite"
-    write(journal, scans_lately())
+    write(journal, recent_scans())
     with forwarder(archive, journal), fleet(archive) as page:
         page.site(is_live=True, verdict="healthy")
 
@@ -143,7 +143,7 @@ def replicas(
 ) -> Iterator[Replicas]:
     archive, folder = shared_archive, tmp_path_factory.mktemp("replicas")
     journal = folder / "journal"
-    forward(archive, journal, scans_lately())
+    forward(archive, journal, recent_scans())
     archive.do("UPDATE forwarder SET heard_at = now() - INTERVAL '1 hour'")
     with ExitStack() as stack:
         pages = [stack.enter_context(fleet(archive, *SHOWN)) for _ in range(3)]
@@ -201,7 +201,7 @@ def test_killing_a_replica_interrupts_no_client(replicas: Replicas) -> None:
         replicas.pages[0].process.send(signal.SIGKILL)
         with httpx.Client(base_url=replicas.url, trust_env=False, timeout=PATIENCE_S) as client:
             for path in ("/api/sites", f"/{ANSWERS[1]}") * 10:
-                assert client.get(path).status_code in (200, 429), "nginx asks another replica"
+                assert client.get(path).status_code in (200, 429), "nginx tries another replica"
         for _ in range(2):
             write(replicas.journal, [scan("new", time.time_ns(), temperature=50.0)])
         returns = 0

@@ -107,9 +107,7 @@ def follow(
 
 @settings(max_examples=150)
 @given(st.integers(0, 2**32))
-def test_alarms_equal_the_simplest_rule_in_any_order_and_with_repeats(
-    seed: int,
-) -> None:
+def test_alarms_equal_the_simplest_rule_in_any_order_and_with_repeats(seed: int) -> None:
     chance = random.Random(seed)
     received = [some_write(chance, number) for number in range(chance.randint(0, 60))]
     spans = chance.choice(SPANS)

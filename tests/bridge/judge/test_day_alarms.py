@@ -149,9 +149,7 @@ def test_without_a_clock_a_day_is_24_hours_of_ros_time() -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_at_any_moment_the_recent_window_gives_the_days_that_the_whole_log_gives(
-    seed: int,
-) -> None:
+def test_at_any_moment_the_recent_window_gives_the_days_that_the_whole_log_gives(seed: int) -> None:
     chance = random.Random(seed)
     # Some days lack their last hours and much of the next day.
     gaps = [(dawn(day) + 20 * HOUR, dawn(day) + 44 * HOUR) for day in range(seed % 3, 7, 3)]

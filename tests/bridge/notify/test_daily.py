@@ -48,7 +48,7 @@ class Greenhouse:
     lag_ns: int = 0
     error: Exception | None = None
     journal_id: str = "j1"
-    looks: int = 0
+    checks: int = 0
     origin: str = "robot"
     alarms: Alarms = field(default_factory=Alarms)
 
@@ -60,7 +60,7 @@ class Greenhouse:
         return seen(tag("a", temperature=20.0))
 
     def journal(self) -> Condition:
-        self.looks += 1
+        self.checks += 1
         complete_ns = self.ros_time_ns - self.lag_ns
         return Condition(
             JournalState.RECORDING, complete_ns=complete_ns, journal_id=self.journal_id
@@ -118,10 +118,10 @@ async def begun(
             yield greenhouse, at
 
 
-async def looks(greenhouse: Greenhouse, count: int = 5) -> None:
+async def checks(greenhouse: Greenhouse, count: int = 5) -> None:
     """Wait until it has checked that often and found nothing to do."""
-    before = greenhouse.looks
-    await until(lambda: greenhouse.looks >= before + count, "more looks")
+    before = greenhouse.checks
+    await until(lambda: greenhouse.checks >= before + count, "more checks")
 
 
 async def test_each_day_is_sent_once_from_the_first_hour_on_also_after_restarts(
@@ -131,16 +131,16 @@ async def test_each_day_is_sent_once_from_the_first_hour_on_also_after_restarts(
     with receiver(status(200)) as at:
         async with sending(greenhouse, tmp_path, at.port):
             await noted(tmp_path)
-            await looks(greenhouse)
+            await checks(greenhouse)
             assert at.posted == []
             greenhouse.ros_time_ns = ns("2026-05-01T06:00Z")
             await until(lambda: at.posted, "the first report")
-            await looks(greenhouse)
+            await checks(greenhouse)
         async with sending(greenhouse, tmp_path, at.port):
-            await looks(greenhouse)
+            await checks(greenhouse)
             greenhouse.ros_time_ns = ns("2026-05-02T06:30Z")
             await until(lambda: len(at.posted) == 2, "the second")
-            await looks(greenhouse)
+            await checks(greenhouse)
         first = [ns("2026-04-30T06:00Z"), ns("2026-05-01T06:00Z")]
         assert periods(at) == [first, [first[1], ns("2026-05-02T06:00Z")]]
         assert at.ids == ["report.20260501T060000Z", "report.20260502T060000Z"]
@@ -158,7 +158,7 @@ async def test_missed_days_are_sent_in_order_and_at_most_a_week_of_them(
         greenhouse.ros_time_ns = ns("2026-05-04T07:00Z")
         async with sending(greenhouse, tmp_path, at.port):
             await until(lambda: len(at.posted) == 3, "three days")
-            await looks(greenhouse)
+            await checks(greenhouse)
         assert [end for _, end in periods(at)] == [
             ns(f"2026-05-0{day}T06:00Z") for day in (2, 3, 4)
         ]
@@ -166,7 +166,7 @@ async def test_missed_days_are_sent_in_order_and_at_most_a_week_of_them(
         greenhouse.ros_time_ns = ns("2026-05-31T07:00Z")
         async with sending(greenhouse, tmp_path, at.port):
             await until(lambda: len(at.posted) == 3 + MOST_DAYS, "a week")
-            await looks(greenhouse)
+            await checks(greenhouse)
         assert periods(at)[-1][1] == ns("2026-05-31T06:00Z")
         assert "too many were missed" in caplog.text
 
@@ -188,11 +188,11 @@ async def test_a_report_that_is_not_accepted_is_sent_again_also_by_the_next_proc
 ) -> None:
     async with begun(tmp_path, status(500)) as (greenhouse, at):
         greenhouse.ros_time_ns = ns("2026-05-02T07:00Z")
-        await until(lambda: len(at.posted) >= 3, "some tries")
+        await until(lambda: len(at.posted) >= 3, "some attempts")
     with receiver(status(503), status(200), port=at.port) as again:
         async with sending(greenhouse, tmp_path, at.port):
             await until(lambda: len(again.posted) == 2, "the report")
-            await looks(greenhouse)
+            await checks(greenhouse)
     assert len({*at.ids, *again.ids}) == 1
 
 
@@ -205,11 +205,11 @@ async def test_a_report_that_cannot_be_recorded_as_sent_is_not_repeated_endlessl
         in_the_way.mkdir()
         greenhouse.ros_time_ns = ns("2026-05-02T07:00Z")
         await until(lambda: "is not sent by webhook: [Errno" in caplog.text, "why")
-        await looks(greenhouse)
+        await checks(greenhouse)
         assert len(at.posted) == 1
         in_the_way.rmdir()
         await until(lambda: note.read_text() != before, "the note of it")
-        await looks(greenhouse)
+        await checks(greenhouse)
         assert len(at.posted) == 1
 
 
@@ -230,7 +230,7 @@ async def test_it_waits_for_the_log_and_reports_why_there_is_none(
     async with begun(tmp_path, status(200)) as (greenhouse, at):
         greenhouse.lag_ns = 10 * 10**9
         greenhouse.ros_time_ns = ns("2026-05-02T06:00:05Z")
-        await looks(greenhouse)
+        await checks(greenhouse)
         assert at.posted == []
         greenhouse.error = NotRemembered("the disk is gone")
         greenhouse.ros_time_ns = ns("2026-05-02T06:00:20Z")
@@ -244,7 +244,7 @@ async def test_a_clock_that_was_ahead_stops_no_reports_and_simulated_time_has_no
 ) -> None:
     async with begun(tmp_path, status(200), now="2036-05-01T07:00Z") as (greenhouse, at):
         greenhouse.ros_time_ns = ns("2026-05-01T07:00Z")
-        await looks(greenhouse)
+        await checks(greenhouse)
         greenhouse.ros_time_ns = ns("2026-05-02T07:00Z")
         await until(lambda: at.posted, "the report of the true day")
         greenhouse.ros_time_ns = 5_000 * 10**9
@@ -256,10 +256,10 @@ async def test_two_greenhouses_with_one_receiver_have_separate_reports(tmp_path:
     with receiver(status(200)) as at:
         for greenhouse in greenhouses:
             async with sending(greenhouse, tmp_path, at.port):
-                await looks(greenhouse)
+                await checks(greenhouse)
             greenhouse.ros_time_ns = ns("2026-05-02T07:00Z")
             async with sending(greenhouse, tmp_path, at.port):
-                await looks(greenhouse, 20)
+                await checks(greenhouse, 20)
         assert len(at.posted) == 2
 
 
@@ -293,9 +293,7 @@ def test_days_follow_each_other_without_a_gap_for_a_year() -> None:
                 end_ns = next_ns
 
 
-async def test_a_broker_gets_it_once_reachable_and_retains_it(
-    tmp_path: Path,
-) -> None:
+async def test_a_broker_gets_it_once_reachable_and_retains_it(tmp_path: Path) -> None:
     broker = Broker(tmp_path)
     target = Targets.of(Settings(mqtt_url=broker.url, mqtt_prefix="lt"), Secrets()).mqtt
     assert target is not None
@@ -308,12 +306,12 @@ async def test_a_broker_gets_it_once_reachable_and_retains_it(
     try:
         await noted(tmp_path)
         greenhouse.ros_time_ns = ns("2026-05-02T07:00Z")
-        await looks(greenhouse, 1)
+        await checks(greenhouse, 1)
         with broker.running():
             with Subscriber(broker) as received:
                 await until(lambda: received.last("lt/house/report"), "the report")
             with Subscriber(broker, "lt/house/report") as later:
-                await until(lambda: later.last("lt/house/report"), "that it is kept")
+                await until(lambda: later.last("lt/house/report"), "that it is retained")
                 found = later.last("lt/house/report")
         assert found["id"] == "report.20260502T060000Z"
         assert found["report"] == [ns("2026-05-01T06:00Z"), ns("2026-05-02T06:00Z")]

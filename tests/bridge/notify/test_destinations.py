@@ -142,9 +142,7 @@ def test_a_mistake_is_named_as_the_operator_wrote_it() -> None:
     assert message.startswith("LUPIN_MQTT_URL must begin with")
 
 
-def test_a_private_authority_is_trusted_and_an_invalid_file_of_one_is_named(
-    tmp_path: Path,
-) -> None:
+def test_a_private_authority_is_trusted_and_an_invalid_file_of_one_is_named(tmp_path: Path) -> None:
     made = certificate(tmp_path)
     target = Targets.of(Settings(mqtt_url="mqtts://a", mqtt_ca=str(made.cert)), Secrets()).mqtt
     assert target is not None

@@ -82,9 +82,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
         yield broker
 
 
-async def test_a_broker_gets_the_state_and_then_its_changes(
-    shared: Broker,
-) -> None:
+async def test_a_broker_gets_the_state_and_then_its_changes(shared: Broker) -> None:
     greenhouse = Greenhouse()
     greenhouse.now = seen(tag("a", temperature=20.0), alarms=(alarm("a"),))
     with Subscriber(shared) as received:
@@ -103,9 +101,7 @@ async def test_a_broker_gets_the_state_and_then_its_changes(
     assert {message.qos for message in received.received} == {1}
 
 
-async def test_only_the_status_is_retained_and_that_of_removed_tags_is_not(
-    shared: Broker,
-) -> None:
+async def test_only_the_status_is_retained_and_that_of_removed_tags_is_not(shared: Broker) -> None:
     greenhouse = Greenhouse()
     greenhouse.now = seen(tag("a", temperature=20.0), tag("gone", temperature=20.0))
     async with telling(shared, greenhouse) as channel:
@@ -117,7 +113,7 @@ async def test_only_the_status_is_retained_and_that_of_removed_tags_is_not(
             await until(lambda: received.of(gone) == [b""], "the end of its entity")
         with Subscriber(shared) as late:
             # Sent in order: whoever has this has all that was retained.
-            late.say("marker", "x")
+            late.publish("marker", "x")
             await until(lambda: late.of("marker"), "the marker")
             retained = {it.topic: it.payload for it in late.received if it.retain}
             assert retained == {"lt/status": b"online"}
@@ -131,8 +127,8 @@ async def test_at_home_assistants_birth_everything_is_sent_again(
         await until(lambda: channel.condition.sent > 1, "the first time")
         await until(lambda: channel.condition.waiting == 0, "the first time")
         with Subscriber(shared) as later:
-            later.say("homeassistant/status", "offline")
-            later.say("homeassistant/status", "online")
+            later.publish("homeassistant/status", "offline")
+            later.publish("homeassistant/status", "online")
             await reported(later, 20.0)
             await until(lambda: later.last("lt/tags/a/health"), "the verdict")
             assert later.last(CONFIG)["expire_after"] == 600
@@ -150,8 +146,8 @@ async def test_a_flood_of_wills_and_births_is_answered_at_a_limited_rate(
             await until(lambda: received.of("lt/status")[-1:] == [b"online"], "that it has come")
             before, sent = len(received.of("lt/status")), channel.condition.sent
             for _ in range(100):
-                received.say("lt/status", "offline", retain=True)
-                received.say("homeassistant/status", "online")
+                received.publish("lt/status", "offline", retain=True)
+                received.publish("homeassistant/status", "online")
             await until(lambda: received.of("lt/status")[-1:] == [b"online"], "that it is there")
             await until(lambda: channel.condition.sent > sent, "all of it, again")
             wording = received.of("lt/status")[before:]
@@ -200,7 +196,7 @@ async def test_a_broker_that_is_absent_appears_and_is_killed_gets_the_latest_sta
 ) -> None:
     broker, greenhouse = Broker(tmp_path), Greenhouse()
     async with telling(broker, greenhouse) as channel:
-        await until(lambda: channel.condition.failed > 2, "some tries")
+        await until(lambda: channel.condition.failed > 2, "some attempts")
         assert channel.condition.detail == f"[Errno 111] Connection refused ({broker.url})"
         for _ in range(2):
             with broker.running() as process, Subscriber(broker) as received:
@@ -210,7 +206,7 @@ async def test_a_broker_that_is_absent_appears_and_is_killed_gets_the_latest_sta
                 process.kill()
             await until(lambda: not channel.condition.is_connected, "the end of the broker")
             greenhouse.scan()
-        await until(lambda: channel.condition.waiting == 2, "the tag and the house")
+        await until(lambda: channel.condition.waiting == 2, "the tag and the greenhouse")
 
 
 async def test_after_a_failure_to_read_the_greenhouse_everything_is_sent_again(
@@ -236,7 +232,7 @@ async def test_a_broker_that_hangs_is_reconnected_and_gets_the_latest_state(tmp_
             greenhouse.scan()
             failed = channel.condition.failed
             # Once while connected, and then without accepting a connection.
-            await until(lambda: channel.condition.failed > failed + 2, "some tries")
+            await until(lambda: channel.condition.failed > failed + 2, "some attempts")
             assert not channel.condition.is_connected
             last = greenhouse.scan()
             process.thaw()

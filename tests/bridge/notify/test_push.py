@@ -202,16 +202,14 @@ async def test_a_browser_that_unsubscribes_meanwhile_is_not_tried_again(tmp_path
         on.subscribe(one)
         on.board.show([alarm("7")])
         await until(lambda: on.service.posted, "the first try")
-        await until(lambda: on.push.condition.waiting == 0, "the end of its tries")
+        await until(lambda: on.push.condition.waiting == 0, "the end of its attempts")
         on.subscribe(other)
         on.board.show([alarm("7"), alarm("8")])
         await until(lambda: on.posted_to(other), "the next alarm")
         assert len(on.posted_to(one)) == 1
 
 
-async def test_a_push_service_with_retry_after_delays_no_other_browser(
-    tmp_path: Path,
-) -> None:
+async def test_a_push_service_with_retry_after_delays_no_other_browser(tmp_path: Path) -> None:
     async with pushing(tmp_path, status(503, "Retry-After: 60"), status(201)) as on:
         phones = [on.phone("one"), on.phone("two")]
         for phone in phones:
@@ -224,9 +222,7 @@ async def test_a_push_service_with_retry_after_delays_no_other_browser(
         assert both.read(on.posted_to(both)[1])["body"].startswith("Tag 8:")
 
 
-async def test_half_an_hour_without_internet_loses_nothing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+async def test_half_an_hour_without_internet_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = 0.0
 
     async def sleep(for_s: float) -> None:
@@ -305,9 +301,7 @@ def subscribe(browser: httpx.Client, phone: Phone, language: str = "en") -> None
     assert answer.status_code == 204, answer.text
 
 
-def test_a_critical_alarm_reaches_exactly_the_browsers_that_may_have_it(
-    open_to: Live,
-) -> None:
+def test_a_critical_alarm_reaches_exactly_the_browsers_that_may_have_it(open_to: Live) -> None:
     on = open_to
     annas, berts, gones = on.phone("anna"), on.phone("bert"), on.phone("gone")
     add(on.accounts, gone="viewer")

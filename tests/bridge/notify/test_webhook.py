@@ -156,7 +156,7 @@ async def test_alarms_of_a_twin_that_never_reports_its_source_are_posted() -> No
 async def test_a_receiver_that_refuses_and_recovers_gets_all_of_it() -> None:
     port = free_port()
     async with telling(port, A) as (hook, _):
-        await until(lambda: hook.condition.failed > 3, "some tries")
+        await until(lambda: hook.condition.failed > 3, "some attempts")
         assert (hook.condition.waiting, hook.condition.is_connected) == (1, False)
         assert hook.condition.detail == f"Connection refused (http://127.0.0.1:{port})"
         with receiver(status(200), port=port) as server:
@@ -176,7 +176,7 @@ async def test_a_message_that_the_receiver_rejects_does_not_hold_up_the_others()
 async def test_texts_of_any_length_are_sent_once_and_cut(caplog: pytest.LogCaptureFixture) -> None:
     with receiver(lambda _: iter([b"x" * 3_000 + b"\r\n\r\n"])) as server:
         async with telling(server.port, A) as (hook, _):
-            await until(lambda: hook.condition.failed > 2, "some tries")
+            await until(lambda: hook.condition.failed > 2, "some attempts")
     (message,) = [r.getMessage() for r in caplog.records if "was not accepted" in r.getMessage()]
     assert len(message) < 300
 

@@ -90,9 +90,7 @@ def test_an_end_at_0_is_not_read_as_now(kind: type[query_string.OfPeriod]) -> No
 
 
 @pytest.mark.parametrize("kind", [HISTORY, TIMELINE, EXPORT])
-def test_an_empty_or_impossible_name_is_refused(
-    kind: type[query_string.OfPeriod],
-) -> None:
+def test_an_empty_or_impossible_name_is_refused(kind: type[query_string.OfPeriod]) -> None:
     with pytest.raises(PastRefused, match=r"^tag_id is '': string should have at least 1 char"):
         query(kind, tag_id="")
     assert query(kind, tag_id="x" * MAX_TEXT_LENGTH).tag_id == "x" * MAX_TEXT_LENGTH

@@ -95,9 +95,7 @@ async def test_parquet_has_the_same_rows_with_units_and_coordinates(domain: int)
         assert json.loads(schema.metadata[b"units"])["co2"] == "ppm"
 
 
-async def test_without_rows_the_file_is_a_csv_header_or_empty_parquet(
-    domain: int,
-) -> None:
+async def test_without_rows_the_file_is_a_csv_header_or_empty_parquet(domain: int) -> None:
     async with remembering(MadeUp()) as it:
         assert (await it.http.get(PATH)).content == bodies.CSV_HEADER
         answer = await it.http.get("/api/export.parquet")

@@ -56,9 +56,7 @@ def client(greenhouse: Bridge) -> Iterator[Viewer]:
 # --- Foxglove's own client ----------------------------------------------------------------------
 
 
-def test_foxgloves_client_finds_and_decodes_the_channels(
-    greenhouse: Bridge,
-) -> None:
+def test_foxgloves_client_finds_and_decodes_the_channels(greenhouse: Bridge) -> None:
     reported = play(greenhouse.url, "look", STATE, INPUT, "/map", DIAGNOSTICS, *LAYERS)
     assert reported["chosen"] == [WEBSOCKET, SDK]
     info = reported["info"]
@@ -94,9 +92,7 @@ def test_foxgloves_client_finds_and_decodes_the_channels(
     assert all(abs(ns - stamp.sec * 10**9) < 120e9 for ns in stamps)
 
 
-def test_foxgloves_client_gets_latched_messages_until_it_unsubscribes(
-    greenhouse: Bridge,
-) -> None:
+def test_foxgloves_client_gets_latched_messages_until_it_unsubscribes(greenhouse: Bridge) -> None:
     reported = play(greenhouse.url, "again", "/map")
     assert reported["before"]["data"] == reported["after"]["data"]
     assert (reported["late"], reported["statuses"]) == (0, [])

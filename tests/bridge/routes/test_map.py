@@ -59,9 +59,7 @@ def test_a_websocket_client_learns_of_a_new_map_by_the_revision(mapped: Bridge) 
         listener.until("state", lambda frame: frame["revision"] != before)
 
 
-def test_a_restarted_bridge_has_no_map_at_first_and_matches_no_earlier_etag(
-    domain: int,
-) -> None:
+def test_a_restarted_bridge_has_no_map_at_first_and_matches_no_earlier_etag(domain: int) -> None:
     paths = ("/api/map", "/api/field.json?sensor_type=temperature")
     first: dict[str, httpx.Response] = {}
     for _ in range(2):

@@ -252,7 +252,7 @@ def test_web_publishes_too_but_only_while_it_receives_a_twin(domain: int, folder
         assert (answer.status_code, "the twin is silent" in answer.text) == (503, True)
         with twin_node(domain), Peer(domain) as peer:
             peer.listen()
-            wait_for(lambda: post(url, body).status_code == 202, "the twin to be heard")
+            wait_for(lambda: post(url, body).status_code == 202, "the twin to be received")
             assert peer.tag("far", lambda tag: tag.readings).readings[0].value == 20.0
         wait_for(lambda: post(url, body).status_code == 503, "its silence to be noticed")
 

@@ -92,9 +92,7 @@ async def test_a_timeline_queries_every_event_of_one_period(domain: int) -> None
         assert [b.scans for b in found.buckets] == [1]
 
 
-async def test_events_in_five_minute_buckets_share_a_grid_with_single_events(
-    domain: int,
-) -> None:
+async def test_events_in_five_minute_buckets_share_a_grid_with_single_events(domain: int) -> None:
     """Scans too many to be read one by one, beside few failures, in buckets of seconds."""
     slot_ns = 300 * NS
     failures = ("*", Event.FAILURES)

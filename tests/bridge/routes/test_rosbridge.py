@@ -23,7 +23,7 @@ def test_names_are_those_of_ros() -> None:
 def test_the_limits_of_fields_hold_here_too() -> None:
     with bridge(*limits(answers_per_s=0.01)) as greenhouse, ros_at(greenhouse.url) as ros:
         assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True
-        assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True, "what is kept costs nothing"
+        assert ros.call(FIELD, args=FIELD_ARGS)["result"] is True, "a cached answer costs nothing"
         other = {**FIELD_ARGS, "resolution": 0.125}
         response = ros.call(FIELD, args=other)
         assert response["result"] is False

@@ -163,7 +163,7 @@ async def test_many_messages_at_once_do_not_delay_the_others(
         at_turn.append(turns)
         return plain(session, message)
 
-    async def somebody_else() -> None:
+    async def other_client() -> None:
         nonlocal turns
         while True:
             turns += 1
@@ -171,7 +171,7 @@ async def test_many_messages_at_once_do_not_delay_the_others(
 
     monkeypatch.setattr(Session, "receive", receive)
     async with inprocess.running() as here:
-        other = asyncio.create_task(somebody_else())
+        other = asyncio.create_task(other_client())
         _reader, writer = await deaf(here.url, "/rosbridge")
         writer.write(masked({"op": "x"}) * 100)
         await until(lambda: len(at_turn) == 100, "all of them")

@@ -185,9 +185,7 @@ async def test_an_error_that_eviction_cannot_fix_evicts_nothing(
     assert "evicted" not in caplog.text
 
 
-async def test_an_unfinished_tls_handshake_is_evicted_too(
-    tmp_path: Path,
-) -> None:
+async def test_an_unfinished_tls_handshake_is_evicted_too(tmp_path: Path) -> None:
     ours, tls = certificate(tmp_path), ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     tls.load_cert_chain(ours.cert, ours.key)
     with listen("127.0.0.1", 0) as listener, ExitStack() as stack:

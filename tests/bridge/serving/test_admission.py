@@ -121,9 +121,7 @@ def test_large_computations_have_few_places(total: int) -> None:
 
 
 @pytest.mark.parametrize("is_large", [False, True])
-def test_six_clients_at_their_limit_each_get_a_place(
-    is_large: bool,
-) -> None:
+def test_six_clients_at_their_limit_each_get_a_place(is_large: bool) -> None:
     limits = Limits()
     admission = Admission(limits)
     places: Counter[str] = Counter()
@@ -156,7 +154,7 @@ def test_every_field_route_has_the_limit(slow: Served, route: str) -> None:
         query = QUERY.replace("co2", route)
         first = client.get(route + query)
         assert first.status_code == 200
-        assert client.get(route + query).content == first.content, "what is kept costs nothing"
+        assert client.get(route + query).content == first.content, "a cached answer costs nothing"
         second = client.get(route + QUERY.replace("co2", f"other {route}"))
         refusal = schema.GetFieldResponse.model_validate_json(second.content)
         assert (refusal.ok, refusal.values, refusal.width, refusal.sample_count) == (

@@ -111,7 +111,7 @@ async def test_a_failed_query_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     stage = Stage()
     stage.snapshot = snapshot(co2=1)
     stage.poller.start()
-    await until(lambda: len(stage.requested) > 1, "it to be asked again")
+    await until(lambda: len(stage.requested) > 1, "another query")
     stage.answers = {"co2": report(9, {"co2": 1})}
     await until(lambda: stage.reported[-1], "the answer")
     await stage.poller.stop()

@@ -267,7 +267,7 @@ def test_a_rate_holds_on_average_and_a_status_does_not_wait_for_it(stage: Stage)
     stage.hub.serve_all(5.9)
     assert socket.got[-1] == "stale"
     stage.hub.serve_all(6.0)
-    assert socket.got[-1] == 55, "the newest, when its time has come"
+    assert socket.got[-1] == 55, "the latest, when its time has come"
 
 
 def test_a_late_frame_does_not_delay_those_after_it_unless_the_interval_is_strict(
@@ -312,9 +312,7 @@ def test_a_new_client_gets_the_alarms_after_the_first_state_and_not_before(stage
     assert late.got == ["live", 1, {"b"}]
 
 
-def test_the_robot_comes_after_a_state_once_and_no_more_often_than_states(
-    stage: Stage,
-) -> None:
+def test_the_robot_comes_after_a_state_once_and_no_more_often_than_states(stage: Stage) -> None:
     usual, seldom = Socket(), Socket()
     stage.join(usual, wants_status=False)
     stage.join(seldom, wants_status=False, min_interval_s=10.0)

@@ -1,19 +1,17 @@
 """The map's JSON and picture, cell by cell."""
 
-import io
 import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from PIL import Image
 
 from lupin_bridge.routes.status import map_json, map_png
 from lupin_bridge.stream import schema
 from lupin_twin.field.explored import OccupancyMap
+from tests.bridge.field.test_formats import decoded
 
 FREE, OCCUPIED = 236, 70
 
@@ -32,12 +30,6 @@ def map_of(rows: Sequence[Sequence[int]], yaw: float = 0.0) -> OccupancyMap:
         cells=np.array([cell for row in rows for cell in row], dtype=np.int8),
         revision=1,
     )
-
-
-def decoded(png: bytes) -> npt.NDArray[np.uint8]:
-    """The picture as RGBA (height, width, 4), its first row on top."""
-    with Image.open(io.BytesIO(png)) as image:
-        return np.asarray(image.convert("RGBA"))
 
 
 ROWS = st.tuples(st.integers(1, 5), st.integers(1, 5)).flatmap(

@@ -251,7 +251,7 @@ def test_check_reports_for_each_topic_whether_it_is_right(domain: int, config: P
             lines[:] = [line for _, line in report(node, 0.0)]
             return "its frame is 'odom', expected 'map'" in lines[0] and "21.5" in lines[1]
 
-        peer.until(publish, "enough to be heard")
+        peer.until(publish, "enough to be received")
         # A topic with a recent message is not silent; one without any is.
         position, temperature, _, co2, made_of = (line for _, line in report(node, 60.0))
         assert position.startswith("WRONG /amcl_pose: dropped a message on /amcl_pose: its frame")
@@ -275,7 +275,7 @@ def test_check_without_a_configuration_finds_a_working_one(domain: int) -> None:
             spin()
             return sum(bool(each.received) for each in node.sources.values()) == 3
 
-        peer.until(publish, "enough to be heard")
+        peer.until(publish, "enough to be received")
         found = config_of(yaml.safe_load(suggestion(node)))
     assert found.frame_id == "odom"
     assert found.robot is not None

@@ -226,7 +226,7 @@ def test_a_broker_that_comes_late_or_goes_is_reported_and_found_again(
         with broker.running():
             peer.until(lambda: robot.reported("connected"), "the broker")
         robot.reports.clear()
-        peer.until(lambda: robot.reported("127.0.0.1"), "its end to be told")
+        peer.until(lambda: robot.reported("127.0.0.1"), "the report of its end")
         with broker.running(), device(broker) as client:
 
             def is_received() -> bool:

@@ -34,9 +34,7 @@ def test_the_number_of_known_observations_per_tag_is_limited_and_the_oldest_go()
 
 
 @pytest.mark.parametrize("retains_keys", [False, True])
-def test_in_a_simulation_what_was_later_than_a_reset_clock_is_news(
-    retains_keys: bool,
-) -> None:
+def test_in_a_simulation_what_was_later_than_a_reset_clock_is_news(retains_keys: bool) -> None:
     repeats = Repeats()
     for at_s in (40.0, 3600.0):
         repeats.add(scan("1", at_s=at_s, co2=at_s))

@@ -14,7 +14,9 @@ class Robot:
         self.lateness, self.source, self.kind = lateness, source, kind
         self.now_s = 1000.0
 
-    def says(self, *stamps_s: float, was_latched: bool = False, every_s: float = 1.0) -> list[Late]:
+    def findings(
+        self, *stamps_s: float, was_latched: bool = False, every_s: float = 1.0
+    ) -> list[Late]:
         """The findings for messages with these stamps."""
         found = []
         for stamp_s in stamps_s:
@@ -35,57 +37,55 @@ def robot() -> Robot:
     return Robot(Lateness())
 
 
-def test_a_clock_that_stepped_back_is_reported_after_a_few_messages(
-    robot: Robot,
-) -> None:
-    robot.says(1000.0, 1001.0)
-    assert robot.says(*(400.0 + i for i in range(FEW))) == []
+def test_a_clock_that_stepped_back_is_reported_after_a_few_messages(robot: Robot) -> None:
+    robot.findings(1000.0, 1001.0)
+    assert robot.findings(*(400.0 + i for i in range(FEW))) == []
     assert robot.lateness.counts == {}
-    assert robot.says(410.0) == [Late("robot", FEW + 1, 591.0, "robot", FEW + 1)]
+    assert robot.findings(410.0) == [Late("robot", FEW + 1, 591.0, "robot", FEW + 1)]
     assert robot.lateness.counts == {"robot": FEW + 1}
-    more = robot.says(411.0, 412.0)
+    more = robot.findings(411.0, 412.0)
     assert [(late.run, late.news) for late in more] == [(FEW + 2, 1), (FEW + 3, 1)]
     assert robot.lateness.counts == {"robot": FEW + 3}
-    assert robot.says(1002.0) == [], "it has caught up"
-    assert robot.says(*(400.0 + i for i in range(FEW))) == []
+    assert robot.findings(1002.0) == [], "it has caught up"
+    assert robot.findings(*(400.0 + i for i in range(FEW))) == []
     assert robot.lateness.counts == {"robot": FEW + 3}
 
 
 def test_each_kind_has_its_own_order(robot: Robot) -> None:
     looks = Robot(robot.lateness, kind=1)
     for at_s in range(1000, 1040):
-        assert robot.says(at_s) == []
-        assert looks.says(at_s - 60.0) == []
+        assert robot.findings(at_s) == []
+        assert looks.findings(at_s - 60.0) == []
 
 
 def test_latched_messages_of_a_second_robot_with_the_same_name_do_no_harm(robot: Robot) -> None:
     """Fifty each, of the same hour, one after the other."""
     stamps = [1000.0 + i for i in range(50)]
-    assert robot.says(*stamps, was_latched=True, every_s=0.001) == []
-    assert robot.says(*stamps, was_latched=True, every_s=0.001) == []
+    assert robot.findings(*stamps, was_latched=True, every_s=0.001) == []
+    assert robot.findings(*stamps, was_latched=True, every_s=0.001) == []
     assert robot.lateness.counts == {}
     # And both go on.
     for at_s in range(1100, 1130):
-        assert robot.says(at_s, at_s - 0.5) == []
+        assert robot.findings(at_s, at_s - 0.5) == []
 
 
 def test_a_clock_that_is_entirely_wrong_is_detected_too(robot: Robot) -> None:
     """Its messages look latched: DDS stamps them with the same clock."""
-    robot.says(1000.0)
-    assert robot.says(*(400.0 + i for i in range(FEW)), was_latched=True, every_s=APART_S) == []
-    assert len(robot.says(410.0, was_latched=True, every_s=APART_S)) == 1
+    robot.findings(1000.0)
+    assert robot.findings(*(400.0 + i for i in range(FEW)), was_latched=True, every_s=APART_S) == []
+    assert len(robot.findings(410.0, was_latched=True, every_s=APART_S)) == 1
 
 
 def test_a_clock_that_goes_back_for_everyone_makes_nobody_late(robot: Robot) -> None:
-    robot.says(1000.0)
+    robot.findings(1000.0)
     robot.lateness.clamp_to(50 * S)
-    assert robot.says(*(51.0 + i for i in range(20))) == []
+    assert robot.findings(*(51.0 + i for i in range(20))) == []
 
 
 def test_names_are_limited_and_the_others_are_counted_together() -> None:
     lateness = Lateness()
     for number in range(3 * MAX_SOURCES):
-        Robot(lateness, f"robot {number}").says(1000.0, *[400.0] * (FEW + 1))
+        Robot(lateness, f"robot {number}").findings(1000.0, *[400.0] * (FEW + 1))
     assert len(lateness.counts) == MAX_SOURCES + 1
     assert lateness.counts["robot 0"] == FEW + 1
     assert lateness.counts[OTHERS] == 2 * MAX_SOURCES * (FEW + 1)

@@ -47,7 +47,7 @@ def test_a_write_that_changes_nothing_visible_is_no_new_revision() -> None:
     before = tag(store, "1")
     store.record(scan("1", at_s=20.0, co2=1.0, light=math.nan))
     store.record_inspection(inspection("1", at_s=20.0, species="rose", confidence=math.nan))
-    assert tag(store, "1") is before, "who looks for changes compares identities"
+    assert tag(store, "1") is before, "changes are found by identity"
     store.record(scan("1", at_s=10.0, co2=9.0))
     store.record_inspection(inspection("1", at_s=10.0, species="lupin"))
     store.record(scan("1", at_s=30.0, succeeded=False))
@@ -111,9 +111,7 @@ BOUNDED: dict[str, tuple[Callable[[int], Scan | Inspection], int]] = {
 
 
 @pytest.mark.parametrize("what", BOUNDED)
-def test_exactly_the_limit_is_allowed_and_one_more_is_refused_with_both_numbers(
-    what: str,
-) -> None:
+def test_exactly_the_limit_is_allowed_and_one_more_is_refused_with_both_numbers(what: str) -> None:
     make, limit = BOUNDED[what]
     store = TwinStore()
     write(store, make(limit))

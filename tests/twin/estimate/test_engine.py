@@ -22,7 +22,7 @@ def test_readings_have_their_seconds_before_the_moment() -> None:
         [tag_past(0, 1.0, 2.0), tag_past(1), tag_past(2, 2.5)], int(3600e9 * 3), DAY_S
     )
     assert readings.time_s.tolist() == [-7200.0, -3600.0, -1800.0]
-    assert readings.tag.tolist() == [0, 0, 2], "numbers are those of the tags asked about"
+    assert readings.tag.tolist() == [0, 0, 2], "numbers are those of the queried tags"
 
 
 def test_many_tags_share_the_limit_of_solvable_readings() -> None:

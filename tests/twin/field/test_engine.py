@@ -162,7 +162,7 @@ def test_a_cancelled_job_ends_between_two_parts(store: TwinStore) -> None:
     answers = iter([False, False, True])
     with pytest.raises(Abandoned):
         compute(lambda: next(answers))
-    assert next(answers, None) is None, "asked three times, and not again"
+    assert next(answers, None) is None, "checked three times, and not again"
 
 
 @pytest.mark.parametrize(

@@ -127,4 +127,4 @@ def test_a_cancelled_judgement_ends_between_two_parts() -> None:
     spots = [(x * 0.5, y * 0.5, 1.0) for x in range(40) for y in range(40)]
     with pytest.raises(Abandoned):
         quality_of(spots, should_stop=lambda: next(answers))
-    assert next(answers, None) is None, "asked three times, and not again"
+    assert next(answers, None) is None, "checked three times, and not again"

@@ -37,12 +37,12 @@ def test_a_sound_file_passes(path: Path) -> None:
 def test_an_interruption_is_no_damage(where: str, path: Path) -> None:
     with closing(open_reader(path)) as connection:
 
-        def tell(what: str, share: float) -> None:
+        def report(what: str, share: float) -> None:
             if what == where:
                 connection.set_progress_handler(lambda: 1, 1)
 
         with pytest.raises(sqlite3.OperationalError, match="interrupted"):
-            list(find_all_damage(connection, tell))
+            list(find_all_damage(connection, report))
 
 
 @pytest.mark.parametrize(

@@ -100,7 +100,7 @@ def test_all_of_a_tag_is_forgotten_and_later_rows_are_stored(path: Path, journal
     assert journal("check").returncode == 0
 
 
-def test_what_was_forgotten_is_recorded_with_person_and_time(path: Path, journal: Journal) -> None:
+def test_it_is_on_record_with_person_and_time(path: Path, journal: Journal) -> None:
     assert journal("forget", LOST, "--pose").returncode == 0
     again = journal("forget", LOST, "--pose")
     assert (again.returncode, again.stdout) == (1, "")

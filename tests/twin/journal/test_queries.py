@@ -14,9 +14,7 @@ def temperature(start_ns: int = 0, end_ns: int = 0, points: int = 500) -> Series
     return SeriesRequest("7", "temperature", start_ns, end_ns, points)
 
 
-def test_as_many_readings_as_points_come_singly_and_more_in_buckets(
-    tmp_path: Path,
-) -> None:
+def test_as_many_readings_as_points_come_singly_and_more_in_buckets(tmp_path: Path) -> None:
     with lived(tmp_path / "j.sqlite") as life:
         life.write(scan(at_ns=BEGUN + n * SECOND, temperature=float(n)) for n in range(10))
         exact = series(life.connection, temperature(BEGUN, BEGUN + 10 * SECOND, 10), END)

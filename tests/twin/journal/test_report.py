@@ -52,9 +52,7 @@ def test_the_report_is_that_of_a_plain_list_on_either_engine(
         check(found[0], life, *period)
 
 
-def test_readings_of_a_failed_attempt_count_as_in_charts_and_alarms(
-    living: Living,
-) -> None:
+def test_readings_of_a_failed_attempt_count_as_in_charts_and_alarms(living: Living) -> None:
     failed = replace(scan(at_ns=BEGUN + MINUTE, temperature=40.0), status=2)
     with living([("rows", [scan(temperature=20.0), failed])]) as life:
         found = report(life.connection, BEGUN, END)
@@ -64,9 +62,7 @@ def test_readings_of_a_failed_attempt_count_as_in_charts_and_alarms(
     assert (found["counts"]["scans"], found["counts"]["failed"]) == (1, 1)
 
 
-def test_no_scans_is_reported_only_as_far_as_the_log_is_complete(
-    living: Living,
-) -> None:
+def test_no_scans_is_reported_only_as_far_as_the_log_is_complete(living: Living) -> None:
     scans = [scan(at_ns=BEGUN + at * MINUTE, temperature=21.0) for at in range(10)]
     with living([("rows", scans)]) as life:
         for complete_ns, silences, stops in (

@@ -30,9 +30,7 @@ def path(tmp_path: Path) -> Path:
     return made
 
 
-def test_an_index_missing_in_earlier_releases_is_created(
-    path: Path,
-) -> None:
+def test_an_index_missing_in_earlier_releases_is_created(path: Path) -> None:
     indexes = "SELECT name FROM sqlite_schema WHERE type = 'index' AND sql != '' ORDER BY name"
     with closing(open_writer(path)) as connection:
         whole = connection.execute(indexes).fetchall()

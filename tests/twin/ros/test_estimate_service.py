@@ -76,9 +76,7 @@ def test_an_impossible_estimate_is_refused_by_name(
     assert answer == GetEstimate.Response(error_message=answer.error_message)
 
 
-def test_a_flood_of_expensive_requests_delays_no_observation_and_no_field(
-    peer: Peer,
-) -> None:
+def test_a_flood_of_expensive_requests_delays_no_observation_and_no_field(peer: Peer) -> None:
     dearest = {**BOX, "resolution": 0.003}
     clients = [
         peer.node.create_client(kind, name)
@@ -167,7 +165,7 @@ def test_a_report_is_reused_for_a_while_and_a_mistake_is_reported_once(
     at_ns = int(NOW_S * 1e9)
     pasts[:] = [TagPast(str(n), n / 10.0, 0.0, ((at_ns, 20.0),)) for n in range(10_001)]
     assert report().fit_problem.startswith("10001 tags have this sensor")
-    assert report().places == (), "who asks for no places has none worked out"
+    assert report().places == (), "no places without a request"
     assert len(searches) == 3, "it serves for half a minute"
     wording = service.finding()
     assert (wording.level, wording.message) == (WARN, f"co2: {report().fit_problem}")

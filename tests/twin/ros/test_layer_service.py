@@ -72,7 +72,7 @@ class Viewer(Peer):
 
         self.node.create_subscription(DiagnosticArray, "/diagnostics", receive, 10)
 
-    def says(self, topic: str, count: int) -> None:
+    def reports(self, topic: str, count: int) -> None:
         """Wait until the twin's diagnostics contain it; any unexpected change is found here too."""
         self.until(lambda: self.said.get(topic) == str(count), f"{count} on {topic}")
 
@@ -124,8 +124,8 @@ def test_a_layer_is_the_field_and_is_computed_only_for_subscribers(
         "both tags",
     )
     # Something is known, without subscribers: nothing was computed.
-    robot.says(CO2, 0)
-    robot.says(TAGS, 0)
+    robot.reports(CO2, 0)
+    robot.reports(TAGS, 0)
     assert robot.said["message"] == "0 of 8 topics have subscribers"
 
     with Viewer(domain, "viewer") as viewer:
@@ -147,8 +147,8 @@ def test_a_layer_is_the_field_and_is_computed_only_for_subscribers(
         with Viewer(domain, "late") as late:
             late.watch(CO2)
             assert late.latest(CO2).header.stamp == msg.header.stamp  # from the latch
-        robot.says(CO2, 1)
-        robot.says(SOIL, 0)
+        robot.reports(CO2, 1)
+        robot.reports(SOIL, 0)
 
         observe(robot, scan("t0", {"co2": 900.0}))
         changed = viewer.latest(CO2, lambda m: cells(m)[:, 3].max() == 900.0)
@@ -165,7 +165,7 @@ def test_a_layer_is_the_field_and_is_computed_only_for_subscribers(
         viewer.came[CO2].clear()
         viewer.watch(CO2)
         viewer.latest(CO2, lambda m: cells(m)[:, 3].max() == 700.0)
-    robot.says(CO2, 3)
+    robot.reports(CO2, 3)
 
 
 def test_the_error_is_that_of_the_value_by_the_estimate(

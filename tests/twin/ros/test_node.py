@@ -19,11 +19,11 @@ class Twin:
     def warning(self, *words: str) -> str:
         """Wait for a warning that contains all of the words."""
 
-        def look_for() -> str | None:
+        def find() -> str | None:
             lines = self.process.output.splitlines()
             return next((x for x in lines if "WARN" in x and all(w in x for w in words)), None)
 
-        return str(self.peer.until(look_for, f"a warning with {words}"))
+        return str(self.peer.until(find, f"a warning with {words}"))
 
     def settled(self, tag_id: str = "marker") -> Any:
         """Send one good observation and wait for it: all earlier messages are handled then."""

@@ -79,7 +79,7 @@ def test_a_refused_change_changes_nothing_and_names_parameter_value_and_limit(
 ) -> None:
     with node_with(domain, made=AdjustableNode) as node:
         node.parameters = declare(node)
-        node.adjust = lambda _: pytest.fail("it was told")
+        node.adjust = lambda _: pytest.fail("it was notified")
         good = Parameter("idw_max_distance_m", value=9.0)
         result = node.set_parameters_atomically([good, Parameter(name, value=value)])
         assert not result.successful

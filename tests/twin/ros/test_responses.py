@@ -163,12 +163,12 @@ def test_a_client_that_dds_never_finds_is_reported_and_delays_nobody() -> None:
             client = robot.node.create_client(kind, name, qos_profile=never)
             message = f"gave up a response of {name}: too much else waits to be sent again"
 
-            def is_said(client: Any = client, kind: Any = kind, message: str = message) -> bool:
+            def is_reported(client: Any = client, kind: Any = kind, message: str = message) -> bool:
                 # A service queues ten requests: more at once would be lost.
                 futures.append(client.call_async(kind.Request()))
                 return message in twin.output
 
-            robot.until(is_said, message)
+            robot.until(is_reported, message)
         assert robot.get_field(sensor_type="co2").sample_count == 0
         assert not any(future.done() for future in futures)
         assert "Error" not in twin.output

@@ -106,9 +106,7 @@ def test_an_answer_that_cannot_be_sent_delays_nobody(made: Stage) -> None:
     assert made.delivered() == "2"
 
 
-def test_large_queries_run_one_at_a_time_and_small_ones_do_not_wait(
-    made: Stage,
-) -> None:
+def test_large_queries_run_one_at_a_time_and_small_ones_do_not_wait(made: Stage) -> None:
     large = [made.query(cost_s=LARGE_S) for _ in range(LARGE_AT_ONCE + 2)]
     small = [made.query(cost_s=SMALL_S) for _ in range(SMALL_AT_ONCE + 1)]
     assert made.begun == [*large[:LARGE_AT_ONCE], *small[:SMALL_AT_ONCE]]

@@ -37,9 +37,7 @@ def test_stale_segments_are_removed_and_logged(
     assert caplog.messages == [f"removed {path}, left unfinished by a killed process"]
 
 
-def test_complete_new_foreign_and_other_files_stay(
-    tmp_path: Path,
-) -> None:
+def test_complete_new_foreign_and_other_files_stay(tmp_path: Path) -> None:
     stored = [
         leave(tmp_path, MADE),
         leave(tmp_path, BEING_MADE, PORT + 1, old_s=0.0),

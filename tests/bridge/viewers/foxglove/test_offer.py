@@ -97,7 +97,7 @@ async def test_a_client_that_disconnects_does_not_cancel_the_discovery_of_anothe
     offer = offer_of(source)
     source.answers.clear()
     gone, waiting = (asyncio.create_task(offer.look()) for _ in range(2))
-    await until(lambda: source.looks == 1, "the look of both")
+    await until(lambda: source.looks == 1, "the discovery for both")
     gone.cancel()
     await asyncio.wait([gone])
     source.answers.set()
@@ -151,7 +151,7 @@ async def test_followers_get_only_changes_and_an_id_is_never_reused(
     news: list[int | None] = []
     async with offer.followed(news.append):
         looks = source.looks
-        await until(lambda: source.looks > looks + 2, "some looks")
+        await until(lambda: source.looks > looks + 2, "some discoveries")
         assert news == []
         del source.now_published["/n/twin/field/a"]
         await until(lambda: news == [None], "the layer's end")
@@ -164,8 +164,8 @@ async def test_followers_get_only_changes_and_an_id_is_never_reused(
         source.now = RosTime(7, is_simulated=True)
         await until(lambda: news[2:] == [7], "its first moment")
         looks = source.looks
-        await until(lambda: source.looks > looks + 2, "some looks")
-        assert news[2:] == [7], "time that stands is told once"
+        await until(lambda: source.looks > looks + 2, "some discoveries")
+        assert news[2:] == [7], "time that stands is sent once"
         source.now = RosTime(8, is_simulated=True)
         await until(lambda: news[2:] == [7, 8], "and the next")
         late: list[int | None] = []

@@ -27,15 +27,15 @@ class Stage:
         self.session = Session(self.counts)
         self.session.offer(CHANNELS)
 
-    def say(self, **members: Any) -> Reaction:
+    def send(self, **members: Any) -> Reaction:
         return self.session.receive(json.dumps(members))
 
     def subscribe(self, *pairs: tuple[int, int]) -> Reaction:
         entries = [{"id": key, "channelId": channel} for key, channel in pairs]
-        return self.say(op="subscribe", subscriptions=entries)
+        return self.send(op="subscribe", subscriptions=entries)
 
     def unsubscribe(self, *keys: int) -> Reaction:
-        return self.say(op="unsubscribe", subscriptionIds=keys)
+        return self.send(op="unsubscribe", subscriptionIds=keys)
 
     def written(self) -> list[tuple[int, bytes]]:
         """All that waits: subscriptions and payloads."""

@@ -158,7 +158,7 @@ async def test_a_throttled_client_gets_the_latest_message_and_not_before_its_tim
     relay.publish("1", "2", "3")
     await until(lambda: len(quick.frames) == 4, "the rest")
     often.gate.set()
-    await until(lambda: len(often.frames) == 2, "the newest")
+    await until(lambda: len(often.frames) == 2, "the latest")
     assert often.frames == [json_frame("0"), json_frame("3")]
     assert rare.frames == [json_frame("0")]
 

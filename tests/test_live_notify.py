@@ -17,9 +17,7 @@ from tests.support.web import bridge, filled
 READING = "farm/gh1/tags/a_2Fb/readings/temperature"
 
 
-def test_an_observation_reaches_the_broker_and_a_killed_bridge_is_offline(
-    tmp_path: Path,
-) -> None:
+def test_an_observation_reaches_the_broker_and_a_killed_bridge_is_offline(tmp_path: Path) -> None:
     broker = Broker(tmp_path, wants_password=True)
     options = ("--mqtt-url", broker.url, "--mqtt-user", USER, "--mqtt-prefix", "farm/gh1")
     secrets: Any = {"LUPIN_MQTT_PASSWORD": PASSWORD, "LUPIN_WEBHOOK_SECRET": "s" * 16}
@@ -60,9 +58,7 @@ def test_an_observation_reaches_the_broker_and_a_killed_bridge_is_offline(
         wait_for(lambda: received.of("farm/gh1/status")[-1:] == [b"offline"], "the will")
 
 
-def test_a_flood_at_home_assistants_topic_costs_no_memory(
-    tmp_path: Path,
-) -> None:
+def test_a_flood_at_home_assistants_topic_costs_no_memory(tmp_path: Path) -> None:
     broker = Broker(tmp_path)
     with (
         broker.running() as process,
@@ -75,7 +71,7 @@ def test_a_flood_at_home_assistants_topic_costs_no_memory(
         before_mb = resident_mb(live.process.pid)
         reset_peak(live.process.pid)
         for retain in (False, True):
-            received.say("homeassistant/status", "x" * 64_000_000, retain=retain)
+            received.publish("homeassistant/status", "x" * 64_000_000, retain=retain)
         live.peer.observe(scan("a", {"co2": 500.0}, at=(1, 1)))
         wait_for(lambda: received.last(reading)["value"] == 500.0, "the next one")
         assert peak_mb(live.process.pid) - before_mb < 32

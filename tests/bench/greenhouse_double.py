@@ -3,10 +3,10 @@
 from typing import Final
 
 # That many tags in a square, a metre apart, each with two readings, species and two blooms.
-# `house.beat()`: a frame that changes nothing; `house.change(n)`: n tags were scanned again;
-# `house.idle()`: no state, but the connection lives; `house.unpin(id)`: a tag without a pose.
+# `greenhouse.beat()`: a frame that changes nothing; `greenhouse.change(n)`: n tags scanned again;
+# `greenhouse.idle()`: only the connection lives; `greenhouse.unpin(id)`: a tag without a pose.
 _SCRIPT: Final = """
-window.house = {};
+window.greenhouse = {};
 (() => {
   const start = Math.floor(Date.now() / 1000);
   const columns = Math.ceil(Math.sqrt(COUNT));
@@ -51,8 +51,8 @@ window.house = {};
     say({ type: 'delta', seq, base, revision: `r${revision}`, header: header(), changed,
           removed: [], health });
   };
-  window.house.beat = () => delta([]);
-  window.house.change = (count) => {
+  window.greenhouse.beat = () => delta([]);
+  window.greenhouse.change = (count) => {
     revision += 1;
     const changed = Array.from({ length: count }, () => {
       const index = (next += 7919) % COUNT;
@@ -60,14 +60,14 @@ window.house = {};
     });
     delta([...new Map(changed.map((each) => [each.tag_id, each])).values()]);
   };
-  window.house.unpin = (id) => {
+  window.greenhouse.unpin = (id) => {
     const { position, orientation } = tags[id - 1].pose;
     const pose = { position, orientation: { ...orientation, w: 0 } };
     tags[id - 1] = { ...tags[id - 1], pose };
     revision += 1;
     delta([tags[id - 1]]);
   };
-  window.house.idle = () => say(status);
+  window.greenhouse.idle = () => say(status);
   window.WebSocket = class {
     constructor() {
       socket = this;

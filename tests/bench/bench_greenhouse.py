@@ -9,7 +9,7 @@ from collections.abc import Callable
 from playwright.sync_api import CDPSession, Page
 
 from tests.bench.bench_page import chromium, page_of
-from tests.bench.house_double import greenhouse_of
+from tests.bench.greenhouse_double import greenhouse_of
 from tests.support.web import bridge
 
 SIZES = (1_000, 10_000)
@@ -30,7 +30,7 @@ async (times) => {
   for (let i = 0; i < times; i++) {
     await new Promise((resolve) => setTimeout(resolve, 1050));
     const start = performance.now();
-    house.beat();
+    greenhouse.beat();
     await null; // what React does at once it does before that; no frame is asked for
     costs.push(performance.now() - start);
   }
@@ -95,10 +95,10 @@ def measure(page: Page, session: CDPSession, count: int) -> dict[str, float]:
         page.evaluate(SETTLED)
 
     # Ages tick by themselves, and reading the page costs something too.
-    idle = cost(frame("house.idle()"), BEATS)
+    idle = cost(frame("greenhouse.idle()"), BEATS)
     return {
         "a heartbeat that changes nothing": page.evaluate(HEARTBEAT, BEATS),
-        "a delta of 1 %": cost(frame(f"house.change({count // 100})"), BEATS) - idle,
+        "a delta of 1 %": cost(frame(f"greenhouse.change({count // 100})"), BEATS) - idle,
         "a move of the mouse over the map": cost(move, MOVES),
         "a sort": cost(sort, 6),
         "a filter": cost(search, 6),

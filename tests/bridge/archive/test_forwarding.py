@@ -166,7 +166,7 @@ def test_a_backup_that_is_put_back_loses_and_overwrites_nothing(
 ) -> None:
     append(journal, scans(0, 50))
     backup = shutil.copy(journal, tmp_path / "backup")
-    kept(journal, scans(50, 10))
+    append(journal, scans(50, 10))
     # Numbered after the scans, and by itself no sign of a backup.
     with opened(journal) as file:
         file.put_note(Note("", NOW, "anna", COMMENT, "tag:7", "dry"))

@@ -120,7 +120,7 @@ def test_what_is_older_goes_for_good_with_its_months_and_what_was_counted_stays(
     assert f"deleted {month(stamps(*AGES)[0])[5:].replace('_', '-')}: the whole month" in told
     assert run("archive", "check", "--archive-url", sites.owner).returncode == 0
     assert retain(sites, 60) == "deleted nothing\n"
-    kept(tmp_path / "gh1", [scan("7", NOW)])
+    append(tmp_path / "gh1", [scan("7", NOW)])
     forward_once(sites, tmp_path / "gh1")
     assert len(sites.rows()["scan"]) == len(after["scan"]) + 1
 

@@ -47,7 +47,6 @@ HEARTBEAT_SPARED_S = 0.8
 # Frames that may be sent back to back while the mean rate allows it. With 1, a single late change
 # would shift the schedule: every later change of a producer at exactly this rate would wait.
 PACE_BURST: Final = 2.0
-_EVERYBODY: Final = ""
 # Worst-case time to write an alarms frame, and the limits on the rate of such frames: each holds
 # all alarms, and goes to every client.
 ALARMS_S: Final = 0.03
@@ -289,7 +288,7 @@ class Bridge:
 
     def _push_when_due(self) -> None:
         self._push_timer = None
-        wait_s = self._pace.take(_EVERYBODY, self._clock())
+        wait_s = self._pace.take("", self._clock())
         if wait_s > 0.0:
             loop = asyncio.get_running_loop()
             self._push_timer = loop.call_later(wait_s, self._push_when_due)

@@ -106,15 +106,14 @@ class DropCounts:
 
     def value(self, now_s: float) -> Counts:
         """Return the current counts."""
-        return Counts(
-            MappingProxyType(dict(self._dropped)),
-            self.callback_errors,
-            tuple(
-                Recent(reason, self._texts[reason], count)
-                for reason in self._buckets
-                if (count := self._recent(reason, now_s))
-            ),
+        for buckets in self._buckets.values():
+            self._forget(buckets, now_s)
+        recent = tuple(
+            Recent(reason, self._texts[reason], sum(count for _, count in buckets))
+            for reason, buckets in self._buckets.items()
+            if buckets
         )
+        return Counts(MappingProxyType(dict(self._dropped)), self.callback_errors, recent)
 
     def add(self, reason: str, text: str, now_s: float, count: int = 1) -> None:
         """Count what was dropped for a `Reason`; `text` is for a person."""
@@ -127,11 +126,6 @@ class DropCounts:
         else:
             buckets.append((now_s, count))
         self._forget(buckets, now_s)
-
-    def _recent(self, reason: str, now_s: float) -> int:
-        buckets = self._buckets[reason]
-        self._forget(buckets, now_s)
-        return sum(count for _, count in buckets)
 
     @staticmethod
     def _forget(buckets: deque[tuple[float, int]], now_s: float) -> None:

@@ -146,7 +146,7 @@ class FollowedLog:
                     why = str(error)
                     log.info("the twin's journal is not followed: %s", why)
                 elif isinstance(error, _FILE_ERRORS):
-                    self.fault = f"This bridge's copy of the twin's journal: {why}"
+                    self.fault = f"This bridge cannot copy the twin's journal: {why}"
                 await asyncio.sleep(RETRY_S)
             except Exception:  # nobody waits for this task, and all of the past depends on it
                 log.exception("the twin's journal is not followed")

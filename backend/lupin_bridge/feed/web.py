@@ -143,7 +143,7 @@ class FollowedLog:
             # Not the first: a copy that is damaged or foreign is deleted, and made anew.
             was_failing, is_failing = is_failing, isinstance(pause_s, _FILE_ERRORS)
             self.fault = (
-                f"This bridge's copy of the twin's journal: {pause_s}"
+                f"This bridge cannot copy the twin's journal: {pause_s}"
                 if was_failing and is_failing
                 else ""
             )

@@ -41,12 +41,16 @@ export type Timeline = Schemas['Timeline'];
 export type Alarm = Schemas['Alarm'];
 export type Session = Schemas['Session'];
 export type Note = Schemas['Note'];
+export type Notes = Schemas['Notes'];
 /** A frame also has the number of notes in the log. */
 export type Alarms = Schemas['Alarms'] & { readonly notes?: number };
 export type HealthReason = Schemas['HealthReason'];
 export type Verdict = TagHealth['verdict'];
 export type Grade = Schemas['EstimateQualities']['sensors'][string];
+/** Each tag's measured value, and the value expected from all other tags. */
+export type ExpectedTags = Schemas['ExpectedTags'];
 /** Where another tag would help. */
+export type Advice = Schemas['Advice'];
 export type Place = Schemas['AdvisedPlace'];
 /** The robot's own report, and its track. */
 export type RobotNow = Omit<RobotFrame, 'type'>;

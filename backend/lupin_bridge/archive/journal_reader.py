@@ -72,8 +72,11 @@ class Epoch:
     def moved(self, table: str, rows: Iterable[Row]) -> list[list[Any]]:
         """Rows of the journal as the archive has them: of its site, and with its numbers."""
         offsets = {**dict.fromkeys(_SEQS, self.seq_offset), **dict.fromkeys(_RUNS, self.run_offset)}
+        # Of the first epoch, none is moved.
         numbers = [
-            (place, offsets[name]) for place, name in enumerate(columns(table)) if name in offsets
+            (place, offset)
+            for place, name in enumerate(columns(table))
+            if (offset := offsets.get(name))
         ]
         found = [[self.site, *map(without_nul, row[1:])] for row in rows]
         for row in found:

@@ -17,6 +17,7 @@ import sqlite3
 from collections.abc import Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -180,7 +181,7 @@ def rows_behind(
         for rank, table in enumerate(_NUMBERED)
         for row in _behind(log, table, after, most)
     ]
-    numbered.sort(key=lambda entry: entry[:2])
+    numbered.sort(key=itemgetter(0, 1))
     purged = _purged(log, every=every)
     last, weight, is_all = after, 0, True
     for place, (number, rank, row) in enumerate(numbered):

@@ -247,12 +247,10 @@ class SiteTwin(TwinSource):
         if reported is None or not (is_live or said != self._said):
             return
         self._said = said
-        ago_s = (
-            max(0.0, (self._watching.now_ns - site.heartbeat_ns) / 1e9)
-            if site.heartbeat_ns
-            else 0.0
-        )
         stamp_ns = self._now_ns(reported)
+        # By the clock of `now`, where it is the wall's: of what is later, a query is refused.
+        now_ns = stamp_ns if reported.is_wall_clock else self._watching.now_ns
+        ago_s = max(0.0, (now_ns - site.heartbeat_ns) / 1e9) if site.heartbeat_ns else 0.0
         if not is_live:
             # As of the forwarder's last heartbeat: readers add `silent_s`.
             stamp_ns = site.heartbeat_ns if reported.is_wall_clock else _newest_ns(reported)

@@ -168,6 +168,9 @@ def test_all_replicas_give_an_answer_the_same_etag(replicas: Replicas) -> None:
     for page in replicas.pages:
         # Silent, so that nothing changes any more.
         page.site(is_live=False, last_verdict="healthy", active_alarms=1)
+        for path in ("state", "report"):  # the state opens the site; a report is of until now
+            answer = page.http.get(f"/sites/gh1/api/{path}")
+            assert answer.status_code == 200, answer.text
     at = int(time.time()) - 90
     with httpx.Client(base_url=replicas.url, trust_env=False, timeout=PATIENCE_S) as browser:
         for path in (f"/{it.format(at=at)}" for it in ANSWERS):

@@ -4,6 +4,10 @@ export type paths = Record<string, never>;
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
+        readonly Advice: {
+            readonly sensor_type: string;
+            readonly places: readonly components["schemas"]["AdvisedPlace"][];
+        };
         readonly AdvisedPlace: {
             readonly x: number;
             readonly y: number;
@@ -59,6 +63,22 @@ export interface components {
             readonly share_day: number | null;
             readonly share_week: number | null;
             readonly is_trusted: boolean | null;
+        };
+        readonly ExpectedReading: {
+            readonly measured: number;
+            readonly observed_at: components["schemas"]["Time"];
+            readonly expected: number;
+            readonly expected_sd: number;
+            readonly z: number;
+            readonly offset: number;
+            readonly left_out: boolean;
+        };
+        readonly ExpectedTags: {
+            readonly sensor_type: string;
+            readonly at: components["schemas"]["Time"];
+            readonly tags: {
+                readonly [key: string]: components["schemas"]["ExpectedReading"];
+            };
         };
         readonly FieldQuality: {
             readonly sensor_type: string;
@@ -153,6 +173,9 @@ export interface components {
             readonly by: string;
             readonly withdrawn_by: string | null;
             readonly withdrawn_at: components["schemas"]["Time"] | null;
+        };
+        readonly Notes: {
+            readonly notes: readonly components["schemas"]["Note"][];
         };
         readonly OccupancyGrid: {
             readonly header: components["schemas"]["Header"];

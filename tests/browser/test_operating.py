@@ -172,7 +172,7 @@ def test_each_layer_can_be_hidden_and_shown(hmi: Hmi) -> None:
         hmi.expect_change(with_it)
         box.click()
         hmi.expect_picture(with_it)
-    assert panel.get_by_role("checkbox").count() == 10
+    assert panel.get_by_role("checkbox").count() == 9
 
 
 # --- the keyboard alone -------------------------------------------------------------------------

@@ -184,7 +184,7 @@ function Also({ of, than }: { of: readonly Urgent[]; than: Verdict }): JSX.Eleme
           {shown(tagId, 16)}
         </Fragment>
       ))}
-      {more > 0 && ` + ${more}`}{' '}
+      {more > 0 && ` ${S.attentionMore(more)}`}{' '}
     </span>
   );
 }

@@ -188,7 +188,9 @@ test('of tags that need the same done the worst stands for all, some by name', (
   const { unmount } = render(<HealthSummary kiosk={false} />);
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
-    expect.stringMatching(/^CriticalTag 1: .*Heat, or close the vents also tags 2, 3, 4 \+ 1 $/),
+    expect.stringMatching(
+      /^CriticalTag 1: .*Heat, or close the vents also tags 2, 3, 4 \+ 1 more $/,
+    ),
     expect.stringMatching(/^StressedTag 6: Humidity/),
   ]);
   // Less severe tags follow their own mark.
@@ -196,7 +198,9 @@ test('of tags that need the same done the worst stands for all, some by name', (
   act(() => {
     showTags(tags, judgement({ ...all, 3: mild, 4: mild, 5: mild }));
   });
-  expect(todo.textContent).toMatch(/Heat, or close the vents also tags 2, Stressed 3, 4 \+ 1 $/);
+  expect(todo.textContent).toMatch(
+    /Heat, or close the vents also tags 2, Stressed 3, 4 \+ 1 more $/,
+  );
   act(() => {
     showTags(tags, judgement({ ...all, 6: [humid] }));
   });

@@ -119,7 +119,7 @@ const SAME: Readonly<Record<string, readonly string[]>> = {
       'sensors',
     ],
     ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'legendMore'],
-    ...['keys.global.11.0', 'idealParts.any', 'colourings.ideal', 'differenceTimes'],
+    ...['keys.global.11.0', 'idealParts.any', 'colourings.ideal'],
   ],
   nl: [
     ...[

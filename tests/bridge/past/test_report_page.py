@@ -143,7 +143,7 @@ def test_a_zone_that_this_machine_does_not_know_is_reported() -> None:
 def test_a_note_has_its_kind_and_its_text_and_headings_do_not_contradict_their_content() -> None:
     page = page_of()
     assert "06:01 Anna Comment: Boiler 2 tripped (withdrawn by Ben) Greenhouse" in page
-    assert "Gaps without scans Where" in page
+    assert "Gaps without scans Where From To Duration" in page
     assert "Tags not scanned None." in page
 
 

@@ -54,7 +54,7 @@ export function AlarmsLabel(): JSX.Element {
   if (isDisconnected && !isNow) return <>{S.alarms}</>;
   return (
     <>
-      {worst && isNow && <HealthShape verdict={worst} />}
+      {worst && <HealthShape verdict={worst} />}
       <span>
         {S.alarms}
         {length > 0 && (

@@ -97,7 +97,7 @@ export const MAP: In<typeof EN.MAP> = {
   differenceLoading: 'Der Unterschied wird geladen',
   differenceNothing: (at) => `Keine Daten für ${at}.`,
   differenceFailed: (reason) => `Kein Unterschied: ${reason}`,
-  differenceTimes: (at, against) => `${at} minus ${against}`,
+  differenceTimes: (at, against) => `${at} verglichen mit ${against}`,
   differenceSinceYesterday: (clock) => `gegenüber gestern ${clock}`,
   differenceSinceWeek: (clock) => `gegenüber vor einer Woche, ${clock}`,
   differenceSince: (moment) => `gegenüber ${moment}`,

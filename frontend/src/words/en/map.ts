@@ -93,7 +93,7 @@ export const MAP = {
   differenceLoading: 'Loading the difference',
   differenceNothing: (at: string): string => `No data for ${at}.`,
   differenceFailed: (reason: string): string => `No difference: ${reason}`,
-  differenceTimes: (at: string, against: string): string => `${at} minus ${against}`,
+  differenceTimes: (at: string, against: string): string => `${at} compared with ${against}`,
   differenceSinceYesterday: (clock: string): string => `since yesterday ${clock}`,
   differenceSinceWeek: (clock: string): string => `since ${clock} a week ago`,
   differenceSince: (moment: string): string => `since ${moment}`,

@@ -95,7 +95,7 @@ export const MAP: In<typeof EN.MAP> = {
   differenceLoading: 'Het verschil wordt geladen',
   differenceNothing: (at) => `Geen gegevens van ${at}.`,
   differenceFailed: (reason) => `Geen verschil: ${reason}`,
-  differenceTimes: (at, against) => `${at} min ${against}`,
+  differenceTimes: (at, against) => `${at} vergeleken met ${against}`,
   differenceSinceYesterday: (clock) => `ten opzichte van gisteren ${clock}`,
   differenceSinceWeek: (clock) => `ten opzichte van vorige week, ${clock}`,
   differenceSince: (moment) => `ten opzichte van ${moment}`,

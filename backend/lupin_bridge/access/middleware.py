@@ -272,7 +272,8 @@ class AccessControl:
         if person is not None:
             scope["state"] = {**scope.get("state", {}), PERSON_KEY: person}
         people = self._access.people
-        if people is None:
+        # What needs no credentials has no session to end with: a sign-in may take seconds.
+        if people is None or (person is None and people.is_on):
             await self._app(scope, receive, send)
             return
         looking = asyncio.create_task(_end_with(people, person, scope))

@@ -58,9 +58,11 @@ _EPOCH: Final = (
     "SELECT journal_id, epoch, seq_offset, run_offset, forwarded_seq FROM epoch"
     " WHERE site = :site ORDER BY epoch DESC LIMIT 1"
 )
+# Each table's own limit has PostgreSQL read one row of it, instead of all rows of the site.
 _NEWEST: Final = "SELECT seq, arrival_ns FROM ({}) AS row ORDER BY seq DESC LIMIT 1".format(
     " UNION ALL ".join(
-        f"SELECT seq, arrival_ns FROM {table} WHERE site = :site AND seq > :begun AND seq <= :upto"
+        f"(SELECT seq, arrival_ns FROM {table} WHERE site = :site"
+        " AND seq > :begun AND seq <= :upto ORDER BY seq DESC LIMIT 1)"
         for table in (*WRITTEN, "place")
     )
 )

@@ -401,7 +401,7 @@ def _with_cors(send: Send, foreign: str | None) -> Send:
 
 
 async def _end_with(people: People, person: Person | None, scope: Scope) -> None:
-    """End the connection with the session; without a person, at the first account."""
+    """End the connection when its session ends; without a person, when accounts are created."""
     try:
         await asyncio.sleep(_POLL_S)
         while people.may_stay(person):

@@ -263,7 +263,7 @@ class Forwarder:
                 if not is_said:  # not earlier: a reachable archive may still refuse every batch
                     self._last_problem, self._wait_s, is_said = "", FIRST_WAIT_S, True
                     self._say(f"site {self._site} is forwarded to {place_of(self._url)}")
-                # Not earlier either: who cannot write is not live.
+                # Not earlier either: a forwarder that cannot write is not live.
                 if time.monotonic() - beaten_s >= _HEARTBEAT_S:
                     beaten_s = time.monotonic()
                     sink.beat()

@@ -168,7 +168,7 @@ def route_class(path: str) -> str:
 
 
 class Metered:
-    """ASGI middleware around access control: notes each HTTP answer as it begins, and refusals."""
+    """ASGI middleware around access control: notes each HTTP answer, and each refusal."""
 
     def __init__(self, app: ASGIApp, note: Note) -> None:
         self._app = app

@@ -272,7 +272,7 @@ class AccessControl:
         if person is not None:
             scope["state"] = {**scope.get("state", {}), PERSON_KEY: person}
         people = self._access.people
-        # Nothing ends what is open to everybody, such as a sign-in that takes seconds.
+        # What needs no credentials has no session to end with: a sign-in may take seconds.
         if people is None or (person is None and people.is_on):
             await self._app(scope, receive, send)
             return
@@ -401,7 +401,7 @@ def _with_cors(send: Send, foreign: str | None) -> Send:
 
 
 async def _end_with(people: People, person: Person | None, scope: Scope) -> None:
-    """End the connection with the session; without a person, at the first account."""
+    """End the connection when its session ends; without a person, when accounts are created."""
     try:
         await asyncio.sleep(_POLL_S)
         while people.may_stay(person):

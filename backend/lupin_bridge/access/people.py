@@ -230,7 +230,8 @@ class People:
         try:
             return await self._on_thread(do, 2 * MAX_WAITING)
         except AccountError:
-            # SQLite shares what was read-only when it was opened: the next reader opens it again.
+            # A process has one WAL index for a file, read-only if the first reader found it so:
+            # let the next reader open the file again.
             self._inode = 0
             raise
 

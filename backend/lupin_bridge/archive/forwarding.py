@@ -58,9 +58,11 @@ _EPOCH: Final = (
     "SELECT journal_id, epoch, seq_offset, run_offset, forwarded_seq FROM epoch"
     " WHERE site = :site ORDER BY epoch DESC LIMIT 1"
 )
+# Each table's own limit has PostgreSQL read one row of it, instead of all rows of the site.
 _NEWEST: Final = "SELECT seq, arrival_ns FROM ({}) AS row ORDER BY seq DESC LIMIT 1".format(
     " UNION ALL ".join(
-        f"SELECT seq, arrival_ns FROM {table} WHERE site = :site AND seq > :begun AND seq <= :upto"
+        f"(SELECT seq, arrival_ns FROM {table} WHERE site = :site"
+        " AND seq > :begun AND seq <= :upto ORDER BY seq DESC LIMIT 1)"
         for table in (*WRITTEN, "place")
     )
 )
@@ -261,7 +263,7 @@ class Forwarder:
                 if not is_said:  # not earlier: a reachable archive may still refuse every batch
                     self._last_problem, self._wait_s, is_said = "", FIRST_WAIT_S, True
                     self._say(f"site {self._site} is forwarded to {place_of(self._url)}")
-                # Not earlier either: who cannot write is not live.
+                # Not earlier either: a forwarder that cannot write is not live.
                 if time.monotonic() - beaten_s >= _HEARTBEAT_S:
                     beaten_s = time.monotonic()
                     sink.beat()

@@ -34,7 +34,7 @@ from lupin_twin.journal.schema import (
     open_named,
 )
 
-# Rows of one transaction, about.
+# About how many rows one transaction has.
 _ROWS: Final = 5_000
 # Small tables: all rows are read each time, and those that have changed are sent.
 _SMALL: Final = ("run", "meta")
@@ -45,8 +45,8 @@ _ARRIVAL: Final = " UNION ALL ".join(
     f"SELECT arrival_ns FROM {table} WHERE site = :site AND seq = :seq"
     for table in (*WRITTEN, "place")
 )
-# By run, from when on events may be others because of those rows. The last silence that began
-# before them may go on past them.
+# For each run, since when new rows may have changed its events. The last silence that began before
+# them may now end later.
 _EVENTS_SINCE: Final = (
     "SELECT run, coalesce((SELECT max(stamp_ns) FROM event WHERE site = :site"
     f" AND event.run = new.run AND event = '{Event.SILENCES}' AND stamp_ns < since_ns), since_ns)"
@@ -72,7 +72,7 @@ class Epoch:
     def moved(self, table: str, rows: Iterable[Row]) -> list[list[Any]]:
         """Rows of the journal as the archive has them: of its site, and with its numbers."""
         offsets = {**dict.fromkeys(_SEQS, self.seq_offset), **dict.fromkeys(_RUNS, self.run_offset)}
-        # Of the first epoch, none is moved.
+        # The offsets of the first epoch are 0.
         numbers = [
             (place, offset)
             for place, name in enumerate(columns(table))
@@ -95,7 +95,7 @@ def without_nul(value: Any) -> Any:
 class Batch:
     """Rows by table for one transaction, up to the number `upto` of the journal.
 
-    Its events replace those of the archive that are of a run and not before a stamp (`replaced`).
+    `replaced`: for these runs, its events replace the archive's from a stamp on.
     """
 
     upto: int

@@ -1,4 +1,4 @@
-"""Asyncio helpers: guard and repeat work (`Periodic`), run identical work once, end tasks."""
+"""Asyncio helpers: survive errors (`Guard`), repeat work, run identical work once, end tasks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ async def end(*tasks: asyncio.Task[Any] | None) -> None:
 class Guard:
     """Runs work of a task that nobody awaits: an error ends nothing, and is logged under `what`.
 
-    An error that stays is logged once. `known` are the errors that need no traceback.
+    An error that persists is logged once. `known` are the errors that need no traceback.
     """
 
     def __init__(self, what: str, *known: type[Exception]) -> None:

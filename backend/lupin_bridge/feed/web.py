@@ -140,7 +140,7 @@ class FollowedLog:
             if self.condition is not None:
                 self._is_known.set()
             pause_s = await guard.run(self._look())
-            # Not the first: a copy that is damaged or foreign is deleted, and made anew.
+            # After a single error, a damaged or foreign copy is deleted and made anew.
             was_failing, is_failing = is_failing, isinstance(pause_s, _FILE_ERRORS)
             self.fault = (
                 f"This bridge cannot copy the twin's journal: {pause_s}"

@@ -248,7 +248,7 @@ class SiteTwin(TwinSource):
             return
         self._said = said
         stamp_ns = self._now_ns(reported)
-        # By the clock of `now`, where it is the wall's: of what is later, a query is refused.
+        # By the same clock as `now`, if that is the wall's: a later moment would be refused.
         now_ns = stamp_ns if reported.is_wall_clock else self._watching.now_ns
         ago_s = max(0.0, (now_ns - site.heartbeat_ns) / 1e9) if site.heartbeat_ns else 0.0
         if not is_live:

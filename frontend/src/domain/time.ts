@@ -34,10 +34,10 @@ export function ageSeconds(
   return Math.max(0, asOf - observedAt) / 1000;
 }
 
-/** A state comes up to this long after newer stamps, seconds. */
+/** A stamp may be this far ahead of the latest state, which comes after it, seconds. */
 const AHEAD_S = 10;
 
-/** Seconds since a moment; null: it is still to come, so the clock was set back. */
+/** Seconds since a moment; null: it is in the future, because the clock was set back. */
 export const secondsSince = (at: number, now: number): number | null =>
   at > now + AHEAD_S ? null : Math.max(0, now - at);
 

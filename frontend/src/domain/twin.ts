@@ -37,7 +37,7 @@ type TakenState = Pick<Snapshot, 'at' | 'takenAt'>;
 
 /**
  * A ROS time on the monotonic clock: the wall clock would be wrong in simulation, and on a tablet whose
- * clock is off. A state without its own time (0) dates nothing, nor what is still to come.
+ * clock is off. Unknown if the state has no time of its own (0), or if the time is in the future.
  */
 export function whenOf(time: WireTime, { at, takenAt }: TakenState): When {
   if (at.sec === 0 && at.nanosec === 0) return 'unknown';

@@ -59,7 +59,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
   const alarms = useMemo(() => alarmCount(sites.values()), [sites]);
   // Until then there is nothing to count.
   const hasArchive = seen.archive !== null;
-  // Only then does no alarm mean that there is none.
+  // Otherwise a count of 0 does not mean that there is no alarm.
   const isKnown =
     hasArchive &&
     asOfWhen(seen) === null &&

@@ -94,7 +94,7 @@ export interface Room {
   /** The visible part; labels of pins inside it are not cut off. */
   readonly within: Box;
   readonly covered: readonly Box[];
-  /** The robot's mark: labels keep clear of it, and a pin below it has one all the same. */
+  /** The robot's mark: labels keep clear of it, but a pin below it still has its label. */
   readonly robot?: Box | null;
 }
 

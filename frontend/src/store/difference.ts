@@ -33,7 +33,7 @@ export function startDifference(): () => void {
     },
     (state) => {
       const { compare, sensor } = state.view;
-      // A difference of another sensor, source or comparison must not stay; nor one of the past, live.
+      // A difference of another sensor, source or comparison must not stay, nor one of the past after it.
       const isOther =
         compare === null ||
         before?.view.compare !== compare ||
@@ -52,7 +52,7 @@ const isPast = (state: AppState): boolean => selectShown(state).moment !== null;
 function taskFor(state: AppState, compare: Compare): FetchTask<Difference> | undefined {
   const { moment, snapshot } = selectShown(state);
   const { epoch, socket } = state.twin.connection;
-  // Of a silent twin, the last state is shown, and keeps its own time.
+  // The last state of a silent twin is shown, and keeps its own time.
   const nowS = rosNow(state, isReceivingNow(state) ? now() : -Infinity);
   const resolution = fieldResolution(selectLatest(state).snapshot);
   const box = boxOf(snapshot, resolution);

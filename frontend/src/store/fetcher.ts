@@ -212,7 +212,7 @@ export function useFetched<T>(task: FetchTask<T> | null, paceMs: number): Fetche
         setFetched(ready(value));
       },
       onError: (message) => {
-        // What another group's fetch brought says nothing about this one.
+        // A value of another group does not answer this one.
         setFetched(({ value, state }) => failed(message, state === 'waiting' ? null : value));
       },
     }),

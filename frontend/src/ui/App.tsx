@@ -65,7 +65,7 @@ export function App({
         {selected !== null && !kiosk && (
           <WithParts>{(parts) => <parts.TagCard key={selected} tagId={selected} />}</WithParts>
         )}
-        {/* The map has its own. */}
+        {/* Over the list; the map has its own. */}
         <WithParts>{(parts) => <parts.Meanwhile />}</WithParts>
       </main>
       {!kiosk && <PaneTabs />}

@@ -92,7 +92,7 @@ describe('of a moment in the past', () => {
   test('that cannot be had, the reason is told', () => {
     come(NO_HOUSE);
     receive({ pastFault: { at, message: 'no journal is kept', isLasting: true } });
-    expect(noticeFor(store.get())?.hint).toBe('This moment is still to come.');
+    expect(noticeFor(store.get())?.hint).toBe('This moment is in the future.');
     receive(withState(stateFrame([wireTag()], { sec: at + 1 }), performance.now()));
     expect(noticeFor(store.get())).toMatchObject({ id: 'past-failed', hint: 'no journal is kept' });
   });

@@ -78,12 +78,18 @@ def test_a_nul_in_a_name_does_not_stop_its_site(archive: Archive, journal: Path)
     assert archive.select("SELECT DISTINCT tag FROM series ORDER BY tag") == [("a\ufffdb",), ("c",)]
 
 
-def test_more_rows_than_go_at_once(archive: Archive, journal: Path) -> None:
+def test_more_rows_than_go_at_once_and_a_restart(archive: Archive, journal: Path) -> None:
     forward(
         archive,
         journal,
         [pin("1"), *scans(0, 6_000), *(inspection("7", NOW + n * HOUR) for n in range(600))],
     )
+    read = "SELECT sum(seq_tup_read + idx_tup_fetch)::int FROM pg_stat_user_tables"
+    read += " WHERE relname LIKE 'scan_%'"
+    ((before,),) = archive.select(read)
+    forward_once(archive, journal)
+    ((after,),) = archive.select(read)
+    assert after - before < 10, "a restart reads the newest rows, not all"
     assert archive.rows() == rows_of(journal)
 
 

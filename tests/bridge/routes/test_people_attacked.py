@@ -185,8 +185,8 @@ def test_a_disconnect_or_a_shutdown_during_a_body_is_no_error(accounts: Path) ->
 def test_who_is_removed_or_replaced_amid_a_sign_in_gets_no_session(
     live: Bridge, accounts: Path
 ) -> None:
-    # What the hash says of itself decides: seconds, for which the others wait behind it. That is
-    # longer than until a request is looked at again, but nothing ends one that is open to everybody.
+    # The parameters in the hash decide: it takes seconds, and the others wait behind it. Sessions
+    # are checked more often, but a sign-in has none yet.
     add(accounts, secret=f"$argon2id$v=19$m=65536,t=60,p=1${'A' * 22}${'A' * 43}", slow="viewer")
     add(accounts, gone="operator", new="operator")
     with ExitStack() as open_, ThreadPoolExecutor() as clients:

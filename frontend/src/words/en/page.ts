@@ -220,7 +220,7 @@ export const PAST = {
   pastFetching: (moment: string): string => `Loading ${moment}`,
   pastFetchingHint: 'Nothing is shown until it has loaded.',
   pastFailed: (moment: string): string => `${moment} cannot be shown`,
-  pastFuture: 'This moment is still to come.',
+  pastFuture: 'This moment is in the future.',
   pastNothing: (moment: string): string => `No data for ${moment}`,
   pastReach: (from: string): string => `Recorded data begins at ${from}.`,
   pastReachNothing: 'Nothing has been recorded yet.',

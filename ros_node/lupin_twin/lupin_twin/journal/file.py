@@ -90,7 +90,7 @@ class JournalFile:
         self.simulated: tuple[int, int] | None = None
         # The limit that is exceeded although nothing more can be deleted, in words.
         self.unmet_limit = ""
-        # What is wrong if the write-ahead log (WAL) was removed; then readers may fail.
+        # Says that the write-ahead log (WAL) was removed, so readers may fail; empty: it was not.
         self.lost_log = ""
         self._path, self._log = path, path.with_name(path.name + "-wal")
         self._limits = limits
@@ -340,8 +340,8 @@ class JournalFile:
                 raise FileNotFoundError(f"{self._path} was removed or replaced")
             if _inode(self._log) != self._log_inode:
                 self.lost_log = f"{self._log} was removed: restart the twin, nothing is lost so far"
-        # Without its name, the WAL is lost with the process. Opened anew, it would be another one
-        # for us than for the readers that have it open.
+        # A removed WAL is lost when the process ends, so its content goes into the file at once. We
+        # cannot begin a new one, because readers still have the old one open.
         if self.lost_log or self._log_bytes() > _LOG_BYTES:
             self._connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
         return may_purge and self._purge(now_s)

@@ -172,8 +172,9 @@ def rows_behind(
 ) -> tuple[list[tuple[str, Row]], int, bool]:
     """Read the next rows after a number with their tables: all runs, and about `most` others.
 
-    Counts are read of hours of which rows were deleted; if `every`, of all hours, but no events.
-    Also returns the number after which to continue, and whether nothing more was written yet.
+    Adds counts and events of hours whose rows were deleted; if `every`, counts of all hours that
+    these rows are in, and no events. Also returns the number after which to continue, and whether
+    nothing more was written yet.
     """
     found = [("run", row) for row in _all(log, "run")]
     numbered = [

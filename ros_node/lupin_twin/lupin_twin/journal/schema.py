@@ -353,7 +353,7 @@ def insert_into(table: str) -> str:
 
 @cache
 def upsert_into(table: str) -> str:
-    """The statement that writes a row, maybe over the one with its key."""
+    """The statement that writes a row, and replaces one with the same key."""
     key = columns(table, of_key=True)
     news = (f"{name} = excluded.{name}" for name in columns(table) if name not in key)
     return f"{insert_into(table)} ON CONFLICT ({', '.join(key)}) DO UPDATE SET {', '.join(news)}"

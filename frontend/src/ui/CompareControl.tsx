@@ -85,7 +85,7 @@ function OwnMoment({ at }: { at: number }): JSX.Element {
 }
 
 /** Legend of the heat map while it shows a difference; null: it shows none. */
-export function DifferenceLegend(): JSX.Element | null {
+export function DifferenceLegend({ kiosk }: { kiosk: boolean }): JSX.Element | null {
   const compare = useApp((state) => state.view.compare);
   const sensor = useApp(selectSensor);
   const unit = useApp((state) => state.settings.unit);
@@ -97,6 +97,17 @@ export function DifferenceLegend(): JSX.Element | null {
     <div className="legend-difference" data-testid="difference-legend">
       <div className="legend-title">
         <strong>{S.difference(shown(sensor.label, 32))}</strong> <span>{unitOf(sensor, unit)}</span>
+        {!kiosk && (
+          <button
+            type="button"
+            className="text-button"
+            onClick={() => {
+              act({ compare: null });
+            }}
+          >
+            {S.compareEnd}
+          </button>
+        )}
       </div>
       {range ? (
         <>

@@ -151,9 +151,7 @@ describe('legend', () => {
     expect(screen.getByTestId('difference-legend')).toBeTruthy();
     expect(screen.queryByTestId('range-low')).toBeNull();
     expect(screen.queryByRole('radio')).toBeNull();
-    flush(() => {
-      act({ compare: null });
-    });
+    fireEvent.click(screen.getByRole('button', { name: 'Stop comparing' }));
     expect(screen.getByTestId('range-low')).toBeTruthy();
   });
 

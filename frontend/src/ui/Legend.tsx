@@ -93,7 +93,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
           )}
         </div>
       )}
-      <WithParts>{(parts) => <parts.DifferenceLegend />}</WithParts>
+      <WithParts>{(parts) => <parts.DifferenceLegend kiosk={kiosk} />}</WithParts>
       {isOld && (
         <span className="legend-old" data-testid="legend-old">
           <HatchedSign isFaint /> {S.legendOld}

@@ -91,6 +91,7 @@ export const MAP: In<typeof EN.MAP> = {
     week: 'vor einer Woche',
     own: 'dem gezeigten Zeitpunkt',
   },
+  compareEnd: 'Vergleich beenden',
   compareMoment: 'Zeitpunkt, mit dem verglichen wird',
   difference: (sensor) => `${sensor}: Unterschied`,
   differenceNone: 'unverändert',

@@ -87,6 +87,7 @@ export const MAP = {
     week: 'a week ago',
     own: 'the moment shown now',
   },
+  compareEnd: 'Stop comparing',
   compareMoment: 'The moment to compare with',
   difference: (sensor: string): string => `${sensor}: difference`,
   differenceNone: 'no change',

@@ -89,6 +89,7 @@ export const MAP: In<typeof EN.MAP> = {
     week: 'hace una semana',
     own: 'el momento mostrado',
   },
+  compareEnd: 'Dejar de comparar',
   compareMoment: 'El momento con el que se compara',
   difference: (sensor) => `${sensor}: diferencia`,
   differenceNone: 'sin cambios',

@@ -89,6 +89,7 @@ export const MAP: In<typeof EN.MAP> = {
     week: 'een week geleden',
     own: 'het getoonde moment',
   },
+  compareEnd: 'Vergelijking stoppen',
   compareMoment: 'Het moment om mee te vergelijken',
   difference: (sensor) => `${sensor}: verschil`,
   differenceNone: 'onveranderd',

@@ -220,6 +220,14 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
         news = hmi.test_id("meanwhile").locator("visible=true")
         expect(news).to_contain_text("New alarm: Tag b")
         assert places(hmi, ".map-frame", ".alarms") == before
+        # On a phone, it lies over the end of the card, which can be scrolled clear of it.
+        hmi.resize(**PHONE)
+        hmi.page.locator(".pane-tabs button").last.click()
+        hmi.turn(f"list=alarms&tag=a&at={int(raised_s) + 1}")
+        expect(hmi.app).to_have_attribute("data-pane", "tags")
+        content = hmi.card("a").locator(".card-body")
+        content.evaluate("it => it.scrollTo(0, it.scrollHeight)")
+        assert apart(content.locator("> *").last, news)
         news.get_by_role("button", name="Back to live, show tag b").click()
         expect(hmi.card("b")).to_be_visible()
 

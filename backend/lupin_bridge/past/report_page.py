@@ -225,10 +225,11 @@ class _Page:
         if tag is not None:
             pests = Reading("pest", float(tag.flower.bug_count), tag.looked_at_ns)
             name = reason["sensor"] if numbers else reason["kind"]
-            for it in (*tag.readings, *derive(tag.readings), pests):
+            for it in (*tag.readings, *derive(tag.readings)) if numbers else (pests,):
                 if it.name == name:
-                    read = self._clock(stamp(it.observed_at_ns or 0))
-                    at_end = f"{number(it.value, limit=limit)} ({read})"
+                    at_end = number(it.value, limit=limit)
+                    if it.observed_at_ns is not None:
+                        at_end += f" ({self._clock(stamp(it.observed_at_ns))})"
         span = self._span(reason, tag) if numbers else None
         low = "" if span is None else number(span.low).removesuffix(f"\u00a0{unit}") + "–"
         return {

@@ -194,6 +194,7 @@ def test_open_alarms_come_first_with_value_and_both_limits() -> None:
         ),
         TagState("8", readings=(Reading("temperature", 12.5, read),), flower=Flower("Orchid", 0.9)),
         TagState("9", readings=(Reading("temperature", 9.97, read),)),
+        TagState("6", readings=(Reading("temperature", 9.1),)),
     ]
     alarms = [
         alarm(tag_id="7", reason=cold, worst=8.0),
@@ -205,6 +206,7 @@ def test_open_alarms_come_first_with_value_and_both_limits() -> None:
         alarm(tag_id="8", reason={**warm, "verdict": "critical", "value": 36.0}, worst=36.0),
         alarm(tag_id="7", reason=dry, worst=1.5),
         alarm(tag_id="9", reason=cold, worst=8.0),
+        alarm(tag_id="6", reason=cold, worst=8.0),
         alarm(tag_id="7", reason=dry, worst=1.6, cleared_at=at(60 + 78 * 60)),
         alarm(tag_id="7", reason={**cold, "limit": 3.5}, worst=2.0, cleared_at=at(97)),
     ]
@@ -218,6 +220,7 @@ def test_open_alarms_come_first_with_value_and_both_limits() -> None:
     assert "8 06:01 12.5 °C (06:10) 36.0 °C 10.0–35.0 °C" in active
     assert "7 06:01 0.83 kPa (06:10) 1.50 kPa 0.20–1.30 kPa" in active
     assert "9 06:01 just below 10.0 °C (06:10) 8.0 °C 10.0–35.0 °C" in active
+    assert "6 06:01 9.1 °C 8.0 °C 10.0–35.0 °C" in active, "a reading of unknown time has none"
     assert "7 06:01 07:19 1 h 18 min 1.60 kPa 0.20–1.30 kPa" in resolved
     # The file of sensors has another range by now.
     assert "7 06:01 06:01 37 s 2.0 °C 3.5 °C" in resolved

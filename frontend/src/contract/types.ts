@@ -30,7 +30,7 @@ export type DeltaFrame = Omit<Schemas['DeltaFrame'], 'changed' | 'health'> & {
   readonly health: Judgement;
 };
 export type RobotFrame = Schemas['RobotFrame'];
-export type Frame = (StateFrame | DeltaFrame | StatusFrame) | (Schemas['AlarmsFrame'] | RobotFrame);
+export type Frame = StateFrame | DeltaFrame | StatusFrame | Schemas['AlarmsFrame'] | RobotFrame;
 export type OccupancyGrid = Schemas['OccupancyGrid'];
 export type FieldQuality = Schemas['FieldQuality'];
 export type PastAttempt = Schemas['PastAttempt'];

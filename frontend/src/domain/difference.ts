@@ -28,7 +28,7 @@ export function differenceOf(shown: Field, then: Field): Field {
     }
   }
   if (Boolean(shown.sureness) !== Boolean(then.sureness)) {
-    throw new Error('difference: one of the two is no estimate');
+    throw new Error(then.noEstimate ?? shown.noEstimate ?? 'one of the two is no estimate');
   }
   const values = shown.values.map((value, index) => value - (then.values[index] ?? NaN));
   const known = rangeOf(values);

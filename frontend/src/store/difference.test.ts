@@ -1,7 +1,7 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { readings, wireTag } from '../testing/tags';
-import { npy } from '../testing/field';
+import { npy, npyEstimate, npyField } from '../testing/field';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { act, receive, store } from './app';
 import { selectHeat } from './derived';
@@ -124,7 +124,24 @@ test('no difference of readings is shown as that of estimates', async () => {
   act({ compare: { by: 'moment', at: 500 } });
   await settled();
   expect(store.get().twin.difference.value).not.toBeNull();
+  // Of then there is no estimate: the nearest readings in its place are not compared with one of now.
+  vi.stubGlobal('fetch', (url: URL) => {
+    const nearest = npyField([1, 2]);
+    nearest.headers.set('X-Field-Resolution', '1');
+    if (!url.pathname.endsWith('estimate.npy')) return Promise.resolve(nearest);
+    return Promise.resolve(
+      url.searchParams.has('at')
+        ? Response.json({ detail: 'no model yet' }, { status: 400 })
+        : npyEstimate([21, 22], [1, 1]),
+    );
+  });
   act({ heat: 'estimate' });
   expect(store.get().twin.difference.value).toBeNull();
+  // The code of estimates loads first, which fake timers do not speed up.
+  for (let look = 0; look < 1_000 && store.get().twin.difference.state === 'waiting'; look++) {
+    await vi.dynamicImportSettled();
+    await settled();
+  }
+  expect(store.get().twin.difference).toMatchObject({ state: 'failed', message: 'no model yet' });
   act({ heat: 'nearest' });
 });

@@ -6,6 +6,7 @@ import { readings, stateFrame, wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
 import { withState } from './twin';
 import { selectHeat } from './derived';
+import { fetchHeat } from './heat';
 import { startLoaders } from './loaders';
 
 let requests: string[];
@@ -98,6 +99,16 @@ test('a house that changes ten times a second costs one estimate a second', asyn
     await vi.advanceTimersByTimeAsync(100);
   }
   expect(count('estimate.npy')).toBeLessThanOrEqual(5);
+});
+
+test('that there was no estimate then does not hide the one of now', async () => {
+  const { signal } = new AbortController();
+  const query = { sensor: 'temperature', resolution: 1 };
+  refusal = 400;
+  const then = await fetchHeat('estimate', { ...query, at: 500 }, signal);
+  expect(then.noEstimate).toBe('ten scans are needed');
+  refusal = null;
+  expect((await fetchHeat('estimate', query, signal)).sureness).toBeDefined();
 });
 
 test('without an estimate, the nearest readings are shown, with the reason', async () => {

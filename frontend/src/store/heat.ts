@@ -12,8 +12,13 @@ import type { Source } from './derived';
 const CALM_MS = 10_000;
 const TOO_MANY_REQUESTS = 429;
 
-let refused: { readonly sensor: string; readonly why: string; readonly until: number } | null =
-  null;
+let refused: {
+  readonly sensor: string;
+  /** A refusal of the past says nothing about now. */
+  readonly isNow: boolean;
+  readonly why: string;
+  readonly until: number;
+} | null = null;
 
 /** If the twin has no estimate, the nearest readings, with the reason. */
 export async function fetchHeat(
@@ -22,17 +27,18 @@ export async function fetchHeat(
   signal: AbortSignal,
 ): Promise<Field> {
   if (source === 'nearest') return fetchField(query, signal);
-  if (refused?.sensor === query.sensor && now() < refused.until) {
+  const isNow = query.at === undefined;
+  if (refused?.sensor === query.sensor && refused.isNow === isNow && now() < refused.until) {
     return inPlace(refused.why, query, signal);
   }
   try {
     const estimate = await fetchEstimate(query, signal);
-    refused = null;
+    if (refused?.isNow === isNow) refused = null;
     return estimatedField(query.sensor, estimate);
   } catch (error) {
     // After 429, a second request would make it worse.
     if (!(error instanceof Refusal) || error.status === TOO_MANY_REQUESTS) throw error;
-    refused = { sensor: query.sensor, why: error.message, until: now() + CALM_MS };
+    refused = { sensor: query.sensor, isNow, why: error.message, until: now() + CALM_MS };
     return inPlace(error.message, query, signal);
   }
 }

@@ -85,7 +85,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     },
     failing: {
       title: 'Die Aufzeichnung schlägt fehl.',
-      hint: 'Der Zwilling läuft und versucht es weiter. Bitte Platz schaffen oder den Datenträger prüfen.',
+      hint: 'Der Zwilling läuft weiter. Ist der Datenträger voll, bitte Platz schaffen: Dann wird wieder aufgezeichnet.',
     },
     upgrading: {
       title: 'Die Aufzeichnung einer älteren Version wird umgestellt.',

@@ -85,7 +85,7 @@ export const PAGE = {
     },
     failing: {
       title: 'Recording has failed.',
-      hint: 'The twin keeps running and retrying. Free disk space, or check the disk.',
+      hint: 'The twin keeps running. If the disk is full, free space: recording then resumes by itself.',
     },
     upgrading: {
       title: 'The recording of an older version is being upgraded.',

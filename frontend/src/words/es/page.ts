@@ -83,7 +83,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     },
     failing: {
       title: 'El registro está fallando.',
-      hint: 'El gemelo sigue en marcha y lo sigue intentando. Libere espacio o revise el disco.',
+      hint: 'El gemelo sigue en marcha. Si el disco está lleno, libere espacio: el registro se reanudará solo.',
     },
     upgrading: {
       title: 'El registro de una versión anterior se está actualizando.',

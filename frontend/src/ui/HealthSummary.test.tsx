@@ -146,7 +146,7 @@ test('of a robot that stands still what is critical is told first', () => {
 });
 
 test('a value that is too old says its age, and an attempt that of the last one', () => {
-  const at = nextStamp() - 2_400;
+  const at = nextStamp() - 2_410;
   const cold = wireTag({ tag_id: '5', readings: readings({ temperature: 6.6 }, at) });
   const old = { kind: 'old', verdict: 'unknown', sensor: '', value: null } as const;
   const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });

@@ -177,7 +177,7 @@ describe('card', () => {
         stale_seconds: 2,
         looked_at: { sec: 0, nanosec: 0 },
         readings: [
-          ...readings({ temperature: 20 }, nextStamp() - 7_200),
+          ...readings({ temperature: 20 }, nextStamp() - 7_210),
           { name: 'co2', value: 20, observed_at: null },
         ],
       }),
@@ -195,7 +195,7 @@ describe('card', () => {
     const now = { sec: 5_000, nanosec: 0 };
     const failing = wireTag({
       tag_id: '7',
-      last_try: { sec: 4_820, nanosec: 0 },
+      last_try: { sec: 4_810, nanosec: 0 },
       last_try_status: 2,
       last_try_detail: 'no tag in the picture',
     });

@@ -9,7 +9,7 @@ import { act as dispatch, receive, store } from '../../store/app';
 import { person } from '../../store/create';
 import { NO_HOUSE, withPast } from '../../store/twin';
 import { alarm, alarms, reportAlarms } from '../../testing/alarms';
-import { goLive, goLost, showTags, status as twinStatus } from '../../testing/page';
+import { goLost, showTags } from '../../testing/page';
 import { judgement, reason } from '../../testing/health';
 import { readings, wireTag } from '../../testing/tags';
 import { AlarmPanel } from './AlarmPanel';
@@ -301,16 +301,6 @@ test('without an alarm it says so; where that is not known it says that', () => 
     receive({ alarms: alarms([], { source: 'starting', since: null }) });
   });
   expect(notes()).toEqual(['starting', 'unknown']);
-  // Without a valid time, nothing is being read; what to do is as in the banner.
-  flush(() => {
-    goLive(twinStatus({ twin: 'offline', reason: 'clock_stopped' }));
-  });
-  expect(notes()).toEqual(['no-time']);
-  report(alarm('s', { tag_id: '', reason: { kind: 'silent', sensor: '', value: null } }));
-  expect(notes()).toEqual(['no-time']);
-  expect(first('active').textContent).toContain('Check the simulation');
-  expect(first('active').textContent).not.toContain('network');
-  flush(goLive);
   report();
   expect(notes()).toEqual(['none']);
   expect(screen.getByText('No alarm is active')).toBeTruthy();

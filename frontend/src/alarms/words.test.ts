@@ -40,7 +40,7 @@ test('what and where, of a tag and of the greenhouse', () => {
   );
   expect(alarmText(cold, F, CRITICAL)).toContain('below 50.0\u00a0°F, now 43.9\u00a0°F');
   const silent = alarm('a', { tag_id: '', reason: { kind: 'silent', sensor: '', value: null } });
-  expect(alarmText(silent, C, null)).toMatch(/^Whole greenhouse: No data from the twin/);
+  expect(alarmText(silent, C, null)).toMatch(/^Whole greenhouse: No current data from the twin/);
 });
 
 test('now, at worst and at first, each with its own severity', () => {

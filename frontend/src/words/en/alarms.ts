@@ -82,6 +82,7 @@ export const ALARMS = {
   alarmNotYet: 'waiting for a second scan',
   alarmsNotYet: 'Waiting for the list of alarms',
   alarmsStarting: 'Recorded data is still being read: more alarms may follow.',
+  alarmsNoTime: 'While the time is unknown, alarms may be missing.',
   alarmsReceived: (since: string): string =>
     `Nothing is recorded, so alarms before ${since} are unknown.`,
   alarmsLost: 'As last received. Later events are unknown.',
@@ -156,7 +157,7 @@ export const HEALTH = {
     },
     outOfRange: 'out of range',
     changed: (reading: string): string => `${reading}: possible sensor fault`,
-    silent: 'No data from the twin: its last data may be out of date',
+    silent: 'No current data from the twin',
     stopped: 'No tag is being scanned: the robot has stopped, or its data is lost',
     other: (kind: string, sensor: string): string => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
@@ -211,6 +212,7 @@ export const HEALTH = {
   healthAcknowledged: 'acknowledged',
   /** Replaces the verdict while the current status is unknown. */
   healthNotCurrent: 'Not current',
+  healthNoTime: 'Not assessed while the time is unknown',
   healthNothing: 'No reading to assess yet',
   healthFilter: ', show only these tags',
   scanInterval: (interval: string): string => `a scan every ${interval}`,

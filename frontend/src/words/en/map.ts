@@ -134,7 +134,7 @@ export const TAGS = {
   farOffLong: (place: string): string =>
     `Its position (${place}) is far from all other tags, so the tag has no pin on the map.`,
   ageUnknown: 'unknown',
-  ageUnknownLong: 'The age is unknown until the twin reports its time again.',
+  ageUnknownLong: 'The age is unknown until the twin’s time is known.',
   neverObserved: 'never',
   neverObservedLong: 'No scan has returned a reading yet.',
   notKnownThen: 'unknown',

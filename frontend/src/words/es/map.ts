@@ -136,7 +136,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   farOffLong: (place) =>
     `Su posición (${place}) está muy lejos de los demás puntos, así que el punto no está en el mapa.`,
   ageUnknown: 'desconocida',
-  ageUnknownLong: 'Se desconoce la antigüedad hasta que el gemelo vuelva a comunicar su hora.',
+  ageUnknownLong: 'Se desconoce la antigüedad hasta que se conozca la hora del gemelo.',
   neverObserved: 'nunca',
   neverObservedLong: 'Ninguna medición ha dado todavía una lectura.',
   notKnownThen: 'desconocido',

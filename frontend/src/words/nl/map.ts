@@ -136,7 +136,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   farOffLong: (place) =>
     `De positie (${place}) ligt ver van alle andere meetpunten; het meetpunt staat niet op de kaart.`,
   ageUnknown: 'onbekend',
-  ageUnknownLong: 'Onbekend hoe lang geleden, tot de digital twin weer zijn tijd meldt.',
+  ageUnknownLong: 'Onbekend hoe lang geleden, tot de tijd van de digital twin bekend is.',
   neverObserved: 'nooit',
   neverObservedLong: 'Nog geen meting heeft een waarde opgeleverd.',
   notKnownThen: 'onbekend',

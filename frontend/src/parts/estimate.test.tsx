@@ -161,6 +161,16 @@ describe('legend', () => {
     expect(screen.getAllByRole('status')).toHaveLength(1);
   });
 
+  test('without a tag none is on its way', async () => {
+    render(<Legend kiosk={false} />);
+    await screen.findByText('Loading the estimate');
+    flush(() => {
+      showTags([]);
+      act({ heat: 'estimate' });
+    });
+    expect(screen.queryByText('Loading the estimate')).toBeNull();
+  });
+
   test('what is computed has no estimate, and that is said', () => {
     act({ sensor: 'vpd' });
     render(<EstimateFacts />);

@@ -174,6 +174,10 @@ export function barSpan(state: AppState, nowS: number): Span {
   return { from, to: Math.max(to, from + 1) };
 }
 
+/** Whether it is known that nothing was recorded yet at that moment, ROS seconds. */
+export const isBeforeAll = ({ twin }: AppState, at: number): boolean =>
+  at < (twin.remembered.value?.reach?.from ?? 0);
+
 /** The twin's current time, ROS seconds; null: not known. */
 export const twinNow = (): number | null => rosNow(store.get(), now());
 

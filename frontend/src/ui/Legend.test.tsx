@@ -153,6 +153,8 @@ describe('legend', () => {
     expect(screen.queryByRole('radio')).toBeNull();
     fireEvent.click(screen.getByRole('button', { name: 'Stop comparing' }));
     expect(screen.getByTestId('range-low')).toBeTruthy();
+    // The button is gone; its focus must not be.
+    expect(document.activeElement).toBe(screen.getByTestId('heat-legend'));
   });
 
   test('a fixed range stays while the data change, and can be typed', () => {

@@ -117,7 +117,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   notificationOther: (channel) => `${channel} empfängt keine Daten.`,
   notificationHint: 'Der Server versucht es weiter. Diese Seite ist nicht betroffen.',
   journalMore: 'Die Datei nennt der Parameter „journal“ des Zwillings; „off“ zeichnet nichts auf.',
-  origin: { simulated: 'Simuliert', recorded: 'Aufzeichnung', sim_time: 'Simulierte Zeit' },
+  origin: { simulated: 'Simuliert', recorded: 'Aufgezeichnet', sim_time: 'Simulierte Zeit' },
   originDay: (length: string): string => `1 Gewächshaustag = ${length}`,
   originHint: {
     simulated: 'Kein echter Roboter: Gewächshaus, Pflanzen und Messwerte sind simuliert.',

@@ -121,7 +121,7 @@ export const PAGE = {
   notificationHint: 'The server keeps trying. This page is not affected.',
   journalMore: 'The file is named by the twin’s parameter “journal”; “off” records nothing.',
   /** Origin of the data, unless it is a real robot's, live. */
-  origin: { simulated: 'Simulated', recorded: 'Recording', sim_time: 'Simulated time' },
+  origin: { simulated: 'Simulated', recorded: 'Recorded', sim_time: 'Simulated time' },
   originDay: (length: string): string => `1 greenhouse day = ${length}`,
   originHint: {
     simulated: 'No real robot: greenhouse, plants and readings are simulated.',

@@ -115,7 +115,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   notificationHint: 'El servidor lo sigue intentando. Esta página no se ve afectada.',
   journalMore:
     'El archivo lo indica el parámetro «journal» del gemelo; con «off» no se registra nada.',
-  origin: { simulated: 'Simulado', recorded: 'Grabación', sim_time: 'Tiempo simulado' },
+  origin: { simulated: 'Simulado', recorded: 'Grabado', sim_time: 'Tiempo simulado' },
   originDay: (length: string): string => `1 día de invernadero = ${length}`,
   originHint: {
     simulated: 'No hay robot real: el invernadero, las plantas y las lecturas son simulados.',

@@ -117,7 +117,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   notificationHint: 'De server blijft het proberen. Deze pagina heeft er geen last van.',
   journalMore:
     'Het bestand staat in de parameter “journal” van de digital twin; “off” legt niets vast.',
-  origin: { simulated: 'Gesimuleerd', recorded: 'Opname', sim_time: 'Gesimuleerde tijd' },
+  origin: { simulated: 'Gesimuleerd', recorded: 'Opgenomen', sim_time: 'Gesimuleerde tijd' },
   originDay: (length: string): string => `1 kasdag = ${length}`,
   originHint: {
     simulated: 'Geen echte robot: kas, planten en metingen zijn gesimuleerd.',

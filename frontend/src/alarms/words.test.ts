@@ -129,8 +129,8 @@ test('of a pest how many: now, at worst and at first', () => {
   const pest = alarm('a', { worst: 4, reason });
   const texts = { what: 'Pest seen', worst: 'peak 4', first: '2 when raised' };
   expect(valuesOf(pest, C, known(3, 'critical'))).toMatchObject({ ...texts, now: 'now 3 pests' });
-  expect(valuesOf(pest, C, known(0, 'critical')).now).toBe('now seen');
-  expect(valuesOf(pest, C, known(null, 'healthy')).now).toBe('now none seen');
+  expect(valuesOf(pest, C, known(0, 'critical')).now).toBe('still seen');
+  expect(valuesOf(pest, C, known(null, 'healthy')).now).toBe('no longer seen');
   // A derived value without a reason.
   const dry = alarm('b', { reason: { sensor: 'vpd', value: 1.7, limit: 1.3 } });
   expect(valuesOf(dry, C, known(null, 'healthy')).now).toBe('now in range');

@@ -12,6 +12,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   listChoice: 'Neben der Karte',
   alarmsCount: (unseen, active) =>
     active === 0 ? 'keine anstehend' : `${active} anstehend, ${unseen} davon nicht quittiert`,
+  alarmsNow: (active) => `jetzt ${active}`,
   alarmGroups: {
     active: (count) => `Anstehend (${count})`,
     shelved: (count) => `Zurückgestellt (${count})`,
@@ -26,7 +27,11 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     last === null
       ? 'jetzt unbekannt'
       : `jetzt unbekannt, zuletzt ${last}${age === null ? '' : ` vor ${age}`}`,
-  alarmPests: { none: 'keine festgestellt', seen: 'festgestellt' },
+  alarmPests: {
+    seen: 'festgestellt',
+    still: 'weiterhin festgestellt',
+    gone: 'nicht mehr festgestellt',
+  },
   alarmWorst: {
     below: (reading) => `Tiefstwert ${reading}`,
     above: (reading) => `Höchstwert ${reading}`,
@@ -192,7 +197,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     assumed: 'angenommen, da weder Licht noch Uhrzeit bekannt sind',
   },
   idealParts: { any: 'ideal', day: 'ideal tagsüber', night: 'ideal nachts' },
-  healthIdeal: (ideal, low, high, unit) => `${ideal} ${low} bis ${high} ${unit}`.trim(),
   healthAllWell: 'Alle beurteilten Messwerte liegen im Idealbereich',
   healthDespite: (alarms) =>
     alarms === 1

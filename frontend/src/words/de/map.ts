@@ -65,7 +65,7 @@ export const MAP: In<typeof EN.MAP> = {
   legendBelow: (value) => `unter ${value}`,
   legendAbove: (value) => `über ${value}`,
   legendAgainst: (sensor) => `${sensor} im Vergleich zum Idealbereich`,
-  legendIdeal: (ideal, low, high) => `${ideal} ${low} bis ${high}`,
+  valueRange: (low, high) => `${low}\u00a0bis\u00a0${high}`,
   legendEach: (part) => `${part} je Art`,
   legendOthers: 'andere',
   legendUnknownSpecies: 'Nicht bestimmt',

@@ -188,7 +188,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   helpToggle: 'Kürzel mit nur einer Taste',
   keys: {
     global: [
-      ['1 – 9', 'Sensor wählen'],
+      ['1 bis 9', 'Sensor wählen'],
       ['/', 'Tabelle filtern'],
       ['F', 'Auf der Karte alles anzeigen'],
       ['N, P', 'Nächster und voriger Messpunkt'],

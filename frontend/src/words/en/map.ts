@@ -61,7 +61,8 @@ export const MAP = {
   legendBelow: (value: string): string => `below ${value}`,
   legendAbove: (value: string): string => `above ${value}`,
   legendAgainst: (sensor: string): string => `${sensor} compared with its ideal range`,
-  legendIdeal: (ideal: string, low: string, high: string): string => `${ideal} ${low} to ${high}`,
+  /** A word, not a dash: "−2 to 5". No-break spaces keep it on one line. */
+  valueRange: (low: string, high: string): string => `${low}\u00a0to\u00a0${high}`,
   legendEach: (part: string): string => `${part} per species`,
   legendOthers: 'others',
   legendUnknownSpecies: 'Not classified',

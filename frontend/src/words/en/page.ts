@@ -186,7 +186,7 @@ export const PAGE = {
   helpToggle: 'Single-key shortcuts',
   keys: {
     global: [
-      ['1 – 9', 'Choose a sensor'],
+      ['1 to 9', 'Choose a sensor'],
       ['/', 'Filter the table'],
       ['F', 'Fit the map to view'],
       ['N, P', 'Next and previous tag'],

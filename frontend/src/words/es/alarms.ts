@@ -10,6 +10,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     active === 0
       ? 'ninguna activa'
       : `${counted(active, 'activa', 'activas')}, ${unseen} sin reconocer`,
+  alarmsNow: (active) => `${active} ahora`,
   alarmGroups: {
     active: (count) => `Activas (${count})`,
     shelved: (count) => `Aplazadas (${count})`,
@@ -24,7 +25,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     last === null
       ? 'ahora sin dato'
       : `ahora sin dato, último ${last}${age === null ? '' : ` hace ${age}`}`,
-  alarmPests: { none: 'no detectada', seen: 'detectada' },
+  alarmPests: { seen: 'detectada', still: 'aún se detecta', gone: 'ya no se detecta' },
   alarmWorst: {
     below: (reading) => `mínimo ${reading}`,
     above: (reading) => `máximo ${reading}`,
@@ -198,7 +199,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     assumed: 'supuesto, porque no se conocen ni la luz ni la hora',
   },
   idealParts: { any: 'ideal', day: 'ideal de día', night: 'ideal de noche' },
-  healthIdeal: (ideal, low, high, unit) => `${ideal} de ${low} a ${high} ${unit}`.trim(),
   healthAllWell: 'Todas las lecturas evaluadas están en su rango ideal',
   healthDespite: (alarms) =>
     alarms === 1

@@ -63,7 +63,7 @@ export const MAP: In<typeof EN.MAP> = {
   legendBelow: (value) => `menos de ${value}`,
   legendAbove: (value) => `más de ${value}`,
   legendAgainst: (sensor) => `${sensor} frente a su rango ideal`,
-  legendIdeal: (ideal, low, high) => `${ideal} de ${low} a ${high}`,
+  valueRange: (low, high) => `${low}\u00a0a\u00a0${high}`,
   legendEach: (part) => `${part} por especie`,
   legendOthers: 'otras',
   legendUnknownSpecies: 'Sin clasificar',

@@ -182,7 +182,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   helpToggle: 'Atajos de una sola tecla',
   keys: {
     global: [
-      ['1 – 9', 'Elegir un sensor'],
+      ['1 a 9', 'Elegir un sensor'],
       ['/', 'Filtrar la tabla'],
       ['F', 'Mostrar todo en el mapa'],
       ['N, P', 'Punto siguiente y anterior'],

@@ -8,6 +8,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   listChoice: 'Naast de kaart',
   alarmsCount: (unseen, active) =>
     active === 0 ? 'geen actief' : `${active} actief, waarvan ${unseen} niet bevestigd`,
+  alarmsNow: (active) => `nu ${active}`,
   alarmGroups: {
     active: (count) => `Actief (${count})`,
     shelved: (count) => `Uitgesteld (${count})`,
@@ -22,7 +23,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     last === null
       ? 'nu onbekend'
       : `nu onbekend, laatst ${last}${age === null ? '' : ` ${age} geleden`}`,
-  alarmPests: { none: 'geen gezien', seen: 'gezien' },
+  alarmPests: { seen: 'gezien', still: 'nog steeds gezien', gone: 'niet meer gezien' },
   alarmWorst: {
     below: (reading) => `laagste ${reading}`,
     above: (reading) => `hoogste ${reading}`,
@@ -186,7 +187,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     assumed: 'aangenomen, want licht en tijd zijn onbekend',
   },
   idealParts: { any: 'ideaal', day: 'ideaal overdag', night: 'ideaal ’s nachts' },
-  healthIdeal: (ideal, low, high, unit) => `${ideal} ${low} tot ${high} ${unit}`.trim(),
   healthAllWell: 'Alle beoordeelde meetwaarden liggen binnen het ideale bereik',
   healthDespite: (alarms) =>
     alarms === 1

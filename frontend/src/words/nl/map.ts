@@ -63,7 +63,7 @@ export const MAP: In<typeof EN.MAP> = {
   legendBelow: (value) => `onder ${value}`,
   legendAbove: (value) => `boven ${value}`,
   legendAgainst: (sensor) => `${sensor} vergeleken met het ideale bereik`,
-  legendIdeal: (ideal, low, high) => `${ideal} ${low} tot ${high}`,
+  valueRange: (low, high) => `${low}\u00a0tot\u00a0${high}`,
   legendEach: (part) => `${part} per soort`,
   legendOthers: 'andere',
   legendUnknownSpecies: 'Niet herkend',

@@ -185,7 +185,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   helpToggle: 'Sneltoetsen van één toets',
   keys: {
     global: [
-      ['1 – 9', 'Een sensor kiezen'],
+      ['1 tot 9', 'Een sensor kiezen'],
       ['/', 'De tabel filteren'],
       ['F', 'Alles tonen op de kaart'],
       ['N, P', 'Volgend en vorig meetpunt'],

@@ -40,9 +40,10 @@ def expect_no_wider_than_a_phone(page: BrowserPage) -> None:
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
 
 
-def after_mark(row: Locator) -> int:
-    """How far a greenhouse's name is from the mark before it, pixels."""
-    return place(row.locator(".fleet-alarm-site")).left - place(row.locator(".health-mark")).right
+def after_status(row: Locator) -> int:
+    """How far a greenhouse's name is from the status before it, pixels."""
+    status = row.locator(".health-mark span")
+    return place(row.locator(".fleet-alarm-site")).left - place(status).right
 
 
 @contextmanager
@@ -166,7 +167,7 @@ def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
             expect_no_wider_than_a_phone(page)
             page.get_by_role("searchbox").fill("")
             expect(silence).to_be_visible()
-            assert after_mark(silence) == after_mark(rows.first)
+            assert after_status(silence) == after_status(rows.first)
             tag = rows.first.locator("span", has_text=re.compile(r"^Tag \d$")).inner_text()
             rows.first.get_by_role("link").click()
             expect(page).to_have_url(re.compile(r"/sites/warm/.*#.*at=\d+"))

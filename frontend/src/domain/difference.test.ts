@@ -141,14 +141,16 @@ describe('a trend', () => {
 });
 
 test.each([
-  ['temperature', 1.26, 'C', 'up', '+1.3\u00a0°C'],
-  ['temperature', 1, 'F', 'up', '+1.8\u00a0°F'],
-  ['temperature', -0.04, 'C', 'level', 'steady'],
-  ['temperature', -0.06, 'C', 'down', '\u22120.1\u00a0°C'],
-  ['light', 0.4, 'C', 'level', 'steady'],
-  ['light', -12.2, 'C', 'down', '\u221212\u00a0lx'],
-  ['ph', 0.2, 'C', 'up', '+0.20'],
-  ['vpd', -0.012, 'C', 'down', '\u22120.01\u00a0kPa'],
-] as const)('a difference of %s by %d in °%s: %s, %s', (name, by, unit, way, text) => {
-  expect(differenceShown(sensorNamed(name), by, unit)).toEqual({ way, text });
+  ['temperature', 1.26, 'C', 'up', '+1.3\u00a0°C', '/h'],
+  ['temperature', 1, 'F', 'up', '+1.8\u00a0°F', '/h'],
+  ['temperature', -0.04, 'C', 'level', 'steady', ''],
+  ['temperature', -0.06, 'C', 'down', '\u22120.1\u00a0°C', '/h'],
+  ['light', 0.4, 'C', 'level', 'steady', ''],
+  ['light', -12.2, 'C', 'down', '\u221212\u00a0lx', '/h'],
+  ['ph', 0.2, 'C', 'up', '+0.20', '/h'],
+  ['vpd', -0.012, 'C', 'down', '\u22120.01\u00a0kPa', '/h'],
+  // Its unit has a time already.
+  ['daily_light_integral', 1, 'C', 'up', '+1.0\u00a0mol/m²/d', ''],
+] as const)('a difference of %s by %d in °%s: %s, %s%s', (name, by, unit, way, text, per) => {
+  expect(differenceShown(sensorNamed(name), by, unit)).toEqual({ way, text, rate: text + per });
 });

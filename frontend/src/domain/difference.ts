@@ -136,15 +136,17 @@ export function sameReading(sensor: string, a: Tag, b: Tag): boolean {
 }
 
 /**
- * The difference, as precise as the sensor's values: what rounds to 0 is level. `text` has sign and
- * unit, or says that there is no difference.
+ * The difference to an hour before, as precise as the sensor's values: what rounds to 0 is level.
+ * `text` has sign and unit, or says that there is no difference; `rate` says that it is per hour.
  */
 export function differenceShown(
   sensor: Sensor,
   by: number,
   unit: TemperatureUnit,
-): { readonly way: 'up' | 'down' | 'level'; readonly text: string } {
+): { readonly way: 'up' | 'down' | 'level'; readonly text: string; readonly rate: string } {
   const text = differenceText(sensor, by, unit);
   const way = text.startsWith('+') ? 'up' : text.startsWith('\u2212') ? 'down' : 'level';
-  return { way, text: way === 'level' ? S.trendLevel : text };
+  if (way === 'level') return { way, text: S.trendLevel, rate: S.trendLevel };
+  // A unit that has a time already, such as mol/m²/d, would be misread.
+  return { way, text, rate: /[/·]/.test(sensor.unit) ? text : `${text}/${S.hours}` };
 }

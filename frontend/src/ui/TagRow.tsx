@@ -294,11 +294,11 @@ function TrendLine({
     // For screen readers only: with a short history, every row would show it.
     return <span className="unseen">{then ? S.trendNone : S.trendUnknown}</span>;
   }
-  const { way, text } = differenceShown(sensor, trend.by, unit);
+  const { way, text, rate } = differenceShown(sensor, trend.by, unit);
   return (
     <span className="trend" data-trend={way} title={`${title}: ${text}`}>
       <span aria-hidden="true">{ARROWS[way]}</span> <span className="unseen">{title}: </span>
-      {text}
+      {rate}
     </span>
   );
 }

@@ -192,7 +192,7 @@ describe('table', () => {
     };
     hourBefore();
     expect(trends()).toEqual([
-      '\u2197 Temperature compared with an hour ago: +1.5\u00a0°C',
+      '\u2197 Temperature compared with an hour ago: +1.5\u00a0°C/h',
       'no reading an hour ago',
     ]);
     // With shortened days, an hour is not a clock hour.

@@ -140,12 +140,12 @@ function NotKnown({
 function Trend({ alarm, by }: { alarm: Alarm; by: number }): JSX.Element {
   const { sensors, unit } = useApp(selectSpeech);
   const sensor = sensors.named(alarm.reason.sensor);
-  const { way, text } = differenceShown(sensor, by, unit);
+  const { way, text, rate } = differenceShown(sensor, by, unit);
   const title = `${S.trendTitle(sensor.label, shortHourText())}: ${text}`;
   return (
     <span data-trend={way} title={title}>
       <span aria-hidden="true">
-        {ARROWS[way]} {text}
+        {ARROWS[way]} {rate}
       </span>{' '}
       <span className="unseen">{title}</span>
     </span>

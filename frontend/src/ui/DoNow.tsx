@@ -106,12 +106,11 @@ export function DoNow({
 }): JSX.Element {
   const health = useApp(selectHealth);
   const urgent = useUrgent();
-  const isNow = useApp((state) => selectShown(state).moment === null);
   const hasOwn = health.reasons.length > 0;
   // While the twin is silent, its last tasks stay listed.
   const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict) || isSilent(health));
   const count = hasOwn && most > 1 ? most - 1 : most;
-  const lines = (isNow ? byTodo(urgent) : urgent.map((each) => [each] as const)).slice(0, count);
+  const lines = byTodo(urgent).slice(0, count);
   const rest = urgent.length - lines.flat().length;
   return (
     <ul className="do-now" aria-label={S.todoLabel} data-most={most}>

@@ -204,6 +204,16 @@ test('of tags that need the same done the worst stands for all, some by name', (
   act(() => {
     showTags(tags, judgement({ ...all, 6: [humid] }));
   });
+  // A past moment names them too, but not what to do.
+  act(() => {
+    const { latest } = store.get().twin;
+    look({ moment: 500 });
+    receive(withPast({ at: 500, house: latest }));
+  });
+  expect(todo.textContent).toMatch(/^CriticalTag 1: [^H]* also tags 2, 3, 4 \+ 1 more /);
+  act(() => {
+    look({ moment: null });
+  });
   unmount();
   render(<HealthSummary kiosk />);
   expect(screen.queryByTestId('health-driver')).toBeNull();

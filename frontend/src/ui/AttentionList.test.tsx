@@ -37,6 +37,8 @@ test('lists who needs somebody and why, the worst first', () => {
   expect(ids()).toEqual(['both', 'bug', 'warm', 'twice', 'back']);
   const [first, , , failing, last] = rows();
   if (!first) throw new Error('no row');
+  // A bare number would read as a count.
+  expect(first.firstElementChild?.textContent).toBe('Tagboth');
   const why = within(first).getAllByRole('listitem');
   expect(why.map((each) => each.textContent)).toEqual([
     '2 pests seen',

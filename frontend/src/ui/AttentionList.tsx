@@ -90,6 +90,7 @@ function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.
   return (
     <li data-fits={fits} {...(isOne ? { 'data-tag-id': tagId } : { 'data-cause': cause })}>
       <strong>
+        {isOne && <small className="faint">{S.columns.tag}</small>}
         <bdi>{isOne ? shown(tagId, 16) : `${tags.length}\u202f×`}</bdi>
       </strong>
       <span className="attention-why">

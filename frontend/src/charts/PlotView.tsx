@@ -65,7 +65,7 @@ export function PlotView({
     >
       <header>
         <h3>
-          {shown(model.sensor.label, 32)}{' '}
+          <span className="plot-name">{shown(model.sensor.label, 32)}</span>{' '}
           <span className="faint">{unitOf(model.sensor, model.unit)}</span>
         </h3>
         {only && <LineValue line={only} model={model} />}

@@ -110,7 +110,7 @@ describe('legend', () => {
     expect((await screen.findByTestId('prediction')).textContent).toBe(
       '9 of 10 scans within the predicted range',
     );
-    expect(text('estimate-key')).toContain(`less certain than ±1.6${NBSP}°C`);
+    expect(text('estimate-key')).toContain(`Hatched colour: less certain than ±1.6${NBSP}°C`);
     expect(text('legend')).toContain(
       'Last day: 412 of 458 scans, last week: 2,900 of 3,200 scans.',
     );

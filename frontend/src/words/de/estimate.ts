@@ -14,7 +14,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   computed:
     'Eine berechnete Größe wird nicht geschätzt: Angezeigt werden die nächstgelegenen Messwerte',
   noModel: 'Noch keine Schätzung: Sie braucht zehn Messungen eines Sensors',
-  unsure: (error) => `Schraffiert: ungenauer als ±${error}. Ohne Farbe: keine Daten`,
+  unsure: (error) => `Schraffierte Farbe: ungenauer als ±${error}. Ohne Farbe: keine Daten`,
   error: 'Unsicherheit der Schätzung',
   predicted: (inside, scans) =>
     `${whole(inside)} von ${counted(scans, 'Messung', 'Messungen')} im vorhergesagten Bereich`,

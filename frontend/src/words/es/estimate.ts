@@ -13,7 +13,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   noneNow: 'Ahora no hay estimación: se muestran las lecturas más cercanas',
   computed: 'Una magnitud calculada no se estima: se muestran las lecturas más cercanas',
   noModel: 'Aún no hay estimación: hacen falta diez mediciones de un sensor',
-  unsure: (error) => `Rayado: menos preciso que ±${error}. Sin color: sin datos`,
+  unsure: (error) => `Color rayado: menos preciso que ±${error}. Sin color: sin datos`,
   error: 'Incertidumbre de la estimación',
   predicted: (inside, scans) =>
     `${whole(inside)} de ${counted(scans, 'medición', 'mediciones')} dentro del rango previsto`,

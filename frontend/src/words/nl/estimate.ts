@@ -13,7 +13,7 @@ export const ESTIMATE: In<typeof ENGLISH> = {
   noneNow: 'Er is nu geen schatting: u ziet de dichtstbijzijnde waarden',
   computed: 'Van een berekende waarde is er geen schatting: u ziet de dichtstbijzijnde waarden',
   noModel: 'Nog geen schatting: er zijn tien metingen van een sensor nodig',
-  unsure: (error) => `Gearceerd: minder zeker dan ±${error}. Geen kleur: geen gegevens`,
+  unsure: (error) => `Gearceerde kleur: minder zeker dan ±${error}. Geen kleur: geen gegevens`,
   error: 'Onzekerheid van de schatting',
   predicted: (inside, scans) =>
     `${whole(inside)} van ${counted(scans, 'meting', 'metingen')} binnen het voorspelde bereik`,

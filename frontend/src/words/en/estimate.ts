@@ -11,7 +11,8 @@ export const ESTIMATE = {
   noneNow: 'No estimate at the moment: the nearest readings are shown',
   computed: 'A computed quantity has no estimate: the nearest readings are shown',
   noModel: 'No estimate yet: it needs ten scans of a sensor',
-  unsure: (error: string): string => `Hatched colour: less certain than ±${error}. No colour: no data`,
+  unsure: (error: string): string =>
+    `Hatched colour: less certain than ±${error}. No colour: no data`,
   /** Beside the error's colour scale. */
   error: 'Uncertainty of the estimate',
   predicted: (inside: number, scans: number): string =>

@@ -59,7 +59,8 @@ def page(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iter
     """At most two sites may be open, and a client may have one request under way."""
     archive = made(postgresql, tmp_path_factory.mktemp("hostile") / "journal", *SITES[1:])
     bounds = limits(client_timeout_s=TIMEOUT_S, open_sites=2, concurrency=1)
-    soon = constants(**{"lupin_bridge.feed.past_process:REST_S": 0.2})
+    of = "lupin_bridge.feed.past_process"
+    soon = constants(**{f"{of}:REST_S": 0.2, f"{of}:STUCK_S": 5.0})
     with fleet(archive, *bounds, *soon) as running:
         wait_for(lambda: {*running.sites()} == {*SITES}, "all sites")
         yield running
@@ -192,22 +193,22 @@ def test_an_overview_client_that_never_reads_is_disconnected(
 # --- processes ------------------------------------------------------------------------------------
 
 
-def test_a_killed_process_is_restarted_and_counted(page: Page) -> None:
+def test_a_stopped_and_a_killed_process_are_replaced_and_counted(page: Page) -> None:
     assert page.http.get(f"/sites/gh1/{HISTORY}").status_code == 200
 
-    def is_started_again(kind: str) -> None:
+    def is_started_again(kind: str, after: signal.Signals) -> None:
         name = f"lupin_fleet_{kind}_starts"
         before = page.metric(name)
         (child,) = children_of(page.process.pid, kind.encode())
-        os.kill(child, signal.SIGKILL)
+        os.kill(child, after)
         assert page.http.get("/sites/gh1/api/state").status_code == 200
         # The first time, the reader restarts at once; a query waits for it or is refused.
         wait_for(lambda: page.http.get(f"/sites/gh1/{HISTORY}").status_code == 200, "the past")
         wait_for(lambda: page.metric(name) > before, f"another {kind}")
         wait_for(lambda: page.http.get("/readyz").status_code == 200, "an archive that is read")
 
-    is_started_again("watcher")
-    is_started_again("reader")
+    is_started_again("watcher", signal.SIGSTOP)
+    is_started_again("reader", signal.SIGKILL)
 
 
 def test_an_archive_that_hangs_is_reported_and_recovers(tmp_path: Path) -> None:

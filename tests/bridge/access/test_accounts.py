@@ -151,6 +151,9 @@ async def test_a_flood_of_sign_ins_waits_in_a_short_queue_while_other_writes_go_
     await people.write(lambda it, at_s: it.note(Audited(at_s, "anna", "comment", "site", "")))
     assert (await people.write(lambda it, _: it.audited(1)))[0].what == "comment"
     await asyncio.gather(*flood, return_exceptions=True)
+    reads = (people.write(lambda it, _: it.audited(1)) for _ in range(2 * MAX_WAITING + 1))
+    *_, refused = await asyncio.gather(*reads, return_exceptions=True)
+    assert f"{2 * MAX_WAITING} sign-ins and changes are waiting" in str(refused)
 
 
 async def test_a_sign_in_that_its_client_cancels_still_counts_as_an_attempt(path: Path) -> None:

@@ -192,11 +192,18 @@ def test_a_forwarder_follows_a_journal_that_is_replaced_under_it(
     append(journal, scans(0, 50))
     other = tmp_path / "other"
     append(other, scans(70, 7))
+    backup = other.read_bytes()
     with forwarder(archive, journal) as following:
         following.wait_for_output("is forwarded to")
         wait_until_equal(archive, journal)
         other.replace(journal)
         wait_for(lambda: len(archive.rows()["scan"]) == 57, "the rows of both")
+        # A backup that is copied over it is the same file.
+        for end in ("-wal", "-shm"):
+            journal.with_name(journal.name + end).unlink()
+        journal.write_bytes(backup)
+        append(journal, scans(80, 3))
+        wait_for(lambda: len(archive.rows()["scan"]) == 60, "the rows after those of the backup")
 
 
 def test_a_journal_without_gaps_is_the_same_journal(archive: Archive, journal: Path) -> None:

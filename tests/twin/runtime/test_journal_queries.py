@@ -3,9 +3,10 @@
 import sqlite3
 import threading
 from collections.abc import Iterator
-from concurrent.futures import CancelledError
+from concurrent.futures import CancelledError, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -105,6 +106,24 @@ def test_a_replaced_file_is_read_from_then_on(path: Path) -> None:
         assert "is not there" in why_not(recall)
         append(path, [scan(at_ns=1), scan(at_ns=2)])
         assert answer(recall) == 2
+
+
+def test_a_backup_that_was_copied_over_the_file_is_read_from_then_on(path: Path) -> None:
+    with ProcessPoolExecutor(1, get_context("spawn")) as elsewhere, recalling(path) as recall:
+
+        def write(*stamps_ns: int) -> None:
+            elsewhere.submit(append, path, [scan(at_ns=it) for it in stamps_ns]).result()
+
+        write(1)
+        backup = path.read_bytes()
+        assert answer(recall) == 1
+        write(2)
+        assert answer(recall) == 2
+        for end in ("-wal", "-shm"):
+            path.with_name(path.name + end).unlink()
+        path.write_bytes(backup)
+        write(3, 4, 5)
+        assert answer(recall) == 4
 
 
 @pytest.mark.parametrize("where", [0, 3 * 1024 + 100])

@@ -256,7 +256,9 @@ test('beside an active alarm, healthy says why', () => {
     reportAlarms(alarm('a'));
   });
   expect(house().dataset['health']).toBe('healthy');
-  expect(driver().textContent).toBe('1 alarm is still active: the next good scan resolves it');
+  expect(driver().textContent).toBe(
+    '1 alarm is still active: the next good scan or inspection resolves it',
+  );
   act(() => {
     reportAlarms(alarm('a', { cleared: 950 }));
   });

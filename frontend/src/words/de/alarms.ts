@@ -195,8 +195,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthAllWell: 'Alle beurteilten Messwerte liegen im Idealbereich',
   healthDespite: (alarms) =>
     alarms === 1
-      ? '1 Alarm steht noch an: mit der nächsten guten Messung behoben'
-      : `${alarms} Alarme stehen noch an: mit der nächsten guten Messung behoben`,
+      ? '1 Alarm steht noch an: mit der nächsten guten Messung oder Kontrolle behoben'
+      : `${alarms} Alarme stehen noch an: mit der nächsten guten Messung oder Kontrolle behoben`,
   healthAcknowledged: 'quittiert',
   healthNotCurrent: 'Nicht aktuell',
   healthNothing: 'Noch kein Messwert zu beurteilen',

@@ -206,8 +206,8 @@ export const HEALTH = {
   healthAllWell: 'All assessed readings are within their ideal ranges',
   healthDespite: (alarms: number): string =>
     alarms === 1
-      ? '1 alarm is still active: the next good scan resolves it'
-      : `${alarms} alarms are still active: the next good scan resolves each`,
+      ? '1 alarm is still active: the next good scan or inspection resolves it'
+      : `${alarms} alarms are still active: the next good scan or inspection resolves each`,
   healthAcknowledged: 'acknowledged',
   /** Replaces the verdict while the current status is unknown. */
   healthNotCurrent: 'Not current',

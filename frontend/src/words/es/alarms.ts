@@ -201,8 +201,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthAllWell: 'Todas las lecturas evaluadas están en su rango ideal',
   healthDespite: (alarms) =>
     alarms === 1
-      ? 'Aún hay 1 alarma activa: queda resuelta con la próxima medición buena'
-      : `Aún hay ${alarms} alarmas activas: quedan resueltas con la próxima medición buena`,
+      ? 'Aún hay 1 alarma activa: queda resuelta con la próxima medición o revisión buena'
+      : `Aún hay ${alarms} alarmas activas: quedan resueltas con la próxima medición o revisión buena`,
   healthAcknowledged: 'reconocida',
   healthNotCurrent: 'Desactualizado',
   healthNothing: 'Aún no hay lecturas que evaluar',

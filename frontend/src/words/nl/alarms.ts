@@ -189,8 +189,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthAllWell: 'Alle beoordeelde meetwaarden liggen binnen het ideale bereik',
   healthDespite: (alarms) =>
     alarms === 1
-      ? '1 alarm is nog actief: opgelost bij de volgende goede meting'
-      : `${alarms} alarmen zijn nog actief: opgelost bij de volgende goede meting`,
+      ? '1 alarm is nog actief: opgelost bij de volgende goede meting of controle'
+      : `${alarms} alarmen zijn nog actief: opgelost bij de volgende goede meting of controle`,
   healthAcknowledged: 'bevestigd',
   healthNotCurrent: 'Niet actueel',
   healthNothing: 'Nog geen meetwaarde om te beoordelen',

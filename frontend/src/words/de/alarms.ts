@@ -77,7 +77,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     'Ein Alarm wird nach zwei auffälligen Messungen nacheinander ausgelöst, bei einem Schädling oder fehlenden Daten sofort.',
   alarmsWait: (tags) =>
     `${counted(tags, 'Messpunkt wartet', 'Messpunkte warten')} auf eine zweite Messung: noch kein Alarm`,
-  alarmNotYet: 'wartet auf eine zweite Messung',
+  alarmNotYet: 'noch kein Alarm',
   alarmsNotYet: 'Warten auf die Liste der Alarme',
   alarmsStarting: 'Die Aufzeichnung wird noch gelesen: Weitere Alarme können folgen.',
   alarmsReceived: (since) =>

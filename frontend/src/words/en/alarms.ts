@@ -79,7 +79,7 @@ export const ALARMS = {
     'An alarm is raised after two bad scans in a row. A pest, or missing data from the greenhouse, raises one at once.',
   alarmsWait: (tags: number): string =>
     `${counted(tags, 'tag', 'tags')} waiting for a second scan: no alarm yet`,
-  alarmNotYet: 'waiting for a second scan',
+  alarmNotYet: 'no alarm yet',
   alarmsNotYet: 'Waiting for the list of alarms',
   alarmsStarting: 'Recorded data is still being read: more alarms may follow.',
   alarmsReceived: (since: string): string =>

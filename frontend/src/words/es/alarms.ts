@@ -76,7 +76,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     'La alarma salta tras dos mediciones anómalas seguidas. Si hay plaga o faltan datos del invernadero, salta enseguida.',
   alarmsWait: (tags) =>
     `${counted(tags, 'punto', 'puntos')} a la espera de otra medición: aún sin alarma`,
-  alarmNotYet: 'a la espera de otra medición',
+  alarmNotYet: 'aún sin alarma',
   alarmsNotYet: 'Esperando la lista de alarmas',
   alarmsStarting: 'Todavía se está leyendo el registro: pueden aparecer más alarmas.',
   alarmsReceived: (since) =>

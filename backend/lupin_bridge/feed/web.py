@@ -388,7 +388,7 @@ class WebTwin(RosSource[WebNode]):
             await self._log.wait()
         condition, update = self._log.condition, self.update
         if condition is None:
-            raise TwinUnavailableError("the twin's journal is not known here yet")
+            raise TwinUnavailableError("the journal is not known here yet: is the twin running?")
         if update is None:  # a log from an earlier run, whose twin is not received
             now_ns = condition.complete_ns or 0
             if now_ns > _A_DATE_NS:

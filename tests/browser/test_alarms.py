@@ -228,6 +228,7 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
         content = hmi.card("a").locator(".card-body")
         content.evaluate("it => it.scrollTo(0, it.scrollHeight)")
         assert apart(content.locator("> *").last, news)
+        assert news.get_by_role("button").evaluate(LINES) == 1
         news.get_by_role("button", name="Back to live, show tag b").click()
         expect(hmi.card("b")).to_be_visible()
 

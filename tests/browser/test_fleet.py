@@ -7,10 +7,11 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, ViewportSize, expect
+from playwright.sync_api import Browser, Locator, ViewportSize, expect
 from playwright.sync_api import Page as BrowserPage
 
 from lupin_twin.core.parameters import World
+from tests.browser.places import place
 from tests.support.archive import Archive, forward_once, forwarder
 from tests.support.fleet import Page, fleet, recent_scans, wall, write
 from tests.support.journal import recording, scan
@@ -37,6 +38,12 @@ def expect_no_wider_than_a_phone(page: BrowserPage) -> None:
     page.set_viewport_size(PHONE)
     page.wait_for_function(f"innerWidth === {PHONE['width']}")
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+
+
+def after_status(row: Locator) -> int:
+    """How far a greenhouse's name is from the status before it, pixels."""
+    status = row.locator(".health-mark span")
+    return place(row.locator(".fleet-alarm-site")).left - place(status).right
 
 
 @contextmanager
@@ -158,6 +165,9 @@ def test_alarms_of_all_greenhouses_are_counted_listed_and_a_click_away(
             page.clock.fast_forward(10_000)
             expect(rows.first).to_contain_text("acknowledged by Anna,")
             expect_no_wider_than_a_phone(page)
+            page.get_by_role("searchbox").fill("")
+            expect(silence).to_be_visible()
+            assert after_status(silence) == after_status(rows.first)
             tag = rows.first.locator("span", has_text=re.compile(r"^Tag \d$")).inner_text()
             rows.first.get_by_role("link").click()
             expect(page).to_have_url(re.compile(r"/sites/warm/.*#.*at=\d+"))
@@ -242,6 +252,8 @@ def test_a_row_for_each_greenhouse_leads_to_its_shift_report(
         page.get_by_role("searchbox").fill("")
         expect(rows).to_have_count(3)
         expect_no_wider_than_a_phone(page)
+        hint = page.get_by_text(re.compile("^Counted in whole hours.*of that greenhouse.$"))
+        assert place(hint).right <= PHONE["width"]
         rows.first.get_by_role("link").click()
         address = r"/sites/warm/api/report\.html\?from=.*&lang=en&time_zone=.+$"
         expect(page).to_have_url(re.compile(address))

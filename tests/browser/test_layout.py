@@ -20,7 +20,7 @@ Size = tuple[int, int]
 ZOOMED, LANDSCAPE = (720, 450), (740, 360)
 LOW = (ZOOMED, LANDSCAPE, (1280, 540))
 # A tablet on its side, below a browser's bars; half a screen, and a little less.
-MIDDLING = ((1024, 650), (960, 896), (960, 895))
+MIDDLING = ((1024, 650), (960, 896), (960, 895), (1100, 800))
 SIZES = ((360, 640), (820, 1180), (1440, 900), *LOW)
 # A phone, a laptop, and a phone on its side: one of each layout.
 FEW = ((360, 640), (1440, 900), LANDSCAPE)
@@ -96,6 +96,11 @@ def test_everything_can_be_clicked(open_at: Callable[..., Hmi]) -> None:
         expect(sure).to_be_visible(visible=has_room)
         if has_room:
             assert place(sure).right <= place(hmi.page.locator(".table-scroll")).right
+        # Below its tag instead, but for a phone.
+        species = hmi.row("1").get_by_text("Lupin").locator("visible=true")
+        expect(species).to_have_count(0 if size == SIZES[0] else 1)
+        head = hmi.page.locator("thead th").first.get_by_text("Tag")
+        assert place(head).left == place(hmi.row("1").locator("bdi").first).left, size
 
 
 def test_below_the_layers_their_labelled_choices_are_always_in_sight(
@@ -148,6 +153,8 @@ def test_a_laptop_has_room_for_what_the_heat_map_shows(
         choice = hmi.test_id("heat-legend")
         expect(choice).to_be_visible()
         assert choice.evaluate(_CUT_CHOICE) <= 0, language
+        scale = place(hmi.test_id("ideal-scale"))
+        assert scale.bottom - scale.top < 36, f"{language}: one line below the colours"
         one_line = [places(hmi, ".legend .heat-choice", ".legend summary")]
         one_line.append(places(hmi, ".sensors label", ".sensors label:last-child"))
         for first, last in one_line:

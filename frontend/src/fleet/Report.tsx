@@ -57,8 +57,8 @@ export default function Report({ shown }: { shown: readonly Site[] }): JSX.Eleme
       {!value && !message && <p className="fleet-empty">{S.chartLoading}</p>}
       {value && (
         <div className="fleet-report">
+          <p className="fleet-note">{W.wholeHours}</p>
           <table className="fleet-table">
-            <caption className="fleet-note">{W.wholeHours}</caption>
             <thead>
               <tr>
                 <th scope="col">{words.sites}</th>

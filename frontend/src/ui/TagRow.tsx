@@ -97,6 +97,9 @@ export const TagRow = memo(function TagRow({
         <button type="button" className="row-button" aria-pressed={selected}>
           <bdi>{shown(tag.id, 24)}</bdi>
           {area !== '' && <small className="faint">{shown(area, 24)}</small>}
+          {has('species') && (
+            <small className="row-species faint">{speciesText(tag.species, 28)}</small>
+          )}
         </button>
         {!tag.at && (
           <span className="chip" title={tag.farOff ? farOffText(tag.farOff) : S.notOnMapLong}>

@@ -58,17 +58,6 @@ def body(plan: Plan) -> dict[str, Any]:
     return found
 
 
-def test_a_field_has_the_tags_and_the_box_of_its_moment() -> None:
-    found = body(field_of(SITE, requested(), JSON))
-    schema.GetFieldResponse.model_validate(found)
-    assert (found["origin_x"], found["origin_y"]) == (-1.5, -1.5)
-    assert (found["width"], found["height"], found["sample_count"]) == (40, 30, 2)
-    assert 400.0 <= found["value_min"] < found["value_max"] <= 500.0
-    found = body(field_of(SITE, requested()))
-    schema.FieldQuality.model_validate(found)
-    assert (found["sample_count"], found["rmse"]) == (2, 100.0)
-
-
 def test_a_tag_pinned_far_away_by_a_lost_robot_is_left_out_and_named() -> None:
     lost = replace(SITE, tags=(*SITE.tags, tag("c", 0.5, 450.0), tag("lost", 5_000.0, 40.0)))
     written = field_of(lost, requested(), JSON).write(lambda: False)

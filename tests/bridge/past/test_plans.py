@@ -14,7 +14,6 @@ from lupin_bridge.past.plans import (
     Health,
     History,
     LatestOfTag,
-    NoSuchTag,
     OneTag,
     Query,
     Timeline,
@@ -64,13 +63,6 @@ def test_a_query_can_be_sent_to_another_process_with_the_same_result(query: Quer
     assert pickle.loads(pickle.dumps(reported, 5)) == reported
     # With a matching ETag, no body is written.
     assert answer(there, f'"other", W/{reported.etag}') == Answered(reported.etag, None)
-
-
-def test_an_unknown_tag_is_reported_with_the_number_of_known_ones() -> None:
-    with pytest.raises(NoSuchTag) as caught:
-        answer(OneTag(5 * NS, "c"))
-    there = pickle.loads(pickle.dumps(caught.value))
-    assert str(there) == "no tag 'c' is known (2 others are)"
 
 
 def test_a_large_greenhouse_and_a_large_field_cost_more_than_small_ones() -> None:

@@ -20,12 +20,6 @@ def test_the_default_is_our_own_file_and_the_scan_interval() -> None:
     assert criteria(reading_validity_s=900.0).recent_s == 900.0
 
 
-def test_an_operators_file_replaces_ours(tmp_path: Path) -> None:
-    file = tmp_path / "mine.json"
-    file.write_text(own_sensors().text.replace("Soil moisture", "Bodenfeuchte"), "utf-8")
-    assert criteria(sensors=str(file)).sensors.named("soil_moisture").label == "Bodenfeuchte"
-
-
 def test_a_mistake_in_the_file_is_reported_with_its_line(tmp_path: Path) -> None:
     file = tmp_path / "mine.json"
     file.write_text(own_sensors().text.replace('"ideal": [18, 26]', '"ideal": [26, 18]'), "utf-8")

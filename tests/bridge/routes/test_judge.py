@@ -33,12 +33,20 @@ def test_frames_and_http_have_the_verdict_and_deltas_its_changes() -> None:
         cold = changes.until("delta", reports("tag_2"))["health"]
         assert list(cold["tags"]) == ["tag_2"]
         assert cold["house"]["verdict"] == "critical"
-        (reason,) = cold["tags"]["tag_2"]["reasons"]
-        assert (reason["kind"], reason["sensor"]) == ("range", "temperature")
-        assert (reason["value"], reason["limit"]) == (6.0, 10.0)
-
+        last_scan = live.tag("tag_2")["last_observed"]
+        assert cold["tags"]["tag_2"]["reasons"] == [
+            {
+                "kind": "range",
+                "verdict": "critical",
+                "sensor": "temperature",
+                "value": 6.0,
+                "limit": 10.0,
+                "since": last_scan,
+            }
+        ]
         reported = whole.until("state", reports("tag_2"))["health"]
         assert reported == live.json("/api/health")
+        assert reported["house"]["patrol"]["last_scan"] == last_scan
         assert verdicts(live) == {"tag_1": "healthy", "tag_2": "critical"}
 
 

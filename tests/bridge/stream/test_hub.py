@@ -115,15 +115,6 @@ def test_after_a_second_without_a_frame_the_status_is_sent_again(stage: Stage) -
     assert (full.got, rosbridge.got) == (["live"], [])
 
 
-def test_a_client_that_wants_no_status_or_no_state_gets_none(stage: Stage) -> None:
-    no_status, no_state = Socket(), Socket()
-    stage.join(no_status, wants_status=False)
-    stage.join(no_state, wants_state=False)
-    stage.publish()
-    stage.announce("stale")
-    assert (no_status.got, no_state.got) == ([1], ["live", "stale"])
-
-
 def fill(**parties: int) -> tuple[Stage, dict[str, list[Socket]]]:
     """A full hub, with connections by address, one address after the other."""
     stage = Stage(max_clients=sum(parties.values()))

@@ -160,14 +160,6 @@ def test_readings_hold_as_long_as_the_earlier_scans_imply() -> None:
     assert verdict_of(judged_at(602, old, before_s=[240.0]))[0] == "healthy"
 
 
-def test_the_etag_of_a_judgement_identifies_its_content() -> None:
-    old = TagState("a", readings=(Reading("temperature", 22.0, NS),))
-    first = judged_at(602, old, before_s=[240.0]).etag
-    assert judged_at(602, old, before_s=[240.0]).etag == first
-    assert judged_at(602, old, before_s=[1.0]).etag != first
-    assert judged_at(601, old, before_s=[240.0]).etag != first
-
-
 # --- refusals -------------------------------------------------------------------------------------
 
 
@@ -194,16 +186,6 @@ def plans(greenhouse: Snapshot, field: Field) -> list[str]:
         *(field_of(greenhouse, field, field_format).etag for field_format in FORMATS),
         field_of(greenhouse, field).etag,
     ]
-
-
-def test_equal_content_has_equal_etags_on_every_replica() -> None:
-    again = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
-    for one, other in (
-        (requested(), requested()),
-        (requested(RULES, a_map(1)), requested(RULES, a_map(7))),
-    ):
-        assert plans(again, other) == plans(SITE, one)
-        assert len(set(plans(SITE, one))) == 7
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,8 @@
-import json
 from collections.abc import Sequence
-from dataclasses import replace
 
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge, Judged, silenced
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.state_json import judgement, judgement_since
+from lupin_bridge.stream.state_json import judgement
 from lupin_twin.core.state import Reading, Snapshot, TagState
 from tests.support.seen import BY_LIGHT
 
@@ -38,12 +36,3 @@ def test_a_silent_greenhouse_is_reported_as_silent() -> None:
 def test_a_greenhouse_not_judged_yet_is_reported_too() -> None:
     body = schema.Judgement.model_validate_json(judgement(NOTHING_JUDGED), strict=True)
     assert (body.house.verdict, body.tags) == ("unknown", {})
-
-
-def test_a_delta_holds_only_the_differences() -> None:
-    judge = Judge(BY_LIGHT)
-    calm = tag("a", 22.0)
-    before = see(judge, START, [calm, tag("b", 22.0)])
-    now = see(judge, START + 1, [calm, tag("b", 6.0, START + 1)])
-    assert list(json.loads(judgement_since(before, now))["tags"]) == ["b"]
-    assert list(json.loads(judgement_since(before, replace(now, number=9)))["tags"]) == ["b"]

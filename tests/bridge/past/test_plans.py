@@ -1,11 +1,8 @@
 """Queries of the past: they are pickled, state their cost, and honour ETags."""
 
 import json
-import pickle
 from dataclasses import replace
 from typing import Any
-
-import pytest
 
 from lupin_bridge.field import PNG
 from lupin_bridge.judge.judging import Criteria
@@ -51,18 +48,6 @@ def found(need: Any) -> Any:
     if isinstance(need, SeriesRequest):
         return SeriesPast(0, 9 * NS)
     return SITE if isinstance(need, int) else ()
-
-
-@pytest.mark.parametrize("query", QUERIES, ids=lambda q: type(q).__name__)
-def test_a_query_can_be_sent_to_another_process_with_the_same_result(query: Query) -> None:
-    there: Query = pickle.loads(pickle.dumps(query, 5))
-    assert there == query
-    assert hash(there) == hash(query)
-    reported = answer(there)
-    assert reported == answer(query)
-    assert pickle.loads(pickle.dumps(reported, 5)) == reported
-    # With a matching ETag, no body is written.
-    assert answer(there, f'"other", W/{reported.etag}') == Answered(reported.etag, None)
 
 
 def test_a_large_greenhouse_and_a_large_field_cost_more_than_small_ones() -> None:

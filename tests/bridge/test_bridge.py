@@ -255,22 +255,6 @@ async def test_a_busy_memory_at_the_start_is_queried_again(monkeypatch: pytest.M
 # --- the watch ----------------------------------------------------------------------------------
 
 
-async def test_the_watch_survives_an_error(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    async with Stage() as stage:
-        looks = 0
-
-        def fail(_now_s: float) -> int:
-            nonlocal looks
-            looks += 1
-            raise RuntimeError("a defect")
-
-        monkeypatch.setattr(stage.bridge.hub, "dismiss_stuck", fail)
-        await until(lambda: looks >= 2, "a second check")
-        assert "the watch had an error and continues" in caplog.text
-
-
 async def test_a_client_with_a_low_rate_gets_the_latest_although_nothing_more_happens() -> None:
     now_s = 100.0
     async with Stage(clock=lambda: now_s, frames_per_s=100.0) as stage:

@@ -191,10 +191,6 @@ def test_the_greenhouses_activity_is_reported_beside_its_verdict() -> None:
     tags = [tag(str(i), START + i * 40 * S, temperature=22.0) for i in range(4)]
     judged = judge.see(snapshot(START + 120 * S, *tags))
     assert judged.patrol == Patrol(40 * S, START + 120 * S, 0)
-    assert (
-        judge_once(snapshot(START + 120 * S, *tags), (), replace(BY_LIGHT, recent_s=600.0)).patrol
-        == judged.patrol
-    )
     # No more scans: the last one stays, and all readings age.
     judged = judge.see(snapshot(START + 721 * S, *tags))
     assert judged.patrol == Patrol(40 * S, START + 120 * S, 4)

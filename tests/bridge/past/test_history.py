@@ -43,29 +43,6 @@ def written(past: SeriesPast, requested: SeriesRequest = REQUESTED) -> dict[str,
 # --- the body -------------------------------------------------------------------------------------
 
 
-def test_readings_are_sent_one_by_one_and_what_is_not_finite_is_null() -> None:
-    past = readings(NS + 1, 2 * NS, 3 * NS, values=[1.5, math.nan, math.inf], end_ns=4 * NS)
-    assert written(past) == {
-        "tag_id": "7",
-        "sensor_type": "co2",
-        "unit": "ppm",
-        "from": {"sec": 0, "nanosec": 0},
-        "to": {"sec": 4, "nanosec": 0},
-        "is_bucketed": False,
-        "bucket_s": None,
-        "readings": [
-            {"stamp": {"sec": 1, "nanosec": 1}, "value": 1.5},
-            {"stamp": {"sec": 2, "nanosec": 0}, "value": None},
-            {"stamp": {"sec": 3, "nanosec": 0}, "value": None},
-        ],
-        "buckets": [],
-        "gaps": [],
-        "nights": None,
-        "complete_to": None,
-        "kept_from": None,
-    }
-
-
 def test_buckets_are_sent_with_their_length() -> None:
     past = SeriesPast(
         0, 9 * NS, 5 * NS // 2, (0, 5 * NS), (3, 1), (2.0, math.inf), (1.0, 4e307), (4.0, 1.6e308)

@@ -26,7 +26,9 @@ def test_frames_and_http_have_the_verdict_and_deltas_its_changes() -> None:
     with bridge() as live, live.listen(delta=1) as changes, live.listen() as whole:
         changes.until("state")  # from before
         live.peer.observe(scan("tag_1", {"temperature": 22.0}))
-        fine = changes.until("delta", reports("tag_1"))["health"]
+        delta = changes.until("delta", reports("tag_1"))
+        schema.DeltaFrame.model_validate(delta)
+        fine = delta["health"]
         assert fine["tags"]["tag_1"] == {"verdict": "healthy"}
         assert fine["house"]["verdict"] == "healthy"
         live.peer.observe(scan("tag_2", {"temperature": 6.0}))

@@ -82,10 +82,17 @@ async def test_nights_by_the_clock_are_not_simulations(
 async def test_a_timeline_queries_every_event_of_one_period(domain: int) -> None:
     past = MadeUp(points={("*", "~scans"): [(NS, 5.0), (2 * NS, 5.0)], ("*", "~runs"): [(0, 9.0)]})
     past.points["7", "~scans"] = [(NS, 5.0)]
+    for event, seconds in ((Event.FAILURES, 3), (Event.PESTS_SEEN, 55), (Event.PESTS_CLEARED, 950)):
+        past.points["*", event] = [(seconds * NS, 1.0)]
+    past.points["*", Event.INSPECTIONS] = [(at * NS, 1.0) for at in (55, 56, 950)]
     async with remembering(past) as it:
         answer = await it.http.get("/api/timeline?points=10")
         found = routes_schema.Timeline.model_validate_json(answer.content)
-        assert [(b.start.sec, b.scans) for b in found.buckets] == [(0, 2)]
+        assert [bucket.model_dump(exclude={"start"}) for bucket in found.buckets] == [
+            {"scans": 2, "failures": 1, "looks": 2, "pests_seen": 1, "pests_cleared": 0},
+            {"scans": 0, "failures": 0, "looks": 1, "pests_seen": 0, "pests_cleared": 1},
+        ]
+        assert [bucket.start.sec for bucket in found.buckets] == [0, 900]
         assert (found.bucket_s, found.reach is None, len(found.runs)) == (100.0, False, 1)
         requested = [request for request in past.requested if isinstance(request, SeriesRequest)]
         assert {request.sensor_type for request in requested} == set(Event)

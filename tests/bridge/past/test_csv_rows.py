@@ -81,11 +81,6 @@ def test_numbers_are_read_back_to_the_last_bit_and_stay_numbers(value: float) ->
         (OfExport(), None, "lupin-twin.csv"),
         (OfExport(), 86_400 * NS, "lupin-twin_to_19700102T000000Z.csv"),
         (
-            OfExport("1", "60", tag_id="a/b", sensor_type="co2"),
-            None,
-            "lupin-twin_a_b_co2_from_19700101T000001Z_to_19700101T000100Z.csv",
-        ),
-        (
             OfExport(None, "1", tag_id='"; x=\r\né'),
             5,
             "lupin-twin____x_____to_19700101T000001Z.csv",

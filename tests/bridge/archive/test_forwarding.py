@@ -279,13 +279,32 @@ def words(archive: Archive, path: Path, **more: str) -> list[str]:
     return ["forward", "--once", *(word for pair in pairs for word in pair)]
 
 
+# As PostgreSQL refuses a row for which its disk has no room.
+NO_ROOM = (
+    "CREATE FUNCTION no_room() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN"
+    " RAISE EXCEPTION 'could not extend file' USING ERRCODE = 'disk_full'; END $$;"
+    " CREATE TRIGGER no_room BEFORE INSERT ON scan FOR EACH ROW EXECUTE FUNCTION no_room()"
+)
+
+
+@pytest.mark.parametrize(
+    ("fault", "remedy", "said"),
+    [
+        (
+            "REVOKE INSERT ON scan FROM lupin_forwarder",
+            "GRANT INSERT ON scan TO lupin_forwarder",
+            "is not forwarded: the archive does not permit it",
+        ),
+        (NO_ROOM, "DROP TRIGGER no_room ON scan", "the archive is full: could not extend file"),
+    ],
+)
 def test_an_archive_that_is_reached_and_takes_nothing_is_said_once(
-    archive: Archive, journal: Path
+    archive: Archive, journal: Path, fault: str, remedy: str, said: str
 ) -> None:
     append(journal, scans(0, 50))
-    archive.do("REVOKE INSERT ON scan FROM lupin_forwarder")
+    archive.do(fault)
     with forwarder(archive, journal) as process:
-        process.wait_for_output("is not forwarded: the archive does not permit it")
+        process.wait_for_output(said)
         heard = archive.select("SELECT heard_at FROM forwarder")
         for _ in range(2):
             here = archive.select("SELECT since FROM forwarder")
@@ -295,7 +314,7 @@ def test_an_archive_that_is_reached_and_takes_nothing_is_said_once(
             )
         assert process.output.count("\n") == 1
         assert archive.select("SELECT heard_at FROM forwarder") == heard, "it is not live"
-        archive.do("GRANT INSERT ON scan TO lupin_forwarder")
+        archive.do(remedy)
         wait_until_equal(archive, journal)
         process.wait_for_output(f"site {archive.site} is forwarded to")
 

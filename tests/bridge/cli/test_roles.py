@@ -69,14 +69,6 @@ def test_the_web_role_refuses_an_archive_as_its_journal(domain: int) -> None:
 # --- roles --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_the_web_role_stops_at_once_without_errors(domain: int, number: signal.Signals) -> None:
-    with lupin_twin(domain, "web") as process:
-        url_of(process)
-        assert process.stop(number) == 0
-        assert "Traceback" not in process.output
-
-
 def test_without_a_twin_the_notes_name_what_is_missing(domain: int) -> None:
     with lupin_twin(domain, "web") as process:
         answer = httpx.get(f"{url_of(process)}/api/notes")

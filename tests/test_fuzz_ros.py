@@ -18,13 +18,13 @@ from lupin_bridge.stream import schema
 from lupin_twin.core.drops import MAX_BLOOMS_PER_TAG, MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH
 from tests.support.domains import own_domain
 from tests.support.hostile import ANY, MEGABYTE, NAN, TEXTS, any_state, damaged, long_lies
-from tests.support.live import attached, field_of, wait_until_ready
+from tests.support.live import attached, field_of, serve_and_web, wait_until_ready
 from tests.support.messages import discovered, inspection, pose, scan
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
 from tests.support.processes import limits, lupin_twin
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
-from tests.support.web import Bridge, bridge
+from tests.support.web import Bridge
 
 # Of the process with the twin: for one batch at any time, and stored of everything sent here (which
 # is bounded tag by tag, and there are some 30), with the cache of fields. In one arena: what the C
@@ -45,12 +45,7 @@ FULLY = 5
 @pytest.fixture(scope="module")
 def both() -> Iterator[tuple[Bridge, Bridge]]:
     """`serve` with the twin, and a `web` that receives everything over `/twin/state`."""
-    with (
-        own_domain() as domain,
-        bridge(*NO_LIMITS, *RATE, domain=domain, afresh=True, **ONE_ARENA) as twin,
-        lupin_twin(domain, "web", *NO_LIMITS, afresh=True) as process,
-        attached(process, twin.peer) as apart,
-    ):
+    with serve_and_web(*RATE, of_both=NO_LIMITS, afresh=True, **ONE_ARENA) as (twin, apart):
         twin.peer.observe(scan("first", {"co2": 400.0}, (0, 0)))
         for live in (twin, apart):
             wait_until_ready(live)

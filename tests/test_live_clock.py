@@ -4,38 +4,23 @@
 """
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rosgraph_msgs.msg import Clock
 
-from tests.support.domains import own_domain
 from tests.support.journal import SECOND, append
 from tests.support.journal import scan as row
-from tests.support.live import attached
+from tests.support.live import serve_and_web
 from tests.support.messages import scan
-from tests.support.processes import limits, lupin_twin
+from tests.support.processes import limits
 from tests.support.waiting import PATIENCE_S, wait_for
-from tests.support.web import Bridge, bridge
+from tests.support.web import Bridge
 
 # No machine is too busy for an answer: the past process yields to all others.
 PATIENT = limits(answer_timeout_s=PATIENCE_S)
 SIM_TIME = ("--ros-args", "-p", "use_sim_time:=true", "-p", "state_publish_rate_hz:=10.0")
-
-
-@contextmanager
-def both(*options: str) -> Iterator[tuple[Bridge, Bridge]]:
-    """`serve`, and a `web` of its twin."""
-    with (
-        own_domain() as domain,
-        bridge(*PATIENT, *options, domain=domain) as twin,
-        lupin_twin(domain, "web", *PATIENT) as process,
-        attached(process, twin.peer) as apart,
-    ):
-        yield twin, apart
 
 
 def tick(live: Bridge, seconds: int) -> None:
@@ -66,7 +51,7 @@ def ages(live: Bridge, is_so: str) -> list[float]:
 
 
 def test_the_clock_never_starts_runs_is_paused_stops_and_runs_again() -> None:
-    with both(*SIM_TIME) as lives:
+    with serve_and_web(*SIM_TIME, of_both=PATIENT) as lives:
         check_clock(lives)
 
 
@@ -147,7 +132,8 @@ def test_a_clock_that_contradicts_the_journal_is_reported(tmp_path: Path) -> Non
     """As on a board that starts years ago; `test_memory_one_truth` has what a twin does then."""
     journal = tmp_path / "journal.sqlite"
     append(journal, [row("1", time.time_ns() + 86_400 * SECOND, co2=5.0)])
-    with both("--ros-args", "-p", f"journal:={journal}") as lives:
+    of_journal = ("--ros-args", "-p", f"journal:={journal}")
+    with serve_and_web(*of_journal, of_both=PATIENT) as lives:
         peer, message = lives[0].peer, list[DiagnosticArray]()
         peer.node.create_subscription(DiagnosticArray, "/diagnostics", message.append, 10)
 

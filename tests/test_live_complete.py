@@ -1,8 +1,6 @@
 """Data missing in the journal are marked in every answer, and not denied."""
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,34 +10,17 @@ import pytest
 from tests.support.disk import Disk, build
 from tests.support.domains import own_domain, ros_env
 from tests.support.journal import select
-from tests.support.live import attached, wait_until_ready
+from tests.support.live import attached, serve_and_web, wait_until_ready
 from tests.support.messages import scan
-from tests.support.processes import OFTEN, Process, limits, lupin_twin, patrols_of
+from tests.support.processes import OFTEN, Process, limits, patrols_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
-from tests.support.web import Bridge, bridge
+from tests.support.web import Bridge
 
 DAY_S = 86_400
 PATIENT = limits(answer_timeout_s=PATIENCE_S, answers_per_s=10_000)
 TO, FROM = "x-complete-to", "x-kept-from"
 ROUTES = ("/api/state", "/api/tags/a", "/api/health", "/api/field.json", "/api/field/quality")
-
-
-@contextmanager
-def both(
-    journal: Path, *options: str, env: dict[str, Any] | None = None
-) -> Iterator[tuple[Bridge, Bridge]]:
-    """`serve` with a journal, and a `web` of it that has received that."""
-    arguments = (*PATIENT, *OFTEN, "-p", f"journal:={journal}", *options)
-    with (
-        own_domain() as domain,
-        bridge(*arguments, domain=domain, **(env or {})) as it,
-        lupin_twin(domain, "web", *PATIENT) as process,
-        attached(process, it.peer) as apart,
-    ):
-        for live in (it, apart):
-            wait_for(lambda live=live: journal_of(live) == "recording", "a journal")  # type: ignore[misc]
-        yield it, apart
 
 
 def journal_of(live: Bridge) -> str:
@@ -65,7 +46,10 @@ def test_with_a_full_disk_answers_have_their_limit_of_completeness(tmp_path: Pat
     folder.mkdir()
     disk = Disk(folder, build(tmp_path), tmp_path / "control")
     journal = folder / "j.sqlite"
-    with both(journal, env={"afresh": True, **disk.env}) as lives:
+    recorded = (*OFTEN, "-p", f"journal:={journal}")
+    with serve_and_web(*recorded, of_both=PATIENT, afresh=True, **disk.env) as lives:
+        for live in lives:
+            wait_for(lambda live=live: journal_of(live) == "recording", "a journal")  # type: ignore[misc]
         serve, _ = lives
         serve.peer.observe(scan("a", {"co2": 400.0}, (1.0, 1.0)))
         wait_for(lambda: len(select(journal, "SELECT 1 FROM scan")) == 1, "it in the journal")

@@ -15,10 +15,9 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState
 
 from lupin_bridge.stream import routes_schema
-from tests.support.domains import own_domain
-from tests.support.live import attached, wait_until_ready
+from tests.support.live import serve_and_web, wait_until_ready
 from tests.support.messages import scan
-from tests.support.processes import constants, limits, lupin_twin
+from tests.support.processes import constants, limits
 from tests.support.waiting import PATIENCE_S
 from tests.support.web import Bridge, Listener, bridge
 
@@ -31,12 +30,7 @@ Json = dict[str, Any]
 
 @pytest.fixture(scope="module")
 def both() -> Iterator[tuple[Bridge, Bridge]]:
-    with (
-        own_domain() as domain,
-        bridge(*PATIENT, *OFTEN, *QUICK, domain=domain) as twin,
-        lupin_twin(domain, "web", *PATIENT, *OFTEN) as process,
-        attached(process, twin.peer) as apart,
-    ):
+    with serve_and_web(*QUICK, of_both=(*PATIENT, *OFTEN)) as (twin, apart):
         twin.peer.observe(scan("1", {"co2": 400.0}, (0.0, 0.0)))
         for live in (twin, apart):
             wait_until_ready(live)

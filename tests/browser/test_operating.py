@@ -28,7 +28,7 @@ def test_a_low_window_has_one_line_of_sensors_with_the_chosen_one_in_sight(hmi: 
 
 
 def test_a_sensor_has_its_colours_texts_legend_and_column(hmi: Hmi) -> None:
-    expect(hmi.test_id("ideal-scale")).to_contain_text("daytime ideal 18.0 – 26.0\u00a0°C")
+    expect(hmi.test_id("ideal-scale")).to_contain_text("daytime ideal 18.0 to 26.0 °C")
     for at, words in (((1.3, 1.3), "ideal"), ((1.3, 3.3), "too high by 5.0\u00a0°C")):
         hmi.point_at(*at)
         expect(hmi.test_id("readout-ideal")).to_have_text(words)

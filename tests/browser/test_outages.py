@@ -1,14 +1,19 @@
 """Outages: no stale data look fresh, and the page recovers without a reload."""
 
 import re
+import time
+from pathlib import Path
 from urllib.parse import urlsplit
 
 from playwright.sync_api import expect
 
-from tests.browser.hmi import SERVER_GONE, Hmi, OpenPage
+from tests.browser.hmi import PHONE, SERVER_GONE, Hmi, OpenPage
+from tests.support.journal import SECOND, append
+from tests.support.journal import scan as row
 from tests.support.messages import occupancy_grid, scan
 from tests.support.processes import lupin_twin, url_of
 from tests.support.ros import Peer
+from tests.support.web import bridge
 
 CLOCK = re.compile(r"Last data at \d\d:\d\d:\d\d")
 
@@ -84,3 +89,26 @@ def test_a_server_that_is_killed_and_restarts_with_other_tags(
         expect(hmi.test_id("sample-count")).to_have_text("No tag contributes")
         hmi.expect(lambda: len(set(hmi.pixels([ground, hot, floor]))) == 1, "bare ground")
     assert min(seqs(hmi)[len(old_seqs) :]) < old_seqs[-1]
+
+
+def test_a_clock_behind_the_recording_is_named_once_with_what_to_do_first(
+    tmp_path: Path, open_page: OpenPage
+) -> None:
+    """As on a board that starts years ago: data arrives, but nobody knows how old it is."""
+    journal = tmp_path / "journal.sqlite"
+    append(journal, [row("1", time.time_ns() + 86_400 * SECOND, co2=5.0)])
+    with bridge("--ros-args", "-p", f"journal:={journal}") as running:
+        hmi = open_page(running.url, "list=alarms", viewport=PHONE)
+        banners = hmi.page.locator(".banners")
+        expect(banners).to_have_text(re.compile("^Set the twin’s clock.*recording waits"))
+        expect(banners).not_to_contain_text(re.compile(r"\dT\d"))
+        box = banners.bounding_box()
+        assert box is not None
+        assert box["height"] < PHONE["height"] / 6
+        expect(hmi.page.get_by_test_id("connection")).to_contain_text("Time unknown")
+        expect(hmi.page.locator(".alarm-notes")).to_have_text(
+            "While the time is unknown, alarms may be missing."
+        )
+        running.peer.observe(scan("1", {"co2": 7.0}))
+        hmi.page.get_by_role("button", name=re.compile("Tags")).click()
+        expect(hmi.cell("1", "co2")).to_have_text("7")

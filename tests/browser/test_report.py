@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Browser, Page, ViewportSize, expect
 
 from tests.browser.hmi import FONTS, OpenPage
-from tests.browser.places import place
+from tests.browser.places import LINES, place
 from tests.support.messages import inspection, scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -38,7 +38,10 @@ def troubled(browser: Browser) -> Iterator[Bridge]:  # created before the page
             running.peer.observe(inspection(tag_id, anomaly=True, bug_count=3))
             if number % 20 == 0:  # no queue has room for all
                 wait_for(partial(has_tags, running, number), "tags")
-        wait_for(lambda: counts(running)["raised"] == len(TAGS), "the alarms in the report")
+        for _ in range(2):
+            running.peer.observe(scan(TAGS[0], {"humidity": 5.0}))
+        raised = len(TAGS) + 1
+        wait_for(lambda: counts(running)["raised"] == raised, "the alarms in the report")
         # A report ends with a whole second; the page's latest state may be a second old.
         end_s = math.floor(time.time()) + 2
         wait_for(lambda: time.time() >= end_s, "the seconds to be over")
@@ -116,6 +119,8 @@ def test_on_a_dark_phone_it_is_light_and_only_a_wide_table_scrolls(
         assert page.evaluate("document.documentElement.scrollWidth") == 390
         left = [place(it).left for it in page.locator("dt").all()]
         assert left[0] == left[2] < left[1] == left[3], "two in a row"
+        limits = page.locator("table.alarms td", has_text=re.compile(r"\d.*%"))
+        assert limits.evaluate_all(f"all => all.map({LINES})") == [1, 1, 1], "now, worst, limits"
         colour = page.locator("body").evaluate("it => getComputedStyle(it).backgroundColor")
         assert colour == "rgb(255, 255, 255)"
 

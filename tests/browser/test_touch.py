@@ -1,9 +1,10 @@
 """A phone in the hand: drag, pinch, and the two halves of a narrow screen."""
 
+import re
 from collections.abc import Sequence
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import WebSocketRoute, expect
 
 from tests.browser.greenhouse import TAGS
 from tests.browser.hmi import PHONE, Hmi, OpenPage
@@ -71,6 +72,26 @@ def test_most_of_the_height_is_content(phone: Hmi) -> None:
     frame, card = heights(".map-frame", ".card")
     assert frame >= 200
     assert frame + card >= tall
+
+
+def test_a_played_recording_shows_its_time_on_each_tab(phone: Hmi) -> None:
+    """Also in German, whose words are longer, and beside a card, where no map is."""
+
+    def of_a_recording(socket: WebSocketRoute) -> None:
+        socket.connect_to_server().on_message(
+            lambda it: socket.send(re.sub(r'("origin": ?)"\w+"', r'\1"recorded"', str(it)))
+        )
+
+    phone.page.route_web_socket(re.compile("/ws/state"), of_a_recording)
+    phone.go("tag=2", "?lang=de")
+    for tab in phone.page.locator(".pane-tabs button").all():
+        tab.tap()
+        time = phone.test_id("origin").locator("strong")
+        expect(time).to_be_in_viewport(ratio=1)
+        expect(time).to_have_text(re.compile(r"\d\d:\d\d:\d\d$"))
+        expect(phone.test_id("origin")).to_contain_text("Aufgezeichnet")
+    menu = phone.page.get_by_role("button", name="Menü")
+    expect(menu).to_be_in_viewport(ratio=1)
 
 
 def test_charts_have_one_line_of_tools_and_the_whole_width(phone: Hmi) -> None:

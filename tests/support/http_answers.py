@@ -6,17 +6,15 @@ Parts that depend on the current time are removed.
 import base64
 import re
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import httpx
 
-from tests.support.domains import own_domain
-from tests.support.live import attached, wait_until_ready
-from tests.support.processes import OFTEN, limits, lupin_twin
-from tests.support.ros import Peer
+from tests.support.live import serve_and_web, wait_until_ready
+from tests.support.processes import OFTEN, limits
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge
 
@@ -40,18 +38,12 @@ OPTIONS = (
 @contextmanager
 def bridges(journal: Path) -> Iterator[tuple[Bridge, Bridge]]:
     """`serve` on a journal, and `web` beside it."""
-    with ExitStack() as stack:
-        domain = stack.enter_context(own_domain())
-        serve = stack.enter_context(
-            lupin_twin(domain, "serve", *OPTIONS, *OFTEN, "-p", f"journal:={journal}", *_STORED)
-        )
-        peer = stack.enter_context(Peer(domain))
-        web = stack.enter_context(lupin_twin(domain, "web", *OPTIONS))
-        found = [stack.enter_context(attached(process, peer)) for process in (serve, web)]
-        for bridge in found:
+    recorded = (*OFTEN, "-p", f"journal:={journal}", *_STORED)
+    with serve_and_web(*recorded, of_both=OPTIONS) as both:
+        for bridge in both:
             wait_until_ready(bridge)
             wait_for(partial(_remembers, bridge), "the past")
-        yield found[0], found[1]
+        yield both
 
 
 def _remembers(bridge: Bridge) -> bool:

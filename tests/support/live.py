@@ -1,15 +1,16 @@
 """`lupin-twin web` processes, attached to twins in their own processes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import httpx
 
-from tests.support.processes import Process, url_of
+from tests.support.domains import own_domain
+from tests.support.processes import Process, lupin_twin, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
-from tests.support.web import Bridge
+from tests.support.web import Bridge, bridge
 
 
 @contextmanager
@@ -17,6 +18,20 @@ def attached(process: Process, peer: Peer) -> Iterator[Bridge]:
     """A bridge's process with an HTTP client; a twin need not exist."""
     with httpx.Client(base_url=url_of(process), timeout=PATIENCE_S, trust_env=False) as http:
         yield Bridge(process, str(http.base_url).rstrip("/"), peer, http)
+
+
+@contextmanager
+def serve_and_web(
+    *options: str, of_both: Sequence[str] = (), afresh: bool = False, **env: str
+) -> Iterator[tuple[Bridge, Bridge]]:
+    """`serve` with these options and this environment, and a `web` of its twin."""
+    with (
+        own_domain() as domain,
+        bridge(*of_both, *options, domain=domain, afresh=afresh, **env) as twin,
+        lupin_twin(domain, "web", *of_both, afresh=afresh) as process,
+        attached(process, twin.peer) as apart,
+    ):
+        yield twin, apart
 
 
 def wait_until_ready(live: Bridge) -> None:

@@ -1,7 +1,7 @@
 """The parent's end of the process that reads the past (`query.Child`): starts, queries, ends it.
 
-Belongs to the event loop. If the process dies, that is logged, and its pending queries fail. The
-first query after a pause starts the next process.
+Belongs to the event loop. If the process dies, or does not react to the cancellation of a query, it
+is ended, and its pending queries fail. The first query after a pause starts the next process.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ log = logging.getLogger(__name__)
 MAX_PENDING: Final = 100
 # Pause after the death of a process, s.
 REST_S: Final = 2.0
+# How long a process may take to react to a cancellation, s; on a busy machine it may just start.
+STUCK_S: Final = 15.0
 
 AnswerT = TypeVar("AnswerT")
 # Imported, not run as `__main__`: pickled names must be the same in both processes.
@@ -50,6 +52,8 @@ class PastProcess:
         self._numbers = itertools.count(1)
         # The process's standard input; until it runs, queries wait in `_unsent`.
         self._queries: asyncio.StreamWriter | None = None
+        # When the process has to have reacted; None: it has.
+        self._patience: asyncio.Timeout
         self._unsent: dict[int, tuple[bytes, OccupancyMap | None]] = {}
         self._sent_map: OccupancyMap | None = None
         self._life: asyncio.Task[None] | None = None
@@ -85,6 +89,8 @@ class PastProcess:
         except asyncio.CancelledError:
             if self._queries is not None:
                 self._queries.write(pickle.dumps((number, None)))
+                if self._patience.when() is None:
+                    self._patience.reschedule(asyncio.get_running_loop().time() + STUCK_S)
             raise
         finally:
             del self.pending[number]
@@ -135,11 +141,15 @@ class PastProcess:
         self.pid, self._queries, self._sent_map = process.pid, process.stdin, None
         try:
             self._send()
-            with contextlib.suppress(asyncio.IncompleteReadError):
-                while True:
-                    number, length = HEAD.unpack(await process.stdout.readexactly(HEAD.size))
-                    self._take(number, await process.stdout.readexactly(length))
-            return _exit_text(await process.wait())
+            async with asyncio.timeout(None) as self._patience:
+                with contextlib.suppress(asyncio.IncompleteReadError):
+                    while True:
+                        number, length = HEAD.unpack(await process.stdout.readexactly(HEAD.size))
+                        self._take(number, await process.stdout.readexactly(length))
+                        self._patience.reschedule(None)
+                return _exit_text(await process.wait())
+        except TimeoutError:
+            return f"did not react for {STUCK_S:g} s"
         finally:
             self.pid = self._queries = None
             # Not by `process.kill`: if the process has just ended, that takes the exit code from

@@ -129,8 +129,10 @@ class Child:
                 self._ask(number, message)
             elif message is not None:
                 self._map = message
-            elif (running := self._running.pop(number, None)) is not None:
-                running.cancel()
+            else:
+                if (running := self._running.pop(number, None)) is not None:
+                    running.cancel()
+                self._send(number, False, None)  # the parent sees that this process reacts
 
     def _ask(self, number: int, message: bytes) -> None:
         try:

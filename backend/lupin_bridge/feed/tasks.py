@@ -37,7 +37,7 @@ class Guard:
             last, self._last = self._last, repr(error)
             if last != self._last:
                 is_known = isinstance(error, self._known)
-                level = logging.INFO if is_known else logging.ERROR
+                level = logging.WARNING if is_known else logging.ERROR
                 log.log(level, "%s: %s", self._what, error, exc_info=not is_known)
             return error
         self._last = ""

@@ -18,7 +18,7 @@ from lupin_bridge.feed.past_process import PastProcess
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.relay import Relay, TwinNames
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
-from lupin_bridge.feed.tasks import end
+from lupin_bridge.feed.tasks import Guard, Periodic, end
 from lupin_bridge.fleet.overview import Archive, Site
 from lupin_bridge.fleet.reader import Latest, Reported
 from lupin_bridge.fleet.watcher import News
@@ -75,15 +75,19 @@ class Watching:
         await self.process.stop()
 
     async def _keep(self) -> None:
+        guard = Guard("the archive is not watched")
         while True:
-            try:
-                self._take(await self._look())
-                continue
-            except NotRemembered as error:
-                self._down(str(error))
-            except Exception:  # nobody waits for this task, and all of the overview depends on it
-                log.exception("the archive is not watched")
-            await asyncio.sleep(_RETRY_S)
+            await guard.run(self._see())
+            if not self.archive.is_reachable:
+                await asyncio.sleep(_RETRY_S)
+
+    async def _see(self) -> None:
+        try:
+            self._take(await self._look())
+        except Exception as error:
+            self._down(_why(error))
+            if not isinstance(error, _KNOWN):
+                raise
 
     async def _look(self) -> News:
         """Wait for news; if they take too long, report that meanwhile."""
@@ -163,7 +167,10 @@ class SiteTwin(TwinSource):
         self._said: tuple[bool, int, str] | None = None
         self._wake = asyncio.Event()
         self._has_read = asyncio.Event()
+        # It goes on while rows are read, however long that takes.
+        self._heartbeat = Periodic(self._notify, HEARTBEAT_S, f"site {site}")
         self._task: asyncio.Task[None] | None = None
+        self._on_state: Callable[[TwinUpdate], None]
 
     async def start(
         self,
@@ -171,7 +178,9 @@ class SiteTwin(TwinSource):
         on_death: Callable[[], None],  # noqa: ARG002  # there is no thread that could die
     ) -> None:
         """Start following the site; waits for its first state, within the time-out."""
-        self._task = asyncio.create_task(self._follow(on_state), name=f"site {self.site}")
+        self._on_state = on_state
+        self._heartbeat.start()
+        self._task = asyncio.create_task(self._keep_reading(), name=f"read {self.site}")
         if self._watching.archive.is_reachable:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._has_read.wait(), self.timeout_s)
@@ -179,6 +188,7 @@ class SiteTwin(TwinSource):
     async def stop(self) -> None:
         """Stop; the process that reads goes on for other sites."""
         await end(self._task)
+        await self._heartbeat.stop()
 
     def on_news(self) -> None:
         """See whether this site has changed: the overview has."""
@@ -199,30 +209,12 @@ class SiteTwin(TwinSource):
     def _is_live(self) -> bool:
         return self._watching.archive.is_reachable and self._site.is_live
 
-    async def _follow(self, on_state: Callable[[TwinUpdate], None]) -> None:
-        """Read new rows; meanwhile, report that the site is live, however long reading takes."""
-        reading = asyncio.create_task(self._keep_reading(on_state), name=f"read {self.site}")
-        try:
-            while True:
-                await asyncio.sleep(HEARTBEAT_S)
-                self._notify(on_state)
-        finally:
-            reading.cancel()
-
-    async def _keep_reading(self, on_state: Callable[[TwinUpdate], None]) -> None:
+    async def _keep_reading(self) -> None:
+        guard = Guard(f"site {self.site} is unchanged", *_KNOWN)
         while True:
-            try:
-                await self._read()
-                self._problem = ""
-                self._notify(on_state)
-                if self._reported is not None:
-                    self._has_read.set()
-            except Exception as error:  # nobody waits for this task, and the page depends on it
-                is_known = isinstance(error, (NotRemembered, TwinUnavailableError))
-                why = str(error) if is_known else f"the archive cannot be read: {error}"
-                before, self._problem = self._problem, _sentence(why)
-                if self._problem != before:
-                    log.warning("site %s is unchanged: %s", self.site, why, exc_info=not is_known)
+            error = await guard.run(self._read())
+            if error is not None:
+                self._problem = _sentence(_why(error))
                 await asyncio.sleep(_RETRY_S)
                 continue
             await self._wake.wait()
@@ -237,8 +229,12 @@ class SiteTwin(TwinSource):
             self._reported = found
             self._read_ns = time.monotonic_ns()
             self._seq = last_seq
+        self._problem = ""
+        await self._notify()
+        if self._reported is not None:
+            self._has_read.set()
 
-    def _notify(self, on_state: Callable[[TwinUpdate], None]) -> None:
+    async def _notify(self) -> None:
         site, is_live = self._site, self._is_live
         reported = self._reported
         archive = self._watching.archive
@@ -268,7 +264,7 @@ class SiteTwin(TwinSource):
             input_problems=(problem,) if problem else (),
             silent_s=0.0 if is_live else ago_s,
         )
-        on_state(self.update)
+        self._on_state(self.update)
 
     def _now_ns(self, reported: Reported) -> int:
         """The site's ROS time now; that of a simulation goes on only while it is live."""
@@ -326,6 +322,14 @@ class SiteTwin(TwinSource):
 def _newest_ns(reported: Reported) -> int:
     """The last moment of a simulation that every replica knows of."""
     return max((tag.last_observed_ns or 0 for tag in reported.snapshot.tags), default=0)
+
+
+# Errors whose message says what is wrong.
+_KNOWN: Final = (NotRemembered, TwinUnavailableError)
+
+
+def _why(error: Exception) -> str:
+    return f"{'' if isinstance(error, _KNOWN) else 'the archive cannot be read: '}{error}"
 
 
 def _sentence(message: str) -> str:

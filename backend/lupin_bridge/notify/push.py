@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import asyncio
 import base64
-import logging
 import math
 import socket
 import time
@@ -27,7 +26,7 @@ from lupin_bridge.access.accounts import Device
 from lupin_bridge.access.credentials import AccountError
 from lupin_bridge.access.people import People
 from lupin_bridge.alarms.board import NOTHING_SAID, Change, notes_of_alarms
-from lupin_bridge.feed.tasks import end
+from lupin_bridge.feed.tasks import Guard, end
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify.destinations import Endpoint, PushTarget
@@ -39,8 +38,6 @@ from lupin_bridge.stream.state_json import alarm_json
 
 if TYPE_CHECKING:
     from py_vapid import Vapid02
-
-log = logging.getLogger(__name__)
 
 MAX_ENDPOINT: Final = 1_000
 # Alarms that come within this time of each other are one notification, s.
@@ -87,6 +84,8 @@ class Push:
         self._owed: dict[str, dict[str, Alarm]] = {}
         self._sending: dict[str, asyncio.Task[None]] = {}
         self._at_once = asyncio.Semaphore(AT_ONCE)
+        known = AccountError, AdmissionError, DeviceRefused
+        self._guard = Guard("a push notification was not accepted", *known)
         self._source: Source
         self._started_s = 0.0
 
@@ -118,7 +117,7 @@ class Push:
     def start(self, source: Source) -> None:
         """Notify of critical alarms from now on."""
         self._source, self._started_s = source, time.monotonic()
-        self._task = asyncio.create_task(self._run(source), name="push")
+        self._task = asyncio.create_task(self._run(), name="push")
 
     def on_alarms(self, change: Change) -> None:
         """Queue changed alarms that are critical, and new or worse."""
@@ -145,55 +144,60 @@ class Push:
         for task in (self._task, *self._sending.values()):
             await end(task)
 
-    async def _run(self, source: Source) -> None:
+    async def _run(self) -> None:
         backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
         while True:
             await self._is_news.wait()
             await asyncio.sleep(TOGETHER_S)
             self._is_news.clear()
-            new, self._new = list(self._new.values()), {}
-            notes = source.notes.notes or ()
-            said = notes_of_alarms(source.alarms.now.alarms, notes, source.ros_time_ns)
-            new = [alarm for alarm in new if said.get(alarm.id, NOTHING_SAID).shelved is None]
-            try:
-                if new:
-                    await self._notify(new, source)
+            alarms, self._new = self._new, {}
+            error = await self._guard.run(self._notify(alarms))
+            if error is None:
                 backoff.succeeded()
-            except (AccountError, AdmissionError) as error:
-                self._failed(str(error))
-                self._new = {alarm.id: alarm for alarm in new} | self._new
+            else:
+                self.condition.failing(str(error))
+                self._new = alarms | self._new
                 self._is_news.set()
                 await asyncio.sleep(backoff.wait_s())
-            except Exception:  # nobody waits for this task
-                log.exception("push had an error and continues")
 
-    async def _notify(self, alarms: Sequence[Alarm], source: Source) -> None:
+    async def _notify(self, alarms: dict[str, Alarm]) -> None:
+        source = self._source
+        notes = source.notes.notes or ()
+        said = notes_of_alarms(source.alarms.now.alarms, notes, source.ros_time_ns)
+        wanted = {
+            name: alarm
+            for name, alarm in alarms.items()
+            if said.get(name, NOTHING_SAID).shelved is None
+        }
+        if not wanted:
+            return
         for device in await self._devices():
             endpoint = device.endpoint
-            self._owed.setdefault(endpoint, {}).update({alarm.id: alarm for alarm in alarms})
+            self._owed.setdefault(endpoint, {}).update(wanted)
             if endpoint not in self._sending:
-                self._sending[endpoint] = asyncio.create_task(self._serve(device, source))
+                self._sending[endpoint] = asyncio.create_task(self._serve(device))
         self.condition.waiting = len(self._sending)
 
     async def _devices(self) -> Sequence[Device]:
         return await self._people.write(lambda it, _: it.devices(self._site))
 
-    async def _serve(self, device: Device, source: Source) -> None:
+    async def _serve(self, device: Device) -> None:
         """Send a browser all that is due to it; no other browser waits for that."""
-        try:
-            while owed := self._owed.pop(device.endpoint, None):
-                bodies = [alarm_json(alarm) for alarm in owed.values()]
-                title, body = push_text(bodies, device.language, source.criteria, source.origin)
-                title = f"{self._site}: {title}" if self._site else title
-                await self._send(device, orjson.dumps({"title": title, "body": body}))
-        except (AccountError, AdmissionError) as error:
-            self._failed(str(error))
-        except Exception:  # nobody waits for this task
-            log.exception("push had an error and continues")
-        finally:
-            self._owed.pop(device.endpoint, None)
-            del self._sending[device.endpoint]
-            self.condition.waiting = len(self._sending)
+        error = await self._guard.run(self._send_owed(device))
+        if error is not None:
+            self.condition.failing(str(error))
+            self.condition.dropped += 1
+        self._owed.pop(device.endpoint, None)
+        del self._sending[device.endpoint]
+        self.condition.waiting = len(self._sending)
+
+    async def _send_owed(self, device: Device) -> None:
+        source = self._source
+        while owed := self._owed.pop(device.endpoint, None):
+            bodies = [alarm_json(alarm) for alarm in owed.values()]
+            title, body = push_text(bodies, device.language, source.criteria, source.origin)
+            title = f"{self._site}: {title}" if self._site else title
+            await self._send(device, orjson.dumps({"title": title, "body": body}))
 
     async def _send(self, device: Device, message: bytes) -> None:
         """Post until the push service takes it, no longer knows the device, or was tried enough."""
@@ -228,12 +232,7 @@ class Push:
         except DeviceGone:
             await self._people.write(lambda it, _: it.remove_device(device.endpoint))
         except DeviceRefused as error:
-            self._failed(f"{error} ({host})")
-            self.condition.dropped += 1
-
-    def _failed(self, why: str) -> None:
-        self.condition.failing(why)
-        log.warning("a push notification was not accepted: %s", self.condition.detail)
+            raise DeviceRefused(f"{error} ({host})") from None
 
     async def _headers(self, endpoint: Endpoint) -> dict[str, str]:
         claims = {

@@ -343,8 +343,8 @@ async def computed(
 
     """
     bridge = bridge_of(request)
-    with bridge.admission.computing(client_of(request), is_large=cost_s > SMALL_S):
-        body = await on_worker(bridge, lambda _: write(), cost_s)
+    with bridge.admission.computing(client_of(request), is_large=cost_s > SMALL_S) as times:
+        body = await on_worker(bridge, lambda _: write(), cost_s * times)
     answer = Answer(body, media_type, headers)
     bridge.cache.put(key, answer)
     return answer
@@ -365,11 +365,11 @@ async def newest_field(bridge: Bridge, client: str, field: Field, etag: str) -> 
     snapshot = newest_of(bridge)
     cost_s = len(snapshot.tags) * PLAN_TAG_S + field.write_s(len(snapshot.tags))
     with (
-        bridge.admission.computing(client, is_large=cost_s > SMALL_S),
+        bridge.admission.computing(client, is_large=cost_s > SMALL_S) as times,
         bridge.metrics.field_seconds.time(),
     ):
         answer = await on_worker(
-            bridge, lambda stop: field.plan(snapshot, etag).write(stop), cost_s
+            bridge, lambda stop: field.plan(snapshot, etag).write(stop), cost_s * times
         )
     bridge.cache.put(etag, answer)
     return answer
@@ -405,10 +405,10 @@ async def respond_past(request: Request, query: Query, kind: str) -> Response:
         tags = 0 if bridge.latest is None else len(bridge.latest.snapshot.tags)
         cost_s = query.cost_s(tags)
         with (
-            bridge.admission.computing(client_of(request), is_large=cost_s > SMALL_S),
+            bridge.admission.computing(client_of(request), is_large=cost_s > SMALL_S) as times,
             bridge.metrics.past_seconds.labels(kind).time(),
         ):
-            found = await bridge.source.ask(partial(answered, query, has), cost_s)
+            found = await bridge.source.ask(partial(answered, query, has), cost_s * times)
         if found.answer is not None:
             bridge.cache.put(found.etag, found.answer)
         return found

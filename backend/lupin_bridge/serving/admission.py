@@ -239,10 +239,12 @@ class Admission:
                 del self._exports[client]
 
     @contextmanager
-    def computing(self, client: str, *, is_large: bool = False) -> Iterator[None]:
+    def computing(self, client: str, *, is_large: bool = False) -> Iterator[int]:
         """A computation, which counts once for all clients that wait for it.
 
-        `client` was the first to request it.
+        `client` was the first to request it. Yields how many large ones the client has under way
+        with this one. It is queued as if it cost that many times as much, so that a client that
+        sends many lets those of others pass. A small one is never delayed: 1.
 
         Raises:
             BusyError: all slots are taken, or the client would take more than it leaves free.
@@ -258,7 +260,7 @@ class Admission:
         for places in taken:
             places.taken[client] += 1
         try:
-            yield
+            yield self._large.taken[client] if is_large else 1
         finally:
             for places in taken:
                 _give_back(places.taken, client)

@@ -66,7 +66,7 @@ describe('title', () => {
     reportAlarms();
     expect(document.title).toBe('sim 00:00:50 (past) · Lupin twin');
     expect(titleOf(0, null)).toBe('Lupin twin');
-    expect(titleOf(2, null, 'Recording')).toBe('(2) Recording · Lupin twin');
+    expect(titleOf(2, null, 'Recorded')).toBe('(2) Recorded · Lupin twin');
   });
 
   test('without a connection does not pass for one that has no alarms', () => {

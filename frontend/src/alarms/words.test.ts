@@ -40,7 +40,7 @@ test('what and where, of a tag and of the greenhouse', () => {
   );
   expect(alarmText(cold, F, CRITICAL)).toContain('below 50.0\u00a0°F, now 43.9\u00a0°F');
   const silent = alarm('a', { tag_id: '', reason: { kind: 'silent', sensor: '', value: null } });
-  expect(alarmText(silent, C, null)).toMatch(/^Whole greenhouse: No data from the twin/);
+  expect(alarmText(silent, C, null)).toMatch(/^Whole greenhouse: No current data from the twin/);
 });
 
 test('now, at worst and at first, each with its own severity', () => {
@@ -129,8 +129,8 @@ test('of a pest how many: now, at worst and at first', () => {
   const pest = alarm('a', { worst: 4, reason });
   const texts = { what: 'Pest seen', worst: 'peak 4', first: '2 when raised' };
   expect(valuesOf(pest, C, known(3, 'critical'))).toMatchObject({ ...texts, now: 'now 3 pests' });
-  expect(valuesOf(pest, C, known(0, 'critical')).now).toBe('now seen');
-  expect(valuesOf(pest, C, known(null, 'healthy')).now).toBe('now none seen');
+  expect(valuesOf(pest, C, known(0, 'critical')).now).toBe('still seen');
+  expect(valuesOf(pest, C, known(null, 'healthy')).now).toBe('no longer seen');
   // A derived value without a reason.
   const dry = alarm('b', { reason: { sensor: 'vpd', value: 1.7, limit: 1.3 } });
   expect(valuesOf(dry, C, known(null, 'healthy')).now).toBe('now in range');

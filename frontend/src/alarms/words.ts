@@ -74,16 +74,20 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
       : isOfRange(reason)
         ? beyondLimitText(sensor, value, reason.release ?? reason.limit, unit)
         : readingText(sensor, value, unit);
-  const nowText = (value: number): string =>
-    isPest && value > 0 ? S.pestCount(value) : text(value);
+  const nowText = (value: number | null): string => {
+    if (value === null) {
+      return isPest ? S.alarmPests.gone : S.alarmNow(S.alarmStatus.healthy);
+    }
+    if (!isPest) return S.alarmNow(text(value));
+    return value > 0 ? S.alarmNow(S.pestCount(value)) : S.alarmPests.still;
+  };
   const value = now?.kind === 'known' ? now.value : null;
   const worstText = worst === null || (isPest && worst === 0) ? null : text(worst);
-  const noneText = isPest ? S.alarmPests.none : S.alarmStatus.healthy;
   const isMeasured = isOfRange(reason) || isPest || reason.kind === 'changed';
   return {
     what: whatText({ ...alarm, reason }, speech),
     todo: todoText(reason),
-    now: now?.kind === 'known' ? S.alarmNow(value === null ? noneText : nowText(value)) : null,
+    now: now?.kind === 'known' ? nowText(now.value) : null,
     worst:
       worstText === null || (value !== null && text(value) === worstText)
         ? null

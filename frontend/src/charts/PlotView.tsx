@@ -108,6 +108,7 @@ export function LineValue({
   const value = point?.value ?? null;
   const was = beforeAt(line, at)?.value ?? null;
   const isMean = point !== null && point.n > 1;
+  const { min = null, max = null } = point ?? {};
   const reach = useApp((state) => state.twin.remembered.value?.reach);
   if (value === null && isOfDay(sensor)) {
     const known = reach ? Math.max(0, (at ?? span.to) - reach.from) : 0;
@@ -118,7 +119,10 @@ export function LineValue({
       {isMean && <span className="faint">{S.chartColumns.mean} </span>}
       <strong>{value === null ? S.noValue : readingText(sensor, value, unit)}</strong>
       {isMean && (
-        <span className="faint"> {rangeText(sensor, rangeOf([point.min, point.max]), unit)}</span>
+        <span className="faint">
+          {' '}
+          {rangeText(sensor, min === null || max === null ? null : [min, max], unit)}
+        </span>
       )}
       {line.before && (
         <span className="faint">

@@ -19,9 +19,16 @@ export const otherMoment = (compare: Compare, shownAt: number): number =>
 
 /**
  * The shown field minus the other, cell by cell, on one grid; a cell is known only if both are.
- * `valueMin` and `valueMax` cover the known cells; both are 0 without any.
+ * `valueMin` and `valueMax` cover the known cells; both are 0 without any. `then` is null if nothing
+ * was recorded yet.
  */
-export function differenceOf(shown: Field, then: Field): Field {
+export function differenceOf(shown: Field, then: Field | null): Field {
+  const { sensor, width, height, originX, originY, resolution } = shown;
+  const grid = { sensor, width, height, originX, originY, resolution };
+  if (!then || then.sampleCount === 0) {
+    const values = shown.values.map(() => NaN);
+    return { ...grid, values, valueMin: 0, valueMax: 0, sampleCount: 0 };
+  }
   for (const key of ['sensor', 'width', 'height', 'originX', 'originY', 'resolution'] as const) {
     if (shown[key] !== then[key]) {
       throw new Error(`difference: ${key} is ${shown[key]} and was ${then[key]}`);
@@ -32,9 +39,8 @@ export function differenceOf(shown: Field, then: Field): Field {
   }
   const values = shown.values.map((value, index) => value - (then.values[index] ?? NaN));
   const known = rangeOf(values);
-  const { sensor, width, height, originX, originY, resolution } = shown;
   return {
-    ...{ sensor, width, height, originX, originY, resolution },
+    ...grid,
     values,
     valueMin: known?.low ?? 0,
     valueMax: known?.high ?? 0,

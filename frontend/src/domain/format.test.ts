@@ -75,9 +75,9 @@ test('shares and lengths', () => {
   expect(metresText(-1.456)).toBe('\u22121.46');
 });
 
-test('a range has its unit once, and none is a dash', () => {
+test('a range has its unit once and never breaks; none is a dash', () => {
   const sensor = sensorNamed('temperature');
-  expect(rangeText(sensor, { low: -1, high: 30 }, 'C')).toBe('\u22121.0 – 30.0\u00a0°C');
+  expect(rangeText(sensor, [-1, 30], 'C')).toBe('\u22121.0\u00a0to\u00a030.0\u00a0°C');
   expect(rangeText(sensor, null, 'C')).toBe('–');
 });
 

@@ -1,8 +1,7 @@
 import { Refusal } from '../contract/api';
 import type { MapPoint } from '../geometry/coordinates';
 import { LOCALE, S } from '../strings';
-import type { Range } from './ramp';
-import type { Sensor } from './sensors';
+import type { Sensor, Span } from './sensors';
 
 /** The reader's decimal separator. */
 const POINT =
@@ -68,9 +67,9 @@ export function beyondLimitText(
 }
 
 /** A range with its unit; an en dash if there is none. */
-export function rangeText(sensor: Sensor, range: Range | null, unit: TemperatureUnit): string {
+export function rangeText(sensor: Sensor, range: Span | null, unit: TemperatureUnit): string {
   if (!range) return '–';
-  return `${valueText(sensor, range.low, unit)} – ${readingText(sensor, range.high, unit)}`;
+  return S.valueRange(valueText(sensor, range[0], unit), readingText(sensor, range[1], unit));
 }
 
 /** An age in at most its two largest units. */

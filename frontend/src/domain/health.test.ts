@@ -205,7 +205,7 @@ describe('a reason in words', () => {
     [
       { kind: 'silent', sensor: '', value: null, limit: null } as const,
       null,
-      'No data from the twin: its last data may be out of date',
+      'No current data from the twin',
     ],
     [
       { kind: 'stopped', sensor: '', value: null, limit: null } as const,

@@ -35,8 +35,7 @@ function reachOf(ideal: Span, critical: Span | null, isAbove: boolean): number {
 
 /** The ideal of each present species with its own ranges, and that of all others; empty: none has its own. */
 export function idealsText(sensor: Sensor, tags: readonly Tag[], unit: TemperatureUnit): string {
-  const text = ({ ideal }: Ranges): string =>
-    rangeText(sensor, ideal && { low: ideal[0], high: ideal[1] }, unit);
+  const text = ({ ideal }: Ranges): string => rangeText(sensor, ideal, unit);
   const own = [...new Set(tags.map(({ sureSpecies }) => sureSpecies.toLowerCase()))]
     .filter((species) => sensor.species.has(species))
     .sort()

@@ -38,6 +38,7 @@ export function EstimateFacts(): JSX.Element {
   const field = useApp((state) => selectShown(state).field.value);
   const isNow = useApp((state) => selectShown(state).moment === null);
   const isError = useApp((state) => state.view.heat === 'error');
+  const hasTags = useApp((state) => selectTags(state).length > 0);
   const graded = useEstimateQuery('EstimateQualities', 'quality').value?.sensors ?? {};
   const grade = Object.hasOwn(graded, sensor.name) ? (graded[sensor.name] ?? null) : null;
   if (!isMeasured(sensor)) {
@@ -50,7 +51,8 @@ export function EstimateFacts(): JSX.Element {
   const ofSensor = field?.sensor === sensor.name ? field : null;
   if (ofSensor?.noEstimate !== undefined)
     return <Missing why={ofSensor.noEstimate} grade={grade} />;
-  if (!ofSensor?.sureness) return <span role="status">{E.onItsWay}</span>;
+  // Without a tag, a notice on the map says what is missing.
+  if (!ofSensor?.sureness) return <span role="status">{hasTags && E.onItsWay}</span>;
   return (
     <>
       {!isError && (

@@ -228,7 +228,10 @@ export function selectHeat(state: AppState): Heat | null {
 /** The field whose known part is shown, possibly empty; null: none of this sensor has arrived. */
 export function selectMapped(state: AppState): Field | null {
   const heated = selectHeat(state);
-  return heated || state.view.compare ? (heated?.field ?? null) : selectField(state);
+  if (heated) return heated.field;
+  if (!state.view.compare) return selectField(state);
+  const field = state.twin.difference.value?.field;
+  return field?.sensor === state.view.sensor ? field : null;
 }
 
 const filtered = memoLast(

@@ -1,12 +1,16 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
-import { readings, wireTag } from '../testing/tags';
+import { snapshotOf } from '../domain/twin';
+import { timelineOf } from '../domain/timeline';
+import { readings, stateFrame, wireTag } from '../testing/tags';
 import { npy, npyEstimate, npyField } from '../testing/field';
+import { wireStretch, wireTimeline } from '../testing/timeline';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { act, receive, store } from './app';
-import { selectHeat } from './derived';
+import { selectHeat, selectMapped } from './derived';
 import { startDifference } from './difference';
-import { withPast } from './twin';
+import { ready } from './fetcher';
+import { NO_HOUSE, withPast } from './twin';
 
 let requests: URLSearchParams[] = [];
 /** The bridge's data of the shown moment, and of the one before. */
@@ -69,12 +73,23 @@ test('both fields are fetched on one box, and their difference is the heat map',
   expect(heat?.difference?.against).toBe(500);
 });
 
-test('without data of then, there is no heat map, and the legend says so', async () => {
+test('without data of then there is no heat map, and all of the map is marked as unknown', async () => {
   known.samplesThen = 0;
   act({ compare: { by: 'moment', at: 500 } });
   await settled();
-  expect(store.get().twin.difference).toMatchObject({ state: 'ready', value: { field: null } });
+  expect(store.get().twin.difference.state).toBe('ready');
   expect(selectHeat(store.get())).toBeNull();
+  expect([...(selectMapped(store.get())?.values ?? [])]).toEqual([NaN, NaN]);
+});
+
+test('a moment without a tag has nothing to compare, instead of a difference on its way', async () => {
+  act({ moment: 50 });
+  const empty = snapshotOf(stateFrame([]), 0, null);
+  receive(withPast({ at: 50, house: { ...NO_HOUSE, snapshot: empty } }));
+  act({ compare: { by: 'moment', at: 500 } });
+  await settled();
+  expect(requests).toEqual([]);
+  expect(store.get().twin.difference.value).toEqual({ field: null, at: 50, against: 50 });
 });
 
 test('while the twin is silent, the shown state keeps its own time', async () => {
@@ -91,11 +106,16 @@ test('while the twin is silent, the shown state keeps its own time', async () =>
   clock.mockRestore();
 });
 
-test('before ROS time 0 nothing is fetched', async () => {
-  act({ compare: { by: 'ago', seconds: 1e12 } });
+test.each([
+  ['ROS time 0', { by: 'ago', seconds: 1e12 }],
+  ['all recorded data', { by: 'moment', at: 49 }],
+] as const)('before %s nothing is fetched', async (_, compare) => {
+  const value = timelineOf(wireTimeline({ from: 0, to: 90, reach: wireStretch(50, 90) }), 90);
+  receive({ remembered: ready(value) });
+  act({ compare });
   await settled();
-  expect(requests).toHaveLength(1);
-  expect(store.get().twin.difference.value?.field).toBeNull();
+  expect(requests.map((query) => query.get('at'))).toEqual([null]);
+  expect(selectMapped(store.get())?.sampleCount).toBe(0);
 });
 
 test('no difference of one sensor is shown as that of another, nor after it ends', async () => {

@@ -9,7 +9,7 @@ import type { Bounds } from '../geometry/coordinates';
 import { keepFetched, receive, type AppState } from './app';
 import { sourceOf } from './derived';
 import { boxOfPins, fetchHeat, fieldResolution } from './heat';
-import { isReceivingNow, rosNow, selectLatest, selectShown } from './moment';
+import { isBeforeAll, isReceivingNow, rosNow, selectLatest, selectShown } from './moment';
 import { DRAG_PACE_MS, failed, NOTHING, ready, type FetchTask } from './fetcher';
 import { type Difference } from './twin';
 
@@ -56,7 +56,7 @@ function taskFor(state: AppState, compare: Compare): FetchTask<Difference> | und
   const nowS = rosNow(state, isReceivingNow(state) ? now() : -Infinity);
   const resolution = fieldResolution(selectLatest(state).snapshot);
   const box = boxOf(snapshot, resolution);
-  if (!snapshot || !box || nowS === null || socket.kind !== 'open') return undefined;
+  if (!snapshot || nowS === null || socket.kind !== 'open') return undefined;
   const { sensor } = state.view;
   const source = sourceOf(state);
   const at = moment ?? Math.floor(nowS / STEP_S) * STEP_S;
@@ -64,16 +64,14 @@ function taskFor(state: AppState, compare: Compare): FetchTask<Difference> | und
   const what = [epoch, sensor, source, moment ?? snapshot.revision, against, box];
   return {
     key: JSON.stringify(what),
-    run: (signal) => {
+    run: async (signal) => {
+      if (!box) return { field: null, at, against: at };
       const query = { sensor, resolution, box };
-      return Promise.all([
+      const [shown, then] = await Promise.all([
         fetchHeat(source, moment === null ? query : { ...query, at: moment }, signal),
-        against < 0 ? null : fetchHeat(source, { ...query, at: against }, signal),
-      ]).then(([shown, then]) => ({
-        field: then && then.sampleCount > 0 ? differenceOf(shown, then) : null,
-        at,
-        against,
-      }));
+        isBeforeAll(state, against) ? null : fetchHeat(source, { ...query, at: against }, signal),
+      ]);
+      return { field: differenceOf(shown, then), at, against };
     },
   };
 }

@@ -29,14 +29,17 @@ export function shownAt(twin: TwinState, moment: number | null): Shown {
   return shownThen(house, twin.latest.map, at);
 }
 
-const CLOCKS_LOST = new Set<unknown>(['no_clock', 'clock_stopped', 'clock_doubted']);
+type ClockFault = keyof typeof S.clockTodo;
+
+const isClockFault = (reason: unknown): reason is ClockFault =>
+  typeof reason === 'string' && Object.hasOwn(S.clockTodo, reason);
 
 type Clock = 'running' | 'paused' | 'unknown';
 
 /** How the latest state ages, as far as known. */
 function clockOf({ isTimeLost, connection, phase }: TwinState): Clock {
   const reason = connection.status?.reason;
-  if (isTimeLost || CLOCKS_LOST.has(reason)) return 'unknown';
+  if (isTimeLost || isClockFault(reason)) return 'unknown';
   if (reason !== 'paused') return 'running';
   // Without a connection, the end of a pause would go unnoticed.
   return phase === 'live' ? 'paused' : 'unknown';
@@ -65,6 +68,16 @@ export const selectShown = ({ twin, view }: AppState): Shown => shownAt(twin, vi
 
 /** Whether the current time is known, whatever is shown. */
 export const selectHasTime = ({ twin }: AppState): boolean => clockOf(twin) !== 'unknown';
+
+/** Why the twin has no valid time, although its data arrives; null: it has one, or is silent. */
+export function selectClockFault({ twin: { phase, connection } }: AppState): ClockFault | null {
+  const reason = connection.status?.reason;
+  return phase === 'offline' && isClockFault(reason) ? reason : null;
+}
+
+/** The connection in a word. */
+export const phaseWord = (state: AppState): string =>
+  S.phase[selectClockFault(state) ? 'noTime' : state.twin.phase];
 
 export const selectIsPaused = ({ twin }: AppState): boolean =>
   twin.connection.status?.reason === 'paused';
@@ -161,15 +174,19 @@ export function barSpan(state: AppState, nowS: number): Span {
   return { from, to: Math.max(to, from + 1) };
 }
 
+/** Whether it is known that nothing was recorded yet at that moment, ROS seconds. */
+export const isBeforeAll = ({ twin }: AppState, at: number): boolean =>
+  at < (twin.remembered.value?.reach?.from ?? 0);
+
 /** The twin's current time, ROS seconds; null: not known. */
 export const twinNow = (): number | null => rosNow(store.get(), now());
 
 /** Label of the bar's end: in a recording, or while nothing arrives, it is not "now". */
 export const latestWord = (): string => {
-  const { phase } = store.get().twin;
-  if (phase !== 'live') return S.phase[phase];
-  if (selectIsPaused(store.get())) return S.recordedIs.paused;
-  return selectIsRecorded(store.get()) ? S.origin.recorded : S.timebarLive;
+  const state = store.get();
+  if (state.twin.phase !== 'live') return phaseWord(state);
+  if (selectIsPaused(state)) return S.recordedIs.paused;
+  return selectIsRecorded(state) ? S.origin.recorded : S.timebarLive;
 };
 
 export function backToLive(): void {

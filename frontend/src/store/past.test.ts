@@ -4,7 +4,10 @@ import { npyEstimate, npyField } from '../testing/field';
 import { goLive, goLost, showTags } from '../testing/page';
 import { judgement, reason } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
+import { wireStretch, wireTimeline } from '../testing/timeline';
+import { timelineOf } from '../domain/timeline';
 import { act, receive, store } from './app';
+import { ready } from './fetcher';
 import { withConnection, withPast } from './twin';
 import { selectHealth, selectMapped } from './derived';
 import { selectAwaited, selectShown } from './moment';
@@ -258,4 +261,12 @@ test('an estimate that is chosen goes the same way: with its state, the newest f
   await pass(2_000);
   // The error of the nearest readings is not needed.
   expect(requests.some(({ path }) => path.endsWith('field/quality'))).toBe(false);
+  // Before all data there is none to ask for.
+  const value = timelineOf(wireTimeline({ from: 0, to: 90, reach: wireStretch(9, 90) }), 90);
+  receive({ remembered: ready(value) });
+  requests = [];
+  go(8);
+  await pass(100);
+  expect(requests.map(({ path }) => path)).toContain('/api/field.npy');
+  expect(requests.map(({ path }) => path)).not.toContain('/api/estimate.npy');
 });

@@ -7,7 +7,7 @@ import { snapshotOf } from '../domain/twin';
 import { type AppState, keepFetched, receive, store } from './app';
 import { sourceOf } from './derived';
 import { fetchHeat, fieldResolution } from './heat';
-import { selectLatest, selectPast } from './moment';
+import { isBeforeAll, selectLatest, selectPast } from './moment';
 import { DRAG_PACE_MS, failed, type Fetched, NOTHING, ready, type FetchTask } from './fetcher';
 import { NO_HOUSE, type Past, withPast } from './twin';
 
@@ -104,7 +104,8 @@ function qualityTask(state: AppState): FetchTask<FieldQuality> | null {
 
 function taskFor(state: AppState, at: number, epoch: number): FetchTask<Past> {
   const { sensor } = state.view;
-  const source = sourceOf(state);
+  // Before all data the server would refuse an estimate.
+  const source = isBeforeAll(state, at) ? 'nearest' : sourceOf(state);
   const resolution = fieldResolution(selectLatest(state).snapshot);
   return {
     key: `${epoch}|${at}|${sensor}|${resolution}|${source}`,

@@ -53,7 +53,7 @@ interface PastFault {
 }
 
 export interface Difference {
-  /** Null: nothing is known of the other moment. */
+  /** Null: no tag had a position at the shown moment, which is then also `against`. */
   readonly field: Field | null;
   /** The moment that was shown, and the other one, ROS seconds. */
   readonly at: number;

@@ -79,11 +79,11 @@ test('a day of the greenhouse that is a short one is told', () => {
 
 test('a recording is never live: header, badge, frame and the way back say so, and of when', () => {
   shows('recorded');
-  expect(screen.getByTestId('origin').textContent).toMatch(/^Recording.*nothing here is current/);
+  expect(screen.getByTestId('origin').textContent).toMatch(/^Recorded.*nothing here is current/);
   expect(screen.getByTestId('origin').querySelector('strong')?.textContent).toMatch(/^sim 00:01:/);
   expect(badge().textContent).toBe('Connection: Playing');
   expect(badge().dataset['ofNow']).toBe('false');
-  expect(screen.getByTestId('recorded-frame').textContent).toMatch(/^Recording: sim 00:01:/);
+  expect(screen.getByTestId('recorded-frame').textContent).toMatch(/^Recorded: sim 00:01:/);
   expect(screen.getByRole('button').textContent).toBe('Back to the recording');
   shows('recorded', 'paused');
   expect(badge().textContent).toBe('Connection: Paused');

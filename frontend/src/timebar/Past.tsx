@@ -98,16 +98,7 @@ export function PastFrame(): JSX.Element | null {
   if (moment === null && isRecorded) {
     return (
       <div className="past-frame recorded" data-testid="recorded-frame" aria-hidden="true">
-        <span>
-          {time === null ? (
-            S.origin.recorded
-          ) : (
-            <>
-              <span className="past-word-short">{S.origin.recorded}: </span>
-              {time}
-            </>
-          )}
-        </span>
+        <span>{time === null ? S.origin.recorded : `${S.origin.recorded}: ${time}`}</span>
       </div>
     );
   }

@@ -82,6 +82,10 @@ test('the end of the bar is not live while the page is not', () => {
     goLive(status({ twin: 'offline', reason: 'stale' }));
   });
   expect(said()).toEqual(['Twin offline', 'Twin offline']);
+  flush(() => {
+    goLive(status({ twin: 'offline', reason: 'clock_stopped' }));
+  });
+  expect(said()).toEqual(['Time unknown', 'Time unknown']);
   flush(goLost);
   expect(said()).toEqual(['Reconnecting', 'Reconnecting']);
 });

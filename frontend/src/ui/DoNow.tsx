@@ -21,7 +21,13 @@ import { act, store, useApp } from '../store/app';
 import { withList, withTag } from '../store/view';
 import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
-import { rosNow, selectHasSnapshot, selectShown, selectTags } from '../store/moment';
+import {
+  rosNow,
+  selectClockFault,
+  selectHasSnapshot,
+  selectShown,
+  selectTags,
+} from '../store/moment';
 import { S } from '../strings';
 import { HealthMark } from './HealthMark';
 import { selectAreAlarmsKnown, useReasonText } from './Reasons';
@@ -233,13 +239,19 @@ export function Overall({
   const isNow = useApp((state) => selectShown(state).moment === null);
   const active = useSelected(alarmList, (list) => list.active.length);
   const shelved = useSelected(alarmList, (list) => list.shelved.length);
-  const text = own ? reason : overallText(health, isNow ? active + shelved : 0);
+  // What to do about a clock's fault is in the banner.
+  const lacksTime = useApp(selectClockFault) !== null && isSilent(health);
+  const text = lacksTime
+    ? S.healthNoTime
+    : own
+      ? reason
+      : overallText(health, isNow ? active + shelved : 0);
   const hasSnapshot = useApp(selectHasSnapshot);
   if (text === null || !hasSnapshot) return null;
   return (
     <p className="do-why" data-testid={id} title={text}>
       {text}
-      {own && <strong> {todoText(own)}</strong>}
+      {own && !lacksTime && <strong> {todoText(own)}</strong>}
     </p>
   );
 }

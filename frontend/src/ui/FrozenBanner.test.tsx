@@ -3,12 +3,13 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { epochOf } from '../clock';
 import { clockText } from '../domain/format';
+import { dateText } from '../domain/time';
 import { act, receive, store } from '../store/app';
 import { NO_HOUSE, withPast } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import { ConnectionBadge } from './Header';
-import { FrozenBanner } from './Troubles';
+import { FrozenBanner, Troubles } from './Troubles';
 
 // The last frame's time is read from two clocks, which would advance between the reads.
 beforeEach(() => {
@@ -50,14 +51,33 @@ test.each([
   else expect(details).toBeNull();
 });
 
-test.each(['no_clock', 'clock_stopped', 'clock_doubted'] as const)(
-  'data without a time of their own are not dated: %s',
-  (reason) => {
+test.each([
+  ['no_clock', 'Start the simulation or the recording.', /age of the readings is unknown/],
+  ['clock_stopped', 'Check the simulation or the recording.', /age of the readings is unknown/],
+  ['clock_doubted', 'Set the twin’s clock.', /ages are unknown and recording waits/],
+] as const)(
+  'data without a valid time are not dated, and what to do comes first: %s',
+  (reason, todo, why) => {
     showTags([wireTag()]);
-    goLive(status({ twin: 'offline', reason }));
-    render(<FrozenBanner />);
-    expect(text()).toMatch(/^The twin.+age of the readings is unknown/);
-    expect(text()).not.toMatch(/Last data|ago/);
+    const detail = 'the clock contradicts the journal, written until 2026-11-30T18:45:24Z';
+    const journal = { ...status().journal, detail };
+    goLive(status({ twin: 'offline', reason, journal }));
+    render(
+      <>
+        <FrozenBanner />
+        <Troubles />
+        <ConnectionBadge />
+      </>,
+    );
+    expect(screen.getByRole('alert').querySelector('strong')?.textContent.trim()).toBe(todo);
+    expect(text()).toMatch(why);
+    expect(text()).not.toMatch(/Last data|ago|18:45:24Z/);
+    expect(screen.getByTestId('troubles').textContent).toBe('');
+    // Data arrives: the twin is not offline.
+    expect(screen.getByTestId('connection').textContent).toBe('Connection: Time unknown');
+    const more = document.querySelector('details.more')?.textContent;
+    const until = dateText(Date.UTC(2026, 10, 30, 18, 45, 24));
+    expect(more).toContain(reason === 'clock_doubted' ? `until ${until}.` : '/clock');
   },
 );
 
@@ -93,7 +113,7 @@ test('behind a look back: live data have stopped, and what is shown stays', () =
   expect(text()).toContain('Live data has stopped.');
   expect(text()).toContain('The past shown is not affected.');
   expect(text()).not.toContain('frozen');
-  expect(screen.getByTestId('connection').textContent).toContain('Past · reconnecting');
+  expect(screen.getByTestId('connection').textContent).toContain('Past · Reconnecting');
 });
 
 test('nothing says “Live” while another moment is shown', () => {

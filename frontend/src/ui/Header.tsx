@@ -3,6 +3,7 @@ import type { JSX, ReactNode } from 'react';
 import { rosText, secondsOf } from '../domain/time';
 import { useApp, type AppState } from '../store/app';
 import {
+  phaseWord,
   selectHasOwnTime,
   selectIsPaused,
   selectIsRecorded,
@@ -48,10 +49,11 @@ export function ConnectionBadge(): JSX.Element {
   const isRecorded = useApp(selectIsRecorded);
   const isPaused = useApp(selectIsPaused);
   const isOfNow = !useApp(selectHasOwnTime) && !isPaused;
-  const word =
-    (isRecorded || isPaused) && phase === 'live' && !isPast
-      ? S.recordedIs[isPaused ? 'paused' : 'playing']
-      : (isPast ? S.phasePast : S.phase)[phase];
+  const current = useApp(phaseWord);
+  const isLive = phase === 'live';
+  const isOwn = (isRecorded || isPaused) && isLive;
+  const past = isLive ? S.past : `${S.past} · ${current}`;
+  const word = isPast ? past : isOwn ? S.recordedIs[isPaused ? 'paused' : 'playing'] : current;
   return (
     <div
       className="connection"
@@ -63,9 +65,7 @@ export function ConnectionBadge(): JSX.Element {
     >
       <span className="unseen">{S.phaseLabel}: </span>
       <svg viewBox="0 0 16 16" width="14" height="14" aria-hidden="true">
-        {phase === 'live' && !isPast && (
-          <circle cx="8" cy="8" r="6" className={isOfNow ? 'solid' : 'ring'} />
-        )}
+        {isLive && !isPast && <circle cx="8" cy="8" r="6" className={isOfNow ? 'solid' : 'ring'} />}
         {(phase === 'connecting' || phase === 'reconnecting') && (
           <circle cx="8" cy="8" r="6" className="ring turning" />
         )}

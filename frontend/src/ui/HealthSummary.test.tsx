@@ -8,7 +8,7 @@ import { act as look, receive, store } from '../store/app';
 import { NO_HOUSE, withPast } from '../store/twin';
 import { alarm, alarms, reportAlarms } from '../testing/alarms';
 import { held, judgement, reason } from '../testing/health';
-import { goLost, nextStamp, showTags } from '../testing/page';
+import { goLive, goLost, nextStamp, showTags, status } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { AttentionList } from './AttentionList';
 import { HealthStrip } from './DoNow';
@@ -146,7 +146,7 @@ test('of a robot that stands still what is critical is told first', () => {
 });
 
 test('a value that is too old says its age, and an attempt that of the last one', () => {
-  const at = nextStamp() - 2_400;
+  const at = nextStamp() - 2_410;
   const cold = wireTag({ tag_id: '5', readings: readings({ temperature: 6.6 }, at) });
   const old = { kind: 'old', verdict: 'unknown', sensor: '', value: null } as const;
   const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
@@ -269,10 +269,18 @@ test('a silent greenhouse is unknown, whatever its last verdict', () => {
   goLost();
   render(<HealthSummary kiosk={false} />);
   expect(house().dataset['health']).toBe('unknown');
-  expect(driver().textContent).toMatch(/^No data from the twin.* Check the twin, the server/);
+  expect(driver().textContent).toMatch(/^No current data .* Check the twin, the server/);
   // "Not current" is not "unknown": the tags' last statuses still count.
   expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Not current');
   expect(screen.getByRole('button', { name: /^2 Healthy/ })).toBeTruthy();
+});
+
+test('a twin without a valid time is not silent: nothing is assessed, and the banner says what to do', () => {
+  showTags(TAGS, judgement({ 1: 'unknown', 5: 'unknown' }));
+  goLive(status({ twin: 'offline', reason: 'clock_doubted' }));
+  render(<HealthSummary kiosk={false} />);
+  expect(screen.getByRole('heading').textContent).toBe('Greenhouse status: Unknown');
+  expect(driver().textContent).toBe('Not assessed while the time is unknown');
 });
 
 test('what had to be done stays when the twin is not heard any more; of when, the banner says', () => {
@@ -282,7 +290,7 @@ test('what had to be done stays when the twin is not heard any more; of when, th
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
     expect.stringMatching(/^CriticalTag 5: .*Heat, or close the vents $/),
-    expect.stringMatching(/^No data from the twin/),
+    expect.stringMatching(/^No current data from the twin/),
   ]);
 });
 

@@ -6,7 +6,7 @@ import { ageSeconds } from '../domain/time';
 import { whenOf } from '../domain/twin';
 import { act, useApp } from '../store/app';
 import { selectHealth } from '../store/derived';
-import { selectHasSnapshot, selectShown } from '../store/moment';
+import { selectClockFault, selectHasSnapshot, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
 import { DoNow, Overall, ShelvedCount } from './DoNow';
@@ -18,6 +18,7 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
   const filter = useApp((state) => state.view.health);
   const hasSnapshot = useApp(selectHasSnapshot);
   const count = health.counts[health.verdict];
+  const isLast = useApp(selectClockFault) === null && isSilent(health);
   return (
     <section
       className="health"
@@ -29,10 +30,7 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
         <h2 title={dayText(health)}>
           <span className="unseen">{S.healthHeading}: </span>
           {hasSnapshot && (
-            <HealthMark
-              verdict={health.verdict}
-              text={isSilent(health) ? S.healthNotCurrent : undefined}
-            />
+            <HealthMark verdict={health.verdict} text={isLast ? S.healthNotCurrent : undefined} />
           )}
           {hasSnapshot && isBad(health.verdict) && count > 0 && !isSilent(health) && (
             <span> {S.shownOf(count, count)}</span>

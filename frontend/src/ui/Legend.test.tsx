@@ -74,7 +74,7 @@ describe('legend', () => {
   });
 
   test.each([
-    [12, 30, '18.0 to 26.0'],
+    [12, 30, '18.0\u00a0to\u00a026.0'],
     [18, 30, 'below 26.0'],
     [12, 26, 'above 18.0'],
     [18, 26, ''],
@@ -117,7 +117,9 @@ describe('legend', () => {
       'night-time ideal per species ',
       'too high above ideal',
     ]);
-    expect(at('ideal-species')).toBe('tulip 8.0 – 18.0\u00a0°C; others 15.0 – 24.0\u00a0°C');
+    expect(at('ideal-species')).toBe(
+      'tulip 8.0\u00a0to\u00a018.0\u00a0°C; others 15.0\u00a0to\u00a024.0\u00a0°C',
+    );
     flush(() => {
       showTags(
         [wireTag({ ...species, species: 'Fern' })],
@@ -126,7 +128,7 @@ describe('legend', () => {
     });
     expect(parts()).toEqual([
       'too low below 15.0',
-      'night-time ideal 15.0 – 24.0\u00a0°C',
+      'night-time ideal 15.0\u00a0to\u00a024.0\u00a0°C',
       'too high above 24.0\u00a0°C',
     ]);
     fireEvent.click(screen.getByRole('radio', { name: 'Value' }));
@@ -153,6 +155,8 @@ describe('legend', () => {
     expect(screen.queryByRole('radio')).toBeNull();
     fireEvent.click(screen.getByRole('button', { name: 'Stop comparing' }));
     expect(screen.getByTestId('range-low')).toBeTruthy();
+    // The button is gone; its focus must not be.
+    expect(document.activeElement).toBe(screen.getByTestId('heat-legend'));
   });
 
   test('a fixed range stays while the data change, and can be typed', () => {

@@ -3,6 +3,7 @@ import type { CSSProperties, JSX } from 'react';
 import type { FieldQuality } from '../contract/types';
 import {
   differenceNumber,
+  rangeText,
   readingText,
   unitOf,
   valueText,
@@ -179,7 +180,7 @@ function idealNote(
   const [low, high] = [valueText(sensor, ideal[0], unit), valueText(sensor, ideal[1], unit)];
   const isHigh = ends[1] === readingText(sensor, ideal[1], unit);
   if (ends[0] === low) return isHigh ? part : `${part} ${S.legendBelow(high)}`;
-  return isHigh ? `${part} ${S.legendAbove(low)}` : S.legendIdeal(part, low, high);
+  return isHigh ? `${part} ${S.legendAbove(low)}` : `${part} ${S.valueRange(low, high)}`;
 }
 
 /** The heat map's colours, from the lowest to the highest value. */
@@ -252,7 +253,11 @@ function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
   return (
     <div className="ideal-scale" data-testid="ideal-scale" title={species}>
       {step('low', S.tooLow(null), low ? S.legendBelow(low) : S.below)}
-      {step('right', species === '' ? part : S.legendEach(part), low && high && `${low} – ${high}`)}
+      {step(
+        'right',
+        species === '' ? part : S.legendEach(part),
+        species === '' && ideal && rangeText(sensor, ideal, unit),
+      )}
       {step('high', S.tooHigh(null), high ? S.legendAbove(high) : S.above)}
     </div>
   );

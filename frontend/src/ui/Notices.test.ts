@@ -35,12 +35,15 @@ describe('the most basic problem is shown first', () => {
     expect(id()).toBe('no-tags');
     // No hint that is untrue without a connection; the banner reports the loss.
     expect(noticeFor(store.get())?.hint).not.toContain('running');
-    goLive(status({ twin: 'offline', reason: 'no_clock' }));
+    goLive(status({ twin: 'offline', reason: 'stale' }));
     expect(noticeFor(store.get())).toMatchObject({
       id: 'no-twin',
       title: 'No tags yet',
-      hint: expect.stringContaining('has no time yet') as string,
+      hint: expect.stringContaining('has stopped sending') as string,
     });
+    // Its data still arrives; the banner says what its clock lacks.
+    goLive(status({ twin: 'offline', reason: 'no_clock' }));
+    expect(id()).toBe('no-tags');
   });
 
   test('no pins', () => {

@@ -5,7 +5,7 @@ import { shown } from '../domain/text';
 import type { Snapshot } from '../domain/twin';
 import { useApp, type AppState } from '../store/app';
 import { selectSensor } from '../store/derived';
-import { selectShown, selectTags } from '../store/moment';
+import { selectClockFault, selectIsDisconnected, selectShown, selectTags } from '../store/moment';
 import { S } from '../strings';
 import { More } from '../widgets/controls';
 import { offlineMore, offlineReason } from './Troubles';
@@ -23,6 +23,8 @@ interface Notice {
 /** What is missing, and what to do about it; only the most basic problem. */
 export function noticeFor(state: AppState): Notice | null {
   const { phase, connection } = state.twin;
+  // Of a clock's fault, the banner says all.
+  const isOffline = phase === 'offline' && !selectClockFault(state);
   const { snapshot, field, map, moment } = selectShown(state);
   const offline = {
     id: 'no-twin',
@@ -35,20 +37,20 @@ export function noticeFor(state: AppState): Notice | null {
     return pastNotice(state, moment, snapshot);
   }
   if (!snapshot) {
-    if (phase === 'offline') return offline;
-    return phase === 'connecting'
-      ? { id: 'connecting', title: S.emptyConnecting, hint: S.emptyConnectingHint, large: true }
-      : {
+    if (isOffline) return offline;
+    return selectIsDisconnected(state)
+      ? {
           id: 'unreachable',
           title: S.emptyUnreachable,
           hint: S.emptyUnreachableHint,
           more: S.emptyUnreachableMore,
           large: true,
-        };
+        }
+      : { id: 'connecting', title: S.emptyConnecting, hint: S.emptyConnectingHint, large: true };
   }
   if (snapshot.tags.length === 0) {
     // The twin was received before: report its fault, not that there is none.
-    if (phase === 'offline') return { ...offline, title: S.emptyNoTags };
+    if (isOffline) return { ...offline, title: S.emptyNoTags };
     return {
       id: 'no-tags',
       title: S.emptyNoTags,

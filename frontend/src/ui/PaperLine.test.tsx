@@ -36,5 +36,5 @@ test('paper has the time of the data and of printing', () => {
     goLive(status({ origin: 'recorded' }));
   });
   // The recording's own time, not when it was played.
-  expect(line()).toMatch(/^As of sim \d\d:\d\d:\d\d \(Recording\), printed 1 May 2026, 14:04:27/);
+  expect(line()).toMatch(/^As of sim \d\d:\d\d:\d\d \(Recorded\), printed 1 May 2026, 14:04:27/);
 });

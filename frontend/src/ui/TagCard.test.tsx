@@ -74,7 +74,7 @@ describe('card', () => {
     const unsure = { species: 'Tulip', species_confidence: 0.49 };
     showTags([wireTag({ tag_id: '7', ...unsure, readings: readings({ temperature: 9 }) })]);
     render(<TagCard tagId="7" />);
-    expect(document.querySelector('.card-ideal')?.textContent).toContain('18.0 to 26.0');
+    expect(document.querySelector('.card-ideal')?.textContent).toContain('18.0\u00a0to\u00a026.0');
     expect(screen.getByRole('complementary').textContent).toContain(
       'tulip 49\u00a0% certain (uncertain)',
     );
@@ -93,11 +93,14 @@ describe('card', () => {
       [...document.querySelectorAll('.card-ideal')].map(({ textContent }) => textContent);
     showTags(tags, judgement({ 7: 'healthy' }));
     const { unmount } = render(<TagCard tagId="7" />);
-    expect(ideals()).toEqual(['daytime ideal 12.0 to 20.0 °C', 'ideal 25.0 to 60.0 %']);
+    expect(ideals()).toEqual([
+      'daytime ideal 12.0\u00a0to\u00a020.0\u00a0°C',
+      'ideal 25.0\u00a0to\u00a060.0\u00a0%',
+    ]);
     unmount();
     showTags(tags, judgement({ 7: 'healthy' }, { is_day: false, source: 'light' }));
     render(<TagCard tagId="7" />);
-    expect(ideals()[0]).toBe('night-time ideal 8.0 to 18.0 °C');
+    expect(ideals()[0]).toBe('night-time ideal 8.0\u00a0to\u00a018.0\u00a0°C');
   });
 
   test('a value that reads like its limit says on which side of it it is', () => {
@@ -177,7 +180,7 @@ describe('card', () => {
         stale_seconds: 2,
         looked_at: { sec: 0, nanosec: 0 },
         readings: [
-          ...readings({ temperature: 20 }, nextStamp() - 7_200),
+          ...readings({ temperature: 20 }, nextStamp() - 7_210),
           { name: 'co2', value: 20, observed_at: null },
         ],
       }),
@@ -195,7 +198,7 @@ describe('card', () => {
     const now = { sec: 5_000, nanosec: 0 };
     const failing = wireTag({
       tag_id: '7',
-      last_try: { sec: 4_820, nanosec: 0 },
+      last_try: { sec: 4_810, nanosec: 0 },
       last_try_status: 2,
       last_try_detail: 'no tag in the picture',
     });

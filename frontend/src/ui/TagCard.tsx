@@ -7,9 +7,8 @@ import {
   farOffText,
   metresText,
   percentText,
+  rangeText,
   readingText,
-  unitOf,
-  valueText,
   type TemperatureUnit,
 } from '../domain/format';
 import { isBack, isBad, rangeReason, sideOf, attemptOutcome } from '../domain/health';
@@ -239,12 +238,7 @@ function CardReading({
       {ideal && (
         <span className="card-ideal" data-side={side || undefined} data-health={out?.verdict}>
           {side && `${S.side[side]}, `}
-          {S.healthIdeal(
-            S.idealParts[sensor.part ?? 'any'],
-            valueText(sensor, ideal[0], unit),
-            valueText(sensor, ideal[1], unit),
-            unitOf(sensor, unit),
-          )}
+          {`${S.idealParts[sensor.part ?? 'any']} ${rangeText(sensor, ideal, unit)}`}
         </span>
       )}
     </li>

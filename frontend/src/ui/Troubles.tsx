@@ -8,7 +8,7 @@ import { rosText } from '../domain/time';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { retryConnection } from '../store/live';
-import { selectHasTime, selectLatest, selectShown } from '../store/moment';
+import { selectClockFault, selectLatest, selectShown } from '../store/moment';
 import type { TwinState } from '../store/twin';
 import { LANGUAGE_TROUBLE, S } from '../strings';
 import { More } from '../widgets/controls';
@@ -115,8 +115,11 @@ function notificationTroubles(channels: readonly Outward[]): readonly Trouble[] 
     }));
 }
 
+const UTC = /[\d-]{10}T[\d:]{8}Z/g;
+
+/** A text of the twin's as a sentence, its times in the page's own form. */
 function sentence(text: string, most = 240): string {
-  const said = shown(text, most);
+  const said = shown(text, most).replace(UTC, (time) => rosText(Date.parse(time) / 1000));
   return said && `${said.charAt(0).toUpperCase()}${said.slice(1)}.`;
 }
 
@@ -145,7 +148,11 @@ export function offlineReason(status: StatusFrame | null): string {
 
 /** The same for whoever maintains the system; empty: nothing to add. */
 export const offlineMore = (status: StatusFrame | null): string =>
-  status ? S.offlineMore[status.reason] : '';
+  status?.reason === 'clock_doubted'
+    ? sentence(status.journal.detail, MAX_PROBLEM)
+    : status
+      ? S.offlineMore[status.reason]
+      : '';
 
 /** Banner across the page while it is not live. */
 export function FrozenBanner(): JSX.Element | null {
@@ -154,8 +161,8 @@ export function FrozenBanner(): JSX.Element | null {
   const isTimeLost = useApp((state) => state.twin.isTimeLost);
   const connection = useApp((state) => state.twin.connection);
   const isPast = useApp((state) => selectShown(state).moment !== null);
-  // Data may still arrive from a twin without a clock.
-  const isDated = useApp(selectHasTime) || isTimeLost || phase !== 'offline';
+  const fault = useApp(selectClockFault);
+  const isDated = fault === null;
   const now = useNow();
   if (phase === 'live' || takenAt === undefined) return null;
   return (
@@ -171,7 +178,10 @@ export function FrozenBanner(): JSX.Element | null {
           {S.agoSuffix(ageText(Math.max(0, now - takenAt) / 1000))}
         </span>
       )}
-      <span>{phase === 'offline' ? offlineReason(connection.status) : S.frozenWhy[phase]}</span>
+      <span>
+        {fault && <strong>{S.clockTodo[fault]} </strong>}
+        {phase === 'offline' ? offlineReason(connection.status) : S.frozenWhy[phase]}
+      </span>
       {phase === 'offline' && <More label={S.more} text={offlineMore(connection.status)} />}
       {isPast && <span>{S.frozenPastStays}</span>}
       {phase === 'reconnecting' && (

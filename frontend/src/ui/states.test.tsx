@@ -75,7 +75,7 @@ const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
       pest: /^\d+ pests? seen$/,
       old: /[Nn]ot scanned|[Nn]o scan|no reading/,
       changed: /changed/,
-      silent: /No data from the twin/,
+      silent: /No current data from the twin/,
       stopped: /^No tag is being scanned/,
     },
     alarms: { range: /(below|above) \d/, pest: /^Pest seen, now \d+ pests? \(critical\)$/ },
@@ -106,7 +106,7 @@ const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
       pest: /^\d+ Schädlinge? festgestellt$/,
       old: /gemessen|kein Messwert|[Kk]eine Messung/,
       changed: /verändert/,
-      silent: /Keine Daten vom digitalen Zwilling/,
+      silent: /Keine aktuellen Daten vom digitalen Zwilling/,
       stopped: /nichts mehr gemessen/,
     },
     alarms: {

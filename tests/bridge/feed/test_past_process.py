@@ -149,6 +149,33 @@ async def test_an_export_goes_on_in_a_restarted_process(
         assert (found, past.starts) == ([1_000, 1_000, 500], 2)
 
 
+async def test_a_process_that_does_not_react_is_replaced_and_one_that_is_busy_is_not(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(past_process, "REST_S", 0.0)
+    async with looking_back() as past:
+
+        async def cancel_a_query() -> None:
+            with pytest.raises(TimeoutError):
+                async with asyncio.timeout(0.01):
+                    await past.ask(Endless(), now(path), 0.0)
+
+        assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
+        monkeypatch.setattr(past_process, "STUCK_S", 1.5)
+        await cancel_a_query()
+        with pytest.raises(TimeoutError):
+            async with asyncio.timeout(2.0):  # longer than it may take to react
+                await past.ask(Endless(), now(path), 0.0)
+        assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
+        assert past.starts == 1
+        os.kill(past.pid or 0, signal.SIGSTOP)
+        await cancel_a_query()
+        with pytest.raises(NotRemembered, match="did not react"):
+            await past.ask(Count(NOW_NS), now(path), 0.0)
+        await until(lambda: not past.why_down, "the rest")
+        assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
+
+
 async def test_a_process_that_dies_or_cannot_start_is_reported_and_replaced(
     path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

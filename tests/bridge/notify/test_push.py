@@ -6,7 +6,7 @@ import json
 import re
 import ssl
 import stat
-from collections.abc import AsyncIterator, Iterator, Sequence
+from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -191,6 +191,19 @@ async def test_while_the_accounts_cannot_be_read_a_message_waits(
         await until(lambda: len(on.service.posted) == 2, "the next attempt")
 
 
+async def test_after_an_unexpected_error_a_message_is_tried_again_and_the_error_logged_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with pushing(tmp_path) as on:
+        on.subscribe(on.phone("one"))
+        with pytest.MonkeyPatch.context() as broken:
+            broken.setattr(push_module, "notes_of_alarms", None)
+            on.board.show([alarm("7")])
+            await until(lambda: on.push.condition.failed > 2, "attempts")
+        await until(lambda: on.service.posted, "the message")
+    assert caplog.text.count("Traceback") == 1
+
+
 async def test_a_browser_that_unsubscribes_meanwhile_is_not_tried_again(tmp_path: Path) -> None:
     def switched_off(posted: Posted) -> Iterator[bytes | None]:
         with changing(tmp_path / "accounts.sqlite") as accounts:
@@ -245,8 +258,8 @@ async def test_an_alarm_raised_while_the_log_is_read_at_the_start_is_new(
 ) -> None:
     notified: list[str] = []
 
-    async def notify(_: Push, alarms: Sequence[Alarm], __: Any) -> None:
-        notified.extend(it.tag_id for it in alarms)
+    async def notify(_: Push, alarms: Mapping[str, Alarm]) -> None:
+        notified.extend(it.tag_id for it in alarms.values())
 
     monkeypatch.setattr(Push, "_notify", notify)
     monkeypatch.setattr(push_module, "TOGETHER_S", 0.0)

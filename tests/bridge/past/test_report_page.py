@@ -213,15 +213,15 @@ def test_open_alarms_come_first_with_value_and_both_limits() -> None:
     page = page_of(alarms=alarms, tags=tags)
     active, _, resolved = page.partition("Alarms still active ")[2].partition(" Alarms resolved ")
     assert active.startswith("Alarm Tag Raised At the end Worst value Limits ")
-    assert "7 06:01 9.5 °C (06:10) 8.0 °C 10.0–35.0 °C" in active
-    assert "8 06:01 12.5 °C (06:10) 11.0 °C 13.0–35.0 °C" in active
-    assert "9 06:01 10.0 °C (06:10) 31.0 °C 8.0–30.0 °C" in active
-    assert "8 06:01 12.5 °C (06:10) 27.0 °C 18.0–26.0 °C" in active
-    assert "8 06:01 12.5 °C (06:10) 36.0 °C 10.0–35.0 °C" in active
-    assert "7 06:01 0.83 kPa (06:10) 1.50 kPa 0.20–1.30 kPa" in active
-    assert "9 06:01 just below 10.0 °C (06:10) 8.0 °C 10.0–35.0 °C" in active
-    assert "6 06:01 9.1 °C 8.0 °C 10.0–35.0 °C" in active, "a reading of unknown time has none"
-    assert "7 06:01 07:19 1 h 18 min 1.60 kPa 0.20–1.30 kPa" in resolved
+    assert "7 06:01 9.5 °C (06:10) 8.0 °C 10.0 to 35.0 °C" in active
+    assert "8 06:01 12.5 °C (06:10) 11.0 °C 13.0 to 35.0 °C" in active
+    assert "9 06:01 10.0 °C (06:10) 31.0 °C 8.0 to 30.0 °C" in active
+    assert "8 06:01 12.5 °C (06:10) 27.0 °C 18.0 to 26.0 °C" in active
+    assert "8 06:01 12.5 °C (06:10) 36.0 °C 10.0 to 35.0 °C" in active
+    assert "7 06:01 0.83 kPa (06:10) 1.50 kPa 0.20 to 1.30 kPa" in active
+    assert "9 06:01 just below 10.0 °C (06:10) 8.0 °C 10.0 to 35.0 °C" in active
+    assert "6 06:01 9.1 °C 8.0 °C 10.0 to 35.0 °C" in active, "a reading of unknown time has none"
+    assert "7 06:01 07:19 1 h 18 min 1.60 kPa 0.20 to 1.30 kPa" in resolved
     # The file of sensors has another range by now.
     assert "7 06:01 06:01 37 s 2.0 °C 3.5 °C" in resolved
     page = page_of(
@@ -231,23 +231,23 @@ def test_open_alarms_come_first_with_value_and_both_limits() -> None:
 
 
 @pytest.mark.parametrize(
-    ("lang", "numbers"),
+    ("lang", "numbers", "limits"),
     [
-        ("en", "just below 350 ppm"),
-        ("de", "knapp unter 350 ppm"),
-        ("nl", "net onder 350 ppm"),
-        ("es", "justo por debajo de 350 ppm"),
+        ("en", "just below 350 ppm", "350 to 1,500 ppm"),
+        ("de", "knapp unter 350 ppm", "350 bis 1.500 ppm"),
+        ("nl", "net onder 350 ppm", "350 tot 1.500 ppm"),
+        ("es", "justo por debajo de 350 ppm", "350 a 1500 ppm"),
     ],
 )
 def test_values_of_a_sensor_have_equal_digits_and_none_looks_like_its_limit(
-    lang: str, numbers: str
+    lang: str, numbers: str, limits: str
 ) -> None:
     low = {"verdict": "stressed", "kind": "range", "sensor": "co2", "value": 349.7, "limit": 350.0}
     assert numbers in page_of(lang, alarms=[alarm(reason=low, worst=349.7)])
     spun = {**low, "sensor": "spin", "value": 12345.0, "limit": 20000.0}
     assert "e+04" not in page_of(lang, alarms=[alarm(reason=spun, worst=12345.0)])
     assert "1e+06 20" in page_of(lang, alarms=[alarm(reason=spun, worst=1e6)])
-    assert "06:01 350 ppm 350–" in page_of(lang, alarms=[alarm(reason=low, worst=350.0)])
+    assert f"06:01 350 ppm {limits}" in page_of(lang, alarms=[alarm(reason=low, worst=350.0)])
     hot = {**low, "sensor": "temperature", "value": 40.0, "limit": 35.0}
     assert re.search(r" 1[.,]?235 °C", page_of(lang, alarms=[alarm(reason=hot, worst=1234.6)]))
     # As on the page: `format.test.ts`.

@@ -109,9 +109,10 @@ def send(it: Running, *paths: str) -> list[asyncio.Task[httpx.Response]]:
 # --- small requests are never queued behind large ones --------------------------------------------
 
 
-async def test_a_flood_of_the_most_expensive_fields_does_not_delay_a_tiny_one(
+async def test_a_flood_of_the_most_expensive_fields_delays_no_tiny_one_nor_that_of_another_client(
     domain: int, held: Held
 ) -> None:
+    other = httpx.AsyncHTTPTransport(local_address="127.0.0.2")
     async with greenhouse() as it:
         flood = send(it, *(field(f"co2 {n}", LARGE) for n in range(40)))
         # Half of the 24 places are for large ones; the other half is for others.
@@ -127,8 +128,14 @@ async def test_a_flood_of_the_most_expensive_fields_does_not_delay_a_tiny_one(
             assert (answer.status_code, answer.headers["retry-after"]) == (503, "1")
             text = "12 large answers are being computed, 12 of them for 127.0.0.1"
             assert text in answer.json()["detail"]
-        held.gate.set()
+        async with httpx.AsyncClient(transport=other, timeout=PATIENCE_S) as client:
+            theirs = asyncio.create_task(client.get(it.url + field("co2 51", LARGE)))
+            workers = it.bridge.source.workers
+            await until(lambda: fields_at(workers) == (13 - LARGE_THREADS, LARGE_THREADS), "both")
+            held.gate.set()
+            assert (await theirs).status_code == 200
         assert sorted([(await task).status_code for task in flood]) == [200] * 12 + [503] * 28
+        assert held.begun.index("co2 51") < len(held.begun) - 2, "it passed the flood"
 
 
 # --- only while a client waits --------------------------------------------------------------------

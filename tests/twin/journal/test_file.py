@@ -1,4 +1,3 @@
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +7,6 @@ from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.state import Reading
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.salvage import quarantine
-from lupin_twin.journal.schema import open_writer, set_meta
 from tests.support.journal import (
     CLOCK,
     NOW,
@@ -38,10 +36,11 @@ def test_a_row_that_cannot_be_written_is_lost_alone(path: Path) -> None:
 def test_runs_are_written_to_a_replaced_file(path: Path) -> None:
     with opened(path) as file:
         run = file.start(CLOCK, is_believed=False).run
+        end = file.end
     path.unlink()
     with opened(path) as file:
-        file.retain_run(run)
-        file.retain_run(run)
+        file.retain_run(run, end)
+        file.retain_run(run, end)
         assert file.append([(run, scan())]) == (1, 0)
     assert known(path) == {scan()}
 
@@ -79,8 +78,6 @@ def test_a_lack_of_room_for_scans_beside_the_hours_is_reported(
 def test_a_salvage_that_was_killed_starts_again(path: Path, *, is_there: bool) -> None:
     append(path, [scan(at_ns=NOW + n) for n in range(300)])
     aside = quarantine(path, "20261121T141500Z")
-    with closing(open_writer(path)) as connection:
-        set_meta(connection, "salvage", aside.name)
     if not is_there:  # the file was removed
         aside.unlink()
     with opened(path):

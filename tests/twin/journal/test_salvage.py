@@ -187,5 +187,5 @@ def test_a_damaged_file_is_quarantined_with_its_wal_and_never_overwritten(tmp_pa
     logs = [name.with_name(name.name + "-wal").read_text() for name in names]
     assert logs == ["first's log", "second's log"]
     assert sorted(tmp_path.iterdir()) == sorted(
-        [*names, *(name.with_name(name.name + "-wal") for name in names)]
+        [path, *names, *(name.with_name(name.name + "-wal") for name in names)]
     )

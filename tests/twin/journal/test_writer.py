@@ -1,16 +1,17 @@
 import os
 import shutil
+import sqlite3
 import time
-from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
+from pkgutil import resolve_name
 
 import pytest
 
 from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.state import Write
-from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.retention import Limits
-from lupin_twin.journal.runs import Clock, Run, Turn
+from lupin_twin.journal.runs import Clock, Turn
 from lupin_twin.journal.schema import DamagedFile
 from lupin_twin.journal.writer import Journal
 from tests.support.journal import (
@@ -114,23 +115,48 @@ def test_a_damaged_file_is_quarantined_and_the_twin_goes_on(path: Path) -> None:
     assert known(path) == {scan()}
 
 
-def test_damage_found_while_recording_quarantines_the_file_too(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    append = JournalFile.append
+APPEND = "file.JournalFile.append"
+DAMAGED, FULL = DamagedFile("as SQLite finds it"), OSError("the disk is full")
 
-    def meet_damage(file: JournalFile, rows: Sequence[tuple[Run, Write]]) -> tuple[int, int]:
-        monkeypatch.setattr(JournalFile, "append", append)
-        raise DamagedFile("as SQLite finds it")
+
+@pytest.mark.parametrize(
+    ("faults", "is_quarantined"),
+    [
+        ({APPEND: FULL}, False),
+        ({APPEND: DAMAGED}, True),
+        ({APPEND: DAMAGED, "file.salvage": FULL}, True),
+        # After a failure, the file is checked, and is sound.
+        ({APPEND: DAMAGED, "salvage.open_writer": FULL}, False),
+    ],
+)
+def test_a_file_that_fails_while_recording_keeps_its_rows_even_if_it_is_quarantined(
+    path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    faults: dict[str, Exception],
+    *,
+    is_quarantined: bool,
+) -> None:
+    def fail_once(name: str, error: Exception) -> None:
+        name = f"lupin_twin.journal.{name}"
+        works = resolve_name(name)
+
+        def fail(*_: object) -> None:
+            monkeypatch.setattr(name, works)
+            raise error
+
+        monkeypatch.setattr(name, fail)
 
     with recording(path) as journal:
         journal.write(scan("1"))
         wait_for(lambda: journal.condition.written == 1, "the row")
-        monkeypatch.setattr(JournalFile, "append", meet_damage)
+        for name, error in faults.items():
+            fail_once(name, error)
         journal.write(scan("2"))
-        condition = wait_state(journal, JournalState.RECORDING, "quarantined as")
-        assert Path(condition.set_aside).exists()
         wait_for(lambda: journal.condition.written == 2, "the row after it")
+        condition = wait_state(journal, JournalState.RECORDING)
+        assert Path(condition.set_aside).is_file() is is_quarantined
+        # It may have lost what was received up to the last row that it saved.
+        assert condition.kept_ns[0][0] == NOW + is_quarantined
     assert known(path) == {scan("1"), scan("2")}
 
 
@@ -145,6 +171,31 @@ def test_a_removed_file_is_created_anew(path: Path) -> None:
         journal.write(scan("2"))
         wait_for(lambda: journal.condition.written == 2, "the row after it")
     assert known(path) == {scan("2")}
+
+
+@pytest.mark.parametrize("is_older", [True, False])
+def test_what_a_file_put_in_its_place_lacks_does_not_count_as_complete(
+    path: Path, tmp_path: Path, *, is_older: bool
+) -> None:
+    """A backup; or the file itself, put back after another was created in its place."""
+    other = tmp_path / "other.sqlite"
+    with recording(path) as journal:
+        journal.write(scan("1"))
+        wait_for(lambda: journal.condition.written == 1, "a row")
+        if is_older:
+            with closing(sqlite3.connect(path)) as own:
+                own.execute("VACUUM INTO ?", (str(other),))
+        else:
+            path.rename(other)
+            path.with_name("j.sqlite-wal").unlink()
+            path.with_name("j.sqlite-shm").unlink()
+            wait_for(path.exists, "a new file")
+        journal.write(scan("2"))
+        wait_for(lambda: journal.condition.written == 2, "a row that the other file lacks")
+        replaced_ns = time.time_ns()
+        other.replace(path)
+        wait_for(lambda: journal.condition.kept_ns[0][0] > replaced_ns, "what is complete")
+    assert known(path) == {scan("1")}
 
 
 def test_a_removed_log_is_reported_and_a_kill_after_it_loses_nothing(

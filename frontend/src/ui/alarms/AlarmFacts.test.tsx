@@ -3,8 +3,8 @@ import { expect, test } from 'vitest';
 
 import { startAlarms } from '../../alarms/watch';
 import { receive } from '../../store/app';
-import { alarm, reportAlarms } from '../../testing/alarms';
-import { goLost, showTags } from '../../testing/page';
+import { alarm, alarms, reportAlarms } from '../../testing/alarms';
+import { goLive, goLost, showTags, status } from '../../testing/page';
 import { readings, wireTag } from '../../testing/tags';
 import { AlarmPanel } from './AlarmPanel';
 
@@ -22,5 +22,26 @@ test('how old the last value is nobody knows after a sleep', () => {
     receive({ isTimeLost: true });
   });
   expect(now()).toBe('now unknown, last 8.0\u00a0°C');
+  stop();
+});
+
+test('without a valid time nothing is being read, and what to do is as in the banner', () => {
+  showTags([wireTag()]);
+  const stop = startAlarms();
+  const { container } = render(<AlarmPanel />);
+  const notes = (): string[] =>
+    [...container.querySelectorAll<HTMLElement>('[data-note]')].map((it) => it.textContent);
+  flush(() => {
+    receive({ alarms: alarms([], { source: 'starting', since: null }) });
+    goLive(status({ twin: 'offline', reason: 'clock_stopped' }));
+  });
+  expect(notes()).toEqual(['While the time is unknown, alarms may be missing.']);
+  flush(() => {
+    reportAlarms(alarm('s', { tag_id: '', reason: { kind: 'silent', sensor: '', value: null } }));
+  });
+  expect(notes()).toHaveLength(1);
+  const row = container.querySelector('[data-alarm]')?.textContent;
+  expect(row).toContain('Check the simulation');
+  expect(row).not.toContain('network');
   stop();
 });

@@ -16,7 +16,7 @@ import { differenceShown } from '../../domain/difference';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { hourAgo, shortHourText } from '../../store/hourAgo';
-import { rosNow, selectHasTime } from '../../store/moment';
+import { rosNow, selectClockFault, selectHasTime } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { HealthMark } from '../HealthMark';
@@ -33,7 +33,11 @@ export function useValues(alarm: Alarm): ValuesNow {
   // As text: a new state with the same values for this tag does not re-render.
   const key = useApp((state) => JSON.stringify(selectNow(state, alarm, last)));
   const state = JSON.parse(key) as Now | null;
-  return { ...valuesOf(alarm, speech, state), state };
+  const values = valuesOf(alarm, speech, state);
+  // As in the banner.
+  const fault = useApp(selectClockFault);
+  const todo = fault && alarm.reason.kind === 'silent' ? S.clockTodo[fault] : values.todo;
+  return { ...values, todo, state };
 }
 
 /** Duration and verdict; also the day it began, if not today, or when it was resolved. */

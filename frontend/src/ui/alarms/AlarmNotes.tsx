@@ -17,7 +17,12 @@ import { rosText, secondsOf } from '../../domain/time';
 import { act, useApp, type AppState } from '../../store/app';
 import { person, useSelected } from '../../store/create';
 import { selectLatestHealth } from '../../store/derived';
-import { selectIsDisconnected, selectLatest, selectShown } from '../../store/moment';
+import {
+  selectClockFault,
+  selectIsDisconnected,
+  selectLatest,
+  selectShown,
+} from '../../store/moment';
 import { S } from '../../strings';
 import { Check } from '../../widgets/controls';
 import { HealthMark } from '../HealthMark';
@@ -50,6 +55,7 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
   const moment = useApp((state) => selectShown(state).moment);
   const isStarting = alarms?.source === 'starting';
   const isKnown = useApp(selectIsKnown);
+  const lacksTime = useApp(selectClockFault) !== null;
   // The banner says from when.
   const isLast = useApp(
     (state) => selectIsDisconnected(state) && selectLatest(state).snapshot !== null,
@@ -58,14 +64,15 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
     <div className="alarm-notes">
       {moment !== null && !isLast && <p data-note="now">{S.alarmsOfNow(rosText(moment))}</p>}
       {isLast && <p data-note="lost">{S.alarmsLost}</p>}
-      {isStarting && <p data-note="starting">{S.alarmsStarting}</p>}
-      {isEmpty && !isLast && (
+      {lacksTime && <p data-note="no-time">{S.alarmsNoTime}</p>}
+      {isStarting && !lacksTime && <p data-note="starting">{S.alarmsStarting}</p>}
+      {isEmpty && !isLast && !lacksTime && (
         <p className="alarm-none" data-note={isKnown ? 'none' : 'unknown'}>
           {isKnown ? S.alarmsNone : S.alarmsNotYet}
         </p>
       )}
       {isEmpty && <AlarmsWait />}
-      {isEmpty && isKnown && <p className="faint">{S.alarmsNoneHint}</p>}
+      {isEmpty && isKnown && !lacksTime && <p className="faint">{S.alarmsNoneHint}</p>}
       {alarms?.source === 'heard' && alarms.since && (
         <p className="faint" data-note="heard">
           {S.alarmsReceived(rosText(secondsOf(alarms.since)))}

@@ -142,11 +142,11 @@ test('the count of alarms is of all behind the sign of the worst, and none of no
   flush(() => {
     act({ moment: 10 });
   });
-  expect([sign(), count()]).toEqual(['critical', '(now 3)']);
+  expect([sign(), count()]).toEqual(['critical', '(3 now)']);
   flush(() => {
     acknowledgeAlarms(alarmList.get().active);
   });
-  expect([sign(), count()]).toEqual([undefined, '(now 3)']);
+  expect([sign(), count()]).toEqual([undefined, '(3 now)']);
   flush(goLost);
   expect(screen.queryByTestId('alarm-count')).toBeNull();
   // Whether an empty list is still empty is unknown.

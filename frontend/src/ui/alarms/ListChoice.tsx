@@ -60,7 +60,7 @@ export function AlarmsLabel(): JSX.Element {
         {length > 0 && (
           <span data-testid="alarm-count" aria-hidden="true">
             {' '}
-            ({isNow ? length : S.alarmNow(String(length))})
+            ({isNow ? length : S.alarmsNow(length)})
           </span>
         )}
       </span>

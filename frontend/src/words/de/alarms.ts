@@ -12,6 +12,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   listChoice: 'Neben der Karte',
   alarmsCount: (unseen, active) =>
     active === 0 ? 'keine anstehend' : `${active} anstehend, ${unseen} davon nicht quittiert`,
+  alarmsNow: (active) => `jetzt ${active}`,
   alarmGroups: {
     active: (count) => `Anstehend (${count})`,
     shelved: (count) => `Zurückgestellt (${count})`,
@@ -26,7 +27,11 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     last === null
       ? 'jetzt unbekannt'
       : `jetzt unbekannt, zuletzt ${last}${age === null ? '' : ` vor ${age}`}`,
-  alarmPests: { none: 'keine festgestellt', seen: 'festgestellt' },
+  alarmPests: {
+    seen: 'festgestellt',
+    still: 'weiterhin festgestellt',
+    gone: 'nicht mehr festgestellt',
+  },
   alarmWorst: {
     below: (reading) => `Tiefstwert ${reading}`,
     above: (reading) => `Höchstwert ${reading}`,
@@ -80,6 +85,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmNotYet: 'wartet auf eine zweite Messung',
   alarmsNotYet: 'Warten auf die Liste der Alarme',
   alarmsStarting: 'Die Aufzeichnung wird noch gelesen: Weitere Alarme können folgen.',
+  alarmsNoTime: 'Solange die Zeit unbekannt ist, können Alarme fehlen.',
   alarmsReceived: (since) =>
     `Es wird nichts aufgezeichnet; Alarme vor ${since} sind nicht bekannt.`,
   alarmsLost: 'Letzter empfangener Stand. Spätere Ereignisse sind nicht bekannt.',
@@ -149,7 +155,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     },
     outOfRange: 'außerhalb des Idealbereichs',
     changed: (reading) => `${reading}: möglicher Sensorfehler`,
-    silent: 'Keine Daten vom digitalen Zwilling: Die letzten Daten können veraltet sein',
+    silent: 'Keine aktuellen Daten vom digitalen Zwilling',
     stopped: 'Es wird nichts mehr gemessen: Der Roboter steht, oder seine Daten kommen nicht an',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
@@ -191,7 +197,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     assumed: 'angenommen, da weder Licht noch Uhrzeit bekannt sind',
   },
   idealParts: { any: 'ideal', day: 'ideal tagsüber', night: 'ideal nachts' },
-  healthIdeal: (ideal, low, high, unit) => `${ideal} ${low} bis ${high} ${unit}`.trim(),
   healthAllWell: 'Alle beurteilten Messwerte liegen im Idealbereich',
   healthDespite: (alarms) =>
     alarms === 1
@@ -199,6 +204,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       : `${alarms} Alarme stehen noch an: mit der nächsten guten Messung behoben`,
   healthAcknowledged: 'quittiert',
   healthNotCurrent: 'Nicht aktuell',
+  healthNoTime: 'Nicht beurteilt, solange die Zeit unbekannt ist',
   healthNothing: 'Noch kein Messwert zu beurteilen',
   healthFilter: ', nur diese Messpunkte anzeigen',
   scanInterval: (interval) => `alle ${interval} eine Messung`,

@@ -65,7 +65,7 @@ export const MAP: In<typeof EN.MAP> = {
   legendBelow: (value) => `unter ${value}`,
   legendAbove: (value) => `über ${value}`,
   legendAgainst: (sensor) => `${sensor} im Vergleich zum Idealbereich`,
-  legendIdeal: (ideal, low, high) => `${ideal} ${low} bis ${high}`,
+  valueRange: (low, high) => `${low}\u00a0bis\u00a0${high}`,
   legendEach: (part) => `${part} je Art`,
   legendOthers: 'andere',
   legendUnknownSpecies: 'Nicht bestimmt',
@@ -138,7 +138,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   farOffLong: (place) =>
     `Die Position (${place}) ist weit von allen anderen Messpunkten entfernt; der Messpunkt fehlt auf der Karte.`,
   ageUnknown: 'unbekannt',
-  ageUnknownLong: 'Das Alter ist unbekannt, bis der Zwilling wieder eine Zeit meldet.',
+  ageUnknownLong: 'Das Alter ist unbekannt, bis die Zeit des Zwillings bekannt ist.',
   neverObserved: 'nie',
   neverObservedLong: 'Noch keine Messung hat einen Wert geliefert.',
   notKnownThen: 'unbekannt',

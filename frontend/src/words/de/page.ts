@@ -23,6 +23,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     live: 'Live',
     stale: 'Kein Signal',
     offline: 'Zwilling offline',
+    noTime: 'Zeit unbekannt',
     reconnecting: 'Verbindet neu',
   },
   phaseLabel: 'Verbindung',
@@ -37,12 +38,20 @@ export const PAGE: In<typeof EN.PAGE> = {
     live: '',
     offline: 'Der Server antwortet, der Zwilling aber nicht.',
   },
+  clockTodo: {
+    no_clock: 'Bitte die Simulation oder Aufzeichnung starten.',
+    clock_stopped: 'Bitte die Simulation oder Aufzeichnung prüfen.',
+    clock_doubted: 'Bitte die Uhr des Zwillings stellen.',
+  },
   offlineWhy: {
     live: '',
     paused: '',
-    no_clock: 'Der Zwilling hat noch keine Uhrzeit; das Alter der Werte ist unbekannt.',
-    clock_stopped: 'Die Uhr des Zwillings ist stehen geblieben. Das Alter der Werte ist unbekannt.',
-    clock_doubted: 'Die Uhr des Zwillings geht falsch. Das Alter der Werte ist unbekannt.',
+    no_clock:
+      'Von dort kommt die Zeit des Zwillings; noch fehlt sie. Das Alter der Werte ist unbekannt.',
+    clock_stopped:
+      'Von dort kommt die Zeit des Zwillings; sie steht still. Das Alter der Werte ist unbekannt.',
+    clock_doubted:
+      'Sie geht gegenüber der Aufzeichnung nach. Bis sie stimmt, höchstens zehn Minuten lang, ist das Alter der Werte unbekannt, und die Aufzeichnung wartet.',
     never_seen:
       'Der Server hat noch keine Daten von einem Zwilling. Ist der Zwilling eingeschaltet?',
     stale: 'Der Zwilling sendet nicht mehr. Bitte prüfen, ob er läuft.',
@@ -54,7 +63,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     paused: '',
     no_clock: 'Der Zwilling läuft mit simulierter Zeit, und auf /clock kommt nichts.',
     clock_stopped: 'Der Zwilling läuft mit simulierter Zeit, und auf /clock kommt nichts mehr.',
-    clock_doubted: 'Die Uhrzeit liegt vor der Aufzeichnung. Bitte die Uhr stellen.',
+    clock_doubted: '',
     never_seen: 'Zwilling und Bridge müssen in derselben ROS-Domain laufen (ROS_DOMAIN_ID).',
     stale: 'Die Bridge läuft, aber auf /twin/state wird nichts mehr veröffentlicht.',
     thread_dead: 'Der ROS-Thread der Bridge ist beendet; warum, steht in ihrem Log.',
@@ -91,10 +100,6 @@ export const PAGE: In<typeof EN.PAGE> = {
       title: 'Die Aufzeichnung einer älteren Version wird umgestellt.',
       hint: 'Neue Daten werden angezeigt, aber noch nicht aufgezeichnet. Frühere Daten sind danach wieder da; das kann Minuten dauern.',
     },
-    doubting: {
-      title: 'Es wird nichts aufgezeichnet: Die Uhr passt nicht zur Aufzeichnung.',
-      hint: 'Neue Daten werden angezeigt, aber erst aufgezeichnet, wenn die Uhr stimmt, spätestens nach zehn Minuten.',
-    },
     in_use: {
       title: 'Dieser Zwilling zeichnet nicht auf: Ein anderer nutzt seine Datei.',
       hint: 'Einen der beiden beenden oder diesem eine eigene Datei geben.',
@@ -112,7 +117,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   notificationOther: (channel) => `${channel} empfängt keine Daten.`,
   notificationHint: 'Der Server versucht es weiter. Diese Seite ist nicht betroffen.',
   journalMore: 'Die Datei nennt der Parameter „journal“ des Zwillings; „off“ zeichnet nichts auf.',
-  origin: { simulated: 'Simuliert', recorded: 'Aufzeichnung', sim_time: 'Simulierte Zeit' },
+  origin: { simulated: 'Simuliert', recorded: 'Aufgezeichnet', sim_time: 'Simulierte Zeit' },
   originDay: (length: string): string => `1 Gewächshaustag = ${length}`,
   originHint: {
     simulated: 'Kein echter Roboter: Gewächshaus, Pflanzen und Messwerte sind simuliert.',
@@ -183,7 +188,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   helpToggle: 'Kürzel mit nur einer Taste',
   keys: {
     global: [
-      ['1 – 9', 'Sensor wählen'],
+      ['1 bis 9', 'Sensor wählen'],
       ['/', 'Tabelle filtern'],
       ['F', 'Auf der Karte alles anzeigen'],
       ['N, P', 'Nächster und voriger Messpunkt'],
@@ -230,13 +235,6 @@ export const PAST: In<typeof EN.PAST> = {
   pastReachNothing: 'Noch ist nichts aufgezeichnet.',
   pastFault: (wanted) => `${wanted} konnte nicht geladen werden.`,
   pastFaultShown: (shown, why) => `Angezeigt wird ${shown}; die Seite versucht es weiter. ${why}`,
-  phasePast: {
-    connecting: 'Rückblick · verbindet',
-    live: 'Rückblick',
-    stale: 'Rückblick · kein Signal',
-    offline: 'Rückblick · Zwilling offline',
-    reconnecting: 'Rückblick · verbindet neu',
-  },
   backToLive: 'Zurück zu Live',
   backToRecording: 'Zurück zur Aufzeichnung',
   frozenBehindPast: (clock) => `Keine Live-Daten mehr. Letzte Daten um ${clock}`,

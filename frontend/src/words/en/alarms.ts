@@ -7,6 +7,8 @@ export const ALARMS = {
   /** For screen readers, after the word. */
   alarmsCount: (unseen: number, active: number): string =>
     active === 0 ? 'none active' : `${active} active, ${unseen} not acknowledged`,
+  /** After the word, while a past moment is shown. */
+  alarmsNow: (active: number): string => `${active} now`,
   /** How many, or "some/all" while the list is filtered. */
   alarmGroups: {
     active: (count: string): string => `Active (${count})`,
@@ -23,8 +25,8 @@ export const ALARMS = {
   alarmNow: (reading: string): string => `now ${reading}`,
   alarmNowUnknown: (last: string | null, age: string | null): string =>
     last === null ? 'now unknown' : `now unknown, last ${last}${age === null ? '' : ` ${age} ago`}`,
-  /** For a pest, instead of a count. */
-  alarmPests: { none: 'none seen', seen: 'seen' },
+  /** For a pest, instead of a count: at first or at worst, and now. */
+  alarmPests: { seen: 'seen', still: 'still seen', gone: 'no longer seen' },
   alarmWorst: {
     below: (reading: string): string => `worst ${reading}`,
     above: (reading: string): string => `worst ${reading}`,
@@ -82,6 +84,7 @@ export const ALARMS = {
   alarmNotYet: 'waiting for a second scan',
   alarmsNotYet: 'Waiting for the list of alarms',
   alarmsStarting: 'Recorded data is still being read: more alarms may follow.',
+  alarmsNoTime: 'While the time is unknown, alarms may be missing.',
   alarmsReceived: (since: string): string =>
     `Nothing is recorded, so alarms before ${since} are unknown.`,
   alarmsLost: 'As last received. Later events are unknown.',
@@ -156,7 +159,7 @@ export const HEALTH = {
     },
     outOfRange: 'out of range',
     changed: (reading: string): string => `${reading}: possible sensor fault`,
-    silent: 'No data from the twin: its last data may be out of date',
+    silent: 'No current data from the twin',
     stopped: 'No tag is being scanned: the robot has stopped, or its data is lost',
     other: (kind: string, sensor: string): string => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
@@ -201,8 +204,6 @@ export const HEALTH = {
   },
   /** "any": the same by day and by night. */
   idealParts: { any: 'ideal', day: 'daytime ideal', night: 'night-time ideal' },
-  healthIdeal: (ideal: string, low: string, high: string, unit: string): string =>
-    `${ideal} ${low} to ${high} ${unit}`.trim(),
   healthAllWell: 'All assessed readings are within their ideal ranges',
   healthDespite: (alarms: number): string =>
     alarms === 1
@@ -211,6 +212,7 @@ export const HEALTH = {
   healthAcknowledged: 'acknowledged',
   /** Replaces the verdict while the current status is unknown. */
   healthNotCurrent: 'Not current',
+  healthNoTime: 'Not assessed while the time is unknown',
   healthNothing: 'No reading to assess yet',
   healthFilter: ', show only these tags',
   scanInterval: (interval: string): string => `a scan every ${interval}`,

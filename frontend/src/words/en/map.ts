@@ -61,7 +61,8 @@ export const MAP = {
   legendBelow: (value: string): string => `below ${value}`,
   legendAbove: (value: string): string => `above ${value}`,
   legendAgainst: (sensor: string): string => `${sensor} compared with its ideal range`,
-  legendIdeal: (ideal: string, low: string, high: string): string => `${ideal} ${low} to ${high}`,
+  /** A word, not a dash: "−2 to 5". No-break spaces keep it on one line. */
+  valueRange: (low: string, high: string): string => `${low}\u00a0to\u00a0${high}`,
   legendEach: (part: string): string => `${part} per species`,
   legendOthers: 'others',
   legendUnknownSpecies: 'Not classified',
@@ -134,7 +135,7 @@ export const TAGS = {
   farOffLong: (place: string): string =>
     `Its position (${place}) is far from all other tags, so the tag has no pin on the map.`,
   ageUnknown: 'unknown',
-  ageUnknownLong: 'The age is unknown until the twin reports its time again.',
+  ageUnknownLong: 'The age is unknown until the twin’s time is known.',
   neverObserved: 'never',
   neverObservedLong: 'No scan has returned a reading yet.',
   notKnownThen: 'unknown',

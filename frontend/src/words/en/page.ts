@@ -21,6 +21,8 @@ export const PAGE = {
     live: 'Live',
     stale: 'No signal',
     offline: 'Twin offline',
+    /** Data arrives, but the twin has no valid time. */
+    noTime: 'Time unknown',
     reconnecting: 'Reconnecting',
   },
   phaseLabel: 'Connection',
@@ -36,12 +38,21 @@ export const PAGE = {
     live: '',
     offline: 'The server responds, but the twin does not.',
   },
+  /** What to do about a twin without a valid time; the reasons below continue it. */
+  clockTodo: {
+    no_clock: 'Start the simulation or the recording.',
+    clock_stopped: 'Check the simulation or the recording.',
+    clock_doubted: 'Set the twin’s clock.',
+  },
   offlineWhy: {
     live: '',
     paused: '',
-    no_clock: 'The twin has no time yet, so the age of the readings is unknown.',
-    clock_stopped: 'The twin’s clock has stopped. The age of the readings is unknown.',
-    clock_doubted: 'The twin’s clock is wrong. The age of the readings is unknown.',
+    no_clock:
+      'The twin’s time comes from there, and there is none yet. The age of the readings is unknown.',
+    clock_stopped:
+      'The twin’s time comes from there, and it has stopped. The age of the readings is unknown.',
+    clock_doubted:
+      'It is behind the recorded data. Until it is right, or for ten minutes, ages are unknown and recording waits.',
     never_seen: 'The server has received nothing from a twin yet. Is the twin switched on?',
     stale: 'The twin has stopped sending. Check that it is running.',
     thread_dead: 'The server has lost the twin and must be restarted.',
@@ -53,7 +64,7 @@ export const PAGE = {
     paused: '',
     no_clock: 'The twin uses simulated time, but nothing is published on /clock.',
     clock_stopped: 'The twin uses simulated time, but /clock has stopped.',
-    clock_doubted: 'Its time is earlier than the recording. Set the clock.',
+    clock_doubted: '',
     never_seen: 'Twin and bridge must use the same ROS domain (ROS_DOMAIN_ID).',
     stale: 'The bridge is running, but nothing is published on /twin/state.',
     thread_dead: 'The bridge’s ROS thread has ended; its log says why.',
@@ -91,10 +102,6 @@ export const PAGE = {
       title: 'The recording of an older version is being upgraded.',
       hint: 'New data is shown but not yet recorded. Earlier data returns after the upgrade, which may take minutes.',
     },
-    doubting: {
-      title: 'Nothing is being recorded: the clock contradicts the recording.',
-      hint: 'New data is shown but not yet recorded. Recording resumes when the clock is correct, or after ten minutes.',
-    },
     in_use: {
       title: 'This twin is not recording: another twin uses its file.',
       hint: 'Stop one of them, or give this one a file of its own.',
@@ -114,7 +121,7 @@ export const PAGE = {
   notificationHint: 'The server keeps trying. This page is not affected.',
   journalMore: 'The file is named by the twin’s parameter “journal”; “off” records nothing.',
   /** Origin of the data, unless it is a real robot's, live. */
-  origin: { simulated: 'Simulated', recorded: 'Recording', sim_time: 'Simulated time' },
+  origin: { simulated: 'Simulated', recorded: 'Recorded', sim_time: 'Simulated time' },
   originDay: (length: string): string => `1 greenhouse day = ${length}`,
   originHint: {
     simulated: 'No real robot: greenhouse, plants and readings are simulated.',
@@ -179,7 +186,7 @@ export const PAGE = {
   helpToggle: 'Single-key shortcuts',
   keys: {
     global: [
-      ['1 – 9', 'Choose a sensor'],
+      ['1 to 9', 'Choose a sensor'],
       ['/', 'Filter the table'],
       ['F', 'Fit the map to view'],
       ['N, P', 'Next and previous tag'],
@@ -227,13 +234,6 @@ export const PAST = {
   pastFault: (wanted: string): string => `${wanted} could not be loaded.`,
   pastFaultShown: (shown: string, why: string): string =>
     `Showing ${shown} while the page retries. ${why}`,
-  phasePast: {
-    connecting: 'Past · connecting',
-    live: 'Past',
-    stale: 'Past · no signal',
-    offline: 'Past · twin offline',
-    reconnecting: 'Past · reconnecting',
-  },
   backToLive: 'Back to live',
   backToRecording: 'Back to the recording',
   frozenBehindPast: (clock: string): string => `Live data has stopped. Last data at ${clock}`,

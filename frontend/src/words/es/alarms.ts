@@ -10,6 +10,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     active === 0
       ? 'ninguna activa'
       : `${counted(active, 'activa', 'activas')}, ${unseen} sin reconocer`,
+  alarmsNow: (active) => `${active} ahora`,
   alarmGroups: {
     active: (count) => `Activas (${count})`,
     shelved: (count) => `Aplazadas (${count})`,
@@ -24,7 +25,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     last === null
       ? 'ahora sin dato'
       : `ahora sin dato, último ${last}${age === null ? '' : ` hace ${age}`}`,
-  alarmPests: { none: 'no detectada', seen: 'detectada' },
+  alarmPests: { seen: 'detectada', still: 'aún se detecta', gone: 'ya no se detecta' },
   alarmWorst: {
     below: (reading) => `mínimo ${reading}`,
     above: (reading) => `máximo ${reading}`,
@@ -79,6 +80,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmNotYet: 'a la espera de otra medición',
   alarmsNotYet: 'Esperando la lista de alarmas',
   alarmsStarting: 'Todavía se está leyendo el registro: pueden aparecer más alarmas.',
+  alarmsNoTime: 'Mientras se desconozca la hora, pueden faltar alarmas.',
   alarmsReceived: (since) =>
     `No se registra nada: se desconocen las alarmas anteriores a ${since}.`,
   alarmsLost: 'Últimos datos recibidos. Se desconoce lo ocurrido después.',
@@ -153,7 +155,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     },
     outOfRange: 'fuera de rango',
     changed: (reading) => `${reading}: posible fallo del sensor`,
-    silent: 'Sin datos del gemelo: los últimos pueden estar desactualizados',
+    silent: 'Sin datos actuales del gemelo',
     stopped: 'No se mide ningún punto: el robot se ha parado o no llegan sus datos',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
@@ -197,7 +199,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     assumed: 'supuesto, porque no se conocen ni la luz ni la hora',
   },
   idealParts: { any: 'ideal', day: 'ideal de día', night: 'ideal de noche' },
-  healthIdeal: (ideal, low, high, unit) => `${ideal} de ${low} a ${high} ${unit}`.trim(),
   healthAllWell: 'Todas las lecturas evaluadas están en su rango ideal',
   healthDespite: (alarms) =>
     alarms === 1
@@ -205,6 +206,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       : `Aún hay ${alarms} alarmas activas: quedan resueltas con la próxima medición buena`,
   healthAcknowledged: 'reconocida',
   healthNotCurrent: 'Desactualizado',
+  healthNoTime: 'Sin evaluar mientras se desconozca la hora',
   healthNothing: 'Aún no hay lecturas que evaluar',
   healthFilter: ', mostrar solo estos puntos',
   scanInterval: (interval) => `una medición cada ${interval}`,

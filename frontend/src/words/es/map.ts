@@ -63,7 +63,7 @@ export const MAP: In<typeof EN.MAP> = {
   legendBelow: (value) => `menos de ${value}`,
   legendAbove: (value) => `más de ${value}`,
   legendAgainst: (sensor) => `${sensor} frente a su rango ideal`,
-  legendIdeal: (ideal, low, high) => `${ideal} de ${low} a ${high}`,
+  valueRange: (low, high) => `${low}\u00a0a\u00a0${high}`,
   legendEach: (part) => `${part} por especie`,
   legendOthers: 'otras',
   legendUnknownSpecies: 'Sin clasificar',
@@ -136,7 +136,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   farOffLong: (place) =>
     `Su posición (${place}) está muy lejos de los demás puntos, así que el punto no está en el mapa.`,
   ageUnknown: 'desconocida',
-  ageUnknownLong: 'Se desconoce la antigüedad hasta que el gemelo vuelva a comunicar su hora.',
+  ageUnknownLong: 'Se desconoce la antigüedad hasta que se conozca la hora del gemelo.',
   neverObserved: 'nunca',
   neverObservedLong: 'Ninguna medición ha dado todavía una lectura.',
   notKnownThen: 'desconocido',

@@ -21,6 +21,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     live: 'En directo',
     stale: 'Sin señal',
     offline: 'Sin gemelo',
+    noTime: 'Hora desconocida',
     reconnecting: 'Reconectando',
   },
   phaseLabel: 'Conexión',
@@ -35,13 +36,20 @@ export const PAGE: In<typeof EN.PAGE> = {
     live: '',
     offline: 'El servidor responde, pero el gemelo no.',
   },
+  clockTodo: {
+    no_clock: 'Inicie la simulación o la grabación.',
+    clock_stopped: 'Revise la simulación o la grabación.',
+    clock_doubted: 'Ponga en hora el reloj del gemelo.',
+  },
   offlineWhy: {
     live: '',
     paused: '',
-    no_clock: 'El gemelo aún no tiene hora; se desconoce la antigüedad de las lecturas.',
-    clock_stopped: 'El reloj del gemelo se ha parado. Se desconoce la antigüedad de las lecturas.',
+    no_clock:
+      'El gemelo toma de ella la hora y aún no la tiene. Se desconoce la antigüedad de las lecturas.',
+    clock_stopped:
+      'El gemelo toma de ella la hora, que se ha parado. Se desconoce la antigüedad de las lecturas.',
     clock_doubted:
-      'El reloj del gemelo no está en hora. Se desconoce la antigüedad de las lecturas.',
+      'Va atrasado respecto a los datos registrados. Hasta que esté en hora, o durante diez minutos, se desconoce la antigüedad de las lecturas y el registro espera.',
     never_seen: 'El servidor aún no ha recibido nada de un gemelo. ¿Está encendido el gemelo?',
     stale: 'El gemelo ha dejado de enviar. Compruebe que está en marcha.',
     thread_dead: 'El servidor ha perdido el contacto con el gemelo y hay que reiniciarlo.',
@@ -52,7 +60,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     paused: '',
     no_clock: 'El gemelo funciona con tiempo simulado y no llega nada por /clock.',
     clock_stopped: 'El gemelo funciona con tiempo simulado y ya no llega nada por /clock.',
-    clock_doubted: 'Su hora es anterior al registro. Póngalo en hora.',
+    clock_doubted: '',
     never_seen:
       'El gemelo y el puente («bridge») deben estar en el mismo dominio de ROS (ROS_DOMAIN_ID).',
     stale: 'El puente («bridge») funciona, pero ya no se publica nada en /twin/state.',
@@ -89,10 +97,6 @@ export const PAGE: In<typeof EN.PAGE> = {
       title: 'El registro de una versión anterior se está actualizando.',
       hint: 'Los datos nuevos se muestran, pero aún no se registran. Los anteriores vuelven al terminar; puede tardar unos minutos.',
     },
-    doubting: {
-      title: 'No se registra nada: el reloj no cuadra con el registro.',
-      hint: 'Los datos nuevos se muestran y se registrarán cuando el reloj esté en hora o, como tarde, a los diez minutos.',
-    },
     in_use: {
       title: 'Este gemelo no registra: otro usa su archivo.',
       hint: 'Detenga uno de los dos o dé a este un archivo propio.',
@@ -111,7 +115,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   notificationHint: 'El servidor lo sigue intentando. Esta página no se ve afectada.',
   journalMore:
     'El archivo lo indica el parámetro «journal» del gemelo; con «off» no se registra nada.',
-  origin: { simulated: 'Simulado', recorded: 'Grabación', sim_time: 'Tiempo simulado' },
+  origin: { simulated: 'Simulado', recorded: 'Grabado', sim_time: 'Tiempo simulado' },
   originDay: (length: string): string => `1 día de invernadero = ${length}`,
   originHint: {
     simulated: 'No hay robot real: el invernadero, las plantas y las lecturas son simulados.',
@@ -178,7 +182,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   helpToggle: 'Atajos de una sola tecla',
   keys: {
     global: [
-      ['1 – 9', 'Elegir un sensor'],
+      ['1 a 9', 'Elegir un sensor'],
       ['/', 'Filtrar la tabla'],
       ['F', 'Mostrar todo en el mapa'],
       ['N, P', 'Punto siguiente y anterior'],
@@ -225,13 +229,6 @@ export const PAST: In<typeof EN.PAST> = {
   pastReachNothing: 'Aún no hay nada registrado.',
   pastFault: (wanted) => `No se pudo cargar ${wanted}.`,
   pastFaultShown: (shown, why) => `Se muestra ${shown} mientras la página lo reintenta. ${why}`,
-  phasePast: {
-    connecting: 'Histórico · conectando',
-    live: 'Histórico',
-    stale: 'Histórico · sin señal',
-    offline: 'Histórico · sin gemelo',
-    reconnecting: 'Histórico · reconectando',
-  },
   backToLive: 'Volver al directo',
   backToRecording: 'Volver a la grabación',
   frozenBehindPast: (clock) => `Ya no llegan datos en directo. Los últimos, a las ${clock}`,

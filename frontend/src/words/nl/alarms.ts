@@ -8,6 +8,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   listChoice: 'Naast de kaart',
   alarmsCount: (unseen, active) =>
     active === 0 ? 'geen actief' : `${active} actief, waarvan ${unseen} niet bevestigd`,
+  alarmsNow: (active) => `nu ${active}`,
   alarmGroups: {
     active: (count) => `Actief (${count})`,
     shelved: (count) => `Uitgesteld (${count})`,
@@ -22,7 +23,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     last === null
       ? 'nu onbekend'
       : `nu onbekend, laatst ${last}${age === null ? '' : ` ${age} geleden`}`,
-  alarmPests: { none: 'geen gezien', seen: 'gezien' },
+  alarmPests: { seen: 'gezien', still: 'nog steeds gezien', gone: 'niet meer gezien' },
   alarmWorst: {
     below: (reading) => `laagste ${reading}`,
     above: (reading) => `hoogste ${reading}`,
@@ -76,6 +77,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmNotYet: 'wacht op een tweede meting',
   alarmsNotYet: 'Wachten op de lijst met alarmen',
   alarmsStarting: 'De vastgelegde gegevens worden nog gelezen: er kunnen alarmen bijkomen.',
+  alarmsNoTime: 'Zolang de tijd onbekend is, kunnen er alarmen ontbreken.',
   alarmsReceived: (since) =>
     `Er wordt niets vastgelegd; alarmen van vóór ${since} zijn niet bekend.`,
   alarmsLost: 'Laatst ontvangen stand. Latere gebeurtenissen zijn niet bekend.',
@@ -144,7 +146,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     },
     outOfRange: 'buiten de grenzen',
     changed: (reading) => `${reading}: mogelijke sensorfout`,
-    silent: 'Geen gegevens van de digital twin: de laatste gegevens kunnen verouderd zijn',
+    silent: 'Geen actuele gegevens van de digital twin',
     stopped: 'Er wordt niets meer gemeten: de robot staat stil, of zijn gegevens komen niet aan',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
@@ -185,7 +187,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     assumed: 'aangenomen, want licht en tijd zijn onbekend',
   },
   idealParts: { any: 'ideaal', day: 'ideaal overdag', night: 'ideaal ’s nachts' },
-  healthIdeal: (ideal, low, high, unit) => `${ideal} ${low} tot ${high} ${unit}`.trim(),
   healthAllWell: 'Alle beoordeelde meetwaarden liggen binnen het ideale bereik',
   healthDespite: (alarms) =>
     alarms === 1
@@ -193,6 +194,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
       : `${alarms} alarmen zijn nog actief: opgelost bij de volgende goede meting`,
   healthAcknowledged: 'bevestigd',
   healthNotCurrent: 'Niet actueel',
+  healthNoTime: 'Niet beoordeeld zolang de tijd onbekend is',
   healthNothing: 'Nog geen meetwaarde om te beoordelen',
   healthFilter: ', alleen deze meetpunten tonen',
   scanInterval: (interval) => `elke ${interval} een meting`,

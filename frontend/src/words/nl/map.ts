@@ -63,7 +63,7 @@ export const MAP: In<typeof EN.MAP> = {
   legendBelow: (value) => `onder ${value}`,
   legendAbove: (value) => `boven ${value}`,
   legendAgainst: (sensor) => `${sensor} vergeleken met het ideale bereik`,
-  legendIdeal: (ideal, low, high) => `${ideal} ${low} tot ${high}`,
+  valueRange: (low, high) => `${low}\u00a0tot\u00a0${high}`,
   legendEach: (part) => `${part} per soort`,
   legendOthers: 'andere',
   legendUnknownSpecies: 'Niet herkend',
@@ -136,7 +136,7 @@ export const TAGS: In<typeof EN.TAGS> = {
   farOffLong: (place) =>
     `De positie (${place}) ligt ver van alle andere meetpunten; het meetpunt staat niet op de kaart.`,
   ageUnknown: 'onbekend',
-  ageUnknownLong: 'Onbekend hoe lang geleden, tot de digital twin weer zijn tijd meldt.',
+  ageUnknownLong: 'Onbekend hoe lang geleden, tot de tijd van de digital twin bekend is.',
   neverObserved: 'nooit',
   neverObservedLong: 'Nog geen meting heeft een waarde opgeleverd.',
   notKnownThen: 'onbekend',

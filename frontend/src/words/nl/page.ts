@@ -21,6 +21,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     live: 'Live',
     stale: 'Geen signaal',
     offline: 'Twin offline',
+    noTime: 'Tijd onbekend',
     reconnecting: 'Verbindt opnieuw',
   },
   phaseLabel: 'Verbinding',
@@ -35,14 +36,20 @@ export const PAGE: In<typeof EN.PAGE> = {
     live: '',
     offline: 'De server antwoordt, maar de digital twin niet.',
   },
+  clockTodo: {
+    no_clock: 'Start de simulatie of de opname.',
+    clock_stopped: 'Controleer de simulatie of de opname.',
+    clock_doubted: 'Zet de klok van de digital twin gelijk.',
+  },
   offlineWhy: {
     live: '',
     paused: '',
-    no_clock: 'De digital twin heeft nog geen tijd; hoe oud de meetwaarden zijn, is onbekend.',
+    no_clock:
+      'Daar haalt de digital twin zijn tijd vandaan; die is er nog niet. Hoe oud de meetwaarden zijn, is onbekend.',
     clock_stopped:
-      'De klok van de digital twin staat stil. Hoe oud de meetwaarden zijn, is onbekend.',
+      'Daar haalt de digital twin zijn tijd vandaan; die staat stil. Hoe oud de meetwaarden zijn, is onbekend.',
     clock_doubted:
-      'De klok van de digital twin loopt verkeerd. Hoe oud de meetwaarden zijn, is onbekend.',
+      'Die loopt achter op de vastgelegde gegevens. Tot de klok goed staat, hooguit tien minuten, is onbekend hoe oud de meetwaarden zijn en wacht het vastleggen.',
     never_seen:
       'De server heeft nog niets van een digital twin ontvangen. Staat de digital twin aan?',
     stale: 'De digital twin stuurt niets meer. Controleer of hij draait.',
@@ -56,7 +63,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     no_clock: 'De digital twin draait op gesimuleerde tijd, en op /clock komt niets binnen.',
     clock_stopped:
       'De digital twin draait op gesimuleerde tijd, en op /clock komt niets meer binnen.',
-    clock_doubted: 'De tijd ligt vóór de vastgelegde gegevens. Zet de klok goed.',
+    clock_doubted: '',
     never_seen: 'Digital twin en bridge moeten in hetzelfde ROS-domein draaien (ROS_DOMAIN_ID).',
     stale: 'De bridge draait, maar op /twin/state wordt niets meer gepubliceerd.',
     thread_dead: 'De ROS-thread van de bridge is gestopt; zijn log zegt waarom.',
@@ -92,10 +99,6 @@ export const PAGE: In<typeof EN.PAGE> = {
       title: 'De gegevens van een oudere versie worden omgezet.',
       hint: 'Nieuwe gegevens worden getoond, maar nog niet vastgelegd. Eerdere gegevens zijn er weer na het omzetten; dat kan enkele minuten duren.',
     },
-    doubting: {
-      title: 'Er wordt niets vastgelegd: de klok klopt niet met eerdere gegevens.',
-      hint: 'Nieuwe gegevens worden getoond en vastgelegd zodra de klok klopt, uiterlijk na tien minuten.',
-    },
     in_use: {
       title: 'Deze digital twin legt niets vast: een andere gebruikt zijn bestand.',
       hint: 'Stop een van beide, of geef deze een eigen bestand.',
@@ -114,7 +117,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   notificationHint: 'De server blijft het proberen. Deze pagina heeft er geen last van.',
   journalMore:
     'Het bestand staat in de parameter “journal” van de digital twin; “off” legt niets vast.',
-  origin: { simulated: 'Gesimuleerd', recorded: 'Opname', sim_time: 'Gesimuleerde tijd' },
+  origin: { simulated: 'Gesimuleerd', recorded: 'Opgenomen', sim_time: 'Gesimuleerde tijd' },
   originDay: (length: string): string => `1 kasdag = ${length}`,
   originHint: {
     simulated: 'Geen echte robot: kas, planten en metingen zijn gesimuleerd.',
@@ -182,7 +185,7 @@ export const PAGE: In<typeof EN.PAGE> = {
   helpToggle: 'Sneltoetsen van één toets',
   keys: {
     global: [
-      ['1 – 9', 'Een sensor kiezen'],
+      ['1 tot 9', 'Een sensor kiezen'],
       ['/', 'De tabel filteren'],
       ['F', 'Alles tonen op de kaart'],
       ['N, P', 'Volgend en vorig meetpunt'],
@@ -229,13 +232,6 @@ export const PAST: In<typeof EN.PAST> = {
   pastReachNothing: 'Er is nog niets vastgelegd.',
   pastFault: (wanted) => `${wanted} kon niet worden geladen.`,
   pastFaultShown: (shown, why) => `Getoond wordt ${shown}; de pagina blijft het proberen. ${why}`,
-  phasePast: {
-    connecting: 'Terugblik · verbinden',
-    live: 'Terugblik',
-    stale: 'Terugblik · geen signaal',
-    offline: 'Terugblik · twin offline',
-    reconnecting: 'Terugblik · verbindt opnieuw',
-  },
   backToLive: 'Terug naar live',
   backToRecording: 'Terug naar de opname',
   frozenBehindPast: (clock) => `Geen live gegevens meer. Laatste gegevens om ${clock}`,

@@ -57,19 +57,25 @@ class Transform:
 
 
 class Frames:
-    """The latest transform of each frame."""
+    """The latest transform of each frame.
+
+    Too many moving frames replace the one updated longest ago. A static frame is sent only once, so
+    it stays.
+    """
 
     def __init__(self) -> None:
-        self._of: dict[str, Transform] = {}
+        # The one updated longest ago is the first.
+        self._moving: dict[str, Transform] = {}
+        self._static: dict[str, Transform] = {}
 
     def __contains__(self, frame: str) -> bool:
-        return frame in self._of
+        return frame in self._moving or frame in self._static
 
     def put(self, frame: str, transform: Transform) -> None:
         """Store a transform as the frame's latest.
 
         Raises:
-            FrameError: it is not finite, has no rotation or a bad name, or is one frame too many.
+            FrameError: not finite, without rotation, a bad name, or one static frame too many.
 
         """
         numbers = (*transform.move, *transform.turn)
@@ -78,13 +84,18 @@ class Frames:
             raise FrameError(f"the transform to {frame[:64]!r} has {numbers}, which is invalid")
         if not 0 < len(frame) <= MAX_NAME or not 0 < len(transform.parent) <= MAX_NAME:
             raise FrameError(f"a frame's name has {len(frame)} characters, the limit: {MAX_NAME}")
-        if frame not in self._of and len(self._of) >= MAX_FRAMES:
-            raise FrameError(f"more than {MAX_FRAMES} frames, the limit")
-        self._of[frame] = transform
+        table = self._moving if transform.stamp_ns is not None else self._static
+        if table is self._static and frame not in table and len(table) >= MAX_FRAMES:
+            raise FrameError(f"more than {MAX_FRAMES} static frames, the limit")
+        self._moving.pop(frame, None)
+        self._static.pop(frame, None)
+        table[frame] = transform
+        if len(table) > MAX_FRAMES:
+            del table[next(iter(table))]
 
     def stamp_ns(self, frame: str) -> int | None:
         """Stamp of the frame's own transform; None if there is none, or it is static."""
-        found = self._of.get(frame)
+        found = self._moving.get(frame)
         return None if found is None else found.stamp_ns
 
     def place(
@@ -100,7 +111,7 @@ class Frames:
         for _ in range(MAX_STEPS):
             if name == inside:
                 return at
-            step = self._of.get(name)
+            step = self._moving.get(name) or self._static.get(name)
             if step is None:
                 raise FrameError(
                     f"TF has no path from {frame!r} to {inside!r} (frame_id): it ends at {name!r}"

@@ -32,7 +32,7 @@ from lupin_twin.journal.retention import (
 )
 from lupin_twin.journal.rows import last_rows
 from lupin_twin.journal.runs import CORRECTION_NS, Clock, Run, put_run, runs, simulation_goes_on
-from lupin_twin.journal.salvage import quarantine, salvage
+from lupin_twin.journal.salvage import SALVAGE, quarantine, salvage
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
     LOCAL_SITE,
@@ -54,7 +54,6 @@ _PURGE_EVERY_S: Final = 60.0
 _POLL_EVERY_S: Final = 1.0
 # Least time between two maps that are written: a robot that explores sends one every second.
 _MAP_REST_S: Final = 10.0
-_SALVAGE: Final = "salvage"
 
 _LAST_SCANS: Final = (
     "SELECT stamp_ns, arrival_ns FROM scan JOIN series ON series.site = scan.site"
@@ -100,7 +99,7 @@ class JournalFile:
         if is_sound is False or (is_sound is None and self._is_damaged()):
             # Wall time, for the person who looks for the file.
             when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
-            self.quarantined = str(quarantine(path, when))
+            quarantine(path, when)
         self._open()
 
     def close(self) -> None:
@@ -123,6 +122,8 @@ class JournalFile:
             self._appender = Appender(self._connection)
             self.simulated = simulated(self._connection)
             self.journal_id = get_meta(self._connection, "journal_id") or ""
+            # The journal's id, and the last number that was committed.
+            self.end = self.journal_id, self._appender.last_seq
             self._purged_s = self._polled_s = 0.0
             self._purges_before_ns: int | None = None
             self._is_shrinking = False
@@ -134,16 +135,17 @@ class JournalFile:
 
     def _salvage(self) -> None:
         """Copy what is readable of a file that was quarantined now, or before the last stop."""
-        name = Path(self.quarantined).name or get_meta(self._connection, _SALVAGE)
+        name = get_meta(self._connection, SALVAGE)
         if not name:
             return
-        set_meta(self._connection, _SALVAGE, name)
-        salvage(self._path.with_name(name), self._connection)
+        quarantined = self._path.with_name(name)
+        self.quarantined = str(quarantined)
+        salvage(quarantined, self._connection)
         with transaction(self._connection):
             # It is unknown what could not be read, so each run counts as incomplete up to now.
             for run in self._runs():
                 note_lost(self._connection, run.root, self._last(run).stamp_ns)
-            self._connection.execute("DELETE FROM meta WHERE key = ?", (_SALVAGE,))
+            self._connection.execute("DELETE FROM meta WHERE key = ?", (SALVAGE,))
 
     def note_world(self, world: World) -> None:
         """Write which world is observed from now on."""
@@ -235,12 +237,17 @@ class JournalFile:
                 return self.begin(now, before, joins=older.id)
         return before
 
-    def retain_run(self, run: Run) -> None:
-        """Write the current run into this file, as it was in another file that is gone."""
-        if all(known.id != run.root for known in self._runs()):
+    def retain_run(self, run: Run, end: tuple[str, int]) -> None:
+        """Go on with a run; `end` is the `end` of the file that was written before this one.
+
+        If this one ends elsewhere, what the run received may be missing: it is new, or a backup.
+        """
+        is_new = all(known.id != run.root for known in self._runs())
+        # A salvage has noted what it may have lost.
+        if is_new or not (self.quarantined or self.end == end):
             with self._transaction():
-                begun_seq = self._appender.last_seq + 1
-                put_run(self._connection, Run(run.root, run.begun, begun_seq))
+                if is_new:
+                    put_run(self._connection, Run(run.root, run.begun, self.end[1] + 1))
                 since_ns = time.time_ns() - run.begun.arrival_ns
                 note_lost(self._connection, run.root, run.begun.stamp_ns + since_ns)
 
@@ -377,6 +384,7 @@ class JournalFile:
         except BaseException:
             self._appender = Appender(self._connection)
             raise
+        self.end = self.journal_id, self._appender.last_seq
         self._syncing.has_written()
 
 

@@ -31,10 +31,13 @@ from lupin_twin.journal.schema import (
     empty_file,
     insert_into,
     is_damage_error,
+    open_writer,
     set_meta,
     transaction,
 )
 
+# Key of the quarantined file's name, until it has been salvaged.
+SALVAGE: Final = "salvage"
 # Rows that are read at once; around damage, fewer.
 _LOT: Final = 1_000
 _LAST: Final = 2**61
@@ -87,14 +90,21 @@ def numbered(path: Path, end: str) -> Iterator[Path]:
 
 
 def quarantine(path: Path, when: str) -> Path:
-    """Rename a file and its WAL; returns the new path. No data is deleted or overwritten."""
+    """Rename a file and its WAL; returns the new path. No data is deleted or overwritten.
+
+    In its place comes a new file which names it, so that a salvage that fails is done again.
+    """
     quarantined = next(name for name in numbered(path, f".damaged-{when}") if not name.exists())
+    new = path.with_name(path.name + ".new")
+    with closing(open_writer(new)) as connection:
+        set_meta(connection, SALVAGE, quarantined.name)
     log = path.with_name(path.name + "-wal")
     if log.exists():
         log.rename(quarantined.with_name(quarantined.name + "-wal"))
     # SQLite rebuilds the WAL's index from the WAL; one left behind would be of another file.
     path.with_name(path.name + "-shm").unlink(missing_ok=True)
     path.rename(quarantined)
+    new.rename(path)
     return quarantined
 
 
@@ -269,7 +279,7 @@ def _copy_facts(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> 
         if run != key and run.isdecimal() and str(value).isdecimal():
             # The whole hour is counted already.
             purged[int(run)] = (int(value) // HOUR_NS + 1) * HOUR_NS - 1
-        if key not in ("journal_id", "salvage", LAST_SEQ):
+        if key not in ("journal_id", SALVAGE, LAST_SEQ):
             set_meta(new, key, value)
     # New numbers are past those of all rows that may have been lost at the end.
     set_meta(new, LAST_SEQ, largest + 1_000_000)

@@ -170,6 +170,8 @@ class Journal:
         # Owned by the writer thread.
         self._runs: list[Run] = []
         self._lock: Lock | None = None
+        # The last one that could be opened.
+        self._file: JournalFile | None = None
         self._failures = 0
         self._is_sound: bool | None = None
         self._heals_from_s = -math.inf
@@ -281,6 +283,8 @@ class Journal:
                     self._is_sound = False
                     if not self._failures:
                         wait_s = 0.0  # a starting twin waits for what can be salvaged
+                elif self._is_sound is False:
+                    self._is_sound = None  # perhaps it is quarantined, and only its salvage failed
                 if wait_s:
                     self._was_attempted.set()
             if self._stop.is_set():
@@ -303,8 +307,10 @@ class Journal:
             self._is_sound = True
             self._quarantined = file.quarantined or self._quarantined
             file.note_world(self._world)
-            if self._runs:
-                file.retain_run(self._runs[-1])
+            if self._file is not None:
+                for run in self._runs:
+                    file.retain_run(run, self._file.end)
+            self._file = file
             is_last = False
             while not is_last:
                 is_last = self._stop.is_set()

@@ -152,6 +152,7 @@ def test_a_file_of_another_application_is_left_alone_and_named(tmp_path: Path) -
             assert (done.returncode, done.stdout) == (1, "")
             assert named in done.stderr
         assert path.read_bytes() == before
+    assert {*tmp_path.iterdir()} - {*tmp_path.glob("theirs*")} == {recorded, empty}
 
 
 # --- what it prints ------------------------------------------------------------------------------

@@ -327,7 +327,7 @@ class JournalFile:
 
     def size(self) -> int:
         """Bytes on the disk, the WAL included."""
-        return self._path.stat().st_size + self._log_bytes()
+        return self._path.stat().st_size + size_of(self._log)
 
     # --- upkeep -------------------------------------------------------------------------------
 
@@ -351,7 +351,7 @@ class JournalFile:
                 self.lost_log = f"{self._log} was removed: restart the twin, nothing is lost so far"
         # A removed WAL is lost when the process ends, so its content goes into the file at once. We
         # cannot begin a new one, because readers still have the old one open.
-        if self.lost_log or self._log_bytes() > _LOG_BYTES:
+        if self.lost_log or size_of(self._log) > _LOG_BYTES:
             self._connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
         return may_purge and self._purge(now_s)
 
@@ -374,9 +374,6 @@ class JournalFile:
         else:
             self._is_shrinking = shrink_step(self._connection)
         return self._purges_before_ns is not None or self._is_shrinking
-
-    def _log_bytes(self) -> int:
-        return size_of(self._log)
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:

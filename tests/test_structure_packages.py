@@ -9,9 +9,8 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterable
-from importlib.metadata import packages_distributions
+from importlib.metadata import distributions, packages_distributions
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 from xml.etree import ElementTree
 
@@ -172,51 +171,11 @@ def test_each_package_has_tests_of_its_own_that_need_nothing_of_the_repository(
     assert "skipped" not in done.stdout
 
 
-@pytest.fixture
-def set_up(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """The arguments of a package's setup.py to setuptools."""
-
-    def run(package: str) -> dict[str, Any]:
-        reported: dict[str, Any] = {}
-        setuptools = ModuleType("setuptools")  # the real one would set up this process
-        setuptools.setup = lambda **arguments: reported.update(arguments)  # type: ignore[attr-defined]
-        setuptools.find_packages = lambda **_: []  # type: ignore[attr-defined]
-        monkeypatch.setitem(sys.modules, "setuptools", setuptools)
-        monkeypatch.chdir(ROS_NODE / package)
-        exec(compile(Path("setup.py").read_text(encoding="utf-8"), "setup.py", "exec"), {})
-        return reported
-
-    return run
-
-
-@pytest.mark.parametrize("package", PACKAGES)
-def test_every_file_of_a_package_exists_and_is_installed(package: str, set_up: Any) -> None:
-    installed = {file: to for to, files in set_up(package)["data_files"] for file in files}
-    assert [file for file in installed if not Path(file).is_file()] == []
-    assert installed.pop(f"resource/{package}") == "share/ament_index/resource_index/packages"
-    assert installed.pop("package.xml") == f"share/{package}"
-    folders = map(Path, ("launch", "config", "rviz"))
-    shared = [p.as_posix() for folder in folders for p in folder.glob("*") if p.is_file()]
-    assert installed == {file: f"share/{package}/{Path(file).parent}" for file in shared}
-
-
-@pytest.mark.parametrize("package", PACKAGES)
-def test_names_versions_and_commands_agree(package: str, set_up: Any) -> None:
-    reported = set_up(package)
-    document = ElementTree.parse("package.xml")
-    for field in ("name", "version", "license"):
-        assert reported[field] == document.findtext(field)
-    for script in reported["entry_points"]["console_scripts"]:
-        module, function = re.fullmatch(r"\w+ = ([\w.]+):(\w+)", script).groups()  # type: ignore[union-attr]
-        source = Path(f"{module.replace('.', '/')}.py").read_text(encoding="utf-8")
-        assert f"def {function}(" in source
-
-
 @pytest.mark.parametrize(
     ("package", "executables"),
     [("lupin_twin", {"twin_node", "adapt"}), ("lupin_patrol", {"patrol_node"})],
 )
-def test_every_executable_is_where_ros2_run_looks_and_runs(
+def test_all_of_a_package_is_installed_where_ros2_looks_and_runs(
     package: str, executables: set[str], tmp_path: Path
 ) -> None:
     """Installed as colcon does; `ros2 run` takes it from lib/PACKAGE of the prefix in the index."""
@@ -226,10 +185,25 @@ def test_every_executable_is_where_ros2_run_looks_and_runs(
     command = [sys.executable, "setup.py", "build", *install, "--prefix", str(prefix)]
     subprocess.run(command, cwd=source, check=True, capture_output=True)
     assert (prefix / "share/ament_index/resource_index/packages" / package).is_file()
+    share = prefix / "share" / package
+    shared = {
+        path.relative_to(source)
+        for folder in ("launch", "config", "rviz")
+        for path in (source / folder).glob("*")
+        if path.is_file()
+    }
+    files = {path.relative_to(share) for path in share.rglob("*") if path.is_file()}
+    assert files == {Path("package.xml"), *shared}
+    (own,) = prefix.glob("lib/python3*/site-packages")
+    (installed,) = distributions(path=[str(own)])
+    document = ElementTree.parse(share / "package.xml")
+    assert installed.name.replace("-", "_") == package == document.findtext("name")
+    for field in ("version", "license"):
+        assert installed.metadata[field] == document.findtext(field)
+    assert all(callable(script.load()) for script in installed.entry_points)
     found = list((prefix / "lib" / package).iterdir())
     assert {path.name for path in found if os.access(path, os.X_OK)} == executables
     if "adapt" in executables:
-        (own,) = prefix.glob("lib/python3*/site-packages")
         env = {**os.environ, "PYTHONPATH": str(own)}
         command = [str(prefix / "lib" / package / "adapt"), "--help"]
         reported = subprocess.run(command, env=env, capture_output=True, text=True, check=True)

@@ -2,19 +2,9 @@
 
 import fcntl
 import os
-import sys
 from pathlib import Path
 
-import pytest
-
-from tests.support.domains import ros_env
-from tests.support.processes import Process
 from tests.support.shared_memory import LOCK, YOUNG_S, remove_what_the_dead_left
-
-PARTICIPANT = (
-    "import rclpy, signal; rclpy.init(); node = rclpy.create_node('n'); "
-    "print('there', flush=True); signal.pause()"
-)
 
 
 def segment(folder: Path, name: str, age_s: float = 2 * YOUNG_S) -> Path:
@@ -37,16 +27,3 @@ def test_only_old_unlocked_segments_are_removed(tmp_path: Path) -> None:
         assert remove_what_the_dead_left(tmp_path) == 1
     gone = before - set(tmp_path.iterdir())
     assert {path.name for path in gone} == {"fastrtps_dead", f"fastrtps_dead{LOCK}"}
-
-
-def test_a_participant_locks_its_segment_as_long_as_it_lives(domain: int) -> None:
-    with Process([sys.executable, "-c", PARTICIPANT], ros_env(domain)) as process:
-        process.wait_for_output("there")
-        files = {path.readlink() for path in Path(f"/proc/{process.pid}/fd").iterdir()}
-        [lock] = [path for path in files if path.match(f"/dev/shm/fastrtps_[!p]*{LOCK}")]
-        with lock.open("rb") as file:
-            with pytest.raises(BlockingIOError):
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            process.kill()
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            assert lock.exists(), "a killed process leaves it behind"

@@ -264,9 +264,12 @@ class Bridge:
         ):
             if counts is not None:
                 yield name, {str(why): counts.dropped.get(why, 0) for why in Reason}
-        if journal.state == "unknown":  # absent, not zero
+        # Not the state of what is read here: a copy can be read while nothing is added to it.
+        recording = status.update.journal.state
+        if recording != "unknown":  # absent, not zero
+            yield "lupin_journal_recording", recording == "recording"
+        if journal.state == "unknown":
             return
-        yield "lupin_journal_recording", journal.state == "recording"
         yield "lupin_journal_rows", journal.written
         yield "lupin_journal_rows_lost", journal.lost
         yield "lupin_journal_rows_waiting", journal.waiting

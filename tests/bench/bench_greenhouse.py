@@ -8,8 +8,9 @@ from collections.abc import Callable
 
 from playwright.sync_api import CDPSession, Page
 
-from tests.bench.bench_page import chromium, page_of
+from tests.bench.bench_page import page_of
 from tests.bench.greenhouse_double import greenhouse_of
+from tests.browser.conftest import chromium
 from tests.support.web import bridge
 
 SIZES = (1_000, 10_000)

@@ -11,7 +11,7 @@ from pathlib import Path
 from playwright.sync_api import Page as BrowserPage
 
 from lupin_twin.core.state import Write
-from tests.bench.bench_page import chromium
+from tests.browser.conftest import chromium
 from tests.support.archive import Archive, forward_once
 from tests.support.fleet import Page, fleet, recent_scans, write
 from tests.support.journal import SECOND, scan

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 
-from playwright.sync_api import Browser, Page, ViewportSize, expect, sync_playwright
+from playwright.sync_api import Browser, Page, ViewportSize, expect
 
-from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
+from tests.browser.conftest import chromium
 from tests.support.messages import inspection, occupancy_grid, scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -64,18 +64,6 @@ def main() -> None:
     with chromium() as browser:
         print_first_paint(browser)
         print_panning(browser)
-
-
-@contextmanager
-def chromium() -> Iterator[Browser]:
-    """The browser of the tests."""
-    with (
-        sync_playwright() as playwright,
-        playwright.chromium.launch(
-            executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
-        ) as browser,
-    ):
-        yield browser
 
 
 @contextmanager

@@ -252,33 +252,7 @@ async def test_a_busy_memory_at_the_start_is_queried_again(monkeypatch: pytest.M
         await until(is_learnt, "the rhythm")
 
 
-async def test_a_second_twin_is_reported(caplog: pytest.LogCaptureFixture) -> None:
-    async with Stage() as stage:
-        stage.script.tell(state(1))
-        stage.script.tell(replace(state(2), twin_count=2))
-        reported = stage.ear.frames[-1] if stage.ear.reasons[-1] == "live" else {}
-        await until(lambda: any("2 twins" in f.get("message", "") for f in stage.ear.frames), "it")
-        assert reported
-        assert "2 twins publish on the same topic" in caplog.text
-
-
 # --- the watch ----------------------------------------------------------------------------------
-
-
-async def test_the_watch_survives_an_error(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    async with Stage() as stage:
-        looks = 0
-
-        def fail(_now_s: float) -> int:
-            nonlocal looks
-            looks += 1
-            raise RuntimeError("a defect")
-
-        monkeypatch.setattr(stage.bridge.hub, "dismiss_stuck", fail)
-        await until(lambda: looks >= 2, "a second check")
-        assert "the watch had an error and continues" in caplog.text
 
 
 async def test_a_client_with_a_low_rate_gets_the_latest_although_nothing_more_happens() -> None:

@@ -1,8 +1,6 @@
 """A copy of a journal: made while its twin writes, complete, and enough for a restart."""
 
 import sqlite3
-import subprocess
-import sys
 from contextlib import closing
 from pathlib import Path
 
@@ -11,17 +9,13 @@ import pytest
 
 from lupin_bridge.cli.command import main
 from lupin_bridge.console import backup
+from tests.support.bags import no_file_above
 from tests.support.journal import NOW, append
 from tests.support.journal import scan as row
 from tests.support.messages import scan
-from tests.support.processes import lupin_twin, url_of
+from tests.support.processes import lupin_twin, run_here, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
-
-
-def journal(*words: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "lupin_bridge.cli.command", "journal", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 def test_another_twin_starts_from_a_backup_of_a_running_one(domain: int, tmp_path: Path) -> None:
@@ -31,6 +25,9 @@ def test_another_twin_starts_from_a_backup_of_a_running_one(domain: int, tmp_pat
         answer = httpx.get(f"{url}/api/state", trust_env=False, timeout=PATIENCE_S)
         return {tag["tag_id"] for tag in answer.json()["tags"]}
 
+    def rows() -> str:
+        return run_here("journal", "export", "--journal", source).stdout
+
     with (
         Peer(domain) as robot,
         lupin_twin(domain, "serve", "--ros-args", "-p", f"journal:={source}") as twin,
@@ -38,19 +35,23 @@ def test_another_twin_starts_from_a_backup_of_a_running_one(domain: int, tmp_pat
         url = url_of(twin)
         robot.observe(scan("before", {"co2": 1.0}))
         wait_for(lambda: "before" in tags(url), "the first tag")
-        wait_for(lambda: "before" in journal("export", "--journal", source).stdout, "its row")
-        assert journal("backup", copy, "--journal", source).returncode == 0
+        wait_for(
+            lambda: "before" in run_here("journal", "export", "--journal", source).stdout, "its row"
+        )
+        assert run_here("journal", "backup", copy, "--journal", source).returncode == 0
         # It is complete by itself: no file lies beside it.
         assert list(tmp_path.glob("copy.sqlite*")) == [copy]
         robot.observe(scan("after", {"co2": 3.0}))
         wait_for(lambda: "after" in tags(url), "the last tag")
-        wait_for(lambda: "after" in journal("export", "--journal", source).stdout, "its row")
+        wait_for(
+            lambda: "after" in run_here("journal", "export", "--journal", source).stdout, "its row"
+        )
         twin.stop()
     # As the docs say.
     for beside in ("-wal", "-shm"):
         source.with_name(source.name + beside).unlink(missing_ok=True)
     source.write_bytes(copy.read_bytes())
-    assert journal("check", "--journal", source).returncode == 0
+    assert run_here("journal", "check", "--journal", source).returncode == 0
     # The robot has gone: it would repeat what it published after the copy.
     with lupin_twin(domain, "serve", "--ros-args", "-p", f"journal:={source}") as twin:
         assert tags(url_of(twin)) == {"before"}
@@ -96,20 +97,12 @@ def test_nothing_is_overwritten_and_a_failed_backup_is_named(
     assert taken.read_text(encoding="ascii") == "mine"
 
 
-def test_a_failed_backup_leaves_no_file(tmp_path: Path) -> None:
+def test_a_failed_backup_leaves_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source, copy = tmp_path / "twin.sqlite", tmp_path / "copy.sqlite"
     append(source, [row(at_ns=NOW + n, a=n / 3) for n in range(2000)])
     assert source.stat().st_size > 40_960
-    # A limit of 40 kB a file: enough for SQLite's 32 kB beside the journal, not for the copy.
-    # Its signal is ignored, so that SQLite sees the error.
-    limit = "import resource as r, signal as s, runpy, sys; s.signal(s.SIGXFSZ, s.SIG_IGN);"
-    limit += " r.setrlimit(r.RLIMIT_FSIZE, (40_960, 40_960));"
-    limit += " runpy.run_module('lupin_bridge.cli.command', run_name='__main__')"
-    words = ["journal", "backup", str(copy), "--journal", str(source)]
-    done = subprocess.run(
-        [sys.executable, "-c", limit, *words],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 1, done.stderr
-    assert done.stderr.splitlines()[-1].startswith(f"lupin-twin: cannot write {copy}: ")
+    # Enough for SQLite's 32 kB beside the journal, not for the copy.
+    with no_file_above(40_960):
+        assert main(["journal", "backup", str(copy), "--journal", str(source)]) == 1
+    assert f"\nlupin-twin: cannot write {copy}: " in capsys.readouterr().err
     assert list(tmp_path.glob("copy*")) == []

@@ -7,7 +7,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from websockets.sync.client import connect
 
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.metrics import CONTENT_TYPE, METRICS, Metrics
+from lupin_bridge.metrics import CONTENT_TYPE, METRICS
 from lupin_bridge.settings import Settings
 from lupin_twin.estimate.engine import Record, Tally
 from lupin_twin.runtime.estimates import Report
@@ -63,14 +63,6 @@ def test_every_metric_exists_and_follows_what_happens(domain: int) -> None:
         assert (after["lupin_ros_thread_alive"], after["lupin_twin_live"]) == (1.0, 1.0)
         assert after["lupin_state_age_seconds"] < 3.0
         assert after["lupin_ros_callback_errors_total"] == 0.0
-
-
-def test_metrics_by_name_have_it_as_a_label_gauges_too() -> None:
-    labelled = [("lupin_outward_waiting", {"mqtt": 3}), ("lupin_outward_sent", {"webhook": 2})]
-    text = Metrics(lambda: labelled).text().decode()
-    assert '\nlupin_outward_waiting{channel="mqtt"} 3.0\n' in text
-    assert "# TYPE lupin_outward_waiting gauge" in text
-    assert '\nlupin_outward_sent_total{channel="webhook"} 2.0\n' in text
 
 
 def test_wrong_estimates_are_counted_by_sensor() -> None:

@@ -27,11 +27,6 @@ def refusal(*pairs: tuple[str, str]) -> str:
     return str(refused.value)
 
 
-def test_each_name_has_its_value() -> None:
-    assert read(Some, [("from", "5"), ("a", "7")]) == Some("7", 5)
-    assert read(Some, [("a", "7"), ("c", "y")]) == Some("7", 2, "y")
-
-
 @pytest.mark.parametrize(
     ("parameters", "why"),
     [
@@ -60,11 +55,6 @@ def test_any_query_string_is_parsed_or_refused(pairs: list[tuple[str, str]]) -> 
 
 
 # --- options of a WebSocket client ----------------------------------------------------------------
-
-
-def test_without_options_a_client_gets_every_state_whole() -> None:
-    requested = read(ListenQuery, [])
-    assert (requested.delta, requested.min_interval_s) == (False, 0.0)
 
 
 def test_the_lowest_rate_is_one_and_anything_lower_is_refused() -> None:

@@ -52,18 +52,26 @@ CHROMIUM_ARGS = (
 )
 
 
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """The browser of tests, benchmarks and pictures."""
+    with (
+        sync_playwright() as playwright,
+        playwright.chromium.launch(
+            executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
+        ) as browser,
+    ):
+        yield browser
+
+
 # Not by session: Playwright keeps an event loop running in this thread, and other tests of the
 # same worker call asyncio.run().
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
     """A headless Chromium with an empty profile."""
     expect.set_options(timeout=PATIENCE_S * 1000)
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
-        )
-        with chromium:
-            yield chromium
+    with chromium() as launched:
+        yield launched
 
 
 TICK_S = 0.5

@@ -6,10 +6,10 @@ import time
 from pathlib import Path
 from urllib.request import urlopen
 
-from playwright.sync_api import Browser, Page, ViewportSize, expect, sync_playwright
+from playwright.sync_api import Browser, Page, ViewportSize, expect
 
 from tests.browser import estimate_pictures, moving_picture
-from tests.browser.conftest import CHROMIUM, CHROMIUM_ARGS
+from tests.browser.conftest import chromium
 from tests.support.domains import own_domain
 from tests.support.processes import lupin_twin, url_of
 from tests.support.state_home import use_own
@@ -28,10 +28,7 @@ def main() -> int:
     with (
         own_domain() as domain,
         lupin_twin(domain, "demo", "--speed", str(PATROL_SPEED)) as server,
-        sync_playwright() as playwright,
-        playwright.chromium.launch(
-            executable_path=CHROMIUM, args=list(CHROMIUM_ARGS), headless=True
-        ) as browser,
+        chromium() as browser,
     ):
         url = url_of(server)
         wait_for_second_pass(browser, url)

@@ -3,10 +3,11 @@
 import re
 
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, expect
+from playwright.sync_api import Page, expect
 
 from lupin_bridge.app import GUIDE_FOLDER
 from lupin_bridge.settings import option, table
+from tests.browser.hmi import OpenPage
 from tests.support.docs import DOCS
 from tests.support.web import bridge
 
@@ -22,21 +23,9 @@ def url() -> object:
 
 
 @pytest.fixture
-def page(browser: Browser) -> object:
+def page(url: str, open_page: OpenPage) -> Page:
     """A page; any error in the browser's console fails the test."""
-    wording: list[str] = []
-    context = browser.new_context()
-    page = context.new_page()
-
-    def receive(message: ConsoleMessage) -> None:
-        if message.type in ("error", "warning"):
-            wording.append(message.text)
-
-    page.on("console", receive)
-    page.on("pageerror", lambda error: wording.append(str(error)))
-    yield page
-    context.close()
-    assert wording == []
+    return open_page(url, go=False).page
 
 
 def test_every_page_was_built_and_all_together_are_small() -> None:

@@ -111,6 +111,11 @@ def test_on_a_phone_open_actions_come_first_in_full_and_the_page_scrolls(
         return line.bottom <= first.top and last.bottom <= plan.top
 
     wall.expect(are_in_order, "the list above the map, nothing over it")
+    # What a row waits for takes no line of its own.
+    row = "li[data-tag-id='3'] .attention-do"
+    expect(wall.page.locator(f"{row} small")).to_have_text("no alarm yet")
+    todo, waits = places(wall, f"{row} strong", f"{row} small")
+    assert waits.top < todo.bottom
     # Its header is one row on a phone of the usual width.
     wall.resize(390, 740)
     wall.expect(lambda: len({round(_middle(wall, part)) for part in _HEADER}) == 1, "one row")

@@ -22,11 +22,6 @@ FLOWER = Flower("lupin", 0.75, True, 12, 3, (BLOOM,), CORNERS)
 FLOWERS = Visited(3.2, 4, 0.0, Inspection("7", 0, FLOWER, POSE))
 
 
-@pytest.fixture(autouse=True)
-def _field_checks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_PYTHON_CHECK_FIELDS", "1")
-
-
 def over_the_wire(message: Any) -> Any:
     """The received message; a value of the wrong type does not survive this."""
     received = deserialize_message(serialize_message(message), type(message))

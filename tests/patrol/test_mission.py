@@ -165,9 +165,6 @@ def test_poses_are_exact_at_first_and_jitter_a_little_later(patrol: list[Event])
             assert yaw_of(scan.pose) == pytest.approx(tag.yaw, abs=0.1)
 
 
-# --- flowers -------------------------------------------------------------------------------------
-
-
 # --- the robot and the day -----------------------------------------------------------------------
 
 

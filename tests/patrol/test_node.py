@@ -187,13 +187,6 @@ def test_a_signal_ends_it_without_errors_even_while_it_waits_for_long(domain: in
         assert "Traceback" not in process.output
 
 
-def test_a_signal_ends_it_without_errors_without_subscribers(domain: int) -> None:
-    with patrol(domain) as process:
-        process.wait_for_output("patrol starts")
-        assert process.stop(signal.SIGTERM) == 0
-        assert "Traceback" not in process.output
-
-
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [

@@ -238,7 +238,7 @@ class People:
     async def _on_thread(self, work: Callable[[], ResultT], most: int = MAX_WAITING) -> ResultT:
         if self._waiting >= most:
             raise ClientLimitError(
-                f"{MAX_WAITING} sign-ins are already waiting: try again in a moment", 2.0
+                f"{self._waiting} sign-ins and changes are waiting: try again in a moment", 2.0
             )
         self._waiting += 1
         try:

@@ -20,7 +20,7 @@ from lupin_bridge.archive.database import ArchiveError
 from lupin_twin.core.past import Event
 from lupin_twin.journal.appending import PURGED_SEQ, Appender
 from lupin_twin.journal.follow import rows_behind
-from lupin_twin.journal.paths import forwarded_seq, note_forwarded
+from lupin_twin.journal.paths import files_of, forwarded_seq, note_forwarded
 from lupin_twin.journal.retention import RECORD
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
@@ -117,8 +117,9 @@ class Source:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._inode = path.stat().st_ino
         self._connection = open_named(path)
+        # Only now, because opening makes a WAL where there is none.
+        self._files = files_of(path)
         self._log = SiteLog(self._connection)
         self._version = -1
         self._sent: frozenset[tuple[str, Row]] = frozenset()
@@ -135,11 +136,8 @@ class Source:
         return self._log.journal_id
 
     def is_replaced(self) -> bool:
-        """Whether its path is now that of another file, or of none."""
-        try:
-            return self._path.stat().st_ino != self._inode
-        except FileNotFoundError:
-            return True
+        """Whether its path, or its WAL's, is now that of another file, or of none."""
+        return files_of(self._path) != self._files
 
     def has_changed(self) -> bool:
         """Whether anybody has written since the last call."""

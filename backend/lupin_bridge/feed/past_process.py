@@ -87,14 +87,18 @@ class PastProcess:
             self._send()
             return await answer  # type: ignore[no-any-return]
         except asyncio.CancelledError:
-            if self._queries is not None:
-                self._queries.write(pickle.dumps((number, None)))
-                if self._patience.when() is None:
-                    self._patience.reschedule(asyncio.get_running_loop().time() + STUCK_S)
+            self.cancel(number)
             raise
         finally:
             del self.pending[number]
             self._unsent.pop(number, None)
+
+    def cancel(self, number: int = 0) -> None:
+        """End a query, or none (0). A process that does not react is replaced."""
+        if self._queries is not None:
+            self._queries.write(pickle.dumps((number, None)))
+            if self._patience.when() is None:
+                self._patience.reschedule(asyncio.get_running_loop().time() + STUCK_S)
 
     def _send(self) -> None:
         if self._queries is None:

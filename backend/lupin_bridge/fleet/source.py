@@ -97,9 +97,12 @@ class Watching:
         try:
             patience_s = STUCK_S if self.looks else _START_S
             done, _ = await asyncio.wait((look,), timeout=patience_s)
-            # A reason that was reported before stays: that of a cancelled query says more.
-            if not done and (self.archive.is_reachable or not self.archive.since_ns):
-                self._down(f"the archive has not answered for {STUCK_S:g} s")
+            if not done:
+                # Not the look itself, because another one must not run beside it.
+                self.process.cancel()
+                # A reason that was reported before stays: that of a cancelled query says more.
+                if self.archive.is_reachable or not self.archive.since_ns:
+                    self._down(f"the archive has not answered for {STUCK_S:g} s")
             return await look
         finally:
             look.cancel()

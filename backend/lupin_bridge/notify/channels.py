@@ -23,7 +23,7 @@ import orjson
 
 from lupin_bridge.alarms.board import Change
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.feed.tasks import Periodic
+from lupin_bridge.feed.tasks import Guard, Periodic
 from lupin_bridge.judge.judging import unix_s
 from lupin_bridge.judge.quantities import Sensors
 from lupin_bridge.notify.destinations import Targets
@@ -69,35 +69,35 @@ class DailyReport(Periodic):
     def __init__(self, target: DailyTarget, channel: Mqtt | Webhook, of: Source) -> None:
         super().__init__(self._attempt, POLL_S, "the report of the day", first_s=0.0)
         self._target, self._channel, self._of = target, channel, of
-        self._why = ""
+        known = NotRemembered, PastRefused, TwinUnavailableError, OSError
+        self._guard = Guard(f"the report of the day is not sent by {channel.name}", *known)
         # The last one sent, which is not sent again and again if that cannot be noted.
         self._sent: tuple[Path, int] | None = None
 
     async def _attempt(self) -> None:
-        try:
-            why = await self._look()
-        except (NotRemembered, PastRefused, TwinUnavailableError, OSError) as error:
-            why = str(error)
-        if why and why != self._why:
-            log.warning("the report of the day is not sent by %s: %s", self._channel.name, why)
-        self._why = why
+        await self._guard.run(self._look())
 
-    async def _look(self) -> str:
-        """Send the report that is due; returns why it cannot be sent; empty: nothing is wrong."""
+    async def _look(self) -> None:
+        """Send the report that is due.
+
+        Raises:
+            Exception: it cannot be sent, for this reason.
+
+        """
         of = self._of
         now_ns, journal, target = of.ros_time_ns, of.source.journal(), self._target
         if now_ns is None or not journal.journal_id:
-            return ""
+            return
         if unix_s(now_ns) is None:
-            return "the time is simulated, and has no time of day"
+            raise PastRefused("the time is simulated, and has no time of day")
         file = self._file(journal.journal_id)
         newest_ns = target.ended_ns(now_ns)
         last_ns = _read(file)
         if last_ns is None or last_ns > now_ns:
             _write(file, newest_ns)  # the first one will be the next day's
-            return ""
+            return
         if last_ns >= newest_ns:
-            return ""
+            return
         oldest_ns = target.ended_ns(now_ns, 1 - MOST_DAYS)
         due_ns = target.ended_ns(last_ns, 1)
         if due_ns < oldest_ns:
@@ -105,7 +105,7 @@ class DailyReport(Periodic):
             due_ns = oldest_ns
         complete_ns = journal.complete_ns or 0
         if complete_ns < due_ns and now_ns < due_ns + LATE_NS:
-            return ""
+            return
         report = Report(target.ended_ns(due_ns, -1), due_ns, of.criteria, journal)
         try:
             if self._sent != (file, due_ns):
@@ -117,7 +117,6 @@ class DailyReport(Periodic):
             log.error("the report up to %s is skipped: %s", compact(due_ns), error)  # noqa: TRY400
         self._sent = file, due_ns
         _write(file, due_ns)
-        return ""
 
     async def _send(self, report: Report) -> None:
         found = await self._of.source.ask(partial(answered, report, ""), REPORT_S)
@@ -227,9 +226,6 @@ class Channels:
 
     def counts(self) -> Iterator[tuple[str, Mapping[str, int]]]:
         """Yield each metric with its values by channel."""
-        conditions = {it.name: it.condition for it in self._running}
-        yield "lupin_outward_connected", {k: int(it.is_connected) for k, it in conditions.items()}
-        yield "lupin_outward_waiting", {k: it.waiting for k, it in conditions.items()}
-        yield "lupin_outward_sent", {k: it.sent for k, it in conditions.items()}
-        yield "lupin_outward_failed", {k: it.failed for k, it in conditions.items()}
-        yield "lupin_outward_dropped", {k: it.dropped for k, it in conditions.items()}
+        for name in ("is_connected", "waiting", "sent", "failed", "dropped"):
+            values = {it.name: int(getattr(it.condition, name)) for it in self._running}
+            yield f"lupin_outward_{name.removeprefix('is_')}", values

@@ -164,11 +164,7 @@ class Push:
         source = self._source
         notes = source.notes.notes or ()
         said = notes_of_alarms(source.alarms.now.alarms, notes, source.ros_time_ns)
-        wanted = {
-            name: alarm
-            for name, alarm in alarms.items()
-            if said.get(name, NOTHING_SAID).shelved is None
-        }
+        wanted = {k: v for k, v in alarms.items() if said.get(k, NOTHING_SAID).shelved is None}
         if not wanted:
             return
         for device in await self._devices():
@@ -201,7 +197,6 @@ class Push:
 
     async def _send(self, device: Device, message: bytes) -> None:
         """Post until the push service takes it, no longer knows the device, or was tried enough."""
-        host = urlsplit(device.endpoint).hostname or ""
 
         async def attempt() -> None:
             try:
@@ -221,18 +216,12 @@ class Push:
 
         backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
         try:
+            what, where = "a push notification", urlsplit(device.endpoint).hostname or ""
             await until_taken(
-                attempt,
-                self.condition,
-                backoff,
-                "a push notification",
-                host,
-                max_attempts=MAX_ATTEMPTS,
+                attempt, self.condition, backoff, what, where, max_attempts=MAX_ATTEMPTS
             )
         except DeviceGone:
             await self._people.write(lambda it, _: it.remove_device(device.endpoint))
-        except DeviceRefused as error:
-            raise DeviceRefused(f"{error} ({host})") from None
 
     async def _headers(self, endpoint: Endpoint) -> dict[str, str]:
         claims = {
@@ -263,7 +252,9 @@ class Push:
         for address in addresses:
             is_public = ip_address(address.partition("%")[0]).is_global
             if not is_public and endpoint.host not in self.target.private_hosts:
-                raise DeviceRefused(f"{address} is not a public address, see --push-private-host")
+                raise DeviceRefused(
+                    f"{address} of {endpoint.host} is not a public address, see --push-private-host"
+                )
         return replace(endpoint, address=addresses[0])
 
 

@@ -26,7 +26,7 @@ import h11
 import orjson
 
 from lupin_bridge.alarms.board import Change, happened_ns
-from lupin_bridge.feed.tasks import end
+from lupin_bridge.feed.tasks import Guard, end
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.notify.destinations import Endpoint, WebhookTarget
 from lupin_bridge.notify.messages import Backoff, Condition, Source
@@ -203,6 +203,7 @@ class Webhook:
         self._has_more.set()
 
     async def _run(self) -> None:
+        guard = Guard("the webhook had an error and continues")
         while True:
             while not self._waiting:
                 self._has_more.clear()
@@ -210,11 +211,9 @@ class Webhook:
             if self._waiting[0].origin == "unknown":
                 await self._wait_for_origin()
             delivery, lost = self._waiting.popleft(), self._lost
-            try:
-                is_taken = await self._send(delivery, lost)
-            except Exception as error:
-                log.exception("the webhook had an error and continues")
-                self.condition.failing(f"{type(error).__name__} ({self._target.called})")
+            is_taken = await guard.run(self._send(delivery, lost))
+            if isinstance(is_taken, Exception):
+                self.condition.failing(f"{type(is_taken).__name__} ({self._target.called})")
                 self.condition.dropped += 1
                 is_taken = False
                 # The next one may meet the same error.

@@ -18,7 +18,6 @@ import orjson
 
 from lupin_bridge.judge.episodes import SITE
 from lupin_bridge.judge.judging import Criteria, unix_s
-from lupin_bridge.judge.quantities import Span
 from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.plans import Plan, of_content
 from lupin_bridge.past.report import Report
@@ -220,7 +219,6 @@ class _Page:
         reason, tag = alarm["reason"], self._tags.get(alarm["tag_id"])
         raised, cleared, limit = alarm["raised_at"], alarm["cleared_at"], reason["limit"]
         numbers = reason["kind"] == "range"
-        unit = self._criteria.sensors.named(reason["sensor"]).unit if numbers else ""
         number, at_end = partial(self._number, sensor=reason["sensor"]), ""
         if tag is not None:
             pests = Reading("pest", float(tag.flower.bug_count), tag.looked_at_ns)
@@ -230,8 +228,6 @@ class _Page:
                     at_end = number(it.value, limit=limit)
                     if it.observed_at_ns is not None:
                         at_end += f" ({self._clock(stamp(it.observed_at_ns))})"
-        span = self._span(reason, tag) if numbers else None
-        low = "" if span is None else number(span.low).removesuffix(f"\u00a0{unit}") + "–"
         return {
             "alarm": f"{self._what(reason)} ({self._words['verdicts'][reason['verdict']]})",
             "point": alarm["tag_id"] or self.say("house"),
@@ -240,24 +236,29 @@ class _Page:
             "length": "" if cleared is None else self._length(cleared["sec"] - raised["sec"]),
             "at_end": at_end,
             "worst": number(alarm["worst"], limit=limit),
-            "limits": low + number(limit if span is None else span.high) if numbers else "",
+            "limits": self._limits(reason, tag) if numbers else "",
             "who": self._who(alarm),
         }
 
-    def _span(self, reason: Entry, tag: TagState | None) -> Span | None:
+    def _limits(self, reason: Entry, tag: TagState | None) -> str:
         """The range of its status whose limit, or the ideal one's, was passed at the start.
 
-        None: no range of today has that limit.
+        Only that limit, if no range of today has it. A range is written as on the page.
         """
         sensor = self._criteria.sensors.named(reason["sensor"])
+        number = partial(self._number, sensor=reason["sensor"])
         is_critical = reason["verdict"] == "critical"
         for species in ("" if tag is None else tag.flower.species, ""):
             for is_day in (True, False):
                 ranges = sensor.ranges(is_day=is_day, species=species)
                 for span in (ranges.ideal, ranges.critical):
                     if span is not None and reason["limit"] in {span.low, span.high}:
-                        return ranges.critical or span if is_critical else span
-        return None
+                        whole = ranges.critical or span if is_critical else span
+                        low = number(whole.low).removesuffix(f"\u00a0{sensor.unit}")
+                        # No-break spaces keep it on one line.
+                        text = self.say("period", **{"from": low, "to": number(whole.high)})
+                        return text.replace(" ", "\u00a0")
+        return number(reason["limit"])
 
     def _sensor(self, of: Entry) -> Iterable[str]:
         number = partial(self._number, sensor=of["sensor_type"])

@@ -84,7 +84,7 @@ async def notes_route(request: Request) -> Response:
     bridge = bridge_of(request)
     given = read(OfNotes, request.query_params.multi_items())
     start_ns, end_ns = given.span(bridge.ros_time_ns)
-    notes = _known(bridge)
+    notes = await _known(bridge)
 
     async def compute() -> Answer:
         gone = withdrawals(notes)
@@ -128,7 +128,7 @@ async def withdraw_note(request: Request, note_id: str) -> Response:
     """The author or an admin may withdraw a note."""
     bridge = bridge_of(request)
     person = _writer(request, bridge)
-    notes = _known(bridge)
+    notes = await _known(bridge)
     note = next((note for note in notes if note.id == note_id), None)
     if note is None or note.kind == WITHDRAW:
         raise Refused(f"there is no note {note_id[:64]!r}", 404)
@@ -160,11 +160,11 @@ def _writer(request: Request, bridge: Bridge) -> Person:
     return person
 
 
-def _known(bridge: Bridge) -> tuple[Note, ...]:
-    notes = bridge.notes.notes
-    if notes is None:
-        raise TwinUnavailableError("the notes have not been read yet")
-    return notes
+async def _known(bridge: Bridge) -> tuple[Note, ...]:
+    # If none were read yet, this reads them, or raises why they cannot be read.
+    if bridge.notes.notes is None:
+        await bridge.notes.look()
+    return bridge.notes.notes or ()
 
 
 def _now_ns(bridge: Bridge) -> int:

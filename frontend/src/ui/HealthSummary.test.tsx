@@ -39,7 +39,7 @@ test('says what to do first, and since when', () => {
   act(() => {
     receive({ alarms: alarms([], { source: 'starting' }) });
   });
-  expect(house().textContent).not.toContain('second scan');
+  expect(house().textContent).not.toContain('no alarm yet');
   act(() => {
     reportAlarms(alarm('a', { tag_id: '5', raised: 100, reason: pest }));
   });
@@ -129,7 +129,7 @@ test('that it is too cold is not shelved with that it was too warm', () => {
     showTags(TAGS, judgement({ 1: 'healthy', 5: [reason()] }));
     reportAlarms(alarm('warm', { tag_id: '5', reason: warm }));
   });
-  expect(todo.textContent).toMatch(/^CriticalTag 5: Temperature 6.6.*waiting for a second scan$/);
+  expect(todo.textContent).toMatch(/^CriticalTag 5: Temperature 6.6.*no alarm yet$/);
   stop();
 });
 
@@ -266,7 +266,9 @@ test('beside an active alarm, healthy says why', () => {
     reportAlarms(alarm('a'));
   });
   expect(house().dataset['health']).toBe('healthy');
-  expect(driver().textContent).toBe('1 alarm is still active: the next good scan resolves it');
+  expect(driver().textContent).toBe(
+    '1 alarm is still active: the next good scan or inspection resolves it',
+  );
   act(() => {
     reportAlarms(alarm('a', { cleared: 950 }));
   });

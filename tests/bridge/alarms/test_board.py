@@ -18,7 +18,6 @@ from lupin_bridge.alarms.board import (
 )
 from lupin_bridge.judge.episodes import MAX_EPISODES, Alarm
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
-from lupin_bridge.stream.state_json import alarm_json
 from lupin_twin.core.notes import ACKNOWLEDGE, SHELVE, WITHDRAW, Note
 from tests.support.seen import Alarms, alarm
 
@@ -135,22 +134,9 @@ SHELF = Note("1", NOW, "anna", SHELVE, "alarm:a", "heater", NOW + HOUR)
 FOUND = Note("0", NOW, "bert", ACKNOWLEDGE, "alarm:a")
 
 
-def test_an_alarm_shows_who_acknowledged_it_and_who_shelved_it_until_when() -> None:
-    message = [FOUND, SHELF]
-    found = alarm_json(COLD, notes_of_alarms([COLD], message, NOW).get("a"))
-    assert {name: value for name, value in found.items() if "_by" in name} == {
-        "acknowledged_by": "bert",
-        "shelved_by": "anna",
-    }
-    assert found["acknowledged_at"] == {"sec": 10**9, "nanosec": 0}
-    assert found["shelved_until"] == {"sec": 10**9 + 3_600, "nanosec": 0}
-    assert found["shelved_reason"] == "heater"
-    assert "acknowledged_by" not in alarm_json(COLD)
-    assert notes_of_alarms([COLD], message, None) == {}
-
-
 def test_a_shelf_ends_at_its_time_or_by_a_later_note_or_by_withdrawal() -> None:
     assert "a" in notes_of_alarms([COLD], [SHELF], NOW + HOUR - 1)
+    assert notes_of_alarms([COLD], [SHELF], None) == {}
     assert notes_of_alarms([COLD], [SHELF], NOW + HOUR) == {}
     ended = Note("2", NOW, "bert", SHELVE, "alarm:a")
     assert notes_of_alarms([COLD], [SHELF, ended], NOW) == {}

@@ -72,12 +72,17 @@ def reported(number: int, **over: object) -> TwinUpdate:
 
 
 @asynccontextmanager
-async def following() -> AsyncIterator[tuple[AlarmFeed, AlarmBoard, Journal]]:
+async def following(*writes: PastWrite) -> AsyncIterator[tuple[AlarmFeed, AlarmBoard, Journal]]:
+    """With writes: once the board has what the log has."""
     source, board = Journal(), AlarmBoard()
+    source.writes_now = list(writes)
     criteria = Criteria.of(Settings())
     feed = AlarmFeed(source, criteria, board, lambda: NOW, 7.0, note_days=lambda _: None)  # type: ignore[arg-type]
     feed.start()
     try:
+        if writes:
+            feed.on_state(reported(1))
+            await changed(board)
         yield feed, board, source
     finally:
         await feed.stop()
@@ -160,12 +165,8 @@ async def test_writes_older_than_the_window_are_counted_and_reported(
     assert defaults is not None
     monkeypatch.setitem(defaults, "kept", 8)
 
-    async with following() as (feed, board, source):
-        source.writes_now = [
-            replace(pest(number, 1), stamp_ns=NOW - 1_000 + number) for number in range(1, 70)
-        ]
-        feed.on_state(reported(1))
-        await changed(board)
+    early = [replace(pest(number, 1), stamp_ns=NOW - 1_000 + number) for number in range(1, 70)]
+    async with following(*early) as (feed, board, source):
         source.writes_now.append(replace(pest(99, 1), stamp_ns=NOW - 1_000))
         feed.on_state(reported(2))
         await until(lambda: feed.missed == 1, "that it was missed")
@@ -174,10 +175,7 @@ async def test_writes_older_than_the_window_are_counted_and_reported(
 
 
 async def test_a_missing_twin_adds_its_alarm_to_those_of_before() -> None:
-    async with following() as (feed, board, source):
-        source.writes_now = [pest(1, 2)]
-        feed.on_state(reported(1))
-        await changed(board)
+    async with following(pest(1, 2)) as (feed, board, source):
         source.is_removed = True
         feed.on_silence(is_silent=True, last_ns=NOW - 5)
         await changed(board)
@@ -194,10 +192,7 @@ async def test_alarms_that_the_journal_has_long_not_confirmed_are_reported_as_in
 ) -> None:
     monkeypatch.setattr("lupin_bridge.alarms.feed.UNANSWERED_S", 0.0)
 
-    async with following() as (feed, board, source):
-        source.writes_now = [pest(1, 2)]
-        feed.on_state(reported(1))
-        await changed(board)
+    async with following(pest(1, 2)) as (feed, board, source):
         source.is_removed = True
         feed.on_state(reported(2))
         await changed(board)
@@ -227,10 +222,7 @@ async def test_without_a_journal_states_raise_alarms_and_a_silent_twin_is_one() 
 
 
 async def test_a_state_from_before_a_silence_does_not_withdraw_it() -> None:
-    async with following() as (feed, board, source):
-        source.writes_now = [pest(1, 2)]
-        feed.on_state(reported(1))
-        await changed(board)
+    async with following(pest(1, 2)) as (feed, board, _):
         feed.on_silence(is_silent=True, last_ns=NOW - 5)
         await changed(board)
         received = replace(reported(1).snapshot, stamp_ns=NOW - 10)

@@ -192,11 +192,18 @@ def test_a_forwarder_follows_a_journal_that_is_replaced_under_it(
     append(journal, scans(0, 50))
     other = tmp_path / "other"
     append(other, scans(70, 7))
+    backup = other.read_bytes()
     with forwarder(archive, journal) as following:
         following.wait_for_output("is forwarded to")
         wait_until_equal(archive, journal)
         other.replace(journal)
         wait_for(lambda: len(archive.rows()["scan"]) == 57, "the rows of both")
+        # A backup that is copied over it is the same file.
+        for end in ("-wal", "-shm"):
+            journal.with_name(journal.name + end).unlink()
+        journal.write_bytes(backup)
+        append(journal, scans(80, 3))
+        wait_for(lambda: len(archive.rows()["scan"]) == 60, "the rows after those of the backup")
 
 
 def test_a_journal_without_gaps_is_the_same_journal(archive: Archive, journal: Path) -> None:
@@ -272,13 +279,32 @@ def words(archive: Archive, path: Path, **more: str) -> list[str]:
     return ["forward", "--once", *(word for pair in pairs for word in pair)]
 
 
+# As PostgreSQL refuses a row for which its disk has no room.
+NO_ROOM = (
+    "CREATE FUNCTION no_room() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN"
+    " RAISE EXCEPTION 'could not extend file' USING ERRCODE = 'disk_full'; END $$;"
+    " CREATE TRIGGER no_room BEFORE INSERT ON scan FOR EACH ROW EXECUTE FUNCTION no_room()"
+)
+
+
+@pytest.mark.parametrize(
+    ("fault", "remedy", "said"),
+    [
+        (
+            "REVOKE INSERT ON scan FROM lupin_forwarder",
+            "GRANT INSERT ON scan TO lupin_forwarder",
+            "is not forwarded: the archive does not permit it",
+        ),
+        (NO_ROOM, "DROP TRIGGER no_room ON scan", "the archive is full: could not extend file"),
+    ],
+)
 def test_an_archive_that_is_reached_and_takes_nothing_is_said_once(
-    archive: Archive, journal: Path
+    archive: Archive, journal: Path, fault: str, remedy: str, said: str
 ) -> None:
     append(journal, scans(0, 50))
-    archive.do("REVOKE INSERT ON scan FROM lupin_forwarder")
+    archive.do(fault)
     with forwarder(archive, journal) as process:
-        process.wait_for_output("is not forwarded: the archive does not permit it")
+        process.wait_for_output(said)
         heard = archive.select("SELECT heard_at FROM forwarder")
         for _ in range(2):
             here = archive.select("SELECT since FROM forwarder")
@@ -288,7 +314,7 @@ def test_an_archive_that_is_reached_and_takes_nothing_is_said_once(
             )
         assert process.output.count("\n") == 1
         assert archive.select("SELECT heard_at FROM forwarder") == heard, "it is not live"
-        archive.do("GRANT INSERT ON scan TO lupin_forwarder")
+        archive.do(remedy)
         wait_until_equal(archive, journal)
         process.wait_for_output(f"site {archive.site} is forwarded to")
 

@@ -144,22 +144,3 @@ def test_a_month_in_which_another_site_has_rows_stays(sites: Archive) -> None:
     for table, stamp in (("scan", 2), ("look", 3)):
         assert sorted(row[stamp] for row in sites.rows("gh3")[table]) == stamps(*AGES)
     assert exists(sites, month(stamps(*AGES)[0]))
-
-
-def test_a_full_disk_is_said_in_one_line_and_holds_until_there_is_room(
-    archive: Archive, tmp_path: Path
-) -> None:
-    journal = tmp_path / "journal"
-    append(journal, [scan("7", NOW)])
-    # As PostgreSQL refuses a row for which its disk has no room.
-    archive.do(
-        "CREATE FUNCTION no_room() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN"
-        " RAISE EXCEPTION 'could not extend file' USING ERRCODE = 'disk_full'; END $$;"
-        " CREATE TRIGGER no_room BEFORE INSERT ON scan FOR EACH ROW EXECUTE FUNCTION no_room()"
-    )
-    with forwarder(archive, journal) as process:
-        process.wait_for_output("the archive is full: could not extend file")
-        assert process.output.count("\n") == 1
-        archive.do("DROP TRIGGER no_room ON scan")
-        wait_until_equal(archive, journal)
-        process.wait_for_output("is forwarded to")

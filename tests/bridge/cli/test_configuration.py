@@ -94,10 +94,6 @@ def test_a_mistake_in_a_variable_names_the_variable(name: str, value: str, named
             " line 3: port is 'True': input should be a valid integer",
         ),
         ("allow_host = 'x'", " line 1: allow_host is 'x': input should be a valid tuple"),
-        (
-            "port = 1\nmax-clients = 5",
-            " line 2: max-clients is not a setting of the bridge (did you",
-        ),
         ('"a\\nb" = 1', ": 'a\\nb' is not a setting of the bridge"),
         ("token = 'x'", " line 1: token is not a setting: put the token into a file of its own"),
         (

@@ -11,7 +11,6 @@ from subprocess import CompletedProcess
 
 import pytest
 
-from lupin_bridge.past import bodies
 from lupin_twin.journal.paths import demo_journal_path, journal_path
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_writer
@@ -153,6 +152,7 @@ def test_a_file_of_another_application_is_left_alone_and_named(tmp_path: Path) -
             assert (done.returncode, done.stdout) == (1, "")
             assert named in done.stderr
         assert path.read_bytes() == before
+    assert {*tmp_path.iterdir()} - {*tmp_path.glob("theirs*")} == {recorded, empty}
 
 
 # --- what it prints ------------------------------------------------------------------------------
@@ -230,7 +230,7 @@ def test_export_writes_the_same_rows_as_the_route(path: Path) -> None:
         return done.stdout.splitlines()
 
     every = exported()
-    assert every[0] + "\r\n" == bodies.CSV_HEADER.decode()
+    assert every[0] == "time_iso,stamp,tag_id,x_m,y_m,sensor,unit,value,status,source"
     assert len(every) == 2002
     assert "2025-11-21T04:40:00.000000000Z,1763700000.000000000,8,,,,,,2,robot" in every
     assert "2025-11-21T04:40:03.000000000Z,1763700003.000000000,7,1.5,2.5,a,,1.0,0,robot" in every

@@ -69,12 +69,11 @@ def test_the_web_role_refuses_an_archive_as_its_journal(domain: int) -> None:
 # --- roles --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_the_web_role_stops_at_once_without_errors(domain: int, number: signal.Signals) -> None:
+def test_without_a_twin_the_notes_name_what_is_missing(domain: int) -> None:
     with lupin_twin(domain, "web") as process:
-        url_of(process)
-        assert process.stop(number) == 0
-        assert "Traceback" not in process.output
+        answer = httpx.get(f"{url_of(process)}/api/notes")
+        wanted = "the journal is not known here yet: is the twin running?"
+        assert (answer.status_code, answer.json()["detail"]) == (503, wanted)
 
 
 def test_the_patrol_ends_when_the_demo_is_killed(domain: int) -> None:

@@ -51,19 +51,6 @@ def manager(tmp_path: Path) -> Iterator[Manager]:
     manager.socket.close()
 
 
-def test_it_sends_what_the_manager_requests_and_no_child_inherits_it(manager: Manager) -> None:
-    environment = {"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": "30000000", "HOME": "/"}
-    supervisor = Supervisor(environment)
-    assert environment == {"HOME": "/"}
-    assert supervisor.watchdog_s == 30.0
-    supervisor.ready("serving http://127.0.0.1:8000")
-    assert manager.next() == {"READY": "1", "STATUS": "serving http://127.0.0.1:8000"}
-    supervisor.stopping()
-    assert manager.next() == {"STOPPING": "1"}
-    assert supervisor._socket is not None
-    supervisor._socket.close()
-
-
 @pytest.mark.parametrize(
     "environment",
     [
@@ -99,26 +86,26 @@ def listening(tmp_path: Path) -> Iterator[Manager]:
 
 
 def test_the_bridge_reports_when_it_is_ready_and_when_it_stops(
-    domain: int, listening: Manager
+    domain: int, manager: Manager
 ) -> None:
-    env = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "1000000", "LUPIN_TOKEN": TOKEN}
+    env = {"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": "1000000", "LUPIN_TOKEN": TOKEN}
     with lupin_twin(domain, "demo", afresh=False, **env) as process:
-        text = listening.next()
+        text = manager.next()
         assert text["READY"] == "1"
         url = text["STATUS"].removeprefix("serving ")
         answer = httpx.get(f"{url}/readyz", headers=BEARER, trust_env=False, timeout=PATIENCE_S)
         assert answer.json()["reason"] == "live", "ROS is up by then"
         for _ in range(3):
-            assert listening.next() == {"WATCHDOG": "1"}
+            assert manager.next() == {"WATCHDOG": "1"}
         (patrol,) = wait_for(lambda: patrols_of(process.pid), "the patrol")
         environment = Path(f"/proc/{patrol}/environ")  # empty while it starts
         wait_for(lambda: b"ROS_DOMAIN_ID" in environment.read_bytes(), "what it inherits")
         inherited = environment.read_bytes()
         assert b"NOTIFY_SOCKET" not in inherited
         assert TOKEN.encode() not in inherited
-        listening.rest()  # unread, the socket holds no more than ten messages
+        manager.rest()  # unread, the socket holds no more than ten messages
         process.send(signal.SIGTERM)
-        wait_for(lambda: {"STOPPING": "1"} in listening.rest(), "the word that it stops")
+        wait_for(lambda: {"STOPPING": "1"} in manager.rest(), "the word that it stops")
         assert process.wait() == 0
 
 

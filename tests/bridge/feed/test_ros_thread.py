@@ -208,14 +208,6 @@ async def test_a_caller_cancelled_while_its_call_starts_leaves_nothing_behind(do
 # --- the end ------------------------------------------------------------------------------------
 
 
-async def test_a_callback_that_raises_is_logged_and_the_thread_lives_on(domain: int) -> None:
-    async with Stage() as stage:
-        await stage.ros.call(lambda node: node.create_timer(0.01, lambda: 1 / 0))
-        await until(lambda: stage.ros.callback_errors > 2, "errors of the callback")
-        assert await stage.ros.call(lambda _: "alive") == "alive"
-        assert stage.deaths == 0
-
-
 async def test_the_end_of_the_thread_is_reported_once_and_logged(
     domain: int, caplog: pytest.LogCaptureFixture
 ) -> None:

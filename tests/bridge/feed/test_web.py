@@ -20,6 +20,7 @@ from lupin_bridge.feed.relay import Sample, TwinNames, topics_of
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.feed.web import RETAINED_S, FollowedLog, WebTwin
 from lupin_bridge.serving.admission import Limits
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Reading, Scan
@@ -246,6 +247,28 @@ def test_an_old_copy_is_deleted_at_the_start(tmp_path: Path) -> None:
 def test_the_latest_copy_stays_whatever_its_age(tmp_path: Path) -> None:
     latest, _ = copies(tmp_path, RETAINED_S + 60.0, RETAINED_S + 120.0)
     assert left_after_start(tmp_path) == (str(latest), [latest])
+
+
+def test_a_request_that_a_killed_twin_leaves_unanswered_is_soon_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(web, "PATIENCE_S", 0.05)
+    requests = list[int]()
+
+    async def query(after: int) -> Lot:
+        requests.append(after)
+        await asyncio.sleep(3_600.0 if len(requests) < 3 else 0.1)
+        return Lot("j", (), 0, is_all=True)
+
+    async def test() -> None:
+        log = FollowedLog(query, Workers("test"))
+        log.on_update(Condition(JournalState.RECORDING, journal_id="j"))
+        await log.start(tmp_path)
+        await until(lambda: log.condition, "a copy, of an answer that takes longer")
+        await log.stop()
+
+    asyncio.run(test())
+    assert len(requests) >= 3
 
 
 def test_a_configured_file_is_read_before_its_twin_is_received(tmp_path: Path) -> None:

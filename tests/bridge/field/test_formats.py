@@ -154,21 +154,6 @@ def test_a_picture_with_nothing_known_is_transparent() -> None:
     assert np.isnan(field.values).all()
 
 
-def test_headers_describe_what_an_array_cannot() -> None:
-    assert formats.estimate_metadata(ESTIMATE, SENSORS.named("co2")) == {
-        "Sensor": "co2",
-        "Unit": "ppm",
-        "Width": "3",
-        "Height": "2",
-        "Origin-X": "-1.0",
-        "Origin-Y": "2.0",
-        "Resolution": "0.5",
-        "Sd-Known": "2.25",
-        "Sample-Count": "3",
-        "Reading-Count": "7",
-    }
-
-
 def test_an_estimate_is_known_where_it_is_certain_to_a_part_of_the_narrowest_ideal_range() -> None:
     wide, narrow = (Ranges(ideal=Span(20.0, high)) for high in (60.0, 26.0))
     sensor = replace(SENSORS.named("ph"), day=wide, night=narrow)

@@ -1,6 +1,5 @@
 """Hostile clients and rows: the fleet's page goes on, and no site slows another."""
 
-import asyncio
 import os
 import signal
 import socket
@@ -13,21 +12,12 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import httpx
 import psycopg
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from lupin_bridge.fleet import source
-from lupin_bridge.fleet.overview import Site
-from lupin_bridge.fleet.reader import Latest, Reported
-from lupin_bridge.fleet.watcher import News
-from lupin_bridge.settings import Settings
-from lupin_twin.core.parameters import World
-from lupin_twin.core.state import Snapshot
-from lupin_twin.runtime.workers import Workers
 from tests.support import raw_http
 from tests.support.archive import Archive, forward_once, forwarder, run
 from tests.support.fleet import Page, fleet, forward, frames, recent_scans, wall, write
@@ -35,7 +25,7 @@ from tests.support.journal import append, inspection, scan
 from tests.support.postgres import Postgres, server
 from tests.support.processes import children_of, constants, limits, lupin_twin
 from tests.support.raw_http import UPGRADE, status
-from tests.support.waiting import PATIENCE_S, until, wait_for
+from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import deaf_client
 from tests.support.ws_client import open_websocket
 
@@ -59,7 +49,8 @@ def page(postgresql: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iter
     """At most two sites may be open, and a client may have one request under way."""
     archive = made(postgresql, tmp_path_factory.mktemp("hostile") / "journal", *SITES[1:])
     bounds = limits(client_timeout_s=TIMEOUT_S, open_sites=2, concurrency=1)
-    soon = constants(**{"lupin_bridge.feed.past_process:REST_S": 0.2})
+    of = "lupin_bridge.feed.past_process"
+    soon = constants(**{f"{of}:REST_S": 0.2, f"{of}:STUCK_S": 5.0})
     with fleet(archive, *bounds, *soon) as running:
         wait_for(lambda: {*running.sites()} == {*SITES}, "all sites")
         yield running
@@ -192,22 +183,22 @@ def test_an_overview_client_that_never_reads_is_disconnected(
 # --- processes ------------------------------------------------------------------------------------
 
 
-def test_a_killed_process_is_restarted_and_counted(page: Page) -> None:
+def test_a_stopped_and_a_killed_process_are_replaced_and_counted(page: Page) -> None:
     assert page.http.get(f"/sites/gh1/{HISTORY}").status_code == 200
 
-    def is_started_again(kind: str) -> None:
+    def is_started_again(kind: str, after: signal.Signals) -> None:
         name = f"lupin_fleet_{kind}_starts"
         before = page.metric(name)
         (child,) = children_of(page.process.pid, kind.encode())
-        os.kill(child, signal.SIGKILL)
+        os.kill(child, after)
         assert page.http.get("/sites/gh1/api/state").status_code == 200
         # The first time, the reader restarts at once; a query waits for it or is refused.
         wait_for(lambda: page.http.get(f"/sites/gh1/{HISTORY}").status_code == 200, "the past")
         wait_for(lambda: page.metric(name) > before, f"another {kind}")
         wait_for(lambda: page.http.get("/readyz").status_code == 200, "an archive that is read")
 
-    is_started_again("watcher")
-    is_started_again("reader")
+    is_started_again("watcher", signal.SIGSTOP)
+    is_started_again("reader", signal.SIGKILL)
 
 
 def test_an_archive_that_hangs_is_reported_and_recovers(tmp_path: Path) -> None:
@@ -240,46 +231,6 @@ def test_an_archive_that_hangs_is_reported_and_recovers(tmp_path: Path) -> None:
                 "the past to be back",
             )
             assert "Traceback" not in running.process.output
-
-
-async def test_an_unexpected_error_is_logged_once_and_ends_neither_overview_nor_site(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(source, "_RETRY_S", 0.01)
-    monkeypatch.setattr(source, "HEARTBEAT_S", 0.01)
-    looks = updates = 0
-    is_broken = False
-
-    async def ask(query: object, *_: object) -> Any:
-        nonlocal looks
-        if isinstance(query, Latest):
-            return Reported(Snapshot(1, "map", ()), True, World("unknown"), (), None, 0, None)
-        await asyncio.sleep(0.01)
-        looks += 1
-        if is_broken:
-            raise KeyError("gh1")
-        return News(0, ("gh1",), [Site("gh1", last_seq=1, is_live=True)])
-
-    def on_state(_: object) -> None:
-        nonlocal updates
-        updates += 1
-        if updates == 2:  # the first heartbeat
-            raise ZeroDivisionError
-
-    watching = source.Watching(Settings(), lambda: None)
-    monkeypatch.setattr(watching.process, "ask", ask)
-    watching.start()
-    await until(lambda: watching.sites, "the overview")
-    site = source.SiteTwin("gh1", watching, watching.process, Workers("none"), 1.0)
-    await site.start(on_state, lambda: None)
-    await until(lambda: updates > 3, "more heartbeats")
-    await site.stop()
-    caplog.clear()
-    is_broken, before = True, looks
-    await until(lambda: looks > before + 3, "more looks")
-    assert watching.archive.message == "the archive cannot be read: 'gh1'"
-    assert caplog.text.count("Traceback") == 1
-    await watching.stop()
 
 
 # --- what is in the archive -----------------------------------------------------------------------

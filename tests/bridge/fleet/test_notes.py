@@ -106,8 +106,6 @@ def test_a_person_without_the_right_is_refused(here: Here) -> None:
         forged = anna.build_request("POST", NOTES, json={"kind": "comment"})
         del forged.headers["X-Lupin-Twin"]
         assert anna.send(forged).status_code == 403
-        assert post(anna, kind="comment", subject="site", text="x" * 501).status_code == 400
-        assert post(anna, kind="comment", subject="site", text="\x00").status_code == 400
         other = anna.post("/sites/other/api/notes", json={"kind": "comment"})
         assert other.status_code == 404
         # Notes belong to a site; the fleet has no others.

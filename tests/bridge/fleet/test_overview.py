@@ -1,5 +1,6 @@
 """The page over all sites: which are live, their status, and what is shown where it is unknown."""
 
+import asyncio
 import random
 import time
 from dataclasses import replace
@@ -10,15 +11,20 @@ from xml.etree import ElementTree
 
 import pytest
 
-from lupin_bridge.fleet.overview import dots, map_svg, map_version
+from lupin_bridge.fleet import source
+from lupin_bridge.fleet.overview import Site, dots, map_svg, map_version
+from lupin_bridge.fleet.reader import Latest, Reported
+from lupin_bridge.fleet.watcher import News
 from lupin_bridge.judge.verdict import Health, Verdict
+from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.parameters import World
-from lupin_twin.core.state import Pose, TagState
+from lupin_twin.core.state import Pose, Snapshot, TagState
+from lupin_twin.runtime.workers import Workers
 from tests.support.archive import Archive, forward_once, forwarder
 from tests.support.fleet import fleet, forward, frames, recent_scans, wall, write
 from tests.support.journal import append, recording, scan
-from tests.support.waiting import wait_for
+from tests.support.waiting import until, wait_for
 
 
 @pytest.fixture
@@ -142,6 +148,46 @@ def dots_of(picture: str) -> dict[str, list[str]]:
     """Positions by verdict."""
     paths = [it for it in ElementTree.fromstring(picture) if it.tag.endswith("path")]
     return {it.attrib["class"]: it.attrib["d"].split("M")[1:] for it in paths}
+
+
+async def test_an_unexpected_error_is_logged_once_and_ends_neither_overview_nor_site(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(source, "_RETRY_S", 0.01)
+    monkeypatch.setattr(source, "HEARTBEAT_S", 0.01)
+    looks = updates = 0
+    is_broken = False
+
+    async def ask(query: object, *_: object) -> Any:
+        nonlocal looks
+        if isinstance(query, Latest):
+            return Reported(Snapshot(1, "map", ()), True, World("unknown"), (), None, 0, None)
+        await asyncio.sleep(0.01)
+        looks += 1
+        if is_broken:
+            raise KeyError("gh1")
+        return News(0, ("gh1",), [Site("gh1", last_seq=1, is_live=True)])
+
+    def on_state(_: object) -> None:
+        nonlocal updates
+        updates += 1
+        if updates == 2:  # the first heartbeat
+            raise ZeroDivisionError
+
+    watching = source.Watching(Settings(), lambda: None)
+    monkeypatch.setattr(watching.process, "ask", ask)
+    watching.start()
+    await until(lambda: watching.sites, "the overview")
+    site = source.SiteTwin("gh1", watching, watching.process, Workers("none"), 1.0)
+    await site.start(on_state, lambda: None)
+    await until(lambda: updates > 3, "more heartbeats")
+    await site.stop()
+    caplog.clear()
+    is_broken, before = True, looks
+    await until(lambda: looks > before + 3, "more looks")
+    assert watching.archive.message == "the archive cannot be read: 'gh1'"
+    assert caplog.text.count("Traceback") == 1
+    await watching.stop()
 
 
 # --- source of the data ---------------------------------------------------------------------------

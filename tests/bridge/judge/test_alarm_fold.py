@@ -14,7 +14,6 @@ from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.day import ClockDay, Day
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria, own_sensors
-from lupin_bridge.judge.verdict import Kind
 from lupin_twin.core.past import PastWrite, RunSpan
 from tests.support.alarms_reference import Plain, S, alarms
 from tests.support.ordinary_day import DAY_NS, ordinary_days
@@ -229,39 +228,6 @@ def test_an_alarm_that_gets_worse_is_the_same_alarm_with_a_worse_verdict() -> No
     assert (critical.worse_at_ns, stressed.worse_at_ns) == (START + 2 * MINUTE, None)
     (bad,) = reported(scans([6, 6, 6]))
     assert (bad.raised_as, bad.is_worse, bad.worse_at_ns) == ("critical", False, None)
-
-
-def test_every_kind_of_reason_becomes_an_alarm_except_those_of_the_estimate() -> None:
-    """A silent twin is reported by the feed."""
-    good = (22.0, 60.0)
-
-    def at(minute: int, tag: str, *values: float, status: int = 0) -> PastWrite:
-        names = ("temperature", "door")[: len(values)]
-        return PastWrite(0, 1, tag, START + minute * MINUTE, SCAN, status, names, values)
-
-    received = [at(minute, "well", *good) for minute in range(60)]
-    received += [at(minute, "cold", 6.0) for minute in range(60)]
-    received += [at(minute, "dead", 22.0, math.nan) for minute in range(60)]
-    received += [at(minute, "silent", *(good if minute < 9 else good[:1])) for minute in range(60)]
-    received += [at(minute, "left out", *good) for minute in range(9)]
-    received += [
-        at(minute, "lost", *(good if minute < 50 else ()), status=2) for minute in range(60)
-    ]
-    received += [replace(at(7, "pest"), kind=LOOK, has_seen=True, anomaly=True, bug_count=2)]
-    received = [replace(write, number=number) for number, write in enumerate(received)]
-    found = {
-        (one.tag_id, str(one.reason.kind), one.reason.sensor) for one in reported(received, DAY_NS)
-    }
-    assert found == {
-        ("cold", "range", "temperature"),
-        ("dead", "reading_failed", "door"),
-        ("silent", "old", "door"),
-        ("left out", "old", ""),
-        ("lost", "scan_failed", ""),
-        ("pest", "pest", ""),
-        ("", "stopped", ""),
-    }
-    assert {kind for _, kind, _ in found} == set(Kind) - {Kind.CHANGED, Kind.SILENT}
 
 
 def test_the_fold_reports_when_it_will_change_without_news() -> None:

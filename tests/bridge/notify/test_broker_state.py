@@ -140,16 +140,6 @@ def test_an_announcement_that_changes_is_sent_again() -> None:
     assert announcements(more) == {"homeassistant/sensor/lt/tag_a_-_reading_co2/config"}
 
 
-def test_a_tag_that_is_gone_is_removed() -> None:
-    one = mirror()
-    first = reported(one, seen(tag("a", temperature=21.0), tag("b", temperature=21.0)))
-    news = reported(one, seen(tag("a", temperature=21.0)))
-    gone = {topic for topic, payload in news.items() if payload is None}
-    assert gone == {topic for topic in announcements(first) if "/tag_b_-_" in topic}
-    one.forget()
-    assert not [topic for topic in reported(one, seen()) if "/tag_b_-_" in topic]
-
-
 def test_without_a_discovery_prefix_nothing_is_announced() -> None:
     assert announcements(reported(mirror(""), seen(tag("a", temperature=21.0)))) == set()
 

@@ -14,14 +14,6 @@ def put(news: AlarmNews, *alarms: Alarm, is_past: bool = False) -> list[tuple[st
     return [(it.change, it.id) for it in found]
 
 
-def test_raised_and_cleared_are_sent_in_order_each_with_its_own_id() -> None:
-    news = AlarmNews()
-    a, b = alarm("a", raised_ns=NOW_NS), alarm("b", raised_ns=NOW_NS - S)
-    assert put(news, a, b) == [("raised", f"{b.id}.raised"), ("raised", f"{a.id}.raised")]
-    cleared = replace(a, cleared_at_ns=NOW_NS + S)
-    assert put(news, cleared) == [("cleared", f"{a.id}.cleared.{NOW_NS + S}")]
-
-
 def test_an_alarm_that_turns_critical_is_sent_once_and_a_worse_value_alone_is_not() -> None:
     news = AlarmNews()
     mild = replace(alarm("a", Verdict.STRESSED), raised_as=Verdict.STRESSED)

@@ -170,7 +170,7 @@ async def test_an_expired_subscription_is_removed_and_a_busy_service_is_tried_ag
         assert phone.read(on.service.posted[3])["body"].startswith("Tag 8:")
 
 
-async def test_while_the_accounts_cannot_be_read_a_message_waits(
+async def test_a_message_waits_while_an_error_lasts_or_the_accounts_cannot_be_read(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     accounts, aside = tmp_path / "accounts.sqlite", tmp_path / "aside"
@@ -182,26 +182,17 @@ async def test_while_the_accounts_cannot_be_read_a_message_waits(
     async with pushing(tmp_path, busy, status(201)) as on:
         on.subscribe(on.phone("one"))
         accounts.rename(aside)
-        on.board.show([alarm("7")])
+        with pytest.MonkeyPatch.context() as broken:
+            broken.setattr(push_module, "notes_of_alarms", None)
+            on.board.show([alarm("7")])
+            await until(lambda: on.push.condition.failed > 2, "attempts")
+        assert caplog.text.count("Traceback") == 1
         await until(lambda: "was not accepted: the file of accounts" in caplog.text, "why")
         aside.rename(accounts)
         await until(lambda: on.service.posted, "the first attempt")
         await until(lambda: "will be retried: the file of accounts" in caplog.text, "why")
         aside.rename(accounts)
         await until(lambda: len(on.service.posted) == 2, "the next attempt")
-
-
-async def test_after_an_unexpected_error_a_message_is_tried_again_and_the_error_logged_once(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    async with pushing(tmp_path) as on:
-        on.subscribe(on.phone("one"))
-        with pytest.MonkeyPatch.context() as broken:
-            broken.setattr(push_module, "notes_of_alarms", None)
-            on.board.show([alarm("7")])
-            await until(lambda: on.push.condition.failed > 2, "attempts")
-        await until(lambda: on.service.posted, "the message")
-    assert caplog.text.count("Traceback") == 1
 
 
 async def test_a_browser_that_unsubscribes_meanwhile_is_not_tried_again(tmp_path: Path) -> None:

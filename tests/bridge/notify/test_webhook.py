@@ -12,7 +12,7 @@ import pytest
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.notify import webhook
 from lupin_bridge.notify.destinations import Targets
-from lupin_bridge.notify.webhook import MAX_REFUSALS, MAX_WAITING, ORIGIN_S, Delivery, Webhook
+from lupin_bridge.notify.webhook import MAX_WAITING, ORIGIN_S, Delivery, Webhook
 from lupin_bridge.settings import Secrets, Settings
 from lupin_twin.core.diagnostics import Origin
 from tests.support.docs import block_named
@@ -162,15 +162,6 @@ async def test_a_receiver_that_refuses_and_recovers_gets_all_of_it() -> None:
         with receiver(status(200), port=port) as server:
             await until(lambda: hook.condition.sent == 1, "the alarm")
         assert server.ids == [f"{A.id}.raised"]
-
-
-async def test_a_message_that_the_receiver_rejects_does_not_hold_up_the_others() -> None:
-    with receiver(*[status(422)] * MAX_REFUSALS, status(200)) as server:
-        async with telling(server.port, A, B) as (hook, _):
-            await until(lambda: hook.condition.sent == 1, "the second")
-            assert (hook.condition.dropped, hook.condition.waiting) == (1, 0)
-    assert server.ids == [f"{A.id}.raised"] * MAX_REFUSALS + [f"{B.id}.raised"]
-    assert server.posted[-1].json["lost"] == 1
 
 
 async def test_texts_of_any_length_are_sent_once_and_cut(caplog: pytest.LogCaptureFixture) -> None:

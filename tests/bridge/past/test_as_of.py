@@ -58,17 +58,6 @@ def body(plan: Plan) -> dict[str, Any]:
     return found
 
 
-def test_a_field_has_the_tags_and_the_box_of_its_moment() -> None:
-    found = body(field_of(SITE, requested(), JSON))
-    schema.GetFieldResponse.model_validate(found)
-    assert (found["origin_x"], found["origin_y"]) == (-1.5, -1.5)
-    assert (found["width"], found["height"], found["sample_count"]) == (40, 30, 2)
-    assert 400.0 <= found["value_min"] < found["value_max"] <= 500.0
-    found = body(field_of(SITE, requested()))
-    schema.FieldQuality.model_validate(found)
-    assert (found["sample_count"], found["rmse"]) == (2, 100.0)
-
-
 def test_a_tag_pinned_far_away_by_a_lost_robot_is_left_out_and_named() -> None:
     lost = replace(SITE, tags=(*SITE.tags, tag("c", 0.5, 450.0), tag("lost", 5_000.0, 40.0)))
     written = field_of(lost, requested(), JSON).write(lambda: False)
@@ -171,14 +160,6 @@ def test_readings_hold_as_long_as_the_earlier_scans_imply() -> None:
     assert verdict_of(judged_at(602, old, before_s=[240.0]))[0] == "healthy"
 
 
-def test_the_etag_of_a_judgement_identifies_its_content() -> None:
-    old = TagState("a", readings=(Reading("temperature", 22.0, NS),))
-    first = judged_at(602, old, before_s=[240.0]).etag
-    assert judged_at(602, old, before_s=[240.0]).etag == first
-    assert judged_at(602, old, before_s=[1.0]).etag != first
-    assert judged_at(601, old, before_s=[240.0]).etag != first
-
-
 # --- refusals -------------------------------------------------------------------------------------
 
 
@@ -205,16 +186,6 @@ def plans(greenhouse: Snapshot, field: Field) -> list[str]:
         *(field_of(greenhouse, field, field_format).etag for field_format in FORMATS),
         field_of(greenhouse, field).etag,
     ]
-
-
-def test_equal_content_has_equal_etags_on_every_replica() -> None:
-    again = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
-    for one, other in (
-        (requested(), requested()),
-        (requested(RULES, a_map(1)), requested(RULES, a_map(7))),
-    ):
-        assert plans(again, other) == plans(SITE, one)
-        assert len(set(plans(SITE, one))) == 7
 
 
 @pytest.mark.parametrize(

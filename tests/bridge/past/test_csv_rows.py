@@ -26,29 +26,6 @@ def read(*rows: PastRow) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text, newline=""), strict=True))
 
 
-def test_a_row_has_its_time_place_value_and_source() -> None:
-    assert read(ROW) == [
-        {
-            "time_iso": "2026-11-21T14:15:00.000000005Z",
-            "stamp": "1795270500.000000005",
-            "tag_id": "7",
-            "x_m": "1.5",
-            "y_m": "-2.0",
-            "sensor": "co2",
-            "unit": "ppm",
-            "value": "412.5",
-            "status": "0",
-            "source": "robot-1",
-        }
-    ]
-
-
-def test_an_attempt_without_readings_has_no_sensor_unit_or_value() -> None:
-    (row,) = read(FAILED)
-    assert (row["x_m"], row["y_m"]) == ("", "")
-    assert (row["sensor"], row["unit"], row["value"], row["status"]) == ("", "", "", "2")
-
-
 def test_rows_of_one_scan_and_of_the_next_have_their_own_times() -> None:
     rows = read(ROW, ROW, FAILED, ROW)
     assert [row["stamp"][9:12] for row in rows] == ["0.0", "0.0", "1.0", "0.0"]
@@ -103,11 +80,6 @@ def test_numbers_are_read_back_to_the_last_bit_and_stay_numbers(value: float) ->
     [
         (OfExport(), None, "lupin-twin.csv"),
         (OfExport(), 86_400 * NS, "lupin-twin_to_19700102T000000Z.csv"),
-        (
-            OfExport("1", "60", tag_id="a/b", sensor_type="co2"),
-            None,
-            "lupin-twin_a_b_co2_from_19700101T000001Z_to_19700101T000100Z.csv",
-        ),
         (
             OfExport(None, "1", tag_id='"; x=\r\né'),
             5,

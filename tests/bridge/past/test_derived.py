@@ -142,12 +142,6 @@ def test_a_daily_quantity_has_a_value_for_every_hour_of_the_day_so_far() -> None
     assert (few.is_bucketed, sum(few.counts)) == (True, 30)
 
 
-def test_the_first_hours_have_no_daily_quantity() -> None:
-    request = SeriesRequest("a", "daily_light_integral", 0, 0, 500)
-    past, _ = answer(replace(request, end_ns=80 * HOUR_NS), COURSE)
-    assert past.stamps_ns[0] / HOUR_NS == 22.5
-
-
 def test_a_daily_quantity_uses_buckets_where_there_are_many_readings() -> None:
     # A peak in one reading, and a dip at night: both count.
     warm = {n * 10 * S: 20.0 + 5.0 * is_day(n * 10 * S) for n in range(1, 3 * 8_640)}

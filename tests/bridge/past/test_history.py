@@ -43,29 +43,6 @@ def written(past: SeriesPast, requested: SeriesRequest = REQUESTED) -> dict[str,
 # --- the body -------------------------------------------------------------------------------------
 
 
-def test_readings_are_sent_one_by_one_and_what_is_not_finite_is_null() -> None:
-    past = readings(NS + 1, 2 * NS, 3 * NS, values=[1.5, math.nan, math.inf], end_ns=4 * NS)
-    assert written(past) == {
-        "tag_id": "7",
-        "sensor_type": "co2",
-        "unit": "ppm",
-        "from": {"sec": 0, "nanosec": 0},
-        "to": {"sec": 4, "nanosec": 0},
-        "is_bucketed": False,
-        "bucket_s": None,
-        "readings": [
-            {"stamp": {"sec": 1, "nanosec": 1}, "value": 1.5},
-            {"stamp": {"sec": 2, "nanosec": 0}, "value": None},
-            {"stamp": {"sec": 3, "nanosec": 0}, "value": None},
-        ],
-        "buckets": [],
-        "gaps": [],
-        "nights": None,
-        "complete_to": None,
-        "kept_from": None,
-    }
-
-
 def test_buckets_are_sent_with_their_length() -> None:
     past = SeriesPast(
         0, 9 * NS, 5 * NS // 2, (0, 5 * NS), (3, 1), (2.0, math.inf), (1.0, 4e307), (4.0, 1.6e308)
@@ -95,25 +72,8 @@ def test_events_have_no_gaps() -> None:
 # --- gaps -----------------------------------------------------------------------------------------
 
 
-def test_the_future_is_not_a_gap() -> None:
-    past = readings(0, 10, 20, 30)
-    assert gaps(past, None) == [(30, 100)]
-    assert gaps(past, 61) == [(30, 61)]
-    assert gaps(past, 60) == []
-    assert gaps(past, 500) == [(30, 100)]
-
-
-def test_a_reading_without_a_value_fills_no_gap() -> None:
-    past = readings(0, 10, 20, 40, 60, 70, 80, 90, values=[1, 1, 1, math.nan, 1, 1, 1, 1])
-    assert gaps(past, None) == [(20, 60)]
-
-
-def test_a_period_without_readings_is_one_gap_and_with_one_reading_unknown() -> None:
-    assert gaps(readings(), None) == [(0, 100)]
-    assert gaps(readings(), 40) == [(0, 40)]
-    assert gaps(readings(50, values=[math.nan]), None) == [(0, 100)]
+def test_an_empty_period_has_no_gap() -> None:
     assert gaps(SeriesPast(5, 5), None) == []
-    assert gaps(readings(50), None) == []
 
 
 def test_many_readings_in_each_bucket_make_every_absent_one_a_gap() -> None:
@@ -132,7 +92,7 @@ def test_a_single_bucket_shows_the_usual_spacing_by_its_count() -> None:
 
 
 def plain_gaps(stamps: list[int], end: int) -> list[tuple[int, int]]:
-    """The rule in its simplest form, for readings that are all finite."""
+    """The rule in its simplest form, for readings with a value."""
     if not stamps:
         return [(0, end)] if end > 0 else []
     if len(stamps) == 1:
@@ -143,10 +103,18 @@ def plain_gaps(stamps: list[int], end: int) -> list[tuple[int, int]]:
     return [(since, until) for since, until in pairs if until - since > usual]
 
 
-@given(st.lists(st.integers(0, 1_000)), st.integers(1_001, 1_500))
-def test_gaps_equal_the_simplest_rule(unsorted: list[int], end_ns: int) -> None:
-    stamps = sorted(unsorted)
-    assert gaps(readings(*stamps, end_ns=end_ns), None) == plain_gaps(stamps, end_ns)
+READINGS = st.lists(st.tuples(st.integers(0, 1_000), st.sampled_from([400.0, math.nan])))
+
+
+@given(READINGS, st.integers(1_001, 1_500), st.none() | st.integers(1_001, 2_000))
+def test_gaps_equal_the_simplest_rule(
+    unsorted: list[tuple[int, float]], end_ns: int, now_ns: int | None
+) -> None:
+    """A reading without a value fills no gap, and the future is none."""
+    found = sorted(unsorted, key=lambda reading: reading[0])
+    past = readings(*(at for at, _ in found), values=[it for _, it in found], end_ns=end_ns)
+    known = [at for at, value in found if math.isfinite(value)]
+    assert gaps(past, now_ns) == plain_gaps(known, min(end_ns, now_ns or end_ns))
 
 
 @given(st.lists(st.integers(0, 999)), st.integers(1, 200))

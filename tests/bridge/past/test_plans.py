@@ -1,11 +1,8 @@
 """Queries of the past: they are pickled, state their cost, and honour ETags."""
 
 import json
-import pickle
 from dataclasses import replace
 from typing import Any
-
-import pytest
 
 from lupin_bridge.field import PNG
 from lupin_bridge.judge.judging import Criteria
@@ -14,7 +11,6 @@ from lupin_bridge.past.plans import (
     Health,
     History,
     LatestOfTag,
-    NoSuchTag,
     OneTag,
     Query,
     Timeline,
@@ -54,25 +50,6 @@ def found(need: Any) -> Any:
     return SITE if isinstance(need, int) else ()
 
 
-@pytest.mark.parametrize("query", QUERIES, ids=lambda q: type(q).__name__)
-def test_a_query_can_be_sent_to_another_process_with_the_same_result(query: Query) -> None:
-    there: Query = pickle.loads(pickle.dumps(query, 5))
-    assert there == query
-    assert hash(there) == hash(query)
-    reported = answer(there)
-    assert reported == answer(query)
-    assert pickle.loads(pickle.dumps(reported, 5)) == reported
-    # With a matching ETag, no body is written.
-    assert answer(there, f'"other", W/{reported.etag}') == Answered(reported.etag, None)
-
-
-def test_an_unknown_tag_is_reported_with_the_number_of_known_ones() -> None:
-    with pytest.raises(NoSuchTag) as caught:
-        answer(OneTag(5 * NS, "c"))
-    there = pickle.loads(pickle.dumps(caught.value))
-    assert str(there) == "no tag 'c' is known (2 others are)"
-
-
 def test_a_large_greenhouse_and_a_large_field_cost_more_than_small_ones() -> None:
     for query in QUERIES:
         assert query.cost_s(10_000) >= query.cost_s(30)
@@ -83,8 +60,6 @@ def test_a_large_greenhouse_and_a_large_field_cost_more_than_small_ones() -> Non
     history = History(SeriesRequest("a", "co2"), None, CRITERIA, UNKNOWN_JOURNAL)
     assert history.cost_s(30) < SMALL_S
     assert Timeline(0, 0, 1, "a", UNKNOWN_JOURNAL).cost_s(30) > SMALL_S
-    for query in QUERIES[:5]:
-        assert json.dumps(query.cost_s(0))
 
 
 def test_a_tags_data_that_are_not_in_the_log_yet_come_from_its_state() -> None:

@@ -43,18 +43,6 @@ def test_a_report_of_the_first_hours_begins_at_0() -> None:
     assert query_string.report(query_string.OfReport(), NOW_NS) == (0, NOW_NS)
 
 
-def test_each_given_value_is_used() -> None:
-    period = {"from_": "1.5", "to": "1970-01-01T00:00:09Z"}
-    assert query_string.at([("at", "8.000000001")], NOW_NS) == 8 * NS + 1
-    for kind in (HISTORY, TIMELINE, EXPORT):
-        assert span(kind, **period) == (3 * NS // 2, 9 * NS)
-    assert query(HISTORY, points="7").points == 7
-    timeline = query(TIMELINE, points="5000", tag_id="a/b")
-    assert (timeline.points, timeline.tag_id) == (5000, "a/b")
-    export = query(EXPORT, tag_id="7", sensor_type="co2")
-    assert (export.tag_id, export.sensor_type) == ("7", "co2")
-
-
 # --- moments and periods --------------------------------------------------------------------------
 
 

@@ -64,26 +64,6 @@ def at(seconds: int) -> dict[str, int]:
     return {"sec": seconds, "nanosec": 0}
 
 
-def test_each_kind_of_event_is_counted_under_its_name() -> None:
-    end_ns = 100 * NS
-    found = written(
-        parts(
-            scans=one_by_one([NS, 2 * NS, 55 * NS], 0, end_ns),
-            failures=one_by_one([3 * NS], 0, end_ns),
-            looks=one_by_one([55 * NS], 0, end_ns),
-            pests_seen=one_by_one([55 * NS], 0, end_ns),
-            pests_cleared=one_by_one([99 * NS], 0, end_ns),
-        )
-    )
-    none = dict.fromkeys(COUNTED, 0)
-    assert (found["from"], found["to"], found["bucket_s"]) == (at(0), at(100), 10.0)
-    assert found["buckets"] == [
-        {**none, "start": at(0), "scans": 2, "failures": 1},
-        {**none, "start": at(50), "scans": 1, "looks": 1, "pests_seen": 1},
-        {**none, "start": at(90), "pests_cleared": 1},
-    ]
-
-
 def test_an_empty_past_is_a_valid_answer() -> None:
     found = written(parts(5 * NS, 5 * NS))
     assert (found["from"], found["to"], found["reach"]) == (at(5), at(5), None)

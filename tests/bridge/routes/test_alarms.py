@@ -40,6 +40,15 @@ def test_alarms_come_from_the_journal_and_the_answer_names_it(live: Bridge) -> N
     [pest] = body.alarms
     assert (pest.tag_id, pest.reason.kind, pest.worst, pest.cleared_at) == ("a", "pest", 2.0, None)
     assert (body.source, body.since) == ("journal", pest.raised_at)
+    with live.listen() as page:
+        frame = page.until("alarms", lambda frame: bool(frame["alarms"]))
+    schema.AlarmsFrame.model_validate(frame)
+    assert list(frame) == ["type", "notes", "alarms", "source", "since"]
+    answer = live.json("/api/alarms")
+    assert {name: frame[name] for name in answer} == answer
+    assert list(answer["alarms"][0]) == [
+        *("id", "reason", "tag_id", "raised_at", "cleared_at", "worst")
+    ]
     with ros_at(live.url) as ros:
         ros.subscribe()
         live.peer.observe(inspection("b"))

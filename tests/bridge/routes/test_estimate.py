@@ -72,7 +72,8 @@ def test_the_service_and_the_formats_give_the_same_numbers(live: Bridge) -> None
     array = np.load(io.BytesIO(npy.content), allow_pickle=False)
     assert array.shape == (2, 6, 4)
     np.testing.assert_array_equal(array.reshape(2, -1), np.array([service.mean, service.sd]))
-    assert npy.headers["x-estimate-reading-count"] == "15"
+    counts = [npy.headers[f"x-estimate-{name}-count"] for name in ("sample", "reading")]
+    assert counts == ["3", "15"]
     assert np.float32(npy.headers["x-estimate-sd-known"]) == np.float32(sd_known)
     assert (npy.headers["x-estimate-origin-x"], npy.headers["cache-control"]) == ("0.0", "no-cache")
 

@@ -82,6 +82,8 @@ def test_a_changed_tag_is_reported_left_out_and_judged(live: Bridge) -> None:
     odd = body["tags"]["d"]
     assert odd["offset"] == pytest.approx(9.0, abs=2.0)
     assert odd["measured"] - odd["expected"] > 6.0
+    assert odd["observed_at"]["sec"] == now_s() - 1800 + 60 * list(PLACES).index("d")
+    assert 0.0 < odd["expected_sd"] < 3.0 < odd["z"]
     estimate = live.json("/api/estimate", **SENSOR, resolution=0.5)
     # All twenty of each tag, without those since the change.
     assert (estimate["sample_count"], estimate["reading_count"]) == (4, 20 * len(PLACES) - 4)

@@ -26,19 +26,29 @@ def test_frames_and_http_have_the_verdict_and_deltas_its_changes() -> None:
     with bridge() as live, live.listen(delta=1) as changes, live.listen() as whole:
         changes.until("state")  # from before
         live.peer.observe(scan("tag_1", {"temperature": 22.0}))
-        fine = changes.until("delta", reports("tag_1"))["health"]
+        delta = changes.until("delta", reports("tag_1"))
+        schema.DeltaFrame.model_validate(delta)
+        fine = delta["health"]
         assert fine["tags"]["tag_1"] == {"verdict": "healthy"}
         assert fine["house"]["verdict"] == "healthy"
         live.peer.observe(scan("tag_2", {"temperature": 6.0}))
         cold = changes.until("delta", reports("tag_2"))["health"]
         assert list(cold["tags"]) == ["tag_2"]
         assert cold["house"]["verdict"] == "critical"
-        (reason,) = cold["tags"]["tag_2"]["reasons"]
-        assert (reason["kind"], reason["sensor"]) == ("range", "temperature")
-        assert (reason["value"], reason["limit"]) == (6.0, 10.0)
-
+        last_scan = live.tag("tag_2")["last_observed"]
+        assert cold["tags"]["tag_2"]["reasons"] == [
+            {
+                "kind": "range",
+                "verdict": "critical",
+                "sensor": "temperature",
+                "value": 6.0,
+                "limit": 10.0,
+                "since": last_scan,
+            }
+        ]
         reported = whole.until("state", reports("tag_2"))["health"]
         assert reported == live.json("/api/health")
+        assert reported["house"]["patrol"]["last_scan"] == last_scan
         assert verdicts(live) == {"tag_1": "healthy", "tag_2": "critical"}
 
 

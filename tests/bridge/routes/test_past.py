@@ -1,6 +1,7 @@
 """History and timeline over HTTP, over a made-up past."""
 
 import asyncio
+import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
@@ -46,20 +47,24 @@ async def remembering(past: MadeUp, limits: Limits | None = None) -> AsyncIterat
 
 async def test_a_history_has_readings_or_buckets_where_there_are_too_many(domain: int) -> None:
     points = [(number * NS, float(number)) for number in range(100)]
+    points[10:12] = [(10 * NS + 1, math.nan), (11 * NS, math.inf)]
     async with remembering(MadeUp(points={("7", "co2"): points})) as it:
         answer = await it.http.get(f"{HISTORY}&from=10&to=1970-01-01T00:00:20Z")
         found = routes_schema.History.model_validate_json(answer.content)
-        assert [reading.value for reading in found.readings] == list(map(float, range(10, 20)))
-        assert (found.unit, found.from_.sec, found.to.sec) == ("ppm", 10, 20)
-        answer = await it.http.get(f"{HISTORY}&from=10&to=20&points=5")
+        values = [None, None, *map(float, range(12, 20))]
+        assert [reading.value for reading in found.readings] == values
+        assert found.readings[0].stamp.model_dump() == {"sec": 10, "nanosec": 1}
+        assert (found.tag_id, found.sensor_type, found.unit) == ("7", "co2", "ppm")
+        assert (found.from_.sec, found.to.sec) == (10, 20)
+        answer = await it.http.get(f"{HISTORY}&from=20&to=30&points=5")
         found = routes_schema.History.model_validate_json(answer.content)
         assert (found.is_bucketed, found.bucket_s, len(found.buckets)) == (True, 2.0, 5)
         assert found.buckets[0].model_dump() == {
-            "start": {"sec": 10, "nanosec": 0},
+            "start": {"sec": 20, "nanosec": 0},
             "n": 2,
-            "mean": 10.5,
-            "min": 10.0,
-            "max": 11.0,
+            "mean": 20.5,
+            "min": 20.0,
+            "max": 21.0,
         }
 
 
@@ -77,10 +82,17 @@ async def test_nights_by_the_clock_are_not_simulations(
 async def test_a_timeline_queries_every_event_of_one_period(domain: int) -> None:
     past = MadeUp(points={("*", "~scans"): [(NS, 5.0), (2 * NS, 5.0)], ("*", "~runs"): [(0, 9.0)]})
     past.points["7", "~scans"] = [(NS, 5.0)]
+    for event, seconds in ((Event.FAILURES, 3), (Event.PESTS_SEEN, 55), (Event.PESTS_CLEARED, 950)):
+        past.points["*", event] = [(seconds * NS, 1.0)]
+    past.points["*", Event.INSPECTIONS] = [(at * NS, 1.0) for at in (55, 56, 950)]
     async with remembering(past) as it:
         answer = await it.http.get("/api/timeline?points=10")
         found = routes_schema.Timeline.model_validate_json(answer.content)
-        assert [(b.start.sec, b.scans) for b in found.buckets] == [(0, 2)]
+        assert [bucket.model_dump(exclude={"start"}) for bucket in found.buckets] == [
+            {"scans": 2, "failures": 1, "looks": 2, "pests_seen": 1, "pests_cleared": 0},
+            {"scans": 0, "failures": 0, "looks": 1, "pests_seen": 0, "pests_cleared": 1},
+        ]
+        assert [bucket.start.sec for bucket in found.buckets] == [0, 900]
         assert (found.bucket_s, found.reach is None, len(found.runs)) == (100.0, False, 1)
         requested = [request for request in past.requested if isinstance(request, SeriesRequest)]
         assert {request.sensor_type for request in requested} == set(Event)

@@ -221,6 +221,7 @@ def test_a_critical_alarm_is_shelved_with_a_reason_for_at_most_an_hour_and_anyon
         assert answer.status_code == 201, answer.text
         assert alarms(live)["a"]["shelved_by"] == "anna"
         assert alarms(live)["a"]["shelved_until"] == answer.json()["until"]
+        assert alarms(live)["a"]["shelved_reason"] == "sprayed"
         assert write(bert, **shelve, until=None).status_code == 201
         assert "shelved_by" not in alarms(live)["a"]
 

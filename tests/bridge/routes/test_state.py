@@ -1,5 +1,6 @@
 """The state over WebSocket and HTTP, from a real twin that a real peer feeds."""
 
+import math
 from collections.abc import Iterator
 from typing import Any
 from urllib.parse import quote
@@ -109,14 +110,14 @@ def history(live: Bridge, tag_id: str) -> dict[str, list[Any]]:
 
 
 def test_a_history_holds_the_last_scans_and_no_inspection(live: Bridge) -> None:
-    for value in range(5):
-        live.peer.observe(scan("past", {"co2": value}, stamp_s=100.0 + value))
+    for number, value in enumerate((0.0, 1.0, 2.0, 3.0, math.nan)):
+        live.peer.observe(scan("past", {"co2": value}, stamp_s=100.25 + number))
     live.peer.observe(scan("past", {"light": 900.0}, stamp_s=110.0), inspection("past"))
     live.tag("past", lambda tag: tag["species"])
-    expected = {"co2": [3.0, 4.0], "light": [900.0]}  # `buffer_len` is 3
+    expected = {"co2": [3.0, None], "light": [900.0]}  # `buffer_len` is 3
     wait_for(lambda: history(live, "past") == expected, "all in the log")
     values = live.json("/api/tags/past/history")["sensors"][0]["values"]
-    assert values[0]["stamp"] == {"sec": 103, "nanosec": 0}
+    assert values[0]["stamp"] == {"sec": 103, "nanosec": 250_000_000}
 
 
 def test_attempts_and_their_times_are_reported(live: Bridge) -> None:
@@ -138,6 +139,8 @@ def test_attempts_and_their_times_are_reported(live: Bridge) -> None:
     expected = {"co2": [400.0], "light": [1.0, 2.0]}
     wait_for(lambda: history(live, "told") == expected, "all in the log")
     past = live.json("/api/tags/told/history")
+    schema.TagHistory.model_validate(past)
+    assert (past["tag_id"], past["source"]) == ("told", "test")
     assert [(each["stamp"]["sec"], each["status"], each["kind"]) for each in past["tries"]] == [
         (3610, 0, 1), (7210, 0, 0), (7300, 2, 0),
     ]  # fmt: skip

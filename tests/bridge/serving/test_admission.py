@@ -8,7 +8,6 @@ from contextlib import ExitStack, suppress
 import httpx
 import pytest
 
-from lupin_bridge.routes import field as field_routes
 from lupin_bridge.serving.admission import (
     BURST_S,
     EXPORTS,
@@ -22,7 +21,6 @@ from lupin_bridge.stream import schema
 from tests.support.access import Served, served
 from tests.support.inprocess import running
 from tests.support.processes import limits
-from tests.support.waiting import until
 
 ROUTES = ("/api/field", "/api/field.json", "/api/field.png", "/api/field.npy", "/api/field/quality")
 QUERY = "?sensor_type=co2&resolution=1&bbox_min_x=0&bbox_min_y=0&bbox_max_x=4&bbox_max_y=4"
@@ -211,29 +209,6 @@ async def test_with_all_places_taken_the_answer_is_503_until_one_is_free(domain:
                 assert (await it.http.get(live)).status_code == 200
         free = await asyncio.gather(*(it.http.get("/api/field" + QUERY) for _ in range(2)))
         assert [answer.status_code for answer in free] == [200, 200]
-
-
-async def test_a_place_is_held_until_the_answer_exists_and_is_then_released(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """With work that never ends, no more clients wait than the limit allows."""
-
-    time_is_up = asyncio.Event()
-
-    async def never(*_: object) -> None:
-        await time_is_up.wait()
-        raise TimeoutError
-
-    monkeypatch.setattr(field_routes, "newest_field", never)
-    async with running(Limits(concurrency=3)) as it:
-        fields = [f"/api/field{QUERY.replace('co2', f'{n}')}" for n in range(8)]
-        requested = [asyncio.create_task(it.http.get(field)) for field in fields]
-        await until(lambda: sum(each.done() for each in requested) == 5, "the refusals")
-        time_is_up.set()
-        answers = await asyncio.gather(*requested)
-        assert sorted(answer.status_code for answer in answers) == [429] * 5 + [504] * 3
-        assert it.bridge.admission.refused == {"client_in_flight": 5}
-        assert not it.bridge.admission.in_flight
 
 
 @pytest.mark.parametrize("route", ["/docs", "/openapi.json"])

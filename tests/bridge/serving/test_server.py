@@ -28,7 +28,6 @@ from lupin_bridge.serving.server import (
 from lupin_bridge.settings import Settings
 from lupin_twin.runtime.process import END_S, IDLE_WORKERS_END_S
 from tests.support import raw_http
-from tests.support.inprocess import running
 from tests.support.live import attached, wait_until_ready
 from tests.support.processes import Process, faults, lupin_twin, twin_node, url_of
 from tests.support.ros import Peer
@@ -104,15 +103,6 @@ def test_an_address_in_use_is_refused_and_nothing_stays_open() -> None:
         with pytest.raises(OSError, match="in use"):
             listen("127.0.0.1", listener.getsockname()[1])
         assert open_files() == before
-
-
-async def test_a_small_write_is_sent_at_once(domain: int) -> None:
-    async with running() as served:
-        await served.http.get("/healthz")
-        (connection,) = served.server.server_state.connections
-        assert connection.transport is not None
-        client = connection.transport.get_extra_info("socket")
-        assert client.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY) == 1
 
 
 @contextmanager

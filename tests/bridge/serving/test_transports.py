@@ -80,13 +80,6 @@ def test_the_kernel_buffers_little_for_a_reader_that_does_not_read() -> None:
     assert hoarded(lambda _: None, 4 * UNSENT_BYTES), "otherwise this shows nothing"
 
 
-async def test_a_connection_that_is_not_read_is_reset() -> None:
-    async with connection() as (transport, theirs, _):
-        transport.write(MUCH)
-        tear_down(transport)
-        await until(lambda: theirs.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR), "a reset")
-
-
 async def test_a_connection_that_has_read_everything_is_closed() -> None:
     async with connection() as (transport, theirs, _):
         transport.write(b"the end")

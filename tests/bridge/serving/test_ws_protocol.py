@@ -36,21 +36,6 @@ async def joined(served: Running) -> Connection:
     return found
 
 
-async def test_a_socket_that_is_writable_again_reports_it_by_itself(domain: int) -> None:
-    async with running(ros_args=SILENT) as served:
-        with deaf_client(served.url) as slow:
-            connection = await joined(served)
-            freed: list[bool] = []
-            connection.on_writable = lambda: freed.append(connection.can_take)
-            while connection.can_take:
-                connection.write(SMALL_FRAME)
-            taken = [connection.can_take]
-            queued = connection.transport.get_write_buffer_size()
-            assert 0 < queued <= len(SMALL_FRAME), "of what the socket does not take, one frame"
-            await asyncio.to_thread(drain, slow, freed)
-            assert (taken, freed[0]) == ([False], True)
-
-
 @pytest.mark.parametrize("is_dismissed", [False, True])
 async def test_after_an_answer_that_nobody_reads_a_handshake_ends_at_the_timeout_or_when_dismissed(
     domain: int, is_dismissed: bool
@@ -99,12 +84,6 @@ async def test_a_client_that_does_not_read_gets_no_pongs_and_ends_after_its_clos
             assert connection.transport.get_write_buffer_size() == queued
             deaf.sendall(masked(CLOSE, b"\x03\xe8"))
             await until(lambda: not served.server.server_state.connections, "its end")
-
-
-def drain(client: socket.socket, freed: list[bool]) -> None:
-    """Read until the server's socket is writable again."""
-    while not freed:
-        client.recv(BLOCK)
 
 
 async def test_the_close_timeout_runs_from_the_close_frame_for_both_sides(

@@ -1,52 +1,7 @@
-import json
-from dataclasses import replace
-
 from lupin_bridge.alarms.board import board_of
-from lupin_bridge.judge.episodes import Alarm
-from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.frames import alarms_message
 from lupin_bridge.stream.state_json import MAX_IN_FRAME, alarms_body, alarms_in_frame
-from tests.bridge.stream.test_frames import received
 from tests.support.seen import NOW_NS, alarm
-
-NIGHT_NS = 1_000_000_000_000
-COLD = Alarm(
-    id="1f",
-    reason=Reason(Kind.RANGE, Verdict.CRITICAL, "temperature", 6.5, 10.0, NIGHT_NS),
-    tag_id="7",
-    raised_at_ns=NIGHT_NS + 5,
-    cleared_at_ns=None,
-    worst=6.25,
-)
-
-
-def test_a_frame_matches_its_contract_type_in_all_fields_and_their_order() -> None:
-    wire = alarms_message(
-        replace(board_of([COLD]), source="journal", since_ns=NIGHT_NS), None, (), 0
-    )
-    text = received(wire)
-    schema.AlarmsFrame.model_validate_json(text, strict=True)
-    frame = json.loads(text)
-    assert list(frame) == ["type", "notes", "alarms", "source", "since"]
-    assert list(frame["alarms"][0].items()) == [
-        ("id", "1f"),
-        (
-            "reason",
-            {
-                "kind": "range",
-                "verdict": "critical",
-                "sensor": "temperature",
-                "value": 6.5,
-                "limit": 10.0,
-                "since": {"sec": 1000, "nanosec": 0},
-            },
-        ),
-        ("tag_id", "7"),
-        ("raised_at", {"sec": 1000, "nanosec": 5}),
-        ("cleared_at", None),
-        ("worst", 6.25),
-    ]
 
 
 def test_an_answer_without_alarms_has_its_limit_of_knowledge() -> None:

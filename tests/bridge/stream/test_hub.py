@@ -91,15 +91,6 @@ def stage() -> Stage:
 # --- everyone -----------------------------------------------------------------------------------
 
 
-def test_a_new_client_gets_the_status_and_the_latest_state_at_once(stage: Stage) -> None:
-    stage.announce("live")
-    stage.publish()
-    stage.publish(0.1)
-    late = Socket()
-    stage.join(late, 5.0)
-    assert late.got == ["live", 2]
-
-
 def test_the_age_in_a_status_is_that_at_the_time_of_sending(stage: Stage) -> None:
     stage.announce("stale", 3.0)
     sockets = [Socket(), Socket(), Socket(room=0)]
@@ -122,26 +113,6 @@ def test_after_a_second_without_a_frame_the_status_is_sent_again(stage: Stage) -
         stage.hub.serve_all(now_s)
     assert (often.got, seldom.got) == (["live"] * 4, ["live"] * 2)
     assert (full.got, rosbridge.got) == (["live"], [])
-
-
-def test_a_client_that_wants_no_status_or_no_state_gets_none(stage: Stage) -> None:
-    no_status, no_state = Socket(), Socket()
-    stage.join(no_status, wants_status=False)
-    stage.join(no_state, wants_state=False)
-    stage.publish()
-    stage.announce("stale")
-    assert (no_status.got, no_state.got) == ([1], ["live", "stale"])
-
-
-def test_the_hub_is_full_at_its_limit_and_has_room_after_a_disconnect() -> None:
-    stage = Stage(max_clients=2)
-    first = stage.join(Socket())
-    has_room = [stage.hub.make_place("")]
-    stage.join(Socket())
-    has_room.append(stage.hub.make_place(""))
-    stage.hub.leave(first)
-    has_room.append(stage.hub.make_place(""))
-    assert (has_room, len(stage.hub)) == ([True, False, True], 1)
 
 
 def fill(**parties: int) -> tuple[Stage, dict[str, list[Socket]]]:
@@ -170,15 +141,6 @@ def test_eviction_needs_an_address_with_two_fewer(mine: int, gets_a_place: bool)
     stage, _ = fill(mine=mine, many=3)
     assert stage.hub.make_place("mine") == gets_a_place
     assert len(stage.hub) == mine + 3 - gets_a_place
-
-
-def test_one_address_may_have_all_places_and_no_more() -> None:
-    stage, sockets = fill(many=3)
-    assert not stage.hub.make_place("many")
-    assert all(socket.dismissed is None for socket in sockets["many"])
-    assert stage.hub.make_place("other")
-    stage.join(Socket(), address="other")
-    assert not stage.hub.make_place("many"), "it does not get it back"
 
 
 # --- slow clients -------------------------------------------------------------------------------

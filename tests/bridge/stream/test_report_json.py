@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from lupin_bridge.stream import pollers
-from lupin_bridge.stream.pollers import Advice, EstimateQualities, ExpectedTags
+from lupin_bridge.stream.pollers import EstimateQualities
 from lupin_twin.estimate.engine import Record, Tally
 from lupin_twin.estimate.solution import Place
 from lupin_twin.runtime.estimates import Report, TagCheck
@@ -41,25 +41,3 @@ def test_the_hit_rate_of_estimates() -> None:
     bare = body["sensors"]["ph"]
     assert (bare["fitted_at"], bare["graded_since"], bare["share_day"]) == (None, None, None)
     assert bare["is_trusted"] is None
-
-
-def test_the_predictions_of_each_tag() -> None:
-    body = json.loads(pollers.tags("co2", REPORT))
-    ExpectedTags.model_validate(body)
-    assert (body["sensor_type"], body["at"]) == ("co2", {"sec": 5, "nanosec": 0})
-    assert body["tags"]["b"] == {
-        "measured": 30.0,
-        "observed_at": {"sec": 1, "nanosec": 0},
-        "expected": 21.0,
-        "expected_sd": 0.5,
-        "z": 9.0,
-        "offset": 9.0,
-        "left_out": True,
-    }
-    assert body["tags"]["a"]["left_out"] is False
-
-
-def test_where_another_tag_would_help() -> None:
-    body = json.loads(pollers.advice("co2", REPORT))
-    Advice.model_validate(body)
-    assert body == {"sensor_type": "co2", "places": [{"x": 1.0, "y": 2.0, "error_ratio": 0.75}]}

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lupin_bridge.stream import schema, state_json
+from lupin_bridge.stream import schema
 from lupin_bridge.stream.state_json import StateJson
-from lupin_twin.core.history import PastAttempt, PastScan, TagHistory
 from lupin_twin.core.state import (
     Attempt,
     Bloom,
@@ -209,49 +208,6 @@ def test_the_last_attempt_is_written_unless_it_was_the_last_observation() -> Non
         written = json.loads(StateJson().tag(replace(tag, last_try=attempted), 5 * S))
         assert written["last_try"] == (attempted and stamp(attempted.stamp_ns))
         assert written["last_try_status"] == (attempted and attempted.status)
-
-
-def test_a_history_is_sorted_by_sensor_in_its_own_order() -> None:
-    past = TagHistory(
-        (
-            PastScan(1_500_000_000, (Reading("co2", 400.0), Reading("light", 900.0))),
-            PastScan(2_000_000_000, (Reading("co2", math.nan),)),
-            PastScan(3_000_000_001, (Reading("light", 800.0),)),
-        ),
-        (PastAttempt(Attempt(S), 0), PastAttempt(Attempt(4 * S, 2, "not decoded"), None)),
-        "adapt/fixed",
-    )
-    written = state_json.history("7", past)
-    assert written == {
-        "tag_id": "7",
-        "source": "adapt/fixed",
-        "sensors": [
-            {
-                "name": "co2",
-                "values": [
-                    {"stamp": {"sec": 1, "nanosec": 500_000_000}, "value": 400.0},
-                    {"stamp": {"sec": 2, "nanosec": 0}, "value": None},
-                ],
-            },
-            {
-                "name": "light",
-                "values": [
-                    {"stamp": {"sec": 1, "nanosec": 500_000_000}, "value": 900.0},
-                    {"stamp": {"sec": 3, "nanosec": 1}, "value": 800.0},
-                ],
-            },
-        ],
-        "tries": [
-            {"stamp": {"sec": 1, "nanosec": 0}, "status": 0, "status_detail": "", "kind": 0},
-            {
-                "stamp": {"sec": 4, "nanosec": 0},
-                "status": 2,
-                "status_detail": "not decoded",
-                "kind": None,
-            },
-        ],
-    }
-    schema.TagHistory.model_validate(written)
 
 
 @pytest.mark.parametrize("clock", ["none", "stopped"])

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from lupin_msgs.msg import Observation
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
@@ -96,28 +95,6 @@ def test_messages_of_zigbee_sensors_are_in_the_state_and_so_is_a_lost_sensor(
 
         peer.until(has_failed, "the failed attempt")
         assert process.exit_code is None
-
-
-def test_the_last_will_of_a_dead_sensor_is_a_failed_scan(domain: int, tmp_path: Path) -> None:
-    broker = Broker(tmp_path)
-    with broker.running(), adapted(domain, broker), Peer(domain) as peer:
-        robot = Robot(peer)
-        peer.until(lambda: robot.reported("connected"), "the broker")
-        sensor = Client(CallbackAPIVersion.VERSION2)
-        sensor.will_set("plain/bench", "offline")
-        sensor.connect("127.0.0.1", broker.port)
-        wait_for(lambda: sensor.loop() == 0 and sensor.is_connected(), "the sensor to be there")
-        connection = sensor.socket()
-        assert connection is not None
-        connection.close()  # without a DISCONNECT
-
-        def failed() -> Any:
-            return next((it for it in robot.observations if it.status), None)
-
-        found = peer.until(failed, "the will as an observation")
-        assert found.status == Observation.STATUS_SCAN_FAILED
-        assert (found.tag_reading.tag_id, found.source) == ("bench", "adapt/fixed")
-        assert found.tag_pose_in_map.position.x == 1.0
 
 
 def test_a_retained_message_counts_by_its_own_time_or_not(domain: int, tmp_path: Path) -> None:

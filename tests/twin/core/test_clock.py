@@ -15,12 +15,6 @@ def check(watch: ClockWatch, ros_s: float, now_s: float) -> ClockState:
     return watch.update(int(ros_s * S), now_s, is_simulated=True)
 
 
-def test_a_simulated_clock_that_was_never_set_is_never_running() -> None:
-    watch = ClockWatch()
-    assert [check(watch, 0, now_s) for now_s in (0.0, 1.0, 1000.0)] == ["none"] * 3
-    assert not watch.should_subscribe
-
-
 def test_a_clock_that_stands_but_is_still_published_is_paused() -> None:
     watch = ClockWatch()
     check(watch, 5, 10.0)

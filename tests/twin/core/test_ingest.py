@@ -178,16 +178,3 @@ def test_an_accepted_write_is_stored_and_known_and_a_refused_one_is_neither() ->
         assert drop.reason is Reason.REJECTED
         assert f"the limit is {MAX_TEXT_LENGTH}" in drop.why
     assert repeats.news(Scan(too_long, S)) is not None
-
-
-@pytest.mark.parametrize("own_s", [160, 10_000])
-def test_a_message_from_the_future_keeps_the_age_of_its_first_receipt(own_s: int) -> None:
-    """When it is received again, latched, its content must not look fresh, even after its time."""
-    store, repeats = TwinStore(), Repeats()
-    for now_s in (100, 130, 200):
-        received = received_reading(own_stamp_ns=own_s * S)
-        write = ingest.observation(received, "map", now_s * S)
-        assert isinstance(write, Scan)
-        ingest.apply(write, store, repeats)
-    [tag] = store.snapshot(200 * S, "map").tags
-    assert tag.last_observed_ns == 100 * S

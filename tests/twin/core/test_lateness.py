@@ -58,17 +58,6 @@ def test_each_kind_has_its_own_order(robot: Robot) -> None:
         assert looks.findings(at_s - 60.0) == []
 
 
-def test_latched_messages_of_a_second_robot_with_the_same_name_do_no_harm(robot: Robot) -> None:
-    """Fifty each, of the same hour, one after the other."""
-    stamps = [1000.0 + i for i in range(50)]
-    assert robot.findings(*stamps, was_latched=True, every_s=0.001) == []
-    assert robot.findings(*stamps, was_latched=True, every_s=0.001) == []
-    assert robot.lateness.counts == {}
-    # And both go on.
-    for at_s in range(1100, 1130):
-        assert robot.findings(at_s, at_s - 0.5) == []
-
-
 def test_a_clock_that_is_entirely_wrong_is_detected_too(robot: Robot) -> None:
     """Its messages look latched: DDS stamps them with the same clock."""
     robot.findings(1000.0)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from lupin_twin.estimate.kernel import PRIOR_LOG_SD, PRIOR_MEDIAN, Hyper, Pairs, Readings, scale_of
+from lupin_twin.estimate.kernel import PRIOR_LOG_SD, PRIOR_MEDIAN, Pairs, Readings, scale_of
 from lupin_twin.estimate.model import FitFailed, hyper_of, minimise, negative_log_posterior
 from tests.support import textbook_gp
-from tests.support.estimates import DAY_S, hypers, some_readings, spots_of
+from tests.support.estimates import DAY_S, some_readings, spots_of
 
 START = np.zeros(len(PRIOR_MEDIAN))
 
@@ -46,14 +46,6 @@ def test_its_gradient_equals_finite_differences(readings: Readings) -> None:
     ]
     scale = 1.0 + np.abs(expected).max()
     assert objective(there)[1] == pytest.approx(expected, rel=1e-4, abs=1e-5 * scale)
-
-
-@given(some_readings(), hypers)
-def test_the_covariance_equals_the_formula_for_each_pair(readings: Readings, h: Hyper) -> None:
-    expected = textbook_gp.of_readings(spots_of(readings), h)
-    assert Pairs(readings, DAY_S).covariance(h) == pytest.approx(expected, rel=1e-12)
-    fast = Readings(readings.time_s / 60.0, readings.tag, readings.value, readings.xy)
-    assert Pairs(fast, DAY_S / 60.0).covariance(h) == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_matrix_that_cannot_be_factorised_has_no_density_and_ends_no_search() -> None:

@@ -22,7 +22,6 @@ from lupin_twin.field.engine import (
     default_box,
     default_request,
 )
-from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import Abandoned
 from tests.support.maps import map_of
@@ -71,9 +70,9 @@ def store() -> TwinStore:
     return store
 
 
-def answer(store: TwinStore, occupancy: OccupancyMap | None = None, **rules: float) -> FieldGrid:
+def answer(store: TwinStore, **rules: float) -> FieldGrid:
     samples = store.samples_for_sensor("temperature")
-    return compute_field(request_of(), samples, occupancy, rules_of(**rules))
+    return compute_field(request_of(), samples, None, rules_of(**rules))
 
 
 # --- the request -----------------------------------------------------------------------------
@@ -185,25 +184,15 @@ def test_cost_follows_cells_and_the_windows_of_the_samples(
 # --- explored --------------------------------------------------------------------------------
 
 
-def test_a_map_clips_to_known_cells(store: TwinStore) -> None:
+def test_a_map_clips_to_known_cells_wherever_the_box_begins(store: TwinStore) -> None:
+    request, samples = request_of(bbox_min_x=1.0), store.samples_for_sensor("temperature")
     occupancy = map_of([[0, -1, 0, 0], [0, 0, 0, -1]])
-    unclipped = answer(store)
-    clipped = answer(store, occupancy)
-    known = np.array([1, 0, 1, 1, 1, 1, 1, 0], dtype=np.bool_)
-    np.testing.assert_array_equal(
-        clipped.values, np.where(known, unclipped.values, np.float32(np.nan))
+    unclipped, clipped = (
+        compute_field(request, samples, it, rules_of()).values for it in (None, occupancy)
     )
-    assert not np.isnan(unclipped.values[1])
-
-
-def test_without_a_map_nothing_is_clipped_and_the_first_map_recomputes_fields(
-    store: TwinStore,
-) -> None:
-    grid = answer(store)
-    assert not np.isnan(grid.values).any()
-    clipped = answer(store, map_of([[-1] * 4] * 2, revision=0))
-    assert np.isnan(clipped.values).all()
-    assert (clipped.sample_count, clipped.value_min, clipped.value_max) == (2, 0.0, 0.0)
+    assert not np.isnan(unclipped).any()
+    known = np.array([0, 1, 1, 1, 1, 0], dtype=np.bool_)
+    np.testing.assert_array_equal(clipped, np.where(known, unclipped, np.float32(np.nan)))
 
 
 # --- the default box -------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lupin_twin.field.grid import FieldGrid, cell_centres
+from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import COINCIDENT_EPS_M, compute_idw_field
 
 Sample = tuple[float, float, float]
@@ -96,27 +96,6 @@ def test_a_distance_equal_to_the_radius_is_within_although_its_square_is_not(pow
 
 
 # --- the grid --------------------------------------------------------------------------------
-
-
-def test_rows_run_up_from_the_lower_edge_and_cells_are_centred() -> None:
-    grid = compute_idw_field(
-        [(10.75, 20.25, 1.0), (10.25, 20.75, 2.0), (11.25, 20.75, 3.0)],
-        bbox_min_x=10.0,
-        bbox_min_y=20.0,
-        bbox_max_x=11.5,
-        bbox_max_y=21.0,
-        resolution=0.5,
-        falloff_radius_m=0.1,
-        max_distance_m=0.1,
-        power=2.0,
-    )
-    assert (grid.width, grid.height, grid.resolution) == (3, 2, 0.5)
-    assert (grid.origin_x, grid.origin_y) == (10.0, 20.0)
-    nan = math.nan
-    np.testing.assert_array_equal(
-        grid.values, np.array([nan, 1.0, nan, 2.0, nan, 3.0], dtype=np.float32)
-    )
-    np.testing.assert_array_equal(cell_centres(10.0, 3, 0.5), [10.25, 10.75, 11.25])
 
 
 def test_the_range_leaves_out_what_float32_cannot_hold() -> None:

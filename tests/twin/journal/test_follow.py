@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.past import HOUR_NS
 from lupin_twin.core.state import Write
 from lupin_twin.journal import follow
 from lupin_twin.journal.follow import Followed, Lot, NotALotError
@@ -113,29 +112,6 @@ def test_a_copy_that_says_nonsense_of_itself_is_damaged(
         set_meta(connection, key, "x")
     with pytest.raises(DamagedFile, match="nonsense"):
         follow.followed(target)
-
-
-def purge(path: Path, upto_ns: int) -> None:
-    with closing(open_writer(path)) as connection, transaction(connection):
-        assert purge_step(connection, Limits(1.0, 10**12), upto_ns)
-
-
-def test_a_copy_is_whole_in_the_end_though_the_journal_deletes_all_the_time(tmp_path: Path) -> None:
-    source, target = tmp_path / "twin.sqlite", tmp_path / "web.sqlite"
-    first = NOW // HOUR_NS * HOUR_NS
-    at = [first + n * 10 * SECOND for n in range(60)]
-    append(source, [scan(str(n % 12), at_ns) for n, at_ns in enumerate(at)])
-    purge(source, at[20])
-    after, is_all, lots = 0, False, 0
-    while not is_all:
-        with reading(source) as connection:
-            lot = follow.read(connection, after, 2)
-        follow.write(target, lot, NOW, after)
-        after, is_all, lots = lot.last, lot.is_all, lots + 1
-        if lots < 20:
-            purge(source, at[20 + lots])
-    assert lots > 6
-    assert contents(target) == contents(source)
 
 
 @pytest.mark.parametrize("said", ["x", "nan", "-5", "0", "1e-300", "inf", "1e300"])

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from lupin_twin.core.past import SeriesPast, SeriesRequest
+from lupin_twin.core.past import SeriesRequest
 from lupin_twin.journal.queries import series
 from tests.support.journal import SECOND, scan
 from tests.support.log_life import BEGUN, LATEST, MINUTE, lived
@@ -21,18 +21,9 @@ def test_as_many_readings_as_points_come_singly_and_more_in_buckets(tmp_path: Pa
         assert exact.means == tuple(map(float, range(10)))
         assert exact.counts == (1,) * 10
         assert not exact.is_bucketed
-        assert series(life.connection, temperature(BEGUN, BEGUN + 10 * SECOND, 9), END) == (
-            SeriesPast(
-                BEGUN,
-                BEGUN + 10 * SECOND,
-                1_111_111_112,
-                tuple(BEGUN + n * 1_111_111_112 for n in range(9)),
-                (2, *(1,) * 8),
-                (0.5, *map(float, range(2, 10))),
-                (0.0, *map(float, range(2, 10))),
-                tuple(map(float, range(1, 10))),
-            )
-        )
+        fewer = series(life.connection, temperature(BEGUN, BEGUN + 10 * SECOND, 9), END)
+        assert fewer.is_bucketed
+        assert fewer.counts == (2, *(1,) * 8)
 
 
 def test_too_many_scans_come_by_the_hour(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

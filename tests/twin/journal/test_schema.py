@@ -17,7 +17,6 @@ from lupin_twin.journal.schema import (
     Empty,
     Foreign,
     is_damage_error,
-    open_named,
     open_reader,
     open_writer,
 )
@@ -111,13 +110,6 @@ def test_a_file_that_is_no_database_is_damaged(tmp_path: Path) -> None:
         open_writer(text)
     assert is_damage_error(caught.value)
     assert find_damage(text)
-
-
-@pytest.mark.parametrize("content", [b"x", b"\x89MCAP0\r\n" * 1000])
-def test_a_named_file_that_is_no_database_is_foreign(content: bytes, path: Path) -> None:
-    path.write_bytes(content)
-    with pytest.raises(Foreign, match="is not a journal: it does not begin as an SQLite file"):
-        open_named(path)
 
 
 def test_a_path_that_is_no_file_is_not_waited_for(tmp_path: Path) -> None:

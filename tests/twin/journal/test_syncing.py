@@ -8,31 +8,6 @@ from lupin_twin.journal.schema import open_writer
 from tests.support.waiting import wait_for
 
 
-def test_each_write_is_synced_once_and_nothing_else_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    synced: list[str] = []
-    sync = os.fdatasync
-
-    def watched(descriptor: int) -> None:
-        synced.append(str(Path(f"/proc/self/fd/{descriptor}").readlink()))
-        sync(descriptor)
-
-    monkeypatch.setattr(os, "fdatasync", watched)
-    path = tmp_path / "j.sqlite"
-    connection = open_writer(path)
-    connection.execute("INSERT INTO site VALUES ('7', '')")
-    syncing = Syncing(path, period_s=0.01)
-    try:
-        for count in (1, 2):
-            syncing.has_written()
-            wait_for(lambda count=count: len(synced) == count, "a sync")  # type: ignore[misc]
-    finally:
-        syncing.close()
-        connection.close()
-    assert set(synced) == {f"{path}-wal"}
-
-
 def test_a_failed_sync_is_reported_with_the_next_write(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

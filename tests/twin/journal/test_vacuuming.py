@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from lupin_twin.journal.rebuild import vacuum
-from lupin_twin.journal.schema import Empty, Foreign, NotPossible, open_reader, open_writer
+from lupin_twin.journal.schema import NotPossible, open_reader, open_writer
 from tests.support.journal import NOW, SECOND, append, is_whole, known, pin, scan
 from tests.twin.journal.conftest import fail_on_a_full_disk
 
@@ -38,20 +38,6 @@ def test_the_file_shrinks_and_its_content_stays(path: Path) -> None:
     assert small(path) == (after, after)
     # It can be written as before, with consecutive numbers.
     assert append(path, [scan("new")]) == (1, 0)
-
-
-@pytest.mark.parametrize(
-    ("content", "refusal"), [(b"", Empty), (b"x", Foreign), (b"\x89MCAP0\r\n" * 1000, Foreign)]
-)
-def test_a_file_that_is_no_journal_is_left_alone_and_nothing_is_created_beside_it(
-    content: bytes, refusal: type[Exception], tmp_path: Path
-) -> None:
-    theirs = tmp_path / "theirs"
-    theirs.write_bytes(content)
-    with pytest.raises(refusal):
-        small(theirs)
-    assert theirs.read_bytes() == content
-    assert list(tmp_path.iterdir()) == [theirs]
 
 
 def test_it_is_refused_while_the_file_is_read(path: Path) -> None:

@@ -204,8 +204,13 @@ def test_a_removed_log_is_reported_and_a_kill_after_it_loses_nothing(
     with recording(path) as journal:
         journal.write(scan("1"))
         wait_for(lambda: journal.condition.written == 1, "the row")
-        path.with_name("j.sqlite-wal").unlink()
+        log, away = path.with_name("j.sqlite-wal"), path.with_name("away")
+        log.rename(away)
         wait_state(journal, JournalState.FAILING, "j.sqlite-wal was removed: restart the twin")
+        away.rename(log)
+        wait_state(journal, JournalState.RECORDING)
+        log.unlink()
+        wait_state(journal, JournalState.FAILING)
         journal.write(scan("2"))
         # As a killed process leaves it.
         left = tmp_path / "left.sqlite"

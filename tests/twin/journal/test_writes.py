@@ -51,16 +51,6 @@ def test_writes_come_in_the_order_of_receipt_and_once_each(tmp_path: Path, copie
         assert late.journal == whole.journal
 
 
-def test_copies_of_known_rows_are_no_writes(tmp_path: Path) -> None:
-    with lived(tmp_path / "j.sqlite") as life:
-        life.write([scan(), inspection()])
-        life.begin(BEGUN - SECOND)
-        life.write([scan("8", BEGUN)])
-        assert [(w.run, w.tag_id) for w in requested(life.connection).writes] == (
-            [(1, "7"), (1, "7"), (2, "8")]
-        )
-
-
 def test_reading_from_the_beginning_is_limited(tmp_path: Path) -> None:
     now = time.time_ns()
 

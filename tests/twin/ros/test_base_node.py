@@ -106,21 +106,6 @@ def test_warnings_are_limited_per_key_and_counted(utilities: NodeUtilities, logg
     assert logged.lines == [wording, wording, wording, f"{wording} (2 more since the last warning)"]
 
 
-def test_an_error_in_a_callback_is_counted_and_logged_with_its_traceback(
-    utilities: NodeUtilities, logged: Logged
-) -> None:
-    def fail() -> None:
-        raise ValueError("broken")
-
-    guarded = utilities.guarded("the test", fail)
-    guarded()
-    guarded()
-    assert utilities.callback_errors == 2
-    [line] = logged.lines
-    assert line.startswith("error number 1, in the test:\n")
-    assert "ValueError: broken" in line
-
-
 def test_on_a_shared_topic_only_wanted_messages_are_read_and_the_others_not_counted(
     utilities: NodeUtilities,
 ) -> None:

@@ -1,24 +1,11 @@
 """Writes on the wire: as values for robots, and as rows for copies of the log."""
 
-from typing import Any
-
 import pytest
-from rclpy.serialization import deserialize_message, serialize_message
 
 from lupin_twin.journal.follow import Lot, NotALotError
-from lupin_twin.ros.convert_services import lot_of, rows_request_message, rows_response
+from lupin_twin.ros.convert_services import lot_of, rows_response
 
 LOT = Lot("0123456789abcdef" * 2, ('["run",1,0,1,1,1,null,null]', '["meta","ä","5"]'), 9, True)
-
-
-def over_the_wire(message: Any) -> Any:
-    return deserialize_message(serialize_message(message), type(message))
-
-
-def test_rows_survive_the_wire() -> None:
-    request = over_the_wire(rows_request_message(8))
-    assert (request.after, request.as_rows) == (8, True)
-    assert lot_of(over_the_wire(rows_response(LOT)), 8) == LOT
 
 
 @pytest.mark.parametrize(

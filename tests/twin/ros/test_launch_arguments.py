@@ -9,31 +9,10 @@ from typing import Any
 import ament_index_python.packages
 import pytest
 
-from lupin_twin.core.parameters import ARGUMENTS, LaunchError, overrides, params_file
+from lupin_twin.core.parameters import ARGUMENTS, LaunchError
 
 SHARE = Path("ros_node/lupin_twin")
 NOT_GIVEN = {argument.name: argument.default for argument in ARGUMENTS}
-
-
-def test_an_omitted_argument_overrides_nothing() -> None:
-    assert overrides(NOT_GIVEN) == {}
-
-
-def test_a_given_argument_overrides_the_file_with_its_type() -> None:
-    given = {"use_sim_time": "false", "journal": "off", "layers": "temperature, co2,"}
-    assert overrides(NOT_GIVEN | given) == {
-        "use_sim_time": False,
-        "journal": "off",
-        "layers": ["temperature", "co2"],
-    }
-    assert overrides(NOT_GIVEN | {"use_sim_time": "true"}) == {"use_sim_time": True}
-
-
-def test_a_missing_file_is_refused_by_name() -> None:
-    given = NOT_GIVEN | {"params_file": "/no.yaml"}
-    with pytest.raises(LaunchError, match=r"params_file is '/no\.yaml', expected an existing file"):
-        params_file(given, "twin.yaml", lambda path: path == "twin.yaml")
-    assert params_file(given, "twin.yaml", lambda path: path == "/no.yaml") == "/no.yaml"
 
 
 def described(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
@@ -83,7 +62,8 @@ def test_the_launch_file_starts_the_twin_with_the_given_arguments(
     file = str(SHARE / "config/twin.yaml")
     [plain] = twin(NOT_GIVEN)
     assert (plain["parameters"], plain["namespace"]) == ([file], "")
-    given = {"namespace": "gh1", "layers": "co2", "journal": "off", "log_level": "rcl:=debug"}
+    given = {"namespace": "gh1", "use_sim_time": "false", "journal": "off"}
+    given |= {"layers": "temperature, co2,", "log_level": "rcl:=debug"}
     assert twin(NOT_GIVEN | given) == [
         {
             "package": "lupin_twin",
@@ -91,7 +71,14 @@ def test_the_launch_file_starts_the_twin_with_the_given_arguments(
             "name": "lupin_twin",
             "namespace": "gh1",
             "output": "screen",
-            "parameters": [file, {"journal": ("off", str), "layers": (["co2"], list[str])}],
+            "parameters": [
+                file,
+                {
+                    "use_sim_time": (False, bool),
+                    "journal": ("off", str),
+                    "layers": (["temperature", "co2"], list[str]),
+                },
+            ],
             "ros_arguments": ["--log-level", "rcl:=debug"],
         }
     ]

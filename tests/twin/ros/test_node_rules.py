@@ -13,7 +13,7 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from lupin_twin.ros.node import TwinNode
-from tests.support.messages import occupancy_grid, scan
+from tests.support.messages import scan
 from tests.support.ros import Peer
 
 
@@ -61,32 +61,6 @@ def test_a_changed_rule_takes_effect_at_once(stage: Stage) -> None:
     assert node.rules == replace(before, idw_power=3.5)
     assert node.revision != revision
     assert len(reported) == 2
-
-
-# --- the map ------------------------------------------------------------------------------------
-
-
-def test_the_maps_revision_grows_with_each_accepted_new_map(stage: Stage) -> None:
-    node = stage.node
-    reported: list[Any] = []
-    node.listen(reported.append, heartbeat_s=1000.0)
-    revisions = []
-    broken, again = occupancy_grid([[0, 0]]), occupancy_grid([[0, -1]])
-    broken.info.width = 7
-    again.header.stamp.sec = 9
-    for message in (
-        occupancy_grid([[0, -1]]),
-        broken,
-        occupancy_grid([[0, 0]], frame_id="odom"),
-        again,
-        occupancy_grid([[0, 0]]),
-    ):
-        node._on_map(message)
-        revisions.append(node.revision[1])
-    assert revisions == [1, 1, 1, 1, 2]
-    assert node.occupancy_map is not None
-    assert node.occupancy_map.revision == 2
-    assert len(reported) == 3, "at first, and for each new map"
 
 
 # --- names --------------------------------------------------------------------------------------

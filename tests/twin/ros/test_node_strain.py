@@ -7,12 +7,11 @@ from contextlib import suppress
 from typing import Any
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lupin_msgs.srv import GetEstimate, GetField, GetHistory
 
 from lupin_twin.ros.base_node import SERVICE_QOS
 from tests.support.domains import own_domain
-from tests.support.messages import discovered, occupancy_grid, scan
+from tests.support.messages import scan
 from tests.support.proc_stat import waited_s
 from tests.support.processes import Process, twin_node
 from tests.support.ros import Peer
@@ -165,24 +164,3 @@ def test_all_requests_made_while_the_twin_stands_still_are_answered(strained: St
     ]
     strained.process.thaw()
     strained.peer.until(lambda: all(future.done() for future in requested), "all answers")
-
-
-def test_the_twin_reports_its_health_on_diagnostics(strained: Strained) -> None:
-    peer = strained.peer
-    received: list[Any] = []
-    peer.node.create_subscription(DiagnosticArray, "/diagnostics", received.append, 10)
-
-    def levels() -> dict[str, bytes]:
-        return {status.name: status.level for status in received[-1].status} if received else {}
-
-    inputs, drops = "/lupin_twin: inputs", "/lupin_twin: drops"
-    peer.until(lambda: levels().get(inputs) == DiagnosticStatus.STALE, "no observation yet")
-    assert levels()["/lupin_twin: clock"] == DiagnosticStatus.OK
-    peer.observe(scan("1", frame_id="odom"))
-    peer.until(lambda: levels()[drops] == DiagnosticStatus.WARN, "the drop")
-    [reported] = [status for status in received[-1].status if status.name == drops]
-    assert {pair.key: pair.value for pair in reported.values}["frame"] == "1"
-    for topic, message in (("/perception/discovered_tags", discovered({})), ("/map", None)):
-        peer.publish(topic, message or occupancy_grid([[0]]))
-    peer.observe(scan("1", {"co2": 1.0}))
-    peer.until(lambda: levels()[inputs] == DiagnosticStatus.OK, "all inputs")

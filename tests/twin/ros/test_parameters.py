@@ -105,12 +105,6 @@ def test_errors_name_the_parameter(domain: int) -> None:
     ):
         node.create_subscription(Time, "a b", lambda _: None, 1)
     with (
-        pytest.raises(ParameterError, match=r"parameter use_sim_time is not a bool: .*'5'"),
-        naming_own_parameters(),
-        node_with(domain, "use_sim_time:=5"),
-    ):
-        pass
-    with (
         pytest.raises(
             ParameterError, match="parameter start_type_description_service is not a bool"
         ),

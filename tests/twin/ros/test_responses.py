@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Iterator
-from concurrent.futures import Future
 from types import SimpleNamespace
 from typing import Any
 
@@ -114,42 +113,6 @@ def test_an_answer_without_a_reader_is_dropped_with_a_warning(stage: Stage) -> N
         "gave up a response of /ask: for 30 s DDS has found no reader for it; does a "
         "client use a QoS other than the default of services?"
     )
-
-
-class Service:
-    """What rclpy's executor does with a service: it sends the callback's result."""
-
-    service_name = "/ask"
-
-    def __init__(self) -> None:
-        self.sent: list[tuple[Any, Any]] = []
-
-    def send_response(self, response: Any, header: Any) -> None:
-        self.sent.append((response, header))
-
-
-UTILITIES: Any = SimpleNamespace(guarded=lambda _, callback: callback)
-
-
-def test_a_later_response_goes_to_its_client() -> None:
-    service = Service()
-    Responses(UTILITIES).watch(service)
-    first, second = Future[int](), Future[int]()
-    service.send_response(first, "first")
-    service.send_response(second, "second")
-    assert service.sent == []
-    second.set_result(2)
-    first.set_result(1)
-    assert service.sent == [(2, "second"), (1, "first")]
-
-
-def test_a_response_may_exist_before_rclpy_reports_its_client() -> None:
-    service = Service()
-    Responses(UTILITIES).watch(service)
-    later = Future[int]()
-    later.set_result(1)
-    service.send_response(later, "header")
-    assert service.sent == [(1, "header")]
 
 
 def test_a_client_that_dds_never_finds_is_reported_and_delays_nobody() -> None:

@@ -39,13 +39,7 @@ exit_after(main)
     [("idle", "returns"), *(("busy", end) for end in ("returns", "exits", "explains", "raises"))],
 )
 def test_the_process_ends_with_its_code_whatever_a_thread_does(how: str, end: str) -> None:
-    ended = subprocess.run(
-        [sys.executable, "-c", LEAVE, how, end],
-        check=False,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE_S,
-    )
+    ended = left(how, end, "")
     failed = end in ("explains", "raises")
     assert (ended.returncode, ended.stdout) == (1 if failed else 3, "said\n")
     assert ("why\n" in ended.stderr) == failed

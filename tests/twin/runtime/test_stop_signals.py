@@ -1,38 +1,10 @@
-"""Stop signals wait until they are handled; in a process of its own."""
+"""A process ends after a stop signal, whatever hangs; `test_cli` has signals during the start."""
 
-import os
 import signal
 import subprocess
 import sys
 
-import pytest
-
 from tests.support.waiting import PATIENCE_S
-
-SCRIPT = """
-from lupin_twin.runtime import process
-process.block()
-print("blocked", flush=True)
-input()
-process.wait()
-print("asked", flush=True)
-"""
-
-
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_waits_until_it_is_handled(stop: signal.Signals) -> None:
-    with subprocess.Popen(
-        [sys.executable, "-c", SCRIPT], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdin is not None
-        assert process.stdout is not None
-        assert process.stdout.readline() == "blocked\n"
-        os.kill(process.pid, stop)
-        process.stdin.write("\n")
-        process.stdin.flush()
-        assert process.stdout.readline() == "asked\n"
-        assert process.wait(PATIENCE_S) == 0
-
 
 # Before the process ends: one holds Python's lock, the other runs after Python.
 HANGS = {

@@ -88,7 +88,10 @@ export function SharingNote(): JSX.Element {
   return <p className="sharing-note faint">{sharingText(who)}</p>;
 }
 
-/** Says that alarms were raised while a past moment is shown, and links back to live. */
+/**
+ * Says that alarms were raised while a past moment is shown, and links back to live. Without
+ * `data-over-map`: it comes and goes by itself, and the map must not move for it under a finger.
+ */
 export function Meanwhile(): JSX.Element | null {
   const items = useSelected(meanwhile);
   const [worst] = items;

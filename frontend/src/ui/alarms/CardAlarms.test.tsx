@@ -93,13 +93,13 @@ test('of two reasons it is said which waits for a second scan; what the deadband
   );
   const lines = (): (string | null)[] =>
     [...screen.getByTestId('reasons').children].map(({ textContent }) => textContent);
-  expect(lines().filter((text) => text?.includes('second scan'))).toEqual([]);
+  expect(lines().filter((text) => text?.includes('no alarm yet'))).toEqual([]);
   flush(() => {
     reportAlarms(alarm('a', { tag_id: '7' }));
   });
   expect(lines()).toEqual([
     expect.stringMatching(/close the vents $/),
-    expect.stringMatching(/^Humidity 90.*waiting for a second scan$/),
+    expect.stringMatching(/^Humidity 90.*no alarm yet$/),
     expect.stringMatching(/^CO₂ 1,450.*CO₂ dosing $/),
   ]);
 });

@@ -82,7 +82,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     'Ein Alarm wird nach zwei auffälligen Messungen nacheinander ausgelöst, bei einem Schädling oder fehlenden Daten sofort.',
   alarmsWait: (tags) =>
     `${counted(tags, 'Messpunkt wartet', 'Messpunkte warten')} auf eine zweite Messung: noch kein Alarm`,
-  alarmNotYet: 'wartet auf eine zweite Messung',
+  alarmNotYet: 'noch kein Alarm',
   alarmsNotYet: 'Warten auf die Liste der Alarme',
   alarmsStarting: 'Die Aufzeichnung wird noch gelesen: Weitere Alarme können folgen.',
   alarmsNoTime: 'Solange die Zeit unbekannt ist, können Alarme fehlen.',
@@ -200,8 +200,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthAllWell: 'Alle beurteilten Messwerte liegen im Idealbereich',
   healthDespite: (alarms) =>
     alarms === 1
-      ? '1 Alarm steht noch an: mit der nächsten guten Messung behoben'
-      : `${alarms} Alarme stehen noch an: mit der nächsten guten Messung behoben`,
+      ? '1 Alarm steht noch an: mit der nächsten guten Messung oder Kontrolle behoben'
+      : `${alarms} Alarme stehen noch an: mit der nächsten guten Messung oder Kontrolle behoben`,
   healthAcknowledged: 'quittiert',
   healthNotCurrent: 'Nicht aktuell',
   healthNoTime: 'Nicht beurteilt, solange die Zeit unbekannt ist',

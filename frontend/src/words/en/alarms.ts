@@ -81,7 +81,7 @@ export const ALARMS = {
     'An alarm is raised after two bad scans in a row. A pest, or missing data from the greenhouse, raises one at once.',
   alarmsWait: (tags: number): string =>
     `${counted(tags, 'tag', 'tags')} waiting for a second scan: no alarm yet`,
-  alarmNotYet: 'waiting for a second scan',
+  alarmNotYet: 'no alarm yet',
   alarmsNotYet: 'Waiting for the list of alarms',
   alarmsStarting: 'Recorded data is still being read: more alarms may follow.',
   alarmsNoTime: 'While the time is unknown, alarms may be missing.',
@@ -207,8 +207,8 @@ export const HEALTH = {
   healthAllWell: 'All assessed readings are within their ideal ranges',
   healthDespite: (alarms: number): string =>
     alarms === 1
-      ? '1 alarm is still active: the next good scan resolves it'
-      : `${alarms} alarms are still active: the next good scan resolves each`,
+      ? '1 alarm is still active: the next good scan or inspection resolves it'
+      : `${alarms} alarms are still active: the next good scan or inspection resolves each`,
   healthAcknowledged: 'acknowledged',
   /** Replaces the verdict while the current status is unknown. */
   healthNotCurrent: 'Not current',

@@ -77,7 +77,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     'La alarma salta tras dos mediciones anómalas seguidas. Si hay plaga o faltan datos del invernadero, salta enseguida.',
   alarmsWait: (tags) =>
     `${counted(tags, 'punto', 'puntos')} a la espera de otra medición: aún sin alarma`,
-  alarmNotYet: 'a la espera de otra medición',
+  alarmNotYet: 'aún sin alarma',
   alarmsNotYet: 'Esperando la lista de alarmas',
   alarmsStarting: 'Todavía se está leyendo el registro: pueden aparecer más alarmas.',
   alarmsNoTime: 'Mientras se desconozca la hora, pueden faltar alarmas.',
@@ -202,8 +202,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthAllWell: 'Todas las lecturas evaluadas están en su rango ideal',
   healthDespite: (alarms) =>
     alarms === 1
-      ? 'Aún hay 1 alarma activa: queda resuelta con la próxima medición buena'
-      : `Aún hay ${alarms} alarmas activas: quedan resueltas con la próxima medición buena`,
+      ? 'Aún hay 1 alarma activa: queda resuelta con la próxima medición o revisión buena'
+      : `Aún hay ${alarms} alarmas activas: quedan resueltas con la próxima medición o revisión buena`,
   healthAcknowledged: 'reconocida',
   healthNotCurrent: 'Desactualizado',
   healthNoTime: 'Sin evaluar mientras se desconozca la hora',

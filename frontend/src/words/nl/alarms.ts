@@ -74,7 +74,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     'Een alarm gaat af na twee afwijkende metingen achter elkaar. Bij een plaag of ontbrekende gegevens gaat het meteen af.',
   alarmsWait: (tags) =>
     `${counted(tags, 'meetpunt wacht', 'meetpunten wachten')} op een tweede meting: nog geen alarm`,
-  alarmNotYet: 'wacht op een tweede meting',
+  alarmNotYet: 'nog geen alarm',
   alarmsNotYet: 'Wachten op de lijst met alarmen',
   alarmsStarting: 'De vastgelegde gegevens worden nog gelezen: er kunnen alarmen bijkomen.',
   alarmsNoTime: 'Zolang de tijd onbekend is, kunnen er alarmen ontbreken.',
@@ -190,8 +190,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthAllWell: 'Alle beoordeelde meetwaarden liggen binnen het ideale bereik',
   healthDespite: (alarms) =>
     alarms === 1
-      ? '1 alarm is nog actief: opgelost bij de volgende goede meting'
-      : `${alarms} alarmen zijn nog actief: opgelost bij de volgende goede meting`,
+      ? '1 alarm is nog actief: opgelost bij de volgende goede meting of controle'
+      : `${alarms} alarmen zijn nog actief: opgelost bij de volgende goede meting of controle`,
   healthAcknowledged: 'bevestigd',
   healthNotCurrent: 'Niet actueel',
   healthNoTime: 'Niet beoordeeld zolang de tijd onbekend is',

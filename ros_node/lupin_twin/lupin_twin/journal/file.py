@@ -18,7 +18,7 @@ from lupin_twin.core.state import Write
 from lupin_twin.journal.appending import Appender, copy_known, simulated
 from lupin_twin.journal.checking import find_damage, size_of
 from lupin_twin.journal.fold import Restored, copies, fold
-from lupin_twin.journal.paths import Syncing, forwarded_seq
+from lupin_twin.journal.paths import Syncing, files_of, forwarded_seq
 from lupin_twin.journal.retention import (
     Limits,
     Stretches,
@@ -131,7 +131,7 @@ class JournalFile:
         except BaseException:  # whatever it was: the caller gets no object to close
             self._connection.close()
             raise
-        self.inode, self._log_inode = _inode(self._path), _inode(self._log)
+        self.inode, self._log_inode = files_of(self._path)
 
     def _salvage(self) -> None:
         """Copy what is readable of a file that was quarantined now, or before the last stop."""
@@ -327,7 +327,7 @@ class JournalFile:
 
     def size(self) -> int:
         """Bytes on the disk, the WAL included."""
-        return self._path.stat().st_size + self._log_bytes()
+        return self._path.stat().st_size + size_of(self._log)
 
     # --- upkeep -------------------------------------------------------------------------------
 
@@ -343,13 +343,15 @@ class JournalFile:
         now_s = time.monotonic()
         if now_s - self._polled_s >= _POLL_EVERY_S:
             self._polled_s = now_s
-            if _inode(self._path) != self.inode:
+            inode, log_inode = files_of(self._path)
+            if inode != self.inode:
                 raise FileNotFoundError(f"{self._path} was removed or replaced")
-            if _inode(self._log) != self._log_inode:
+            self.lost_log = ""
+            if log_inode != self._log_inode:
                 self.lost_log = f"{self._log} was removed: restart the twin, nothing is lost so far"
         # A removed WAL is lost when the process ends, so its content goes into the file at once. We
         # cannot begin a new one, because readers still have the old one open.
-        if self.lost_log or self._log_bytes() > _LOG_BYTES:
+        if self.lost_log or size_of(self._log) > _LOG_BYTES:
             self._connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
         return may_purge and self._purge(now_s)
 
@@ -373,9 +375,6 @@ class JournalFile:
             self._is_shrinking = shrink_step(self._connection)
         return self._purges_before_ns is not None or self._is_shrinking
 
-    def _log_bytes(self) -> int:
-        return size_of(self._log)
-
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         try:
@@ -386,10 +385,3 @@ class JournalFile:
             raise
         self.end = self.journal_id, self._appender.last_seq
         self._syncing.has_written()
-
-
-def _inode(path: Path) -> int:
-    try:
-        return path.stat().st_ino
-    except FileNotFoundError:
-        return 0

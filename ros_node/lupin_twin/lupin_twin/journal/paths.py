@@ -143,6 +143,22 @@ def _name_in(descriptor: int) -> str:
     return os.read(descriptor, 512).decode("utf-8", "replace").strip() or "another process"
 
 
+def files_of(journal: Path) -> tuple[int, int]:
+    """The numbers of a journal's file and of its WAL, which tell them from others in their place.
+
+    A backup that is copied over the file leaves its number, but gets a new WAL.
+    """
+    return inode_of(journal), inode_of(journal.with_name(journal.name + "-wal"))
+
+
+def inode_of(path: Path) -> int:
+    """Number of a file; 0 if it does not exist."""
+    try:
+        return path.stat().st_ino
+    except FileNotFoundError:
+        return 0
+
+
 def mark_of(journal: Path) -> Path:
     """The archive's mark: a file with the journal's id, and the last `seq` that is archived."""
     return journal.with_name(journal.name + ".forwarded")

@@ -18,6 +18,7 @@ from typing import Final, TypeVar
 
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered
+from lupin_twin.journal.paths import files_of
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, is_damage_error, open_reader
 from lupin_twin.runtime.workers import ShouldStop, Workers
 
@@ -36,10 +37,10 @@ Search = Callable[[sqlite3.Connection, ShouldStop], AnswerT]
 
 @dataclass(frozen=True, slots=True)
 class _Open:
-    """A connection and the file that it is to."""
+    """A connection, and the files that it is to, see `files_of`."""
 
     connection: sqlite3.Connection
-    file: tuple[int, int]
+    files: tuple[int, int]
 
 
 class Recall:
@@ -141,18 +142,18 @@ class Recall:
             raise NotRemembered(
                 f"the journal {path} was replaced; the twin opens the new one within seconds"
             )
-        file = (status.st_dev, status.st_ino)
+        files = files_of(path)
         while True:
             with self._changed:
                 opened = self._idle.pop() if self._idle else None
             if opened is None:
                 break
-            if opened.file == file:
+            if opened.files == files:
                 return opened
             opened.connection.close()
         connection = open_reader(path)
         connection.execute(f"PRAGMA cache_size = -{_CACHE_KB}")
-        return _Open(connection, file)
+        return _Open(connection, files)
 
     def _put_back(self, opened: _Open | None, *, is_sound: bool) -> None:
         with self._changed:

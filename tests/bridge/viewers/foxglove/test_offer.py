@@ -92,33 +92,6 @@ async def test_the_topics_of_a_twin_and_the_published_layers_are_offered() -> No
     assert offer.channels[1].schema == "# lupin_msgs/msg/TwinState"
 
 
-async def test_a_client_that_disconnects_does_not_cancel_the_discovery_of_another() -> None:
-    source = Source()
-    offer = offer_of(source)
-    source.answers.clear()
-    gone, waiting = (asyncio.create_task(offer.look()) for _ in range(2))
-    await until(lambda: source.looks == 1, "the discovery for both")
-    gone.cancel()
-    await asyncio.wait([gone])
-    source.answers.set()
-    await waiting
-    assert (topics(offer), source.looks) == (OWN, 1)
-
-
-async def test_discovery_goes_on_after_an_error(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(module, "POLL_S", 0.0)
-
-    source = Source()
-    source.fault = RuntimeError("a fault")
-    offer = offer_of(source)
-    async with offer.followed(lambda _: None):
-        await until(lambda: "had an error and continues" in caplog.text, "the error")
-        source.fault = None
-        await until(lambda: offer.channels, "the topics")
-
-
 async def test_a_topic_without_a_definition_is_left_out_and_warned_about_once(
     caplog: pytest.LogCaptureFixture,
 ) -> None:

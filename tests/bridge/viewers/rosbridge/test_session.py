@@ -94,11 +94,6 @@ def test_the_type_may_be_given_in_both_forms(session: Session, type_: object) ->
     assert subscribe(session, type=type_) == Reaction(state_is_due=True, subscribed=TOPIC)
 
 
-def test_a_subscription_with_options_of_rosbridge_is_accepted(session: Session) -> None:
-    reaction = subscribe(session, "a", queue_length=10, compression="png", fragment_size=9)
-    assert reaction == Reaction(state_is_due=True, subscribed=TOPIC)
-
-
 def test_subscriptions_are_limited(session: Session) -> None:
     for number in range(MAX_SUBSCRIPTIONS):
         assert not subscribe(session, number).replies

@@ -130,8 +130,8 @@ async def test_a_flood_of_the_most_expensive_fields_delays_no_tiny_one_nor_that_
             assert text in answer.json()["detail"]
         async with httpx.AsyncClient(transport=other, timeout=PATIENCE_S) as client:
             theirs = asyncio.create_task(client.get(it.url + field("co2 51", LARGE)))
-            workers = it.bridge.source.workers
-            await until(lambda: fields_at(workers) == (13 - LARGE_THREADS, LARGE_THREADS), "both")
+            in_flight = it.bridge.admission.in_flight
+            await until(lambda: in_flight["127.0.0.2"] == 1, "the other client's")
             held.gate.set()
             assert (await theirs).status_code == 200
         assert sorted([(await task).status_code for task in flood]) == [200] * 12 + [503] * 28

@@ -32,7 +32,7 @@ from lupin_twin.journal.retention import (
 )
 from lupin_twin.journal.rows import last_rows
 from lupin_twin.journal.runs import CORRECTION_NS, Clock, Run, put_run, runs, simulation_goes_on
-from lupin_twin.journal.salvage import SALVAGE, quarantine, salvage
+from lupin_twin.journal.salvage import SALVAGE, begun_quarantine, quarantine, salvage
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
     LOCAL_SITE,
@@ -96,7 +96,8 @@ class JournalFile:
         self._map: object = None
         self._map_rests_until_s = 0.0
         self.quarantined = ""
-        if is_sound is False or (is_sound is None and self._is_damaged()):
+        is_damaged = is_sound is False or (is_sound is None and self._is_damaged())
+        if is_damaged or begun_quarantine(path):
             # Wall time, for the person who looks for the file.
             when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
             quarantine(path, when)

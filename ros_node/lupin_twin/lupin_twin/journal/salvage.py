@@ -27,10 +27,13 @@ from lupin_twin.journal.schema import (
     LOCAL_SITE,
     PAGE_SIZE,
     WRITTEN,
+    Foreign,
     SiteLog,
     empty_file,
+    get_meta,
     insert_into,
     is_damage_error,
+    open_reader,
     open_writer,
     set_meta,
     transaction,
@@ -92,20 +95,47 @@ def numbered(path: Path, end: str) -> Iterator[Path]:
 def quarantine(path: Path, when: str) -> Path:
     """Rename a file and its WAL; returns the new path. No data is deleted or overwritten.
 
-    In its place comes a new file which names it, so that a salvage that fails is done again.
+    In its place comes a new file which names it, so that a salvage that fails is done again. If
+    this is killed, the next call completes it (`begun_quarantine`).
     """
-    quarantined = next(name for name in numbered(path, f".damaged-{when}") if not name.exists())
-    new = path.with_name(path.name + ".new")
-    with closing(open_writer(new)) as connection:
-        set_meta(connection, SALVAGE, quarantined.name)
-    log = path.with_name(path.name + "-wal")
-    if log.exists():
-        log.rename(quarantined.with_name(quarantined.name + "-wal"))
-    # SQLite rebuilds the WAL's index from the WAL; one left behind would be of another file.
-    path.with_name(path.name + "-shm").unlink(missing_ok=True)
-    path.rename(quarantined)
+    new, name = _new_of(path), begun_quarantine(path)
+    if not name:
+        _delete(new)
+        free = (file for file in numbered(path, f".damaged-{when}") if not file.exists())
+        name = next(free).name
+        with closing(open_writer(new)) as connection:
+            set_meta(connection, SALVAGE, name)
+    quarantined = path.with_name(name)
+    # The WAL first: SQLite would read it as that of the new file.
+    for end in ("-wal", ""):
+        old, its = path.with_name(path.name + end), quarantined.with_name(name + end)
+        if old.exists() and not its.exists():
+            old.rename(its)
+    # SQLite rebuilds the WAL's index from the WAL; one left behind would be of another file. So
+    # would be an empty WAL, which a reader makes if it finds none.
+    _delete(path, "-wal", "-shm")
     new.rename(path)
     return quarantined
+
+
+def begun_quarantine(path: Path) -> str:
+    """The new name of a file whose quarantine was killed; empty: none was."""
+    try:
+        with closing(open_reader(_new_of(path))) as connection:
+            name = get_meta(connection, SALVAGE) or ""
+    except (*FILE_ERRORS, Foreign, OSError):
+        return ""
+    # If both exist, another journal has been begun since then.
+    return "" if path.exists() and path.with_name(name).exists() else name
+
+
+def _new_of(path: Path) -> Path:
+    return path.with_name(path.name + ".new")
+
+
+def _delete(path: Path, *ends: str) -> None:
+    for end in ends or ("", "-journal", "-wal", "-shm"):
+        path.with_name(path.name + end).unlink(missing_ok=True)
 
 
 def readable(connection: sqlite3.Connection, select: str, number: str) -> Iterator[list[Record]]:
@@ -186,9 +216,8 @@ def salvage(quarantined: Path, connection: sqlite3.Connection) -> None:
             with closing(_opened(mended)) as old:
                 _copy(old, connection, quarantined.stat().st_size)
     finally:
-        for file, ends in ((quarantined, ("-shm",)), (mended, ("", "-wal", "-shm"))):
-            for end in ends:
-                file.with_name(file.name + end).unlink(missing_ok=True)
+        _delete(quarantined, "-shm")
+        _delete(mended)
 
 
 def _opened(path: Path) -> sqlite3.Connection:

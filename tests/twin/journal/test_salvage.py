@@ -171,14 +171,17 @@ def test_without_its_first_page_all_is_read(whole: Path, damaged: Path, size: in
     }
 
 
-def test_a_damaged_file_is_quarantined_with_its_wal_and_never_overwritten(tmp_path: Path) -> None:
+def test_a_damaged_file_is_quarantined_with_its_wal_and_never_overwritten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("time.strftime", lambda *_: "20261121T141500Z")
     path = tmp_path / "j.sqlite"
     names = []
     for text in ("first", "second"):
         path.write_text(text)
         path.with_name("j.sqlite-wal").write_text(text + "'s log")
         path.with_name("j.sqlite-shm").write_text("index")
-        names.append(quarantine(path, "20261121T141500Z"))
+        names.append(quarantine(path))
     assert [name.name for name in names] == [
         "j.sqlite.damaged-20261121T141500Z",
         "j.sqlite.damaged-20261121T141500Z-1",

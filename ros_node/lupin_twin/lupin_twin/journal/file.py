@@ -78,14 +78,14 @@ class JournalFile:
     """A journal's file, open for writing from construction to `close`.
 
     A damaged file is first quarantined, then salvaged into a new one; `quarantined` is its new
-    path. `is_sound` None: the file is checked when it is opened, if it is not too large.
+    path. Unless it `is_sound`, the file is checked when it is opened, if it is not too large.
 
     Raises:
         Foreign, sqlite3.Error, OSError: as `open_writer`.
 
     """
 
-    def __init__(self, path: Path, limits: Limits, *, is_sound: bool | None) -> None:
+    def __init__(self, path: Path, limits: Limits, *, is_sound: bool) -> None:
         self.simulated: tuple[int, int] | None = None
         # The limit that is exceeded although nothing more can be deleted, in words.
         self.unmet_limit = ""
@@ -96,11 +96,8 @@ class JournalFile:
         self._map: object = None
         self._map_rests_until_s = 0.0
         self.quarantined = ""
-        is_damaged = is_sound is False or (is_sound is None and self._is_damaged())
-        if is_damaged or begun_quarantine(path):
-            # Wall time, for the person who looks for the file.
-            when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
-            quarantine(path, when)
+        if begun_quarantine(path) or (not is_sound and self._is_damaged()):
+            quarantine(path)
         self._open()
 
     def close(self) -> None:

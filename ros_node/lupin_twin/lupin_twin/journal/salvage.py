@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import shutil
 import sqlite3
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, suppress
 from itertools import count
@@ -92,7 +93,7 @@ def numbered(path: Path, end: str) -> Iterator[Path]:
         yield path.with_name(f"{path.name}{end}" + (f"-{number}" if number else ""))
 
 
-def quarantine(path: Path, when: str) -> Path:
+def quarantine(path: Path) -> Path:
     """Rename a file and its WAL; returns the new path. No data is deleted or overwritten.
 
     In its place comes a new file which names it, so that a salvage that fails is done again. If
@@ -101,6 +102,8 @@ def quarantine(path: Path, when: str) -> Path:
     new, name = _new_of(path), begun_quarantine(path)
     if not name:
         _delete(new)
+        # Wall time, for the person who looks for the file.
+        when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
         free = (file for file in numbered(path, f".damaged-{when}") if not file.exists())
         name = next(free).name
         with closing(open_writer(new)) as connection:

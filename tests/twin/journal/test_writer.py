@@ -148,14 +148,15 @@ def test_a_file_that_fails_while_recording_keeps_its_rows_even_if_it_is_quaranti
     with recording(path) as journal:
         journal.write(scan("1"))
         wait_for(lambda: journal.condition.written == 1, "the row")
+        begun_ns = time.time_ns()
         for name, error in faults.items():
             fail_once(name, error)
         journal.write(scan("2"))
         wait_for(lambda: journal.condition.written == 2, "the row after it")
         condition = wait_state(journal, JournalState.RECORDING)
         assert Path(condition.set_aside).is_file() is is_quarantined
-        # It may have lost what was received up to the last row that it saved.
-        assert condition.kept_ns[0][0] == NOW + is_quarantined
+        # It may have lost any row up to now: the last ones too.
+        assert (condition.kept_ns[0][0] > begun_ns) is is_quarantined
     assert known(path) == {scan("1"), scan("2")}
 
 

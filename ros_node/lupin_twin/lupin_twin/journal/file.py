@@ -140,9 +140,11 @@ class JournalFile:
         self.quarantined = str(quarantined)
         salvage(quarantined, self._connection)
         with transaction(self._connection):
-            # It is unknown what could not be read, so each run counts as incomplete up to now.
+            # It is unknown what could not be read, so each run counts as incomplete up to now. A
+            # simulation's time may have stood still since its last row.
             for run in self._runs():
-                note_lost(self._connection, run.root, self._last(run).stamp_ns)
+                now_ns = 0 if run.begun.is_simulated else time.time_ns()
+                note_lost(self._connection, run.root, max(now_ns, self._last(run).stamp_ns))
             self._connection.execute("DELETE FROM meta WHERE key = ?", (SALVAGE,))
 
     def note_world(self, world: World) -> None:
@@ -238,11 +240,11 @@ class JournalFile:
     def retain_run(self, run: Run, end: tuple[str, int]) -> None:
         """Go on with a run; `end` is the `end` of the file that was written before this one.
 
-        If this one ends elsewhere, what the run received may be missing: it is new, or a backup.
+        If this one ends elsewhere, what the run received may be missing: it is new, salvaged, or a
+        backup.
         """
         is_new = all(known.id != run.root for known in self._runs())
-        # A salvage has noted what it may have lost.
-        if is_new or not (self.quarantined or self.end == end):
+        if is_new or self.end != end:
             with self._transaction():
                 if is_new:
                     put_run(self._connection, Run(run.root, run.begun, self.end[1] + 1))

@@ -1,7 +1,10 @@
 import random
 import shutil
+import sqlite3
 from contextlib import closing
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -159,6 +162,25 @@ def test_salvage_ends_whatever_is_on_the_pages(whole: Path, damaged: Path, seed:
         content[chance.randrange(len(content))] = chance.randrange(256)
     damaged.write_bytes(content)
     salvaged(damaged)
+
+
+def test_what_the_disk_cannot_read_is_lost_alone(
+    whole: Path, damaged: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Or the salvage would fail again and again, and nothing be recorded meanwhile."""
+
+    class BadDisk(sqlite3.Connection):
+        def execute(self, sql: str, values: Any = ()) -> sqlite3.Cursor:
+            if sql.startswith("SELECT seq, * FROM scan") and 1_000 in next(
+                zip(*super().execute(sql, values), strict=True), ()
+            ):
+                error = sqlite3.OperationalError("disk I/O error")
+                error.sqlite_errorcode = sqlite3.SQLITE_IOERR_READ
+                raise error
+            return super().execute(sql, values)
+
+    monkeypatch.setattr("sqlite3.connect", partial(sqlite3.connect, factory=BadDisk))
+    assert len(scans(whole) - scans(salvaged(damaged))) == 1
 
 
 @pytest.mark.parametrize("size", [100, 1024])

@@ -152,7 +152,7 @@ def readable(connection: sqlite3.Connection, select: str, number: str) -> Iterat
         try:
             rows = connection.execute(text, (at, size)).fetchall()
         except FILE_ERRORS as error:
-            if is_damage_error(error):
+            if _is_unreadable(error):
                 return None
             raise
         # A number may be damaged: rows count only if it is within the lot's range. The last row of
@@ -221,6 +221,12 @@ def salvage(quarantined: Path, connection: sqlite3.Connection) -> None:
     finally:
         _delete(quarantined, "-shm")
         _delete(mended)
+
+
+def _is_unreadable(error: Exception) -> bool:
+    """Whether these rows cannot be read, now or later: of damage, or by a disk's bad sector."""
+    code = getattr(error, "sqlite_errorcode", None)
+    return is_damage_error(error) or code == sqlite3.SQLITE_IOERR_READ
 
 
 def _opened(path: Path) -> sqlite3.Connection:
@@ -295,7 +301,7 @@ def _both_ends(
         try:
             yield from old.execute(f"{select} ORDER BY {by} {order}", values or {})
         except FILE_ERRORS as error:
-            if not is_damage_error(error):
+            if not _is_unreadable(error):
                 raise
         else:
             return

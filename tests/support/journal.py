@@ -60,7 +60,7 @@ def pin(tag_id: str = "7", at_ns: int = NOW, x: float = 1.5) -> Pin:
 @contextmanager
 def opened(path: Path, limits: Limits = LIMITS) -> Iterator[JournalFile]:
     """A journal's file, in this thread."""
-    file = JournalFile(path, limits, is_sound=None)
+    file = JournalFile(path, limits, is_sound=False)
     try:
         yield file
     finally:

@@ -96,8 +96,7 @@ class Watching:
         look: asyncio.Task[News] = asyncio.create_task(self.process.ask(settings, about, 0.0))
         try:
             patience_s = STUCK_S if self.looks else _START_S
-            done, _ = await asyncio.wait((look,), timeout=patience_s)
-            if not done:
+            while not (await asyncio.wait((look,), timeout=patience_s))[0]:
                 # Not the look itself, because another one must not run beside it.
                 self.process.cancel()
                 # A reason that was reported before stays: that of a cancelled query says more.

@@ -84,9 +84,9 @@ async def notes_route(request: Request) -> Response:
     bridge = bridge_of(request)
     given = read(OfNotes, request.query_params.multi_items())
     start_ns, end_ns = given.span(bridge.ros_time_ns)
-    notes = await _known(bridge)
 
     async def compute() -> Answer:
+        notes = await _known(bridge)
         gone = withdrawals(notes)
         found = [
             note_json(note, gone)

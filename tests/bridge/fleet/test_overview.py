@@ -278,3 +278,17 @@ def test_a_tag_without_a_position_is_not_drawn_and_an_empty_map_has_no_version()
     assert dots([TagState("a")], {"a": Health(WELL)}) == ""
     assert map_version("") is None
     assert map_version(drawn((0.0, 0.0, WELL))) != map_version(drawn((0.0, 0.0, BAD)))
+
+
+async def test_a_process_is_checked_as_long_as_it_does_not_answer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It may be stopped after a check, while it waits for the archive."""
+    monkeypatch.setattr(source, "_START_S", 0.01)
+    watching = source.Watching(Settings(), lambda: None)
+    checks: list[None] = []
+    monkeypatch.setattr(watching.process, "ask", lambda *_: asyncio.sleep(60.0))
+    monkeypatch.setattr(watching.process, "cancel", lambda: checks.append(None))
+    watching.start()
+    await until(lambda: len(checks) > 1, "another check")
+    await watching.stop()

@@ -161,7 +161,9 @@ async def test_a_client_that_disconnects_cancels_its_work(domain: int, held: Hel
         assert held.begun.count(at_work[0]) == 1, "computed once, for who stayed"
 
 
-async def test_a_time_out_cancels_the_work_too(domain: int, held: Held) -> None:
+async def test_a_time_out_cancels_the_work_too(
+    domain: int, held: Held, monkeypatch: pytest.MonkeyPatch
+) -> None:
     # Long enough for all four to run or wait by then.
     limits = Limits(answers_per_s=10_000.0, answer_timeout_s=3.0)
     async with greenhouse(limits) as it:
@@ -172,6 +174,10 @@ async def test_a_time_out_cancels_the_work_too(domain: int, held: Held) -> None:
         await until(lambda: fields_at(workers) == (0, 0), "the end of it all")
         assert workers.abandoned == 4
         assert it.bridge.admission.being_computed == 0
+        # Notes that were never read, and a log that hangs.
+        monkeypatch.setattr(type(it.bridge.notes), "notes", None)
+        monkeypatch.setattr(it.bridge.notes, "look", lambda: asyncio.sleep(PATIENCE_S))
+        assert (await it.http.get("/api/notes")).status_code == 504
 
 
 # --- shared work ----------------------------------------------------------------------------------

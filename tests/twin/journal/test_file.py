@@ -1,4 +1,6 @@
+import shutil
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -77,10 +79,37 @@ def test_a_lack_of_room_for_scans_beside_the_hours_is_reported(
 @pytest.mark.parametrize("is_there", [True, False])
 def test_a_salvage_that_was_killed_starts_again(path: Path, *, is_there: bool) -> None:
     append(path, [scan(at_ns=NOW + n) for n in range(300)])
-    aside = quarantine(path, "20261121T141500Z")
+    aside = quarantine(path)
     if not is_there:  # the file was removed
         aside.unlink()
     with opened(path):
         pass
     assert select(path, "SELECT count(*) FROM scan") == [(300 if is_there else 0,)]
     assert select(path, "SELECT * FROM meta WHERE key = 'salvage'") == []
+
+
+@pytest.mark.parametrize("renamed", [0, 1, 2])
+def test_a_quarantine_that_was_killed_is_completed(
+    path: Path, monkeypatch: pytest.MonkeyPatch, renamed: int
+) -> None:
+    left = path.with_name("left.sqlite")
+    with opened(path) as file:
+        run = file.start(CLOCK, is_believed=False).run
+        file.append([(run, scan(at_ns=NOW + n)) for n in range(300)])
+        for end in ("", "-wal"):  # as a killed twin leaves them
+            shutil.copy(f"{path}{end}", f"{left}{end}")
+    rename, done = Path.rename, count()
+
+    def killed(old: Path, new: Path) -> None:
+        if next(done) == renamed:
+            raise KeyboardInterrupt
+        rename(old, new)
+
+    with monkeypatch.context() as killing:
+        killing.setattr(Path, "rename", killed)
+        with pytest.raises(KeyboardInterrupt):
+            quarantine(left)
+    with opened(left) as file:
+        assert Path(file.quarantined).name.startswith("left.sqlite.damaged-")
+    assert select(left, "SELECT count(*) FROM scan") == [(300,)]
+    assert not left.with_name("left.sqlite.new").exists()

@@ -1,7 +1,10 @@
 import random
 import shutil
+import sqlite3
 from contextlib import closing
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -161,6 +164,25 @@ def test_salvage_ends_whatever_is_on_the_pages(whole: Path, damaged: Path, seed:
     salvaged(damaged)
 
 
+def test_what_the_disk_cannot_read_is_lost_alone(
+    whole: Path, damaged: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Or the salvage would fail again and again, and nothing be recorded meanwhile."""
+
+    class BadDisk(sqlite3.Connection):
+        def execute(self, sql: str, values: Any = ()) -> sqlite3.Cursor:
+            if sql.startswith("SELECT seq, * FROM scan") and 1_000 in next(
+                zip(*super().execute(sql, values), strict=True), ()
+            ):
+                error = sqlite3.OperationalError("disk I/O error")
+                error.sqlite_errorcode = sqlite3.SQLITE_IOERR_READ
+                raise error
+            return super().execute(sql, values)
+
+    monkeypatch.setattr("sqlite3.connect", partial(sqlite3.connect, factory=BadDisk))
+    assert len(scans(whole) - scans(salvaged(damaged))) == 1
+
+
 @pytest.mark.parametrize("size", [100, 1024])
 def test_without_its_first_page_all_is_read(whole: Path, damaged: Path, size: int) -> None:
     content = damaged.read_bytes()
@@ -171,14 +193,17 @@ def test_without_its_first_page_all_is_read(whole: Path, damaged: Path, size: in
     }
 
 
-def test_a_damaged_file_is_quarantined_with_its_wal_and_never_overwritten(tmp_path: Path) -> None:
+def test_a_damaged_file_is_quarantined_with_its_wal_and_never_overwritten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("time.strftime", lambda *_: "20261121T141500Z")
     path = tmp_path / "j.sqlite"
     names = []
     for text in ("first", "second"):
         path.write_text(text)
         path.with_name("j.sqlite-wal").write_text(text + "'s log")
         path.with_name("j.sqlite-shm").write_text("index")
-        names.append(quarantine(path, "20261121T141500Z"))
+        names.append(quarantine(path))
     assert [name.name for name in names] == [
         "j.sqlite.damaged-20261121T141500Z",
         "j.sqlite.damaged-20261121T141500Z-1",

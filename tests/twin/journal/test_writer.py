@@ -125,8 +125,7 @@ DAMAGED, FULL = DamagedFile("as SQLite finds it"), OSError("the disk is full")
         ({APPEND: FULL}, False),
         ({APPEND: DAMAGED}, True),
         ({APPEND: DAMAGED, "file.salvage": FULL}, True),
-        # After a failure, the file is checked, and is sound.
-        ({APPEND: DAMAGED, "salvage.open_writer": FULL}, False),
+        ({APPEND: DAMAGED, "salvage.open_writer": FULL}, True),
     ],
 )
 def test_a_file_that_fails_while_recording_keeps_its_rows_even_if_it_is_quarantined(
@@ -149,14 +148,15 @@ def test_a_file_that_fails_while_recording_keeps_its_rows_even_if_it_is_quaranti
     with recording(path) as journal:
         journal.write(scan("1"))
         wait_for(lambda: journal.condition.written == 1, "the row")
+        begun_ns = time.time_ns()
         for name, error in faults.items():
             fail_once(name, error)
         journal.write(scan("2"))
         wait_for(lambda: journal.condition.written == 2, "the row after it")
         condition = wait_state(journal, JournalState.RECORDING)
         assert Path(condition.set_aside).is_file() is is_quarantined
-        # It may have lost what was received up to the last row that it saved.
-        assert condition.kept_ns[0][0] == NOW + is_quarantined
+        # It may have lost any row up to now: the last ones too.
+        assert (condition.kept_ns[0][0] > begun_ns) is is_quarantined
     assert known(path) == {scan("1"), scan("2")}
 
 

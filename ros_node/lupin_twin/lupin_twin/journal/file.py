@@ -32,7 +32,7 @@ from lupin_twin.journal.retention import (
 )
 from lupin_twin.journal.rows import last_rows
 from lupin_twin.journal.runs import CORRECTION_NS, Clock, Run, put_run, runs, simulation_goes_on
-from lupin_twin.journal.salvage import SALVAGE, quarantine, salvage
+from lupin_twin.journal.salvage import SALVAGE, begun_quarantine, quarantine, salvage
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
     LOCAL_SITE,
@@ -78,14 +78,14 @@ class JournalFile:
     """A journal's file, open for writing from construction to `close`.
 
     A damaged file is first quarantined, then salvaged into a new one; `quarantined` is its new
-    path. `is_sound` None: the file is checked when it is opened, if it is not too large.
+    path. Unless it `is_sound`, the file is checked when it is opened, if it is not too large.
 
     Raises:
         Foreign, sqlite3.Error, OSError: as `open_writer`.
 
     """
 
-    def __init__(self, path: Path, limits: Limits, *, is_sound: bool | None) -> None:
+    def __init__(self, path: Path, limits: Limits, *, is_sound: bool) -> None:
         self.simulated: tuple[int, int] | None = None
         # The limit that is exceeded although nothing more can be deleted, in words.
         self.unmet_limit = ""
@@ -96,10 +96,8 @@ class JournalFile:
         self._map: object = None
         self._map_rests_until_s = 0.0
         self.quarantined = ""
-        if is_sound is False or (is_sound is None and self._is_damaged()):
-            # Wall time, for the person who looks for the file.
-            when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
-            quarantine(path, when)
+        if begun_quarantine(path) or (not is_sound and self._is_damaged()):
+            quarantine(path)
         self._open()
 
     def close(self) -> None:
@@ -142,9 +140,11 @@ class JournalFile:
         self.quarantined = str(quarantined)
         salvage(quarantined, self._connection)
         with transaction(self._connection):
-            # It is unknown what could not be read, so each run counts as incomplete up to now.
+            # It is unknown what could not be read, so each run counts as incomplete up to now. A
+            # simulation's time may have stood still since its last row.
             for run in self._runs():
-                note_lost(self._connection, run.root, self._last(run).stamp_ns)
+                now_ns = 0 if run.begun.is_simulated else time.time_ns()
+                note_lost(self._connection, run.root, max(now_ns, self._last(run).stamp_ns))
             self._connection.execute("DELETE FROM meta WHERE key = ?", (SALVAGE,))
 
     def note_world(self, world: World) -> None:
@@ -240,11 +240,11 @@ class JournalFile:
     def retain_run(self, run: Run, end: tuple[str, int]) -> None:
         """Go on with a run; `end` is the `end` of the file that was written before this one.
 
-        If this one ends elsewhere, what the run received may be missing: it is new, or a backup.
+        If this one ends elsewhere, what the run received may be missing: it is new, salvaged, or a
+        backup.
         """
         is_new = all(known.id != run.root for known in self._runs())
-        # A salvage has noted what it may have lost.
-        if is_new or not (self.quarantined or self.end == end):
+        if is_new or self.end != end:
             with self._transaction():
                 if is_new:
                     put_run(self._connection, Run(run.root, run.begun, self.end[1] + 1))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import shutil
 import sqlite3
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, suppress
 from itertools import count
@@ -27,10 +28,13 @@ from lupin_twin.journal.schema import (
     LOCAL_SITE,
     PAGE_SIZE,
     WRITTEN,
+    Foreign,
     SiteLog,
     empty_file,
+    get_meta,
     insert_into,
     is_damage_error,
+    open_reader,
     open_writer,
     set_meta,
     transaction,
@@ -89,23 +93,52 @@ def numbered(path: Path, end: str) -> Iterator[Path]:
         yield path.with_name(f"{path.name}{end}" + (f"-{number}" if number else ""))
 
 
-def quarantine(path: Path, when: str) -> Path:
+def quarantine(path: Path) -> Path:
     """Rename a file and its WAL; returns the new path. No data is deleted or overwritten.
 
-    In its place comes a new file which names it, so that a salvage that fails is done again.
+    In its place comes a new file which names it, so that a salvage that fails is done again. If
+    this is killed, the next call completes it (`begun_quarantine`).
     """
-    quarantined = next(name for name in numbered(path, f".damaged-{when}") if not name.exists())
-    new = path.with_name(path.name + ".new")
-    with closing(open_writer(new)) as connection:
-        set_meta(connection, SALVAGE, quarantined.name)
-    log = path.with_name(path.name + "-wal")
-    if log.exists():
-        log.rename(quarantined.with_name(quarantined.name + "-wal"))
-    # SQLite rebuilds the WAL's index from the WAL; one left behind would be of another file.
-    path.with_name(path.name + "-shm").unlink(missing_ok=True)
-    path.rename(quarantined)
+    new, name = _new_of(path), begun_quarantine(path)
+    if not name:
+        _delete(new)
+        # Wall time, for the person who looks for the file.
+        when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
+        free = (file for file in numbered(path, f".damaged-{when}") if not file.exists())
+        name = next(free).name
+        with closing(open_writer(new)) as connection:
+            set_meta(connection, SALVAGE, name)
+    quarantined = path.with_name(name)
+    # The WAL first: SQLite would read it as that of the new file.
+    for end in ("-wal", ""):
+        old, its = path.with_name(path.name + end), quarantined.with_name(name + end)
+        if old.exists() and not its.exists():
+            old.rename(its)
+    # SQLite rebuilds the WAL's index from the WAL; one left behind would be of another file. So
+    # would be an empty WAL, which a reader makes if it finds none.
+    _delete(path, "-wal", "-shm")
     new.rename(path)
     return quarantined
+
+
+def begun_quarantine(path: Path) -> str:
+    """The new name of a file whose quarantine was killed; empty: none was."""
+    try:
+        with closing(open_reader(_new_of(path))) as connection:
+            name = get_meta(connection, SALVAGE) or ""
+    except (*FILE_ERRORS, Foreign, OSError):
+        return ""
+    # If both exist, another journal has been begun since then.
+    return "" if path.exists() and path.with_name(name).exists() else name
+
+
+def _new_of(path: Path) -> Path:
+    return path.with_name(path.name + ".new")
+
+
+def _delete(path: Path, *ends: str) -> None:
+    for end in ends or ("", "-journal", "-wal", "-shm"):
+        path.with_name(path.name + end).unlink(missing_ok=True)
 
 
 def readable(connection: sqlite3.Connection, select: str, number: str) -> Iterator[list[Record]]:
@@ -119,7 +152,7 @@ def readable(connection: sqlite3.Connection, select: str, number: str) -> Iterat
         try:
             rows = connection.execute(text, (at, size)).fetchall()
         except FILE_ERRORS as error:
-            if is_damage_error(error):
+            if _is_unreadable(error):
                 return None
             raise
         # A number may be damaged: rows count only if it is within the lot's range. The last row of
@@ -186,9 +219,14 @@ def salvage(quarantined: Path, connection: sqlite3.Connection) -> None:
             with closing(_opened(mended)) as old:
                 _copy(old, connection, quarantined.stat().st_size)
     finally:
-        for file, ends in ((quarantined, ("-shm",)), (mended, ("", "-wal", "-shm"))):
-            for end in ends:
-                file.with_name(file.name + end).unlink(missing_ok=True)
+        _delete(quarantined, "-shm")
+        _delete(mended)
+
+
+def _is_unreadable(error: Exception) -> bool:
+    """Whether these rows cannot be read, now or later: of damage, or by a disk's bad sector."""
+    code = getattr(error, "sqlite_errorcode", None)
+    return is_damage_error(error) or code == sqlite3.SQLITE_IOERR_READ
 
 
 def _opened(path: Path) -> sqlite3.Connection:
@@ -263,7 +301,7 @@ def _both_ends(
         try:
             yield from old.execute(f"{select} ORDER BY {by} {order}", values or {})
         except FILE_ERRORS as error:
-            if not is_damage_error(error):
+            if not _is_unreadable(error):
                 raise
         else:
             return

@@ -30,6 +30,7 @@ from lupin_twin.journal.rebuild import is_version3, upgrade
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import weight
 from lupin_twin.journal.runs import Clock, Run, Turn
+from lupin_twin.journal.salvage import quarantine
 from lupin_twin.journal.schema import DamagedFile, Foreign, is_damage_error
 from lupin_twin.journal.writes import NoteQueue
 
@@ -283,8 +284,6 @@ class Journal:
                     self._is_sound = False
                     if not self._failures:
                         wait_s = 0.0  # a starting twin waits for what can be salvaged
-                elif self._is_sound is False:
-                    self._is_sound = None  # perhaps it is quarantined, and only its salvage failed
                 if wait_s:
                     self._was_attempted.set()
             if self._stop.is_set():
@@ -300,9 +299,12 @@ class Journal:
         if self._lock is None:
             self._lock = Lock(self._path, self._holder)
         # A damaged one is quarantined, whatever its version.
-        if self._is_sound is not False and is_version3(self._path):
+        if self._is_sound is False:
+            quarantine(self._path)
+            self._is_sound = None  # if its salvage fails, only that is done again
+        elif is_version3(self._path):
             self._left_out = upgrade(self._path, self._report_progress)
-        file = JournalFile(self._path, self._limits, is_sound=self._is_sound)
+        file = JournalFile(self._path, self._limits, is_sound=bool(self._is_sound))
         try:
             self._is_sound = True
             self._quarantined = file.quarantined or self._quarantined

@@ -391,6 +391,8 @@ _TOO_LONG = """() => [...document.querySelectorAll('body *')].filter((e) => {
 _CUT_REASONS = """() => [...document.querySelectorAll('tbody .cell-health > div')]
   .filter((e) => e.scrollHeight > e.clientHeight + 1).map((e) => e.textContent)"""
 
+_COLOUR = "e => getComputedStyle(e).color"
+
 # The parts of open actions that are left out.
 _CUT_TODO = """() => [...document.querySelectorAll('.health .do-what > *')]
   .filter((e) => e.offsetTop >= e.parentElement.offsetTop + e.parentElement.offsetHeight)
@@ -438,6 +440,10 @@ def test_every_language_has_room_on_a_phone(greenhouse: Bridge, open_page: OpenP
         for width in (PHONE["width"], 1100, 1280, 1440):
             hmi.resize(width, 800)
             assert hmi.page.evaluate(_CUT_REASONS) == [], (language, width)
+            # A reason that has no room for its status's word has its colour.
+            mark, why = (hmi.row("10").locator(e) for e in (".health-mark", ".why"))
+            has_word = place(mark.locator("span")).right > place(mark.locator("svg")).right
+            assert (mark.evaluate(_COLOUR) == why.evaluate(_COLOUR)) is not has_word, width
             if width >= 1100:
                 assert hmi.page.evaluate(_CUT_TODO) == [], (language, width)
             assert hmi.row("failed").locator(".row-button bdi").evaluate(LINES) == 1, width

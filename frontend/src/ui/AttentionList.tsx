@@ -21,8 +21,6 @@ import { Reasons, useReasonText } from './Reasons';
 
 /** Most lines that a wall screen can hold. */
 const MOST_LINES = 40;
-/** Above this many, tags are grouped by cause. */
-const MANY_TAGS = 12;
 /** Reasons shown per tag. */
 const MOST_REASONS = 2;
 
@@ -56,11 +54,10 @@ export function AttentionList(): JSX.Element {
   );
 }
 
-/** One line per tag; with many tags, one line per cause that several share. */
+/** One line per tag, or per cause that more than a few share, as in the alarm list. */
 function useLines(urgent: readonly Urgent[]): readonly Line[] {
   const speech = useApp(selectSpeech);
   const ofOne = (each: Urgent): Line => ({ key: each.tagId, cause: null, tags: [each] });
-  if (urgent.length <= MANY_TAGS) return urgent.map(ofOne);
   const wrong = urgent.map((own) => ({
     own,
     alarm: { id: own.tagId, tag_id: own.tagId, reason: own.reasons[0] },

@@ -1,6 +1,4 @@
-"""Alarms of a large greenhouse: the start over its past, one change, nothing new.
-
-What runs on the event loop is marked so; a worker does the rest.
+"""Alarms of a large greenhouse: the start over its past, and one change.
 
 Processor time, so that other load does not count. Beside that, what the simulator's ordinary
 days raise.
@@ -11,22 +9,14 @@ import statistics
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
 from random import Random
 
-from lupin_bridge.alarms.board import AlarmBoard, board_of, change_between
 from lupin_bridge.alarms.feed import LOT, REACH_COUNT
-from lupin_bridge.feed.source import TwinUpdate
 from lupin_bridge.judge.alarm_fold import AlarmFold
-from lupin_bridge.judge.judging import Judge, own_sensors
-from lupin_bridge.notify.messages import GreenhouseState, Topics
-from lupin_bridge.notify.mqtt import Mirror
-from lupin_bridge.stream.frames import Status
 from lupin_twin.core.past import PastWrite, RunSpan
-from lupin_twin.core.state import Reading, Snapshot, TagState
 from tests.support.ordinary_day import DAY_NS, S, ordinary_days
 from tests.support.proc_stat import resident_mb
-from tests.support.seen import BY_LIGHT, alarm
+from tests.support.seen import BY_LIGHT
 
 DAYS = 7
 SIZES = (1_000, 10_000)
@@ -39,7 +29,6 @@ MIDDLE = {
     "soil_moisture": 40.0,
 }
 CHANGES = 40
-ALARMS = 100_000
 
 
 def past_of(tags: int) -> Iterator[PastWrite]:
@@ -97,57 +86,6 @@ def alarms_of(tags: int) -> None:
     row(tags, "alarms: one scan, hours to days late", statistics.median(took), max(took))
 
 
-def loop_of(tags: int) -> None:
-    """What a hundred thousand alarms, and a second in which nothing happens, cost the loop."""
-    many = [
-        replace(alarm(str(number % tags), raised_ns=number), id=f"{number:06x}")
-        for number in range(ALARMS)
-    ]
-    board = AlarmBoard()
-    start = time.thread_time()
-    found = board_of(many)
-    change = change_between(board.now, found)
-    row(tags, f"{ALARMS:,} alarms: put in order", ms_since(start))
-    start = time.thread_time()
-    board.put(found, change, "journal", 1)
-    row(tags, "loop: to take them over", ms_since(start))
-    ordered, taken = [], []
-    for number in range(CHANGES):
-        many[number] = replace(many[number], worst=99.0 + number)
-        start = time.thread_time()
-        found = board_of(many)
-        change = change_between(board.now, found)
-        ordered.append(ms_since(start))
-        start = time.thread_time()
-        board.put(found, change, "journal", 1)
-        taken.append(ms_since(start))
-    row(tags, "one of them worse: put in its place", statistics.median(ordered), max(ordered))
-    row(tags, "loop: one of them worse", statistics.median(taken), max(taken))
-
-    judge, mirror = (
-        Judge(replace(BY_LIGHT, recent_s=3_600.0)),
-        Mirror(Topics("lt", ""), own_sensors()),
-    )
-    now_ns = DAY_NS
-    readings = tuple(Reading(name, value, now_ns) for name, value in MIDDLE.items())
-    greenhouse = tuple(
-        TagState(str(n), readings=readings, last_observed_ns=now_ns) for n in range(tags)
-    )
-    took = []
-    for second in range(CHANGES):
-        snapshot = Snapshot(now_ns + second * S, "map", greenhouse)
-        start = time.process_time()
-        judged = judge.see(snapshot)
-        status = Status("live", 0.0, TwinUpdate(snapshot, "r"))
-        seen = GreenhouseState(status, judged, board.now, judge.holds_ns(), snapshot.stamp_ns)
-        mirror.see(seen)
-        for _ in mirror.messages():
-            pass
-        took.append((time.process_time() - start) * 1e3)
-    quiet = took[tags // 500 + 5 :]
-    row(tags, "loop: a quiet second, MQTT included", statistics.median(quiet), max(quiet))
-
-
 def row(tags: int, name: str, took_ms: float, most_ms: float | None = None) -> None:
     most = "" if most_ms is None else f"{most_ms:>12.2f}"
     print(f"{tags:>7}  {name:<44}{took_ms:>12.2f}{most}")
@@ -172,5 +110,4 @@ def main() -> None:
     print(f"\n{'tags':>7}  {'five sensors each':<44}{'ms':>12}{'at most':>12}")
     for tags in SIZES:
         alarms_of(tags)
-        loop_of(tags)
     ordinary()

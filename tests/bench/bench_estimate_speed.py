@@ -1,4 +1,4 @@
-"""What an estimate costs beside IDW on the same grid: ms of one core, the best of several."""
+"""What an estimate costs: ms of one core, the best of several."""
 
 import time
 from collections.abc import Callable
@@ -8,7 +8,6 @@ from typing import TypeVar
 from lupin_twin.estimate.engine import thinned
 from lupin_twin.estimate.model import fit
 from lupin_twin.estimate.posterior import Posterior
-from lupin_twin.field.idw import FieldSample, compute_idw_field
 from tests.support.estimates import DAY_S, many_tags
 
 Made = TypeVar("Made")
@@ -33,26 +32,11 @@ def best(make: Callable[[], Made], times: int = 7) -> tuple[float, Made]:
 
 
 def costs(tags: int, each: int, metres: float, side: int) -> list[float]:
-    """IDW; a fit; a posterior, until its first value; a grid; all tags checked."""
+    """A fit; a posterior, until its first value; a grid."""
     readings = many_tags(tags, each, metres)
     at_s = float(readings.time_s.max())
     readings = thinned(readings, at_s, DAY_S)
-    resolution = metres / side
     box = {"bbox_min_x": 0.0, "bbox_min_y": 0.0, "bbox_max_x": metres, "bbox_max_y": metres}
-    latest = [FieldSample(x, y, 20.0) for x, y in readings.xy.tolist()]
-    idw = partial(
-        compute_idw_field,
-        latest,
-        bbox_min_x=0.0,
-        bbox_min_y=0.0,
-        bbox_max_x=metres,
-        bbox_max_y=metres,
-        resolution=resolution,
-        falloff_radius_m=1.5,
-        max_distance_m=1.5,
-        power=2.0,
-    )
-    idw_ms, _ = best(idw, 3)
     fit_ms, model = best(partial(fit, readings), 2)
 
     def load() -> Posterior:
@@ -62,13 +46,12 @@ def costs(tags: int, each: int, metres: float, side: int) -> list[float]:
 
     load_ms, posterior = best(load, 3)
     times = 7 if tags < 1_000 else 1
-    grid_ms, _ = best(partial(posterior.grid, **box, resolution=resolution), times)
-    checks_ms, _ = best(posterior.changes, 1)
-    return [idw_ms, fit_ms, load_ms, grid_ms, checks_ms]
+    grid_ms, _ = best(partial(posterior.grid, **box, resolution=metres / side), times)
+    return [fit_ms, load_ms, grid_ms]
 
 
 def main() -> None:
-    columns = ("IDW", "fit", "load", "grid", "checks")
+    columns = ("fit", "load", "grid")
     print(f"{'tags x readings, cells':<34}" + "".join(f"{name:>10}" for name in columns))
     for tags, each, metres, side in GREENHOUSES:
         label = f"{tags} x {each}, {side} x {side} in {metres:g} m"

@@ -18,22 +18,22 @@ REACH_M = 1.5
 LOOP_PAIRS = 2_000_000
 
 
-def best_of(run: Callable[[], object], seconds: float = 1.0, at_most: int = 200) -> float:
+def best_of(run: Callable[[], object], seconds: float = 1.0) -> float:
     """The shortest of as many runs as fit into `seconds`, three at least."""
     run()
     times: list[float] = []
     end = time.perf_counter() + seconds
-    while len(times) < 3 or (time.perf_counter() < end and len(times) < at_most):
+    while len(times) < 3 or time.perf_counter() < end:
         start = time.perf_counter()
         run()
         times.append(time.perf_counter() - start)
     return min(times)
 
 
-def scattered(count: int, side: float, away: float = 0.0) -> list[FieldSample]:
+def scattered(count: int, side: float) -> list[FieldSample]:
     rng = np.random.default_rng(count)
     return [
-        FieldSample(away + x, away + y, 15.0 + 15.0 * value)
+        FieldSample(x, y, 15.0 + 15.0 * value)
         for x, y, value in (rng.random((count, 3)) * (side, side, 1.0)).tolist()
     ]
 
@@ -66,19 +66,9 @@ def loop_seconds(samples: Sequence[FieldSample], side: float, cells: int) -> tup
     return best_of(loop, seconds=0.0) * len(points) / len(some), step > 1
 
 
-def line(name: str, seconds: float, *others: tuple[str, float, bool]) -> None:
-    text = f"{name:46} {milliseconds(seconds)}"
-    for other, other_seconds, extrapolated in others:
-        mark = "~" if extrapolated else " "
-        text += f"   {mark}{other} {milliseconds(other_seconds)} {other_seconds / seconds:8.0f} x"
-    print(text, flush=True)
-
-
-def milliseconds(seconds: float) -> str:
-    return f"{seconds * 1e3:11.3f} ms"
-
-
-def compare_fields() -> None:
+def main() -> None:
+    """Print the table."""
+    print(f"Python {sys.version.split()[0]}, numpy {np.__version__}")
     print("fields (falloff and gate 1.5 m, power 2); ~ extrapolated from some of the cells")
     for count, side, cells in (
         (30, 5.0, 200),
@@ -89,14 +79,9 @@ def compare_fields() -> None:
     ):
         samples = scattered(count, side)
         seconds = best_of(lambda: field(samples, side, cells))  # noqa: B023  # run at once
-        line(
-            f"{cells} x {cells} cells, {count} tags, {side:g} m",
-            seconds,
-            ("loop", *loop_seconds(samples, side, cells)),
+        loop_s, is_extrapolated = loop_seconds(samples, side, cells)
+        print(
+            f"{cells} x {cells} cells, {count} tags, {side:g} m: {seconds * 1e3:.3f} ms;"
+            f" loop {'~' * is_extrapolated}{loop_s / seconds:.0f} x",
+            flush=True,
         )
-
-
-def main() -> None:
-    """Print every table."""
-    print(f"Python {sys.version.split()[0]}, numpy {np.__version__}")
-    compare_fields()

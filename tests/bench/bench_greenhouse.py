@@ -17,13 +17,6 @@ SIZES = (1_000, 10_000)
 BEATS = 8
 MOVES = 60
 
-FIRST_ROW = """
-new MutationObserver((_, observer) => {
-  if (!document.querySelector('tr[data-tag-id]')) return;
-  observer.disconnect();
-  requestAnimationFrame(() => setTimeout(() => { window.firstRow = performance.now(); }));
-}).observe(document, { childList: true, subtree: true });
-"""
 # Until the page has taken the frame, ms, the median.
 HEARTBEAT = """
 async (times) => {
@@ -46,16 +39,12 @@ def main() -> None:
     with chromium() as browser, bridge() as running:
         for count in SIZES:
             with page_of(browser) as page:
-                page.add_init_script(FIRST_ROW)
                 page.add_init_script(greenhouse_of(count))
                 page.goto(running.url)
-                page.wait_for_function("() => window.firstRow")
+                page.locator("tr[data-tag-id]").first.wait_for()
                 page.evaluate(SETTLED)
                 session = page.context.new_cdp_session(page)
                 session.send("Performance.enable", {"timeDomain": "threadTicks"})
-                first = page.evaluate("firstRow")
-                rows = page.locator("tr[data-tag-id]").count()
-                print(f"{count:,} tags: first row painted after {first:.0f} ms, {rows} in the page")
                 for what, ms in measure(page, session, count).items():
                     print(f"{count:,} tags, {what}: {ms:.1f} ms of main thread")
 
@@ -86,23 +75,12 @@ def measure(page: Page, session: CDPSession, count: int) -> dict[str, float]:
         x = box["x"] + 60 + (step * 37) % (box["width"] - 180)
         page.mouse.move(x, box["y"] + 60 + (step * 23) % (box["height"] - 180))
 
-    def sort() -> None:
-        page.locator("th[data-column=temperature] button").click()
-        page.evaluate(SETTLED)
-
-    def search() -> None:
-        step = next(steps)
-        page.get_by_role("searchbox").fill("tomato" if step % 2 else "basil")
-        page.evaluate(SETTLED)
-
     # Ages tick by themselves, and reading the page costs something too.
     idle = cost(frame("greenhouse.idle()"), BEATS)
     return {
         "a heartbeat that changes nothing": page.evaluate(HEARTBEAT, BEATS),
         "a delta of 1 %": cost(frame(f"greenhouse.change({count // 100})"), BEATS) - idle,
         "a move of the mouse over the map": cost(move, MOVES),
-        "a sort": cost(sort, 6),
-        "a filter": cost(search, 6),
     }
 
 

@@ -136,9 +136,10 @@ class Hmi:
     def app(self) -> Locator:
         return self.page.get_by_test_id("app")
 
-    def expect_phase(self, phase: str, timeout_s: float = PATIENCE_S) -> None:
+    def expect_phase(self, phase: str) -> None:
         """Wait until the page shows its connection in that phase."""
-        expect(self.app).to_have_attribute("data-connection-state", phase, timeout=timeout_s * 1000)
+        patience_ms = PATIENCE_S * 1000
+        expect(self.app).to_have_attribute("data-connection-state", phase, timeout=patience_ms)
 
     def expect(self, look: Callable[[], bool], what: str) -> None:
         """Wait for a condition that no locator can express."""
@@ -305,13 +306,13 @@ class Hmi:
 
     # --- the keyboard -----------------------------------------------------------------------
 
-    def tab_to(self, target: Locator, key: str = "Tab", most: int = 80) -> None:
+    def tab_to(self, target: Locator) -> None:
         """Reach an element with the Tab key alone."""
-        for _ in range(most):
+        for _ in range(80):
             if target.evaluate("element => element === document.activeElement"):
                 return
-            self.page.keyboard.press(key)
-        raise AssertionError(f"{target} was not reached with {most} times {key}")
+            self.page.keyboard.press("Tab")
+        raise AssertionError(f"{target} was not reached")
 
 
 # `open_page(url, fragment, query, **options)`, the fixture of `conftest.py`.

@@ -111,8 +111,8 @@ def requested(hmi: Hmi, sensor: str = "temperature") -> dict[str, str]:
     return [each for each in queries(hmi) if each["sensor_type"] == sensor][-1]
 
 
-def plot(hmi: Hmi, sensor: str = "Temperature") -> Locator:
-    return hmi.page.get_by_role("region", name=f"Chart of {sensor}").get_by_test_id("plot")
+def plot(hmi: Hmi) -> Locator:
+    return hmi.page.get_by_role("region", name="Chart of Temperature").get_by_test_id("plot")
 
 
 def plotted(hmi: Hmi) -> Image.Image:

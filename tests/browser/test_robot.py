@@ -53,9 +53,9 @@ def place(live: Bridge, x: float, y: float, yaw: float = 0.0, ago_s: float = 0.0
     live.peer.until(is_there, f"the robot at {x}, {y} m")
 
 
-def charge(live: Bridge, share: float, ago_s: float = 0.0) -> None:
+def charge(live: Bridge, share: float) -> None:
     battery = BatteryState(percentage=share)
-    stamp(live, battery, ago_s)
+    stamp(live, battery, 0.0)
     live.peer.publish("/battery_state", battery, depth=1)
 
 

@@ -13,8 +13,8 @@ TAG = Tag("7", (1.05, 1.5), ("co2",), TABLE, (1.0, 1.5), (-1.0, 0.0), (0.6, 1.5)
 HALL = Greenhouse(Rect(0.0, 0.0, 4.0, 4.0), (TABLE,), (TAG,))
 
 
-def sees(position: Point, greenhouse: Greenhouse = HALL) -> bool:
-    return TagDetector(greenhouse, Plants(greenhouse, 0), 0).observe_from(position, 0)
+def sees(position: Point) -> bool:
+    return TagDetector(HALL, Plants(HALL, 0), 0).observe_from(position, 0)
 
 
 def in_front(angle_deg: float, away_m: float) -> Point:

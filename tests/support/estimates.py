@@ -67,13 +67,13 @@ _VALUES = st.floats(-50.0, 50.0).map(lambda value: round(value, 1))
 
 
 @st.composite
-def some_readings(draw: st.DrawFn, most: int = 10) -> Readings:
+def some_readings(draw: st.DrawFn) -> Readings:
     """One tag or several, perhaps at one position; one reading or two; one time, one value."""
     places = draw(st.lists(st.tuples(_METRES, _METRES), min_size=1, max_size=4))
     tags = st.integers(0, len(places) - 1)
     hours = draw(st.sampled_from((_HOURS, st.just(7.0))))
     values = draw(st.sampled_from((_VALUES, st.just(21.0))))
-    rows = draw(st.lists(st.tuples(hours, tags, values), min_size=1, max_size=most))
+    rows = draw(st.lists(st.tuples(hours, tags, values), min_size=1, max_size=10))
     if draw(st.booleans()):
         rows.append(rows[0])
     return readings_of(rows, places)

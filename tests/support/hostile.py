@@ -193,12 +193,9 @@ def damaged(message: Any, chance: random.Random) -> bytes:
     return bytes(data)
 
 
-def lies(data: bytes, within: int | None = None) -> Iterator[bytes]:
-    """A message (CDR) with each of its words replaced by a length that its bytes do not contain.
-
-    `within`: each word of that many first bytes.
-    """
-    for at in range(4, len(data) - 3 if within is None else within - 3, 4):
+def lies(data: bytes) -> Iterator[bytes]:
+    """A message (CDR) with each of its words replaced by a length that its bytes do not contain."""
+    for at in range(4, len(data) - 3, 4):
         for claim in claims(data, at):
             yield lie_at(data, at, claim)
 

@@ -53,13 +53,12 @@ def inspection(
     bug_count: int = 0,
     blooms: Sequence[tuple[float, float]] = (),
     footprint: Sequence[tuple[float, float]] = (),
-    status: int = Observation.STATUS_OK,
     frame_id: str = "map",
     pose_frame_id: str = "",
     stamp_s: float = 0.0,
 ) -> Any:
     """An observation of a tag's flowers."""
-    msg = Observation(kind=Observation.KIND_FLOWER, status=status, source="test")
+    msg = Observation(kind=Observation.KIND_FLOWER, source="test")
     msg.header.frame_id = frame_id
     set_stamp(msg.header, stamp_s)
     flower = msg.flower

@@ -19,9 +19,9 @@ _SCAN, _INSPECTION = 0, 1
 _DAY_SPEED: Final = 60.0
 
 
-def ordinary_days(seed: int = 0) -> list[PastWrite]:
+def ordinary_days() -> list[PastWrite]:
     """Scans and inspections of three days, from 0 ns on, as a journal returns them."""
-    rows = past(GreenhouseSimulator(), seed, _DAY_SPEED, 1.0, 0)
+    rows = past(GreenhouseSimulator(), 0, _DAY_SPEED, 1.0, 0)
     reported = (row for row in rows if not isinstance(row, Pin))
     return [
         _write(number, row, DAYS * DAY_NS + round(row.stamp_ns * _DAY_SPEED))

@@ -129,9 +129,9 @@ class MadeUp:
             raise self.error
 
 
-def answered_by(log: Any, query: Query, now_ns: int = 2**62) -> bytes:
+def answered_by(log: Any, query: Query) -> bytes:
     """The body of a query's answer over a log, as the past process makes it."""
-    now = Now(now_ns, "map", UNKNOWN_JOURNAL)
+    now = Now(2**62, "map", UNKNOWN_JOURNAL)
     answer = answered(query, "", lambda need: _found(need, now, log), lambda: False).answer
     assert answer is not None
     return answer.body

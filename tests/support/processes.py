@@ -114,9 +114,9 @@ class Process:
         """Send a signal to the process alone."""
         self._process.send_signal(number)
 
-    def stand_still(self, seconds: float = 1.5) -> None:
-        """Stop the process for that long, as Ctrl-Z does, and let it go on."""
-        until = time.monotonic() + seconds
+    def stand_still(self) -> None:
+        """Stop the process for 1.5 s, as Ctrl-Z does, and let it go on."""
+        until = time.monotonic() + 1.5
         self.freeze()
         wait_for(lambda: time.monotonic() > until, "the time to pass")
         self.thaw()

@@ -69,13 +69,6 @@ def test_the_web_role_refuses_an_archive_as_its_journal(domain: int) -> None:
 # --- roles --------------------------------------------------------------------------------------
 
 
-def test_without_a_twin_the_notes_name_what_is_missing(domain: int) -> None:
-    with lupin_twin(domain, "web") as process:
-        answer = httpx.get(f"{url_of(process)}/api/notes")
-        wanted = "the journal is not known here yet: is the twin running?"
-        assert (answer.status_code, answer.json()["detail"]) == (503, wanted)
-
-
 def test_the_patrol_ends_when_the_demo_is_killed(domain: int) -> None:
     with lupin_twin(domain, "demo", *NO_JOURNAL) as demo:
         url_of(demo)

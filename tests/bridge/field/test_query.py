@@ -77,9 +77,6 @@ def test_any_accept_header_chooses_a_format_or_none(accept: str) -> None:
     assert field_query.negotiate(accept) in (None, *FORMATS)
 
 
-# --- ETag (RFC 9110, sections 8.8.3 and 13.1.2) ---------------------------------------------------
-
-
 # --- headers ------------------------------------------------------------------------------------
 
 

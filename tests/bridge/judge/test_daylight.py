@@ -50,19 +50,6 @@ def test_the_clock_is_that_of_the_greenhouse() -> None:
     assert not judge_day(light_of(), east, NOON_S).is_day
 
 
-def test_a_day_may_end_after_midnight() -> None:
-    late = ClockDay(UTC, time(14), time(2))
-    assert late.is_day(MIDNIGHT_S)
-    assert not late.is_day(MIDNIGHT_S + 3 * 3600)
-    assert late.is_day(MIDNIGHT_S + 14 * 3600)
-
-
-@pytest.mark.parametrize("hour", [time(), time(6), time(23, 59)])
-def test_from_an_hour_to_the_same_it_is_always_day(hour: time) -> None:
-    always = ClockDay(UTC, hour, hour)
-    assert all(always.is_day(MIDNIGHT_S + minute * 60) for minute in range(24 * 60))
-
-
 @pytest.mark.parametrize(
     ("clock", "from_h", "to_h", "nights"),
     [

@@ -7,7 +7,7 @@ import pytest
 from lupin_bridge import query_string
 from lupin_bridge.query_string import read
 from lupin_twin.core.drops import MAX_TEXT_LENGTH
-from lupin_twin.core.past import DEFAULT_POINTS, PastRefused, SeriesRequest
+from lupin_twin.core.past import DEFAULT_POINTS, PastRefused
 
 NS = 10**9
 NOW_NS = 1_000 * NS
@@ -84,11 +84,3 @@ def test_an_empty_or_impossible_name_is_refused(kind: type[query_string.OfPeriod
     assert query(kind, tag_id="x" * MAX_TEXT_LENGTH).tag_id == "x" * MAX_TEXT_LENGTH
     with pytest.raises(PastRefused, match=f"at most {MAX_TEXT_LENGTH} characters"):
         query(kind, tag_id="x" * (MAX_TEXT_LENGTH + 1))
-
-
-def test_a_history_is_of_one_sensor_or_of_one_event() -> None:
-    with pytest.raises(PastRefused, match="sensor_type: field required"):
-        read(HISTORY, [("tag_id", "7")])
-    with pytest.raises(PastRefused, match="'~dances' is none of ~scans"):
-        SeriesRequest("7", "~dances")
-    assert SeriesRequest("7", "~looks").event == "~looks"

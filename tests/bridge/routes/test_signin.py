@@ -104,15 +104,6 @@ def test_the_token_is_exchanged_for_a_strict_cookie(closed: Served) -> None:
     assert TOKEN not in answer.headers["set-cookie"]
 
 
-def test_the_cookie_opens_everything(closed: Served) -> None:
-    with closed.client() as browser:
-        assert browser.get("/api/state").status_code == 401
-        browser.post("/api/signin", headers={**BEARER, **OWN})
-        for path in ("/api/state", "/docs", "/api/field.png?sensor_type=co2", "/readyz"):
-            assert browser.get(path).status_code == 200
-        assert browser.get("/", headers={"Accept": "text/html"}).status_code != 303
-
-
 def test_a_session_does_not_renew_itself(closed: Served) -> None:
     with closed.client() as browser:
         browser.post("/api/signin", headers={**BEARER, **OWN})

@@ -144,15 +144,6 @@ def last_words(listener: Listener) -> tuple[str, int]:
         return reason, 0 if closed.rcvd is None else closed.rcvd.code
 
 
-# --- limits -------------------------------------------------------------------------------------
-
-
-def test_frames_are_not_compressed() -> None:
-    with bridge() as live, live.listen() as listener:
-        assert listener.connection.response is not None
-        assert "sec-websocket-extensions" not in listener.connection.response.headers
-
-
 # --- shutdown -----------------------------------------------------------------------------------
 
 
@@ -165,6 +156,8 @@ def test_a_signal_ends_it_and_all_clients_are_notified_whether_they_read_or_not(
         deaf_client(running_bridge.url, MILLION_CELLS),
         raw_http.connect(running_bridge.url) as refused,
     ):
+        assert one.connection.response is not None
+        assert "sec-websocket-extensions" not in one.connection.response.headers, "uncompressed"
         two.until("state")
         overfill(running_bridge, one)
         running_bridge.get("/api/state")  # and its connection is kept alive

@@ -12,7 +12,6 @@ import pytest
 from lupin_twin.core.state import Write
 from lupin_twin.journal import follow
 from lupin_twin.journal.follow import Followed, Lot, NotALotError
-from lupin_twin.journal.rebuild import upgrade
 from lupin_twin.journal.retention import Limits, forget, purge_step
 from lupin_twin.journal.schema import (
     DamagedFile,
@@ -23,7 +22,6 @@ from lupin_twin.journal.schema import (
     transaction,
 )
 from tests.support.journal import NOW, SECOND, append, inspection, pin, scan
-from tests.support.journal_answers import NAMES, answer, answers, old, same
 
 TABLES = ("run", "series", "scan", "look", "place", "hour", "tally", "event")
 
@@ -137,19 +135,6 @@ def test_a_copy_of_a_journal_that_was_put_back_from_a_backup_is_made_anew(
     target.unlink()
     copy(source, target)
     assert contents(target) == contents(source)
-
-
-@pytest.mark.parametrize(
-    "name", [name for name in NAMES if name in {"day", "runs", "late", "purged"}]
-)
-def test_a_copy_answers_as_the_journal_does(name: str, tmp_path: Path) -> None:
-    source = old(name, tmp_path)
-    upgrade(source, lambda _: None)
-    target = tmp_path / "web.sqlite"
-    copy(source, target, 500)
-    with reading(source) as one, reading(target) as other:
-        for question, _ in answers(name):
-            assert same(answer(other, question), answer(one, question)), question
 
 
 @pytest.mark.parametrize("seed", range(60))

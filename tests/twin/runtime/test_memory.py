@@ -156,32 +156,26 @@ BLIND = Inspection("8", NOW + 2 * S, None, None, 1, "dark", "a", NOW + 2 * S)
 WRITES = (SCAN, PART, FAILED, LOOK, BLIND, Pin("8", HERE), Pin("9", HERE))
 
 
-def test_a_restarted_twin_has_the_state_from_before(tmp_path: Path) -> None:
+def test_a_restarted_twin_has_the_state_from_before_and_repeated_messages_change_nothing(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "j.sqlite"
     with twin(path, wall(5)) as (memory, before):
         for write in WRITES:
             assert memory.apply(write, NOW) is None
-    with twin(path, wall(9)) as (_, after):
+    with twin(path, wall(9)) as (memory, after):
         known = {tag.tag_id: tag for tag in after.snapshot(NOW, "map").tags}
         assert list(known) == ["7", "8", "9"]
         for tag in before.snapshot(NOW, "map").tags:
-            restored = known[tag.tag_id]
-            assert set(restored.readings) == set(tag.readings)
-            assert replace(restored, readings=tag.readings) == tag
-        assert after.observation_count >= before.observation_count
-
-
-def test_repeated_messages_change_nothing_and_are_not_written(tmp_path: Path) -> None:
-    path = tmp_path / "j.sqlite"
-    with twin(path, wall(5)) as (memory, _):
-        for write in WRITES:
-            memory.apply(write, NOW)
-    with twin(path, wall(9)) as (memory, store):
-        before, count = store.snapshot(NOW, "map"), store.observation_count
+            same = known[tag.tag_id]
+            assert set(same.readings) == set(tag.readings)
+            assert replace(same, readings=tag.readings) == tag
+        restored, count = after.snapshot(NOW, "map"), after.observation_count
+        assert count >= before.observation_count
         for write in WRITES:
             memory.apply(write, NOW + 9 * S)
-        assert store.snapshot(NOW, "map") == before
-        assert store.observation_count == count
+        assert after.snapshot(NOW, "map") == restored
+        assert after.observation_count == count
         wait_for(lambda: memory.condition.repeated == 5, "all that were there")
         assert memory.condition.written == 0
 

@@ -145,7 +145,7 @@ class Push:
             await end(task)
 
     async def _run(self) -> None:
-        backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
+        backoff, why = Backoff(FIRST_WAIT_S, MOST_WAIT_S), ""
         while True:
             await self._is_news.wait()
             await asyncio.sleep(TOGETHER_S)
@@ -154,8 +154,11 @@ class Push:
             error = await self._guard.run(self._notify(alarms))
             if error is None:
                 backoff.succeeded()
+                if self.condition.detail == why:  # not that of a push service
+                    self.condition.taken(0)
             else:
                 self.condition.failing(str(error))
+                why = self.condition.detail
                 self._new = alarms | self._new
                 self._is_news.set()
                 await asyncio.sleep(backoff.wait_s())

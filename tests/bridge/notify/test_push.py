@@ -180,13 +180,15 @@ async def test_a_message_waits_while_an_error_lasts_or_the_accounts_cannot_be_re
         yield from status(503)(posted)
 
     async with pushing(tmp_path, busy, status(201)) as on:
-        on.subscribe(on.phone("one"))
-        accounts.rename(aside)
         with pytest.MonkeyPatch.context() as broken:
             broken.setattr(push_module, "notes_of_alarms", None)
             on.board.show([alarm("7")])
             await until(lambda: on.push.condition.failed > 2, "attempts")
         assert caplog.text.count("Traceback") == 1
+        await until(lambda: not on.push.condition.detail, "its end, with nobody to notify")
+        on.subscribe(on.phone("one"))
+        accounts.rename(aside)
+        on.board.show([alarm("7"), alarm("8")])
         await until(lambda: "was not accepted: the file of accounts" in caplog.text, "why")
         aside.rename(accounts)
         await until(lambda: on.service.posted, "the first attempt")

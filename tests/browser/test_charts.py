@@ -16,7 +16,8 @@ from lupin_msgs.msg import Observation
 from PIL import Image
 from playwright.sync_api import Locator, expect
 
-from tests.browser.hmi import PHONE, Hmi, OpenPage
+from tests.browser.hmi import PHONE, WIDE, Hmi, OpenPage
+from tests.browser.places import places
 from tests.support.messages import inspection, scan, set_stamp
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -280,6 +281,10 @@ def test_on_a_phone_the_card_makes_room_for_its_charts(garden: Garden, open_page
     expect(tab).to_have_attribute("aria-pressed", "true")
     expect(charts).to_be_focused()
     expect(hmi.test_id("card-chart")).to_be_in_viewport()
+    # Elsewhere the chart's line of facts shares that of its choice.
+    hmi.resize(**WIDE)
+    choice, facts = places(hmi, ".card-chart > select", ".card-chart header")
+    assert (choice.right <= facts.left, facts.bottom) == (True, choice.bottom)
 
 
 def test_each_of_several_tags_has_the_colour_of_its_name(

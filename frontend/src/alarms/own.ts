@@ -6,7 +6,8 @@
 import { timeOfDay } from '../clock';
 import type { Alarm, Verdict } from '../contract/types';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
-import { createStore } from '../store/create';
+import { store } from '../store/app';
+import { createStore, person } from '../store/create';
 
 /** An acknowledgement of an alarm no longer listed is deleted after this long, ms. */
 export const FORGET_MS = 7 * 86_400_000;
@@ -180,8 +181,9 @@ interface LastAction {
   readonly what: 'acknowledge' | 'unacknowledge' | 'shelve' | 'unshelve';
   /** Number of alarms affected. */
   readonly count: number;
-  /** State before the action. */
+  /** State before and after the action. */
   readonly before: LocalAlarms;
+  readonly after: LocalAlarms;
 }
 
 /** The last action while it can be undone; null: none. */
@@ -203,7 +205,7 @@ function setLastAction(action: LastAction | null): void {
 function change(what: LastAction['what'], count: number, next: LocalAlarms): void {
   const before = own.get();
   own.set(next);
-  setLastAction({ what, count, before });
+  setLastAction({ what, count, before, after: next });
   acting.share?.(before, next);
 }
 
@@ -225,13 +227,34 @@ export const unshelveAlarm = (alarm: Alarm): void => {
   change('unshelve', 1, { ...local, shelved: without(local.shelved, faultKey(alarm)) });
 };
 
-/** Undoes the last action. */
+/** `now` with only those keys as before that the action changed and that nobody else has set since. */
+function reverted<Value>(
+  now: ReadonlyMap<string, Value>,
+  before: ReadonlyMap<string, Value>,
+  after: ReadonlyMap<string, Value>,
+  theirs: readonly string[],
+): ReadonlyMap<string, Value> {
+  const isOurs = ([key]: readonly [string, Value]): boolean =>
+    before.get(key) !== after.get(key) && !(now.has(key) && theirs.includes(key));
+  return new Map([...[...now].filter((each) => !isOurs(each)), ...[...before].filter(isOurs)]);
+}
+
+/** Undoes the last action; what others have done meanwhile stays. */
 export function undo(): void {
   const last = lastAction.get();
   if (!last) return;
-  const { acknowledged, shelved } = last.before;
+  const { before, after } = last;
   const now = own.get();
-  own.set({ ...now, acknowledged, shelved });
+  const name = person.get()?.name;
+  const { alarms = [] } = store.get().twin.alarms ?? {};
+  const isTheirs = (by: string | null | undefined): boolean => !!name && !!by && by !== name;
+  const acknowledged = alarms.filter((it) => isTheirs(it.acknowledged_by)).map(({ id }) => id);
+  const shelved = alarms.filter((it) => isTheirs(it.shelved_by)).map(faultKey);
+  own.set({
+    ...now,
+    acknowledged: reverted(now.acknowledged, before.acknowledged, after.acknowledged, acknowledged),
+    shelved: reverted(now.shelved, before.shelved, after.shelved, shelved),
+  });
   setLastAction(null);
   acting.share?.(now, own.get());
 }

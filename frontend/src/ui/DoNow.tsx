@@ -237,14 +237,9 @@ export function Overall({
   // The alarm list is always live.
   const isNow = useApp((state) => selectShown(state).moment === null);
   const active = useSelected(alarmList, (list) => list.active.length);
-  const shelved = useSelected(alarmList, (list) => list.shelved.length);
   // What to do about a clock's fault is in the banner.
   const lacksTime = useApp(selectClockFault) !== null && isSilent(health);
-  const text = lacksTime
-    ? S.healthNoTime
-    : own
-      ? reason
-      : overallText(health, isNow ? active + shelved : 0);
+  const text = lacksTime ? S.healthNoTime : own ? reason : overallText(health, isNow ? active : 0);
   const hasSnapshot = useApp(selectHasSnapshot);
   if (text === null || !hasSnapshot) return null;
   return (
@@ -255,13 +250,12 @@ export function Overall({
   );
 }
 
-/** Number of shelved alarms, shown while something is wrong: shelved ones have no line of their own. */
+/** Number of shelved alarms: they have no line of their own. */
 export function ShelvedCount({ disabled = false }: { disabled?: boolean }): JSX.Element | null {
-  const isWrong = useApp((state) => isBad(selectHealth(state).verdict));
   // The alarm list is always live.
   const isNow = useApp((state) => selectShown(state).moment === null);
   const count = useSelected(alarmList, (list) => list.shelved.length);
-  if (!isWrong || !isNow || count === 0) return null;
+  if (!isNow || count === 0) return null;
   return (
     <button
       type="button"

@@ -2,7 +2,7 @@ import { act, fireEvent, render, screen } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
 import { calling } from '../alarms/list';
-import { acknowledgeAlarms, shelveAlarm } from '../alarms/own';
+import { acknowledgeAlarms, NO_LOCAL_ALARMS, own, shelveAlarm } from '../alarms/own';
 import { alarmList, startAlarms } from '../alarms/watch';
 import { act as look, receive, store } from '../store/app';
 import { NO_HOUSE, withPast } from '../store/twin';
@@ -261,6 +261,7 @@ test('all is well, hardly anything is known, and nothing is', () => {
 test('beside an active alarm, healthy says why', () => {
   showTags(TAGS, judgement({ 1: 'healthy', 5: 'healthy' }));
   const stop = startAlarms();
+  own.set(NO_LOCAL_ALARMS);
   render(<HealthSummary kiosk={false} />);
   act(() => {
     reportAlarms(alarm('a'));
@@ -269,6 +270,12 @@ test('beside an active alarm, healthy says why', () => {
   expect(driver().textContent).toBe(
     '1 alarm is still active: the next good scan or inspection resolves it',
   );
+  // A shelved one is not called active, but counted.
+  act(() => {
+    for (const item of calling(alarmList.get())) shelveAlarm(item, 15, 'fan');
+  });
+  expect(driver().textContent).toMatch(/^All assessed readings/);
+  expect(screen.getByRole('button', { name: 'Shelved (1)' })).toBeTruthy();
   act(() => {
     reportAlarms(alarm('a', { cleared: 950 }));
   });

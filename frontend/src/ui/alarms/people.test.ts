@@ -11,7 +11,7 @@ import {
 } from '../../alarms/own';
 import { person } from '../../store/create';
 import { SILENCE_MS } from '../../connection/machine';
-import { goLive, goLost, status as bridgeStatus } from '../../testing/page';
+import { goLive, goLost, showTags, status as bridgeStatus } from '../../testing/page';
 import { toast } from '../toast';
 import { merged, startPeople, sharingText, wordsFor } from './people';
 
@@ -67,6 +67,7 @@ beforeEach(() => {
   isAway = false;
   role = 'operator';
   own.set(NO_LOCAL_ALARMS);
+  reportAlarms();
   const note = {
     ...{ id: 'n1', kind: 'acknowledge', subject: 'alarm:cold', text: '', until: null },
     ...{ made_at: { sec: 1, nanosec: 0 }, by: 'anna', withdrawn_by: null, withdrawn_at: null },
@@ -137,6 +138,33 @@ test('own actions are sent to the bridge, and withdrawn there', async () => {
   undo();
   await vi.waitFor(() => {
     expect(requests.slice(1).map(({ method, path }) => `${method} ${path}`)).toEqual([
+      'GET /api/notes?subject=alarm%3Acold',
+      'DELETE /api/notes/n1',
+    ]);
+  });
+});
+
+test('undo takes back only one’s own words: what others have said since stays', async () => {
+  showTags([]);
+  await signedIn();
+  const [same, other] = ['same', 'other'].map((id) => alarm(id, { tag_id: id }));
+  if (!same || !other) throw new Error('two alarms');
+  reportAlarms(COLD, same, other);
+  acknowledgeAlarms([COLD, same].map((each) => ({ alarm: each, verdict: 'stressed' })));
+  await vi.waitFor(() => {
+    expect(requests).toHaveLength(2);
+  });
+  const bert = { acknowledged_by: 'bert', acknowledged_at: STAMP };
+  const shelf = { shelved_by: 'bert', shelved_until: { ...STAMP, sec: 2_000 } };
+  await vi.waitFor(() => {
+    reportAlarms(SAID, { ...same, ...bert }, { ...other, ...bert, ...shelf });
+    expect(own.get().shelved.size).toBe(1);
+  });
+  undo();
+  expect([...own.get().acknowledged.keys()]).toEqual(['same', 'other']);
+  expect([...own.get().shelved.keys()]).toEqual([faultKey(other)]);
+  await vi.waitFor(() => {
+    expect(requests.slice(2).map(({ method, path }) => `${method} ${path}`)).toEqual([
       'GET /api/notes?subject=alarm%3Acold',
       'DELETE /api/notes/n1',
     ]);

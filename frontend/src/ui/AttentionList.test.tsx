@@ -65,7 +65,8 @@ test('what ails more than a few tags has one line, as among the alarms, and the 
   document.body.replaceChildren();
   show({ ...many(11), bug: [pest] });
   expect(ids()).toEqual(['bug']);
-  const [cause] = document.querySelectorAll('li[data-cause]');
+  const [cause] = document.querySelectorAll<HTMLElement>('li[data-cause]');
+  expect(cause?.parentElement?.style.getPropertyValue('--rows')).toBe('3');
   expect(cause?.textContent).toMatch(
     /^11\u202f×.*Temperature too lowHeat, or close the vents Tag 11: Temperature 8.0.*Tags 11, 10, .* 4 and 3 more/,
   );

@@ -40,11 +40,13 @@ export function AttentionList(): JSX.Element {
   const heading = urgent.length > 0 ? S.attention : hasSnapshot ? noneText(health) : null;
   const list = useRef<HTMLUListElement>(null);
   const count = useFitting(list, lines.length);
+  // A cause needs the height of two tags.
+  const rows = lines.reduce((sum, { cause }) => sum + (cause === null ? 1 : 2), 0);
   const rest = lines.slice(count).reduce((sum, { tags }) => sum + tags.length, 0);
   return (
     <div className="attention">
       {heading && <h3>{heading}</h3>}
-      <ul ref={list} style={{ '--rows': lines.length } as CSSProperties}>
+      <ul ref={list} style={{ '--rows': rows } as CSSProperties}>
         {lines.slice(0, MOST_LINES).map(({ key, ...line }, index) => (
           <Row key={key} {...line} fits={index < count} />
         ))}

@@ -6,8 +6,9 @@ import { act, receive, store } from '../store/app';
 import { announce } from '../store/create';
 import { NO_HOUSE, withPast } from '../store/twin';
 import { alarm, reportAlarms } from '../testing/alarms';
+import { judgement, reason } from '../testing/health';
 import { goLive, goLost, showTags } from '../testing/page';
-import { wireTag } from '../testing/tags';
+import { readings, wireTag } from '../testing/tags';
 import {
   badgeOf,
   notifyState,
@@ -91,6 +92,10 @@ describe('icon', () => {
     expect(drawn()).toMatch(/^data:image\/svg\+xml,<svg .*<circle.*>1<\/text>/);
     reportAlarms(warm, cold);
     expect(drawn()).toMatch(/<path.*>2<\/text>/);
+    // As on the alarms' button, by what they are now, not by what they were at worst.
+    const mild = reason({ value: 12, limit: 18, verdict: 'stressed' });
+    showTags([wireTag({ readings: readings({ temperature: 12 }) })], judgement({ 1: [mild] }));
+    expect(drawn()).toMatch(/<circle.*>2<\/text>/);
     reportAlarms();
     expect(link.href).toMatch(/\/lupin\.svg$/);
     link.remove();

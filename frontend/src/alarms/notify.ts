@@ -3,14 +3,14 @@ import { now } from '../clock';
 import { request } from '../contract/api';
 import { postPush } from '../contract/people';
 import type { Verdict } from '../contract/types';
-import { store } from '../store/app';
+import { onChange, store } from '../store/app';
 import { createStore } from '../store/create';
 import { selectOrigin } from '../store/moment';
 import { S } from '../strings';
 import { showAlarm } from './follow';
 import type { Item } from './list';
 import { own, updateNotifySettings } from './own';
-import { textNow } from './speech';
+import { textNow, worstNow } from './speech';
 import { alarmList, onNews } from './watch';
 import { severalText } from './words';
 
@@ -147,11 +147,17 @@ export function startBadge(): () => void {
   const plain = link.getAttribute('href') ?? '';
   const update = (): void => {
     const items = alarmList.get().active;
-    const href = badgeOf(items.length, items[0]?.verdict ?? 'unknown') ?? plain;
+    const href = badgeOf(items.length, worstNow(store.get(), items) ?? 'unknown') ?? plain;
     if (link.getAttribute('href') !== href) link.setAttribute('href', href);
   };
   update();
-  return alarmList.subscribe(update);
+  const stops = [
+    alarmList.subscribe(update),
+    onChange((state) => [worstNow(state, alarmList.get().active)], update),
+  ];
+  return () => {
+    for (const stop of stops) stop();
+  };
 }
 
 /** Least time between two sounds, ms. */

@@ -5,7 +5,7 @@ import { failureText } from '../domain/format';
 import { shown } from '../domain/text';
 import { rosText } from '../domain/time';
 import { useApp } from '../store/app';
-import { person, useSelected } from '../store/create';
+import { mayWithdraw, person, useSelected } from '../store/create';
 import { selectShown } from '../store/moment';
 import { Disclosure, useClose } from '../widgets/controls';
 import { C, standingNotes, type StandingNote } from './NoteMarks';
@@ -71,13 +71,15 @@ export function CommentList({
     (it) => it.kind === 'comment' && it.subject === subject && (moment === null || it.at <= moment),
   );
   if (found.length === 0) return null;
-  const mayWithdraw = ({ by }: StandingNote): boolean =>
-    who?.can_write_notes === true && (by === who.name || who.role === 'admin');
   return (
     <div className="comments" data-testid="comments">
       <ul aria-label={C.title}>
         {found.slice(-MOST_SHOWN).map((comment) => (
-          <CommentRow key={comment.id} comment={comment} mayWithdraw={mayWithdraw(comment)} />
+          <CommentRow
+            key={comment.id}
+            comment={comment}
+            mayWithdraw={mayWithdraw(who, comment.by)}
+          />
         ))}
       </ul>
     </div>

@@ -72,6 +72,10 @@ export const person = createStore<Session | null>(null);
 /** With sign-in, users who may write notes acknowledge and shelve; otherwise each browser for itself. */
 export const mayAct = (who: Session | null): boolean => who?.can_write_notes ?? true;
 
+/** A note is withdrawn by who wrote it, or by an admin. */
+export const mayWithdraw = (who: Session | null, by: string | null): boolean =>
+  who?.can_write_notes === true && (by === who.name || who.role === 'admin');
+
 /** The time under the mouse, in a chart or on the time bar; each shows the other's. */
 interface PointedTime {
   /** ROS seconds. */

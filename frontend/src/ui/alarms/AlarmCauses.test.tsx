@@ -5,6 +5,7 @@ import { acknowledge, NO_LOCAL_ALARMS, own } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
 import type { Alarm } from '../../contract/types';
 import { store } from '../../store/app';
+import { person } from '../../store/create';
 import { alarm, reportAlarms } from '../../testing/alarms';
 import { showTags } from '../../testing/page';
 import { wireTag } from '../../testing/tags';
@@ -13,6 +14,7 @@ import { AlarmPanel } from './AlarmPanel';
 let stop: () => void;
 beforeEach(() => {
   own.set(NO_LOCAL_ALARMS);
+  person.set(null);
   showTags([wireTag()]);
   stop = startAlarms();
   render(<AlarmPanel />);
@@ -64,6 +66,27 @@ test('many of one cause that one person has acknowledged say who, and when the l
   expect(status()).toBe('acknowledged by anna, sim 00:16:44');
   saidBy('anna', 'anna', 'anna', 'anna', 'ben');
   expect(status()).toBe('acknowledged');
+});
+
+test('only who acknowledged an alarm, or an admin, may take that back', () => {
+  const anna = { can_sign_out: true, seconds_left: null, name: 'anna', can_write_notes: true };
+  const isOffered = (role: 'operator' | 'admin', acknowledged_by: string | null): boolean => {
+    const said = alarm('a', { acknowledged_by });
+    report(said);
+    act(() => {
+      person.set({ ...anna, role });
+      own.set(acknowledge(NO_LOCAL_ALARMS, [{ alarm: said, verdict: 'critical' }], 0));
+    });
+    fireEvent.click(screen.getByRole('button', { name: /^Actions/ }));
+    const found = screen.queryByText('Unacknowledge') !== null;
+    fireEvent.keyDown(document, { key: 'Escape' });
+    return found;
+  };
+  expect(isOffered('operator', 'bert')).toBe(false);
+  expect(isOffered('admin', 'bert')).toBe(true);
+  expect(isOffered('operator', 'anna')).toBe(true);
+  // Just acknowledged here: the frame with the name is still to come.
+  expect(isOffered('operator', null)).toBe(true);
 });
 
 test('many of one cause that are resolved have nothing to do, and say when the last was', () => {

@@ -17,7 +17,7 @@ import { minuteText } from '../../domain/format';
 import { C } from '../../notes/NoteMarks';
 import { CommentField, CommentList } from '../../notes/Comments';
 import { useApp } from '../../store/app';
-import { mayAct, person, useSelected } from '../../store/create';
+import { mayAct, mayWithdraw, person, useSelected } from '../../store/create';
 import { S } from '../../strings';
 import { Disclosure, Icon, useClose } from '../../widgets/controls';
 import { AlarmFacts, AlarmTimes, useValues } from './AlarmFacts';
@@ -156,7 +156,9 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
           {act(S.alarmStart, then(goToStart), true)}
           {mayAct(who) && (
             <>
-              {isAcknowledged && act(S.alarmUnacknowledge, then(unacknowledgeAlarm))}
+              {isAcknowledged &&
+                (who === null || mayWithdraw(who, alarm.acknowledged_by ?? who.name)) &&
+                act(S.alarmUnacknowledge, then(unacknowledgeAlarm))}
               {shelf !== null
                 ? act(S.alarmUnshelve, then(unshelveAlarm))
                 : alarm.cleared_at === null &&

@@ -53,7 +53,7 @@ def test_a_fleet_answers_for_a_site_as_its_serve_and_both_as_an_old_build_did(
 
 
 def still_says(old: Any, new: Any) -> bool:
-    """Whether all of an old answer is in the new one, but for rounding; it may have further fields."""
+    """Whether all of an old answer is in the new one, but for rounding; it may have more fields."""
     if isinstance(old, dict):
         return all(key in new and still_says(value, new[key]) for key, value in old.items())
     if isinstance(old, list):

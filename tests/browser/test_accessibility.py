@@ -1,15 +1,17 @@
 """axe-core reports nothing: light, dark, kiosk, phone, frozen, and with all panels open.
 
-Only this file bypasses the page's own policy, to get axe into the page.
+Only this file bypasses the page's own policy, to get axe into the page. High contrast is here too.
 """
 
+import io
 from typing import Any
 
 import pytest
-from playwright.sync_api import expect
+from PIL import Image
+from playwright.sync_api import Locator, expect
 
 from tests.browser.greenhouse import TAGS
-from tests.browser.hmi import AXE, PHONE, SERVER_GONE, WIDE, Hmi, OpenPage
+from tests.browser.hmi import AXE, PHONE, SERVER_GONE, WIDE, Hmi, OpenPage, Pixel
 from tests.support.messages import scan
 from tests.support.web import Bridge, bridge
 
@@ -113,3 +115,46 @@ def test_an_empty_greenhouse_and_a_frozen_one(domain: int, open_page: OpenPage) 
         running.process.kill()
         hmi.expect_phase("reconnecting")
         assert violations(hmi) == []
+
+
+def colours(thing: Locator) -> set[Pixel]:
+    """All colours that it has on the screen, without the edge that it shares with its neighbour."""
+    picture = Image.open(io.BytesIO(thing.screenshot())).convert("RGB")
+    picture = picture.crop((1, 1, picture.width - 1, picture.height - 1))
+    data = picture.tobytes()
+    return set(zip(data[::3], data[1::3], data[2::3], strict=True))
+
+
+def test_high_contrast_shows_what_is_chosen_and_what_a_colour_means(
+    greenhouse: Bridge, open_page: OpenPage
+) -> None:
+    hmi = open_page(greenhouse.url, "tag=2", viewport=WIDE, forced_colors="active")
+    hmi.expect_samples()
+    hmi.settled_picture()
+    expect(hmi.row("2")).to_have_attribute("data-selected", "true")
+    hmi.page.locator(".health-counts [data-health=healthy]").first.click()
+    hmi.page.evaluate(
+        """() => {
+          const probe = document.body.appendChild(document.createElement('i'));
+          probe.id = 'probe';
+          probe.style = 'position: fixed; inset: 0 auto auto 0; width: 3px; height: 3px;' +
+            'background: Highlight; z-index: 99';
+        }"""
+    )
+    (highlight,) = colours(hmi.page.locator("#probe"))
+    for one, other in (
+        (".sensors label:has(:checked)", ".sensors label:not(:has(:checked))"),
+        (".colouring label:has(:checked)", ".colouring label:not(:has(:checked))"),
+        (".health-counts [aria-pressed=true]", ".health-counts [aria-pressed=false]"),
+        ("tr[data-selected=true] th", "tr[data-selected=false] th"),
+        ("td.chosen", "td.other"),
+    ):
+        assert highlight in colours(hmi.page.locator(one).first), one
+        assert highlight not in colours(hmi.page.locator(other).last), other
+    swatches = [colours(swatch) for swatch in hmi.page.locator(".sensors .swatch").all()]
+    assert len({frozenset(each) for each in swatches}) == len(swatches)
+    assert len(colours(hmi.page.locator(".ideal-bar").first)) > 50
+    # In the time bar, open actions stand out from failed scans.
+    marks = [hmi.page.locator(f".timebar-picture [data-mark={it}]") for it in ("pest", "failures")]
+    pest, failed = (mark.first.evaluate("e => getComputedStyle(e).fill") for mark in marks)
+    assert pest != failed

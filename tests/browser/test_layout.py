@@ -1,15 +1,13 @@
 """All window sizes and vision settings: everything is there, in its place, and can be clicked."""
 
-import io
 import re
 from collections.abc import Callable, Iterator
 from functools import partial
 
 import pytest
-from PIL import Image
-from playwright.sync_api import Locator, expect
+from playwright.sync_api import expect
 
-from tests.browser.hmi import PHONE, Box, Hmi, OpenPage, Pixel
+from tests.browser.hmi import PHONE, Box, Hmi, OpenPage
 from tests.browser.places import LINES, expect_in_reach, place, places, words_below
 from tests.support.messages import scan
 from tests.support.web import Bridge, bridge
@@ -249,47 +247,6 @@ def test_the_table_stays_in_place_while_tags_arrive(running: Bridge, open_page: 
 
 def stands_at(hmi: Hmi, filter_bar: list[Box]) -> bool:
     return places(hmi, ".filter-bar") == filter_bar
-
-
-def colours(thing: Locator) -> set[Pixel]:
-    """All colours that it has on the screen, without the edge that it shares with its neighbour."""
-    picture = Image.open(io.BytesIO(thing.screenshot())).convert("RGB")
-    picture = picture.crop((1, 1, picture.width - 1, picture.height - 1))
-    data = picture.tobytes()
-    return set(zip(data[::3], data[1::3], data[2::3], strict=True))
-
-
-def test_high_contrast_shows_what_is_chosen_and_what_a_colour_means(
-    open_at: Callable[..., Hmi],
-) -> None:
-    hmi = open_at((1440, 900), "tag=2", forced_colors="active")
-    expect(hmi.row("2")).to_have_attribute("data-selected", "true")
-    hmi.page.locator(".health-counts [data-health=healthy]").first.click()
-    hmi.page.evaluate(
-        """() => {
-          const probe = document.body.appendChild(document.createElement('i'));
-          probe.id = 'probe';
-          probe.style = 'position: fixed; inset: 0 auto auto 0; width: 3px; height: 3px;' +
-            'background: Highlight; z-index: 99';
-        }"""
-    )
-    (highlight,) = colours(hmi.page.locator("#probe"))
-    for one, other in (
-        (".sensors label:has(:checked)", ".sensors label:not(:has(:checked))"),
-        (".colouring label:has(:checked)", ".colouring label:not(:has(:checked))"),
-        (".health-counts [aria-pressed=true]", ".health-counts [aria-pressed=false]"),
-        ("tr[data-selected=true] th", "tr[data-selected=false] th"),
-        ("td.chosen", "td.other"),
-    ):
-        assert highlight in colours(hmi.page.locator(one).first), one
-        assert highlight not in colours(hmi.page.locator(other).last), other
-    swatches = [colours(swatch) for swatch in hmi.page.locator(".sensors .swatch").all()]
-    assert len({frozenset(each) for each in swatches}) == len(swatches)
-    assert len(colours(hmi.page.locator(".ideal-bar").first)) > 50
-    # In the time bar, open actions stand out from failed scans.
-    marks = [hmi.page.locator(f".timebar-picture [data-mark={it}]") for it in ("pest", "failures")]
-    pest, failed = (mark.first.evaluate("e => getComputedStyle(e).fill") for mark in marks)
-    assert pest != failed
 
 
 def test_an_empty_greenhouse_says_what_to_do_beside_the_controls_and_in_the_table(

@@ -8,7 +8,7 @@ from playwright.sync_api import WebSocketRoute, expect
 
 from tests.browser.greenhouse import TAGS
 from tests.browser.hmi import PHONE, Hmi, OpenPage
-from tests.browser.places import places
+from tests.browser.places import place, places
 from tests.support.web import Bridge
 
 
@@ -97,8 +97,9 @@ def test_a_played_recording_shows_its_time_on_each_tab(phone: Hmi) -> None:
 def test_charts_have_one_line_of_tools_and_the_whole_width(phone: Hmi) -> None:
     phone.go("chart.tag=10&tag=10", "?lang=nl")
     expect(phone.page.get_by_role("radio", name="Meetpunt 10")).to_be_checked()
-    [head] = places(phone, ".chart-view > header")
-    assert head.bottom - head.top < 60
+    head = phone.page.locator(".chart-view > header")
+    # More lines until its styles and all its parts are there.
+    phone.expect(lambda: place(head).bottom - place(head).top < 60, "one line of tools")
     phone.turn("chart.sensor=1&chart.sensor=10&sensor=dew_point")
     expect(phone.page.locator(".chart-tags li")).to_have_count(2)
     expect(phone.page.locator(".u-over")).to_be_visible()

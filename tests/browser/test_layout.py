@@ -351,7 +351,7 @@ _CUT_REASONS = """() => [...document.querySelectorAll('tbody .cell-health > div'
 _COLOUR = "e => getComputedStyle(e).color"
 
 # The parts of open actions that are left out.
-_CUT_TODO = """() => [...document.querySelectorAll('.health .do-what > *')]
+_CUT_ACTIONS = """() => [...document.querySelectorAll('.health .do-what > *')]
   .filter((e) => e.offsetTop >= e.parentElement.offsetTop + e.parentElement.offsetHeight)
   .map((e) => e.textContent)"""
 
@@ -402,7 +402,7 @@ def test_every_language_has_room_on_a_phone(greenhouse: Bridge, open_page: OpenP
             has_word = place(mark.locator("span")).right > place(mark.locator("svg")).right
             assert (mark.evaluate(_COLOUR) == why.evaluate(_COLOUR)) is not has_word, width
             if width >= 1100:
-                assert hmi.page.evaluate(_CUT_TODO) == [], (language, width)
+                assert hmi.page.evaluate(_CUT_ACTIONS) == [], (language, width)
             assert hmi.row("failed").locator(".row-button bdi").evaluate(LINES) == 1, width
             for head in hmi.page.locator("thead button > span:first-child:visible").all():
                 words = place(head)

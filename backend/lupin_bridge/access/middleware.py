@@ -64,6 +64,10 @@ _METHODS: Final = {
     OBSERVATIONS: ("POST",),
 }
 OWN_HEADER: Final = "X-Lupin-Twin"
+# The routes that take a body, in a fleet below a site's path, and its largest size: a note of 500
+# characters, all escaped, or 64 readings.
+_BODIES: Final = (NOTES, OBSERVATIONS, PUSH, SIGN_IN)
+MAX_BODY_BYTES: Final = 8 * 1024
 
 # The page loads nothing from elsewhere, cannot be framed, and runs no inline script. Other pages
 # can read an answer only by CORS, which CORP does not affect. No HSTS: it would block the way past
@@ -205,7 +209,8 @@ class Access:
 class AccessControl:
     """ASGI middleware: 403 for foreign hosts and pages, 401 and 429 without the token.
 
-    Also 414 for an address that is far too long, and security headers on every answer.
+    Also 413 for a body that nobody reads, 414 for an address that is far too long, and security
+    headers on every answer.
     """
 
     def __init__(self, app: ASGIApp, access: Access) -> None:
@@ -219,12 +224,10 @@ class AccessControl:
             await self._app(scope, receive, send)
             return
         send = _with_security_headers(send)
-        length = len(scope.get("raw_path") or b"") + len(scope["query_string"])
-        if length > MAX_TARGET_BYTES:
-            detail = f"the address has {length} bytes, the limit is {MAX_TARGET_BYTES}"
-            await deny(_refusal(414, detail), scope, receive, send)
-            return
         request = HTTPConnection(scope)
+        if (too_large := _too_large(request)) is not None:
+            await deny(too_large, scope, receive, send)
+            return
         scheme = "https" if scope["scheme"] in ("https", "wss") else "http"
         decision = self._access.policy.judge(
             scheme, request.headers, wants_page=_wants_page(request)
@@ -319,6 +322,27 @@ class AccessControl:
         self._guesses.take(client, now_s)
         log.warning("wrong token from %s", client)
         return _unauthorized("this is not the bridge's token, expected Authorization: Bearer")
+
+
+def _too_large(request: HTTPConnection) -> Response | None:
+    """The refusal of an address that is far too long, or of a body that no route reads.
+
+    RFC 9112, section 6: only two headers announce a body. h11 has checked the length.
+    """
+    scope, headers = request.scope, request.headers
+    size = len(scope.get("raw_path") or b"") + len(scope["query_string"])
+    if size > MAX_TARGET_BYTES:
+        return _refusal(414, f"the address has {size} bytes, the limit is {MAX_TARGET_BYTES}")
+    is_wanted = scope.get("method") == "POST" and path_of(scope).endswith(_BODIES)
+    most = MAX_BODY_BYTES if is_wanted else 0
+    length, coding = headers.get("content-length", "0"), headers.get("transfer-encoding")
+    if coding is None and int(length) <= most:
+        return None
+    given = f"content-length: {length}" if coding is None else f"transfer-encoding: {coding[:32]}"
+    limit = f"the limit is {most} bytes" if most else "and none is read here"
+    # uvicorn would parse all of it: only a connection that is closed reads nothing.
+    closing = {"connection": "close"}
+    return _refusal(413, f"the request has a body ({given}), {limit}", closing)
 
 
 def client_of(request: HTTPConnection) -> str:

@@ -19,7 +19,7 @@ import resource
 import socket
 import ssl
 import struct
-from asyncio.sslproto import SSLProtocol, _SSLProtocolTransport
+from asyncio.sslproto import SSLProtocol
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable
 from contextlib import suppress
@@ -27,38 +27,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-import orjson
-
 from lupin_bridge.serving.admission import client_key
 from lupin_twin.core.drops import Throttle
 
 log = logging.getLogger(__name__)
-
-# Not `http.HTTPStatus`: its names for 414 and 431 depend on the version of Python.
-_PHRASES: Final = {
-    400: "Bad Request",
-    413: "Content Too Large",
-    414: "URI Too Long",
-    431: "Request Header Fields Too Large",
-    501: "Not Implemented",  # an unknown Transfer-Encoding, says h11
-    503: "Service Unavailable",
-}
-
-
-def refusal(status: int, detail: str, *headers: str) -> bytes:
-    """A whole HTTP answer (`schema.ErrorMessage`), after which the connection ends."""
-    body = orjson.dumps({"detail": detail})
-    head = (
-        f"HTTP/1.1 {status} {_PHRASES[status]}",
-        "Content-Type: application/json",
-        f"Content-Length: {len(body)}",
-        "Cache-Control: no-store",
-        "X-Content-Type-Options: nosniff",
-        "Connection: close",
-        *headers,
-    )
-    return "\r\n".join((*head, "", "")).encode() + body
-
 
 # The key of the connection in the state of a request's scope.
 CONNECTION_KEY: Final = "connection"
@@ -84,32 +56,48 @@ def tear_down(transport: asyncio.WriteTransport) -> None:
 
     If only closed, its socket would keep the unread data for another four minutes.
     """
-    if transport.get_write_buffer_size() > 0:
-        reset(transport)
-    else:
-        transport.abort()
+    with _unless_forgotten():
+        if transport.get_write_buffer_size() > 0:
+            reset(transport)
+        else:
+            transport.abort()
 
 
 def reset(transport: asyncio.WriteTransport) -> None:
     """End a connection now with a TCP reset, so that the other side sees that it was cut off."""
     no_lingering = struct.pack("ii", 1, 0)
-    connection: socket.socket | None = transport.get_extra_info("socket")
-    if connection is not None and connection.fileno() >= 0:  # else it has ended already
-        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, no_lingering)
-    transport.abort()
+    with _unless_forgotten():
+        connection: socket.socket | None = transport.get_extra_info("socket")
+        if connection is not None and connection.fileno() >= 0:  # else it has ended already
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, no_lingering)
+        transport.abort()
 
 
-_close_tls: Final = _SSLProtocolTransport.close
+def _unless_forgotten() -> suppress:
+    """Ignore how asyncio fails on a TLS transport that uvicorn closed twice; it ends by itself."""
+    return suppress(AttributeError)
 
 
-def _close_tls_once(transport: _SSLProtocolTransport) -> None:
-    if not transport.is_closing():
-        _close_tls(transport)
+# Bytes read from a connection at once: clients send little, and all others wait while it is parsed,
+# 3 ms for the smallest WebSocket frames.
+READ_BYTES: Final = 8_192
+_READ_BUFFER: Final = memoryview(bytearray(READ_BYTES))
 
 
-# uvicorn may call `close` several times. A second call would make the transport forget its
-# connection, which nothing could end any more until the other side answers the first.
-_SSLProtocolTransport.close = _close_tls_once  # type: ignore[assignment,method-assign]
+class SmallReads(asyncio.BufferedProtocol):
+    """Reads each client in small parts, in turn."""
+
+    def data_received(self, data: bytes) -> None:
+        """Take bytes; see `asyncio.Protocol`."""
+        raise NotImplementedError
+
+    def get_buffer(self, sizehint: int) -> memoryview:  # noqa: ARG002  # asyncio's suggestion
+        """The buffer for the next bytes; all connections share it, as they are read at once."""
+        return _READ_BUFFER
+
+    def buffer_updated(self, nbytes: int) -> None:
+        """Take the bytes that have come."""
+        self.data_received(bytes(_READ_BUFFER[:nbytes]))
 
 
 class Evictable(Protocol):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import fcntl
 import gc
 import logging
 import math
@@ -13,7 +12,7 @@ import signal
 import socket
 import ssl
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import Any, Final, NoReturn
@@ -24,7 +23,7 @@ from uvicorn.server import HANDLED_SIGNALS
 
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.connections import Acceptor, room_for_connections, tear_down
-from lupin_bridge.serving.http_protocol import HttpConnection
+from lupin_bridge.serving.http_protocol import MAX_INCOMPLETE_BYTES, HttpConnection
 from lupin_bridge.serving.ws_protocol import Connection
 from lupin_bridge.settings import UNIX, SettingError, Settings, unix_path
 from lupin_twin.runtime import process
@@ -151,6 +150,7 @@ class BridgeServer(uvicorn.Server):
                 ws_max_size=MAX_INBOUND_BYTES,
                 ws_ping_interval=PING_PERIOD_S,
                 ws_ping_timeout=PING_PERIOD_S,
+                h11_max_incomplete_event_size=MAX_INCOMPLETE_BYTES,
                 timeout_keep_alive=math.ceil(limits.client_timeout_s),
                 access_log=False,
                 log_config=None,
@@ -226,16 +226,12 @@ class BridgeServer(uvicorn.Server):
         super().handle_exit(signal.SIGTERM, frame)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Notify the clients, then close.
+        """Notify the clients, and cut off after `CLOSE_AFTER_S` those that are still there.
 
-        uvicorn would wait a second for the answers under way and then cancel them, each with a
-        trace in the log and a bare 500.
+        uvicorn would cancel their requests instead, each with a trace in the log and a bare 500.
         """
         for announce in self._announcements:
             announce()
-        for connection in list(self.server_state.connections):
-            if isinstance(connection, HttpConnection):
-                connection.end_waiting()
         asyncio.get_running_loop().call_later(CLOSE_AFTER_S, self._cut_off_clients)
         await super().shutdown(sockets)
 
@@ -264,30 +260,18 @@ def listen(host: str, port: int) -> socket.socket:
         listener = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        with nullcontext() if path is None else _locked(path.parent):
-            if path is not None:
-                _remove_left(path)
-                listener.bind(str(path))
-                path.chmod(0o660)  # nobody can connect before it listens
-            else:
-                listener.bind((host, port))
-            listener.listen(BACKLOG)
+        if path is not None:
+            _remove_left(path)
+            listener.bind(str(path))
+            path.chmod(0o660)  # nobody can connect before it listens
+        else:
+            listener.bind((host, port))
+        listener.listen(BACKLOG)
     except OSError:
         listener.close()
         raise
     listener.setblocking(False)
     return listener
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Lock a folder: of two processes that start at once, one could remove the other's socket."""
-    file = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(file)
 
 
 def _remove_left(path: Path) -> None:

@@ -18,7 +18,12 @@ from websockets.frames import CloseCode, Frame
 from websockets.protocol import State
 
 from lupin_bridge.serving.admission import RateLimit, client_key
-from lupin_bridge.serving.connections import CLOSE_GRACE_S, CONNECTION_KEY, refusal, tear_down
+from lupin_bridge.serving.connections import (
+    CLOSE_GRACE_S,
+    CONNECTION_KEY,
+    SmallReads,
+    tear_down,
+)
 
 # --- a client's JSON ------------------------------------------------------------------------------
 
@@ -104,11 +109,8 @@ def frame_head(first: int, length: int) -> bytes:
 
 # --- a connection ---------------------------------------------------------------------------------
 
-# Limits on input: clients send little, and all others wait while it is parsed, 3 ms for
-# `READ_BYTES` of the smallest frames. A page subscribes a few times as it opens, a layout with
-# twenty panels twenty times, and both hardly ever after that. Nobody gets more than 50 fields a
-# second anyway.
-READ_BYTES = 8_192
+# A page subscribes a few times as it opens, a layout with twenty panels twenty times, and both
+# hardly ever after that. Nobody gets more than 50 fields a second anyway.
 FRAMES_PER_S = 100
 FRAMES_AT_ONCE = 500
 # Fragments of one message. The parser bounds their size, not their number: it would keep an endless
@@ -116,14 +118,8 @@ FRAMES_AT_ONCE = 500
 MAX_PIECES = 400
 
 
-_READ_BUFFER = memoryview(bytearray(READ_BYTES))
-
-
-class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
-    """uvicorn's protocol, which also puts itself into `scope["state"]["connection"]`.
-
-    Buffered, so that each client is read in small parts, in turn.
-    """
+class Connection(WebSocketsSansIOProtocol, SmallReads):
+    """uvicorn's protocol, which also puts itself into `scope["state"]["connection"]`."""
 
     def __init__(
         self,
@@ -136,9 +132,6 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         self.address = ""
         # uvicorn's time-out for the client's answer to a close, by default ten seconds.
         self.close_timeout = CLOSE_GRACE_S
-        # Since when it is being closed, with time for its client to read why, s; None: it is open,
-        # and is not evicted for others.
-        self.waiting_since_s: float | None = None
         self.on_writable: Callable[[], None] | None = None
         self._pace = RateLimit(FRAMES_PER_S, FRAMES_AT_ONCE)
         # What is left of large messages, for as long as the socket does not take it.
@@ -162,13 +155,19 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         # An earlier HTTP answer may still fill the socket. Then the HTTP protocol was notified.
         if self.transport.get_write_buffer_size() > 0:
             self.pause_writing()
-        # Until the handshake is answered, the client counts towards no limit of ours.
+        # An answer that nobody reads may be before the handshake's. Until that has gone, the client
+        # counts towards no limit of ours.
         timeout_s = self.config.timeout_keep_alive
         self._opening = self.loop.call_later(timeout_s, self._end_unless_open)
 
     def _end_unless_open(self) -> None:
         if not self.handshake_complete:
             tear_down(self.transport)
+
+    @property
+    def waiting_since_s(self) -> float | None:
+        """For ever, if it is being closed; None: it is open, and is not evicted for others."""
+        return 0.0 if self.close_sent or self.transport.is_closing() else None
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection, which the timer would keep."""
@@ -182,20 +181,16 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
 
     def data_received(self, data: bytes) -> None:
         """Take bytes: first of all the whole request for the handshake, which may be refused."""
+        if self.transport.is_closing():
+            return  # over TLS, more may come
         super().data_received(data)
-        if not self.handshake_initiated and not self.transport.is_closing():
-            # The request is complete, but the parser rejects it: uvicorn would wait for ever.
-            self.handshake_complete = self.close_sent = True
-            self.transport.write(_refusal_of(self.conn.handshake_exc))
+        error = self.conn.handshake_exc
+        if error is not None and not self.handshake_initiated:
+            # uvicorn would wait for ever. websockets has an answer to some errors.
+            text = f"this is no request for a WebSocket: {error.__cause__ or error}"
+            answer = b"".join(self.conn.data_to_send())
+            self.transport.write(answer or self.conn.reject(400, text[:500]).serialize())
             self.transport.close()
-
-    def get_buffer(self, sizehint: int) -> memoryview:  # noqa: ARG002  # asyncio's suggestion
-        """The buffer for the next bytes; all connections share it, as they are read at once."""
-        return _READ_BUFFER
-
-    def buffer_updated(self, nbytes: int) -> None:
-        """Take the bytes that have come."""
-        self.data_received(bytes(_READ_BUFFER[:nbytes]))
 
     def handle_events(self) -> None:
         """Handle the frames that a client has sent, unless it sends too many."""
@@ -227,8 +222,6 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
         Otherwise uvicorn would think that the application forgot it, and log an error for each.
         """
         await super().send(message)
-        if self.close_sent:
-            self._note_closing()
         if message["type"] == "websocket.http.response.body" and self.close_sent:
             self.handshake_complete = True
 
@@ -242,12 +235,6 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
     def _dismiss_for(self, reason: str) -> None:
         self.transport.pause_reading()
         self.dismiss(CloseCode.POLICY_VIOLATION, reason)
-
-    def handle_ping(self) -> None:
-        """Answer a ping, unless its sender does not read: unread answers would only pile up."""
-        pong = b"".join(self.conn.data_to_send())
-        if self.writable.is_set():
-            self.transport.write(pong)
 
     def handle_parser_exception(self) -> None:
         """Close with the reason, if input breaks the protocol or a limit; drop further input."""
@@ -294,36 +281,12 @@ class Connection(WebSocketsSansIOProtocol, asyncio.BufferedProtocol):
             self.conn.send_close(code, reason)
             self._send_close()
         else:
-            self._note_closing()
-            self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)
-
-    def _note_closing(self) -> None:
-        if self.waiting_since_s is None:
-            self.waiting_since_s = self.loop.time()
+            self.loop.call_later(CLOSE_GRACE_S, self.abort)
 
     def _send_close(self) -> None:
         """Write the close frame that the parser has ready, and tear down after `CLOSE_GRACE_S`."""
         self._pieces.clear()
         self.transport.write(b"".join(self.conn.data_to_send()))
         self.close_sent = True
-        self._note_closing()
         # uvicorn's attribute: while it is set, the application's end does not end the connection.
-        self.close_timer = self.loop.call_later(CLOSE_GRACE_S, tear_down, self.transport)
-
-
-# Status by the name of the error's class: these classes differ between versions of websockets.
-_REFUSED_AS: Final = {
-    "RequestLineTooLong": 414,
-    "HeaderLineTooLong": 431,
-    "SecurityError": 431,
-}
-
-
-def _refusal_of(error: Exception | None) -> bytes:
-    """The answer to a request that the parser did not take for a handshake."""
-    causes = [cause for cause in (error, error and error.__cause__) if cause is not None]
-    known = (_REFUSED_AS.get(type(cause).__name__) for cause in causes)
-    status = next((status for status in known if status is not None), 400)
-    return refusal(
-        status, f"this is no request for a WebSocket: {causes[-1] if causes else 'unknown'}"[:500]
-    )
+        self.close_timer = self.loop.call_later(CLOSE_GRACE_S, self.abort)

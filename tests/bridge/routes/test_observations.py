@@ -11,9 +11,9 @@ import httpx
 import pytest
 
 from lupin_bridge.access.credentials import digest
+from lupin_bridge.access.middleware import MAX_BODY_BYTES
 from lupin_bridge.cli.command import main
 from lupin_bridge.serving.admission import Limits
-from lupin_bridge.serving.http_protocol import MAX_BODY_BYTES
 from tests.support import raw_http
 from tests.support.journal import select
 from tests.support.people import OWN, TOKEN, add, remove, signed_in

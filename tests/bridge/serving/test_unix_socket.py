@@ -2,9 +2,7 @@
 
 import re
 import socket
-import threading
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,7 +10,6 @@ import httpx
 import pytest
 from websockets.sync.client import unix_connect
 
-from lupin_bridge.serving.server import listen
 from tests.support.access import refused_start
 from tests.support.domains import own_domain
 from tests.support.people import add
@@ -65,25 +62,6 @@ def test_its_client_is_the_proxy_and_names_the_person(path: Path, tmp_path: Path
     with asking(path, *accounts, "--proxy-user-header", "Remote-User") as client:
         assert client.get("/api/session").status_code == 401
         assert client.get("/api/session", headers={"Remote-User": "anna"}).json()["name"] == "anna"
-
-
-def test_of_several_that_start_at_once_one_gets_the_socket(path: Path) -> None:
-    """The second must not take the first's new socket for an old one."""
-    together = threading.Barrier(4)
-
-    def start(_: int) -> socket.socket | None:
-        together.wait(PATIENCE_S)
-        try:
-            return listen(f"unix:{path}", 0)
-        except OSError:
-            return None
-
-    with ThreadPoolExecutor(4) as starting:
-        for _ in range(100):
-            listeners = [it for it in starting.map(start, range(4)) if it is not None]
-            for listener in listeners:
-                listener.close()  # its path is left, as after a crash
-            assert len(listeners) == 1
 
 
 @pytest.mark.parametrize("name", ["file", "no-such-folder/http.sock", "long" * 40])

@@ -9,10 +9,9 @@ from websockets.frames import CloseCode
 from lupin_bridge.serving import ws_protocol
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.ws_protocol import Connection
-from lupin_bridge.settings import Settings
 from tests.support import raw_http
 from tests.support.inprocess import Running, running
-from tests.support.raw_ws import BINARY, CLOSE, PING, TEXT, RawClient, frames_of, masked
+from tests.support.raw_ws import BINARY, CLOSE, TEXT, RawClient, frames_of, masked
 from tests.support.waiting import PATIENCE_S, until
 from tests.support.web import deaf_client
 
@@ -60,66 +59,14 @@ async def test_after_an_answer_that_nobody_reads_a_handshake_ends_at_the_timeout
             await until(lambda: not connections, "its end")
 
 
-async def test_a_client_that_does_not_read_gets_no_pongs_and_ends_after_its_close_frame(
-    domain: int,
-) -> None:
-    pings = 100
+async def test_a_client_that_does_not_read_ends_after_its_close_frame(domain: int) -> None:
     async with running(Limits(client_timeout_s=3.0), SILENT) as served:
         with deaf_client(served.url) as deaf:
             connection = await joined(served)
-            pongs = 0
-            handle_ping = connection.handle_ping
-
-            def counted() -> None:
-                nonlocal pongs
-                pongs += 1
-                handle_ping()
-
-            connection.handle_ping = counted  # type: ignore[method-assign]
             while connection.can_take:
                 connection.write(SMALL_FRAME)
-            queued = connection.transport.get_write_buffer_size()
-            deaf.sendall(masked(PING, bytes(125)) * pings)
-            await until(lambda: pongs == pings, "all pings")
-            assert connection.transport.get_write_buffer_size() == queued
             deaf.sendall(masked(CLOSE, b"\x03\xe8"))
             await until(lambda: not served.server.server_state.connections, "its end")
-
-
-async def test_the_close_timeout_runs_from_the_close_frame_for_both_sides(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(ws_protocol, "CLOSE_GRACE_S", PATIENCE_S)
-    async with running(None, SILENT, Settings(max_clients=1)) as served:
-        with deaf_client(served.url), deaf_client(served.url):
-
-            def both() -> list[Connection] | None:
-                found = [
-                    connection
-                    for connection in served.server.server_state.connections
-                    if isinstance(connection, Connection) and connection.handshake_complete
-                ]
-                return found if [c.close_sent for c in found].count(True) == 1 else None
-
-            found = await until(both, "one client, and one for whom there is no place")
-            assert found is not None
-            client, refused = sorted(found, key=lambda connection: connection.close_sent)
-            now_s = asyncio.get_running_loop().time()
-            refused_s = refused.waiting_since_s
-            assert refused_s is not None
-            assert (client.waiting_since_s, refused_s <= now_s) == (None, True)
-            # No longer than for others, however long uvicorn waits for an answer to a close.
-            assert refused.close_timer is not None
-            assert refused.close_timer.when() - refused_s > PATIENCE_S / 2
-            client.dismiss(CloseCode.POLICY_VIOLATION, "enough")
-            dismissed_s = client.waiting_since_s
-            assert dismissed_s is not None
-            assert dismissed_s >= now_s
-            for connection in (client, refused):
-                connection.dismiss(CloseCode.POLICY_VIOLATION, "once more")
-            assert (client.waiting_since_s, refused.waiting_since_s) == (dismissed_s, refused_s)
-            refused.abort()
-            client.abort()
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,6 @@ ROUTES = {
     "/metrics": True,
     "/api/session": True,
     "/openapi.json": False,
-    "/docs": False,
 }
 
 

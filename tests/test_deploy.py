@@ -127,7 +127,8 @@ def test_the_service_serves_and_the_journal_command_finds_its_file(
         file = folder / f"domain-{domain}.sqlite"
         assert file.is_file()
         monkeypatch.setattr(journal, "SERVICE_FOLDER", folder)
-        assert main(["journal", "info", "--domain", str(domain)]) == 0
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+        assert main(["journal", "info"]) == 0
         assert str(file) in capsys.readouterr().out
 
 

@@ -21,7 +21,6 @@ from lupin_bridge.bridge import Bridge
 from lupin_bridge.metrics import Metered
 from lupin_bridge.routes import export, field, pages, sockets, state, status, writes
 from lupin_bridge.routes.answers import add_refusals, error_response
-from lupin_bridge.serving.http_protocol import PieceByPiece
 from lupin_bridge.stream import routes_schema, schema
 
 STATIC_FOLDER = Path(__file__).parent / "static"
@@ -70,7 +69,6 @@ def create_app(
     for module in ROUTED:
         app.router.routes.extend(module.router.routes)
     # The last one added runs first.
-    app.add_middleware(PieceByPiece)
     app.add_middleware(ReadOnly)
     app.add_middleware(AccessControl, access=access)
     if bridge is not None:

@@ -133,13 +133,6 @@ def add_which(parser: argparse.ArgumentParser) -> None:
     which.add_argument(
         "--namespace", default="", help="journal of the twin in this namespace (default: none)"
     )
-    parser.add_argument(
-        "--domain",
-        type=int,
-        metavar="ID",
-        help=f"journal of the twin in this ROS domain, 0 to {_MAX_DOMAIN}"
-        " (default: ROS_DOMAIN_ID, or 0)",
-    )
 
 
 def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
@@ -178,15 +171,13 @@ def path_of(
         CommandError: there is none.
 
     """
-    named = f"--demo {options.demo}" if options.demo is not None else options.journal
-    if named and options.domain is not None:
-        raise CommandError(f"--domain {options.domain} is for a twin's own file, not with {named}")
+    named = options.demo is not None or options.journal
     path: Path | None
     try:
         if options.demo is not None:
             path = demo_journal_path(environ, options.demo)
         else:
-            domain = 0 if named else _domain(options, environ)
+            domain = 0 if named else _domain(environ)
             path = journal_path(options.journal or "", environ, domain, options.namespace)
     except RuntimeError as error:
         raise CommandError(f"there is no home folder to look for a journal in: {error}") from error
@@ -205,18 +196,13 @@ def path_of(
     raise CommandError(f"there is no journal {path}{there}")
 
 
-def _domain(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
+def _domain(environ: Mapping[str, str]) -> int:
     given = environ.get("ROS_DOMAIN_ID") or "0"
-    what, domain = "ROS_DOMAIN_ID", options.domain
-    if domain is not None:
-        what = "--domain"
-    elif given.isdecimal():
-        domain = int(given)
-    else:
-        raise CommandError(f"ROS_DOMAIN_ID is {given!r}, must be a whole number")
-    if not 0 <= domain <= _MAX_DOMAIN:
-        raise CommandError(f"{what} is {domain}, must be from 0 to {_MAX_DOMAIN}")
-    return int(domain)
+    if not given.isdecimal() or int(given) > _MAX_DOMAIN:
+        raise CommandError(
+            f"ROS_DOMAIN_ID is {given!r}, must be a whole number from 0 to {_MAX_DOMAIN}"
+        )
+    return int(given)
 
 
 def _reader(path: Path) -> sqlite3.Connection:

@@ -73,7 +73,6 @@ from lupin_bridge.serving.admission import (
     Limits,
     content_answer,
 )
-from lupin_bridge.serving.http_protocol import PieceByPiece
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.frames import Status
 from lupin_bridge.stream.hub import Client, Hub
@@ -280,7 +279,6 @@ def create_fleet_app(
     every = (*pages.router.routes, *status.router.routes)
     app.router.routes.extend(it for it in every if getattr(it, "path", "") in _AS_EVERYWHERE)
     # The last one added runs first.
-    app.add_middleware(PieceByPiece)
     app.add_middleware(ReadOnly)
     app.add_middleware(Sites, pages=fleet.pages, page=SitePage(STATIC_FOLDER))
     app.add_middleware(AccessControl, access=access)

@@ -11,7 +11,7 @@ from typing import Final
 
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
-from starlette.responses import RedirectResponse
+from starlette.responses import FileResponse, RedirectResponse
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
@@ -247,10 +247,10 @@ _add_file("signin.js", "text/javascript; charset=utf-8")
 @read_route(router, "/font.woff2", include_in_schema=False)
 async def font() -> Response:
     """The HMI's font, under a fixed name for the report and the sign-in page."""
-    found = _font()
+    found = next(_ASSETS.glob("inter-*.woff2"), None)
     if found is None:
         return error_response("the page was not built, and has no font", 404)
-    return Response(found, headers={"Cache-Control": "max-age=604800"}, media_type="font/woff2")
+    return FileResponse(found, headers={"Cache-Control": "max-age=604800"}, media_type="font/woff2")
 
 
 def _set_cookie(request: Request, response: Response, name: str, value: str, lasts_s: int) -> None:
@@ -284,12 +284,6 @@ def _page_in(language: str, *, has_accounts: bool) -> str:
         words |= {"token": words["password"], "wrong": words["wrong_person"]}
     page = _read_file("signin.html").decode()
     return page.format(lang=language, hidden="" if has_accounts else "hidden", **words)
-
-
-@cache
-def _font() -> bytes | None:
-    path = next(_ASSETS.glob("inter-*.woff2"), None)
-    return None if path is None else path.read_bytes()
 
 
 @cache

@@ -4,7 +4,8 @@ uvicorn buffers all of an answer that the socket does not take, and waits for th
 without limit. A few hundred connections that request a large field and never read would fill the
 memory; some thousand that never finish a request would use up all sockets. The time limits are the
 connection's, and so cover all that is sent: answers of routes, and refusals by access control, the
-framework and this protocol alike. `AccessControl` refuses bodies that no route takes.
+framework and this protocol alike. `AccessControl` refuses bodies that no route takes, and
+`CachedResponse` sends a body in pieces.
 """
 
 from __future__ import annotations
@@ -12,12 +13,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import sys
-from collections.abc import Iterator
 from typing import Any, Final, cast
 
 import h11
 import orjson
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 
 from lupin_bridge.serving.admission import client_key
@@ -138,41 +137,3 @@ class HttpConnection(H11Protocol, SmallReads):
             limit_s = self.timeout_keep_alive
             log.warning("disconnected a reader that accepted nothing for %g s", limit_s)
         self.abort()
-
-
-# --- an answer, piece by piece --------------------------------------------------------------------
-
-# Size of a piece of a body: the next one follows when the socket has taken it.
-PIECE_BYTES: Final = 64 * 1024
-
-
-def pieces_of(message: Message) -> Iterator[Message]:
-    """A message of an answer as messages with no more than `PIECE_BYTES` of body."""
-    body = message.get("body", b"")
-    if len(body) <= PIECE_BYTES:
-        yield message
-        return
-    body = memoryview(body)  # pieces are views: a hundred readers share one body
-    for start in range(0, len(body), PIECE_BYTES):
-        yield {**message, "body": body[start : start + PIECE_BYTES], "more_body": True}
-    # uvicorn waits before it writes: the empty last message waits for the last piece.
-    yield {**message, "body": b""}
-
-
-class PieceByPiece:
-    """ASGI middleware that sends an answer in pieces, each when its reader has taken the last."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the application's answers in pieces."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
-
-        async def send_in_pieces(message: Message) -> None:
-            for piece in pieces_of(message):
-                await send(piece)
-
-        await self._app(scope, receive, send_in_pieces)

@@ -58,14 +58,12 @@ def test_the_default_file_is_found_by_the_rule_of_the_node(
 ) -> None:
     environ = {"XDG_STATE_HOME": str(home.parent)}
     home.mkdir(parents=True)
-    for words, domain, namespace in (
-        ([], 7, ""),
-        (["--domain", 3], 3, ""),
-        (["--namespace", "/gh1/north"], 7, "/gh1/north"),
-        (["--domain", 3, "--namespace", "gh1"], 3, "/gh1"),
+    for words, namespace in (
+        ([], ""),
+        (["--namespace", "/gh1/north"], "/gh1/north"),
     ):
         monkeypatch.setenv("ROS_DOMAIN_ID", "7")
-        path = journal_path("", environ, domain, namespace)
+        path = journal_path("", environ, 7, namespace)
         assert path is not None
         append(path, [])
         assert reported(*words)["file"] == str(path)
@@ -90,7 +88,6 @@ def test_a_missing_file_is_named_and_not_created(tmp_path: Path, path: Path) -> 
     ("words", "named"),
     [
         (["info", "--ros-args", "-p", "journal:=x"], "journal takes no ROS arguments: choose its"),
-        (["info", "--domain", "x"], "argument --domain: invalid int value: 'x'"),
         (["info", "--journal", "x", "--demo", "0"], "--demo: not allowed with argument --journal"),
         ([], "the following arguments are required: ACTION"),
         (["burn"], "invalid choice: 'burn'"),
@@ -106,14 +103,9 @@ def test_a_mistake_is_one_clear_line(words: list[str], named: str) -> None:
     ("words", "domain", "named"),
     [
         ("--journal off", "0", "--journal is 'off', expected a file"),
-        ("--domain -1", "0", "--domain is -1, must be from 0 to 232"),
-        ("--domain 233", "0", "--domain is 233, must be from 0 to 232"),
-        ("--domain 232", "x", "domain-232.sqlite"),
-        ("", "0", "domain-0.sqlite"),
-        ("", "233", "ROS_DOMAIN_ID is 233, must be from 0 to 232"),
-        ("", "x", "ROS_DOMAIN_ID is 'x', must be a whole number"),
-        ("--demo 0 --domain 5", "0", "--domain 5 is for a twin's own file, not with --demo 0"),
-        ("--journal x --domain 5", "0", "--domain 5 is for a twin's own file, not with x"),
+        ("", "232", "domain-232.sqlite"),
+        ("", "233", "ROS_DOMAIN_ID is '233', must be a whole number from 0 to 232"),
+        ("", "x", "ROS_DOMAIN_ID is 'x', must be a whole number from 0 to 232"),
     ],
 )
 def test_an_invalid_domain_or_journal_is_one_clear_line(

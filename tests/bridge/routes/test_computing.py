@@ -15,9 +15,10 @@ import pytest
 
 from lupin_bridge.past import fields
 from lupin_bridge.routes import status
+from lupin_bridge.routes.answers import PIECE_BYTES
 from lupin_bridge.routes.state import AGES_HOLD_S
 from lupin_bridge.serving.admission import Limits
-from lupin_bridge.serving.http_protocol import PIECE_BYTES, HttpConnection
+from lupin_bridge.serving.http_protocol import HttpConnection
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import StateJson
 from lupin_twin.core.state import Pose, Reading, Scan

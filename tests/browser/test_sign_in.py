@@ -43,7 +43,7 @@ def new_page(context: BrowserContext) -> Page:
 
 
 def sign_in(page: Page, token: str) -> None:
-    page.get_by_label("Access token").fill(token)
+    page.get_by_label("Access code (token)").fill(token)
     page.get_by_role("button", name="Sign in").click()
 
 
@@ -57,7 +57,7 @@ def test_a_person_signs_in_with_the_keyboard_alone(closed: Served, page: Page) -
     page.on("request", lambda request: addresses.append(request.url))
     page.goto(closed.url)
     expect(page).to_have_url(closed.url + "/signin")
-    expect(page.get_by_label("Access token")).to_be_focused()
+    expect(page.get_by_label("Access code (token)")).to_be_focused()
     # The page's mark and font need no token.
     expect(page.locator("h1 img")).not_to_have_js_property("naturalWidth", 0)
     assert page.evaluate(FONTS) == ["loaded"]
@@ -82,7 +82,7 @@ def test_with_a_name_the_page_says_who_sees_what_is_done_to_alarms(
                 page = new_page(context)
                 page.goto(running.url)
                 page.get_by_label("Name").fill(name)
-                page.get_by_label("Password or token").fill(PASSWORD)
+                page.get_by_label("Password or access code").fill(PASSWORD)
                 page.keyboard.press("Enter")
                 expect_live(page)
                 page.keyboard.press("a")
@@ -94,7 +94,7 @@ def test_a_wrong_token_can_be_corrected_and_nothing_of_the_right_one_is_stored(
 ) -> None:
     page.goto(closed.url + "/signin")
     sign_in(page, TOKEN[::-1].strip("=") + "x")
-    expect(page.get_by_role("alert")).to_have_text("The token is not valid.")
+    expect(page.get_by_role("alert")).to_have_text("The access code is wrong.")
     sign_in(page, "not a token")
     expect(page.get_by_role("alert")).to_have_text(re.compile("letters, digits"))
     assert "/signin" in page.url

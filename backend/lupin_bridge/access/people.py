@@ -227,13 +227,7 @@ class People:
             with closing(Accounts(self._path, is_writer=True)) as accounts:
                 return work(accounts, int(time.time()))
 
-        try:
-            return await self._on_thread(do, 2 * MAX_WAITING)
-        except AccountError:
-            # A process has one WAL index for a file, read-only if the first reader found it so:
-            # let the next reader open the file again.
-            self._inode = 0
-            raise
+        return await self._on_thread(do, 2 * MAX_WAITING)
 
     async def _on_thread(self, work: Callable[[], ResultT], most: int = MAX_WAITING) -> ResultT:
         if self._waiting >= most:

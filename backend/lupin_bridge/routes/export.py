@@ -32,7 +32,7 @@ from lupin_bridge.routes.answers import (
     while_client_waits,
     within_time,
 )
-from lupin_bridge.serving.admission import Admission, Export, Limits
+from lupin_bridge.serving.admission import Admission, Limits
 from lupin_bridge.serving.connections import CONNECTION_KEY
 from lupin_bridge.serving.http_protocol import HttpConnection
 from lupin_twin.core.past import NotRemembered, PastRefused, PastRow
@@ -146,7 +146,7 @@ async def respond_export(
     client, connection = client_of(request), request.scope["state"][CONNECTION_KEY]
 
     def evict() -> None:
-        log.warning("the export of %s is slow and is ended for another one", client)
+        log.warning("the export of %s is old and is ended for another one", client)
         connection.dismiss()
 
     facts = {"title": "lupin-twin: readings and failed attempts", **_facts(known, given, now_ns)}
@@ -162,29 +162,26 @@ async def respond_export(
     with ExitStack() as held:
         # A response that has begun cannot be refused any more: so the first rows are read before.
         with of.admission.request(client, time.monotonic()):
-            export = held.enter_context(of.admission.export(client, time.monotonic(), evict))
+            held.enter_context(of.admission.export(client, time.monotonic(), evict))
             try:
                 begun = await while_client_waits(request, within_time(of.limits, begin()))
             except MissingPackageError as error:
                 return error_response(str(error), 501)
         if begun is None:
             return Response(status_code=CLIENT_DISCONNECTED)
-        parts = _parts(of, export, kind, begun)
+        parts = _parts(of, kind, begun)
         return ExportResponse(
             parts, headers=headers, media_type=kind.media_type, release=held.pop_all().close
         )
 
 
-async def _parts(of: Exporting, export: Export, kind: Format, begun: Begun) -> Lots:
+async def _parts(of: Exporting, kind: Format, begun: Begun) -> Lots:
     """Yield the parts to send; the next lot is read once the part before has been sent."""
     writer, lots, lot = begun
     async with aclosing(lots):
         yield writer.begin()
         while lot is not None:
-            part = await _written(of, kind, partial(writer.add, lot))
-            yield part
-            # Also if there is nothing to send yet: the reader is not slow.
-            export.take(len(part) or len(lot), time.monotonic())
+            yield await _written(of, kind, partial(writer.add, lot))
             lot = await within_time(of.limits, anext(lots, None))
         yield await _written(of, kind, writer.end)
 

@@ -112,11 +112,10 @@ def client_key(address: str) -> str:
 
 # The burst, in seconds' worth of the rate: a page that opens requests several fields at once.
 BURST_S: Final = 2.0
-# An export lasts as long as its reader takes: one per client, and few that share the disk. A reader
-# that takes less than 100 kB/s may go on until another client wants the slot.
+# An export lasts as long as its reader takes: one per client, and few that share the disk. After
+# this time, it goes on until another client wants the slot.
 EXPORTS: Final = 4
-STRETCH_BYTES: Final = 500_000
-SLOW_STRETCH_S: Final = 5.0
+LONG_EXPORT_S: Final = 300.0
 
 
 class AdmissionError(RuntimeError):
@@ -140,24 +139,6 @@ class BusyError(AdmissionError):
     """All clients together request too much."""
 
 
-@dataclass(slots=True, eq=False)
-class Export:
-    """An export under way; `since_s` is when its reader began its current `STRETCH_BYTES`.
-
-    `end` breaks it off.
-    """
-
-    since_s: float
-    end: Callable[[], None]
-    taken_bytes: int = 0
-
-    def take(self, size: int, now_s: float) -> None:
-        """Note that its reader has taken `size` more bytes."""
-        self.taken_bytes += size
-        if self.taken_bytes >= STRETCH_BYTES:
-            self.taken_bytes, self.since_s = 0, now_s
-
-
 class Admission:
     """The requests in flight. Belongs to the event loop."""
 
@@ -167,7 +148,8 @@ class Admission:
         self._limits = limits
         self._rate = RateLimit(limits.answers_per_s, limits.answers_per_s * BURST_S)
         self.in_flight: Counter[str] = Counter()
-        self._exports: dict[str, Export] = {}
+        # By client: since when, s, and what breaks it off.
+        self._exports: dict[str, tuple[float, Callable[[], None]]] = {}
         total = limits.total_concurrency
         self._computing = _Places(total)
         self._large = _Places(total - total // 4)
@@ -212,30 +194,31 @@ class Admission:
         return len(self._exports)
 
     @contextmanager
-    def export(self, client: str, now_s: float, end: Callable[[], None]) -> Iterator[Export]:
+    def export(self, client: str, now_s: float, end: Callable[[], None]) -> Iterator[None]:
         """A client's export, from its first row to its last; `end` breaks it off.
 
-        If all slots are taken, the slowest export is ended, provided that it is slow.
+        If all slots are taken, the oldest export is ended, provided that it is old.
 
         Raises:
             ClientLimitError: the client has one already.
-            BusyError: all slots are taken, and no export is slow.
+            BusyError: all slots are taken, and no export is old.
 
         """
         if client in self._exports:
             self.refused["client_exports"] += 1
             raise ClientLimitError(f"{client} has 1 export under way, the limit", 5.0)
         if len(self._exports) >= EXPORTS:
-            slowest = min(self._exports, key=lambda other: self._exports[other].since_s)
-            if now_s - self._exports[slowest].since_s < SLOW_STRETCH_S:
+            oldest, (since_s, end_oldest) = next(iter(self._exports.items()))
+            if now_s - since_s < LONG_EXPORT_S:
                 self.refused["total_exports"] += 1
                 raise BusyError(f"{EXPORTS} exports are under way, the limit", 5.0)
-            self._exports.pop(slowest).end()
-        export = self._exports[client] = Export(now_s, end)
+            del self._exports[oldest]
+            end_oldest()
+        entry = self._exports[client] = now_s, end
         try:
-            yield export
+            yield
         finally:
-            if self._exports.get(client) is export:
+            if self._exports.get(client) is entry:
                 del self._exports[client]
 
     @contextmanager

@@ -16,6 +16,7 @@ from pyarrow import parquet
 from lupin_bridge.judge.judging import own_sensors
 from lupin_bridge.past import bodies
 from lupin_bridge.past.export import GROUP_ROWS
+from lupin_bridge.serving import admission
 from lupin_bridge.serving.admission import EXPORTS, Limits
 from lupin_twin.core.past import PastRow
 from tests.bridge.routes.test_past import remembering
@@ -160,9 +161,10 @@ async def test_a_client_has_one_export_and_a_disconnect_frees_its_place(domain: 
 
 
 async def test_slow_readers_do_not_keep_others_waiting(
-    domain: int, caplog: pytest.LogCaptureFixture
+    domain: int, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They take a byte now and then, and so are not cut off like readers that take nothing."""
+    monkeypatch.setattr(admission, "LONG_EXPORT_S", 5.0)
     past = MadeUp(lots=[rows(1_000)] * MANY)
     async with remembering(past, Limits(client_timeout_s=3_600.0)) as it:
         with ExitStack() as stack:
@@ -187,7 +189,7 @@ async def test_slow_readers_do_not_keep_others_waiting(
             with pytest.raises(ConnectionResetError):
                 deque(iter(lambda: slow[0].recv(65_536), b""))
         await until(lambda: it.bridge.admission.exporting == 0, "their places")
-    assert "the export of 127.0.9.1 is slow and is ended for another one" in caplog.text
+    assert "the export of 127.0.9.1 is old and is ended for another one" in caplog.text
     assert [record for record in caplog.records if record.levelname == "ERROR"] == []
 
 

@@ -65,7 +65,7 @@ def test_without_its_script_the_page_sends_no_token(closed: Served) -> None:
         ("", "fr,de-AT;q=0.9", "de", "Zugangscode (Token)"),
         ("?lang=nl", "de", "nl", "Toegangscode (token)"),
         ("", "es", "es", "Código de acceso (token)"),
-        ("?lang=xx", "de", "en", "Access token"),
+        ("?lang=xx", "de", "en", "Access code (token)"),
     ],
 )
 def test_the_page_is_in_the_language_of_the_browser(

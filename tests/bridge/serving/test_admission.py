@@ -11,10 +11,10 @@ import pytest
 from lupin_bridge.serving.admission import (
     BURST_S,
     EXPORTS,
+    LONG_EXPORT_S,
     Admission,
     BusyError,
     ClientLimitError,
-    Export,
     Limits,
 )
 from lupin_bridge.stream import schema
@@ -50,30 +50,23 @@ def test_dragging_through_the_past_is_admitted_and_a_flood_is_not() -> None:
     assert admitted(1_000.0, seconds) == pytest.approx(allowed, abs=1)
 
 
-def test_the_slowest_export_is_evicted_unless_it_is_fast_enough() -> None:
-    admission = Admission(Limits(answers_per_s=1000.0, concurrency=9, total_concurrency=9))
-    ended: list[str] = []
+def test_the_oldest_export_is_ended_for_another_client_once_it_is_old() -> None:
+    admission, ended = Admission(Limits()), list[str]()
     with ExitStack() as taken:
 
-        def begin(client: str, now_s: float) -> Export:
-            return taken.enter_context(
-                admission.export(client, now_s, lambda: ended.append(client))
-            )
+        def begin(client: str, now_s: float) -> None:
+            taken.enter_context(admission.export(client, now_s, lambda: ended.append(client)))
 
-        running_ = {client: begin(client, 0.0) for client in "abcd"}
-        for now_s in range(1, 100):  # "b" reads at half of the sufficient rate
-            for client, size in (("a", 150_000), ("b", 50_000), ("c", 150_000), ("d", 200_000)):
-                running_[client].take(size, now_s)
-        begin("e", 100.0)
-        assert ended == ["b"]
+        for now_s, client in enumerate("abcd"):
+            begin(client, now_s)
         with pytest.raises(BusyError):
-            begin("f", 100.0)
+            begin("e", LONG_EXPORT_S - 1)
         with pytest.raises(ClientLimitError):
-            begin("c", 100.0)
+            begin("c", LONG_EXPORT_S)
+        begin("e", LONG_EXPORT_S)
+        assert ended == ["a"]
         assert admission.refused == {"client_exports": 1, "total_exports": 1}
         assert admission.exporting == EXPORTS
-        begin("f", 105.0)
-        assert len(ended) == 2
     assert admission.exporting == 0
 
 
@@ -81,7 +74,7 @@ def test_a_cancelled_export_does_not_free_the_place_of_the_next() -> None:
     admission = Admission(Limits())
     with ExitStack() as taken, ExitStack() as broken_off:
         for client, stack in zip("abcdea", (broken_off, *[taken] * 5), strict=True):
-            now_s = 100.0 * admission.exporting
+            now_s = LONG_EXPORT_S * admission.exporting
             stack.enter_context(admission.export(client, now_s, lambda: None))
         broken_off.close()
         assert admission.exporting == EXPORTS

@@ -68,12 +68,6 @@ def test_an_invalid_handshake_is_answered_and_ended(plain: Served, name: str) ->
     assert received.count(b"HTTP/1.1") == 1
 
 
-@pytest.mark.parametrize("name", ["a body", "a long cookie", "many headers", "a bad key"])
-def test_over_tls_and_with_a_token_too(secret: Served, name: str) -> None:
-    assert isinstance(secret.trust, ssl.SSLContext)
-    assert 400 <= status(raw_http.answer(secret.url, NO_HANDSHAKES[name], secret.trust)) < 500
-
-
 def test_a_refusal_has_its_reason(plain: Served) -> None:
     message = {
         "the request has a body (content-length: 1), and none": b"GET / HTTP/1.1\r\n"

@@ -109,13 +109,6 @@ def user() -> str:
         return f"user {os.getuid()}"
 
 
-# Errors of the copy: the journal is only read.
-_NOT_WRITTEN: Final = {
-    sqlite3.SQLITE_FULL,
-    sqlite3.SQLITE_IOERR_WRITE,
-    sqlite3.SQLITE_IOERR_FSYNC,
-    sqlite3.SQLITE_IOERR_TRUNCATE,
-}
 # Pages copied per step; Ctrl-C takes effect between two steps.
 _PAGES_AT_ONCE: Final = 1000
 
@@ -127,7 +120,7 @@ def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], 
 
     Raises:
         CommandError: `target` exists, or cannot be created or written.
-        sqlite3.Error: the journal cannot be read.
+        sqlite3.Error: the journal cannot be read before the copy begins.
 
     """
     # Without a transaction, SQLite would restart the copy after each write of the twin.
@@ -150,9 +143,7 @@ def backup(journal: sqlite3.Connection, target: Path, report: Callable[[float], 
                     progress=lambda _, rest, total: report(1 - rest / max(total, 1)),
                 )
         except sqlite3.Error as error:
-            if getattr(error, "sqlite_errorcode", None) in _NOT_WRITTEN:
-                raise CommandError(f"cannot write {target}: {error}") from error
-            raise
+            raise CommandError(f"cannot copy to {target}: {error}") from error
         if_unfinished.pop_all()
     return target.stat().st_size
 

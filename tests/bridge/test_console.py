@@ -82,14 +82,6 @@ def test_a_closed_pipe_is_silent(
     say("nobody hears it")
 
 
-def test_a_stream_that_was_closed_ends_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with (tmp_path / "log").open("w") as log:
-        monkeypatch.setattr(sys, "stderr", log)
-    say("nobody hears it")
-
-
 def test_a_line_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     say("one\n  and two")
     assert capsys.readouterr().err == "lupin-twin: one and two\n"

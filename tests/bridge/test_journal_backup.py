@@ -104,5 +104,5 @@ def test_a_failed_backup_leaves_no_file(tmp_path: Path, capsys: pytest.CaptureFi
     # Enough for SQLite's 32 kB beside the journal, not for the copy.
     with no_file_above(40_960):
         assert main(["journal", "backup", str(copy), "--journal", str(source)]) == 1
-    assert f"\nlupin-twin: cannot write {copy}: " in capsys.readouterr().err
+    assert f"\nlupin-twin: cannot copy to {copy}: " in capsys.readouterr().err
     assert list(tmp_path.glob("copy*")) == []

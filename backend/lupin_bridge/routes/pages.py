@@ -53,15 +53,6 @@ HOW_TO_BUILD: Final = (
     "build it with `npm ci && npm run build` in the project's folder, install the bridge again "
     "(`pip install .`) unless it is installed with -e, and restart it"
 )
-_NO_PAGE: Final = (
-    '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-    '<meta name="viewport" content="width=device-width"><title>Lupin twin: no page</title></head>'
-    "<body><main><h1>The page was not built</h1>"
-    f"<p>The bridge runs, but was installed without its page: {escape(HOW_TO_BUILD)}.</p>"
-    '<p>The data is there: <a href="openapi.json">openapi.json</a>, '
-    '<a href="api/state">api/state</a>.</p>'
-    "</main></body></html>"
-)
 
 
 @read_route(router, "/openapi.json", include_in_schema=False)
@@ -124,7 +115,8 @@ def add_guide(app: FastAPI, folder: Path) -> None:
 @read_route(no_page_router, "/", include_in_schema=False)
 async def no_page() -> Response:
     """503, with how to build the page."""
-    return Response(_NO_PAGE, 503, NEVER_STORE, "text/html; charset=utf-8")
+    text = f"The page was not built: {HOW_TO_BUILD}. The data is there, see /openapi.json."
+    return Response(text, 503, NEVER_STORE, "text/plain; charset=utf-8")
 
 
 def language_of(request: Request, known: Collection[str]) -> str:

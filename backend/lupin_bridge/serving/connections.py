@@ -12,7 +12,6 @@ it opens, it evicts only itself.
 from __future__ import annotations
 
 import asyncio
-import errno
 import heapq
 import logging
 import resource
@@ -151,8 +150,6 @@ EVICTED_SHARE: Final = 1 / 16
 TLS_BUFFER_BYTES: Final = 32 * 1024
 RETRY_S: Final = 0.25
 WARNING_PERIOD_S: Final = 30.0
-# Errors that eviction may mend: no file descriptors, no memory.
-_NO_ROOM: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
 
 
 def room_for_connections() -> int:
@@ -241,8 +238,7 @@ class Acceptor:
                 return
             except OSError as error:
                 self._warn("no new connections for now: %s", error.strerror)
-                if error.errno in _NO_ROOM:
-                    self._make_room()
+                self._make_room()
                 self._pause()
                 return
             connection.setblocking(False)

@@ -63,7 +63,8 @@ class HttpConnection(H11Protocol, SmallReads):
         """Since when the client has requested, or taken, nothing; None: it is being served."""
         cycle = cast("RequestResponseCycle | None", self.cycle)
         is_at_work = cycle is not None and not cycle.response_complete
-        return None if is_at_work and not self.flow.write_paused else self._idle_since_s
+        is_stuck = self.flow.write_paused or self.transport.is_closing()
+        return None if is_at_work and not is_stuck else self._idle_since_s
 
     def connection_made(self, transport: Any) -> None:
         """Start to wait for a request."""
@@ -72,7 +73,8 @@ class HttpConnection(H11Protocol, SmallReads):
             self.address = client_key(self.client[0])
         bound_unsent(transport)
         transport.set_write_buffer_limits(HIGH_WATER_BYTES)
-        self._wait()
+        self._idle_since_s = self.loop.time()
+        self._check_later()
 
     def data_received(self, data: bytes) -> None:
         """Take bytes; over TLS, some may come after the end."""
@@ -81,14 +83,12 @@ class HttpConnection(H11Protocol, SmallReads):
 
     def on_response_complete(self) -> None:
         """Start to wait for the next request; perhaps it has come already."""
-        self._deadline.cancel()
         self._wait()
         super().on_response_complete()
 
     def pause_writing(self) -> None:
         """Start to wait for the client to take a piece."""
         super().pause_writing()
-        self._deadline.cancel()
         self._wait()
 
     def handle_websocket_upgrade(self, event: Any) -> None:
@@ -128,10 +128,15 @@ class HttpConnection(H11Protocol, SmallReads):
 
     def _wait(self) -> None:
         self._idle_since_s = self.loop.time()
+        self._deadline.cancel()
+        self._check_later()
+
+    def _check_later(self) -> None:
         self._deadline = self.loop.call_later(self.timeout_keep_alive, self._end_if_waiting)
 
     def _end_if_waiting(self) -> None:
         if self.waiting_since_s is None:
+            self._check_later()
             return
         if self.flow.write_paused:
             limit_s = self.timeout_keep_alive

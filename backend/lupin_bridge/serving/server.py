@@ -127,8 +127,6 @@ GRACEFUL_SHUTDOWN_S = 1
 # Connections that may wait in the kernel while the loop is busy; others try again a second later.
 # When a bridge is restarted, all clients come at once.
 BACKLOG = 2_048
-# Ticks of uvicorn's main loop.
-TICKS_PER_S = 10
 
 
 class BridgeServer(uvicorn.Server):
@@ -163,8 +161,6 @@ class BridgeServer(uvicorn.Server):
         )
         # Called first at the shutdown.
         self._announcements = announcements
-        # Connections that are being closed, and since when, s.
-        self._closing_since_s: dict[Any, float] = {}
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """As uvicorn, but an `Acceptor` of our own accepts the connections of each socket."""
@@ -186,24 +182,6 @@ class BridgeServer(uvicorn.Server):
             for listener in sockets or []
         ]
         self.servers.extend(acceptors)
-
-    async def on_tick(self, counter: int) -> bool:
-        """Once a second, end connections that are being closed; uvicorn calls this at each tick."""
-        if counter % TICKS_PER_S == 0:
-            self._end_the_closing(asyncio.get_running_loop().time())
-        return await super().on_tick(counter)
-
-    def _end_the_closing(self, now_s: float) -> None:
-        """Tear down closing connections whose client does not take the last bytes."""
-        since_s = self._closing_since_s
-        self._closing_since_s = {
-            connection: since_s.get(connection, now_s)
-            for connection in self.server_state.connections
-            if connection.transport.is_closing()
-        }
-        for connection, start_s in self._closing_since_s.items():
-            if now_s - start_s >= self.config.timeout_keep_alive:
-                tear_down(connection.transport)
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:

@@ -137,7 +137,7 @@ class Connection(WebSocketsSansIOProtocol, SmallReads):
         # What is left of large messages, for as long as the socket does not take it.
         self._pieces: deque[Piece] = deque()
         self._is_full = False
-        self._opening: asyncio.TimerHandle
+        self._check: asyncio.TimerHandle
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Have the socket count as full at its first unsent byte: one frame is queued at most.
@@ -155,14 +155,17 @@ class Connection(WebSocketsSansIOProtocol, SmallReads):
         # An earlier HTTP answer may still fill the socket. Then the HTTP protocol was notified.
         if self.transport.get_write_buffer_size() > 0:
             self.pause_writing()
-        # An answer that nobody reads may be before the handshake's. Until that has gone, the client
-        # counts towards no limit of ours.
-        timeout_s = self.config.timeout_keep_alive
-        self._opening = self.loop.call_later(timeout_s, self._end_unless_open)
+        self._check_later()
+
+    def _check_later(self) -> None:
+        self._check = self.loop.call_later(self.config.timeout_keep_alive, self._end_unless_open)
 
     def _end_unless_open(self) -> None:
-        if not self.handshake_complete:
-            tear_down(self.transport)
+        # An answer that nobody reads may be before the handshake's, or before the close.
+        if not self.handshake_complete or self.transport.is_closing():
+            self.abort()
+        else:
+            self._check_later()
 
     @property
     def waiting_since_s(self) -> float | None:
@@ -171,7 +174,7 @@ class Connection(WebSocketsSansIOProtocol, SmallReads):
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection, which the timer would keep."""
-        self._opening.cancel()
+        self._check.cancel()
         self._pieces.clear()
         super().connection_lost(exc)
 

@@ -75,7 +75,7 @@ def test_with_accounts_every_read_needs_a_name(live: Bridge) -> None:
     assert (page.status_code, page.headers["location"]) == (303, "signin")
     signin = live.get("/signin").text
     assert '<label for="name" >' in signin
-    assert "Password or token" in signin
+    assert "Password or access code" in signin
     assert live.get("/api/state", BEARER).status_code == 200
 
 

@@ -5,7 +5,6 @@ import json
 import signal
 import socket
 import sqlite3
-import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
@@ -16,11 +15,8 @@ import httpx
 import pytest
 
 from lupin_bridge.access.credentials import digest
-from lupin_bridge.routes.writes import MAX_LISTED
-from lupin_twin.core.notes import COMMENT
 from tests.support import raw_http
 from tests.support.access import served
-from tests.support.journal import append
 from tests.support.messages import inspection
 from tests.support.people import (
     BEARER,
@@ -225,32 +221,3 @@ def test_open_connections_end_when_the_first_account_is_created_and_when_the_fil
             refused = live.get("/api/state", BEARER)
             assert (refused.status_code, "cannot be read" in refused.text) == (503, True)
             assert "the session has ended" in end_of(stream)
-
-
-def test_ten_thousand_notes_delay_nothing(accounts: Path, tmp_path: Path) -> None:
-    path, now_ns = tmp_path / "j.sqlite", time.time_ns()
-    append(path, [])
-    notes = (
-        (f"{number + 1:016x}", now_ns - 10_000 + number, "bert", COMMENT, "site", "x" * 500)
-        for number in range(10_000)
-    )
-    with closing(sqlite3.connect(path)) as log, log:
-        log.executemany("INSERT INTO note SELECT site, ?, ?, ?, ?, ?, ?, NULL FROM run", notes)
-    options = ("--accounts", str(accounts), "--ros-args", "-p", f"journal:={path}")
-    with bridge(*options) as running, signed_in(running.url, "anna") as browser:
-        running.peer.wait_for_twin()
-        running.peer.observe(inspection("a"))
-
-        def answer_of(note: dict[str, str]) -> httpx.Response | None:
-            answer = write(browser, **note)
-            return answer if answer.status_code == 201 else None
-
-        wait_for(lambda: answer_of(COMMENT_NOW), "a note", meanwhile=lambda _: None)
-        begun_s = time.monotonic()
-        assert write(browser, **{**COMMENT_NOW, "text": "one more"}).status_code == 201
-        took_s = time.monotonic() - begun_s
-        found = browser.get("/api/notes").json()["notes"]
-        assert (len(found), found[0]["text"]) == (MAX_LISTED, "one more")
-        assert browser.delete(f"/api/notes/{found[-1]['id']}").status_code == 403
-        print(f"a note took {took_s:.2f} s")
-        assert took_s < PATIENCE_S / 4

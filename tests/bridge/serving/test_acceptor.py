@@ -2,13 +2,11 @@
 
 import asyncio
 import resource
-import socket
 import ssl
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -129,13 +127,6 @@ def test_out_of_files_it_waits_logs_so_once_and_recovers(live: Served) -> None:
         assert live.process.output.count("no new connections") == 1
 
 
-def test_a_disconnect_before_the_accept_does_no_harm(live: Served) -> None:
-    for _ in range(200):
-        with raw_http.connect(live.url) as client, suppress(OSError):
-            client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
-    assert raw_http.status(raw_http.answer(live.url, GET)) == 200
-
-
 async def test_no_connection_is_evicted_before_another_one_comes() -> None:
     room = 3
 
@@ -168,21 +159,6 @@ async def test_no_connection_is_evicted_before_another_one_comes() -> None:
         await door.wait_closed()
         stack.close()
         await until(lambda: not guests, "their end")
-
-
-async def test_an_error_that_eviction_cannot_fix_evicts_nothing(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    gone: list[bool] = []
-    guest = SimpleNamespace(address="", waiting_since_s=0.0, abort=lambda: gone.append(True))
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))  # it does not listen, so nothing can be accepted
-        listener.setblocking(False)
-        door = Acceptor(listener, asyncio.Protocol, [guest], room=9, tls=None, timeout_s=PATIENCE_S)
-        await until(lambda: "no new connections for now: Invalid arg" in caplog.text, "the line")
-        door.close()
-    assert not gone
-    assert "evicted" not in caplog.text
 
 
 async def test_an_unfinished_tls_handshake_is_evicted_too(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ from lupin_twin.runtime.process import (
     split_ros_args,
 )
 
-# How often a message of ours may repeat at once, and the period of each further one.
+# How often a message may repeat at once, and the period of each further one.
 AT_ONCE: Final = 20
 PERIOD_S: Final = 5.0
 # The same limits for all messages of one logger.
@@ -53,9 +53,6 @@ LOGGER_PERIOD_S: Final = 0.2
 MAX_KINDS: Final = 1_000
 
 _NUMBER: Final = re.compile(r"(?:0x)?[0-9a-f]*[0-9][0-9a-f]*", re.IGNORECASE)
-
-# uvicorn's message, whose trace is of no use: a client sent the bytes.
-_NO_TEXT: Final = "Invalid UTF-8 sequence received from client."
 
 
 class JsonFormatter(logging.Formatter):
@@ -83,8 +80,7 @@ class OnceInAWhile(logging.Filter):
 
     def __init__(self) -> None:
         super().__init__()
-        self._ours = RateLimit(1.0 / PERIOD_S, AT_ONCE, MAX_KINDS)
-        self._libraries = RateLimit(1.0 / PERIOD_S, 1, MAX_KINDS)
+        self._kinds = RateLimit(1.0 / PERIOD_S, AT_ONCE, MAX_KINDS)
         self._loggers = RateLimit(1.0 / LOGGER_PERIOD_S, LOGGER_AT_ONCE, MAX_KINDS)
         self._held_back: Counter[Hashable] = Counter()
 
@@ -94,15 +90,11 @@ class OnceInAWhile(logging.Filter):
         text = record.getMessage() if record.msg == "%s" else str(record.msg)
         error = record.exc_info[0] if record.exc_info else None
         kind = (record.name, record.levelno, _NUMBER.sub("#", text[:200].partition("\n")[0]), error)
-        # A library's errors come with a page of trace each.
-        kinds = self._ours if record.name.startswith("lupin") else self._libraries
-        if kinds.take(kind, now_s) or self._loggers.take(record.name, now_s):
+        if self._kinds.take(kind, now_s) or self._loggers.take(record.name, now_s):
             if len(self._held_back) < MAX_KINDS:
                 self._held_back[kind] += 1
             return False
         held_back = self._held_back.pop(kind, 0)
-        if record.msg == _NO_TEXT:
-            record.exc_info = record.exc_text = None
         if held_back:
             record.msg = f"{record.msg} ({held_back} more since the last time)"
         return True

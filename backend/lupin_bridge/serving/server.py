@@ -318,11 +318,9 @@ class Supervisor:
         # "@": Linux's abstract namespace, whose names begin with a zero.
         self._address = f"\0{address[1:]}" if address.startswith("@") else address
         self._socket: socket.socket | None = None
-        if address.startswith(("/", "@")):
+        if address:
             self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
             self._socket.setblocking(False)
-        elif address:
-            log.warning("NOTIFY_SOCKET is %r, expected a path or @name: no notifications", address)
         is_ours = process in ("", str(os.getpid()))
         self.watchdog_s: Final = (
             int(timeout_us) / 1e6 if is_ours and timeout_us.isdecimal() else 0.0

@@ -223,27 +223,6 @@ def test_an_expired_session_closes_its_connections(closed: Served) -> None:
     assert time.time() - start_s >= 5.0, "and not before: its end is in whole seconds"
 
 
-@pytest.mark.parametrize(
-    "headers",
-    [
-        {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors", "Sec-Fetch-Dest": "image"},
-        {"Sec-Fetch-Site": "same-site", "Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document"},
-        {"Origin": "http://127.0.0.1:1"},  # the cookie is sent: to a browser, it is one site
-        {},
-    ],
-)
-@pytest.mark.parametrize("method", ["GET", "POST", "HEAD"])
-def test_no_other_page_can_sign_anybody_out(
-    closed: Served, headers: dict[str, str], method: str
-) -> None:
-    """With the headers that a browser sends by itself; over plain http, they are few."""
-    mine = session(closed)
-    answer = closed.get("/api/signout", {**mine, **headers}, method)
-    assert answer.status_code in (403, 405)
-    assert "set-cookie" not in answer.headers
-    assert closed.get("/api/state", mine).status_code == 200
-
-
 def test_a_page_knows_whether_it_can_sign_out(closed: Served) -> None:
     reported = closed.get("/api/session", session(closed)).json()
     assert (reported["name"], reported["role"], reported["can_write_notes"]) == (

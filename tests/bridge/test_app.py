@@ -44,7 +44,8 @@ def query(static_folder: Path, method: str, path: str) -> httpx.Response:
 def test_it_describes_itself_without_a_twin_and_the_frameworks_own_pages_are_off(
     tmp_path: Path,
 ) -> None:
-    assert query(tmp_path, "GET", "/openapi.json").status_code == 200
+    for path in ("/docs", "/openapi.json"):
+        assert query(tmp_path, "GET", path).status_code == 200
     for path in ("/redoc", "/docs/oauth2-redirect"):
         assert query(tmp_path, "GET", path).status_code == 404
 
@@ -62,7 +63,7 @@ def test_the_page_and_its_files_are_served_from_the_same_origin(static: Path) ->
 
 def test_the_page_hides_no_route(static: Path) -> None:
     (static / "docs").write_text("a file of that name")
-    assert query(static, "GET", "/docs").headers["location"] == "/docs/guide/reference/http.html"
+    assert "API" in query(static, "GET", "/docs").text
 
 
 @pytest.mark.parametrize(

@@ -55,6 +55,7 @@ ROUTES = {
     "/metrics": True,
     "/api/session": True,
     "/openapi.json": False,
+    "/docs": False,
 }
 
 

@@ -1,13 +1,13 @@
-"""The bridge's own pages: sign-in, `/openapi.json`, the guide, and `/` without the HMI."""
+"""The bridge's own pages: sign-in, `/docs`, `/openapi.json`, the guide, and `/` without the HMI."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from functools import cache
 from html import escape
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
@@ -17,6 +17,7 @@ from starlette.types import Scope
 
 from lupin_bridge.access.credentials import SHARED
 from lupin_bridge.access.middleware import CONTENT_POLICY, Access, client_of
+from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinSource
 from lupin_bridge.field import weighted
 from lupin_bridge.routes.answers import (
@@ -38,14 +39,11 @@ router = APIRouter()
 # In the application only where the page was not built.
 no_page_router = APIRouter()
 
-# Rough time to write the document, s.
+# Rough time to write either document, s.
 _WRITE_S: Final = 0.02
 
 GUIDE_PATH: Final = "/docs/guide"
-_NO_GUIDE: Final = (
-    "the guide was not built: run `make docs` in the clone, or install a release; the routes are "
-    "in /openapi.json"
-)
+_NO_GUIDE: Final = "the guide was not built: run `make docs` in the clone, or install a release"
 # The guide's theme has inline styles; scripts are files, as everywhere.
 _GUIDE_POLICY: Final = f"{CONTENT_POLICY}; style-src 'self' 'unsafe-inline'"
 
@@ -59,7 +57,6 @@ HOW_TO_BUILD: Final = (
 async def openapi(request: Request) -> Response:
     """The OpenAPI document."""
     app, prefix = request.app, request.scope.get("root_path", "")
-    key = f"openapi {prefix}"
 
     def write() -> bytes:
         document = app.openapi()
@@ -67,15 +64,114 @@ async def openapi(request: Request) -> Response:
             document = {**document, "servers": [{"url": prefix}]}
         return orjson.dumps(document, option=orjson.OPT_INDENT_2)
 
-    if app.state.bridge is None:
-        return Response(write(), headers=REVALIDATE, media_type="application/json")
+    return await _written_once(request, f"openapi {prefix}", write, "application/json")
+
+
+@read_route(router, "/docs", include_in_schema=False)
+async def docs(request: Request) -> Response:
+    """The OpenAPI document for people."""
+    app, base_url = request.app, str(request.base_url).rstrip("/")
+
+    def write() -> bytes:
+        return render(app.openapi(), base_url).encode()
+
+    return await _written_once(request, f"docs {base_url}", write, "text/html; charset=utf-8")
+
+
+async def _written_once(
+    request: Request, key: str, write: Callable[[], bytes], media_type: str
+) -> Response:
+    bridge: Bridge | None = request.app.state.bridge
+    if bridge is None:
+        return Response(write(), headers=REVALIDATE, media_type=media_type)
+
     return await respond(
         request,
         key,
-        lambda: computed(
-            request, key, write, "application/json", cost_s=_WRITE_S, headers=REVALIDATE
-        ),
+        lambda: computed(request, key, write, media_type, cost_s=_WRITE_S, headers=REVALIDATE),
     )
+
+
+def render(document: dict[str, Any], base_url: str) -> str:
+    """An OpenAPI document as one HTML page: routes, parameters, answers, and lines for curl."""
+    info = document["info"]
+    routes = "".join(
+        _route(method.upper(), path, operation, base_url)
+        for path, operations in document["paths"].items()
+        for method, operation in operations.items()
+    )
+    schemas = "".join(
+        _schema(name, described) for name, described in document["components"]["schemas"].items()
+    )
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width">'
+        f"<title>{escape(info['title'])}: API</title></head><body><main>"
+        f"<h1>{escape(info['title'])}: API</h1><p>{escape(info['summary'])}</p>"
+        f"<p>{escape(info['description'])}</p>"
+        '<p>As a document for tools: <a href="openapi.json">/openapi.json</a></p>'
+        '<p>For people, with tutorials: <a href="docs/guide/">the guide</a></p>'
+        f"<h2>Routes</h2>{routes}<h2>Types</h2>{schemas}</main></body></html>"
+    )
+
+
+def _route(method: str, path: str, operation: dict[str, Any], base_url: str) -> str:
+    parameters = operation.get("parameters", [])
+    required = [p for p in parameters if p.get("required") and p["in"] == "query"]
+    query = "&".join(f"{p['name']}=…" for p in required)
+    rows = "".join(
+        f"<tr><td><code>{escape(p['name'])}</code></td><td>{escape(p['schema'].get('type', ''))}"
+        f"{' (required)' if p.get('required') else ''}</td>"
+        f"<td>{escape(p.get('description', ''))}</td></tr>"
+        for p in parameters
+    )
+    answers = "".join(
+        f"<li>{escape(code)}: {escape(answer['description'])} {_types(answer)}</li>"
+        for code, answer in operation["responses"].items()
+    )
+    url = f"{base_url}{path}{'?' + query if query else ''}"
+    return (
+        f"<section><h3><code>{method} {escape(path)}</code></h3>"
+        f"<p>{escape(operation.get('summary', ''))}. {escape(operation.get('description', ''))}</p>"
+        f"<pre>curl {'' if method == 'GET' else f'-X {method} '}'{escape(url)}'</pre>"
+        + (f"<table border='1'>{rows}</table>" if rows else "")
+        + f"<ul>{answers}</ul></section>"
+    )
+
+
+def _types(answer: dict[str, Any]) -> str:
+    names = []
+    for media_type, content in answer.get("content", {}).items():
+        name = content.get("schema", {}).get("$ref", "").rpartition("/")[2]
+        link = f' <a href="#{escape(name)}">{escape(name)}</a>' if name else ""
+        names.append(f"<code>{escape(media_type)}</code>{link}")
+    return ", ".join(names)
+
+
+def _schema(name: str, described: dict[str, Any]) -> str:
+    rows = "".join(
+        f"<tr><td><code>{escape(field)}</code></td><td>{_type_of(prop)}</td>"
+        f"<td>{escape(prop.get('description', ''))}</td></tr>"
+        for field, prop in described.get("properties", {}).items()
+    )
+    return (
+        f'<section id="{escape(name)}"><h3>{escape(name)}</h3>'
+        f"<p>{escape(described.get('description', ''))}</p>"
+        f"<table border='1'>{rows}</table></section>"
+    )
+
+
+def _type_of(prop: dict[str, Any]) -> str:
+    if "$ref" in prop:
+        name = prop["$ref"].rpartition("/")[2]
+        return f'<a href="#{escape(name)}">{escape(name)}</a>'
+    if "anyOf" in prop:
+        return " or ".join(_type_of(option) for option in prop["anyOf"])
+    if prop.get("type") == "array":
+        return f"list of {_type_of(prop['items'])}"
+    if "enum" in prop:
+        return ", ".join(escape(repr(value)) for value in prop["enum"])
+    return escape(str(prop.get("const", prop.get("type", ""))))
 
 
 # --- the guide -----------------------------------------------------------------------------------
@@ -94,12 +190,6 @@ async def to_guide(request: Request) -> Response:
     return RedirectResponse(f"{request.scope.get('root_path', '')}{GUIDE_PATH}/")
 
 
-@read_route(router, "/docs", include_in_schema=False)
-async def to_routes(request: Request) -> Response:
-    """The guide's page of all routes."""
-    return RedirectResponse(f"{request.scope.get('root_path', '')}{GUIDE_PATH}/reference/http.html")
-
-
 async def _no_guide(_request: Request) -> Response:
     return error_response(_NO_GUIDE, 404)
 
@@ -115,7 +205,7 @@ def add_guide(app: FastAPI, folder: Path) -> None:
 @read_route(no_page_router, "/", include_in_schema=False)
 async def no_page() -> Response:
     """503, with how to build the page."""
-    text = f"The page was not built: {HOW_TO_BUILD}. The data is there, see /openapi.json."
+    text = f"The page was not built: {HOW_TO_BUILD}. The data is there, see /docs."
     return Response(text, 503, NEVER_STORE, "text/plain; charset=utf-8")
 
 

@@ -134,7 +134,7 @@ def test_a_picture_in_a_foreign_page_is_not_computed(open_bridge: Served) -> Non
     assert "without naming itself" in refusal_of(answer)
 
 
-@pytest.mark.parametrize("path", ["/", "/signin", "/api/report.html"])
+@pytest.mark.parametrize("path", ["/", "/docs", "/signin", "/api/report.html"])
 def test_any_page_may_link_to_the_bridge(open_bridge: Served, path: str) -> None:
     linked = {**PAGE, "Referer": "http://wiki.example/greenhouse"}
     assert open_bridge.get(path, linked).status_code in (200, 303)

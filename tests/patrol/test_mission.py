@@ -3,14 +3,13 @@
 import random
 from collections.abc import Iterator
 from itertools import pairwise
-from math import atan2, dist
+from math import dist
 from typing import TypeVar
 
 import numpy as np
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
-from lupin_patrol.greenhouse import Point
 from lupin_patrol.mission import (
     DOCK,
     START_OF_DAY_S,
@@ -18,11 +17,12 @@ from lupin_patrol.mission import (
     MapGrown,
     Mission,
     PassCompleted,
+    RobotMoved,
     ScanStatus,
     TagsDiscovered,
     Visited,
 )
-from lupin_twin.core.state import Pose, Scan
+from lupin_twin.core.state import Scan
 from tests.support.climate import known_in
 
 DEFAULT_SEED = 0
@@ -90,7 +90,7 @@ def test_a_tag_is_discovered_before_its_first_attempt(many_first_passes: list[li
         discovered: set[str] = set()
         for event in events:
             if isinstance(event, TagsDiscovered):
-                discovered = {sighting.tag.tag_id for sighting in event.sightings}
+                discovered = {tag.tag_id for tag in event.tags}
             elif isinstance(event, Visited):
                 assert event.write.tag_id in discovered
 
@@ -144,45 +144,16 @@ def test_a_retry_may_fail_too_and_a_later_round_reads_the_tag(patrol: list[Event
     )
 
 
-def yaw_of(pose: Pose) -> float:
-    return 2.0 * atan2(pose.qz, pose.qw)
-
-
-def test_poses_are_exact_at_first_and_jitter_a_little_later(patrol: list[Event]) -> None:
-    greenhouse = Mission(GreenhouseSimulator(), 0, DAY_SPEED).greenhouse
-    tags = {tag.tag_id: tag for tag in greenhouse.tags}
-    for visit in only(Visited, patrol):
-        scan = visit.write
-        if scan.pose is None:
-            continue
-        tag = tags[scan.tag_id]
-        off = dist((scan.pose.x, scan.pose.y), tag.position)
-        if visit.pass_index == 0:
-            assert off == 0.0
-            assert yaw_of(scan.pose) == pytest.approx(tag.yaw)
-        else:
-            assert 0.0 < off < 0.06
-            assert yaw_of(scan.pose) == pytest.approx(tag.yaw, abs=0.1)
-
-
 # --- the robot and the day -----------------------------------------------------------------------
 
 
-def test_the_robot_never_enters_a_table_and_never_jumps(monkeypatch: pytest.MonkeyPatch) -> None:
-    mission = Mission(GreenhouseSimulator(), DEFAULT_SEED, DAY_SPEED)
-    positions: list[Point] = []
-    see_tags = mission._detector.observe_from
-
-    def observe_from(position: Point, pass_index: int) -> bool:
-        positions.append(position)
-        return see_tags(position, pass_index)
-
-    monkeypatch.setattr(mission._detector, "observe_from", observe_from)
-    list(until(3, mission.events()))
+def test_the_robot_never_enters_a_table_and_never_jumps(patrol: list[Event]) -> None:
+    greenhouse = Mission(GreenhouseSimulator(), DEFAULT_SEED, DAY_SPEED).greenhouse
+    positions = [event.position for event in only(RobotMoved, patrol)]
     assert positions[0] == DOCK
     assert any(dist(position, DOCK) < 1e-6 for position in positions[1:])
     assert len(positions) > 300
-    assert all(mission.greenhouse.is_free(position) for position in positions)
+    assert all(greenhouse.is_free(position) for position in positions)
     assert max(dist(a, b) for a, b in pairwise(positions)) < 0.3
 
 

@@ -36,7 +36,6 @@ from lupin_patrol.mission import (
     WayPlanned,
     pose_of,
 )
-from lupin_patrol.perception import Sighting
 from lupin_twin.core import interfaces
 from lupin_twin.core.state import STATUS_OK
 from lupin_twin.ros.base_node import NodeUtilities, latched, running_ros, spinning
@@ -170,7 +169,12 @@ def discovered_tags(event: TagsDiscovered, stamp: Time, frame_id: str) -> Discov
     """Return perception's whole list."""
     return DiscoveredTags(
         header=Header(stamp=stamp, frame_id=frame_id),
-        tags=[_discovered_tag(sighting) for sighting in event.sightings],
+        tags=[
+            DiscoveredTag(
+                tag_id=tag.tag_id, pose_in_map=pose_message(pose_of(tag.position, tag.yaw))
+            )
+            for tag in event.tags
+        ],
     )
 
 
@@ -215,15 +219,4 @@ def _on_floor(point: tuple[float, float], yaw: float) -> Pose:
     return Pose(
         position=Point(x=float(point[0]), y=float(point[1]), z=0.0),
         orientation=Quaternion(x=0.0, y=0.0, z=sin(yaw / 2), w=cos(yaw / 2)),
-    )
-
-
-def _discovered_tag(sighting: Sighting) -> DiscoveredTag:
-    return DiscoveredTag(
-        tag_id=sighting.tag.tag_id,
-        pose_in_map=pose_message(pose_of(sighting.tag.position, sighting.tag.yaw)),
-        species=sighting.species,
-        species_confidence=float(sighting.species_confidence),
-        anomaly=sighting.anomaly,
-        sightings=int(sighting.sightings),
     )

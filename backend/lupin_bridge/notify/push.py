@@ -130,9 +130,8 @@ class Push:
             else:
                 since_ns = now_ns - (time.monotonic() - self._started_s) * 1e9
             self._has_read = True
-        for news in self._news.of(change, now_ns, source.origin):
-            alarm = news.alarm
-            if alarm is None or news.change not in ("raised", "worse"):
+        for _, what, alarm in self._news.of(change, now_ns):
+            if what not in ("raised", "worse"):
                 continue
             at_ns = alarm.worse_at_ns or alarm.raised_at_ns
             if at_ns >= since_ns and alarm.reason.verdict is Verdict.CRITICAL:
@@ -145,23 +144,20 @@ class Push:
             await end(task)
 
     async def _run(self) -> None:
-        backoff, why = Backoff(FIRST_WAIT_S, MOST_WAIT_S), ""
+        has_failed = False
         while True:
             await self._is_news.wait()
             await asyncio.sleep(TOGETHER_S)
             self._is_news.clear()
             alarms, self._new = self._new, {}
             error = await self._guard.run(self._notify(alarms))
-            if error is None:
-                backoff.succeeded()
-                if self.condition.detail == why:  # not that of a push service
-                    self.condition.taken(0)
-            else:
+            if error is not None:
                 self.condition.failing(str(error))
-                why = self.condition.detail
                 self._new = alarms | self._new
                 self._is_news.set()
-                await asyncio.sleep(backoff.wait_s())
+            elif has_failed:
+                self.condition.taken(0)
+            has_failed = error is not None
 
     async def _notify(self, alarms: dict[str, Alarm]) -> None:
         source = self._source

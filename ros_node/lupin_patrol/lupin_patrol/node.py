@@ -27,7 +27,7 @@ from std_msgs.msg import Header
 
 from lupin_patrol.mission import (
     Event,
-    MapGrown,
+    MapKnown,
     PassCompleted,
     RobotMoved,
     ScanStatus,
@@ -66,7 +66,7 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.observations = self._latched(
             Observation, "observations_topic", interfaces.OBSERVATIONS.depth
         )
-        # Each message repeats all earlier content, so only the latest is latched.
+        # Each message has all tags, so only the latest is latched.
         self._discovered_tags = self._latched(DiscoveredTags, "discovered_tags_topic", 1)
         self._map = self._latched(OccupancyGrid, "map_topic", 1)
         self._pose, self._plan, self._battery = (
@@ -82,7 +82,7 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """Publish an event, stamped with the current ROS time."""
         stamp = self.get_clock().now().to_msg()
         match event:
-            case MapGrown():
+            case MapKnown():
                 self._map.publish(occupancy_grid(event, stamp, self._frame_id))
             case TagsDiscovered():
                 self._discovered_tags.publish(discovered_tags(event, stamp, self._frame_id))
@@ -178,7 +178,7 @@ def discovered_tags(event: TagsDiscovered, stamp: Time, frame_id: str) -> Discov
     )
 
 
-def occupancy_grid(event: MapGrown, stamp: Time, frame_id: str) -> OccupancyGrid:
+def occupancy_grid(event: MapKnown, stamp: Time, frame_id: str) -> OccupancyGrid:
     """Return the map."""
     grid = event.grid
     message = OccupancyGrid(header=Header(stamp=stamp, frame_id=frame_id))

@@ -4,9 +4,8 @@ Plants and climate follow from the seed, the pass and the time of day, and hold 
 inspection of one tag never depends on the others. Sensors have the units of
 `lupin_msgs/SensorReading`: temperature °C, humidity % relative, co2 ppm, light lx, soil_moisture %.
 
-The occupancy grid only grows. It is row-major with row 0 at the smallest y, as in
-nav_msgs/OccupancyGrid: -1 unknown, 0 free, 100 occupied. The outermost ring of cells is the
-greenhouse's wall.
+The map is row-major with row 0 at the smallest y, as in nav_msgs/OccupancyGrid: 0 free, 100
+occupied. The outermost ring of cells is the greenhouse's wall.
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ from random import Random
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lupin_patrol.greenhouse import TABLE_HEIGHT_M, Greenhouse, Point, Table, Tag
 from lupin_twin.core.state import Bloom, Flower, Reading
@@ -151,14 +149,12 @@ def value_of(registry: Any, sensor: str, position: Point, time_of_day_s: float) 
 
 
 RESOLUTION_M = 0.05
-VIEW_RADIUS_M = 2.0
-
-UNKNOWN, FREE, OCCUPIED = -1, 0, 100
+FREE, OCCUPIED = 0, 100
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """One state of the map: `cells` are int8 bytes, row-major; the origin is cell 0's corner."""
+    """The map: `cells` are int8 bytes, row-major; the origin is cell 0's corner."""
 
     width: int
     height: int
@@ -167,34 +163,18 @@ class Grid:
     cells: bytes
 
 
-class Exploration:
-    """What the robot has seen of the floor so far. Cells become known and never unknown again."""
-
-    def __init__(self, greenhouse: Greenhouse) -> None:
-        inside = greenhouse.interior
-        self._origin = (inside.x0 - RESOLUTION_M, inside.y0 - RESOLUTION_M)
-        columns, rows = (
-            2 + ceil(round(extent / RESOLUTION_M, 6))
-            for extent in (inside.x1 - inside.x0, inside.y1 - inside.y0)
-        )
-        row, column = np.mgrid[:rows, :columns]
-        self._x = self._origin[0] + (column + 0.5) * RESOLUTION_M
-        self._y = self._origin[1] + (row + 0.5) * RESOLUTION_M
-        occupied = (row == 0) | (row == rows - 1) | (column == 0) | (column == columns - 1)
-        for box in (table.rect for table in greenhouse.tables):
-            inside_x = (box.x0 < self._x) & (self._x < box.x1)
-            occupied |= inside_x & (box.y0 < self._y) & (self._y < box.y1)
-        self._truth = np.where(occupied, OCCUPIED, FREE).astype(np.int8)
-        self._cells = np.full((rows, columns), UNKNOWN, dtype=np.int8)
-
-    def observe_from(self, position: Point) -> bool:
-        """Add the cells within VIEW_RADIUS_M of a position; returns whether any of them was new."""
-        near = np.hypot(self._x - position[0], self._y - position[1]) <= VIEW_RADIUS_M
-        new: NDArray[np.bool_] = near & (self._cells == UNKNOWN)
-        self._cells[new] = self._truth[new]
-        return bool(new.any())
-
-    def snapshot(self) -> Grid:
-        """Return an immutable copy of the current map."""
-        rows, columns = self._cells.shape
-        return Grid(columns, rows, RESOLUTION_M, self._origin, self._cells.tobytes())
+def floor_map(greenhouse: Greenhouse) -> Grid:
+    """The complete map, as a robot has it that has patrolled for days."""
+    inside = greenhouse.interior
+    origin = (inside.x0 - RESOLUTION_M, inside.y0 - RESOLUTION_M)
+    columns, rows = (
+        2 + ceil(round(extent / RESOLUTION_M, 6))
+        for extent in (inside.x1 - inside.x0, inside.y1 - inside.y0)
+    )
+    row, column = np.mgrid[:rows, :columns]
+    x, y = (origin[i] + (n + 0.5) * RESOLUTION_M for i, n in enumerate((column, row)))
+    occupied = (row == 0) | (row == rows - 1) | (column == 0) | (column == columns - 1)
+    for box in (table.rect for table in greenhouse.tables):
+        occupied |= (box.x0 < x) & (x < box.x1) & (box.y0 < y) & (y < box.y1)
+    cells = np.where(occupied, OCCUPIED, FREE).astype(np.int8)
+    return Grid(columns, rows, RESOLUTION_M, origin, cells.tobytes())

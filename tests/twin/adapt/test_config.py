@@ -110,7 +110,6 @@ def changed(path: str, value: Any) -> dict[str, Any]:
         ("sensors.temperature.factr", 2, "sensors.temperature.'factr' is not known, expected one"),
         ("sensors.temperature.factor", "2", "sensors.temperature.factor is '2', expected a number"),
         ("sensors.temperature.factor", math.nan, "sensors.temperature.factor is nan, expected a"),
-        ("sensors.temperature.factor", 10**400, "expected a number"),
         ("sensors.temperature.type", "Temperature", "expected such as sensor_msgs/msg/Temp"),
         ("sensors.temperature.field", "a b", "sensors.temperature.field is 'a b', expected a path"),
         ("sensors.temperature.min", 1e300, None),
@@ -160,18 +159,10 @@ def test_an_invalid_configuration_is_named(path: str, value: Any, complaint: str
     ("text", "complaint"),
     [
         ("a: [", "is not YAML"),
-        ("[" * 5000, "is not YAML"),
         ("a: " + "9" * 5000, "is not YAML"),
         ("\x00", "is not YAML"),
         ("- 1", "the file is [1], expected keys"),
-        ("reach_m: 0x" + "f" * 5000, "reach_m is a very large int, expected a number"),
-        # A thousand million entries, in ten lines.
-        (
-            "a0: &a0 [1]\n" + "".join(f"a{n + 1}: &a{n + 1} [{f'*a{n},' * 9}]\n" for n in range(9)),
-            "the alias *a0 is not taken",
-        ),
         ("sensors: " + "[" * 99 + "]" * 99, ", expected keys and values"),
-        ("x" * 4_000_001, "has more than 4000000 bytes"),
     ],
 )
 def test_an_invalid_file_is_reported_by_name(tmp_path: Path, text: str, complaint: str) -> None:

@@ -294,7 +294,6 @@ class _RosbridgeConversation(_Conversation):
         super().__init__(
             websocket,
             bridge,
-            strict_interval=True,
             wire=lambda _client, frame: session.wire(frame),
         )
         self._feeds = Feeds(bridge.rosbridge_writer, self._write_when_free)

@@ -38,8 +38,7 @@ SPECIES = ("lupin", "tulip", "gerbera", "orchid", "rose")
 
 _PLANT_SPACING_M = 0.09
 _IN_FLOWER = 0.75
-_POSITION_NOISE_M = 0.01
-_OVERLOOKED = 0.06
+_OFF_GRID_M = 0.01
 # Probability of a pest outbreak per pass.
 _OUTBREAK = 0.2
 
@@ -72,19 +71,14 @@ class Plants:
         return bugs if breaks_out and where == tag_id else 0
 
     def inspect(self, tag_id: str, pass_index: int, attempt: int) -> Flower:
-        """Inspect the plants of a tag: some flowers are missed, the others are located to 1 cm."""
+        """Inspect the plants of a tag."""
         chance = stream(self._seed, "look", tag_id, pass_index, attempt)
         bugs = self.bugs(tag_id, pass_index)
         blooms = self._blooms[tag_id]
         infested = set(chance.sample(range(len(blooms)), min(len(blooms), bugs, 3)))
         seen = tuple(
-            replace(
-                _jittered(bloom, chance),
-                confidence=chance.uniform(0.72, 0.99),
-                anomaly=index in infested,
-            )
+            replace(bloom, confidence=chance.uniform(0.72, 0.99), anomaly=index in infested)
             for index, bloom in enumerate(blooms)
-            if index in infested or chance.random() > _OVERLOOKED
         )
         return Flower(
             species=self.species(tag_id),
@@ -98,7 +92,7 @@ class Plants:
 
 
 def _grow(table: Table, species: str, seed: int) -> Iterator[Bloom]:
-    """Plant a table in rows, spaced wider than the position noise; most plants flower."""
+    """Plant a table in rows that are not quite straight; most plants flower."""
     chance = stream(seed, "grow", table.name)
     rect = table.rect
     columns = max(1, round((rect.x1 - rect.x0) / _PLANT_SPACING_M))
@@ -109,18 +103,13 @@ def _grow(table: Table, species: str, seed: int) -> Iterator[Bloom]:
             y = rect.y0 + (row + 0.5) * (rect.y1 - rect.y0) / rows
             height_m = chance.uniform(0.12, 0.38)
             if chance.random() < _IN_FLOWER:
+                x, y = (at + chance.uniform(-_OFF_GRID_M, _OFF_GRID_M) for at in (x, y))
                 z = TABLE_HEIGHT_M + height_m
-                yield _jittered(Bloom(x, y, z, height_m, species, 1.0, anomaly=False), chance)
+                yield Bloom(x, y, z, height_m, species, 1.0, anomaly=False)
 
 
 def _nearest(tags: list[Tag], position: Point) -> Tag:
     return min(tags, key=lambda tag: dist(tag.position, position))
-
-
-def _jittered(bloom: Bloom, chance: Random) -> Bloom:
-    noise = _POSITION_NOISE_M
-    x, y = (at + chance.uniform(-noise, noise) for at in (bloom.x, bloom.y))
-    return replace(bloom, x=x, y=y)
 
 
 SECONDS_PER_DAY = 86_400.0

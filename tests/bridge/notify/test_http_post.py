@@ -1,9 +1,7 @@
 """One POST to a real server: what is sent, and how little of the answer is read."""
 
 import asyncio
-import socket
 import ssl
-import struct
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -138,16 +136,3 @@ def test_https_trusts_its_authority_alone(tmp_path: Path) -> None:
         made.authority.cert_pem.write_to_path(str(ca))
         sent(url, ca=str(ca))
     assert len(server.posted) == 1
-
-
-async def test_a_reset_connection_is_reported() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        listener.setblocking(False)
-        url = f"http://127.0.0.1:{listener.getsockname()[1]}/"
-        sending = asyncio.create_task(post(target(url), {}, b"{}"))
-        client, _ = await asyncio.get_running_loop().sock_accept(listener)
-        # Closed with a linger time of 0, it is reset (socket(7)).
-        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-        client.close()
-        with pytest.raises(PostError):
-            await sending

@@ -305,11 +305,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         assert self._config.broker is not None
         for message in self._mqtt.take():
             self._sources[MQTT].received += 1
-            try:
-                topic = message.topic
-            except UnicodeDecodeError as error:  # some brokers let it pass
-                self._drop(Reason.UNREADABLE, MQTT, f"topic is not UTF-8: {error}", case="topic")
-                continue
+            topic = message.topic
             if len(topic) > MAX_TOPIC_LENGTH:
                 why = f"its topic has {len(topic)} characters, the limit: {MAX_TOPIC_LENGTH}"
                 self._drop(Reason.SIZE, f"MQTT {topic[:80]}", why, case="topic")

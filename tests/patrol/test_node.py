@@ -93,6 +93,10 @@ def test_one_round_shows_the_whole_greenhouse(domain: int) -> None:
     # Nothing was lost: two observations a tag, and the two that failed at first.
     round_ = [it for it in received.observations if it.mission_id == "patrol-0001"]
     assert len(round_) == 2 * 29 + 2
+    failed = {it.status: it for it in round_ if it.status != Observation.STATUS_OK}
+    assert failed.keys() == {Observation.STATUS_UNREACHABLE, Observation.STATUS_SCAN_FAILED}
+    # Quaternion.w is 1 by default, which would put the tag at the origin.
+    assert all(it.status_detail and not it.tag_pose_in_map.orientation.w for it in failed.values())
     for observation in round_:
         assert observation.header.frame_id == "map"
         assert observation.header.stamp.sec > 0

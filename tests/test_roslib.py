@@ -75,7 +75,7 @@ def test_fields_have_null_and_a_refused_field_differs_from_a_failed_call(
     assert reported["refused"]["values"]["ok"] is False
     assert "resolution" in reported["refused"]["values"]["error_message"]
     assert reported["failed"]["callback"] == "failed"
-    assert reported["failed"]["values"].startswith("args.colour is unknown")
+    assert reported["failed"]["values"].startswith("args.colour is 'red': extra")
     assert reported["late"] == {
         "callback": "failed",
         "values": "/twin/get_field did not answer within 1e-09 s",

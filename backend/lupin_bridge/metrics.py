@@ -57,7 +57,7 @@ METRICS: Final = {
     ),
     "lupin_estimate_fit_failing": gauge("1 while the last fit of its model has failed", "sensor"),
     "lupin_outward_waiting": gauge(
-        "items not yet sent: tags, the greenhouse or changes of alarms", "channel"
+        "changes of alarms not yet sent; MQTT: 0 if the broker has the current state", "channel"
     ),
     "lupin_clients_dismissed": counter(
         "clients disconnected because they accepted no frame for too long"
@@ -88,10 +88,7 @@ METRICS: Final = {
     "lupin_http_answers": counter("HTTP answers of the routes, by status", "status"),
     "lupin_outward_sent": counter("messages that a broker or a receiver accepted", "channel"),
     "lupin_outward_failed": counter("connections and posts that failed", "channel"),
-    "lupin_outward_dropped": counter(
-        "MQTT: states of tags replaced by newer ones; webhook: changes of alarms given up",
-        "channel",
-    ),
+    "lupin_outward_dropped": counter("changes of alarms and messages given up", "channel"),
 }
 HISTOGRAMS: Final = {
     "lupin_push_seconds": (

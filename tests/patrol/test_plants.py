@@ -45,15 +45,12 @@ def test_blooms_stand_inside_the_tags_own_table(greenhouse: Greenhouse, plants: 
             assert 0.0 <= look.confidence <= 1.0
 
 
-def test_pests_appear_now_and_then_and_go_after_two_rounds(
-    greenhouse: Greenhouse, plants: Plants
-) -> None:
+def test_pests_appear_now_and_then_and_at_first(greenhouse: Greenhouse, plants: Plants) -> None:
     quiet = 0
     for tag in greenhouse.tags:
         history = [plants.bugs(tag.tag_id, pass_index) for pass_index in PASSES]
-        # Two outbreaks in a row at one tag are possible and rare; none in this seed.
-        assert not any(all(history[p : p + 3]) for p in PASSES)
         quiet += history.count(0)
+    assert sum(plants.bugs(tag.tag_id, 0) > 0 for tag in greenhouse.tags) == 1
     assert 0.9 < quiet / (29 * len(PASSES)) < 1.0
 
 

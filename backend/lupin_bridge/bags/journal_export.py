@@ -61,7 +61,7 @@ def offered_qos(topic: Topic) -> str:
 
 # --- the rows -------------------------------------------------------------------------------------
 
-# Rows that are read in one short transaction: during a long one, the write-ahead log would grow.
+# Rows that are in memory at once.
 LOT: Final = 2_000
 
 
@@ -73,7 +73,7 @@ class JournalRows:
 
     def __init__(self, connection: sqlite3.Connection, start_ns: int, end_ns: int) -> None:
         self._connection = connection
-        self._period = {"site": LOCAL_SITE, "start": start_ns, "end": end_ns, "lot": LOT}
+        self._period = {"site": LOCAL_SITE, "start": start_ns, "end": end_ns}
         with one_view(connection):
             self._spans = cut(spans(runs(connection.execute)), start_ns, end_ns)
             self.runs: dict[int, Run] = {span.run.id: span.run for span in self._spans}
@@ -81,9 +81,9 @@ class JournalRows:
 
     def __iter__(self) -> Iterator[tuple[Run, Write]]:
         """Yield each write with its run of the clock, in the order of receipt."""
-        parts = (self._rows("scan"), self._rows("look"), self._places())
-        for _, run, row in heapq.merge(*parts, key=itemgetter(0)):
-            yield run, row
+        with one_view(self._connection):
+            for _, run, row in heapq.merge(self._observed(), self._placed(), key=itemgetter(0)):
+                yield run, row
 
     def _places_before(self, start_ns: int) -> list[Pin]:
         first: dict[str, Pin] = {}
@@ -93,39 +93,33 @@ class JournalRows:
                     first.setdefault(pin.tag_id, pin)
         return list(first.values())
 
-    def _rows(self, table: str) -> Iterator[tuple[int, Run, Write]]:
-        """Yield scans or inspections as (number, run, row), in the order of their numbers."""
-        after = 0
-        while True:
-            with one_view(self._connection):
-                found = self._connection.execute(
-                    f"SELECT seq FROM {table} WHERE site = :site AND seq > :after"  # noqa: S608
-                    " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
-                    " ORDER BY seq LIMIT :lot",
-                    self._period | {"after": after},
-                )
-                seqs = [seq for (seq,) in found]
-                of_table = (seqs, ()) if table == "scan" else ((), seqs)
-                within = [
-                    (seq, run, row)
-                    for run in self.runs.values()
-                    for seq, row in listed_rows(self._connection, run.id, *of_table)
-                    if self._holds(run, row.stamp_ns)
-                ]
-            yield from sorted(within, key=itemgetter(0))
-            if len(seqs) < LOT:
-                return
-            after = seqs[-1]
-
-    def _places(self) -> Iterator[tuple[int, Run, Write]]:
-        with one_view(self._connection):
-            within = [
-                (seq, run, pin)
+    def _observed(self) -> Iterator[tuple[int, Run, Write]]:
+        """Yield scans and inspections as (number, run, row), in the order of their numbers."""
+        within = "site = :site AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
+        found = self._connection.execute(
+            f"SELECT seq FROM scan WHERE {within} UNION ALL"  # noqa: S608
+            f" SELECT seq FROM look WHERE {within} ORDER BY seq",
+            self._period,
+        )
+        seqs = [seq for (seq,) in found]
+        for start in range(0, len(seqs), LOT):
+            lot = seqs[start : start + LOT]
+            rows = [
+                (seq, run, row)
                 for run in self.runs.values()
-                for seq, pin, is_copy in self._pins(run)
-                if not is_copy and self._holds(run, pin.stamp_ns)
+                for seq, row in listed_rows(self._connection, run.id, lot, lot)
+                if self._holds(run, row.stamp_ns)
             ]
-        yield from sorted(within, key=itemgetter(0))
+            yield from sorted(rows, key=itemgetter(0))
+
+    def _placed(self) -> list[tuple[int, Run, Write]]:
+        rows: list[tuple[int, Run, Write]] = [
+            (seq, run, pin)
+            for run in self.runs.values()
+            for seq, pin, is_copy in self._pins(run)
+            if not is_copy and self._holds(run, pin.stamp_ns)
+        ]
+        return sorted(rows, key=itemgetter(0))
 
     def _pins(self, run: Run) -> Iterator[tuple[int, Pin, bool]]:
         for seq, tag, stamp_ns, arrival_ns, is_copy, *pose in self._connection.execute(

@@ -165,7 +165,7 @@ class Player:
         if recording.has_clock:
             newest = recording.messages([CLOCK.name], before_ns=self._start_ns, newest_first=True)
             for message in islice(newest, 1):
-                self._time_ns = self._clock_ns(message)
+                self._time_ns = _clock_ns(message)
         self._earlier: Iterator[Recorded] = iter(())
         if self._start_ns > recording.start_ns:
             maps = [topic for topic, kind in inputs.items() if kind == MAP.type_name]
@@ -190,7 +190,7 @@ class Player:
         """Publish the time and what is due.
 
         Raises:
-            RecordingError: the recording is damaged here, or its `/clock` cannot be read.
+            RecordingError: the recording is damaged here.
 
         """
         left = _MAX_A_BEAT
@@ -209,7 +209,7 @@ class Player:
             if message.log_ns > self._position_ns - (0 if is_clock else lag_ns):
                 break
             if is_clock:
-                self._time_ns = self._clock_ns(message) or self._time_ns
+                self._time_ns = _clock_ns(message) or self._time_ns
             elif left:
                 left -= 1
                 self._publish(message)
@@ -235,15 +235,6 @@ class Player:
         if not self._recording.has_clock:
             self._time_ns = min(self._position_ns, self._recording.end_ns)
 
-    def _clock_ns(self, message: Recorded) -> int:
-        try:
-            return nanoseconds(deserialize_message(message.data, Clock).clock)
-        except RuntimeError as error:  # rclpy's own: the bytes are no such message
-            name, kind = self._recording.name, CLOCK.type_name
-            raise RecordingError(
-                f"cannot read {name}: a message on {message.topic} is not a {kind}"
-            ) from error
-
     def _publish(self, message: Recorded) -> None:
         self._node.publish(message)
         self.published += 1
@@ -251,6 +242,10 @@ class Player:
     def _publish_time(self) -> None:
         if self._time_ns is not None:
             self._node.publish_time(self._time_ns)
+
+
+def _clock_ns(message: Recorded) -> int:
+    return nanoseconds(deserialize_message(message.data, Clock).clock)
 
 
 def _play(

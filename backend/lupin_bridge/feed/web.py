@@ -49,9 +49,8 @@ POLL_S: Final = 0.3
 RETRY_S: Final = 1.0
 # Longest wait for a log: a live twin reports within a second where its journal is.
 FOUND_S: Final = 3.0
-# Least wait for rows: a killed twin leaves a request unanswered, and the next one soon runs. Each
-# wait in vain doubles it, because a slow network takes longer.
-PATIENCE_S: Final = 2.0
+# Longest wait for rows: a killed twin leaves a request unanswered, and the next one soon runs.
+ROWS_S: Final = 5.0
 # A copy that was not written for this long is deleted at the start, unless it is the newest.
 RETAINED_S: Final = 90 * 86_400.0
 # Estimated time to write a lot into the file, s.
@@ -85,7 +84,6 @@ class FollowedLog:
         self._has_report = False
         self._own: Path | None = None
         self._followed: Followed | None = None
-        self._patience_s = PATIENCE_S
         self._is_known = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
 
@@ -173,13 +171,10 @@ class FollowedLog:
         try:
             # Read each time: another `web` may write it too, and anybody may delete it.
             after = await self._on_worker(lambda: _last(here))
-            begun_s = time.monotonic()
             try:
-                lot = await asyncio.wait_for(self._query(after), self._patience_s)
+                lot = await asyncio.wait_for(self._query(after), ROWS_S)
             except TimeoutError:
-                self._patience_s *= 2
                 raise TwinUnavailableError("the twin does not answer; it is asked again") from None
-            self._patience_s = max(PATIENCE_S, 2 * (time.monotonic() - begun_s))
             if lot.journal != twin.journal_id:
                 return RETRY_S  # the twin has begun a new journal, and soon reports that
             self._followed = await self._on_worker(

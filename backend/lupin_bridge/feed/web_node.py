@@ -36,10 +36,6 @@ from lupin_twin.ros.parameters import (
 NODE_NAME: Final = "lupin_web"
 
 
-# How long a state waits for its times, which a twin publishes right after it. It is then shown
-# without them, and when things were observed is not known.
-TIMES_PATIENCE_S: Final = 0.5
-
 # How long a twin's report of itself, sent once a second, stays valid, s.
 REPORT_HOLDS_S: Final = 5.0
 
@@ -66,9 +62,9 @@ class WebNode(AdjustableNode):
     All nodes of a domain share `/diagnostics`: it takes only the report of the twin that publishes
     this state.
 
-    `on_state(snapshot)` is called for each state, once its times are there. Unchanged tags are the
-    same objects as in the snapshot before. `on_map()` is called when the map or a parameter of this
-    node has changed.
+    `on_state(snapshot)` is called for each state, once its times are there or the next state is.
+    Unchanged tags are the same objects as in the snapshot before. `on_map()` is called when the map
+    or a parameter of this node has changed.
 
     Raises:
         lupin_twin.core.parameters.ParameterError: a parameter out of its range.
@@ -138,10 +134,6 @@ class WebNode(AdjustableNode):
                 (GetEstimateReport, interfaces.GET_ESTIMATE_REPORT.name),
             )
         }
-        self._patience = self.utilities.every(
-            group, TIMES_PATIENCE_S, "the wait for times", self._show_without_times
-        )
-        self._patience.cancel()
 
     # --- for the source, on this node's thread ------------------------------------------------
 
@@ -193,34 +185,28 @@ class WebNode(AdjustableNode):
         if 0 < self.utilities.published_ns == self._published_ns:
             return
         self._published_ns = self.utilities.published_ns
+        # Without its times a state is shown too: when things were observed is then not known.
+        if self._state is not None:
+            self._show(self._state, None)
         self._state = msg
-        if self._show_pair():
-            return
-        if not self.count_publishers(self._topics["times"]):
-            self._show_without_times()
-        elif self._patience.is_canceled():
-            self._patience.reset()
+        if self.count_publishers(self._topics["times"]):
+            self._show_pair()
+        else:
+            self._state = None
+            self._show(msg, None)
 
     def _take_times(self, msg: Any) -> None:
         self._times = msg
         self._show_pair()
 
-    def _show_pair(self) -> bool:
+    def _show_pair(self) -> None:
         """Show the state with its times, once both are here: two topics keep no order."""
         state, times = self._state, self._times
-        if state is None or times is None or state.header.stamp != times.header.stamp:
-            return False
-        self._state = self._times = None
-        self._show(state, times)
-        return True
-
-    def _show_without_times(self) -> None:
-        # `_state` stays: its times may still come.
-        if self._state is not None:
-            self._show(self._state, None)
+        if state is not None and times is not None and state.header.stamp == times.header.stamp:
+            self._state = self._times = None
+            self._show(state, times)
 
     def _show(self, msg: Any, times: Any) -> None:
-        self._patience.cancel()
         topic = self._topics["state_topic"]
         # The same in all replicas: DDS gives a publisher one id for all who see it.
         ids = sorted(bytes(it.endpoint_gid) for it in self.get_publishers_info_by_topic(topic))

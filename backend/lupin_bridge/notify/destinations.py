@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import re
 import ssl
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import time
 from typing import Final
@@ -163,8 +164,6 @@ def _webhook(settings: Settings, secrets: Secrets) -> WebhookTarget | None:
         _needs(settings, "webhook_url", "webhook_secret_file", "webhook_ca")
         return None
     url, port = _address(settings, "webhook_url", _HTTP_PORTS)
-    if url.fragment:
-        raise settings.wrong("webhook_url", "has a fragment (#), must have none")
     secret = secrets.webhook_secret
     if secret is None:
         raise settings.wrong(
@@ -179,7 +178,7 @@ def _webhook(settings: Settings, secrets: Secrets) -> WebhookTarget | None:
     return WebhookTarget(
         host=url.hostname or "",
         port=port,
-        path=(url.path or "/") + (f"?{url.query}" if url.query else ""),
+        path=path_of(url),
         authority=url.netloc,
         secret=secret.encode(),
         tls=_tls(settings, "webhook_ca", is_wanted=url.scheme == "https", url="webhook_url"),
@@ -201,31 +200,46 @@ def _push(settings: Settings) -> PushTarget | None:
 
 
 def _address(settings: Settings, name: str, ports: dict[str, int]) -> tuple[SplitResult, int]:
-    """An address and its port. What may be secret in it is in no message."""
-    called, text = settings.called(name), getattr(settings, name)
-    schemes = one_of([f"{scheme}://" for scheme in ports])
+    try:
+        return address_of(getattr(settings, name), ports)
+    except ValueError as error:
+        raise SettingError(f"{settings.called(name)} {error}") from None
+
+
+def address_of(text: str, ports: Mapping[str, int]) -> tuple[SplitResult, int]:
+    """An address and its port, of one of these schemes, which have these ports.
+
+    Raises:
+        ValueError: it is invalid; what may be secret in it is not in the message.
+
+    """
     if len(text) > MAX_URL or not _ADDRESS.fullmatch(text):
-        raise SettingError(
-            f"{called} is longer than {MAX_URL} characters, or has one that is invalid in an "
-            "address: write it in ASCII, without spaces"
+        raise ValueError(
+            f"is longer than {MAX_URL} characters, or has one that is invalid in an address: write "
+            "it in ASCII, without spaces"
         )
     try:
         url = urlsplit(text)
-        port, host = url.port, url.hostname
+        port = url.port
     except ValueError as error:
-        raise SettingError(f"{called} is not an address: {error}") from None
+        raise ValueError(f"is not an address: {error}") from None
     if url.scheme not in ports:
-        raise SettingError(f"{called} must begin with {schemes}")
+        raise ValueError(f"must begin with {one_of([f'{scheme}://' for scheme in ports])}")
     if "@" in url.netloc:
-        raise SettingError(
-            f"{called} has a user or a password in it: others can read a command line, they have "
-            "settings and files of their own"
+        raise ValueError(
+            "has a user or a password in it: others can read a command line, they have settings "
+            "and files of their own"
         )
-    if not host:
-        raise SettingError(f"{called} names no host")
-    if port == 0:
-        raise SettingError(f"{called} has the port 0, must be from 1 to 65535")
+    if not url.hostname or port == 0:
+        raise ValueError("names no host, or the port 0")
+    if url.fragment:
+        raise ValueError("has a fragment (#), must have none")
     return url, port or ports[url.scheme]
+
+
+def path_of(url: SplitResult) -> str:
+    """What a request asks for there."""
+    return (url.path or "/") + (f"?{url.query}" if url.query else "")
 
 
 def _prefix(settings: Settings, name: str) -> str:

@@ -3,7 +3,8 @@
 Only the daily report and the bridge's own `online` are retained; the last will turns that into
 `offline`. A retained reading or verdict would outlive its truth. A later subscriber gets everything
 at Home Assistant's birth message, or with the next change. The bridge receives only that message:
-anybody may publish it, so its size is bounded, and its effects are rate-limited.
+anybody may publish it, so its effects are rate-limited, and the broker is told to send nothing
+large.
 """
 
 from __future__ import annotations
@@ -65,7 +66,8 @@ class _Published:
     """What was published of a tag or the greenhouse: a digest for each topic."""
 
     digests: dict[str, bytes] = field(default_factory=dict)
-    # What its announcements were made of.
+    # What its messages were made of, and its announcements.
+    made_of: object = None
     announced: object = None
     configs: frozenset[str] = frozenset()
     # When the first of its readings becomes too old.
@@ -73,10 +75,7 @@ class _Published:
 
 
 class Mirror:
-    """Knows what a broker has, and what it needs next: the newest of each topic.
-
-    Tags are queued, not payloads: a payload is made from what is known at the tag's turn.
-    """
+    """Knows what a broker has, and what it needs next: the newest of each topic."""
 
     def __init__(self, topics: Topics, sensors: Sensors) -> None:
         self._topics = topics
@@ -84,76 +83,45 @@ class Mirror:
         self._seen = GreenhouseState()
         self._tags: dict[str, TagState] = {}
         self._published: dict[str, _Published] = {}
-        # Queued tags, each with its state when it was queued; SITE: the greenhouse.
-        self._waiting: dict[str, TagState | None] = {SITE: None}
-        # Until then, no published reading becomes too old.
-        self._first_until_ns = _NEVER
-        self.dropped = 0
-
-    @property
-    def waiting(self) -> int:
-        """How many tags are queued, the greenhouse included."""
-        return len(self._waiting)
 
     def forget(self) -> None:
-        """Queue everything again: the broker knows nothing any more."""
+        """Publish everything again: the broker knows nothing any more."""
         self._published = {
             tag_id: _Published(configs=published.configs)
             for tag_id, published in self._published.items()
         }
-        every = (SITE, *self._tags, *self._published)
-        self._waiting = {tag_id: self._tags.get(tag_id) for tag_id in every}
 
     def see(self, seen: GreenhouseState) -> None:
-        """Take the current state, and queue the tags that have changed."""
-        before, self._seen = self._seen, seen
-        changed: dict[str, None] = {}
-        if seen.tags != before.tags:
-            known, self._tags = self._tags, {tag.tag_id: tag for tag in seen.tags}
-            changed |= dict.fromkeys(t for t, tag in self._tags.items() if known.get(t) is not tag)
-            changed |= dict.fromkeys(known.keys() - self._tags.keys())
-        old, new = before.judged.tags, seen.judged.tags
-        if new is not old:
-            changed |= dict.fromkeys(t for t, health in new.items() if old.get(t) is not health)
-        if seen.knows_alarms is not before.knows_alarms:
-            changed |= dict.fromkeys(self._tags)
-        elif seen.board is not before.board:
-            was, now = before.board.by_tag, seen.board.by_tag
-            changed |= dict.fromkeys(t for t in {**was, **now} if was.get(t) != now.get(t))
-        if (seen.now_ns is None, seen.origin) != (before.now_ns is None, before.origin):
-            changed |= dict.fromkeys(self._tags)
-        now_ns = seen.now_ns
-        if now_ns is not None and self._first_until_ns < now_ns:
-            changed |= dict.fromkeys(t for t, it in self._published.items() if it.until_ns < now_ns)
-            self._first_until_ns = min(
-                (it.until_ns for it in self._published.values() if it.until_ns >= now_ns),
-                default=_NEVER,
-            )
-        for tag_id in changed:
-            if tag_id in self._tags or tag_id in self._published:
-                self._wait(tag_id, self._tags.get(tag_id))
-        self._waiting.setdefault(SITE, None)
+        """Take the current state."""
+        if seen.tags is not self._seen.tags:
+            self._tags = {tag.tag_id: tag for tag in seen.tags}
+        self._seen = seen
 
     def messages(self) -> Iterator[Message]:
-        """Yield the messages of all queued tags."""
-        while self._waiting:
-            tag_id = next(iter(self._waiting))
-            del self._waiting[tag_id]
-            yield from self._turn_of(tag_id)
+        """Yield what has changed; a tag is written as it is known at its turn."""
+        yield from self._changed(SITE, self._of_greenhouse(), None)
+        for tag_id in tuple(self._tags):
+            tag = self._tags.get(tag_id)
+            if tag is not None and self._has_changed(tag):
+                yield from self._changed(tag_id, self._of_tag(tag), tag)
+        for tag_id in self._published.keys() - self._tags.keys() - {SITE}:
+            gone = self._published.pop(tag_id)
+            yield from ((topic, _GONE) for topic in sorted(gone.configs))
 
-    def _wait(self, tag_id: str, tag: TagState | None) -> None:
-        if self._waiting.get(tag_id, tag) is not tag:
-            self.dropped += 1
-        self._waiting[tag_id] = tag
-
-    def _turn_of(self, tag_id: str) -> Iterator[Message]:
+    def _has_changed(self, tag: TagState) -> bool:
+        seen, tag_id = self._seen, tag.tag_id
         published = self._published.setdefault(tag_id, _Published())
-        tag = self._tags.get(tag_id)
-        if tag_id != SITE and tag is None:
-            del self._published[tag_id]
-            yield from ((topic, _GONE) for topic in sorted(published.configs))
-            return
-        said = self._of_greenhouse() if tag is None else self._of_tag(tag, published)
+        before = published.made_of
+        published.made_of = (
+            *(tag, seen.judged.tags.get(tag_id), seen.board.by_tag.get(tag_id)),
+            *(seen.knows_alarms, seen.origin, seen.now_ns is None, self._holds_ns(tag_id)),
+        )
+        return published.made_of != before or (seen.now_ns or 0) > published.until_ns
+
+    def _changed(
+        self, key: str, said: Iterable[tuple[str, dict[str, Any]]], tag: TagState | None
+    ) -> Iterator[Message]:
+        published = self._published.setdefault(key, _Published())
         # With the data's origin, so that nobody is called for a simulation.
         states = ((topic, {**it, "origin": self._seen.origin}) for topic, it in said)
         for topic, payload in chain(self._announced(tag, published), states):
@@ -170,10 +138,10 @@ class Mirror:
         alarms = alarms_payload(len(board.active), board.worst, is_known=seen.knows_alarms)
         yield topics.of(None, "alarms"), alarms
 
-    def _of_tag(self, tag: TagState, published: _Published) -> Iterator[tuple[str, dict[str, Any]]]:
+    def _of_tag(self, tag: TagState) -> Iterator[tuple[str, dict[str, Any]]]:
         seen, topics, tag_id = self._seen, self._topics, tag.tag_id
         readings, holds_ns = (*tag.readings, *derive(tag.readings)), self._holds_ns(tag_id)
-        published.until_ns = min(
+        self._published[tag_id].until_ns = min(
             (
                 reading.observed_at_ns + holds_ns
                 for reading in readings
@@ -181,7 +149,6 @@ class Mirror:
             ),
             default=_NEVER,
         )
-        self._first_until_ns = min(self._first_until_ns, published.until_ns)
         for reading in readings:
             sensor = self._sensors.named(reading.name)
             payload = reading_payload(reading, sensor, holds_ns, seen.now_ns)
@@ -246,7 +213,8 @@ class Mqtt:
     name: Final = "mqtt"
 
     def __init__(self, target: MqttTarget, mirror: Mirror) -> None:
-        self.condition = Condition()
+        # `waiting` is 0 when the broker has the current state.
+        self.condition = Condition(waiting=1)
         self._target, self._topics = target, target.topics
         self._mirror = mirror
         self._backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
@@ -290,9 +258,6 @@ class Mqtt:
     async def _run(self) -> None:
         while True:
             try:
-                # What changes without a connection is seen to wait.
-                self._see()
-                self._count()
                 await self._one_connection()
             except MqttError as error:
                 self._failed(str(error))
@@ -331,8 +296,8 @@ class Mqtt:
                 together.create_task(self._receive(client))
                 together.create_task(self._stay_online(client))
                 together.create_task(self._publish(client))
-        except* MqttError as group:
-            raise MqttError(str(group.exceptions[0])) from None
+        except ExceptionGroup as group:
+            raise group.exceptions[0] from None
 
     async def _receive(self, client: Client) -> None:
         async for message in client.messages:
@@ -359,14 +324,14 @@ class Mqtt:
             while batch := list(islice(messages, WINDOW)):
                 if time.monotonic() - self._seen_s >= POLL_S:
                     self._see()
-                self._count(in_flight=1)
+                self.condition.waiting = len(batch)
                 await asyncio.gather(
                     *(client.publish(topic, text, qos=AT_LEAST_ONCE) for topic, text in batch)
                 )
                 self.condition.taken(len(batch))
                 await asyncio.sleep(len(batch) / MAX_PER_S)
             self._backoff.succeeded()
-            self._count()
+            self.condition.waiting = len(self._reports)
             await asyncio.sleep(POLL_S)
 
     async def _publish_reports(self, client: Client) -> None:
@@ -411,33 +376,15 @@ class Mqtt:
         client._disconnected.add_done_callback(  # noqa: SLF001
             lambda end: end.cancelled() or end.exception()
         )
-        _limit_packet_size(client, MAX_PACKET_BYTES)
         return client
 
     def _see(self) -> None:
         self._seen_s = time.monotonic()
         self._mirror.see(self._look())
 
-    def _count(self, in_flight: int = 0) -> None:
-        self.condition.waiting = self._mirror.waiting + in_flight + len(self._reports)
-        self.condition.dropped = self._mirror.dropped
-
     def _failed(self, why: str) -> None:
-        before = self.condition.detail
+        before, self.condition.waiting = self.condition.detail, 1
         self.condition.failing(f"{why} ({self._target.called})")
         problem = self.condition.detail
         if problem != before:
             log.warning("MQTT: %s; it will be retried", problem)
-
-
-def _limit_packet_size(client: Client, most: int) -> None:
-    """End the connection at a larger packet: paho has no limit, and some brokers heed none."""
-    paho = client._client  # noqa: SLF001
-    receive = paho._sock_recv  # noqa: SLF001
-
-    def receive_little(count: int) -> bytes:
-        if count > most:
-            raise OSError(f"the broker sent a packet of {count} bytes, the limit is {most}")
-        return receive(count)
-
-    paho._sock_recv = receive_little  # type: ignore[method-assign, assignment]  # noqa: SLF001

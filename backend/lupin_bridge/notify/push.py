@@ -29,7 +29,7 @@ from lupin_bridge.alarms.board import NOTHING_SAID, Change, notes_of_alarms
 from lupin_bridge.feed.tasks import Guard, end
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Verdict
-from lupin_bridge.notify.destinations import Endpoint, PushTarget
+from lupin_bridge.notify.destinations import Endpoint, PushTarget, address_of, path_of
 from lupin_bridge.notify.messages import Backoff, Condition, Source
 from lupin_bridge.notify.webhook import AlarmNews, PostError, post, until_taken
 from lupin_bridge.past.report_page import push_text
@@ -39,7 +39,6 @@ from lupin_bridge.stream.state_json import alarm_json
 if TYPE_CHECKING:
     from py_vapid import Vapid02
 
-MAX_ENDPOINT: Final = 1_000
 # Alarms that come within this time of each other are one notification, s.
 TOGETHER_S: Final = 2.0
 # How long a push service keeps a message for a phone that is off, s; older ones are on the page.
@@ -130,9 +129,8 @@ class Push:
             else:
                 since_ns = now_ns - (time.monotonic() - self._started_s) * 1e9
             self._has_read = True
-        for news in self._news.of(change, now_ns, source.origin):
-            alarm = news.alarm
-            if alarm is None or news.change not in ("raised", "worse"):
+        for _, what, alarm in self._news.of(change, now_ns):
+            if what not in ("raised", "worse"):
                 continue
             at_ns = alarm.worse_at_ns or alarm.raised_at_ns
             if at_ns >= since_ns and alarm.reason.verdict is Verdict.CRITICAL:
@@ -145,23 +143,20 @@ class Push:
             await end(task)
 
     async def _run(self) -> None:
-        backoff, why = Backoff(FIRST_WAIT_S, MOST_WAIT_S), ""
+        has_failed = False
         while True:
             await self._is_news.wait()
             await asyncio.sleep(TOGETHER_S)
             self._is_news.clear()
             alarms, self._new = self._new, {}
             error = await self._guard.run(self._notify(alarms))
-            if error is None:
-                backoff.succeeded()
-                if self.condition.detail == why:  # not that of a push service
-                    self.condition.taken(0)
-            else:
+            if error is not None:
                 self.condition.failing(str(error))
-                why = self.condition.detail
                 self._new = alarms | self._new
                 self._is_news.set()
-                await asyncio.sleep(backoff.wait_s())
+            elif has_failed:
+                self.condition.taken(0)
+            has_failed = error is not None
 
     async def _notify(self, alarms: dict[str, Alarm]) -> None:
         source = self._source
@@ -268,20 +263,14 @@ def parsed(url: str, target: PushTarget) -> Endpoint:
         DeviceRefused: it is invalid.
 
     """
-    if len(url) > MAX_ENDPOINT or not url.isascii() or not url.isprintable() or " " in url:
-        raise DeviceRefused(f"endpoint: expected an address of at most {MAX_ENDPOINT} characters")
     try:
-        parts = urlsplit(url)
-        port = parts.port or 443
-    except ValueError:
-        raise DeviceRefused("endpoint: expected an address") from None
+        parts, port = address_of(url, {"https": 443})
+    except ValueError as error:
+        raise DeviceRefused(f"endpoint {error}") from None
     host = parts.hostname or ""
-    if parts.scheme != "https" or not host or "@" in parts.netloc or parts.fragment:
-        raise DeviceRefused("endpoint: expected https:// and a host, without a user or a fragment")
     if port != 443 and host not in target.private_hosts:
         raise DeviceRefused(f"endpoint has the port {port}, expected 443")
-    path = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
-    return Endpoint(host, port, path, parts.netloc, target.tls)
+    return Endpoint(host, port, path_of(parts), parts.netloc, target.tls)
 
 
 def check_device(device: Device, target: PushTarget) -> None:

@@ -17,10 +17,9 @@ import logging
 import math
 import os
 import time
-from collections import OrderedDict, deque
+from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import h11
 import orjson
@@ -31,7 +30,6 @@ from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.notify.destinations import Endpoint, WebhookTarget
 from lupin_bridge.notify.messages import Backoff, Condition, Source
 from lupin_bridge.stream.state_json import alarm_json
-from lupin_twin.core.diagnostics import Origin
 
 log = logging.getLogger(__name__)
 
@@ -41,39 +39,15 @@ MAX_KNOWN: Final = 20_000
 # Changes since this long before the start are sent again.
 RESENT_NS: Final = 24 * 3600 * 1_000_000_000
 
-What = Literal["raised", "worse", "cleared", "withdrawn", "report"]
+What = Literal["raised", "worse", "cleared", "withdrawn"]
 
 
-@dataclass(slots=True)
-class Delivery:
-    """One change of one alarm, or a report; `id` is the same however often it is sent.
-
-    `origin` is where observations came from when it was received.
-    """
+class Delivery(NamedTuple):
+    """One change of one alarm; `id` is the same however often it is sent."""
 
     id: str
     change: What
-    alarm: Alarm | None
-    origin: Origin
-    report: orjson.Fragment | None = None
-    # Set to whether it was taken, or given up.
-    end: asyncio.Future[bool] | None = None
-
-    def body(self, lost: int, origin: Origin) -> bytes:
-        """The body to post; `lost` changes were given up since the last one that was taken.
-
-        `origin` is where observations come from now, in case that was not known then.
-        """
-        alarm = self.alarm
-        of = {"report": self.report} if alarm is None else {"alarm": alarm_json(alarm)}
-        origin = origin if self.origin == "unknown" else self.origin
-        head = {"id": self.id, "change": self.change}
-        return orjson.dumps({**head, **of, "lost": lost, "origin": origin})
-
-    def ended(self, *, taken: bool) -> None:
-        """Note that it was taken, or given up."""
-        if self.end is not None and not self.end.done():
-            self.end.set_result(taken)
+    alarm: Alarm
 
 
 class AlarmNews:
@@ -84,24 +58,21 @@ class AlarmNews:
         # it had got worse since it was raised.
         self._sent: OrderedDict[str, tuple[int | None, bool]] = OrderedDict()
 
-    def of(self, change: Change, now_ns: int | None, origin: Origin) -> Iterator[Delivery]:
-        """Yield the deliveries of a change; `now_ns` is ROS time; None: not known.
-
-        `origin` is where observations come from.
-        """
+    def of(self, change: Change, now_ns: int | None) -> Iterator[Delivery]:
+        """Yield the deliveries of a change; `now_ns` is ROS time; None: not known."""
         changed: Iterable[Alarm] = change.changed
         if change.is_past:
             newest_ns = max(map(happened_ns, changed), default=0)
             after_ns = (newest_ns if now_ns is None else now_ns) - RESENT_NS
             changed = (it for it in changed if it.is_active or happened_ns(it) >= after_ns)
         for alarm in sorted(changed, key=happened_ns):
-            yield from self._of_alarm(alarm, origin)
+            yield from self._of_alarm(alarm)
         for alarm in change.withdrawn:
             if alarm.id in self._sent:
                 del self._sent[alarm.id]
-                yield Delivery(f"{alarm.id}.withdrawn", "withdrawn", alarm, origin)
+                yield Delivery(f"{alarm.id}.withdrawn", "withdrawn", alarm)
 
-    def _of_alarm(self, alarm: Alarm, origin: Origin) -> Iterator[Delivery]:
+    def _of_alarm(self, alarm: Alarm) -> Iterator[Delivery]:
         before = self._sent.get(alarm.id)
         now = (alarm.cleared_at_ns, alarm.is_worse)
         if before == now:
@@ -114,15 +85,14 @@ class AlarmNews:
         if alarm.cleared_at_ns is not None:
             if before is None or alarm.cleared_at_ns != was_cleared_ns:
                 name = f"{alarm.id}.cleared.{alarm.cleared_at_ns}"
-                yield Delivery(name, "cleared", alarm, origin)
+                yield Delivery(name, "cleared", alarm)
             return
         if was_cleared_ns is not None:  # a late write shows that it went on
-            yield Delivery(f"{alarm.id}.raised.{was_cleared_ns}", "raised", alarm, origin)
+            yield Delivery(f"{alarm.id}.raised.{was_cleared_ns}", "raised", alarm)
         elif before is None:
-            yield Delivery(f"{alarm.id}.raised", "raised", alarm, origin)
+            yield Delivery(f"{alarm.id}.raised", "raised", alarm)
         if alarm.is_worse and not was_worse:
-            verdict = alarm.reason.verdict
-            yield Delivery(f"{alarm.id}.worse.{verdict}", "worse", alarm, origin)
+            yield Delivery(f"{alarm.id}.worse.{alarm.reason.verdict}", "worse", alarm)
 
 
 def signed(secret: bytes, delivery_id: str, now_s: int, body: bytes) -> dict[str, str]:
@@ -155,9 +125,10 @@ class Webhook:
         self.condition = Condition(is_connected=True)
         self._target = target
         self._news = AlarmNews()
-        # Oldest first. Past `MAX_WAITING`, the oldest is given up and counted.
-        self._waiting: deque[Delivery] = deque()
-        self._has_more = asyncio.Event()
+        # Past `MAX_WAITING`, the oldest is given up and counted.
+        self._waiting: asyncio.Queue[Delivery] = asyncio.Queue(MAX_WAITING)
+        # One post after the other.
+        self._posting = asyncio.Lock()
         # Given up since the last one that was taken.
         self._lost = 0
         self._backoff = Backoff(FIRST_WAIT_S, MOST_WAIT_S)
@@ -173,9 +144,14 @@ class Webhook:
 
     def on_alarms(self, change: Change) -> None:
         """Queue the deliveries of changed alarms."""
-        source = self._source
-        for delivery in self._news.of(change, source.ros_time_ns, source.origin):
-            self._wait(delivery)
+        for delivery in self._news.of(change, self._source.ros_time_ns):
+            if self._waiting.full():
+                self._waiting.get_nowait()
+                self.condition.dropped += 1
+                self.condition.waiting -= 1
+                self._lost += 1
+            self._waiting.put_nowait(delivery)
+            self.condition.waiting += 1
 
     @property
     def called(self) -> str:
@@ -184,53 +160,39 @@ class Webhook:
 
     async def deliver(self, report_id: str, report: orjson.Fragment) -> bool:
         """Send a report until it is taken; False: it was given up, which is logged."""
-        end: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
-        self._wait(Delivery(report_id, "report", None, self._source.origin, report, end))
-        return await end
+        return await self._send(report_id, {"change": "report", "report": report})
 
     async def stop(self) -> None:
         """End at once; what was not taken is sent after the next start."""
         await end(self._task)
 
-    def _wait(self, delivery: Delivery) -> None:
-        if len(self._waiting) >= MAX_WAITING:
-            self._waiting.popleft().ended(taken=False)
-            self.condition.dropped += 1
-            self.condition.waiting -= 1
-            self._lost += 1
-        self._waiting.append(delivery)
-        self.condition.waiting += 1
-        self._has_more.set()
-
     async def _run(self) -> None:
         guard = Guard("the webhook had an error and continues")
         while True:
-            while not self._waiting:
-                self._has_more.clear()
-                await self._has_more.wait()
-            if self._waiting[0].origin == "unknown":
-                await self._wait_for_origin()
-            delivery, lost = self._waiting.popleft(), self._lost
-            is_taken = await guard.run(self._send(delivery, lost))
-            if isinstance(is_taken, Exception):
-                self.condition.failing(f"{type(is_taken).__name__} ({self._target.called})")
+            name, change, alarm = await self._waiting.get()
+            of = {"change": change, "alarm": alarm_json(alarm)}
+            error = await guard.run(self._send(name, of))
+            if isinstance(error, Exception):
+                self.condition.failing(f"{type(error).__name__} ({self._target.called})")
                 self.condition.dropped += 1
-                is_taken = False
-                # The next one may meet the same error.
-                await asyncio.sleep(self._backoff.wait_s())
-            delivery.ended(taken=is_taken)
-            self._lost += -lost if is_taken else 1
+                self._lost += 1
             self.condition.waiting -= 1
 
-    async def _send(self, delivery: Delivery, lost: int) -> bool:
-        body = delivery.body(lost, self._source.origin)
+    async def _send(self, name: str, of: Mapping[str, Any]) -> bool:
+        async with self._posting:
+            await self._wait_for_origin()
+            # `lost` changes were given up since the last one that was taken.
+            lost = self._lost
+            body = orjson.dumps({"id": name, **of, "lost": lost, "origin": self._source.origin})
 
-        async def attempt() -> None:
-            headers = signed(self._target.secret, delivery.id, int(time.time()), body)
-            await post(self._target, headers, body)
+            async def attempt() -> None:
+                headers = signed(self._target.secret, name, int(time.time()), body)
+                await post(self._target, headers, body)
 
-        what, where = f"{delivery.id} of the webhook", self._target.called
-        return await until_taken(attempt, self.condition, self._backoff, what, where)
+            what, where = f"{name} of the webhook", self._target.called
+            is_taken = await until_taken(attempt, self.condition, self._backoff, what, where)
+            self._lost += -lost if is_taken else 1
+            return is_taken
 
     async def _wait_for_origin(self) -> None:
         """Wait until the origin is known; after one time-out, it is never waited for again."""
@@ -244,10 +206,9 @@ class Webhook:
 
 # --- one POST, and how it is tried until it is taken ----------------------------------------------
 
-CONNECT_S: Final = 5.0
 ANSWER_S: Final = 10.0
-# Limit of the answer's head, with those of status 1xx before it. The body is not read.
-MAX_HEAD_BYTES: Final = 16_384
+# Read at once; h11 has a limit of its own for the answer's head. The body is not read.
+_CHUNK_BYTES: Final = 16_384
 
 
 class PostError(RuntimeError):
@@ -270,33 +231,27 @@ async def post(target: Endpoint, headers: Mapping[str, str], body: bytes) -> Non
 
     """
     try:
-        async with asyncio.timeout(CONNECT_S):
+        async with asyncio.timeout(ANSWER_S):
             reader, writer = await asyncio.open_connection(
                 target.address or target.host,
                 target.port,
                 ssl=target.tls,
                 server_hostname=None if target.tls is None else target.host,
-                limit=MAX_HEAD_BYTES,
             )
-    except TimeoutError:
-        raise PostError(f"no connection within {CONNECT_S:g} s") from None
-    except OSError as error:
-        raise PostError(_words_of(error)) from None
-    except UnicodeError:  # of a label that is empty or too long
-        raise PostError("its host name cannot be looked up") from None
-    try:
-        async with asyncio.timeout(ANSWER_S):
-            all_headers = {"Content-Type": "application/json", **headers}
-            answer = await _exchange(target, all_headers, body, reader, writer)
+            try:
+                all_headers = {"Content-Type": "application/json", **headers}
+                answer = await _exchange(target, all_headers, body, reader, writer)
+            finally:
+                # At once: the rest of the answer is not wanted.
+                writer.transport.abort()
     except TimeoutError:
         raise PostError(f"no answer within {ANSWER_S:g} s") from None
     except OSError as error:
         raise PostError(_words_of(error)) from None
+    except UnicodeError:  # of a label that is empty or too long
+        raise PostError("its host name cannot be looked up") from None
     except h11.RemoteProtocolError as error:
         raise PostError(f"no HTTP answer: {error}") from None
-    finally:
-        # At once: the rest of the answer is not wanted.
-        writer.transport.abort()
     if not 200 <= answer.status_code < 300:
         is_elsewhere = 300 <= answer.status_code < 400
         why = f"answered {answer.status_code}{', which is not followed' if is_elsewhere else ''}"
@@ -327,18 +282,14 @@ async def _exchange(
     for part in (head, h11.Data(data=body), h11.EndOfMessage()):
         writer.write(http.send(part) or b"")
     await writer.drain()
-    left = MAX_HEAD_BYTES
     while True:
         event = http.next_event()
         if isinstance(event, h11.Response):
             return event
         if event is h11.NEED_DATA:
-            if not left:
-                raise PostError(f"its answer's head has more than {MAX_HEAD_BYTES} bytes")
-            got = await reader.read(left)
+            got = await reader.read(_CHUNK_BYTES)
             if not got:
                 raise PostError("the connection was closed before an answer")
-            left -= len(got)
             http.receive_data(got)
 
 

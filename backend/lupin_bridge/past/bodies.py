@@ -113,7 +113,7 @@ def history_body(
         if past.is_bucketed
         else [{"stamp": stamp(at_ns), "value": finite(mean)} for at_ns, _, mean, _, _ in entries],
         "buckets": [
-            {"start": stamp(at_ns), "n": n, "mean": _mean(mean, low, high), "min": low, "max": high}
+            {"start": stamp(at_ns), "n": n, "mean": mean, "min": low, "max": high}
             for at_ns, n, mean, low, high in entries
         ]
         if past.is_bucketed
@@ -189,11 +189,6 @@ def _weighted_median(weighted: Sequence[tuple[int, int]]) -> int:
     """The weighted median of ascending (value, weight): half of the weight is on it and below."""
     up_to = list(accumulate(weight for _, weight in weighted))
     return weighted[bisect_left(up_to, up_to[-1] / 2)][0]
-
-
-def _mean(mean: float, low: float, high: float) -> float:
-    """The mean; if its sum overflowed a float, the middle between `low` and `high`."""
-    return mean if math.isfinite(mean) else low / 2 + high / 2
 
 
 # The events that are counted, by their names in a bucket.

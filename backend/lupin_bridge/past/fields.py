@@ -108,7 +108,7 @@ class Field(StateQuery):
         return self.plan(snapshot)
 
     def plan(self, snapshot: Snapshot, etag: str | None = None) -> Plan:
-        """See `StateQuery`; `etag` None: it is made of content.
+        """The plan of the answer from a snapshot; `etag` None: it is made of content.
 
         Raises:
             lupin_twin.field.engine.FieldRefused: a bad request.

@@ -114,7 +114,7 @@ def answered(query: Query, if_none_match: str, find: Find, should_stop: ShouldSt
 
 @dataclass(frozen=True, slots=True)
 class StateQuery:
-    """A query of the state as of a moment, ns of ROS time. None: the caller has the snapshot."""
+    """A query of the state as of a moment, ns of ROS time; None: of the newest."""
 
     at_ns: int | None
 
@@ -128,11 +128,6 @@ class StateQuery:
 
     def look(self, find: Find) -> Plan:
         """See `Query`."""
-        snapshot: Snapshot = find(self.at_ns or 0)
-        return self.plan(snapshot)
-
-    def plan(self, snapshot: Snapshot) -> Plan:
-        """The plan of the answer from a snapshot."""
         raise NotImplementedError
 
 
@@ -140,8 +135,9 @@ class StateQuery:
 class WholeState(StateQuery):
     """`schema.TwinState`: every tag."""
 
-    def plan(self, snapshot: Snapshot) -> Plan:
-        """See `StateQuery`."""
+    def look(self, find: Find) -> Plan:
+        """See `Query`."""
+        snapshot: Snapshot = find(self.at_ns or 0)
         etag = etag_of("state", (snapshot.stamp_ns, snapshot.frame_id, snapshot.tags))
         return plan_of(etag, lambda _: StateJson().state(snapshot, snapshot.now_ns))
 
@@ -156,8 +152,9 @@ class OneTag(StateQuery):
         """See `StateQuery`."""
         return _WRITE_TAG_S
 
-    def plan(self, snapshot: Snapshot) -> Plan:
-        """See `StateQuery`, and `tag_of`."""
+    def look(self, find: Find) -> Plan:
+        """See `Query`, and `tag_of`."""
+        snapshot: Snapshot = find(self.at_ns or 0)
         found = tag_of(snapshot, self.tag_id)
         etag = etag_of("tag", (snapshot.stamp_ns, found))
         return plan_of(etag, lambda _: StateJson().tag(found, snapshot.now_ns))

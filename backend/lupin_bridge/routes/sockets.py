@@ -39,13 +39,12 @@ from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.hub import CLOSE_TRY_AGAIN_LATER, Client, Hub
 from lupin_bridge.stream.schema import GetFieldResponse
 from lupin_bridge.viewers.foxglove import (
-    ERROR,
     SUBPROTOCOLS,
     Channel,
     Reaction,
     Session,
+    error_status,
     server_info,
-    status,
 )
 from lupin_bridge.viewers.rosbridge_protocol import FieldCall, service_failure, service_response
 from lupin_bridge.viewers.rosbridge_session import Feeds
@@ -188,7 +187,7 @@ class _FoxgloveConversation(_Conversation):
         self._session = Session(bridge.offer.counts)
         # By subscription, the function that ends it.
         self._close: dict[int, Callable[[], None]] = {}
-        # Messages that are no replies, such as notes and advertisements.
+        # Advertisements that wait.
         self._due: deque[bytes] = deque()
         self._offer_is_due = False
 
@@ -224,7 +223,7 @@ class _FoxgloveConversation(_Conversation):
         except (NotRelayedError, TwinUnavailableError, TimeoutError) as error:
             self._session.end(key)
             text = f"channel {channel.id} cannot be served now: {str(error) or 'ROS is busy'}"
-            await self._send(status(ERROR, text))
+            await self._send(error_status(text))
             return
         if self._session.has(key, channel):
             self._close[key] = close
@@ -239,9 +238,7 @@ class _FoxgloveConversation(_Conversation):
     # --- what is written ------------------------------------------------------------------------
 
     def _on_sample(self, key: int, sample: Sample) -> None:
-        note = self._session.put(key, sample)
-        if note is not None:
-            self._due.append(note)
+        self._session.put(key, sample)
         self._write_all()
 
     def _on_news(self, time_ns: int | None) -> None:
@@ -297,7 +294,6 @@ class _RosbridgeConversation(_Conversation):
         super().__init__(
             websocket,
             bridge,
-            strict_interval=True,
             wire=lambda _client, frame: session.wire(frame),
         )
         self._feeds = Feeds(bridge.rosbridge_writer, self._write_when_free)

@@ -9,10 +9,11 @@ from __future__ import annotations
 import asyncio
 import struct
 from collections import deque
-from collections.abc import Callable, Iterator
-from typing import Any, Final
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Final, TypeVar
 
 import orjson
+from pydantic import BaseModel, ValidationError
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import CloseCode, Frame
 from websockets.protocol import State
@@ -26,6 +27,8 @@ from lupin_bridge.serving.connections import (
 )
 
 # --- a client's JSON ------------------------------------------------------------------------------
+
+ModelT = TypeVar("ModelT", bound=BaseModel)
 
 # The messages that we understand have some hundred bytes at most.
 MAX_MESSAGE_LENGTH: Final = 16_384
@@ -51,6 +54,24 @@ def members_of(message: str | bytes) -> dict[str, Any]:
     if not isinstance(members, dict):
         raise ValueError(f"the message is {shown(members)}, expected an object")  # noqa: TRY004
     return members
+
+
+def model_of(kind: type[ModelT], members: Mapping[str, Any]) -> ModelT:
+    """The members as a model.
+
+    Raises:
+        ValueError: one of them is invalid; the text names it and its value.
+
+    """
+    try:
+        return kind.model_validate(members)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        (name, *inside), why = first["loc"], first["msg"]
+        if len(inside) > 1:  # in an entry of a list
+            name = f"{name}[{inside[0]}].{inside[1]}"
+        value = "" if first["type"] == "missing" else f" is {shown(first['input'])}"
+        raise ValueError(f"{str(name)[:64]}{value}: {why[0].lower()}{why[1:]}") from None
 
 
 def shown(value: object) -> str:

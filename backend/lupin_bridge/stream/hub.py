@@ -116,16 +116,15 @@ def plain_wire(client: Client, frame: StateFrame) -> bytes:
 class Client:
     """One client: what it requested, what it was sent, and since when its socket is full.
 
-    `min_interval_s` is the mean time between two frames; a frame may come a tenth earlier, unless
-    `strict_interval` is set. `wire` serializes a frame for this client. `address` is the one whose
-    share of the connections it counts towards. `written_s` is the time of the last write.
+    `min_interval_s` is the mean time between two frames; a frame may come a tenth earlier. `wire`
+    serializes a frame for this client. `address` is the one whose share of the connections it
+    counts towards. `written_s` is the time of the last write.
     """
 
     connection: Writable
     address: str = ""
     delta: bool = False
     min_interval_s: float = 0.0
-    strict_interval: bool = False
     wants_status: bool = True
     wants_state: bool = True
     wants_alarms: bool = True
@@ -306,10 +305,7 @@ class Hub:
                 self.frames_skipped += frame.seq - client.sent_seq - 1
             self.frames_sent += 1
             client.sent_seq = frame.seq
-            if client.strict_interval:
-                client.next_due_s = now_s + client.min_interval_s
-            else:
-                client.next_due_s = next_beat_s(client.next_due_s, now_s, client.min_interval_s)
+            client.next_due_s = next_beat_s(client.next_due_s, now_s, client.min_interval_s)
 
     def dismiss_stuck(self, now_s: float) -> int:
         """Close every client that has not taken a frame for too long; returns how many."""

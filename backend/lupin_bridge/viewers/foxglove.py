@@ -22,14 +22,15 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
-from typing import Any, Final
+from typing import Annotated, Final
 
 import orjson
+from pydantic import BaseModel, ConfigDict, Field
 
 from lupin_bridge.feed.relay import Sample, TwinNames, schema_text, topics_of
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError
 from lupin_bridge.feed.tasks import Periodic, Shared
-from lupin_bridge.serving.ws_protocol import members_of, shown
+from lupin_bridge.serving.ws_protocol import members_of, model_of, shown
 from lupin_twin.core import interfaces
 from lupin_twin.core.interfaces import Topic
 
@@ -40,8 +41,7 @@ SUBPROTOCOLS: Final = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 MAX_SUBSCRIPTIONS: Final = 128
 _MAX_ID: Final = 2**32 - 1
 
-WARNING: Final = 1
-ERROR: Final = 2
+_ERROR: Final = 2
 
 _MESSAGE_DATA: Final = 1
 _TIME: Final = 2
@@ -60,6 +60,27 @@ class Channel:
 
 # --- incoming ---------------------------------------------------------------------------------
 
+_Id = Annotated[int, Field(ge=0, le=_MAX_ID)]
+
+
+class _Subscription(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+    id: _Id
+    channel_id: _Id = Field(alias="channelId")
+
+
+class _Subscribe(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+    subscriptions: list[_Subscription] = Field(max_length=MAX_SUBSCRIPTIONS)
+
+
+class _Unsubscribe(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+    ids: list[_Id] = Field(alias="subscriptionIds", max_length=MAX_SUBSCRIPTIONS)
+
 
 def parse(message: str | bytes) -> tuple[list[tuple[int, int]], list[int]]:
     """Read one message: subscriptions to begin (the client's own id, the channel's), or to end.
@@ -73,34 +94,10 @@ def parse(message: str | bytes) -> tuple[list[tuple[int, int]], list[int]]:
     members = members_of(message)
     op = members.get("op")
     if op == "subscribe":
-        return [_subscription(value) for value in _list(members, "subscriptions")], []
+        return [(it.id, it.channel_id) for it in model_of(_Subscribe, members).subscriptions], []
     if op == "unsubscribe":
-        ids = _list(members, "subscriptionIds")
-        return [], [_id("subscriptionIds", value) for value in ids]
-    if isinstance(op, str):
-        raise ValueError(f"{op[:64]} is {_REFUSED}")  # noqa: TRY004
-    raise ValueError(f"op is {shown(op)}, expected subscribe or unsubscribe")
-
-
-def _list(members: Mapping[str, Any], name: str) -> list[Any]:
-    value = members.get(name)
-    if not isinstance(value, list):
-        raise ValueError(f"{name} is {shown(value)}, expected an array")  # noqa: TRY004
-    if len(value) > MAX_SUBSCRIPTIONS:
-        raise ValueError(f"{name} has {len(value)} entries, the limit is {MAX_SUBSCRIPTIONS}")
-    return value
-
-
-def _subscription(value: Any) -> tuple[int, int]:
-    if not isinstance(value, dict):
-        raise ValueError(f"an entry of subscriptions is {shown(value)}, expected an object")  # noqa: TRY004
-    return _id("id", value.get("id")), _id("channelId", value.get("channelId"))
-
-
-def _id(name: str, value: Any) -> int:
-    if type(value) is not int or not 0 <= value <= _MAX_ID:
-        raise ValueError(f"{name} is {shown(value)}, expected an integer from 0 to {_MAX_ID}")
-    return value
+        return [], model_of(_Unsubscribe, members).ids
+    raise ValueError(f"op {shown(op)} is {_REFUSED}")
 
 
 # --- outgoing ---------------------------------------------------------------------------------
@@ -119,9 +116,9 @@ def server_info(session_id: str, *, has_time: bool) -> bytes:
     )
 
 
-def status(level: int, text: str) -> bytes:
-    """A status message about a request, or about a channel."""
-    return orjson.dumps({"op": "status", "level": level, "message": text})
+def error_status(text: str) -> bytes:
+    """A status message: a request that failed, and why."""
+    return orjson.dumps({"op": "status", "level": _ERROR, "message": text})
 
 
 def advertise(channels: Iterable[Channel]) -> bytes:
@@ -149,10 +146,6 @@ def unadvertise(ids: Iterable[int]) -> bytes:
 
 log = logging.getLogger(__name__)
 
-# The largest message that one client is sent: a map of 4,000 × 4,000 cells has 16 MB, a layer of a
-# million points 20. At most one such message waits for a client that does not read.
-MAX_MESSAGE_BYTES: Final = 24_000_000
-
 
 @dataclass(slots=True)
 class Counts:
@@ -179,7 +172,6 @@ class Session:
         self._subscriptions: dict[int, Channel] = {}
         self._advertised: dict[int, Channel] = {}
         self._waiting: dict[int, Sample] = {}
-        self._too_large: set[int] = set()
         self.time_ns: int | None = None
 
     def receive(self, message: str | bytes) -> Reaction:
@@ -187,7 +179,7 @@ class Session:
         try:
             begun, ended = parse(message)
         except ValueError as error:
-            return Reaction((status(ERROR, str(error)),))
+            return Reaction((error_status(str(error)),))
         return self._unsubscribe(ended) if ended else self._subscribe(begun)
 
     def offer(self, channels: Mapping[int, Channel]) -> Reaction:
@@ -217,25 +209,14 @@ class Session:
         self._subscriptions.pop(subscription_id, None)
         self._waiting.pop(subscription_id, None)
 
-    def put(self, subscription_id: int, sample: Sample) -> bytes | None:
-        """Queue a message for a subscription; returns a warning to send, if there is one."""
-        channel = self._subscriptions.get(subscription_id)
-        if channel is None:
-            return None
-        if len(sample.data) > MAX_MESSAGE_BYTES:
-            if channel.id in self._too_large:
-                return None  # reported once
-            self._too_large.add(channel.id)
-            return status(
-                WARNING,
-                f"messages on {shown(channel.topic.name)} are left out while they are larger than "
-                f"{MAX_MESSAGE_BYTES} bytes: this one has {len(sample.data)}",
-            )
+    def put(self, subscription_id: int, sample: Sample) -> None:
+        """Queue a message for a subscription, if that is open."""
+        if subscription_id not in self._subscriptions:
+            return
         self._counts.skipped += subscription_id in self._waiting
         # After the others that wait: one fast channel must not starve them.
         self._waiting.pop(subscription_id, None)
         self._waiting[subscription_id] = sample
-        return None
 
     def next(self) -> tuple[bytes, bytes] | None:
         """What is to be written next, as a binary message in two parts; None: nothing waits."""
@@ -279,7 +260,7 @@ class Session:
 
 def _errors(errors: list[str]) -> tuple[bytes, ...]:
     # One message for all errors: the answer is never longer than the request.
-    return (status(ERROR, "; ".join(errors)),) if errors else ()
+    return (error_status("; ".join(errors)),) if errors else ()
 
 
 # How often layers are looked for, s.

@@ -33,11 +33,11 @@ from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import orjson
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from lupin_bridge.feed.relay import TwinNames, absolute, topics_of
-from lupin_bridge.field import BOX_NAMES, FieldQuery
-from lupin_bridge.serving.ws_protocol import members_of, shown
+from lupin_bridge.field import FieldQuery
+from lupin_bridge.serving.ws_protocol import members_of, model_of, shown
 
 MAX_NAME_LENGTH: Final = 256
 MAX_THROTTLE_RATE_MS: Final = 3_600_000.0
@@ -123,13 +123,10 @@ def parse(message: str | bytes) -> Request:
             f"op {shown(op)} is refused: lupin-twin only reads, expected {served}", message_id
         )
     try:
-        return kind.model_validate(members)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        name, why = str(first["loc"][0]), first["msg"]
-        value = "" if first["type"] == "missing" else f" is {shown(first['input'])}"
+        return model_of(kind, members)
+    except ValueError as error:
         called = service if kind is CallService and _is_short(service) else None
-        raise Refused(f"{name}{value}: {why[0].lower()}{why[1:]}", message_id, called) from None
+        raise Refused(str(error), message_id, called) from None
 
 
 def _is_short(value: object) -> bool:
@@ -241,21 +238,28 @@ def _one(kind: str) -> Converter:
 
 
 FIELD_TYPE: Final = "lupin_msgs/srv/GetField"
+# The types of rosapi's services, by name.
+_ROSAPI: Final = {
+    "/rosapi/topics": "Topics",
+    "/rosapi/topics_for_type": "TopicsForType",
+    "/rosapi/topic_type": "TopicType",
+    "/rosapi/services": "Services",
+    "/rosapi/services_for_type": "ServicesForType",
+    "/rosapi/service_type": "ServiceType",
+}
 
-# A request's members in their order, at ROS's defaults for what a call leaves out.
-_FIELD_ARGS: Final[Mapping[str, str | float]] = {
-    "sensor_type": "",
-    "resolution": 0.0,
-    **dict.fromkeys(BOX_NAMES, 0.0),
-}
-_ROSAPI: Final[Mapping[str, tuple[str, Mapping[str, str | float]]]] = {
-    "/rosapi/topics": ("Topics", {}),
-    "/rosapi/topics_for_type": ("TopicsForType", {"type": ""}),
-    "/rosapi/topic_type": ("TopicType", {"topic": ""}),
-    "/rosapi/services": ("Services", {}),
-    "/rosapi/services_for_type": ("ServicesForType", {"type": ""}),
-    "/rosapi/service_type": ("ServiceType", {"service": ""}),
-}
+
+class _FieldArgs(BaseModel):
+    """GetField's request; what a call leaves out has ROS's default."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    sensor_type: str = ""
+    resolution: float = 0.0
+    bbox_min_x: float = 0.0
+    bbox_min_y: float = 0.0
+    bbox_max_x: float = 0.0
+    bbox_max_y: float = 0.0
 
 
 # A checked call of GetField; the field itself may still be refused by the twin.
@@ -280,8 +284,7 @@ def answer(call: CallService, names: TwinNames) -> FieldCall | bytes:
         if service == names.field_service:
             return _field_call(call)
         if service in _ROSAPI:
-            _, defaults = _ROSAPI[service]
-            return orjson.dumps(_rosapi(service, _arguments(call.args, defaults), names))
+            return orjson.dumps(_rosapi(service, call.args, names))
     except Refused as error:
         raise Refused(str(error), call.id, call.service) from None
     known = ", ".join((names.field_service, *_ROSAPI))
@@ -295,47 +298,31 @@ def answer(call: CallService, names: TwinNames) -> FieldCall | bytes:
 def _field_call(call: CallService) -> FieldCall:
     if call.type and not is_type(call.type, FIELD_TYPE):
         raise Refused(f"type is {shown(call.type)}, expected {FIELD_TYPE}")
-    return call, FieldQuery(**_arguments(call.args, _FIELD_ARGS))
-
-
-def _arguments(args: dict[str, Any], defaults: Mapping[str, str | float]) -> dict[str, Any]:
-    values: dict[str, Any] = dict(defaults)
-    for name, value in args.items():
-        if name not in defaults:
-            known = ", ".join(defaults) or "no arguments"
-            raise Refused(f"args.{name[:64]} is unknown, expected {known}")
-        values[name] = _checked(name, value, defaults[name])
-    return values
-
-
-def _checked(name: str, value: Any, default: str | float) -> str | float:
-    if isinstance(default, str):
-        if isinstance(value, str):
-            return value
-        raise Refused(f"args.{name} is {shown(value)}, expected a string")
-    if type(value) in (int, float):
-        return float(value)
-    raise Refused(f"args.{name} is {shown(value)}, expected a number")
+    try:
+        return call, FieldQuery(**model_of(_FieldArgs, call.args).model_dump())
+    except ValueError as error:
+        raise Refused(f"args.{error}") from None
 
 
 def _rosapi(service: str, args: Mapping[str, Any], names: TwinNames) -> dict[str, Any]:
     """The answer of rosapi; for unknown names and types it is empty, which is no error."""
+    of = {name: str(value) for name, value in args.items()}
     topics = {topic.name: topic.type_name for topic in topics_of(names)}
     services = {names.field_service: FIELD_TYPE}
-    services |= {name: f"rosapi_msgs/srv/{kind}" for name, (kind, _) in _ROSAPI.items()}
+    services |= {name: f"rosapi_msgs/srv/{kind}" for name, kind in _ROSAPI.items()}
     match service:
         case "/rosapi/topics":
             return {"topics": list(topics), "types": list(topics.values())}
         case "/rosapi/topics_for_type":
-            return {"topics": _of_type(topics, args["type"])}
+            return {"topics": _of_type(topics, of.get("type", ""))}
         case "/rosapi/topic_type":
-            return {"type": topics.get(absolute(args["topic"]), "")}
+            return {"type": topics.get(absolute(of.get("topic", "")), "")}
         case "/rosapi/services":
             return {"services": list(services)}
         case "/rosapi/services_for_type":
-            return {"services": _of_type(services, args["type"])}
+            return {"services": _of_type(services, of.get("type", ""))}
         case _:
-            return {"type": services.get(absolute(args["service"]), "")}
+            return {"type": services.get(absolute(of.get("service", "")), "")}
 
 
 def _of_type(names: Mapping[str, str], type_: str) -> list[str]:

@@ -8,7 +8,6 @@ bytes: the newest map, the newest 50 observations. Of a throttled topic, only th
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from typing import Final
@@ -23,7 +22,7 @@ from lupin_bridge.feed.relay import (
     topics_of,
 )
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.feed.tasks import Shared
+from lupin_bridge.feed.tasks import Guard, Shared
 from lupin_bridge.serving.ws_protocol import shown
 from lupin_bridge.stream.frames import StateFrame, text_frame
 from lupin_bridge.viewers.rosbridge_protocol import (
@@ -44,8 +43,6 @@ from lupin_bridge.viewers.rosbridge_protocol import (
 )
 from lupin_twin.core.interfaces import Topic
 from lupin_twin.runtime.workers import Workers
-
-log = logging.getLogger(__name__)
 
 MAX_SUBSCRIPTIONS: Final = 32
 
@@ -181,8 +178,6 @@ class Session:
         return Reaction((service_response(request.id, request.service, reply, result=True),))
 
 
-# The largest message that is sent, bytes of CDR: twice as much in JSON, and more.
-MAX_MESSAGE_BYTES: Final = 24_000_000
 # Rough worst-case time to serialize, s per byte of CDR.
 _WRITE_S: Final = 1e-7
 
@@ -199,7 +194,7 @@ class Writer:
         """The sample as a frame for a feed; concurrent requests for the same one share it.
 
         Raises:
-            ValueError: not a message of the topic's type, or too large.
+            ValueError: not a message of the topic's type.
 
         """
 
@@ -221,8 +216,6 @@ class Feeds:
         self._writer = writer
         self._send = send
         self._tasks: dict[str, tuple[Feed, asyncio.Task[None]]] = {}
-        # Logged once for each topic: nonsense on a topic must not fill the log.
-        self._logged: set[tuple[str, bool]] = set()
 
     def follow(self, feeds: dict[str, Feed], renewed: str | None) -> None:
         """Run exactly these feeds, by their spelling; restart the one that is `renewed`."""
@@ -250,39 +243,22 @@ class Feeds:
         try:
             close = await self._writer.relay.listen(feed.topic, take)
         except (NotRelayedError, TwinUnavailableError) as error:
-            await self._report(feed, str(error))
+            await self._send(text_frame(status("error", str(error))))
             return
+        guard = Guard(f"rosbridge, {feed.topic.name}", ValueError)
         try:
             while True:
                 await has_come.wait()
                 has_come.clear()
                 while waiting:
-                    await self._send_sample(feed, waiting.take())
+                    frame = await guard.run(self._writer.frame(feed, waiting.take()))
+                    if isinstance(frame, Exception):
+                        is_known = isinstance(frame, ValueError)
+                        why = str(frame) if is_known else "an internal error, see the bridge's log"
+                        text = f"a message of topic {shown(feed.name)} is left out: {why}"
+                        frame = text_frame(status("error", text))
+                    await self._send(frame)
                     if feed.min_interval_s:
                         await asyncio.sleep(feed.min_interval_s)
         finally:
             close()
-
-    async def _send_sample(self, feed: Feed, sample: Sample) -> None:
-        if len(sample.data) > MAX_MESSAGE_BYTES:
-            await self._report(
-                feed,
-                f"a message of topic {shown(feed.name)} is left out: it has {len(sample.data)} "
-                f"bytes, the limit is {MAX_MESSAGE_BYTES}",
-            )
-            return
-        try:
-            frame = await self._writer.frame(feed, sample)
-        except ValueError as error:
-            await self._report(feed, f"a message of topic {shown(feed.name)} is invalid: {error}")
-        except Exception as error:  # noqa: BLE001  # nobody awaits this task: the next one comes
-            await self._report(feed, "the bridge had an internal error, see its log", error)
-        else:
-            await self._send(frame)
-
-    async def _report(self, feed: Feed, text: str, unforeseen: Exception | None = None) -> None:
-        about = feed.name, unforeseen is None
-        if about not in self._logged:
-            self._logged.add(about)
-            log.warning("rosbridge, %s: %s", feed.topic.name, text, exc_info=unforeseen)
-        await self._send(text_frame(status("error", text)))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import atan2, dist
 from pathlib import Path
@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 Point = tuple[float, float]
 
-# Touching an edge is not crossing it: a robot slides along a table at its clearance, and the
-# camera sees along a table's side. One micrometre is far above float noise.
+# Touching an edge is not crossing it: a robot slides along a table at its clearance. One micrometre
+# is far above float noise.
 TOUCH_M = 1e-6
 
 
@@ -90,12 +90,12 @@ def length_of(points: Sequence[Point]) -> float:
     return sum(dist(a, b) for a, b in pairwise(points))
 
 
-def walk(points: Sequence[Point], step_m: float, length_m: float) -> Iterator[tuple[Point, float]]:
+def walk(points: Sequence[Point], step_m: float) -> Iterator[tuple[Point, float]]:
     """Yield positions along a polyline, each with its distance from the last, at most `step_m`.
 
-    Ends after `length_m`, or at the polyline's end if that comes first; yields at least one.
+    The last one is the polyline's end.
     """
-    remaining = min(length_m, length_of(points))
+    remaining = length_of(points)
     position, ahead = points[0], list(points[1:])
     while True:
         wanted = covered = min(step_m, max(remaining, 0.0))
@@ -166,14 +166,14 @@ class Greenhouse:
 
     def is_free(self, point: Point) -> bool:
         """Whether the robot's centre may be there."""
-        return _is_free(point, self.interior, self.tables)
+        floor = self.interior.grown(TOUCH_M - CLEARANCE_M)
+        return floor.nearest(point) == point and not any(
+            table.rect.grown(CLEARANCE_M).contains(point) for table in self.tables
+        )
 
 
 def read_greenhouse(simulator: Any) -> Greenhouse:
-    """Read the layout of a `greenhouse_sim.simulator.GreenhouseSimulator`.
-
-    Raises ValueError when a tag has no aisle that the robot fits into.
-    """
+    """Read the layout of a `greenhouse_sim.simulator.GreenhouseSimulator`."""
     size = simulator.sim_config["visualization"]
     interior = Rect(0.0, 0.0, float(size["greenhouse_width_m"]), float(size["greenhouse_height_m"]))
     # The simulator's tag manager drops the tables when it loads this file.
@@ -182,35 +182,25 @@ def read_greenhouse(simulator: Any) -> Greenhouse:
         Table(name, Rect(float(box["x0"]), float(box["y0"]), float(box["x1"]), float(box["y1"])))
         for name, box in layout["tables"].items()
     )
-    tags = tuple(
-        _place_tag(tag_id, (float(tag["x"]), float(tag["y"])), tag["sensors"], interior, tables)
+    greenhouse = Greenhouse(interior, tables, ())
+    tags = (
+        _place_tag(tag_id, (float(tag["x"]), float(tag["y"])), tag["sensors"], greenhouse)
         for tag_id, tag in simulator.tag_manager.get_tags().items()
     )
-    return Greenhouse(interior, tables, tags)
+    return replace(greenhouse, tags=tuple(tags))
 
 
-def _place_tag(
-    tag_id: str,
-    position: Point,
-    sensors: list[str],
-    interior: Rect,
-    tables: tuple[Table, ...],
-) -> Tag:
+def _place_tag(tag_id: str, position: Point, sensors: list[str], greenhouse: Greenhouse) -> Tag:
     """Put a tag on the nearest side of its table; at a corner, on the side with the wider aisle."""
-    table = min(tables, key=lambda candidate: dist(position, candidate.rect.nearest(position)))
+    table = min(greenhouse.tables, key=lambda it: dist(position, it.rect.nearest(position)))
     sides = []
     for order, (edge, facing) in enumerate(_sides(table.rect, position)):
         for stand_off_m in STAND_OFFS_M:
             stop = (edge[0] + facing[0] * stand_off_m, edge[1] + facing[1] * stand_off_m)
-            if _is_free(stop, interior, tables):
+            if greenhouse.is_free(stop):
                 away_m = round(dist(position, edge), 3)
                 sides.append((away_m, -stand_off_m, order, edge, facing, stop))
                 break
-    if not sides:
-        raise ValueError(
-            f"tag {tag_id} at {position}: no aisle beside {table.name} is as wide as"
-            f" {2 * CLEARANCE_M} m"
-        )
     *_, edge, facing, stop = min(sides)
     return Tag(tag_id, position, tuple(sensors), table, edge, facing, stop)
 
@@ -224,13 +214,6 @@ def _sides(rect: Rect, position: Point) -> list[tuple[Point, Point]]:
         ((x, rect.y0), (0.0, -1.0)),
         ((x, rect.y1), (0.0, 1.0)),
     ]
-
-
-def _is_free(point: Point, interior: Rect, tables: tuple[Table, ...]) -> bool:
-    floor = interior.grown(TOUCH_M - CLEARANCE_M)
-    return floor.nearest(point) == point and not any(
-        table.rect.grown(CLEARANCE_M).contains(point) for table in tables
-    )
 
 
 class Roadmap:
@@ -249,17 +232,12 @@ class Roadmap:
         self._length, self._next = self._shortest_between_corners()
 
     def way(self, start: Point, goal: Point) -> list[Point]:
-        """Return the shortest path as a polyline from start to goal, both included.
-
-        Raises ValueError when there is no path.
-        """
+        """Return the shortest path as a polyline from start to goal, both included."""
         if not crossings(start, np.array([goal]), self._obstacles).any():
             return [start, goal]
         total = (
             self._straight(start)[:, np.newaxis] + self._length + self._straight(goal)[np.newaxis]
         )
-        if not np.isfinite(total).any():
-            raise ValueError(f"no way from {start} to {goal} is {2 * CLEARANCE_M} m wide")
         first, last = np.unravel_index(np.argmin(total), total.shape)
         corner, bends = int(first), []
         while corner != last:
@@ -288,36 +266,12 @@ class Roadmap:
 
 
 def tour(roadmap: Roadmap, start: Point, stops: Sequence[Point]) -> list[int]:
-    """Order the stops into a short round trip from `start`; returns their indices.
-
-    Nearest neighbour, then 2-opt until nothing gets shorter. For a few dozen stops, the result is
-    within a few percent of the optimum and takes milliseconds.
-    """
-    places = [start, *stops]
-    length = np.array([[length_of(roadmap.way(a, b)) for b in places] for a in places])
-    order, left = [0], set(range(1, len(places)))
+    """Order the stops into a round trip from `start`, always to the nearest; returns indices."""
+    order, left, position = [], set(range(len(stops))), start
     while left:
-        nearest = min(left, key=lambda place: (length[order[-1], place], place))
+        ways = {index: length_of(roadmap.way(position, stops[index])) for index in left}
+        nearest = min(left, key=lambda index: (ways[index], index))
         order.append(nearest)
         left.remove(nearest)
-    order.append(0)
-    while _untangle(order, length):
-        pass
-    return [place - 1 for place in order[1:-1]]
-
-
-def _untangle(order: list[int], length: NDArray[np.float64]) -> bool:
-    """Reverse the first stretch whose reversal shortens the trip; returns whether there was one."""
-    for i in range(1, len(order) - 2):
-        for j in range(i + 1, len(order) - 1):
-            before, first, last, after = order[i - 1], order[i], order[j], order[j + 1]
-            gain = (
-                length[before, first]
-                + length[last, after]
-                - length[before, last]
-                - length[first, after]
-            )
-            if gain > 1e-9:
-                order[i : j + 1] = order[i : j + 1][::-1]
-                return True
-    return False
+        position = stops[nearest]
+    return order

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from itertools import count
 from math import atan2, cos, sin
-from random import Random
 from typing import Any, Final
 
 from lupin_patrol.greenhouse import (
@@ -20,18 +19,15 @@ from lupin_patrol.greenhouse import (
     Point,
     Roadmap,
     Tag,
-    length_of,
     read_greenhouse,
     tour,
     walk,
 )
 from lupin_patrol.perception import (
     SECONDS_PER_DAY,
-    Exploration,
     Grid,
     Plants,
-    Sighting,
-    TagDetector,
+    floor_map,
     readings_at,
     stream,
 )
@@ -52,8 +48,8 @@ def pose_of(position: Point, yaw: float) -> Pose:
 
 
 @dataclass(frozen=True, slots=True)
-class MapGrown:
-    """More cells of the map have become known."""
+class MapKnown:
+    """The map of the floor, sent at the start."""
 
     at_s: float
     grid: Grid
@@ -61,10 +57,10 @@ class MapGrown:
 
 @dataclass(frozen=True, slots=True)
 class TagsDiscovered:
-    """Perception's complete list of tags, sent when it grows and at the end of each pass."""
+    """Perception's list of tags, sent at the start and at the end of each pass."""
 
     at_s: float
-    sightings: tuple[Sighting, ...]
+    tags: tuple[Tag, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,23 +104,18 @@ class RobotMoved:
     battery: float
 
 
-Event = MapGrown | TagsDiscovered | Visited | PassCompleted | WayPlanned | RobotMoved
+Event = MapKnown | TagsDiscovered | Visited | PassCompleted | WayPlanned | RobotMoved
 
 
 DOCK: Point = (0.4, 0.4)
 START_OF_DAY_S = 9 * 3600.0
 
 _ROBOT_SPEED_M_S = 1.2
-_OBSERVE_PERIOD_S = 0.2
-_MAP_PERIOD_S = 1.0
+_MOVE_PERIOD_S = 0.2
 _READ_S = 0.3
 _PICTURE_S = 0.2
-_BLOCKED_SHORT_M = 0.1
 # Range of a full battery; the dock recharges it completely.
 _BATTERY_M = 400.0
-
-_POSE_NOISE_M = 0.01
-_YAW_NOISE_RAD = 0.02
 
 _FAILURES_A_PASS = 2
 _RETRY_FAILS = 0.3
@@ -156,8 +147,6 @@ class Mission:
         self._sensors = simulator.sensor_registry
         self._plants = Plants(self.greenhouse, seed, first_pass)
         self._roadmap = Roadmap(self.greenhouse)
-        self._exploration = Exploration(self.greenhouse)
-        self._detector = TagDetector(self.greenhouse, self._plants, seed)
         self._seed = seed
         self._day_speed = day_speed
         self._position = DOCK
@@ -165,29 +154,29 @@ class Mission:
         self._battery_m = _BATTERY_M
         self._now_s = begin_s
         self._first_pass = first_pass
-        self._is_observing = True
-        self._map_due_s = begin_s
-        self._map_is_new = False
+        self._is_silent = False
         order = tour(self._roadmap, DOCK, [tag.stop for tag in self.greenhouse.tags])
         self._tour = [self.greenhouse.tags[index] for index in order]
 
     def events(self) -> Iterator[Event]:
         """Patrol forever. Call it once: the mission holds the state of one robot."""
-        yield from self._observe(self._first_pass)
+        yield MapKnown(self._now_s, floor_map(self.greenhouse))
+        yield TagsDiscovered(self._now_s, self.greenhouse.tags)
+        yield self._moved()
         for pass_index in count(self._first_pass):
             yield from self._patrol(pass_index)
-            yield from self._drive(DOCK, pass_index)
+            yield from self._drive(DOCK)
             self._battery_m = _BATTERY_M
 
     def visits(self) -> Iterator[Visited]:
-        """Yield only the visits of `events`, at a tenth of the work: no observing on the way."""
-        self._is_observing = False
+        """Yield only the visits of `events`, at a tenth of the work: nothing on the way."""
+        self._is_silent = True
         for event in self.events():
             if isinstance(event, Visited):
                 yield event
 
     def _patrol(self, pass_index: int) -> Iterator[Event]:
-        """Visit every tag once, then the failed ones again, the nearest first."""
+        """Visit every tag once, then the failed ones again."""
         planned = self._planned_failures(pass_index)
         failed: list[Tag] = []
         for tag in self._tour:
@@ -196,16 +185,12 @@ class Mission:
             if status is not ScanStatus.OK:
                 failed.append(tag)
         lost = []
-        while failed:
-            tag = min(failed, key=lambda tag: self._way_length(tag.stop))
-            failed.remove(tag)
+        for tag in failed:
             status = self._retry_status(tag, pass_index)
             yield from self._visit(tag, pass_index, 1, status)
             if status is not ScanStatus.OK:
                 lost.append(tag.tag_id)
-        if self._map_is_new:
-            yield self._map()
-        yield TagsDiscovered(self._now_s, self._detector.sightings())
+        yield TagsDiscovered(self._now_s, self.greenhouse.tags)
         yield PassCompleted(self._now_s, pass_index, tuple(lost))
 
     def _planned_failures(self, pass_index: int) -> dict[str, ScanStatus]:
@@ -223,17 +208,14 @@ class Mission:
     def _visit(
         self, tag: Tag, pass_index: int, attempt: int, status: ScanStatus
     ) -> Iterator[Event]:
-        blocked = status is ScanStatus.UNREACHABLE
-        yield from self._drive(tag.stop, pass_index, _BLOCKED_SHORT_M if blocked else 0.0)
+        yield from self._drive(tag.stop)
         self._now_s += _READ_S
         time_of_day_s = (START_OF_DAY_S + self._now_s * self._day_speed) % SECONDS_PER_DAY
         pose: Pose | None = None
         readings: tuple[Reading, ...] = ()
         if status is ScanStatus.OK:
             chance = stream(self._seed, "scan", tag.tag_id, pass_index, attempt)
-            # The first pass builds the map and so defines where the tags are: it is exact. Later
-            # passes localise in that map, with noise.
-            pose = _locate(tag, 0.0 if pass_index == self._first_pass else 1.0, chance)
+            pose = pose_of(tag.position, tag.yaw)
             readings = readings_at(self._sensors, tag.sensors, tag.position, time_of_day_s, chance)
         scan = Scan(tag.tag_id, 0, readings, pose, status, _DETAILS[status])
         yield Visited(self._now_s, pass_index, time_of_day_s, scan)
@@ -243,44 +225,24 @@ class Mission:
             seen = Inspection(tag.tag_id, 0, flower, pose)
             yield Visited(self._now_s, pass_index, time_of_day_s, seen)
 
-    def _drive(self, goal: Point, pass_index: int, short_m: float = 0.0) -> Iterator[Event]:
-        """Drive to a goal, or stop `short_m` before it, and observe on the way."""
+    def _drive(self, goal: Point) -> Iterator[Event]:
+        """Drive to a goal, and report the way."""
         way = self._roadmap.way(self._position, goal)
-        if self._is_observing:
+        if not self._is_silent:
             yield WayPlanned(self._now_s, tuple(way))
-        step_m = _ROBOT_SPEED_M_S * _OBSERVE_PERIOD_S
-        for position, driven_m in walk(way, step_m, max(0.0, length_of(way) - short_m)):
+        step_m = _ROBOT_SPEED_M_S * _MOVE_PERIOD_S
+        for position, driven_m in walk(way, step_m):
             (x, y), self._position = self._position, position
             if position != (x, y):
                 self._yaw = atan2(position[1] - y, position[0] - x)
             self._now_s += driven_m / _ROBOT_SPEED_M_S
             self._battery_m -= driven_m
-            yield from self._observe(pass_index)
+            if not self._is_silent:
+                yield self._moved()
 
-    def _observe(self, pass_index: int) -> Iterator[Event]:
-        if not self._is_observing:
-            return
+    def _moved(self) -> RobotMoved:
         battery = self._battery_m / _BATTERY_M
-        yield RobotMoved(self._now_s, self._position, self._yaw, battery)
-        if self._detector.observe_from(self._position, pass_index):
-            yield TagsDiscovered(self._now_s, self._detector.sightings())
-        self._map_is_new |= self._exploration.observe_from(self._position)
-        if self._map_is_new and self._now_s >= self._map_due_s:
-            yield self._map()
-
-    def _map(self) -> MapGrown:
-        self._map_is_new = False
-        self._map_due_s = self._now_s + _MAP_PERIOD_S
-        return MapGrown(self._now_s, self._exploration.snapshot())
-
-    def _way_length(self, goal: Point) -> float:
-        return length_of(self._roadmap.way(self._position, goal))
-
-
-def _locate(tag: Tag, noise: float, chance: Random) -> Pose:
-    """Return a tag's measured pose, with an error of about 1 cm times `noise`."""
-    x, y = (at + noise * chance.gauss(0.0, _POSE_NOISE_M) for at in tag.position)
-    return pose_of((x, y), tag.yaw + noise * chance.gauss(0.0, _YAW_NOISE_RAD))
+        return RobotMoved(self._now_s, self._position, self._yaw, battery)
 
 
 # --- the past: what the patrol would have observed in the last three simulated days ---------------

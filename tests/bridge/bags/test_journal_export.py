@@ -13,7 +13,7 @@ from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from lupin_bridge.bags import journal_export
-from lupin_bridge.bags.journal_export import JournalRows, export
+from lupin_bridge.bags.journal_export import export
 from lupin_twin.core import ingest
 from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import Repeats
@@ -161,19 +161,6 @@ def test_simulated_time_comes_with_a_clock_topic(tmp_path: Path) -> None:
     assert observation[:2] == ("/floranova/observations", row.arrival_ns)
     # By arrival, not by observation: a clock does not go back.
     assert convert.nanoseconds(deserialize_message(later, ClockMessage).clock) == 65 * SECOND
-
-
-def test_writes_during_the_export_are_exported_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path, later = tmp_path / "j.sqlite", scan("10", NOW + 9 * SECOND, light=1.0)
-    append(path, ROWS[:4])
-    monkeypatch.setattr(journal_export, "LOT", 1)
-    with closing(open_reader(path)) as connection:
-        reading = iter(JournalRows(connection, 0, 2**62))
-        first = [next(reading)[1] for _ in range(2)]
-        append(path, [later])
-        assert [*first, *(row for _, row in reading)] == [*ROWS[:4], later]
 
 
 def test_positions_from_an_earlier_run_are_exported(tmp_path: Path) -> None:

@@ -6,12 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-import pytest
 from builtin_interfaces.msg import Time
 from rosgraph_msgs.msg import Clock
 
-from lupin_bridge.bags.player import Player, parser
-from lupin_bridge.bags.recording import Recording, RecordingError
 from tests.support.messages import occupancy_grid, scan
 from tests.support.processes import Process, children_of, is_running, lupin_twin, twin_node, url_of
 from tests.support.recordings import OBSERVATIONS, Sent, write_bag
@@ -86,19 +83,6 @@ def test_a_recorded_clock_is_the_time(domain: int, tmp_path: Path) -> None:
         )
         assert shown["state"]["tags"][0]["stale_seconds"] == 9.0
         assert len(list(tmp_path.glob("lupin-twin-*/journal.sqlite"))) == 1
-
-
-def test_a_clock_topic_without_times_is_named_with_its_file(tmp_path: Path) -> None:
-    reported = b"\0\1\0\0" + b"1111"
-    sent = [Sent("/clock", 5_000.0, Clock(clock=Time(sec=0x31313131))), seen("a", 5_002.0)]
-    path = write_bag(tmp_path / "run.mcap", sent, is_chunked=False)
-    assert path.read_bytes().count(reported) == 1
-    path.write_bytes(path.read_bytes().replace(reported, b"\xff\xff" + reported[2:]))
-    with (
-        Recording([path]) as recording,
-        pytest.raises(RecordingError, match=f"^cannot read {path}: a message on /clock is not a "),
-    ):
-        Player(recording, None, parser().parse_args([str(path), "--start", "1"]))  # type: ignore[arg-type]  # it comes to no node
 
 
 def test_a_loop_starts_again_without_later_data(domain: int, tmp_path: Path) -> None:

@@ -156,21 +156,22 @@ def spare(_: float) -> None:
 # --- times --------------------------------------------------------------------------------------
 
 
-def test_a_state_waits_for_its_own_times_alone(stage: Stage, peer: Peer) -> None:
+def test_a_state_waits_for_its_own_times_but_not_past_the_next_one(
+    stage: Stage, peer: Peer
+) -> None:
     reported = stage.take(peer, tag())
     assert reported.tags[0].readings[0].observed_at_ns == 5 * S
-    count = len(stage.reported)
-    # A state without its times is passed on without them, so that the twin does not seem dead.
-    late = Snapshot(90 * S, "map", (tag(value=7.0, at_s=80),))
-    peer.publish("/twin/state", convert.StateMessages().build(late), depth=1)
-    alone = stage.reported_of(90 * S)
-    assert not has_times(alone)
-    assert alone.tags[0].readings[0] == Reading("co2", 7.0)
-    assert len(stage.reported) == count + 1
-    # And again with them as soon as they arrive.
-    times = convert.StateMessages().times(late)
-    peer.publish("/twin/times", times, depth=1)
-    stage.until(lambda: has_times(stage.reported[-1]), "the times")
+    late: list[Snapshot] = []
+
+    def is_shown_alone() -> bool:
+        late.append(Snapshot((90 + len(late)) * S, "map", (tag(value=7.0, at_s=80),)))
+        peer.publish("/twin/state", convert.StateMessages().build(late[-1]), depth=1)
+        return not has_times(stage.reported[-1])
+
+    stage.until(is_shown_alone, "a state without times: the twin must not seem dead")
+    assert stage.reported[-1].tags[0].readings[0] == Reading("co2", 7.0)
+    peer.publish("/twin/times", convert.StateMessages().times(late[-1]), depth=1)
+    stage.until(lambda: has_times(stage.reported[-1]), "the last one, with its times")
     assert stage.reported[-1].tags[0].readings[0].observed_at_ns == 80 * S
 
 

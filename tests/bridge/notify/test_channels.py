@@ -68,6 +68,6 @@ async def test_a_failing_channel_is_reported_and_the_other_goes_on(tmp_path: Pat
         counts = dict(channels.counts())
         assert counts["lupin_outward_connected"] == {"mqtt": 0, "webhook": 1}
         assert counts["lupin_outward_failed"]["mqtt"] >= 1
-        assert counts["lupin_outward_waiting"]["mqtt"] == 2
+        assert counts["lupin_outward_waiting"]["mqtt"] == 1
         await channels.stop()
     assert server.posted[0].json["origin"] == Greenhouse.origin

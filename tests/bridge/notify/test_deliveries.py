@@ -10,7 +10,7 @@ from tests.support.seen import NOW_NS, S, alarm
 
 
 def put(news: AlarmNews, *alarms: Alarm, is_past: bool = False) -> list[tuple[str, str]]:
-    found = news.of(Change(alarms, is_past=is_past), NOW_NS, "robot")
+    found = news.of(Change(alarms, is_past=is_past), NOW_NS)
     return [(it.change, it.id) for it in found]
 
 
@@ -45,8 +45,8 @@ def test_an_alarm_that_continues_after_all_is_raised_again_with_another_id() -> 
 def test_a_sent_alarm_that_turns_out_never_to_have_been_is_withdrawn_and_no_other() -> None:
     news = AlarmNews()
     put(news, alarm("a"))
-    found = news.of(Change((), (alarm("a"), alarm("b"))), NOW_NS, "robot")
-    assert [(it.change, getattr(it.alarm, "tag_id", None)) for it in found] == [("withdrawn", "a")]
+    found = news.of(Change((), (alarm("a"), alarm("b"))), NOW_NS)
+    assert [(it.change, it.alarm.tag_id) for it in found] == [("withdrawn", "a")]
 
 
 def test_active_alarms_and_those_of_the_last_day_are_sent_again_with_the_same_ids() -> None:
@@ -65,5 +65,5 @@ def test_active_alarms_and_those_of_the_last_day_are_sent_again_with_the_same_id
 def test_without_a_known_time_the_latest_alarm_sets_the_day() -> None:
     news = AlarmNews()
     old, new = alarm("old", raised_ns=1, cleared_ns=2), alarm("new", raised_ns=NOW_NS)
-    found = news.of(Change((old, new), is_past=True), None, "robot")
-    assert [getattr(it.alarm, "tag_id", None) for it in found] == ["new"]
+    found = news.of(Change((old, new), is_past=True), None)
+    assert [it.alarm.tag_id for it in found] == ["new"]

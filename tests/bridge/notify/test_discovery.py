@@ -92,13 +92,6 @@ def test_a_silent_twin_makes_only_the_verdicts_of_tags_unavailable() -> None:
     assert greenhouse["Twin"]["device_class"] == "connectivity"
 
 
-def test_no_two_entities_have_the_same_name() -> None:
-    odd = [*announced("a", "x/y", "x y", "verdict").items(), *announced("a_-_verdict").items()]
-    odd += greenhouse_configs(TOPICS)
-    assert len({topic for topic, _ in odd}) == len(odd)
-    assert len({config["unique_id"] for _, config in odd}) == len(odd)
-
-
 def test_readings_expire_no_sooner_than_they_hold() -> None:
     assert expire_after_s(600 * S) == 600
     assert expire_after_s(600 * S + 1) == 900

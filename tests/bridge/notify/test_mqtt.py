@@ -1,10 +1,8 @@
 """MQTT with a real mosquitto: absent, refusing, hanging, killed, and brought up to date again."""
 
 import asyncio
-import gc
-import socket
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -157,33 +155,6 @@ async def test_a_flood_of_wills_and_births_is_answered_at_a_limited_rate(
             assert channel.condition.sent <= 3 * sent
 
 
-async def test_a_broker_that_sends_a_packet_of_256_mb_is_disconnected_before_it_is_read(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    """None should, as the limit was announced. The packet never gets into memory."""
-    taken: list[int] = []
-
-    def serve(listener: socket.socket) -> None:
-        client, _ = listener.accept()
-        with client, suppress(OSError):
-            client.recv(4_096)
-            client.sendall(b"\x20\x03\x00\x00\x00")  # CONNACK, no property
-            client.sendall(b"\x30\xff\xff\xff\x7f")  # PUBLISH, with the longest possible length
-            taken.append(0)
-            while taken[0] < 256_000_000:
-                taken[0] += client.send(bytes(1 << 20))
-
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        serving = asyncio.create_task(asyncio.to_thread(serve, listener))
-        broker = Broker(Path(), listener.getsockname()[1])
-        async with telling(broker, Greenhouse(), answer_s=2.0) as channel:
-            await until(lambda: channel.condition.failed, "the end of the connection")
-        await serving
-    assert taken[0] < 32_000_000, "what the sockets of the two hold, and no more"
-    gc.collect()
-    assert "never retrieved" not in caplog.text
-
-
 async def test_two_bridges_with_one_prefix_do_not_disconnect_each_other(shared: Broker) -> None:
     async with telling(shared, Greenhouse()) as one, telling(shared, Greenhouse()) as two:
         await until(lambda: one.condition.sent > 10, "what the one tells")
@@ -205,8 +176,7 @@ async def test_a_broker_that_is_absent_appears_and_is_killed_gets_the_latest_sta
                 assert channel.condition.detail == ""
                 process.kill()
             await until(lambda: not channel.condition.is_connected, "the end of the broker")
-            greenhouse.scan()
-        await until(lambda: channel.condition.waiting == 2, "the tag and the greenhouse")
+            assert channel.condition.waiting == 1
 
 
 async def test_after_a_failure_to_read_the_greenhouse_everything_is_sent_again(

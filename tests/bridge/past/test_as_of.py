@@ -21,7 +21,6 @@ from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
 from lupin_twin.estimate.engine import TagPast
 from lupin_twin.field.engine import FieldRefused, FieldRules
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.runtime.workers import SMALL_S
 from tests.support.maps import map_of
 
 NS = 10**9
@@ -111,7 +110,7 @@ def test_a_derived_reading_uses_the_readings_of_one_scan() -> None:
 
 def test_before_the_first_observation_state_and_field_are_empty() -> None:
     nothing = Snapshot(1, "map", ())
-    assert body(WholeState(None).plan(nothing))["tags"] == []
+    assert body(WholeState(1).look(lambda _: nothing))["tags"] == []
     found = body(field_of(nothing, requested(), JSON))
     assert (found["sample_count"], set(found["values"])) == (0, {None})
 
@@ -181,8 +180,8 @@ def test_too_large_a_past_field_is_refused() -> None:
 def plans(greenhouse: Snapshot, field: Field) -> list[str]:
     """The ETags of every kind of answer."""
     return [
-        WholeState(None).plan(greenhouse).etag,
-        *(OneTag(None, tag_id).plan(greenhouse).etag for tag_id in "ab"),
+        WholeState(1).look(lambda _: greenhouse).etag,
+        *(OneTag(1, tag_id).look(lambda _: greenhouse).etag for tag_id in "ab"),
         *(field_of(greenhouse, field, field_format).etag for field_format in FORMATS),
         field_of(greenhouse, field).etag,
     ]
@@ -201,22 +200,3 @@ def plans(greenhouse: Snapshot, field: Field) -> list[str]:
 )
 def test_another_field_has_another_etag(other: Field) -> None:
     assert not set(plans(SITE, other)[3:]) & set(plans(SITE, requested())[3:])
-
-
-# --- cost -----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("field_format", [JSON, PNG])
-def test_expensive_answers_declare_their_cost(field_format: FieldFormat) -> None:
-    large = replace(RULES, max_grid_cells=1_000_000)
-
-    def cost_s(tags: int, field: Field) -> float:
-        return replace(field, field_format=field_format).write_s(tags)
-
-    assert (
-        cost_s(len(SITE.tags), requested())
-        < SMALL_S
-        < cost_s(2_000, requested(large, resolution=1))
-    )
-    assert cost_s(len(SITE.tags), requested(large, resolution=0.004)) > SMALL_S
-    assert cost_s(2, requested(scale=9)) > cost_s(2, requested()), "of a picture each pixel"

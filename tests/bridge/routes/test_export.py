@@ -133,18 +133,6 @@ async def test_an_export_to_a_reader_that_does_not_read_stops_and_is_cut_off(dom
                 deque(iter(lambda: client.recv(65_536), b""))
 
 
-async def test_a_slow_reader_gets_everything_and_no_more_is_read_ahead(domain: int) -> None:
-    lot = rows(1_000)
-    past = MadeUp(lots=[lot] * MANY)
-    size = len(bodies.csv_lines(lot, own_sensors()))
-    async with remembering(past) as it, it.http.stream("GET", PATH) as answer:
-        taken = 0
-        async for piece in answer.aiter_raw(65_536):
-            taken += len(piece)
-            assert past.lots_taken * size - taken < MOST_TAKEN_BYTES
-        assert taken == len(bodies.CSV_HEADER) + MANY * size
-
-
 async def test_a_client_has_one_export_and_a_disconnect_frees_its_place(domain: int) -> None:
     past = MadeUp(lots=[rows(1_000)] * MANY)
     async with remembering(past) as it:

@@ -7,7 +7,6 @@ import pytest
 
 from lupin_bridge.feed.relay import Sample
 from lupin_bridge.viewers.foxglove import (
-    MAX_MESSAGE_BYTES,
     MAX_SUBSCRIPTIONS,
     Channel,
     Counts,
@@ -81,7 +80,7 @@ def test_subscriptions_are_limited(stage: Stage) -> None:
 def test_the_latest_message_of_each_subscription_waits_and_they_take_turns(stage: Stage) -> None:
     stage.subscribe((1, 10), (2, 20))
     for key, payload in ((1, b"a"), (2, b"b"), (1, b"c"), (9, b"nobody")):
-        assert stage.session.put(key, Sample(payload, 5)) is None
+        stage.session.put(key, Sample(payload, 5))
     assert stage.written() == [(2, b"b"), (1, b"c")]
     assert stage.counts == Counts(sent=2, skipped=1)
     stage.session.put(1, Sample(b"d", 5))
@@ -96,20 +95,6 @@ def test_time_goes_before_messages_and_only_the_latest(stage: Stage) -> None:
     stage.session.time_ns = 8
     assert stage.session.next() == (b"\x02\x08" + bytes(7), b"")
     assert stage.written() == [(1, b"a")]
-
-
-def test_a_message_past_the_limit_is_left_out_and_reported_once(stage: Stage) -> None:
-    stage.subscribe((1, 10))
-    most = bytes(MAX_MESSAGE_BYTES)
-    assert stage.session.put(1, Sample(most, 5)) is None
-    assert len(stage.written()[0][1]) == MAX_MESSAGE_BYTES
-    too_large = Sample(most + b"x", 5)
-    note = stage.session.put(1, too_large)
-    assert note is not None
-    assert json.loads(note)["level"] == 1
-    assert json.loads(note)["message"].startswith("messages on '/topic10' are left out while")
-    assert stage.session.put(1, too_large) is None
-    assert stage.written() == []
 
 
 def test_channels_that_come_and_go_are_announced_and_their_subscriptions_end(stage: Stage) -> None:

@@ -143,7 +143,6 @@ def test_a_topic_has_the_name_that_the_client_used(session: Session) -> None:
         {"service": "/twin/get_field", "args": ["co2"]},
         {"service": "/twin/get_field", "args": {"resolution": "x"}},
         {"service": "/twin/get_field", "type": "std_srvs/srv/Trigger"},
-        {"service": "/rosapi/topic_type", "args": {"x": 1}},
         {"service": "/twin/get_field", "timeout": "soon"},
     ],
 )

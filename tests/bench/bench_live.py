@@ -12,8 +12,8 @@ The columns:
 - delivered: the share of (frames made × clients) that arrived. A frame that a slow client
   skipped, as the bridge intends, counts as not delivered.
 - joined: all clients connect in the same moment; the time until the last has its first state.
-- cores: the server's processor time, all threads, over the time measured.
-- memory: the server's resident memory at the end, MB.
+- cores: the processor time of the server and its child processes, over the time measured.
+- memory: the resident memory of the same at the end, MB; a page that two share counts once.
 """
 
 import itertools
@@ -22,7 +22,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tests.bench.live_parts import Clients, Server, serving
-from tests.support.proc_stat import cpu_s, resident_mb
 
 # Between joining, which is not measured, and the measurement: the load goes on meanwhile.
 SETTLE_S = 1.0
@@ -30,18 +29,22 @@ SETTLE_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """One row: that many clients of a twin with that many tags and that rate of changes."""
+    """One row: that many clients of a twin with that many tags and that rate of scans.
+
+    `frames_hz` 0: the bridge may send a frame for each scan.
+    """
 
     clients: int
     rate_hz: float = 10.0
+    frames_hz: float = 0.0
     tags: int = 30
     path: str = "/ws/state"
     measure_s: float = 8.0
 
     @property
-    def server(self) -> tuple[int, float]:
-        """How the server and the robot are started: tags and rate."""
-        return self.tags, self.rate_hz
+    def server(self) -> tuple[int, float, float]:
+        """How the server and the robot are started."""
+        return self.tags, self.rate_hz, self.frames_hz
 
 
 def measure_load(server: Server, load: Load) -> list[str]:
@@ -50,15 +53,16 @@ def measure_load(server: Server, load: Load) -> list[str]:
         joined_s = clients.joined_s()
         start_s = time.monotonic() + SETTLE_S
         time.sleep(SETTLE_S)  # for every load the same time: joining is not measured
-        before_s = cpu_s(server.process.pid)
+        before_s = server.cpu_s()
         # The clients answer when it is over and drained; the processor time ends with them.
         seen = clients.measure(start_s, start_s + load.measure_s)
-        cores = server.cores_since(start_s, before_s)
-        memory = resident_mb(server.process.pid)
+        cores = (server.cpu_s() - before_s) / (time.monotonic() - start_s)
+        memory = server.memory_mb()
     return [
         f"{load.tags:,}",
         f"{load.clients:,}",
         f"{load.rate_hz:g}",
+        f"{load.frames_hz or load.rate_hz:g}",
         "delta" if "delta=1" in load.path else "full",
         f"{seen.frame_bytes / 1e3:,.1f}",
         f"{100 * seen.delivered(load.clients):.2f}",
@@ -71,7 +75,7 @@ def measure_load(server: Server, load: Load) -> list[str]:
 
 
 HEADINGS = (
-    *("tags", "clients", "Hz", "frames", "kB", "delivered %", "median ms", "p99 ms"),
+    *("tags", "clients", "scans/s", "Hz", "frames", "kB", "delivered %", "median ms", "p99 ms"),
     *("joined s", "cores", "memory MB"),
 )
 
@@ -79,6 +83,7 @@ HEADINGS = (
 DELTA = "/ws/state?delta=1"
 LOADS = (
     *(Load(clients) for clients in (1, 50, 200, 500, 1_000)),
+    Load(200, rate_hz=40.0, frames_hz=10.0),
     Load(5_000, rate_hz=1.0, measure_s=10.0),
     Load(50, tags=1_000),
     Load(50, tags=1_000, path=DELTA),
@@ -95,7 +100,7 @@ def as_row(cells: Sequence[str]) -> str:
 def main() -> None:
     print(as_row(HEADINGS))
     print(f"|{'|'.join('-' * (len(h) + 1) + ':' for h in HEADINGS)}|")
-    for started_with, same in itertools.groupby(LOADS, lambda load: load.server):
-        with serving(*started_with) as server:
+    for (tags, rate_hz, frames_hz), same in itertools.groupby(LOADS, lambda load: load.server):
+        with serving(tags, rate_hz, frames_hz=frames_hz) as server:
             for load in same:
                 print(as_row(measure_load(server, load)), flush=True)

@@ -59,7 +59,7 @@ def reset_peak(pid: int) -> None:
 
 
 def proportional_mb(pid: int) -> float:
-    """Resident memory, MB, where a page that processes share counts in parts (proc_pid_smaps(5))."""
+    """Resident memory, MB; a page that processes share counts in parts (proc_pid_smaps(5))."""
     text = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii")
     return int(text.partition("\nPss:")[2].split()[0]) * 1024 / 1e6
 

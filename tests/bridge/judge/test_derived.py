@@ -4,15 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lupin_bridge.judge.judging import Criteria, judge_once
 from lupin_bridge.judge.quantities import (
     DERIVED,
     dew_point_c,
     saturation_kpa,
     vapour_pressure_deficit_kpa,
 )
-from lupin_bridge.settings import Settings
-from lupin_twin.core.state import Reading, Snapshot, TagState
 
 
 @pytest.mark.parametrize(
@@ -54,13 +51,3 @@ def test_dry_air_has_no_dew_point(humidity: float) -> None:
 def test_a_sensor_that_reads_slightly_high_in_saturated_air_counts_as_saturated() -> None:
     assert vapour_pressure_deficit_kpa(20.0, 100.4) == 0.0
     assert dew_point_c(20.0, 105.0) == pytest.approx(20.0)
-
-
-@pytest.mark.parametrize(("humidity", "limit"), [(90.0, None), (92.0, 1.5)])
-def test_air_close_to_its_dew_point_is_a_reason(humidity: float, limit: float | None) -> None:
-    readings = (Reading("temperature", 20.0, 1), Reading("humidity", humidity, 1))
-    judged = judge_once(
-        Snapshot(1, "map", (TagState("7", readings=readings),)), (), Criteria.of(Settings())
-    )
-    margins = [it for it in judged.tags["7"].reasons if it.sensor == "condensation_margin"]
-    assert [it.limit for it in margins] == ([] if limit is None else [limit])

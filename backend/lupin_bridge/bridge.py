@@ -87,23 +87,23 @@ class Bridge:
         self.offer = Offer(source)
         self.rosbridge_writer = Writer(source.relay, source.workers)
         self.criteria = criteria or Criteria.of(settings)
-        self._judge = Judge(self.criteria, knows_recent=False)
+        self.judge = Judge(self.criteria, knows_recent=False)
         self._judged = NOTHING_JUDGED
         self._states_unjudged = 0
         self._is_judge_failing = False
-        self._estimates = EstimatePoller(
+        self.estimates = EstimatePoller(
             source,
             lambda: None if self.latest is None else self.latest.snapshot,
-            self._judge.note_changed,
+            self.judge.note_changed,
         )
         self.alarms = AlarmBoard(self._on_alarms)
-        self._alarm_feed = AlarmFeed(
+        self.alarm_feed = AlarmFeed(
             source,
             self.criteria,
             self.alarms,
             lambda: self.ros_time_ns,
             limits.alarm_days,
-            note_days=self._judge.note_days,
+            note_days=self.judge.note_days,
         )
         self.robot = RobotPoller(source, self.hub, lambda: self.ros_time_ns, clock)
         self._has_alarms = asyncio.Event()
@@ -139,16 +139,16 @@ class Bridge:
         self.outward.start(self, self.criteria.sensors)
         if self.latest is not None:  # there may be no second state: a silent site sends one
             self.notes.start()
-        self._alarm_feed.start()
-        self._estimates.start()
+        self.alarm_feed.start()
+        self.estimates.start()
         self.robot.start()
 
     async def stop(self) -> None:
         """Stop all that `start` began; call `announce_shutdown` first to notify the clients."""
         await end(self._learning, self._publishing_alarms)
         await self._watch.stop()
-        await asyncio.gather(self._alarm_feed.stop(), self.notes.stop())
-        await asyncio.gather(self._estimates.stop(), self.robot.stop())
+        await asyncio.gather(self.alarm_feed.stop(), self.notes.stop())
+        await asyncio.gather(self.estimates.stop(), self.robot.stop())
         if self._push_timer is not None:
             self._push_timer.cancel()
         await asyncio.gather(self.outward.stop(), self.source.stop())
@@ -196,7 +196,7 @@ class Bridge:
             self.status,
             self.judged,
             self.alarms.now,
-            holds_ns=self._judge.holds_ns(),
+            holds_ns=self.judge.holds_ns(),
             now_ns=self.ros_time_ns,
         )
 
@@ -242,7 +242,7 @@ class Bridge:
         yield "lupin_judge_errors", self._states_unjudged
         yield "lupin_alarms_known", self.alarms.now.source != "starting"
         yield "lupin_alarms_active", len(self.alarms.now.active)
-        yield "lupin_alarms_missed", self._alarm_feed.missed
+        yield "lupin_alarms_missed", self.alarm_feed.missed
         yield "lupin_alarms_raised", self.alarms_raised
         yield "lupin_fields_computing", self.admission.being_computed
         yield "lupin_exports_running", self.admission.exporting
@@ -250,7 +250,7 @@ class Bridge:
         yield "lupin_admission_refused", self.admission.refused
         yield "lupin_http_answers", self.http_answers
         yield from self.outward.counts()
-        known = self._estimates.known
+        known = self.estimates.known
         trusted = {name: report.record.is_trusted for name, report in known.items()}
         yield "lupin_estimate_trusted", {name: it for name, it in trusted.items() if it is not None}
         yield (
@@ -282,7 +282,7 @@ class Bridge:
         self.state_number += 1
         now_s = self._clock()
         self.liveness.update, self.liveness.updated_s = state, now_s
-        self._alarm_feed.on_state(state)
+        self.alarm_feed.on_state(state)
         if self._push_timer is not None:
             return  # the timer will send this state
         if self._is_redundant(state, now_s):
@@ -323,7 +323,7 @@ class Bridge:
         if has_started:
             self.notes.start()
         if has_started and self._learning is None and state.snapshot.tags:
-            work = learn_recent(self.source, self._judge, state.snapshot)
+            work = learn_recent(self.source, self.judge, state.snapshot)
             self._learning = asyncio.create_task(work, name="recent")
         self._judged = self._judge_state(state.snapshot)
         self.hub.publish(self.frames.state(state.snapshot, state.revision, self._judged), now_s)
@@ -331,7 +331,7 @@ class Bridge:
 
     def _judge_state(self, snapshot: Snapshot) -> Judged:
         try:
-            judged = self._judge.see(snapshot)
+            judged = self.judge.see(snapshot)
         except Exception:  # whatever failed: the state itself must be sent
             self._states_unjudged += 1
             if not self._is_judge_failing:
@@ -390,7 +390,7 @@ class Bridge:
         self._published = status
         if status.reason not in ("never_seen", "shutting_down"):
             last = self.latest
-            self._alarm_feed.on_silence(
+            self.alarm_feed.on_silence(
                 is_silent=not status.is_live,
                 last_ns=None if last is None else last.snapshot.now_ns,
             )

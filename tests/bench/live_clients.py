@@ -14,6 +14,7 @@ It connects all clients at the monotonic time T and prints one JSON object a lin
 
 import argparse
 import json
+import re
 import resource
 import select
 import socket
@@ -26,7 +27,7 @@ READ_BYTES = 1 << 18
 # After the end of the measurement, for frames still under way.
 DRAIN_S = 1.5
 _SEQ = b'"seq":'
-_BEAT = b'"name":"beat","value":'
+_BEAT = re.compile(rb'"name":"beat","value":([\d.]+)')
 
 
 @dataclass(slots=True, eq=False)
@@ -168,13 +169,11 @@ class Clients:
             self._joined.append(self._now - self._connected_at)
             stream.beat = -1.0
         seq = _number(data, at + len(_SEQ))
-        at = data.find(_BEAT, start, end)
-        if at >= 0:
-            beat = _number(data, at + len(_BEAT))
-            if beat != stream.beat:
-                stream.beat = beat
-                if self._window[0] <= beat <= self._window[1]:
-                    self._delays.append(self._now - beat)
+        beat = max(map(float, _BEAT.findall(data, start, end)), default=stream.beat)
+        if beat > stream.beat:
+            stream.beat = beat
+            if self._window[0] <= beat <= self._window[1]:
+                self._delays.append(self._now - beat)
         if self._window[0] <= stream.beat <= self._window[1]:
             self._received[int(seq)] += 1
             self._bytes += end - start

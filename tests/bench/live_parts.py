@@ -12,8 +12,8 @@ from typing import Any, Self
 from urllib.parse import urlsplit
 
 from tests.support.domains import own_domain, ros_env
-from tests.support.proc_stat import cpu_s
-from tests.support.processes import Process, limits, lupin_twin, url_of
+from tests.support.proc_stat import cpu_s, proportional_mb
+from tests.support.processes import Process, children_of, limits, lupin_twin, url_of
 
 CLIENTS_A_PROCESS = 1_250
 # Python starts and imports; then all clients connect at once.
@@ -109,17 +109,26 @@ class Server:
     process: Process
     port: int
 
-    def cores_since(self, start_s: float, cpu_before_s: float) -> float:
-        """Processor time per time since a moment, in cores."""
-        return (cpu_s(self.process.pid) - cpu_before_s) / (time.monotonic() - start_s)
+    @property
+    def pids(self) -> list[int]:
+        """The server and its child processes."""
+        return [self.process.pid, *children_of(self.process.pid, b"")]
+
+    def cpu_s(self) -> float:
+        """Processor time of the server and its child processes so far, s."""
+        return sum(map(cpu_s, self.pids))
+
+    def memory_mb(self) -> float:
+        """Memory of the server and its child processes, MB."""
+        return sum(map(proportional_mb, self.pids))
 
 
 @contextmanager
-def serving(tags: int, rate_hz: float, *options: str) -> Iterator[Server]:
-    """A server and its robot, once the twin has all tags."""
+def serving(tags: int, rate_hz: float, *options: str, frames_hz: float = 0) -> Iterator[Server]:
+    """A server and its robot, once the twin has all tags; `frames_hz` 0: a frame for each scan."""
     with ExitStack() as stack:
         domain = stack.enter_context(own_domain())
-        pace = limits(frames_per_s=rate_hz * HEADROOM)
+        pace = limits(frames_per_s=frames_hz or rate_hz * HEADROOM)
         server = stack.enter_context(
             lupin_twin(domain, "serve", *pace, *options, afresh=True, **AS_IN_USE)
         )

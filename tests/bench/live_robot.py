@@ -1,15 +1,15 @@
-"""The robot of the live bench: fills a twin with tags, then changes one of them at a steady rate.
+"""The robot of the live bench: fills a twin with tags, then scans some of them at a steady rate.
 
 Run as `python -m tests.bench.live_robot --domain D --url U --tags N --rate-hz R`, with the address
 of the twin's bridge. It prints `filled` when the twin knows all tags, and goes on until it is
-killed. Every change is an observation of the tag `beat`, whose reading `beat` is this machine's
-CLOCK_MONOTONIC at the moment of its publication: a receiver can compute its delay.
+killed. It scans the first `SCANNED` tags in turn. A scan has five sensors, and the reading of
+`beat` is this machine's CLOCK_MONOTONIC at its publication: a receiver can compute its delay.
 """
 
 import argparse
 import contextlib
+import itertools
 import time
-from collections.abc import Sequence
 from typing import Any
 
 import httpx
@@ -19,6 +19,8 @@ from tests.support.ros import Peer
 from tests.support.waiting import wait_for
 
 BEAT = "beat"
+# As many as a robot reaches in a small greenhouse, however many the twin knows.
+SCANNED = 30
 # Two messages a tag, and the topic holds 50: a confirmed batch has lost none.
 BATCH = 20
 
@@ -33,43 +35,48 @@ def main() -> None:
     with Peer(options.domain, "bench_robot") as peer:
         peer.wait_for_twin()
         with httpx.Client(base_url=options.url, trust_env=False) as http:
-            fill(peer, http, [BEAT, *(str(number) for number in range(1, options.tags))])
+            fill(peer, http, options.tags)
         print("filled", flush=True)
         with contextlib.suppress(KeyboardInterrupt):
-            beat(peer, 1.0 / options.rate_hz)
+            beat(peer, 1.0 / options.rate_hz, min(options.tags, SCANNED))
 
 
-def fill(peer: Peer, http: httpx.Client, tag_ids: Sequence[str]) -> None:
+def fill(peer: Peer, http: httpx.Client, tags: int) -> None:
     """Publish every tag, no faster than the twin takes them."""
-    for start in range(0, len(tag_ids), BATCH):
-        batch = tag_ids[start : start + BATCH]
-        for tag_id in batch:
-            peer.observe(*tag_messages(tag_id, 0 if tag_id == BEAT else int(tag_id)))
+    for start in range(0, tags, BATCH):
+        last = min(start + BATCH, tags) - 1
+        for number in range(start, last + 1):
+            peer.observe(*tag_messages(number))
         wait_for(
-            lambda last=batch[-1]: http.get(f"/api/tags/{last}").json().get("flowers"),  # type: ignore[misc]
-            f"tag {batch[-1]} in the twin",
+            lambda last=last: http.get(f"/api/tags/{last}").json().get("flowers"),  # type: ignore[misc]
+            f"tag {last} in the twin",
         )
 
 
-def tag_messages(tag_id: str, number: int) -> tuple[Any, Any]:
-    """A tag with three sensors, an outline and two blooms: as in the demo, on average."""
+def tag_messages(number: int) -> tuple[Any, Any]:
+    """A tag with its sensors, an outline and two blooms: as in the demo, on average."""
     x, y = 0.5 * (number % 100), 0.5 * (number // 100)
-    readings = {"temperature": 21.3, "humidity": 64.0, "co2": 612.0}
     corners = [(x - 0.1, y - 0.1), (x + 0.1, y - 0.1), (x + 0.1, y + 0.1), (x - 0.1, y + 0.1)]
     blooms = [(x - 0.05, y), (x + 0.05, y)]
     return (
-        scan(tag_id, {**readings, BEAT: 0.0} if tag_id == BEAT else readings, (x, y)),
-        inspection(tag_id, at=(x, y), flower_count=2, blooms=blooms, footprint=corners),
+        scan(str(number), readings(number), (x, y)),
+        inspection(str(number), at=(x, y), flower_count=2, blooms=blooms, footprint=corners),
     )
 
 
-def beat(peer: Peer, period_s: float) -> None:
-    """Publish for ever, on a grid of the monotonic clock."""
+def readings(number: int) -> dict[str, float]:
+    """Five sensors; `BEAT` only where the robot goes on scanning."""
+    climate = {"temperature": 21.3, "humidity": 64.0, "co2": 612.0, "light": 8210.0}
+    return climate | ({BEAT: 0.0} if number < SCANNED else {"soil_moisture": 38.5})
+
+
+def beat(peer: Peer, period_s: float, tags: int) -> None:
+    """Scan one tag after the other for ever, on a grid of the monotonic clock."""
     due_s = time.monotonic()
-    while True:
+    for number in itertools.cycle(range(tags)):
         due_s += period_s
         time.sleep(max(0.0, due_s - time.monotonic()))  # a load at a rate
-        peer.observe(scan(BEAT, {BEAT: time.monotonic()}))
+        peer.observe(scan(str(number), {**readings(number), BEAT: time.monotonic()}))
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ async def test_a_robot_is_not_reported_as_stopped_before_the_log_was_read(
                 assert greenhouse["verdict"] == "healthy"
                 await requested.wait()
                 may_answer.set()
-                await until(lambda: stage.bridge._judge.knows_recent, "the log's word")
+                await until(lambda: stage.bridge.judge.knows_recent, "the log's word")
         assert [reason["kind"] for reason in greenhouse["reasons"]] == ["stopped"]
 
 

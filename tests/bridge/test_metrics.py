@@ -70,7 +70,7 @@ def test_wrong_estimates_are_counted_by_sensor() -> None:
     bridge = Bridge(source, Settings())
     right, wrong = (Record(1, tally, tally) for tally in (Tally(90, 81), Tally(90, 10)))
     for name, record, problem in (("co2", right, "singular"), ("light", wrong, "")):
-        bridge._estimates.known[name] = Report(1, 1, problem, record)
+        bridge.estimates.known[name] = Report(1, 1, problem, record)
     text = bridge.metrics.text().decode()
     for name, sensor, value in (
         ("trusted", "co2", 1.0),

@@ -143,7 +143,7 @@ _Key = tuple[str, str, str]
 
 def _of_readings(occasion: list[PastWrite], sensors: Sensors) -> Iterator[tuple[_Key, _Said]]:
     for name, value in _readings(occasion).items():
-        if name not in ("vpd", "dew_point"):
+        if name not in ("vpd", "dew_point", "condensation_margin"):
             bad, span = not sensors.named(name).is_plausible(value), sensors.named(name).plausible
             numbers: tuple[float | None, float | None] = (None, None)
             if math.isfinite(value) and span is not None:
@@ -160,7 +160,8 @@ def _of_ranges(
     air = readings.get("temperature"), readings.get("humidity")
     if air[0] is not None and air[1] is not None:
         readings.setdefault("vpd", vapour_pressure_deficit_kpa(air[0], air[1]))
-        readings.setdefault("dew_point", dew_point_c(air[0], air[1]))
+        dew_c = readings.setdefault("dew_point", dew_point_c(air[0], air[1]))
+        readings.setdefault("condensation_margin", air[0] - dew_c)
     for name, value in readings.items():
         ranges = sensors.named(name).ranges(is_day=is_day, species=species)
         if not sensors.named(name).is_plausible(value):

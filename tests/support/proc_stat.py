@@ -58,6 +58,12 @@ def reset_peak(pid: int) -> None:
     Path(f"/proc/{pid}/clear_refs").write_text("5", encoding="ascii")
 
 
+def proportional_mb(pid: int) -> float:
+    """Resident memory, MB; a page that processes share counts in parts (proc_pid_smaps(5))."""
+    text = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii")
+    return int(text.partition("\nPss:")[2].split()[0]) * 1024 / 1e6
+
+
 def peak_mb(pid: int) -> float:
     """The most memory that was resident at any time, MB."""
     for line in Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines():

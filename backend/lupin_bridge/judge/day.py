@@ -87,6 +87,23 @@ def says_day(light_lx: float | None) -> bool | None:
     return light_lx >= DAY_FROM_LX
 
 
+def nights_by_light(
+    readings: Iterable[tuple[int, float]], end_ns: int
+) -> Sequence[tuple[int, int]] | None:
+    """The (dusk, dawn) of a period's nights by readings of light; None: there is no such reading.
+
+    Readings are (stamp in ns, lx), oldest first. What one says holds until the next.
+    """
+    says = [(at_ns, is_day) for at_ns, lx in readings if (is_day := says_day(lx)) is not None]
+    turns = [
+        turn
+        for turn, before in zip(says, [(0, True), *says], strict=False)
+        if turn[1] is not before[1]
+    ]
+    moments = [at_ns for at_ns, _ in turns]
+    return list(zip(moments[::2], [*moments[1::2], end_ns], strict=False)) if says else None
+
+
 class Light:
     """What the light sensor of each tag says, and how many say that it is day."""
 

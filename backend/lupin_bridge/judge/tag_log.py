@@ -6,11 +6,11 @@ after it are computed again. Writes that the log has no room for survive as the 
 
 from __future__ import annotations
 
-from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from operator import attrgetter
 from typing import Final, Generic, TypeVar
 
 from lupin_bridge.judge.day import LEFT_OUT_NS, LIGHT, Turn, says_day
@@ -80,66 +80,48 @@ class Trail:
         return replace(self, gaps=gaps, turns=self.turns[max(0, first - 1) :])
 
 
+_stamp_ns = attrgetter("stamp_ns")
+_order = attrgetter("stamp_ns", "number")
+
+
 class TagLog:
-    """The writes of one tag, ordered by stamp and number; a hundred bytes each."""
+    """The writes of one tag, ordered by stamp and number."""
 
     def __init__(self) -> None:
-        self._stamps_ns = array("q")
-        self._numbers = array("q")
-        self._values: list[bytes] = []
-        # The rest of each write, which is mostly the same: equal ones share one object.
-        self._others: list[PastWrite] = []
-        self._known: dict[PastWrite, PastWrite] = {}
+        self._writes: list[PastWrite] = []
 
     def __len__(self) -> int:
-        return len(self._stamps_ns)
+        return len(self._writes)
 
     @property
     def last_ns(self) -> int:
         """The stamp of the newest; -1: there is none."""
-        return self._stamps_ns[-1] if self._stamps_ns else -1
+        return self._writes[-1].stamp_ns if self._writes else -1
 
     def put(self, write: PastWrite) -> bool:
         """Insert a write at its place; False: it is there already."""
-        stamp_ns, number = write.stamp_ns, write.number
-        at = bisect_right(self._stamps_ns, stamp_ns)
-        while at and self._stamps_ns[at - 1] == stamp_ns and self._numbers[at - 1] >= number:
-            if self._numbers[at - 1] == number:
-                return False
-            at -= 1
-        other = replace(write, number=0, stamp_ns=0, values=())
-        self._stamps_ns.insert(at, stamp_ns)
-        self._numbers.insert(at, number)
-        self._values.insert(at, array("d", write.values).tobytes())
-        self._others.insert(at, self._known.setdefault(other, other))
+        at = bisect_right(self._writes, _order(write), key=_order)
+        if at and _order(self._writes[at - 1]) == _order(write):
+            return False
+        self._writes.insert(at, write)
         return True
 
     def occasions(self, after_ns: int, until_ns: int | None = None) -> Iterator[list[PastWrite]]:
         """The writes of each stamp, oldest first."""
-        first = bisect_right(self._stamps_ns, after_ns)
-        end = len(self) if until_ns is None else bisect_right(self._stamps_ns, until_ns)
-        for _, group in groupby(range(first, end), key=self._stamps_ns.__getitem__):
-            yield [self._write(index) for index in group]
+        end = len(self) if until_ns is None else self._count(until_ns)
+        for _, group in groupby(self._writes[self._count(after_ns) : end], key=_stamp_ns):
+            yield list(group)
 
     def newest(self, count: int) -> int:
         """A stamp after which there are about `count` writes."""
-        return self._stamps_ns[-count - 1] if count < len(self) else -1
+        return self._writes[-count - 1].stamp_ns if count < len(self) else -1
 
     def drop(self, until_ns: int) -> None:
         """Drop all writes up to and including a stamp."""
-        count = bisect_right(self._stamps_ns, until_ns)
-        del self._stamps_ns[:count], self._numbers[:count]
-        del self._values[:count], self._others[:count]
-        if len(self._known) > len(self._others):
-            self._known = {other: other for other in self._others}
+        del self._writes[: self._count(until_ns)]
 
-    def _write(self, index: int) -> PastWrite:
-        return replace(
-            self._others[index],
-            number=self._numbers[index],
-            stamp_ns=self._stamps_ns[index],
-            values=tuple(array("d", self._values[index])),
-        )
+    def _count(self, until_ns: int) -> int:
+        return bisect_right(self._writes, until_ns, key=_stamp_ns)
 
 
 class Replay(Generic[StateT]):

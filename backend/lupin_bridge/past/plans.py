@@ -18,7 +18,7 @@ import orjson
 
 from lupin_bridge.feed.query import Find
 from lupin_bridge.field import matches
-from lupin_bridge.judge.day import SINCE_NS, days_of
+from lupin_bridge.judge.day import LIGHT, SINCE_NS, days_of, nights_by_light
 from lupin_bridge.judge.judging import Criteria, judge_once
 from lupin_bridge.judge.quantities import DAILY, DERIVED, Daily, Derived, IsDay, Sensors
 from lupin_bridge.past import bodies
@@ -197,8 +197,8 @@ class History:
     now_ns: int | None = field(compare=False)
     criteria: Criteria = field(compare=False)
     journal: Condition = field(compare=False)
-    # A simulation's days are not those of the clock.
-    has_nights: bool = True
+    # A simulation's days are not those of the clock: there, the tag's light decides.
+    is_by_clock: bool = True
 
     def cost_s(self, tags: int) -> float:
         """See `Query`."""
@@ -213,7 +213,10 @@ class History:
         """See `Query`."""
         sensors = self.criteria.sensors
         past = derived_series(self.request, sensors, self.criteria.is_day, find)
-        nights = self.criteria.nights(past.start_ns, past.end_ns) if self.has_nights else None
+        nights = self.criteria.nights(past.start_ns, past.end_ns)
+        if not self.is_by_clock and self.request.event is None:
+            light = find(replace(self.request, sensor_type=LIGHT, end_ns=past.end_ns))
+            nights = nights_by_light(zip(light.stamps_ns, light.means, strict=True), past.end_ns)
         return of_json(
             bodies.history_body(
                 self.request, past, self.now_ns, sensors, self.journal, nights=nights

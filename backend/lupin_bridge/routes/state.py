@@ -185,8 +185,8 @@ async def history_route(request: Request) -> Response:
     now_ns = bridge.ros_time_ns
     given = read(query_string.OfHistory, request.query_params.multi_items())
     series = SeriesRequest(given.tag_id, given.sensor_type, *given.span(now_ns), given.points)
-    journal, has_nights = bridge.source.journal(), bridge.origin != "simulated"
-    history = History(series, now_ns, bridge.criteria, journal, has_nights)
+    journal, is_by_clock = bridge.source.journal(), bridge.origin != "simulated"
+    history = History(series, now_ns, bridge.criteria, journal, is_by_clock)
     return await respond_past(request, history, "history")
 
 

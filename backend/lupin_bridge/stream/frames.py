@@ -233,18 +233,16 @@ class StateFrame:
     judged: Judged
     base: StateFrame | None
     _writer: FrameWriter
-    _written: dict[str, bytes] = field(default_factory=dict)
+    _wires: dict[str, bytes] = field(default_factory=dict)
 
-    @property
     def message_json(self) -> bytes:
         """The state as JSON of lupin_msgs/TwinState, for clients of the ROS message."""
-        snapshot, writer = self.snapshot, self._writer.message_json
-        return self._once("message", lambda: writer.state(snapshot, snapshot.now_ns))
+        return self._writer.message_json.state(self.snapshot, self.snapshot.now_ns)
 
     def let_go(self) -> None:
         """Keep only what a delta needs; else every frame ever made would stay in memory."""
         self.base = None
-        self._written.clear()
+        self._wires.clear()
 
     def full(self) -> bytes:
         """`schema.StateFrame` as a WebSocket frame."""
@@ -256,12 +254,10 @@ class StateFrame:
 
     def wire(self, kind: str, payload: Callable[[], bytes]) -> bytes:
         """The frame of this kind, from `payload()` if it is the first call."""
-        return self._once(f"wire {kind}", lambda: text_frame(payload()))
-
-    def _once(self, what: str, write: Callable[[], bytes]) -> bytes:
-        if what not in self._written:
-            self._written[what] = write()
-        return self._written[what]
+        wire = self._wires.get(kind)
+        if wire is None:
+            wire = self._wires[kind] = text_frame(payload())
+        return wire
 
     def _full(self) -> bytes:
         return b'{"type":"state","seq":%d,"revision":%b,"state":%b,"health":%b}' % (

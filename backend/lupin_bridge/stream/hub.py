@@ -275,36 +275,39 @@ class Hub:
     def serve(self, client: Client, now_s: float) -> None:
         """Send a client what it lacks, as far as its socket and its rate allow."""
         if client.status_due and client.wants_status:
-            if not self._write(client, self._status_at_once(now_s), now_s):
+            if not self._can_take(client, now_s):
                 return
+            self._write(client, self._status_at_once(now_s), now_s)
             client.status_due = False
         if not client.wants_state:
-            if not client.connection.can_take:
-                self._mark_blocked(client, now_s)
+            self._can_take(client, now_s)
             return
         self._serve_state(client, now_s)
         # Only after a state, so that the client knows the alarms' tags and the time for ages.
         if not (client.wants_alarms and client.sent_seq):
             return
-        if client.alarms_due and self._alarms is not None:
-            client.alarms_due = not self._write(client, self._alarms, now_s)
-        if client.robot_due and self._robot is not None and now_s >= client.robot_next_s:
-            client.robot_due = not self._write(client, self._robot, now_s)
-            if not client.robot_due:
-                client.robot_next_s = now_s + client.min_interval_s
+        if client.alarms_due and self._alarms is not None and self._can_take(client, now_s):
+            self._write(client, self._alarms, now_s)
+            client.alarms_due = False
+        if not client.robot_due or self._robot is None or now_s < client.robot_next_s:
+            return
+        if self._can_take(client, now_s):
+            self._write(client, self._robot, now_s)
+            client.robot_due = False
+            client.robot_next_s = now_s + client.min_interval_s
 
     def _serve_state(self, client: Client, now_s: float) -> None:
         frame = self._frame
         if frame is None or frame.seq == client.sent_seq or now_s < client.next_due_s:
             return
-        if not client.connection.can_take:
-            self._mark_blocked(client, now_s)
+        if not self._can_take(client, now_s):
             return
-        if self._write(client, client.wire(client, frame), now_s):
-            if client.sent_seq:
-                self.frames_skipped += frame.seq - client.sent_seq - 1
-            self.frames_sent += 1
-            client.sent_seq = frame.seq
+        self._write(client, client.wire(client, frame), now_s)
+        if client.sent_seq:
+            self.frames_skipped += frame.seq - client.sent_seq - 1
+        self.frames_sent += 1
+        client.sent_seq = frame.seq
+        if client.min_interval_s:
             client.next_due_s = next_beat_s(client.next_due_s, now_s, client.min_interval_s)
 
     def dismiss_stuck(self, now_s: float) -> int:
@@ -328,16 +331,16 @@ class Hub:
             self._status_wire_s = now_s
         return self._status_wire
 
-    def _write(self, client: Client, wire: bytes, now_s: float) -> bool:
-        if not client.connection.can_take:
-            self._mark_blocked(client, now_s)
-            return False
+    def _can_take(self, client: Client, now_s: float) -> bool:
+        """Whether the client's socket has taken everything; notes since when it has not."""
+        if client.connection.can_take:
+            return True
+        if client.blocked_since_s is None:
+            client.blocked_since_s = now_s
+        return False
+
+    def _write(self, client: Client, wire: bytes, now_s: float) -> None:
         client.blocked_since_s = None
         client.written_s = now_s
         client.connection.write(wire)
         self.bytes_sent += len(wire)
-        return True
-
-    def _mark_blocked(self, client: Client, now_s: float) -> None:
-        if client.blocked_since_s is None:
-            client.blocked_since_s = now_s

@@ -252,7 +252,8 @@ class History(PastPeriod):
         description="no reading for longer than three times the usual interval: draw no line"
     )
     nights: list[Period] | None = Field(
-        description="nights by the clock that overlap it; null: simulated, or over 400 days"
+        description="nights that overlap it, by the clock or, in a demo, by the tag's light; "
+        "null: not known, or over 400 days"
     )
 
 

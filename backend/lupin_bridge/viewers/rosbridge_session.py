@@ -135,7 +135,7 @@ class Session:
         Serialized once for all clients that use the same spelling.
         """
         return b"".join(
-            frame.wire(f"rosbridge {topic}", lambda of=topic: publish(of, frame.message_json))  # type: ignore[misc]
+            frame.wire(f"rosbridge {topic}", lambda of=topic: publish(of, frame.message_json()))  # type: ignore[misc]
             for topic in self._states()
         )
 

@@ -68,15 +68,21 @@ async def test_a_history_has_readings_or_buckets_where_there_are_too_many(domain
         }
 
 
-async def test_nights_by_the_clock_are_not_simulations(
+async def test_a_simulations_nights_are_those_of_its_light_not_of_the_clock(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     period = "from=2026-11-27T00:00:00Z&to=2026-11-28T00:00:00Z"
+    begin_s = 1_795_737_600
     async with remembering(MadeUp()) as it:
-        for origin in ("robot", "simulated"):
-            monkeypatch.setattr(Bridge, "origin", origin)
-            found = (await it.http.get(f"{HISTORY}&{period}")).json()
-            assert (found["nights"] is None) == (origin == "simulated")
+        assert len((await it.http.get(f"{HISTORY}&{period}")).json()["nights"]) == 2
+        monkeypatch.setattr(Bridge, "origin", "simulated")
+        assert (await it.http.get(f"{HISTORY}&{period}")).json()["nights"] is None
+    lux = [9_000.0, 20.0, math.nan, 0.0, 800.0, 70_000.0, 10.0]
+    points = [((begin_s + 600 * index) * NS, lx) for index, lx in enumerate(lux)]
+    async with remembering(MadeUp(points={("7", "light"): points})) as it:
+        nights = (await it.http.get(f"{HISTORY}&{period}")).json()["nights"]
+        seconds = [night[end]["sec"] - begin_s for night in nights for end in ("from", "to")]
+        assert seconds == [600, 2_400, 3_600, 86_400]
 
 
 async def test_a_timeline_queries_every_event_of_one_period(domain: int) -> None:

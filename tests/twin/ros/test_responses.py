@@ -15,7 +15,6 @@ from lupin_twin.ros.services import (
     MAX_ATTEMPT_S,
     MAX_UNSENT,
     PATIENCE_S,
-    RETRY_S,
     UNSENT,
     Responses,
 )
@@ -58,7 +57,7 @@ class Stage:
     def go_on(self) -> list[Any]:
         """Continue; returns the clients that were attempted."""
         del self.attempted[:]
-        self.now_s += RETRY_S
+        self.now_s += 0.5
         self.responses.go_on()
         return self.attempted
 
@@ -105,7 +104,7 @@ def test_a_too_large_answer_is_not_retained(stage: Stage) -> None:
 
 def test_an_answer_without_a_reader_is_dropped_with_a_warning(stage: Stage) -> None:
     stage.send_response("response", "a")
-    stage.now_s += PATIENCE_S - 2 * RETRY_S
+    stage.now_s += PATIENCE_S - 1.0
     assert stage.go_on() == ["a"]
     assert stage.go_on() == []
     [message] = stage.warned

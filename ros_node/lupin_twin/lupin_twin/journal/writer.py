@@ -121,7 +121,7 @@ class Pending:
 
 # Rows wait this long, from when the first was handed over, for others to share a commit with. They
 # have to be safe from a killed process within 100 ms. Late rows do not wait.
-_GATHER_S: Final = 0.04
+_GATHER_S: Final = 0.08
 _MAX_BATCH: Final = 500
 _SLOW_S: Final = 1.0  # ten times that promise: a checkpoint on a slow disk must not raise an alarm
 _RETRY_S: Final = (0.5, 1.0, 2.0, 5.0, 10.0)

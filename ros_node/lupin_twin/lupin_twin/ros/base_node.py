@@ -18,7 +18,7 @@ from typing import Any, Final
 
 import rclpy
 from rclpy.clock import Clock, ClockType
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -48,6 +48,9 @@ BEHIND_S: Final = 0.05
 BELIEVED_S: Final = 0.25
 # The default of ROS, reliable and volatile, except for the depth.
 SERVICE_QOS: Final = QoSProfile(depth=SERVICE_DEPTH)
+# Without rclpy's default warnings about subscribers that do not match, which log the same warning
+# themselves. rclpy's executor handles each of them in Python at each of its wake-ups.
+NO_EVENTS: Final = PublisherEventCallbacks(use_default_callbacks=False)
 
 
 def waker(condition: Any) -> Callable[[], None]:

@@ -33,7 +33,7 @@ from lupin_twin.field.engine import (
 )
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.idw import Abandoned
-from lupin_twin.ros.base_node import NodeUtilities, qos_of
+from lupin_twin.ros.base_node import NO_EVENTS, NodeUtilities, qos_of
 from lupin_twin.ros.estimate_service import EstimateService
 from lupin_twin.ros.layers import (
     MAX_POINTS,
@@ -50,8 +50,6 @@ from lupin_twin.ros.parameters import naming
 from lupin_twin.runtime.estimates import are_enough
 from lupin_twin.runtime.workers import JobQueue, Query, ShouldStop, Workers
 
-# How often subscriptions and changes are checked, s.
-LAYERS_PERIOD_S: Final = 0.2
 # A topic is published no more often than this, s, and only when something has changed.
 PERIOD_S: Final = 1.0
 # Every message counts as large, s of one core: then they are made one after the other.
@@ -119,7 +117,9 @@ class LayerService:
         """
         for topic, sensor in topics_of(sensors).items():
             with naming("layers", sensor):
-                publisher = node.create_publisher(PointCloud2, topic, qos_of(LAYERS))
+                publisher = node.create_publisher(
+                    PointCloud2, topic, qos_of(LAYERS), event_callbacks=NO_EVENTS
+                )
             self._topics.append(
                 _Topic(
                     publisher,
@@ -132,12 +132,14 @@ class LayerService:
             (PLANTERS, planter_marks, planter_markers),
         ):
             arrays = MarkerArrays(marks, make, frame_id)
-            publisher = node.create_publisher(MarkerArray, kind.name, qos_of(kind))
+            publisher = node.create_publisher(
+                MarkerArray, kind.name, qos_of(kind), event_callbacks=NO_EVENTS
+            )
             # Markers show ages: whether they have changed is known only when they are made.
             self._topics.append(_Topic(publisher, lambda: None, partial(self._plan_marks, arrays)))
 
     def check(self) -> None:
-        """Begin messages that are wanted and may have changed; call it every `LAYERS_PERIOD_S`."""
+        """Begin messages that are wanted and may have changed; call it regularly."""
         self.queue.go_on()
         now_s = time.monotonic()
         for topic in self._topics:

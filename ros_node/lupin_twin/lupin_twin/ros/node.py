@@ -28,19 +28,20 @@ from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.paths import journal_path
 from lupin_twin.journal.runs import Clock as RunClock
 from lupin_twin.ros import convert, message_limits
-from lupin_twin.ros.base_node import NodeUtilities, qos_of, waker
+from lupin_twin.ros.base_node import NO_EVENTS, NodeUtilities, qos_of, waker
 from lupin_twin.ros.convert import diagnostics
 from lupin_twin.ros.estimate_service import EstimateService
 from lupin_twin.ros.inputs import TwinCount
-from lupin_twin.ros.layer_service import LAYERS_PERIOD_S, LayerService
+from lupin_twin.ros.layer_service import LayerService
 from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
-from lupin_twin.ros.services import RETRY_S, FieldService, PastService, Responses
+from lupin_twin.ros.services import FieldService, PastService, Responses
 from lupin_twin.runtime.memory import Memory, open_journal
 from lupin_twin.runtime.workers import LARGE_THREADS, JobQueue, Workers
 
 NODE_NAME: Final = "lupin_twin"
-# How often ROS time is checked, s, however rarely the state is published.
-CLOCK_PERIOD_S: Final = 0.5
+# How often ROS time, the layers and unsent responses are checked, s. In one timer: rclpy's executor
+# takes half a millisecond to wake up.
+UPKEEP_PERIOD_S: Final = 0.5
 DIAGNOSTICS_PERIOD_S: Final = 1.0
 
 
@@ -169,8 +170,12 @@ class TwinNode(AdjustableNode):
             )
         state, times, own = interfaces.STATE, interfaces.TIMES, interfaces.DIAGNOSTICS
         with naming("state_topic", p.state_topic):
-            self._state_publisher = self.create_publisher(TwinState, p.state_topic, qos_of(state))
-        self._times_publisher = self.create_publisher(TwinTimes, times.name, qos_of(times))
+            self._state_publisher = self.create_publisher(
+                TwinState, p.state_topic, qos_of(state), event_callbacks=NO_EVENTS
+            )
+        self._times_publisher = self.create_publisher(
+            TwinTimes, times.name, qos_of(times), event_callbacks=NO_EVENTS
+        )
         self._field_service.offer(self, p.field_service_name, group)
         PastService(
             self.utilities,
@@ -184,14 +189,22 @@ class TwinNode(AdjustableNode):
         self.layers.offer(self, p.layers, p.frame_id)
         for service in self.services:  # including those for parameters
             responses.watch(service)
-        self._diagnostics = self.create_publisher(DiagnosticArray, own.name, qos_of(own))
-        for period_s, what, callback in (
-            (DIAGNOSTICS_PERIOD_S, "diagnostics", self._publish_diagnostics),
-            (CLOCK_PERIOD_S, "clock", self._check_clock),
-            (LAYERS_PERIOD_S, "layers", self.layers.check),
-            (RETRY_S, "responses", responses.go_on),
-        ):
-            self.utilities.every(group, period_s, f"{what} timer", callback)
+        self._diagnostics = self.create_publisher(
+            DiagnosticArray, own.name, qos_of(own), event_callbacks=NO_EVENTS
+        )
+        every, guarded = self.utilities.every, self.utilities.guarded
+        every(group, DIAGNOSTICS_PERIOD_S, "diagnostics timer", self._publish_diagnostics)
+        checks = (
+            guarded("the clock check", self._check_clock),
+            guarded("the layers check", self.layers.check),
+            guarded("the retry of responses", responses.go_on),
+        )
+
+        def keep_up() -> None:
+            for check in checks:
+                check()
+
+        every(group, UPKEEP_PERIOD_S, "upkeep timer", keep_up)
         self._state_timer = self._publish_at(p.state_publish_rate_hz)
 
     def _log_start(self) -> None:

@@ -193,9 +193,8 @@ def offer(
 
 # The beginning of rclpy's warning (7.1.6) that the middleware has dropped a response.
 UNSENT: Final = "failed to send response (timeout)"
-# How often responses are retried, s, and for how long. Discovery that lost a message recovers
-# within about 3 s, or later on a busy machine.
-RETRY_S: Final = 0.5
+# For how long responses are retried, s. Discovery that lost a message recovers within about 3 s, or
+# later on a busy machine.
 PATIENCE_S: Final = 30.0
 # Responses retained at most. One that took longer to try, s, is too large (60 MB took 0.5 s).
 MAX_UNSENT: Final = 8
@@ -257,7 +256,7 @@ class Responses:
         service.send_response = send_response
 
     def go_on(self) -> None:
-        """Retry responses until an attempt fails; to be called every `RETRY_S`.
+        """Retry responses until an attempt fails; to be called regularly.
 
         An attempt that fails blocks the node's thread for 0.1 s. The latest response is first, and
         a failed one goes to the end. So one that can be sent does not wait long behind others.

@@ -150,17 +150,23 @@ def limit_blas_threads() -> None:
     os.environ.setdefault(_VARIABLE, "1")
 
 
+# malloc.h of glibc.
 _M_MMAP_THRESHOLD: Final = -3
+_M_ARENA_MAX: Final = -8
 _LARGE_BYTES: Final = 1_000_000
+_HEAPS: Final = 2
 
 
 def return_large_blocks() -> None:
     """Make glibc return the memory of a large array to the system as soon as it is freed.
 
-    By default it ends up keeping blocks of up to 32 MB: an estimate left 50 MB behind.
+    By default it ends up keeping blocks of up to 32 MB: an estimate left 50 MB behind. And nearly
+    each thread has a heap of its own, which keeps what it once needed: 11 MB.
     """
     with suppress(AttributeError, OSError):  # another C library
-        ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, _LARGE_BYTES)
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(_M_MMAP_THRESHOLD, _LARGE_BYTES)
+        mallopt(_M_ARENA_MAX, _HEAPS)
 
 
 STOP_SIGNALS: Final = frozenset({signal.SIGINT, signal.SIGTERM})

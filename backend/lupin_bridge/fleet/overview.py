@@ -7,6 +7,7 @@ are those of the page's `--pin-*`, in light and in dark.
 from __future__ import annotations
 
 import heapq
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from hashlib import blake2b
@@ -14,9 +15,10 @@ from typing import Any, Final
 
 import orjson
 
-from lupin_bridge.judge.verdict import ORDER, Health, Verdict, worst
+from lupin_bridge.judge.episodes import Alarm
+from lupin_bridge.judge.verdict import ORDER, Health, Kind, Verdict, derive, worst
 from lupin_bridge.stream.frames import text_frame
-from lupin_bridge.stream.state_json import moment, stamp
+from lupin_bridge.stream.state_json import moment, reason_json, stamp
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import TagState
 from lupin_twin.field.grid import reach_of
@@ -78,6 +80,52 @@ def map_version(paths: str) -> str | None:
     return blake2b(paths.encode(), digest_size=6).hexdigest() if paths else None
 
 
+# --- what is wrong --------------------------------------------------------------------------------
+
+# Causes on the card of a site.
+MAX_CAUSES: Final = 2
+
+
+def causes(alarms: Iterable[Alarm]) -> tuple[dict[str, Any], ...]:
+    """The worst causes of alarms that come worst first: each with its worst alarm and their number.
+
+    Its silence is none of them: the card shows since when a site is silent.
+    """
+    found: dict[tuple[object, ...], list[Alarm]] = {}
+    for alarm in alarms:
+        if alarm.reason.kind is not Kind.SILENT:
+            found.setdefault(alarm.cause[1:], []).append(alarm)
+    return tuple(
+        {"reason": reason_json(its[0].reason), "tag_id": its[0].tag_id, "count": len(its)}
+        for its in list(found.values())[:MAX_CAUSES]
+    )
+
+
+def now_json(
+    alarm: Alarm, tags: Mapping[str, TagState], healths: Mapping[str, Health]
+) -> dict[str, Any] | None:
+    """An alarm's value now, with its verdict and reason, if it is out of range.
+
+    None: it has no value, or its last reading says nothing about now.
+    """
+    kind, sensor = alarm.reason.kind, alarm.reason.sensor
+    tag, health = tags.get(alarm.tag_id), healths.get(alarm.tag_id)
+    if tag is None or health is None or kind not in {Kind.RANGE, Kind.PEST, Kind.CHANGED}:
+        return None
+    if any(it.kind is Kind.OLD and it.sensor in {"", sensor} for it in health.reasons):
+        return None
+    said = next((it for it in health.reasons if (it.kind, it.sensor) == (kind, sensor)), None)
+    readings = {it.name: it.value for it in (*tag.readings, *derive(tag.readings))}
+    value = readings.get(sensor) if said is None else said.value
+    if kind is not Kind.PEST and (value is None or not math.isfinite(value)):
+        return None
+    return {
+        "value": value,
+        "verdict": Verdict.HEALTHY if said is None else said.verdict,
+        "reason": None if said is None else reason_json(said),
+    }
+
+
 # --- the overview ---------------------------------------------------------------------------------
 
 # A forwarder sends a heartbeat every two seconds; this long after the last it counts as gone.
@@ -91,8 +139,8 @@ class Site:
     `origin` is where its observations come from, as far as its log reports that. `last_seq` grows
     with every row; `heartbeat_ns` is the forwarder's last heartbeat; 0: never. `last_received_ns`
     is when the twin received its newest row, by the clock of its machine. `verdict` and
-    `active_alarms` are None until they are computed; `alarms` are the worst active ones, as in
-    `/api/alarms`. `dots` draw its map; `notes` is the number of notes.
+    `active_alarms`, without shelved ones, are None until they are computed; `causes` is from
+    `causes`; `alarms` are the worst active ones, as in `/api/alarms`. `dots` draw its map; `notes` is the number of notes.
     """
 
     site: str
@@ -104,6 +152,7 @@ class Site:
     verdict: Verdict | None = None
     active_alarms: int | None = None
     origin: Origin = "unknown"
+    causes: tuple[dict[str, Any], ...] = ()
     alarms: tuple[dict[str, Any], ...] = ()
     dots: str = ""
     notes: int = 0
@@ -134,6 +183,7 @@ def site_json(site: Site, archive: Archive, now_ns: int) -> dict[str, Any]:
         "is_live": is_live,
         "origin": site.origin,
         "map": map_version(site.dots),
+        "causes": site.causes,
     }
 
 
@@ -148,6 +198,7 @@ def _lasting(site: Site) -> tuple[object, ...]:
     return (
         *(site.site, site.name, site.last_seq, site.is_live),
         *(site.verdict, site.active_alarms, site.last_received_ns, site.origin, site.dots),
+        site.causes,
     )
 
 
@@ -158,7 +209,7 @@ MAX_LISTED: Final = 200
 def alarms_json(sites: Iterable[Site], archive: Archive) -> dict[str, Any]:
     """`/api/alarms`: active ones, worst first, then newest; of silent sites, the last known.
 
-    `total` includes those that are left out.
+    Shelved ones are last. `total` does not count them; it includes those that are left out.
     """
     every = list(sites)
     found = [
@@ -178,7 +229,7 @@ def alarms_json(sites: Iterable[Site], archive: Archive) -> dict[str, Any]:
 def _worst_first(alarm: Mapping[str, Any]) -> tuple[Any, ...]:
     raised = alarm["raised_at"]
     verdict = ORDER[Verdict(alarm["reason"]["verdict"])]
-    return verdict, -raised["sec"], -raised["nanosec"], alarm["site"], alarm["id"]
+    return "shelved_by" in alarm, verdict, -raised["sec"], -raised["nanosec"], alarm["site"], alarm["id"]
 
 
 class SitesFrame:

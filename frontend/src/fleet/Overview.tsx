@@ -4,6 +4,7 @@ import {
   lazy,
   memo,
   Suspense,
+  useCallback,
   useDeferredValue,
   useEffect,
   useMemo,
@@ -14,6 +15,7 @@ import {
 import { S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
 import { Select } from '../widgets/controls';
+import type { CauseText } from './Causes';
 import { Choice } from './Choice';
 import type { Seen } from './follow';
 import {
@@ -33,10 +35,11 @@ import {
   words,
 } from './sites';
 
-// Loaded when first shown.
-const Alarms = lazy(() => import('./Alarms'));
+const Alarms = lazy(async () => ({ default: (await import('./views')).Alarms }));
+const Causes = lazy(async () => ({ default: (await import('./views')).Causes }));
+const Report = lazy(async () => ({ default: (await import('./views')).Report }));
+// Loaded when first shown: it brings the charts.
 const Compare = lazy(() => import('./Compare'));
-const Report = lazy(() => import('./Report'));
 
 const VIEWS = ['sites', 'alarms', 'compare', 'report'] as const;
 type View = (typeof VIEWS)[number];
@@ -53,6 +56,10 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
   const [filter, setFilter] = useState<Filter>('all');
   const [search, setSearch] = useState('');
   const [group, setGroup] = useState(query.get('group') ?? '');
+  const [causeText, setCauseText] = useState<CauseText | null>(null);
+  const onWords = useCallback((text: CauseText) => {
+    setCauseText(() => text);
+  }, []);
   const field = useRef<HTMLInputElement>(null);
   const sites = useDeferredValue(seen.sites);
   const counts = useMemo(() => countsOf(sites.values()), [sites]);
@@ -135,6 +142,9 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
         )}
       </header>
       <Trouble seen={seen} />
+      <Suspense>
+        <Causes onWords={onWords} />
+      </Suspense>
       <main aria-label={view === 'alarms' ? words.alarmList : words.list}>
         <p className="unseen" role="status">
           {search || group || filter !== 'all' ? words.shown(shown.length, sites.size) : ''}
@@ -142,7 +152,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
         {shown.length === 0 ? (
           <p className="fleet-empty">{nothingText(seen)}</p>
         ) : view === 'sites' ? (
-          <Cards shown={shown} groups={groups} asOf={asOfWhen(seen)} />
+          <Cards shown={shown} groups={groups} asOf={asOfWhen(seen)} causeText={causeText} />
         ) : (
           <Suspense fallback={<p className="fleet-empty">{words.connecting}</p>}>
             {view === 'alarms' && <Alarms shown={shown} />}
@@ -189,28 +199,30 @@ const STAYS_MS = 200;
 /** After this long without data, a greenhouse counts as silent, or the archive as down. */
 const LIVE_MS = 20_000;
 
+interface Listed {
+  /** When all of it was last known, ms since the epoch; null: it is as of now. */
+  readonly asOf: number | null;
+  /** null: not loaded yet. */
+  readonly causeText: CauseText | null;
+}
+
 function Cards({
   shown,
   groups,
-  asOf,
+  ...listed
 }: Listed & { shown: readonly Site[]; groups: readonly string[] }): JSX.Element {
   const parts = useMemo(() => grouped(shown, groups), [shown, groups]);
-  if (groups.length === 0) return <List sites={shown} asOf={asOf} />;
+  if (groups.length === 0) return <List sites={shown} {...listed} />;
   return (
     <>
       {parts.map((part) => (
-        <GroupOf key={part.name} group={part} asOf={asOf} />
+        <GroupOf key={part.name} group={part} {...listed} />
       ))}
     </>
   );
 }
 
-interface Listed {
-  /** When all of it was last known, ms since the epoch; null: it is as of now. */
-  readonly asOf: number | null;
-}
-
-function GroupOf({ group, asOf }: Listed & { group: Group }): JSX.Element {
+function GroupOf({ group, ...listed }: Listed & { group: Group }): JSX.Element {
   const { name, sites } = group;
   const worst = sites[0];
   return (
@@ -220,7 +232,7 @@ function GroupOf({ group, asOf }: Listed & { group: Group }): JSX.Element {
         {worst && <HealthMark verdict={worst.verdict} word={false} />}
         <span className="fleet-line">{groupText(sites)}</span>
       </summary>
-      <List sites={sites} asOf={asOf} />
+      <List sites={sites} {...listed} />
     </details>
   );
 }
@@ -240,17 +252,21 @@ function filterText(filter: Filter): string {
   return filter === 'all' || filter === 'silent' ? words[filter] : S.health[filter];
 }
 
-function List({ sites, asOf }: Listed & { sites: readonly Site[] }): JSX.Element {
+function List({ sites, ...listed }: Listed & { sites: readonly Site[] }): JSX.Element {
   return (
     <ul className="fleet-sites">
       {sites.map((site) => (
-        <SiteCard key={site.site} site={site} asOf={asOf} />
+        <SiteCard key={site.site} site={site} {...listed} />
       ))}
     </ul>
   );
 }
 
-const SiteCard = memo(function SiteCard({ site, asOf }: Listed & { site: Site }): JSX.Element {
+const SiteCard = memo(function SiteCard({
+  site,
+  asOf,
+  causeText,
+}: Listed & { site: Site }): JSX.Element {
   const { name, verdict, last_verdict: last, map } = site;
   const isLive = site.is_live && asOf === null;
   const origin = originText(site);
@@ -274,6 +290,12 @@ const SiteCard = memo(function SiteCard({ site, asOf }: Listed & { site: Site })
         <span className="fleet-alarms" data-any={(site.active_alarms ?? 0) > 0}>
           {(isLive || site.active_alarms !== 0) && countText(site.active_alarms)}
         </span>
+        {causeText !== null &&
+          site.causes.map((cause, index) => (
+            <span key={index} className="fleet-cause">
+              <HealthMark verdict={cause.reason.verdict} text={causeText(cause)} />
+            </span>
+          ))}
         <span className="fleet-line">
           {site.last_received
             ? words.received(timeText(ms(site.last_received)))

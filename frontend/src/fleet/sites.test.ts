@@ -23,6 +23,7 @@ const site = (name: string, more: Partial<Site> = {}): Site => ({
   is_live: true,
   origin: 'robot',
   map: null,
+  causes: [],
   ...more,
 });
 const frame = (sites: readonly Site[], more: Partial<SitesFrame> = {}): SitesFrame => ({

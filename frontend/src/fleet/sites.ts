@@ -1,7 +1,7 @@
 /** The server's data on all sites, and their order, groups and filter on the page. Pure. */
 import { timeOfDay } from '../clock';
 import { isObject } from '../contract/check';
-import type { Verdict, WireTime } from '../contract/types';
+import type { HealthReason, Verdict, WireTime } from '../contract/types';
 import { groupedBy } from '../domain/memo';
 import { LANGUAGE, LOCALE } from '../strings';
 import { fleetWordsOf } from '../words/fleet';
@@ -22,6 +22,15 @@ export interface Site {
   readonly origin: string;
   /** Changes with its small map; null: it has none. */
   readonly map: string | null;
+  /** Of its active alarms that are not shelved, the worst first; its silence is none. */
+  readonly causes: readonly Cause[];
+}
+
+/** One cause of alarms: its worst alarm's reason and tag, and how many there are. */
+export interface Cause {
+  readonly reason: HealthReason;
+  readonly tag_id: string;
+  readonly count: number;
 }
 
 export interface Archive {
@@ -54,7 +63,7 @@ export const FILTERS = ['all', 'critical', 'stressed', 'silent', 'healthy'] as c
 export type Filter = (typeof FILTERS)[number];
 
 /** The worst first. Not imported from `domain/health`, which the first view here does not need. */
-const VERDICTS: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'healthy'];
+export const VERDICTS: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'healthy'];
 
 function isSite(value: unknown): value is Site {
   return (
@@ -63,7 +72,8 @@ function isSite(value: unknown): value is Site {
     typeof value['name'] === 'string' &&
     VERDICTS.includes(value['verdict'] as Verdict) &&
     typeof value['is_live'] === 'boolean' &&
-    typeof value['origin'] === 'string'
+    typeof value['origin'] === 'string' &&
+    Array.isArray(value['causes'])
   );
 }
 

@@ -5,7 +5,6 @@ import type { In } from './shape';
 const ENGLISH = {
   wasLive: 'last known',
   acknowledged: (name: string, at: string): string => `acknowledged by ${name}, ${at}`,
-  shelved: (name: string, until: string): string => `shelved by ${name} until ${until}`,
   moreAlarms: (count: number): string => `${count} more: see the pages of the greenhouses.`,
   deviation: 'Deviation',
   deviationHint: 'How far a greenhouse is from the median of all, on average.',
@@ -30,7 +29,6 @@ const ENGLISH = {
 const GERMAN: In<typeof ENGLISH> = {
   wasLive: 'zuletzt bekannt',
   acknowledged: (name, at) => `quittiert von ${name}, ${at}`,
-  shelved: (name, until) => `zurückgestellt von ${name} bis ${until}`,
   moreAlarms: (count) => `${count} weitere: siehe die Seiten der Gewächshäuser.`,
   deviation: 'Abweichung',
   deviationHint: 'Wie weit ein Gewächshaus im Mittel vom Median aller entfernt ist.',
@@ -55,7 +53,6 @@ const GERMAN: In<typeof ENGLISH> = {
 const DUTCH: In<typeof ENGLISH> = {
   wasLive: 'laatst bekend',
   acknowledged: (name, at) => `bevestigd door ${name}, ${at}`,
-  shelved: (name, until) => `uitgesteld door ${name} tot ${until}`,
   moreAlarms: (count) => `Nog ${count}: zie de pagina’s van de kassen.`,
   deviation: 'Afwijking',
   deviationHint: 'Hoe ver een kas gemiddeld van de mediaan van alle kassen ligt.',
@@ -80,7 +77,6 @@ const DUTCH: In<typeof ENGLISH> = {
 const SPANISH: In<typeof ENGLISH> = {
   wasLive: 'último dato',
   acknowledged: (name, at) => `reconocida por ${name}, ${at}`,
-  shelved: (name, until) => `aplazada por ${name} hasta ${until}`,
   moreAlarms: (count) => `${count} más: vea las páginas de los invernaderos.`,
   deviation: 'Desviación',
   deviationHint: 'Cuánto se aleja un invernadero de la mediana de todos, en promedio.',

@@ -40,7 +40,7 @@ def test_a_site_is_live_and_judged_and_new_scans_are_pushed(
         before = page.site(is_live=True, verdict="healthy", active_alarms=0)
         assert before.keys() == {
             "site", "name", "verdict", "last_verdict", "active_alarms", "last_received", "lag_s",
-            "is_live", "origin", "map",
+            "is_live", "origin", "map", "causes",
         }  # fmt: skip
         assert abs(before["last_received"]["sec"] - time.time()) < 120
         assert 0 <= before["lag_s"] < 10

@@ -86,19 +86,24 @@ def map_version(paths: str) -> str | None:
 MAX_CAUSES: Final = 2
 
 
-def causes(alarms: Iterable[Alarm]) -> tuple[dict[str, Any], ...]:
-    """The worst causes of alarms that come worst first: each with its worst alarm and their number.
+def causes(alarms: Iterable[tuple[Alarm, Mapping[str, Any]]]) -> tuple[dict[str, Any], ...]:
+    """The worst causes of alarms that come worst first: each with its first alarm, and their number.
 
-    Its silence is none of them: the card shows since when a site is silent.
+    Left out are alarms whose value is back in range, and the site's silence: its card shows that.
     """
-    found: dict[tuple[object, ...], list[Alarm]] = {}
-    for alarm in alarms:
-        if alarm.reason.kind is not Kind.SILENT:
-            found.setdefault(alarm.cause[1:], []).append(alarm)
-    return tuple(
-        {"reason": reason_json(its[0].reason), "tag_id": its[0].tag_id, "count": len(its)}
-        for its in list(found.values())[:MAX_CAUSES]
-    )
+    found: dict[tuple[object, ...], dict[str, Any]] = {}
+    for alarm, entry in alarms:
+        verdict = verdict_now(entry)
+        if alarm.reason.kind is Kind.SILENT or verdict is Verdict.HEALTHY:
+            continue
+        first = {"reason": {**entry["reason"], "verdict": verdict}, "tag_id": alarm.tag_id}
+        found.setdefault(alarm.cause[1:], {**first, "count": 0})["count"] += 1
+    return tuple(found.values())[:MAX_CAUSES]
+
+
+def verdict_now(alarm: Mapping[str, Any]) -> Verdict:
+    """The verdict of an alarm's value now, or if that is not known, its worst so far."""
+    return Verdict((alarm["now"] or alarm["reason"])["verdict"])
 
 
 def now_json(
@@ -112,7 +117,8 @@ def now_json(
     tag, health = tags.get(alarm.tag_id), healths.get(alarm.tag_id)
     if tag is None or health is None or kind not in {Kind.RANGE, Kind.PEST, Kind.CHANGED}:
         return None
-    if any(it.kind is Kind.OLD and it.sensor in {"", sensor} for it in health.reasons):
+    is_old = any(it.kind is Kind.OLD and it.sensor in {"", sensor} for it in health.reasons)
+    if is_old and kind is not Kind.PEST:
         return None
     said = next((it for it in health.reasons if (it.kind, it.sensor) == (kind, sensor)), None)
     readings = {it.name: it.value for it in (*tag.readings, *derive(tag.readings))}
@@ -222,14 +228,21 @@ def alarms_json(sites: Iterable[Site], archive: Archive) -> dict[str, Any]:
         for site in every
         for alarm in site.alarms
     ]
-    worst = heapq.nsmallest(MAX_LISTED, found, key=_worst_first)
+    worst = heapq.nsmallest(
+        MAX_LISTED, found, key=lambda alarm: (*worst_first(alarm), alarm["site"])
+    )
     return {"alarms": worst, "total": sum(site.active_alarms or 0 for site in every)}
 
 
-def _worst_first(alarm: Mapping[str, Any]) -> tuple[Any, ...]:
+def worst_first(alarm: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Sort key, as on the page of a greenhouse: by the verdict now, then what needs attention."""
     raised = alarm["raised_at"]
-    verdict = ORDER[Verdict(alarm["reason"]["verdict"])]
-    return "shelved_by" in alarm, verdict, -raised["sec"], -raised["nanosec"], alarm["site"], alarm["id"]
+    return (
+        "shelved_by" in alarm,
+        ORDER[verdict_now(alarm)],
+        "acknowledged_by" in alarm,
+        *(-raised["sec"], -raised["nanosec"], alarm["id"]),
+    )
 
 
 class SitesFrame:

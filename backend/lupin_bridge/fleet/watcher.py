@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar
 
-from lupin_bridge.alarms.board import notes_of_alarms, worst_first
+from lupin_bridge.alarms.board import notes_of_alarms
 from lupin_bridge.archive.database import (
     CHANNEL,
     ArchiveError,
@@ -23,7 +23,7 @@ from lupin_bridge.archive.database import (
 )
 from lupin_bridge.feed.query import Child, Now, Search
 from lupin_bridge.feed.query import main as serve
-from lupin_bridge.fleet.overview import LIVE_S, Site, causes, dots, now_json
+from lupin_bridge.fleet.overview import LIVE_S, Site, causes, dots, now_json, worst_first
 from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge
@@ -243,22 +243,25 @@ class Watcher:
         judgement = judged.judge.see(replace(judged.snapshot, stamp_ns=moment_ns))
         if judged.is_caught_up:
             said = notes_of_alarms(alarms, judged.notes, now_ns)
-            shelved = {id for id, notes in said.items() if notes.shelved is not None}
-            active = [alarm for alarm in alarms if alarm.is_active]
-            active.sort(key=lambda alarm: (alarm.id in shelved, worst_first(alarm)))
-            calling = [alarm for alarm in active if alarm.id not in shelved]
             tags = {tag.tag_id: tag for tag in judged.snapshot.tags} if site.is_live else {}
+            active = [
+                (
+                    alarm,
+                    {
+                        **alarm_json(alarm, said.get(alarm.id)),
+                        "now": now_json(alarm, tags, judgement.tags),
+                    },
+                )
+                for alarm in alarms
+                if alarm.is_active
+            ]
+            active.sort(key=lambda it: worst_first(it[1]))
+            calling = [it for it in active if "shelved_by" not in it[1]]
             site = replace(
                 site,
                 active_alarms=len(calling),
                 causes=causes(calling),
-                alarms=tuple(
-                    {
-                        **alarm_json(alarm, said.get(alarm.id)),
-                        "now": now_json(alarm, tags, judgement.tags),
-                    }
-                    for alarm in active[:MAX_ALARMS]
-                ),
+                alarms=tuple(entry for _, entry in active[:MAX_ALARMS]),
             )
         judged.judged_s, judged.was_live = time.monotonic(), site.is_live
         self.sites[name] = replace(

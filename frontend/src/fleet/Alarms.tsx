@@ -3,12 +3,12 @@ import { useMemo, type JSX } from 'react';
 
 import { type Now, valuesOf, whenText, whereText, type Speech } from '../alarms/words';
 import { timeOfDay } from '../clock';
-import type { Alarm, Verdict } from '../contract/types';
+import type { Alarm } from '../contract/types';
 import { secondsOf } from '../domain/time';
 import { LANGUAGE, S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
 import { VIEW_WORDS } from '../words/fleetViews';
-import { alarmCount, ms, namesOf, type Site, siteLink, timeText, VERDICTS, words } from './sites';
+import { alarmCount, ms, namesOf, type Site, siteLink, timeText, words } from './sites';
 import { useAnswer, useSpeech } from './useAnswer';
 
 interface SiteAlarm extends Alarm {
@@ -32,8 +32,7 @@ export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Eleme
   const { value, message } = useAnswer<{ alarms: readonly SiteAlarm[] }>(path, EVERY_MS, news);
   const rows = useMemo(() => {
     const sites = new Set(shown.map(({ site }) => site));
-    const found = value?.alarms.filter(({ site }) => sites.has(site)) ?? [];
-    return found.sort((a, b) => rankOf(a) - rankOf(b));
+    return value?.alarms.filter(({ site }) => sites.has(site)) ?? [];
   }, [value, shown]);
   const active = rows.filter(({ shelved_by: by }) => by === undefined);
   const shelved = rows.filter(({ shelved_by: by }) => by !== undefined);
@@ -66,17 +65,11 @@ export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Eleme
   );
 }
 
-const verdictOf = ({ now, reason }: SiteAlarm): Verdict => now?.verdict ?? reason.verdict;
-
-/** By the verdict now; acknowledged ones after the others. */
-const rankOf = (alarm: SiteAlarm): number =>
-  2 * VERDICTS.indexOf(verdictOf(alarm)) + Number(alarm.acknowledged_by !== undefined);
-
 function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Element {
   const raised = secondsOf(alarm.raised_at);
   const state = alarm.is_live && alarm.now ? alarm.now : null;
   const values = valuesOf(alarm, speech, state && { kind: 'known', trend: null, ...state });
-  const verdict = verdictOf(alarm);
+  const { verdict } = alarm.now ?? alarm.reason;
   return (
     <li data-live={alarm.is_live} data-shelved={Boolean(alarm.shelved_by)}>
       <a href={linkOf(alarm, raised)}>
@@ -88,7 +81,7 @@ function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Eleme
           {values.now}
           {values.worst !== null && (
             <span className="fleet-line">
-              {values.now !== null && <HealthMark verdict={alarm.reason.verdict} word={false} />}{' '}
+              {values.now !== null && <HealthMark verdict={alarm.reason.verdict} word={false} />}
               {values.worst}
             </span>
           )}

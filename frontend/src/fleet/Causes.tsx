@@ -2,7 +2,7 @@
 import { useEffect } from 'react';
 
 import { causeWords } from '../alarms/arrange';
-import { whereText } from '../alarms/words';
+import { inOnePiece, whereText } from '../alarms/words';
 import { S } from '../strings';
 import type { Cause } from './sites';
 import { useSpeech } from './useAnswer';
@@ -17,7 +17,7 @@ export default function Causes({ onWords }: { onWords: (text: CauseText) => void
       const where = count > 1 ? S.shownOf(count, count) : whereText(worst);
       return worst.tag_id === ''
         ? causeWords(worst, speech)
-        : `${causeWords(worst, speech)} · ${where}`;
+        : `${causeWords(worst, speech)} · ${inOnePiece(where)}`;
     });
   }, [speech, onWords]);
   return null;

@@ -277,25 +277,27 @@ const SiteCard = memo(function SiteCard({
           <span className="fleet-name">{name}</span>
           {origin && <span className="fleet-origin">{origin}</span>}
         </h3>
-        {map && <SmallMap src={`api/sites/${encodeURIComponent(site.site)}/map.svg?v=${map}`} />}
-        {isLive ? (
-          <HealthMark verdict={verdict} />
-        ) : (
-          <span className="fleet-silent">{silentText(site, asOf)}</span>
-        )}
-        {isLive && last === null && <span className="fleet-line">{words.judging}</span>}
-        {!isLive && last !== null && (
-          <span className="fleet-line">{words.lastKnown(S.health[last])}</span>
-        )}
-        <span className="fleet-alarms" data-any={(site.active_alarms ?? 0) > 0}>
-          {(isLive || site.active_alarms !== 0) && countText(site.active_alarms)}
-        </span>
-        {causeText !== null &&
-          site.causes.map((cause, index) => (
-            <span key={index} className="fleet-cause">
-              <HealthMark verdict={cause.reason.verdict} text={causeText(cause)} />
-            </span>
-          ))}
+        <div className="fleet-facts">
+          {map && <SmallMap src={`api/sites/${encodeURIComponent(site.site)}/map.svg?v=${map}`} />}
+          {isLive ? (
+            <HealthMark verdict={verdict} />
+          ) : (
+            <span className="fleet-silent">{silentText(site, asOf)}</span>
+          )}
+          {isLive && last === null && <span className="fleet-line">{words.judging}</span>}
+          {!isLive && last !== null && last !== 'unknown' && (
+            <span className="fleet-line">{words.lastKnown(S.health[last])}</span>
+          )}
+          <span className="fleet-alarms" data-any={(site.active_alarms ?? 0) > 0}>
+            {(isLive || site.active_alarms !== 0) && countText(site.active_alarms)}
+          </span>
+          {causeText !== null &&
+            site.causes.map((cause, index) => (
+              <span key={index} className="fleet-cause">
+                <HealthMark verdict={cause.reason.verdict} text={causeText(cause)} />
+              </span>
+            ))}
+        </div>
         <span className="fleet-line">
           {site.last_received
             ? words.received(timeText(ms(site.last_received)))

@@ -63,7 +63,7 @@ export const FILTERS = ['all', 'critical', 'stressed', 'silent', 'healthy'] as c
 export type Filter = (typeof FILTERS)[number];
 
 /** The worst first. Not imported from `domain/health`, which the first view here does not need. */
-export const VERDICTS: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'healthy'];
+const VERDICTS: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'healthy'];
 
 function isSite(value: unknown): value is Site {
   return (

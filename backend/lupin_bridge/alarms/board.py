@@ -189,7 +189,7 @@ def _shelved(alarms: Sequence[Alarm], shelves: Mapping[str, Note]) -> Mapping[st
     for alarm in alarms:
         note = shelves.get(alarm.id)
         known = held.get(alarm.cause)
-        if note is not None and (known is None or known[0].id < note.id):
+        if note is not None and (known is None or known[0].made_at_ns <= note.made_at_ns):
             held[alarm.cause] = note, ORDER[_verdict_at(alarm, note.made_at_ns)]
     return {
         alarm.id: shelf[0]

@@ -87,7 +87,7 @@ MAX_CAUSES: Final = 2
 
 
 def causes(alarms: Iterable[tuple[Alarm, Mapping[str, Any]]]) -> tuple[dict[str, Any], ...]:
-    """The worst causes of alarms that come worst first: each with its first alarm, and their number.
+    """The worst causes of alarms that come worst first: each with its worst alarm, and a count.
 
     Left out are alarms whose value is back in range, and the site's silence: its card shows that.
     """
@@ -146,7 +146,8 @@ class Site:
     with every row; `heartbeat_ns` is the forwarder's last heartbeat; 0: never. `last_received_ns`
     is when the twin received its newest row, by the clock of its machine. `verdict` and
     `active_alarms`, without shelved ones, are None until they are computed; `causes` is from
-    `causes`; `alarms` are the worst active ones, as in `/api/alarms`. `dots` draw its map; `notes` is the number of notes.
+    `causes`; `alarms` are the worst active ones, as in `/api/alarms`. `dots` draw its map;
+    `notes` is the number of notes.
     """
 
     site: str

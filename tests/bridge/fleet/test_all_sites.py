@@ -176,7 +176,10 @@ def test_an_alarm_comes_with_its_notes_and_a_shelved_one_is_not_counted(every: A
     assert "acknowledged_by" not in message()[first["id"]]
     # As on its own page: apart, and in no count.
     found = alarms(page, "noted")
-    assert (found["total"], [it["id"] for it in found["alarms"]]) == (1, [first["id"], second["id"]])
+    assert (found["total"], [it["id"] for it in found["alarms"]]) == (
+        1,
+        [first["id"], second["id"]],
+    )
     (cause,) = page.site("noted", active_alarms=1)["causes"]
     assert (cause["tag_id"], cause["count"]) == (first["tag_id"], 1)
     assert page.http.get("/api/alarms?sites=noted").headers["etag"] != etag

@@ -40,7 +40,6 @@ from lupin_bridge.fleet.overview import (
     SitesFrame,
     alarms_json,
     archive_json,
-    etag,
     map_svg,
     map_version,
     site_json,
@@ -181,8 +180,6 @@ class Fleet:
         self.hub.serve(client, time.monotonic())
 
     def _on_news(self) -> None:
-        for opened in self.pages:
-            opened.source.on_news()
         if self._push_timer is None:
             wait_s = max(0.0, self._framed_s + _FRAME_S - time.monotonic())
             self._push_timer = asyncio.get_running_loop().call_later(wait_s, self._push)
@@ -304,14 +301,6 @@ def create_fleet_app(
     return app
 
 
-def sites_wire(client: Client, frame: SitesFrame, only: tuple[str, ...]) -> bytes:
-    """A frame for a client that may read `only` these sites; empty: all."""
-    base = frame.base
-    if base is not None and base.seq == client.sent_seq:
-        return frame.delta(only)
-    return frame.full(only)
-
-
 async def _not_found(request: Request, _error: Exception) -> Response:
     return error_response(f"there is nothing at {request.url.path[:128]!r}", 404)
 
@@ -321,12 +310,9 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
     async def overview(request: Request) -> Response:
         """Every site of the archive, by name."""
         sites, archive = fleet.sites_for(request), fleet.watching.archive
-        tag = etag(sites, archive)
-        if has_etag(request, tag.removeprefix("W/")):
-            return not_modified(tag)
         now_ns = fleet.watching.now_ns
         entries = [site_json(site, archive, now_ns) for site in sites.values()]
-        return json_response(orjson.dumps({"sites": entries}), 200, {"ETag": tag, **REVALIDATE})
+        return json_response(orjson.dumps({"sites": entries}), 200)
 
     @app.api_route("/api/sites/{name}/map.svg", methods=["GET", "HEAD"])
     async def site_map(request: Request, name: str) -> Response:
@@ -352,7 +338,7 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
             delta=True,
             wants_status=False,
             wants_alarms=False,
-            wire=lambda it, frame: sites_wire(it, cast("SitesFrame", frame), only),
+            wire=lambda it, frame: cast("SitesFrame", frame).wire(it.sent_seq, only),
         )
 
 

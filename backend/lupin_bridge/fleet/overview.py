@@ -194,13 +194,6 @@ def site_json(site: Site, archive: Archive, now_ns: int) -> dict[str, Any]:
     }
 
 
-def etag(sites: Mapping[str, Site], archive: Archive) -> str:
-    """The ETag of the overview, the same in replicas that have seen the same; ages do not count."""
-    said = [(*_lasting(site),) for site in sites.values()]
-    text = repr((said, archive.is_reachable)).encode()
-    return f'W/"{blake2b(text, digest_size=12).hexdigest()}"'
-
-
 def _lasting(site: Site) -> tuple[object, ...]:
     return (
         *(site.site, site.name, site.last_seq, site.is_live),
@@ -258,46 +251,37 @@ class SitesFrame:
     ) -> None:
         self.seq: int = 1 if base is None else base.seq + 1
         self.base = base
-        self._sites = sites
-        self._archive = archive
+        self.sites = sites
+        self.archive = archive
         self._now_ns = now_ns
         self._wires: dict[tuple[bool, tuple[str, ...]], bytes] = {}
         if base is not None:
             base.base = None
 
-    def full(self, only: tuple[str, ...] = ()) -> bytes:
-        """A frame of every site, or `only` of these, if any is named."""
-        return self._wire(self._sites.values(), (), only, is_whole=True)
+    def wire(self, sent_seq: int | None, only: tuple[str, ...] = ()) -> bytes:
+        """The frame for a client that has the frame `sent_seq`: what differs from that, or all.
 
-    def delta(self, only: tuple[str, ...] = ()) -> bytes:
-        """A frame of what differs from `base`; of all sites, if the archive has come or gone."""
-        assert self.base is not None  # the caller checks that
-        known, archive = self.base._sites, self.base._archive  # noqa: SLF001  # its own
-        is_all = self._archive.is_reachable != archive.is_reachable
-        # A heartbeat alone is no change.
-        changed = [
-            site
-            for name, site in self._sites.items()
-            if is_all or name not in known or _lasting(known[name]) != _lasting(site)
-        ]
-        gone = [name for name in known if name not in self._sites]
-        return self._wire(changed, gone, only, is_whole=False)
-
-    def _wire(
-        self, sites: Iterable[Site], gone: Iterable[str], only: tuple[str, ...], *, is_whole: bool
-    ) -> bytes:
-        key = is_whole, only
+        `only` are the sites that it may read; empty: all.
+        """
+        base = self.base if self.base is not None and self.base.seq == sent_seq else None
+        key = base is None, only
         if key not in self._wires:
-            archive = self._archive
-            if only:
-                sites = (site for site in sites if site.site in only)
-                gone = (name for name in gone if name in only)
+            known: Mapping[str, object] = {}
+            # If the archive has come or gone, every site is changed.
+            if base is not None and base.archive == self.archive:
+                known = {name: _lasting(site) for name, site in base.sites.items()}
+            gone = [] if base is None else [it for it in base.sites if it not in self.sites]
             body = {
                 "type": "sites",
-                "is_whole": is_whole,
-                "archive": archive_json(archive),
-                "sites": [site_json(site, archive, self._now_ns) for site in sites],
-                "gone": list(gone),
+                "is_whole": base is None,
+                "archive": archive_json(self.archive),
+                # A heartbeat alone is no change.
+                "sites": [
+                    site_json(site, self.archive, self._now_ns)
+                    for name, site in self.sites.items()
+                    if known.get(name) != _lasting(site) and (not only or name in only)
+                ],
+                "gone": [name for name in gone if not only or name in only],
             }
             self._wires[key] = text_frame(orjson.dumps(body))
         return self._wires[key]

@@ -14,7 +14,6 @@ import {
 
 import { S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
-import { Select } from '../widgets/controls';
 import type { CauseText } from './Causes';
 import { Choice } from './Choice';
 import type { Seen } from './follow';
@@ -44,7 +43,8 @@ const Compare = lazy(() => import('./Compare'));
 const VIEWS = ['sites', 'alarms', 'compare', 'report'] as const;
 type View = (typeof VIEWS)[number];
 
-const query = new URLSearchParams(window.location.search);
+/** The group on a wall screen; empty: all. */
+const group = new URLSearchParams(window.location.search).get('group') ?? '';
 
 interface Props {
   readonly seen: Seen;
@@ -55,7 +55,6 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
   const [view, setView] = useState<View>('sites');
   const [filter, setFilter] = useState<Filter>('all');
   const [search, setSearch] = useState('');
-  const [group, setGroup] = useState(query.get('group') ?? '');
   const [causeText, setCauseText] = useState<CauseText | null>(null);
   const onWords = useCallback((text: CauseText) => {
     setCauseText(() => text);
@@ -72,7 +71,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
     asOfWhen(seen) === null &&
     [...sites.values()].every((site) => site.is_live && site.active_alarms !== null);
   const groups = useMemo(() => groupNames(sites.values()), [sites]);
-  const shown = useMemo(() => chosen(sites, filter, search, group), [sites, filter, search, group]);
+  const shown = useMemo(() => chosen(sites, filter, search, group), [sites, filter, search]);
 
   useEffect(() => {
     document.title = alarms === 0 ? words.sites : `(${alarms}) ${words.sites}`;
@@ -120,16 +119,6 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
                 setSearch(event.target.value);
               }}
             />
-            {groups.length > 0 && (
-              <Select
-                className="fleet-search"
-                aria-label={words.group}
-                value={groups.includes(group) ? group : ''}
-                options={['', ...groups]}
-                text={(name) => name || words.allGroups}
-                onChange={setGroup}
-              />
-            )}
             <Choice
               label={words.filter}
               options={FILTERS}
@@ -195,7 +184,6 @@ function Trouble({ seen }: { seen: Seen }): JSX.Element {
   );
 }
 
-const STAYS_MS = 200;
 /** After this long without data, a greenhouse counts as silent, or the archive as down. */
 const LIVE_MS = 20_000;
 
@@ -278,7 +266,17 @@ const SiteCard = memo(function SiteCard({
           {origin && <span className="fleet-origin">{origin}</span>}
         </h3>
         <div className="fleet-facts">
-          {map && <SmallMap src={`api/sites/${encodeURIComponent(site.site)}/map.svg?v=${map}`} />}
+          {map && (
+            <img
+              className="fleet-map"
+              src={`api/sites/${encodeURIComponent(site.site)}/map.svg?v=${map}`}
+              alt=""
+              width={88}
+              height={48}
+              loading="lazy"
+              decoding="async"
+            />
+          )}
           {isLive ? (
             <HealthMark verdict={verdict} />
           ) : (
@@ -307,33 +305,6 @@ const SiteCard = memo(function SiteCard({
     </li>
   );
 });
-
-/** Fetched once its card stays in sight, not while scrolling past. */
-function SmallMap({ src }: { src: string }): JSX.Element {
-  const place = useRef<HTMLSpanElement>(null);
-  const [isShown, setShown] = useState(false);
-  useEffect(() => {
-    let timer: ReturnType<typeof setTimeout> | undefined;
-    const seen = new IntersectionObserver(([entry]) => {
-      clearTimeout(timer);
-      if (!entry?.isIntersecting) return;
-      timer = setTimeout(() => {
-        setShown(true);
-        seen.disconnect();
-      }, STAYS_MS);
-    });
-    if (place.current) seen.observe(place.current);
-    return () => {
-      clearTimeout(timer);
-      seen.disconnect();
-    };
-  }, []);
-  return (
-    <span ref={place} className="fleet-map">
-      {isShown && <img src={src} alt="" width={88} height={48} decoding="async" />}
-    </span>
-  );
-}
 
 /** Says that data are simulated or recorded; null: not known, or from a robot. */
 function originText({ origin }: Site): string | null {

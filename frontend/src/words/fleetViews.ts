@@ -11,7 +11,7 @@ const ENGLISH = {
   median: 'Median of all; band: the middle half',
   draw: (site: string): string => `Show ${site}`,
   someCompared: (count: number, all: number): string =>
-    `${count} of ${all} greenhouses are compared, the worst first. Search, or choose a group.`,
+    `${count} of ${all} greenhouses are compared, the worst first. Search to choose others.`,
   notFetched: (reason: string): string => `This could not be fetched: ${reason}`,
   hours: (count: number): string => `Last ${count} hours`,
   scans: 'Scans',
@@ -35,7 +35,7 @@ const GERMAN: In<typeof ENGLISH> = {
   median: 'Median aller; Band: die mittlere Hälfte',
   draw: (site) => `${site} anzeigen`,
   someCompared: (count, all) =>
-    `${count} von ${all} Gewächshäusern werden verglichen, die schlimmsten zuerst. Suchen Sie, oder wählen Sie eine Gruppe.`,
+    `${count} von ${all} Gewächshäusern werden verglichen, die schlimmsten zuerst. Suchen Sie nach anderen.`,
   notFetched: (reason) => `Das ließ sich nicht abrufen: ${reason}`,
   hours: (count) => `Letzte ${count} Stunden`,
   scans: 'Messungen',
@@ -59,7 +59,7 @@ const DUTCH: In<typeof ENGLISH> = {
   median: 'Mediaan van alle; band: de middelste helft',
   draw: (site) => `${site} tonen`,
   someCompared: (count, all) =>
-    `${count} van ${all} kassen worden vergeleken, de slechtste eerst. Zoek, of kies een groep.`,
+    `${count} van ${all} kassen worden vergeleken, de slechtste eerst. Zoek om andere te kiezen.`,
   notFetched: (reason) => `Dit kon niet worden opgehaald: ${reason}`,
   hours: (count) => `Afgelopen ${count} uur`,
   scans: 'Metingen',
@@ -83,7 +83,7 @@ const SPANISH: In<typeof ENGLISH> = {
   median: 'Mediana de todos; banda: la mitad central',
   draw: (site) => `Mostrar ${site}`,
   someCompared: (count, all) =>
-    `Se comparan ${count} de ${all} invernaderos, los peores primero. Busque o elija un grupo.`,
+    `Se comparan ${count} de ${all} invernaderos, los peores primero. Busque para elegir otros.`,
   notFetched: (reason) => `No se pudo obtener: ${reason}`,
   hours: (count) => `Últimas ${count} horas`,
   scans: 'Mediciones',

@@ -106,7 +106,7 @@ class Fleet:
     def __init__(
         self, settings: Settings, criteria: Criteria, access: Access, limits: Limits
     ) -> None:
-        self.watching = Watching(settings, self._on_news)
+        self.watching = Watching(settings)
         self.past = PastProcess("lupin_bridge.fleet.reader")
         self.hub = Hub(
             settings.max_clients, limits.client_timeout_s, lambda _: Status("live", None)
@@ -136,20 +136,20 @@ class Fleet:
         # `routes.answers` needs these, as it does of a bridge.
         self.cache = AnswerCache()
         self.answering: Shared[Answer] = Shared()
-        self._frame: SitesFrame | None = None
+        self._frame = SitesFrame(self.watching.sites, self.watching.archive, 0)
         self._framed_s = -math.inf
-        self._push_timer: asyncio.TimerHandle | None = None
+        self._pushing = Periodic(self._push, _FRAME_S, "the overview", 0.0)
         self._tidying = Periodic(self._tidy, _TIDY_S, "tidying")
 
     async def start(self) -> None:
         """Start watching the archive."""
         self.watching.start()
+        self._pushing.start()
         self._tidying.start()
 
     async def stop(self) -> None:
         """Close every page, and stop."""
-        if self._push_timer is not None:
-            self._push_timer.cancel()
+        await self._pushing.stop()
         await self._tidying.stop()
         await self.pages.close()
         self.workers.close()
@@ -171,33 +171,25 @@ class Fleet:
 
     def join(self, client: Client) -> None:
         """Add a browser; it has been sent every site when this returns."""
-        if self._frame is None:
-            self._push()
         self.hub.join(client, time.monotonic())
 
     def serve(self, client: Client) -> None:
         """Send a browser what it lacks: its socket is free again."""
         self.hub.serve(client, time.monotonic())
 
-    def _on_news(self) -> None:
-        if self._push_timer is None:
-            wait_s = max(0.0, self._framed_s + _FRAME_S - time.monotonic())
-            self._push_timer = asyncio.get_running_loop().call_later(wait_s, self._push)
-
-    def _push(self) -> None:
-        self._push_timer = None
-        now_s = time.monotonic()
+    async def _push(self) -> None:
+        now_s, watching, last = time.monotonic(), self.watching, self._frame
+        is_same = last.sites is watching.sites and last.archive is watching.archive
+        if is_same and now_s - self._framed_s < _HEARTBEAT_S:
+            return
         self._framed_s = now_s
-        watching = self.watching
-        self._frame = SitesFrame(watching.sites, watching.archive, watching.now_ns, self._frame)
+        self._frame = SitesFrame(watching.sites, watching.archive, watching.now_ns, last)
         self.hub.publish(self._frame, now_s)  # type: ignore[arg-type]  # all that the hub needs of one
 
     async def _tidy(self) -> None:
         now_s = time.monotonic()
         self.pages.tidy(now_s)
         self.hub.dismiss_stuck(now_s)
-        if now_s - self._framed_s >= _HEARTBEAT_S and self._push_timer is None:
-            self._push()
 
     def measure(self) -> Iterator[tuple[str, str, float]]:
         """Yield (name, help text, value) of each metric, for Prometheus."""

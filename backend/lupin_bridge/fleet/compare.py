@@ -227,7 +227,7 @@ FROM (
 ) AS newest LEFT JOIN LATERAL (
     SELECT made_by AS by, made_at_ns AS at_ns FROM note AS other
     WHERE other.site = newest.site AND kind = %(withdraw)s AND subject = %(withdrawn)s || newest.id
-    ORDER BY other.id LIMIT 1
+    ORDER BY other.made_at_ns, other.id LIMIT 1
 ) AS gone ON true
 ORDER BY made_at_ns DESC, site, id
 """

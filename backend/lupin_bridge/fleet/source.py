@@ -46,14 +46,13 @@ _RETRY_S: Final = 1.0
 class Watching:
     """The sites and the archive as they were seen last, from `start` to `stop`.
 
-    `on_news` is called when anything has changed.
+    Each is another object when it has changed.
     """
 
-    def __init__(self, settings: Settings, on_news: Callable[[], None]) -> None:
+    def __init__(self, settings: Settings) -> None:
         self.sites: Mapping[str, Site] = {}
         self.archive = Archive(is_reachable=False, message="the archive has not been read yet")
         self.looks = 0
-        self._on_news = on_news
         # How far the archive's clock is ahead of this process's monotonic one.
         self._ahead_ns = time.time_ns() - time.monotonic_ns()
         self.process = PastProcess("lupin_bridge.fleet.watcher")
@@ -116,7 +115,6 @@ class Watching:
         known = {**self.sites, **{site.site: site for site in news.changed}}
         self.sites = {name: known[name] for name in sorted(news.names)}
         self.archive = Archive(is_reachable=True)
-        self._on_news()
 
     def _down(self, message: str) -> None:
         if not self.archive.is_reachable and self.archive.message == message:
@@ -124,7 +122,6 @@ class Watching:
         since_ns = self.archive.since_ns or self.now_ns
         self.archive = replace(self.archive, is_reachable=False, message=message, since_ns=since_ns)
         log.warning("%s", message)
-        self._on_news()
 
 
 # --- the source of one site's page ----------------------------------------------------------------

@@ -174,7 +174,7 @@ async def test_an_unexpected_error_is_logged_once_and_ends_neither_overview_nor_
         if updates == 2:  # the first heartbeat
             raise ZeroDivisionError
 
-    watching = source.Watching(Settings(), lambda: None)
+    watching = source.Watching(Settings())
     monkeypatch.setattr(watching.process, "ask", ask)
     watching.start()
     await until(lambda: watching.sites, "the overview")
@@ -285,7 +285,7 @@ async def test_a_process_is_checked_as_long_as_it_does_not_answer(
 ) -> None:
     """It may be stopped after a check, while it waits for the archive."""
     monkeypatch.setattr(source, "_START_S", 0.01)
-    watching = source.Watching(Settings(), lambda: None)
+    watching = source.Watching(Settings())
     checks: list[None] = []
     monkeypatch.setattr(watching.process, "ask", lambda *_: asyncio.sleep(60.0))
     monkeypatch.setattr(watching.process, "cancel", lambda: checks.append(None))

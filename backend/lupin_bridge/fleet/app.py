@@ -130,7 +130,7 @@ class Fleet:
             app = create_app(bridge, access=Access(access.policy))
             app.state.access = access
             ready = asyncio.create_task(bridge.start(), name=f"open {name}")
-            return Opened(source, bridge, app, ready)
+            return Opened(bridge, app, ready)
 
         self.pages = SitePages(make, lambda: self.watching.sites, limits.open_sites)
         # `routes.answers` needs these, as it does of a bridge.

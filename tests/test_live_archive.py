@@ -5,6 +5,7 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+import httpx
 import pytest
 
 from lupin_twin.journal.paths import mark_of
@@ -62,14 +63,14 @@ def test_a_promoted_standby_is_used_and_has_what_was_acknowledged(tmp_path: Path
             assert took_s < 10.0, took_s
 
 
-def test_serve_forwards_and_survives_the_end_of_archive_and_forwarder(
+def test_serve_forwards_both_ways_and_survives_the_end_of_archive_and_forwarder(
     postgresql: Postgres, tmp_path: Path, domain: int
 ) -> None:
     archive, journal = Archive(postgresql), tmp_path / "journal.sqlite"
     args = ("--site", "gh1", "--archive-url", archive.url())
     ros_args = (*OFTEN, "-p", f"journal:={journal}")
     with lupin_twin(domain, "serve", *args, *ros_args) as serve, Peer(domain, "robot") as robot:
-        url_of(serve)
+        url = url_of(serve)
         robot.wait_for_twin()
         robot.observe(scan("7", {"temperature": 21.5}, at=(1.0, 2.0)))
         wait_for(lambda: archive.rows()["place"], "the first scan in the archive")
@@ -79,6 +80,26 @@ def test_serve_forwards_and_survives_the_end_of_archive_and_forwarder(
         robot.observe(scan("8", {"temperature": 22.5}, at=(2.0, 2.0)))
         wait_for(lambda: len(rows_of(journal)["scan"]) == 2, "the scan in the journal")
         postgresql.start()
+        wait_until_equal(archive, journal)
+        # What the fleet wrote, also while nothing was forwarded, comes back: each once, and nothing
+        # gets its number. One whose number no journal can have had stays where it is.
+        notes = [(f"{number:016x}{by:0>8}", by) for number, by in ((2, "a"), (500, "b"))]
+        archive.do(
+            "INSERT INTO note VALUES "
+            + ", ".join(
+                f"('gh1', '{name}', {time.time_ns()}, '{by}', 'comment', 'tag:7', 'vent', NULL)"
+                for name, by in (*notes, (f"{2**40:016x}{'c':0>8}", "c"))
+            )
+        )
+
+        def returned() -> bool:
+            found = httpx.get(f"{url}/api/notes", trust_env=False).json()["notes"]
+            return sorted((it["id"], it["by"]) for it in found) == notes
+
+        wait_for(returned, "the notes on the greenhouse's own page")
+        robot.observe(scan("9", {"temperature": 23.5}, at=(3.0, 2.0)))
+        wait_for(lambda: max(row[0] for row in rows_of(journal)["scan"]) > 500, "a later number")
+        archive.do("DELETE FROM note WHERE made_by = 'c'")
         wait_until_equal(archive, journal)
         (child,) = children_of(serve.pid, b"forward")
         assert archive.name.encode() not in Path(f"/proc/{child}/cmdline").read_bytes()

@@ -185,16 +185,16 @@ def _shelved(alarms: Sequence[Alarm], shelves: Mapping[str, Note]) -> Mapping[st
 
     It also covers an alarm that returns: one of the same tag, kind, sensor and side.
     """
-    held: dict[tuple[object, ...], tuple[Note, int]] = {}
+    held: dict[object, tuple[Note, int]] = {}
     for alarm in alarms:
         note = shelves.get(alarm.id)
-        known = held.get(_what(alarm))
-        if note is not None and (known is None or known[0].id < note.id):
-            held[_what(alarm)] = note, ORDER[_verdict_at(alarm, note.made_at_ns)]
+        known = held.get(alarm.cause)
+        if note is not None and (known is None or known[0].made_at_ns <= note.made_at_ns):
+            held[alarm.cause] = note, ORDER[_verdict_at(alarm, note.made_at_ns)]
     return {
         alarm.id: shelf[0]
         for alarm in alarms
-        if (shelf := held.get(_what(alarm))) and ORDER[alarm.reason.verdict] >= shelf[1]
+        if (shelf := held.get(alarm.cause)) and ORDER[alarm.reason.verdict] >= shelf[1]
     }
 
 
@@ -202,13 +202,6 @@ def _verdict_at(alarm: Alarm, at_ns: int) -> Verdict:
     """The verdict of an alarm at a moment."""
     was_better = alarm.worse_at_ns is not None and at_ns < alarm.worse_at_ns
     return alarm.raised_as if was_better and alarm.raised_as else alarm.reason.verdict
-
-
-def _what(alarm: Alarm) -> tuple[object, ...]:
-    reason = alarm.reason
-    value, limit = reason.value, reason.limit
-    is_low = value is not None and limit is not None and value < limit
-    return alarm.tag_id, reason.kind, reason.sensor, is_low
 
 
 class NoteBoard(Periodic):

@@ -4,6 +4,9 @@
 A problem is reported once, in one line, and retried later; it does not affect the twin.
 
 `Sink` is the archive's end: it appends a site's rows, one batch per transaction, each row once.
+
+Notes also go the other way: those made in the fleet are handed to the twin, which writes them into
+its journal. A note has one id everywhere, so it is written once in each.
 """
 
 from __future__ import annotations
@@ -15,8 +18,8 @@ import os
 import socket
 import sys
 import time
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Awaitable, Callable
+from contextlib import closing, suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
@@ -35,9 +38,11 @@ from lupin_bridge.archive.database import (
 )
 from lupin_bridge.archive.journal_reader import Batch, Epoch, Source, without_nul
 from lupin_bridge.console import CommandError
+from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.feed.tasks import end
 from lupin_bridge.settings import Settings, option, variable
-from lupin_twin.core.past import DAY_NS
+from lupin_twin.core.notes import MAX_NOTES, Note, NotesRequest, NotesUnwritable
+from lupin_twin.core.past import DAY_NS, NotRemembered
 from lupin_twin.journal.retention import RECORD
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
@@ -48,6 +53,7 @@ from lupin_twin.journal.schema import (
     insert_into,
     upsert_into,
 )
+from lupin_twin.journal.writes import notes, number_of
 
 # How to write the tables whose rows change.
 _CHANGING: Final = {
@@ -78,6 +84,9 @@ _LOCK: Final = "SELECT pg_try_advisory_lock(hashtextextended(:name, 0))"
 _OTHER: Final = (
     "SELECT machine, process, date_trunc('second', since) FROM forwarder WHERE site = :site"
 )
+# Notes of the fleet in one go, and characters of one: more than people write.
+_MAX_RETURNED: Final = 50
+_MAX_TEXT: Final = 4_000
 _HERE: Final = (
     "INSERT INTO forwarder VALUES (:site, :machine, :process, now(), now())"
     " ON CONFLICT (site) DO UPDATE SET"
@@ -100,6 +109,8 @@ class Sink:
         self._log = SiteLog(self._connection, site)
         # Days since 1970 whose months have their partitions.
         self._days: set[int] = set()
+        self._read = NotesRequest()
+        self._lacking: tuple[Note, ...] = ()
 
     def close(self) -> None:
         """Close the connection, so that others may write the site."""
@@ -175,6 +186,23 @@ class Sink:
             self._log.execute("SELECT pg_notify(:channel, :site)", {"channel": CHANNEL})
         return epoch
 
+    def lacking(self, source: Source) -> tuple[Note, ...]:
+        """The notes of the archive that the journal lacks: the next ones to hand over."""
+        found = notes(self._log, self._read)
+        if found.notes is not None:
+            self._read, self._lacking = NotesRequest(found.journal, found.count), found.notes
+        if self._lacking:
+            known, most = source.note_ids(), source.last_seq() + MAX_NOTES
+            self._lacking = tuple(
+                note
+                for note in self._lacking
+                # A number far ahead is that of a journal before this one, or nonsense.
+                if note.id not in known
+                and number_of(note.id) <= most
+                and len(note.text) + len(note.by) + len(note.subject) <= _MAX_TEXT
+            )
+        return self._lacking[:_MAX_RETURNED]
+
     def _make_months(self, batch: Batch) -> None:
         """Create the partitions of the batch's months, and of the month after each."""
         days = {
@@ -201,13 +229,21 @@ _HEARTBEAT_S: Final = 2.0
 class Forwarder:
     """Forwards the journal that `path` finds, to a site of the archive.
 
+    `give` hands a note of the fleet to the twin; it is called until the journal has it. None:
+    nobody takes it.
+
     Raises:
         UsageError: the site or the address is invalid.
 
     """
 
     def __init__(
-        self, url: str, site: str, path: Callable[[], Path], say: Callable[[str], None]
+        self,
+        url: str,
+        site: str,
+        path: Callable[[], Path],
+        say: Callable[[str], None],
+        give: Callable[[Note], None] | None = None,
     ) -> None:
         check_site("--site", site)
         check_url(url)
@@ -215,6 +251,7 @@ class Forwarder:
         self._site = site
         self._path = path
         self._say = say
+        self._give = give
         self._last_problem = ""
         self._wait_s = FIRST_WAIT_S
 
@@ -267,6 +304,9 @@ class Forwarder:
                 if time.monotonic() - beaten_s >= _HEARTBEAT_S:
                     beaten_s = time.monotonic()
                     sink.beat()
+                    if self._give is not None:
+                        for note in sink.lacking(source):
+                            self._give(note)
                 if once and not is_full:
                     return
                 if not is_full:
@@ -302,11 +342,17 @@ class Forwarding:
     """Keeps a process that forwards, from construction to `stop`; restarts it whenever it ends.
 
     Without a site, there is none. `journal` returns the path of the twin's journal; empty: not
-    known yet.
+    known yet. `put` writes a note of the fleet into that.
     """
 
-    def __init__(self, settings: Settings, journal: Callable[[], str]) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        journal: Callable[[], str],
+        put: Callable[[Note], Awaitable[object]],
+    ) -> None:
         self._journal = journal
+        self._put = put
         # Not on its command line, which others can read.
         self._env = {
             **os.environ,
@@ -335,7 +381,13 @@ class Forwarding:
                     *(sys.executable, "-P", "-m", "lupin_bridge.cli.command", *words),
                     env=self._env,
                     stdin=asyncio.subprocess.PIPE,
+                    stdout=asyncio.subprocess.PIPE,
                 )
+                assert self._process.stdout is not None
+                async for line in self._process.stdout:
+                    # If it is not written now, it comes again.
+                    with suppress(NotesUnwritable, NotRemembered, TwinUnavailableError):
+                        await self._put(Note(**json.loads(line)))
                 ended = f"has ended with code {await self._process.wait()}"
             except OSError as error:
                 ended = f"cannot be started: {error}"

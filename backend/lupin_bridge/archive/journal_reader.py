@@ -149,6 +149,12 @@ class Source:
         """The last number that the journal has assigned."""
         return Appender(self._connection).last_seq
 
+    def note_ids(self) -> set[str]:
+        """The ids of all its notes."""
+        return {
+            note_id for (note_id,) in self._log.execute("SELECT id FROM note WHERE site = :site")
+        }
+
     def arrival_of(self, seq: int) -> int | None:
         """When the row of a number was received; None: it is not there."""
         found = self._log.execute(_ARRIVAL, {"seq": seq}).fetchone()

@@ -9,6 +9,7 @@ import argparse
 import csv
 import getpass
 import io
+import json
 import logging
 import os
 import secrets
@@ -17,6 +18,7 @@ import threading
 import time
 from collections.abc import Mapping
 from contextlib import closing
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -166,13 +168,16 @@ def _archive(options: argparse.Namespace, url: str) -> int:
 
 
 def _forward(options: argparse.Namespace, environ: Mapping[str, str], url: str) -> int:
+    give = None
     if options.end_with_input:
+        # Notes of the fleet, a line each, see `Forwarding`.
+        give = lambda note: tell(json.dumps(asdict(note)))  # noqa: E731
         os.nice(_NICENESS)
         threading.Thread(target=_end_with_input, name="end", daemon=True).start()
 
     # Looked for each time: the journal may not exist yet.
     path = partial(journal.path_of, options, environ)
-    forwarder = Forwarder(url, _given(options, environ, "site"), path, say)
+    forwarder = Forwarder(url, _given(options, environ, "site"), path, say, give)
     return 0 if forwarder.run(once=options.once) else FAILED
 
 

@@ -295,7 +295,7 @@ async def _run(
     server = BridgeServer(app, settings, announcements, limits)
     await bridge.start()
     feeder = None if feed is None else Feeder(feed, lambda: server.should_exit)
-    forwarding = archive.Forwarding(settings, lambda: source.journal().path)
+    forwarding = archive.Forwarding(settings, lambda: source.journal().path, source.write_note)
     try:
         await serve(server, listener, settings, supervisor, lambda: ailment(source.thread))
     finally:

@@ -40,7 +40,6 @@ from lupin_bridge.fleet.overview import (
     SitesFrame,
     alarms_json,
     archive_json,
-    etag,
     map_svg,
     map_version,
     site_json,
@@ -106,7 +105,7 @@ class Fleet:
     def __init__(
         self, settings: Settings, criteria: Criteria, access: Access, limits: Limits
     ) -> None:
-        self.watching = Watching(settings, self._on_news)
+        self.watching = Watching(settings)
         self.past = PastProcess("lupin_bridge.fleet.reader")
         self.hub = Hub(
             settings.max_clients, limits.client_timeout_s, lambda _: Status("live", None)
@@ -130,26 +129,26 @@ class Fleet:
             app = create_app(bridge, access=Access(access.policy))
             app.state.access = access
             ready = asyncio.create_task(bridge.start(), name=f"open {name}")
-            return Opened(source, bridge, app, ready)
+            return Opened(bridge, app, ready)
 
         self.pages = SitePages(make, lambda: self.watching.sites, limits.open_sites)
         # `routes.answers` needs these, as it does of a bridge.
         self.cache = AnswerCache()
         self.answering: Shared[Answer] = Shared()
-        self._frame: SitesFrame | None = None
+        self._frame = SitesFrame(self.watching.sites, self.watching.archive, 0)
         self._framed_s = -math.inf
-        self._push_timer: asyncio.TimerHandle | None = None
+        self._pushing = Periodic(self._push, _FRAME_S, "the overview", 0.0)
         self._tidying = Periodic(self._tidy, _TIDY_S, "tidying")
 
     async def start(self) -> None:
         """Start watching the archive."""
         self.watching.start()
+        self._pushing.start()
         self._tidying.start()
 
     async def stop(self) -> None:
         """Close every page, and stop."""
-        if self._push_timer is not None:
-            self._push_timer.cancel()
+        await self._pushing.stop()
         await self._tidying.stop()
         await self.pages.close()
         self.workers.close()
@@ -171,35 +170,25 @@ class Fleet:
 
     def join(self, client: Client) -> None:
         """Add a browser; it has been sent every site when this returns."""
-        if self._frame is None:
-            self._push()
         self.hub.join(client, time.monotonic())
 
     def serve(self, client: Client) -> None:
         """Send a browser what it lacks: its socket is free again."""
         self.hub.serve(client, time.monotonic())
 
-    def _on_news(self) -> None:
-        for opened in self.pages:
-            opened.source.on_news()
-        if self._push_timer is None:
-            wait_s = max(0.0, self._framed_s + _FRAME_S - time.monotonic())
-            self._push_timer = asyncio.get_running_loop().call_later(wait_s, self._push)
-
-    def _push(self) -> None:
-        self._push_timer = None
-        now_s = time.monotonic()
+    async def _push(self) -> None:
+        now_s, watching, last = time.monotonic(), self.watching, self._frame
+        is_same = last.sites is watching.sites and last.archive is watching.archive
+        if is_same and now_s - self._framed_s < _HEARTBEAT_S:
+            return
         self._framed_s = now_s
-        watching = self.watching
-        self._frame = SitesFrame(watching.sites, watching.archive, watching.now_ns, self._frame)
+        self._frame = SitesFrame(watching.sites, watching.archive, watching.now_ns, last)
         self.hub.publish(self._frame, now_s)  # type: ignore[arg-type]  # all that the hub needs of one
 
     async def _tidy(self) -> None:
         now_s = time.monotonic()
         self.pages.tidy(now_s)
         self.hub.dismiss_stuck(now_s)
-        if now_s - self._framed_s >= _HEARTBEAT_S and self._push_timer is None:
-            self._push()
 
     def measure(self) -> Iterator[tuple[str, str, float]]:
         """Yield (name, help text, value) of each metric, for Prometheus."""
@@ -302,14 +291,6 @@ def create_fleet_app(
     return app
 
 
-def sites_wire(client: Client, frame: SitesFrame, only: tuple[str, ...]) -> bytes:
-    """A frame for a client that may read `only` these sites; empty: all."""
-    base = frame.base
-    if base is not None and base.seq == client.sent_seq:
-        return frame.delta(only)
-    return frame.full(only)
-
-
 async def _not_found(request: Request, _error: Exception) -> Response:
     return error_response(f"there is nothing at {request.url.path[:128]!r}", 404)
 
@@ -319,12 +300,9 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
     async def overview(request: Request) -> Response:
         """Every site of the archive, by name."""
         sites, archive = fleet.sites_for(request), fleet.watching.archive
-        tag = etag(sites, archive)
-        if has_etag(request, tag.removeprefix("W/")):
-            return not_modified(tag)
         now_ns = fleet.watching.now_ns
         entries = [site_json(site, archive, now_ns) for site in sites.values()]
-        return json_response(orjson.dumps({"sites": entries}), 200, {"ETag": tag, **REVALIDATE})
+        return json_response(orjson.dumps({"sites": entries}), 200)
 
     @app.api_route("/api/sites/{name}/map.svg", methods=["GET", "HEAD"])
     async def site_map(request: Request, name: str) -> Response:
@@ -350,7 +328,7 @@ def _add_overview(app: FastAPI, fleet: Fleet) -> None:
             delta=True,
             wants_status=False,
             wants_alarms=False,
-            wire=lambda it, frame: sites_wire(it, cast("SitesFrame", frame), only),
+            wire=lambda it, frame: cast("SitesFrame", frame).wire(it.sent_seq, only),
         )
 
 

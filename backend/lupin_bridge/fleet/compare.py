@@ -26,7 +26,7 @@ from lupin_bridge.fleet.overview import MAX_LISTED
 from lupin_bridge.judge.quantities import DAILY, DERIVED, Sensors
 from lupin_bridge.query_string import Name, OfPeriod, OfReport, Parameters, needed, parameter, read
 from lupin_bridge.serving.admission import Answer, content_answer
-from lupin_bridge.stream.state_json import note_json, stamp
+from lupin_bridge.stream.state_json import moment, note_json, stamp
 from lupin_twin.core.notes import WITHDRAW, WITHDRAWN, Note
 from lupin_twin.core.past import HOUR_NS, Event, Grid, NotFound, PastRefused, grid, seconds
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
@@ -227,7 +227,7 @@ FROM (
 ) AS newest LEFT JOIN LATERAL (
     SELECT made_by AS by, made_at_ns AS at_ns FROM note AS other
     WHERE other.site = newest.site AND kind = %(withdraw)s AND subject = %(withdrawn)s || newest.id
-    ORDER BY other.id LIMIT 1
+    ORDER BY other.made_at_ns, other.id LIMIT 1
 ) AS gone ON true
 ORDER BY made_at_ns DESC, site, id
 """
@@ -269,7 +269,8 @@ class SitesReport:
                 "name": name,
                 **{key: counts[site, event] for event, key in _COUNTED.items()},
                 "active_alarms": active,
-                "complete_to": stamp(min(heartbeat_ns, self.end_ns)),
+                # A site that has never been forwarded has nothing that is complete.
+                "complete_to": moment(min(heartbeat_ns, self.end_ns) or None),
                 "report": f"sites/{quote(site, safe='')}/api/report?{period_query}",
             }
             for site, name, active, heartbeat_ns in self.sites

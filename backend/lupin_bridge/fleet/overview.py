@@ -7,6 +7,7 @@ are those of the page's `--pin-*`, in light and in dark.
 from __future__ import annotations
 
 import heapq
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from hashlib import blake2b
@@ -14,9 +15,10 @@ from typing import Any, Final
 
 import orjson
 
-from lupin_bridge.judge.verdict import ORDER, Health, Verdict, worst
+from lupin_bridge.judge.episodes import Alarm
+from lupin_bridge.judge.verdict import ORDER, Health, Kind, Verdict, derive, worst
 from lupin_bridge.stream.frames import text_frame
-from lupin_bridge.stream.state_json import moment, stamp
+from lupin_bridge.stream.state_json import moment, reason_json, stamp
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.state import TagState
 from lupin_twin.field.grid import reach_of
@@ -78,6 +80,58 @@ def map_version(paths: str) -> str | None:
     return blake2b(paths.encode(), digest_size=6).hexdigest() if paths else None
 
 
+# --- what is wrong --------------------------------------------------------------------------------
+
+# Causes on the card of a site.
+MAX_CAUSES: Final = 2
+
+
+def causes(alarms: Iterable[tuple[Alarm, Mapping[str, Any]]]) -> tuple[dict[str, Any], ...]:
+    """The worst causes of alarms that come worst first: each with its worst alarm, and a count.
+
+    Left out are alarms whose value is back in range, and the site's silence: its card shows that.
+    """
+    found: dict[tuple[object, ...], dict[str, Any]] = {}
+    for alarm, entry in alarms:
+        verdict = verdict_now(entry)
+        if alarm.reason.kind is Kind.SILENT or verdict is Verdict.HEALTHY:
+            continue
+        first = {"reason": {**entry["reason"], "verdict": verdict}, "tag_id": alarm.tag_id}
+        found.setdefault(alarm.cause[1:], {**first, "count": 0})["count"] += 1
+    return tuple(found.values())[:MAX_CAUSES]
+
+
+def verdict_now(alarm: Mapping[str, Any]) -> Verdict:
+    """The verdict of an alarm's value now, or if that is not known, its worst so far."""
+    return Verdict((alarm["now"] or alarm["reason"])["verdict"])
+
+
+def now_json(
+    alarm: Alarm, tags: Mapping[str, TagState], healths: Mapping[str, Health]
+) -> dict[str, Any] | None:
+    """An alarm's value now, with its verdict and reason, if it is out of range.
+
+    None: it has no value, or its last reading says nothing about now.
+    """
+    kind, sensor = alarm.reason.kind, alarm.reason.sensor
+    tag, health = tags.get(alarm.tag_id), healths.get(alarm.tag_id)
+    if tag is None or health is None or kind not in {Kind.RANGE, Kind.PEST, Kind.CHANGED}:
+        return None
+    is_old = any(it.kind is Kind.OLD and it.sensor in {"", sensor} for it in health.reasons)
+    if is_old and kind is not Kind.PEST:
+        return None
+    said = next((it for it in health.reasons if (it.kind, it.sensor) == (kind, sensor)), None)
+    readings = {it.name: it.value for it in (*tag.readings, *derive(tag.readings))}
+    value = readings.get(sensor) if said is None else said.value
+    if kind is not Kind.PEST and (value is None or not math.isfinite(value)):
+        return None
+    return {
+        "value": value,
+        "verdict": Verdict.HEALTHY if said is None else said.verdict,
+        "reason": None if said is None else reason_json(said),
+    }
+
+
 # --- the overview ---------------------------------------------------------------------------------
 
 # A forwarder sends a heartbeat every two seconds; this long after the last it counts as gone.
@@ -91,8 +145,9 @@ class Site:
     `origin` is where its observations come from, as far as its log reports that. `last_seq` grows
     with every row; `heartbeat_ns` is the forwarder's last heartbeat; 0: never. `last_received_ns`
     is when the twin received its newest row, by the clock of its machine. `verdict` and
-    `active_alarms` are None until they are computed; `alarms` are the worst active ones, as in
-    `/api/alarms`. `dots` draw its map; `notes` is the number of notes.
+    `active_alarms`, without shelved ones, are None until they are computed; `causes` is from
+    `causes`; `alarms` are the worst active ones, as in `/api/alarms`. `dots` draw its map;
+    `notes` is the number of notes.
     """
 
     site: str
@@ -104,6 +159,7 @@ class Site:
     verdict: Verdict | None = None
     active_alarms: int | None = None
     origin: Origin = "unknown"
+    causes: tuple[dict[str, Any], ...] = ()
     alarms: tuple[dict[str, Any], ...] = ()
     dots: str = ""
     notes: int = 0
@@ -134,20 +190,15 @@ def site_json(site: Site, archive: Archive, now_ns: int) -> dict[str, Any]:
         "is_live": is_live,
         "origin": site.origin,
         "map": map_version(site.dots),
+        "causes": site.causes,
     }
-
-
-def etag(sites: Mapping[str, Site], archive: Archive) -> str:
-    """The ETag of the overview, the same in replicas that have seen the same; ages do not count."""
-    said = [(*_lasting(site),) for site in sites.values()]
-    text = repr((said, archive.is_reachable)).encode()
-    return f'W/"{blake2b(text, digest_size=12).hexdigest()}"'
 
 
 def _lasting(site: Site) -> tuple[object, ...]:
     return (
         *(site.site, site.name, site.last_seq, site.is_live),
         *(site.verdict, site.active_alarms, site.last_received_ns, site.origin, site.dots),
+        site.causes,
     )
 
 
@@ -158,7 +209,7 @@ MAX_LISTED: Final = 200
 def alarms_json(sites: Iterable[Site], archive: Archive) -> dict[str, Any]:
     """`/api/alarms`: active ones, worst first, then newest; of silent sites, the last known.
 
-    `total` includes those that are left out.
+    Shelved ones are last. `total` does not count them; it includes those that are left out.
     """
     every = list(sites)
     found = [
@@ -171,14 +222,21 @@ def alarms_json(sites: Iterable[Site], archive: Archive) -> dict[str, Any]:
         for site in every
         for alarm in site.alarms
     ]
-    worst = heapq.nsmallest(MAX_LISTED, found, key=_worst_first)
+    worst = heapq.nsmallest(
+        MAX_LISTED, found, key=lambda alarm: (*worst_first(alarm), alarm["site"])
+    )
     return {"alarms": worst, "total": sum(site.active_alarms or 0 for site in every)}
 
 
-def _worst_first(alarm: Mapping[str, Any]) -> tuple[Any, ...]:
+def worst_first(alarm: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Sort key, as on the page of a greenhouse: by the verdict now, then what needs attention."""
     raised = alarm["raised_at"]
-    verdict = ORDER[Verdict(alarm["reason"]["verdict"])]
-    return verdict, -raised["sec"], -raised["nanosec"], alarm["site"], alarm["id"]
+    return (
+        "shelved_by" in alarm,
+        ORDER[verdict_now(alarm)],
+        "acknowledged_by" in alarm,
+        *(-raised["sec"], -raised["nanosec"], alarm["id"]),
+    )
 
 
 class SitesFrame:
@@ -193,46 +251,37 @@ class SitesFrame:
     ) -> None:
         self.seq: int = 1 if base is None else base.seq + 1
         self.base = base
-        self._sites = sites
-        self._archive = archive
+        self.sites = sites
+        self.archive = archive
         self._now_ns = now_ns
         self._wires: dict[tuple[bool, tuple[str, ...]], bytes] = {}
         if base is not None:
             base.base = None
 
-    def full(self, only: tuple[str, ...] = ()) -> bytes:
-        """A frame of every site, or `only` of these, if any is named."""
-        return self._wire(self._sites.values(), (), only, is_whole=True)
+    def wire(self, sent_seq: int | None, only: tuple[str, ...] = ()) -> bytes:
+        """The frame for a client that has the frame `sent_seq`: what differs from that, or all.
 
-    def delta(self, only: tuple[str, ...] = ()) -> bytes:
-        """A frame of what differs from `base`; of all sites, if the archive has come or gone."""
-        assert self.base is not None  # the caller checks that
-        known, archive = self.base._sites, self.base._archive  # noqa: SLF001  # its own
-        is_all = self._archive.is_reachable != archive.is_reachable
-        # A heartbeat alone is no change.
-        changed = [
-            site
-            for name, site in self._sites.items()
-            if is_all or name not in known or _lasting(known[name]) != _lasting(site)
-        ]
-        gone = [name for name in known if name not in self._sites]
-        return self._wire(changed, gone, only, is_whole=False)
-
-    def _wire(
-        self, sites: Iterable[Site], gone: Iterable[str], only: tuple[str, ...], *, is_whole: bool
-    ) -> bytes:
-        key = is_whole, only
+        `only` are the sites that it may read; empty: all.
+        """
+        base = self.base if self.base is not None and self.base.seq == sent_seq else None
+        key = base is None, only
         if key not in self._wires:
-            archive = self._archive
-            if only:
-                sites = (site for site in sites if site.site in only)
-                gone = (name for name in gone if name in only)
+            known: Mapping[str, object] = {}
+            # If the archive has come or gone, every site is changed.
+            if base is not None and base.archive == self.archive:
+                known = {name: _lasting(site) for name, site in base.sites.items()}
+            gone = [] if base is None else [it for it in base.sites if it not in self.sites]
             body = {
                 "type": "sites",
-                "is_whole": is_whole,
-                "archive": archive_json(archive),
-                "sites": [site_json(site, archive, self._now_ns) for site in sites],
-                "gone": list(gone),
+                "is_whole": base is None,
+                "archive": archive_json(self.archive),
+                # A heartbeat alone is no change.
+                "sites": [
+                    site_json(site, self.archive, self._now_ns)
+                    for name, site in self.sites.items()
+                    if known.get(name) != _lasting(site) and (not only or name in only)
+                ],
+                "gone": [name for name in gone if not only or name in only],
             }
             self._wires[key] = text_frame(orjson.dumps(body))
         return self._wires[key]

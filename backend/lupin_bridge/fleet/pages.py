@@ -22,7 +22,6 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from lupin_bridge.access.middleware import client_of, deny
 from lupin_bridge.bridge import Bridge
-from lupin_bridge.fleet.source import SiteTwin
 from lupin_bridge.routes.answers import error_response, has_etag, not_modified
 from lupin_bridge.serving.admission import REVALIDATE
 
@@ -70,7 +69,6 @@ _PREFIX: Final = "/sites/"
 class Opened:
     """A site's page: its bridge and its application, as if it were the only one."""
 
-    source: SiteTwin
     bridge: Bridge
     app: ASGIApp
     ready: asyncio.Task[None]

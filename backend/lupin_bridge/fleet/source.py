@@ -46,14 +46,13 @@ _RETRY_S: Final = 1.0
 class Watching:
     """The sites and the archive as they were seen last, from `start` to `stop`.
 
-    `on_news` is called when anything has changed.
+    Each is another object when it has changed.
     """
 
-    def __init__(self, settings: Settings, on_news: Callable[[], None]) -> None:
+    def __init__(self, settings: Settings) -> None:
         self.sites: Mapping[str, Site] = {}
         self.archive = Archive(is_reachable=False, message="the archive has not been read yet")
         self.looks = 0
-        self._on_news = on_news
         # How far the archive's clock is ahead of this process's monotonic one.
         self._ahead_ns = time.time_ns() - time.monotonic_ns()
         self.process = PastProcess("lupin_bridge.fleet.watcher")
@@ -116,7 +115,6 @@ class Watching:
         known = {**self.sites, **{site.site: site for site in news.changed}}
         self.sites = {name: known[name] for name in sorted(news.names)}
         self.archive = Archive(is_reachable=True)
-        self._on_news()
 
     def _down(self, message: str) -> None:
         if not self.archive.is_reachable and self.archive.message == message:
@@ -124,7 +122,6 @@ class Watching:
         since_ns = self.archive.since_ns or self.now_ns
         self.archive = replace(self.archive, is_reachable=False, message=message, since_ns=since_ns)
         log.warning("%s", message)
-        self._on_news()
 
 
 # --- the source of one site's page ----------------------------------------------------------------
@@ -167,11 +164,11 @@ class SiteTwin(TwinSource):
         self._problem = ""
         # As last notified: whether it was live, up to where it was read, what was wrong.
         self._said: tuple[bool, int, str] | None = None
-        self._wake = asyncio.Event()
         self._has_read = asyncio.Event()
+        self._guard = Guard(f"site {site} is unchanged", *_KNOWN)
+        self._reader = Periodic(self._read, HEARTBEAT_S, f"read {site}", 0.0)
         # It goes on while rows are read, however long that takes.
         self._heartbeat = Periodic(self._notify, HEARTBEAT_S, f"site {site}")
-        self._task: asyncio.Task[None] | None = None
         self._on_state: Callable[[TwinUpdate], None]
 
     async def start(
@@ -182,21 +179,15 @@ class SiteTwin(TwinSource):
         """Start following the site; waits for its first state, within the time-out."""
         self._on_state = on_state
         self._heartbeat.start()
-        self._task = asyncio.create_task(self._keep_reading(), name=f"read {self.site}")
+        self._reader.start()
         if self._watching.archive.is_reachable:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._has_read.wait(), self.timeout_s)
 
     async def stop(self) -> None:
         """Stop; the process that reads goes on for other sites."""
-        await end(self._task)
+        await self._reader.stop()
         await self._heartbeat.stop()
-
-    def on_news(self) -> None:
-        """See whether this site has changed: the overview has."""
-        site = self._site
-        if site.last_seq != self._seq or self._said is None or self._is_live != self._said[0]:
-            self._wake.set()
 
     @property
     def world(self) -> World:
@@ -211,30 +202,22 @@ class SiteTwin(TwinSource):
     def _is_live(self) -> bool:
         return self._watching.archive.is_reachable and self._site.is_live
 
-    async def _keep_reading(self) -> None:
-        guard = Guard(f"site {self.site} is unchanged", *_KNOWN)
-        while True:
-            error = await guard.run(self._read())
-            if error is not None:
-                self._problem = _sentence(_why(error))
-                await asyncio.sleep(_RETRY_S)
-                continue
-            await self._wake.wait()
-            self._wake.clear()
-
     async def _read(self) -> None:
+        error = await self._guard.run(self._read_newer())
+        self._problem = "" if error is None else _sentence(_why(error))
+
+    async def _read_newer(self) -> None:
         last_seq = self._site.last_seq
-        if last_seq != self._seq and self._watching.archive.is_reachable:
-            found: Reported = await self._in_time(self._reading(Latest(self._map_hash)))
-            if found.map_hash != self._map_hash:
-                self._map, self._map_hash = found.occupancy_map, found.map_hash
-            self._reported = found
-            self._read_ns = time.monotonic_ns()
-            self._seq = last_seq
-        self._problem = ""
+        if last_seq == self._seq or not self._watching.archive.is_reachable:
+            return
+        found: Reported = await self._in_time(self._reading(Latest(self._map_hash)))
+        if found.map_hash != self._map_hash:
+            self._map, self._map_hash = found.occupancy_map, found.map_hash
+        self._reported = found
+        self._read_ns = time.monotonic_ns()
+        self._seq = last_seq
         await self._notify()
-        if self._reported is not None:
-            self._has_read.set()
+        self._has_read.set()
 
     async def _notify(self) -> None:
         site, is_live = self._site, self._is_live

@@ -6,7 +6,6 @@ new rows give its verdict and alarms, by the same judge that a bridge has.
 
 from __future__ import annotations
 
-import heapq
 import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar
 
-from lupin_bridge.alarms.board import notes_of_alarms, worst_first
+from lupin_bridge.alarms.board import notes_of_alarms
 from lupin_bridge.archive.database import (
     CHANNEL,
     ArchiveError,
@@ -24,7 +23,7 @@ from lupin_bridge.archive.database import (
 )
 from lupin_bridge.feed.query import Child, Now, Search
 from lupin_bridge.feed.query import main as serve
-from lupin_bridge.fleet.overview import LIVE_S, Site, dots
+from lupin_bridge.fleet.overview import LIVE_S, Site, causes, dots, now_json, worst_first
 from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge
@@ -55,7 +54,7 @@ _JUDGING_S: Final = 1.0
 # Interval of judging a site again without new rows, because its readings grow old.
 _AGE_S: Final = 10.0
 _LOT: Final = 2_000
-# The worst alarms of a site that are shown; all of them are on its own page.
+# The worst alarms of a site that are shown, shelved ones last; its own page has all of them.
 MAX_ALARMS: Final = 20
 # As many as a bridge reads of the past, see `alarms.feed`.
 _REACH_COUNT: Final = 300_000
@@ -217,7 +216,7 @@ class Watcher:
                 Judge(self._criteria), is_failing=True, judged_s=time.monotonic()
             )
             self.sites[name] = replace(
-                self.sites[name], verdict=None, active_alarms=None, alarms=(), dots=""
+                self.sites[name], verdict=None, active_alarms=None, causes=(), alarms=(), dots=""
             )
         else:
             judged.is_failing = False
@@ -240,17 +239,30 @@ class Watcher:
         now_ns = newest_ns if judged.is_simulated else now_ns
         # The last known state of a silent site does not grow old.
         moment_ns = now_ns if site.is_live else min(now_ns, max(site.heartbeat_ns, newest_ns))
+        alarms = _alarms(site, judged, moment_ns)
+        judgement = judged.judge.see(replace(judged.snapshot, stamp_ns=moment_ns))
         if judged.is_caught_up:
-            alarms = _alarms(site, judged, moment_ns)
-            active = [alarm for alarm in alarms if alarm.is_active]
             said = notes_of_alarms(alarms, judged.notes, now_ns)
-            worst = heapq.nsmallest(MAX_ALARMS, active, key=worst_first)
+            tags = {tag.tag_id: tag for tag in judged.snapshot.tags} if site.is_live else {}
+            active = [
+                (
+                    alarm,
+                    {
+                        **alarm_json(alarm, said.get(alarm.id)),
+                        "now": now_json(alarm, tags, judgement.tags),
+                    },
+                )
+                for alarm in alarms
+                if alarm.is_active
+            ]
+            active.sort(key=lambda it: worst_first(it[1]))
+            calling = [it for it in active if "shelved_by" not in it[1]]
             site = replace(
                 site,
-                active_alarms=len(active),
-                alarms=tuple(alarm_json(alarm, said.get(alarm.id)) for alarm in worst),
+                active_alarms=len(calling),
+                causes=causes(calling),
+                alarms=tuple(entry for _, entry in active[:MAX_ALARMS]),
             )
-        judgement = judged.judge.see(replace(judged.snapshot, stamp_ns=moment_ns))
         judged.judged_s, judged.was_live = time.monotonic(), site.is_live
         self.sites[name] = replace(
             site,

@@ -77,6 +77,13 @@ class Alarm:
         """Whether it has not been cleared."""
         return self.cleared_at_ns is None
 
+    @property
+    def cause(self) -> tuple[str, Kind, str, bool]:
+        """What is wrong, and where: tag, kind, sensor, and whether the value is too low."""
+        value, limit = self.reason.value, self.reason.limit
+        is_low = value is not None and limit is not None and value < limit
+        return self.tag_id, self.reason.kind, self.reason.sensor, is_low
+
 
 def alarm_id(tag_id: str, kind: str, sensor: str, run_ns: int, began_ns: int) -> str:
     """The id of an episode, the same in every process that computes it.

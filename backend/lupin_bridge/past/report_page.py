@@ -6,6 +6,7 @@ the sensors file.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, tzinfo
@@ -35,6 +36,8 @@ PAGE_HEADERS: Final = {"Content-Security-Policy": _POLICY}
 # Decimal comma and thousands point, in all languages but English.
 _COMMA: Final = str.maketrans(".,", ",.")
 _EXTREMES: Final = ("sensor", "low*", "where", "mean*", "high*", "where", "count*", "bad*")
+# More active alarms than this that share a cause are below one heading, as on the page.
+MOST_LOOSE: Final = 4
 # Alarms in one notification.
 MAX_PUSHED: Final = 4
 Words = Mapping[str, Any]
@@ -204,7 +207,13 @@ class _Page:
             found = self._alarm(alarm)
             return [found[name.removesuffix("*")] for name in names]
 
-        return self._list(title, "alarms", alarms, names, cells)
+        is_active = title == "active_alarms"
+        counts = Counter(self._what(alarm["reason"]) for alarm in alarms if is_active)
+        groups: dict[str, list[Entry]] = {}
+        for alarm in alarms:
+            cause = self._what(alarm["reason"])
+            groups.setdefault(cause if counts[cause] > MOST_LOOSE else "", []).append(alarm)
+        return self._list(title, "alarms", groups, names, cells)
 
     def _who(self, alarm: Entry) -> str:
         """Who has acknowledged or shelved an alarm."""
@@ -310,34 +319,35 @@ class _Page:
         cells: Callable[[Entry], Iterable[str]],
     ) -> str:
         """A table of one list of the body, and how many entries are left out."""
-        return self._list(title, name, body[name], columns, cells) + self._more(body, name)
+        return self._list(title, name, {"": body[name]}, columns, cells) + self._more(body, name)
 
     def _list(
         self,
         title: str,
         name: str,
-        entries: Sequence[Entry],
+        groups: Mapping[str, Sequence[Entry]],
         columns: Sequence[str],
         cells: Callable[[Entry], Iterable[str]],
     ) -> str:
-        """A table; a column whose word ends with `*` has numbers."""
+        """A table, with a heading above each group; a column ending with `*` has numbers."""
         kinds = [' class="number"' if column.endswith("*") else "" for column in columns]
         head = f"<h2>{escape(self.say(title))}</h2>"
-        if not entries:
+        if not any(groups.values()):
             return f"{head}<p>{escape(self.say('none'))}</p>"
         names = "".join(
             f'<th scope="col"{kind}>{escape(self.say(column.removesuffix("*")))}</th>'
             for column, kind in zip(columns, kinds, strict=True)
         )
-        rows = "".join(
-            ('<tr class="critical">' if _is_critical(entry) else "<tr>")
-            + "".join(
-                f"<td{kind}>{escape(cell)}</td>"
-                for cell, kind in zip(cells(entry), kinds, strict=True)
-            )
-            + "</tr>"
-            for entry in entries
-        )
+        rows = ""
+        for heading, entries in groups.items():
+            if heading:
+                text = f"{heading}: {self._count(len(entries))}"
+                rows += f'<tr><th colspan="{len(columns)}">{escape(text)}</th></tr>'
+            for entry in entries:
+                rows += '<tr class="critical">' if _is_critical(entry) else "<tr>"
+                for cell, kind in zip(cells(entry), kinds, strict=True):
+                    rows += f"<td{kind}>{escape(cell)}</td>"
+                rows += "</tr>"
         return (
             f'{head}<table class="{name}"><thead><tr>{names}</tr></thead>'
             f"<tbody>{rows}</tbody></table>"

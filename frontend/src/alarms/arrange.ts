@@ -89,7 +89,7 @@ function causeText(alarm: Wrong['alarm'], speech: Speech): string {
   return [...(area === '' ? [] : [shown(area, 32)]), causeWords(alarm, speech)].join(' · ');
 }
 
-function causeWords(alarm: Wrong['alarm'], speech: Speech): string {
+export function causeWords(alarm: Pick<Alarm, 'reason'>, speech: Speech): string {
   const { reason } = alarm;
   if (!isOfRange(reason)) return whatText(alarm, speech);
   const beyond = sideOf(reason) === 'below' ? S.tooLow(null) : S.tooHigh(null);

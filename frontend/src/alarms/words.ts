@@ -26,7 +26,7 @@ const LONGEST_NAME = 24;
 /** Most alarms named in one message; the list has the rest. */
 const MOST_NAMED = 3;
 
-export const whereText = ({ tag_id }: Alarm): string =>
+export const whereText = ({ tag_id }: Pick<Alarm, 'tag_id'>): string =>
   tag_id === '' ? S.alarmHouse : S.card(shown(tag_id, LONGEST_NAME));
 
 /** What the words need besides the alarm: the sensor catalogue and the temperature unit. */

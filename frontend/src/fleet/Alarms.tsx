@@ -1,7 +1,7 @@
 /** Active alarms of the shown greenhouses, the worst first. */
 import { useMemo, type JSX } from 'react';
 
-import { valuesOf, whenText, whereText, type Speech } from '../alarms/words';
+import { type Now, valuesOf, whenText, whereText, type Speech } from '../alarms/words';
 import { timeOfDay } from '../clock';
 import type { Alarm } from '../contract/types';
 import { secondsOf } from '../domain/time';
@@ -15,6 +15,8 @@ interface SiteAlarm extends Alarm {
   readonly site: string;
   readonly name: string;
   readonly is_live: boolean;
+  /** null: it has no value, or that is not known. */
+  readonly now: Omit<Extract<Now, { kind: 'known' }>, 'kind' | 'trend'> | null;
 }
 
 const W = VIEW_WORDS[LANGUAGE];
@@ -23,31 +25,41 @@ const EVERY_MS = 10_000;
 
 export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Element {
   const speech = useSpeech();
-  const having = shown.filter((site) => (site.active_alarms ?? 0) > 0);
-  const names = namesOf(having);
+  const names = namesOf(shown);
   const path = names === '' ? 'api/alarms' : `api/alarms?sites=${names}`;
   // Refetch when a count changes.
-  const news = having.map((site) => `${site.site} ${site.active_alarms ?? 0}`).join();
+  const news = shown.map((site) => `${site.site} ${site.active_alarms ?? 0}`).join();
   const { value, message } = useAnswer<{ alarms: readonly SiteAlarm[] }>(path, EVERY_MS, news);
   const rows = useMemo(() => {
     const sites = new Set(shown.map(({ site }) => site));
     return value?.alarms.filter(({ site }) => sites.has(site)) ?? [];
   }, [value, shown]);
+  const active = rows.filter(({ shelved_by: by }) => by === undefined);
+  const shelved = rows.filter(({ shelved_by: by }) => by !== undefined);
   const all = alarmCount(shown);
   const isRead = shown.every((site) => site.active_alarms !== null);
+  const listOf = (alarms: readonly SiteAlarm[]): JSX.Element => (
+    <ul className="fleet-alarm-list">
+      {alarms.map((alarm) => (
+        <Row key={`${alarm.site} ${alarm.id}`} alarm={alarm} speech={speech} />
+      ))}
+    </ul>
+  );
   return (
     <>
       {message && <p className="fleet-note">{W.notFetched(message)}</p>}
       {all === 0 && (
         <p className="fleet-empty">{isRead ? words.noAlarms : words.alarmsBeingRead}</p>
       )}
-      <ul className="fleet-alarm-list">
-        {rows.map((alarm) => (
-          <Row key={`${alarm.site} ${alarm.id}`} alarm={alarm} speech={speech} />
-        ))}
-      </ul>
-      {value && rows.length < all && (
-        <p className="fleet-note">{W.moreAlarms(all - rows.length)}</p>
+      {listOf(active)}
+      {value && active.length < all && (
+        <p className="fleet-note">{W.moreAlarms(all - active.length)}</p>
+      )}
+      {shelved.length > 0 && (
+        <details className="fleet-group">
+          <summary>{S.alarmGroups.shelved(String(shelved.length))}</summary>
+          {listOf(shelved)}
+        </details>
       )}
     </>
   );
@@ -55,16 +67,24 @@ export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Eleme
 
 function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Element {
   const raised = secondsOf(alarm.raised_at);
-  const { what, worst } = valuesOf(alarm, speech, null);
+  const state = alarm.is_live && alarm.now ? alarm.now : null;
+  const values = valuesOf(alarm, speech, state && { kind: 'known', trend: null, ...state });
+  const { verdict } = alarm.now ?? alarm.reason;
   return (
     <li data-live={alarm.is_live} data-shelved={Boolean(alarm.shelved_by)}>
       <a href={linkOf(alarm, raised)}>
-        <HealthMark verdict={alarm.reason.verdict} />
+        <HealthMark verdict={verdict} text={verdict === 'healthy' ? S.alarmBack : undefined} />
         <strong className="fleet-alarm-site">{alarm.name}</strong>
         <span>{whereText(alarm)}</span>
+        <span className="fleet-alarm-what">{values.what}</span>
         <span className="fleet-alarm-what">
-          {what}
-          {worst !== null && `, ${worst}`}
+          {values.now}
+          {values.worst !== null && (
+            <span className="fleet-line">
+              {values.now !== null && <HealthMark verdict={alarm.reason.verdict} word={false} />}
+              {values.worst}
+            </span>
+          )}
         </span>
         <span className="fleet-line">
           {S.alarmSince(whenText(raised, timeOfDay() / 1000), null)}
@@ -84,7 +104,7 @@ function saidOf(alarm: SiteAlarm): readonly string[] {
   const { acknowledged_by: by, acknowledged_at: at, shelved_by: who, shelved_until: until } = alarm;
   return [
     ...(by && at ? [W.acknowledged(by, timeText(ms(at)))] : []),
-    ...(who && until ? [W.shelved(who, timeText(ms(until)))] : []),
+    ...(who && until ? [S.alarmShelved(timeText(ms(until)), alarm.shelved_reason ?? '', who)] : []),
   ];
 }
 

@@ -6,7 +6,7 @@ import { type Site, type Sites, words } from './sites';
 
 const GREENHOUSE: Site = {
   ...{ site: 'gh1', name: 'One', verdict: 'healthy', last_verdict: 'healthy', active_alarms: 0 },
-  ...{ last_received: null, lag_s: 1, is_live: true, origin: 'robot', map: null },
+  ...{ last_received: null, lag_s: 1, is_live: true, origin: 'robot', map: null, causes: [] },
 };
 
 test('before anything has come nothing is counted', () => {

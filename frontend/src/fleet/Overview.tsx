@@ -4,6 +4,7 @@ import {
   lazy,
   memo,
   Suspense,
+  useCallback,
   useDeferredValue,
   useEffect,
   useMemo,
@@ -13,7 +14,7 @@ import {
 
 import { S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
-import { Select } from '../widgets/controls';
+import type { CauseText } from './Causes';
 import { Choice } from './Choice';
 import type { Seen } from './follow';
 import {
@@ -33,15 +34,17 @@ import {
   words,
 } from './sites';
 
-// Loaded when first shown.
-const Alarms = lazy(() => import('./Alarms'));
+const Alarms = lazy(async () => ({ default: (await import('./views')).Alarms }));
+const Causes = lazy(async () => ({ default: (await import('./views')).Causes }));
+const Report = lazy(async () => ({ default: (await import('./views')).Report }));
+// Loaded when first shown: it brings the charts.
 const Compare = lazy(() => import('./Compare'));
-const Report = lazy(() => import('./Report'));
 
 const VIEWS = ['sites', 'alarms', 'compare', 'report'] as const;
 type View = (typeof VIEWS)[number];
 
-const query = new URLSearchParams(window.location.search);
+/** The group on a wall screen; empty: all. */
+const group = new URLSearchParams(window.location.search).get('group') ?? '';
 
 interface Props {
   readonly seen: Seen;
@@ -52,7 +55,10 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
   const [view, setView] = useState<View>('sites');
   const [filter, setFilter] = useState<Filter>('all');
   const [search, setSearch] = useState('');
-  const [group, setGroup] = useState(query.get('group') ?? '');
+  const [causeText, setCauseText] = useState<CauseText | null>(null);
+  const onWords = useCallback((text: CauseText) => {
+    setCauseText(() => text);
+  }, []);
   const field = useRef<HTMLInputElement>(null);
   const sites = useDeferredValue(seen.sites);
   const counts = useMemo(() => countsOf(sites.values()), [sites]);
@@ -65,7 +71,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
     asOfWhen(seen) === null &&
     [...sites.values()].every((site) => site.is_live && site.active_alarms !== null);
   const groups = useMemo(() => groupNames(sites.values()), [sites]);
-  const shown = useMemo(() => chosen(sites, filter, search, group), [sites, filter, search, group]);
+  const shown = useMemo(() => chosen(sites, filter, search, group), [sites, filter, search]);
 
   useEffect(() => {
     document.title = alarms === 0 ? words.sites : `(${alarms}) ${words.sites}`;
@@ -113,16 +119,6 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
                 setSearch(event.target.value);
               }}
             />
-            {groups.length > 0 && (
-              <Select
-                className="fleet-search"
-                aria-label={words.group}
-                value={groups.includes(group) ? group : ''}
-                options={['', ...groups]}
-                text={(name) => name || words.allGroups}
-                onChange={setGroup}
-              />
-            )}
             <Choice
               label={words.filter}
               options={FILTERS}
@@ -135,6 +131,9 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
         )}
       </header>
       <Trouble seen={seen} />
+      <Suspense>
+        <Causes onWords={onWords} />
+      </Suspense>
       <main aria-label={view === 'alarms' ? words.alarmList : words.list}>
         <p className="unseen" role="status">
           {search || group || filter !== 'all' ? words.shown(shown.length, sites.size) : ''}
@@ -142,7 +141,7 @@ export function Overview({ seen, isKiosk }: Props): JSX.Element {
         {shown.length === 0 ? (
           <p className="fleet-empty">{nothingText(seen)}</p>
         ) : view === 'sites' ? (
-          <Cards shown={shown} groups={groups} asOf={asOfWhen(seen)} />
+          <Cards shown={shown} groups={groups} asOf={asOfWhen(seen)} causeText={causeText} />
         ) : (
           <Suspense fallback={<p className="fleet-empty">{words.connecting}</p>}>
             {view === 'alarms' && <Alarms shown={shown} />}
@@ -185,32 +184,33 @@ function Trouble({ seen }: { seen: Seen }): JSX.Element {
   );
 }
 
-const STAYS_MS = 200;
 /** After this long without data, a greenhouse counts as silent, or the archive as down. */
 const LIVE_MS = 20_000;
+
+interface Listed {
+  /** When all of it was last known, ms since the epoch; null: it is as of now. */
+  readonly asOf: number | null;
+  /** null: not loaded yet. */
+  readonly causeText: CauseText | null;
+}
 
 function Cards({
   shown,
   groups,
-  asOf,
+  ...listed
 }: Listed & { shown: readonly Site[]; groups: readonly string[] }): JSX.Element {
   const parts = useMemo(() => grouped(shown, groups), [shown, groups]);
-  if (groups.length === 0) return <List sites={shown} asOf={asOf} />;
+  if (groups.length === 0) return <List sites={shown} {...listed} />;
   return (
     <>
       {parts.map((part) => (
-        <GroupOf key={part.name} group={part} asOf={asOf} />
+        <GroupOf key={part.name} group={part} {...listed} />
       ))}
     </>
   );
 }
 
-interface Listed {
-  /** When all of it was last known, ms since the epoch; null: it is as of now. */
-  readonly asOf: number | null;
-}
-
-function GroupOf({ group, asOf }: Listed & { group: Group }): JSX.Element {
+function GroupOf({ group, ...listed }: Listed & { group: Group }): JSX.Element {
   const { name, sites } = group;
   const worst = sites[0];
   return (
@@ -220,7 +220,7 @@ function GroupOf({ group, asOf }: Listed & { group: Group }): JSX.Element {
         {worst && <HealthMark verdict={worst.verdict} word={false} />}
         <span className="fleet-line">{groupText(sites)}</span>
       </summary>
-      <List sites={sites} asOf={asOf} />
+      <List sites={sites} {...listed} />
     </details>
   );
 }
@@ -240,17 +240,21 @@ function filterText(filter: Filter): string {
   return filter === 'all' || filter === 'silent' ? words[filter] : S.health[filter];
 }
 
-function List({ sites, asOf }: Listed & { sites: readonly Site[] }): JSX.Element {
+function List({ sites, ...listed }: Listed & { sites: readonly Site[] }): JSX.Element {
   return (
     <ul className="fleet-sites">
       {sites.map((site) => (
-        <SiteCard key={site.site} site={site} asOf={asOf} />
+        <SiteCard key={site.site} site={site} {...listed} />
       ))}
     </ul>
   );
 }
 
-const SiteCard = memo(function SiteCard({ site, asOf }: Listed & { site: Site }): JSX.Element {
+const SiteCard = memo(function SiteCard({
+  site,
+  asOf,
+  causeText,
+}: Listed & { site: Site }): JSX.Element {
   const { name, verdict, last_verdict: last, map } = site;
   const isLive = site.is_live && asOf === null;
   const origin = originText(site);
@@ -261,19 +265,37 @@ const SiteCard = memo(function SiteCard({ site, asOf }: Listed & { site: Site })
           <span className="fleet-name">{name}</span>
           {origin && <span className="fleet-origin">{origin}</span>}
         </h3>
-        {map && <SmallMap src={`api/sites/${encodeURIComponent(site.site)}/map.svg?v=${map}`} />}
-        {isLive ? (
-          <HealthMark verdict={verdict} />
-        ) : (
-          <span className="fleet-silent">{silentText(site, asOf)}</span>
-        )}
-        {isLive && last === null && <span className="fleet-line">{words.judging}</span>}
-        {!isLive && last !== null && (
-          <span className="fleet-line">{words.lastKnown(S.health[last])}</span>
-        )}
-        <span className="fleet-alarms" data-any={(site.active_alarms ?? 0) > 0}>
-          {(isLive || site.active_alarms !== 0) && countText(site.active_alarms)}
-        </span>
+        <div className="fleet-facts">
+          {map && (
+            <img
+              className="fleet-map"
+              src={`api/sites/${encodeURIComponent(site.site)}/map.svg?v=${map}`}
+              alt=""
+              width={88}
+              height={48}
+              loading="lazy"
+              decoding="async"
+            />
+          )}
+          {isLive ? (
+            <HealthMark verdict={verdict} />
+          ) : (
+            <span className="fleet-silent">{silentText(site, asOf)}</span>
+          )}
+          {isLive && last === null && <span className="fleet-line">{words.judging}</span>}
+          {!isLive && last !== null && last !== 'unknown' && (
+            <span className="fleet-line">{words.lastKnown(S.health[last])}</span>
+          )}
+          <span className="fleet-alarms" data-any={(site.active_alarms ?? 0) > 0}>
+            {(isLive || site.active_alarms !== 0) && countText(site.active_alarms)}
+          </span>
+          {causeText !== null &&
+            site.causes.map((cause, index) => (
+              <span key={index} className="fleet-cause">
+                <HealthMark verdict={cause.reason.verdict} text={causeText(cause)} />
+              </span>
+            ))}
+        </div>
         <span className="fleet-line">
           {site.last_received
             ? words.received(timeText(ms(site.last_received)))
@@ -283,33 +305,6 @@ const SiteCard = memo(function SiteCard({ site, asOf }: Listed & { site: Site })
     </li>
   );
 });
-
-/** Fetched once its card stays in sight, not while scrolling past. */
-function SmallMap({ src }: { src: string }): JSX.Element {
-  const place = useRef<HTMLSpanElement>(null);
-  const [isShown, setShown] = useState(false);
-  useEffect(() => {
-    let timer: ReturnType<typeof setTimeout> | undefined;
-    const seen = new IntersectionObserver(([entry]) => {
-      clearTimeout(timer);
-      if (!entry?.isIntersecting) return;
-      timer = setTimeout(() => {
-        setShown(true);
-        seen.disconnect();
-      }, STAYS_MS);
-    });
-    if (place.current) seen.observe(place.current);
-    return () => {
-      clearTimeout(timer);
-      seen.disconnect();
-    };
-  }, []);
-  return (
-    <span ref={place} className="fleet-map">
-      {isShown && <img src={src} alt="" width={88} height={48} decoding="async" />}
-    </span>
-  );
-}
 
 /** Says that data are simulated or recorded; null: not known, or from a robot. */
 function originText({ origin }: Site): string | null {

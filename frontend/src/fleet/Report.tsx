@@ -21,7 +21,8 @@ interface SiteReport extends Readonly<Record<(typeof COUNTED)[number], number>> 
   readonly site: string;
   readonly name: string;
   readonly active_alarms: number | null;
-  readonly complete_to: WireTime;
+  /** null: it has never sent anything. */
+  readonly complete_to: WireTime | null;
   readonly report: string;
 }
 
@@ -128,9 +129,9 @@ function Row({ row, isLive }: { row: SiteReport; isLive: boolean }): JSX.Element
       ))}
       <td>
         {row.active_alarms ?? S.noValue}
-        {!isLive && ` (${W.wasLive})`}
+        {!isLive && row.complete_to && ` (${W.wasLive})`}
       </td>
-      <td>{timeText(ms(row.complete_to))}</td>
+      <td>{row.complete_to ? timeText(ms(row.complete_to)) : S.noValue}</td>
     </tr>
   );
 }

@@ -1,7 +1,7 @@
 /** The server's data on all sites, and their order, groups and filter on the page. Pure. */
 import { timeOfDay } from '../clock';
 import { isObject } from '../contract/check';
-import type { Verdict, WireTime } from '../contract/types';
+import type { HealthReason, Verdict, WireTime } from '../contract/types';
 import { groupedBy } from '../domain/memo';
 import { LANGUAGE, LOCALE } from '../strings';
 import { fleetWordsOf } from '../words/fleet';
@@ -22,6 +22,15 @@ export interface Site {
   readonly origin: string;
   /** Changes with its small map; null: it has none. */
   readonly map: string | null;
+  /** Of its active alarms that are not shelved, the worst first; its silence is none. */
+  readonly causes: readonly Cause[];
+}
+
+/** One cause of alarms: its worst alarm's reason and tag, and how many there are. */
+export interface Cause {
+  readonly reason: HealthReason;
+  readonly tag_id: string;
+  readonly count: number;
 }
 
 export interface Archive {
@@ -56,18 +65,7 @@ export type Filter = (typeof FILTERS)[number];
 /** The worst first. Not imported from `domain/health`, which the first view here does not need. */
 const VERDICTS: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'healthy'];
 
-function isSite(value: unknown): value is Site {
-  return (
-    isObject(value) &&
-    typeof value['site'] === 'string' &&
-    typeof value['name'] === 'string' &&
-    VERDICTS.includes(value['verdict'] as Verdict) &&
-    typeof value['is_live'] === 'boolean' &&
-    typeof value['origin'] === 'string'
-  );
-}
-
-/** null: no frame of the contract. */
+/** null: no frame of the overview. */
 export function parseSites(data: unknown): SitesFrame | null {
   if (typeof data !== 'string') return null;
   let frame: unknown;
@@ -76,10 +74,7 @@ export function parseSites(data: unknown): SitesFrame | null {
   } catch {
     return null;
   }
-  if (!isObject(frame) || frame['type'] !== 'sites') return null;
-  const { sites, gone, archive } = frame;
-  if (!Array.isArray(sites) || !Array.isArray(gone) || !isObject(archive)) return null;
-  return sites.every(isSite) ? (frame as unknown as SitesFrame) : null;
+  return isObject(frame) && frame['type'] === 'sites' ? (frame as unknown as SitesFrame) : null;
 }
 
 export function withFrame(before: Sites, frame: SitesFrame): Sites {

@@ -5,14 +5,13 @@ import type { In } from './shape';
 const ENGLISH = {
   wasLive: 'last known',
   acknowledged: (name: string, at: string): string => `acknowledged by ${name}, ${at}`,
-  shelved: (name: string, until: string): string => `shelved by ${name} until ${until}`,
   moreAlarms: (count: number): string => `${count} more: see the pages of the greenhouses.`,
   deviation: 'Deviation',
   deviationHint: 'How far a greenhouse is from the median of all, on average.',
   median: 'Median of all; band: the middle half',
   draw: (site: string): string => `Show ${site}`,
   someCompared: (count: number, all: number): string =>
-    `${count} of ${all} greenhouses are compared, the worst first. Search, or choose a group.`,
+    `${count} of ${all} greenhouses are compared, the worst first. Search to choose others.`,
   notFetched: (reason: string): string => `This could not be fetched: ${reason}`,
   hours: (count: number): string => `Last ${count} hours`,
   scans: 'Scans',
@@ -30,14 +29,13 @@ const ENGLISH = {
 const GERMAN: In<typeof ENGLISH> = {
   wasLive: 'zuletzt bekannt',
   acknowledged: (name, at) => `quittiert von ${name}, ${at}`,
-  shelved: (name, until) => `zurückgestellt von ${name} bis ${until}`,
   moreAlarms: (count) => `${count} weitere: siehe die Seiten der Gewächshäuser.`,
   deviation: 'Abweichung',
   deviationHint: 'Wie weit ein Gewächshaus im Mittel vom Median aller entfernt ist.',
   median: 'Median aller; Band: die mittlere Hälfte',
   draw: (site) => `${site} anzeigen`,
   someCompared: (count, all) =>
-    `${count} von ${all} Gewächshäusern werden verglichen, die schlimmsten zuerst. Suchen Sie, oder wählen Sie eine Gruppe.`,
+    `${count} von ${all} Gewächshäusern werden verglichen, die schlimmsten zuerst. Suchen Sie nach anderen.`,
   notFetched: (reason) => `Das ließ sich nicht abrufen: ${reason}`,
   hours: (count) => `Letzte ${count} Stunden`,
   scans: 'Messungen',
@@ -55,14 +53,13 @@ const GERMAN: In<typeof ENGLISH> = {
 const DUTCH: In<typeof ENGLISH> = {
   wasLive: 'laatst bekend',
   acknowledged: (name, at) => `bevestigd door ${name}, ${at}`,
-  shelved: (name, until) => `uitgesteld door ${name} tot ${until}`,
   moreAlarms: (count) => `Nog ${count}: zie de pagina’s van de kassen.`,
   deviation: 'Afwijking',
   deviationHint: 'Hoe ver een kas gemiddeld van de mediaan van alle kassen ligt.',
   median: 'Mediaan van alle; band: de middelste helft',
   draw: (site) => `${site} tonen`,
   someCompared: (count, all) =>
-    `${count} van ${all} kassen worden vergeleken, de slechtste eerst. Zoek, of kies een groep.`,
+    `${count} van ${all} kassen worden vergeleken, de slechtste eerst. Zoek om andere te kiezen.`,
   notFetched: (reason) => `Dit kon niet worden opgehaald: ${reason}`,
   hours: (count) => `Afgelopen ${count} uur`,
   scans: 'Metingen',
@@ -80,14 +77,13 @@ const DUTCH: In<typeof ENGLISH> = {
 const SPANISH: In<typeof ENGLISH> = {
   wasLive: 'último dato',
   acknowledged: (name, at) => `reconocida por ${name}, ${at}`,
-  shelved: (name, until) => `aplazada por ${name} hasta ${until}`,
   moreAlarms: (count) => `${count} más: vea las páginas de los invernaderos.`,
   deviation: 'Desviación',
   deviationHint: 'Cuánto se aleja un invernadero de la mediana de todos, en promedio.',
   median: 'Mediana de todos; banda: la mitad central',
   draw: (site) => `Mostrar ${site}`,
   someCompared: (count, all) =>
-    `Se comparan ${count} de ${all} invernaderos, los peores primero. Busque o elija un grupo.`,
+    `Se comparan ${count} de ${all} invernaderos, los peores primero. Busque para elegir otros.`,
   notFetched: (reason) => `No se pudo obtener: ${reason}`,
   hours: (count) => `Últimas ${count} horas`,
   scans: 'Mediciones',

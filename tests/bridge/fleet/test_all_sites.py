@@ -55,6 +55,10 @@ def every(shared_archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> 
         "gh2": recent_scans(temperature=45.0, tags=1, scans=9),
         "well": recent_scans(temperature=22.0),
         "over": recent_scans(temperature=45.0, tags=1),
+        "mild": [
+            *recent_scans(temperature=45.0, tags=1),
+            scan("0", wall().stamp_ns, temperature=28.0),
+        ],
         "noted": recent_scans(temperature=45.0, tags=2),
         "a": day(20.0),
         "b": day(21.0),
@@ -94,11 +98,24 @@ def test_alarms_of_all_sites_come_with_the_worst_first(every: All) -> None:
     first = dict(found["alarms"][0])
     assert (first.pop("site"), first.pop("name")) == ("gh2", "gh2")
     assert first.pop("is_live") is True
+    assert first.pop("now")["value"] == 45.0
     wait_for(
         lambda: first in page.http.get("/sites/gh2/api/alarms").json()["alarms"],
         f"the same alarm below its site's path: {first}",
     )
     assert alarms(page, "well") == {"alarms": [], "total": 0}
+    (cause,) = page.sites()["gh1"]["causes"]
+    assert (cause["reason"]["sensor"], cause["reason"]["value"]) == ("temperature", 28.0)
+    assert (cause["tag_id"], cause["count"]) == ("1", 2)
+
+
+def test_an_alarm_comes_with_its_value_now_beside_its_worst(every: All) -> None:
+    page = every.page
+    page.site("mild", active_alarms=1)
+    (found,) = alarms(page, "mild")["alarms"]
+    assert (found["reason"]["verdict"], found["worst"]) == ("critical", 45.0)
+    assert (found["now"]["value"], found["now"]["verdict"]) == (28.0, "stressed")
+    assert found["now"]["reason"]["limit"] < 28.0
 
 
 def test_cleared_alarms_are_gone_and_the_etag_changes(every: All) -> None:
@@ -133,7 +150,7 @@ def test_alarms_are_limited_per_site_and_in_all_and_the_rest_is_counted(
         assert f"sites are {50 + many}, the limit is 50" in answer.json()["detail"]
 
 
-def test_an_alarm_comes_with_its_notes(every: All) -> None:
+def test_an_alarm_comes_with_its_notes_and_a_shelved_one_is_not_counted(every: All) -> None:
     archive, page = every.archive, every.page
     page.site("noted", active_alarms=2)
     etag = page.http.get("/api/alarms?sites=noted").headers["etag"]
@@ -157,6 +174,14 @@ def test_an_alarm_comes_with_its_notes(every: All) -> None:
     wait_for(lambda: message()[second["id"]].get("shelved_by") == "anna", "who said what")
     assert message()[second["id"]]["shelved_until"]["sec"] == until_ns // SECOND
     assert "acknowledged_by" not in message()[first["id"]]
+    # As on its own page: apart, and in no count.
+    found = alarms(page, "noted")
+    assert (found["total"], [it["id"] for it in found["alarms"]]) == (
+        1,
+        [first["id"], second["id"]],
+    )
+    (cause,) = page.site("noted", active_alarms=1)["causes"]
+    assert (cause["tag_id"], cause["count"]) == (first["tag_id"], 1)
     assert page.http.get("/api/alarms?sites=noted").headers["etag"] != etag
 
 
@@ -224,7 +249,7 @@ def test_the_compared_sensor_and_period_can_be_chosen(every: All) -> None:
         ("compare?sensor_type=a&from=0&to=2678401", 400, "31.0 days apart, the limit is 31"),
         ("compare?sensor_type=a&from=5&to=4", 400, "to is 4.000000000 s, before from"),
         ("compare?sensor_type=a&from=soon", 400, "from is 'soon'"),
-        ("alarms?sites=nowhere", 404, "there is no site 'nowhere' in the archive, which has 10"),
+        ("alarms?sites=nowhere", 404, "there is no site 'nowhere' in the archive, which has 11"),
         ("compare?sensor_type=a&sites=gh1,nowhere", 404, "there is no site 'nowhere'"),
     ],
 )

@@ -40,7 +40,7 @@ def test_a_site_is_live_and_judged_and_new_scans_are_pushed(
         before = page.site(is_live=True, verdict="healthy", active_alarms=0)
         assert before.keys() == {
             "site", "name", "verdict", "last_verdict", "active_alarms", "last_received", "lag_s",
-            "is_live", "origin", "map",
+            "is_live", "origin", "map", "causes",
         }  # fmt: skip
         assert abs(before["last_received"]["sec"] - time.time()) < 120
         assert 0 <= before["lag_s"] < 10
@@ -174,7 +174,7 @@ async def test_an_unexpected_error_is_logged_once_and_ends_neither_overview_nor_
         if updates == 2:  # the first heartbeat
             raise ZeroDivisionError
 
-    watching = source.Watching(Settings(), lambda: None)
+    watching = source.Watching(Settings())
     monkeypatch.setattr(watching.process, "ask", ask)
     watching.start()
     await until(lambda: watching.sites, "the overview")
@@ -285,7 +285,7 @@ async def test_a_process_is_checked_as_long_as_it_does_not_answer(
 ) -> None:
     """It may be stopped after a check, while it waits for the archive."""
     monkeypatch.setattr(source, "_START_S", 0.01)
-    watching = source.Watching(Settings(), lambda: None)
+    watching = source.Watching(Settings())
     checks: list[None] = []
     monkeypatch.setattr(watching.process, "ask", lambda *_: asyncio.sleep(60.0))
     monkeypatch.setattr(watching.process, "cancel", lambda: checks.append(None))

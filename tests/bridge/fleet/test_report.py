@@ -87,9 +87,13 @@ def test_the_latest_notes_of_all_sites_and_who_withdrew_one(
             f"INSERT INTO note VALUES ('{site}', '{name}', {made_s * SECOND}, '{by}', '{kind}',"
             f" '{subject}', $${text}$$, NULL)"
         )
+    archive.do("INSERT INTO site VALUES ('new', '')")
     with fleet(archive) as page:
         page.site("gh2")
+        page.site("new")
         found = page.http.get(f"/api/report?from={at_s}").json()
+        # A site that has never been forwarded is not complete up to 1970.
+        assert [it["complete_to"] is None for it in found["sites"]] == [False, False, True]
         assert [(it["site"], it["id"], it["by"], it["text"]) for it in found["notes"]] == [
             ("gh1", "2", "Anna", ""),
             ("gh2", "1", "Ben", "'; DROP TABLE note; --"),

@@ -254,3 +254,16 @@ def test_values_of_a_sensor_have_equal_digits_and_none_looks_like_its_limit(
     sensors = GREENHOUSE.sensors
     names = ("temperature", "vpd", "co2", "humidity", "dew_point", "co2_dose", "spin")
     assert [sensors.digits(name) for name in names] == [1, 2, 0, 1, 1, 0, None]
+
+
+def test_active_alarms_that_share_a_cause_are_below_one_heading() -> None:
+    warm = {"verdict": "stressed", "kind": "range", "sensor": "temperature", "value": 30.0}
+    many = [alarm(tag_id=str(n), reason={**warm, "limit": 26.0}) for n in range(5)]
+    page = page_of(alarms=[alarm(), *many])
+    active = page.partition("Alarms still active ")[2]
+    assert "Temperature too high: 5 Temperature too high (stressed) 0 06:01" in active
+    # The worst comes first, and few need no heading.
+    assert active.index("Pest seen (critical)") < active.index("Temperature too high: 5")
+    assert "Pest seen:" not in active
+    over = [{**each, "cleared_at": at(120)} for each in many]
+    assert "Temperature too high: 5" not in page_of(alarms=over)

@@ -70,6 +70,22 @@ def test_a_reader_that_has_all_of_them_gets_none_again(tmp_path: Path) -> None:
         assert read(path, NotesRequest("another", 2)).notes == after.notes
 
 
+def test_a_note_from_elsewhere_keeps_its_id_and_the_one_made_later_is_in_force(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "j.sqlite"
+    away = replace(note("away", NOW + 2), id=f"{3:016x}beefbeef")
+    with opened(path) as file:
+        for number in range(5):
+            file.put_note(note(str(number), NOW + number // 4))
+        for _ in range(2):
+            assert file.put_note(away) == away
+        assert number_of(file.put_note(note("next", NOW + 1)).id) == 6
+    found = read(path).notes or ()
+    assert [it.text for it in found] == ["0", "1", "2", "3", "4", "next", "away"]
+    assert standing(found, NOW + 9)["alarm:a", ACKNOWLEDGE] == away
+
+
 def test_of_too_many_notes_the_latest_are_known(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     with opened(path) as file:

@@ -1,8 +1,8 @@
 """Notes by people on alarms, tags and the greenhouse, and which of them are in force. Pure.
 
 A note never changes. To take one back, a person writes another of the kind `withdraw`, so that both
-stay in the journal. Of two notes on one subject, the one written later is in force.
-Times are ns of ROS time.
+stay in the journal. Of two notes on one subject, the one made later is in force: they may have been
+made in two places that could not reach each other. Times are ns of ROS time.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Note:
     """A person's note. `until_ns` of `shelve` is when it ends; None: the alarm is unshelved.
 
     Of `comment`, `until_ns` is the time that it is about; None: the time at which it was made.
-    `id` is assigned when the note is written, and ascends in that order.
+    `id` is assigned when the note is written, and ascends in that order; empty: not written yet.
     """
 
     id: str
@@ -58,7 +58,7 @@ class NotesRequest:
 
 @dataclass(frozen=True, slots=True)
 class PastNotes:
-    """The latest `MAX_NOTES` notes in the order of writing; None: unchanged since the request.
+    """The latest `MAX_NOTES` notes in the order of their times; None: unchanged since the request.
 
     `journal` identifies the journal, which has `count` notes in all.
     """

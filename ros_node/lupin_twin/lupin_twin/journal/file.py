@@ -44,7 +44,7 @@ from lupin_twin.journal.schema import (
     set_meta,
     transaction,
 )
-from lupin_twin.journal.writes import put_note
+from lupin_twin.journal.writes import number_of, put_note
 
 # A file up to this size is checked for damage when it is opened: a quarter of a second.
 _CHECKED_BYTES: Final = 64_000_000
@@ -306,14 +306,16 @@ class JournalFile:
         return written
 
     def put_note(self, note: Note) -> Note:
-        """Write a note; returns it with its id.
+        """Write a note, see `writes.put_note`; returns it with its id.
 
         Raises:
             sqlite3.Error, OSError: it was not written.
 
         """
         with self._transaction():
-            self._appender.last_seq += 1
+            # Nothing gets the number of a note: a reader of what follows it would miss that.
+            last = self._appender.last_seq
+            self._appender.last_seq = max(last, number_of(note.id)) if note.id else last + 1
             return put_note(SiteLog(self._connection), self._appender.last_seq, note)
 
     def note_lost(self, run: Run, at_ns: int) -> None:

@@ -357,10 +357,15 @@ def last_number(log: SiteLog) -> int:
 
 
 def put_note(log: SiteLog, number: int, note: Note) -> Note:
-    """Write a note under a number; returns it with its id."""
-    note = replace(note, id=f"{number:0{_DIGITS}x}{secrets.token_hex(4)}")
+    """Write a note under a number; returns it with its id.
+
+    One that has an id was written elsewhere: it keeps that, and is written once.
+    """
+    if not note.id:
+        note = replace(note, id=f"{number:0{_DIGITS}x}{secrets.token_hex(4)}")
     log.execute(
-        "INSERT INTO note VALUES (:site, :id, :made_at_ns, :by, :kind, :subject, :text, :until_ns)",
+        "INSERT INTO note VALUES (:site, :id, :made_at_ns, :by, :kind, :subject, :text, :until_ns)"
+        " ON CONFLICT DO NOTHING",
         asdict(note),
     )
     return note
@@ -374,7 +379,8 @@ def notes(connection: Any, request: NotesRequest) -> PastNotes:
     if (journal, count) == (request.journal, request.count):
         return PastNotes(journal, count, None)
     rows = log.execute(_NEWEST_NOTES, {"most": MAX_NOTES}).fetchall()
-    found = sorted((Note(*row) for row in rows), key=lambda note: note.id)
+    # Not by id alone: notes from elsewhere have numbers of their own.
+    found = sorted((Note(*row) for row in rows), key=lambda note: (note.made_at_ns, note.id))
     return PastNotes(journal, count, tuple(found))
 
 

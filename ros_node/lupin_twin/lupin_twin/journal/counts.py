@@ -8,15 +8,14 @@ added.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final
 
 from lupin_twin.core.history import KIND_TAG_READING
 from lupin_twin.core.past import HOUR_NS, Event
 from lupin_twin.core.state import STATUS_OK
 from lupin_twin.journal.rows import numbers_of
-from lupin_twin.journal.schema import DamagedFile, SiteLog, insert_into, json_text, upsert_into
+from lupin_twin.journal.schema import DamagedFile, SiteLog, insert_into
 
 # A shorter time without an attempt is no silence, whatever interval is usual.
 SILENCE_NS: Final = 600 * 1_000_000_000
@@ -46,7 +45,7 @@ def count_rows(log: SiteLog, after: int, until: int, counted_ns: Mapping[int, in
     """
     within = {"after": after, "until": until}
     scans = log.execute(_SCANS, within).fetchall()
-    hours: dict[tuple[int, int], list[Sequence[float]]] = {}
+    hours: dict[tuple[int, int, int], list[float]] = {}
     tallies: dict[tuple[int, str, int], tuple[int, ...]] = {}
     stamps: dict[int, list[int]] = {}
     readings = numbers_of([row[-1] for row in scans])
@@ -61,8 +60,7 @@ def count_rows(log: SiteLog, after: int, until: int, counted_ns: Mapping[int, in
             _tally(tallies, (run, Event.FAILURES, hour), status, stamp_ns)
         elif kind == KIND_TAG_READING:
             _tally(tallies, (run, Event.SCANS, hour), len(values), stamp_ns)
-        if values:
-            hours.setdefault((series, hour), []).append(values)
+        _collect(hours, (series, hour), values)
     inspections = [
         row
         for row in log.execute(_INSPECTIONS, within).fetchall()
@@ -73,8 +71,12 @@ def count_rows(log: SiteLog, after: int, until: int, counted_ns: Mapping[int, in
         _tally(tallies, (run, Event.INSPECTIONS, stamp_ns // HOUR_NS), bug_count, stamp_ns)
     for run, of_run in stamps.items():
         _note_silences(log, run, sorted(of_run))
-    _upsert_hours(log, hours)
-    log.execute_many(_TALLY, [(log.site, *key, *entry) for key, entry in sorted(tallies.items())])
+    # In the order of the tables, so that each of their pages is visited once.
+    each = [(*key, len(of), sum(of), min(of), max(of)) for key, of in sorted(hours.items())]
+    log.execute_many(ADD_HOUR, [(log.site, *entry) for entry in each])
+    log.execute_many(
+        _ADD_TALLY, [(log.site, *key, *entry) for key, entry in sorted(tallies.items())]
+    )
     for inspection in inspections:
         _note_pests(log, *inspection)
 
@@ -107,20 +109,14 @@ _INSPECTIONS: Final = (
 
 # --- by the hour ----------------------------------------------------------------------------------
 
-_LEAST: Final = "CASE WHEN excluded.{0} < tally.{0} THEN excluded.{0} ELSE tally.{0} END"
-_MOST: Final = "CASE WHEN excluded.{0} > tally.{0} THEN excluded.{0} ELSE tally.{0} END"
-
-
-_OF_HOUR: Final = (
-    "SELECT series, hour, CAST(n AS TEXT), CAST(total AS TEXT), CAST(low AS TEXT),"
-    " CAST(high AS TEXT) FROM hour WHERE site = :site AND series IN ({}) AND hour = :hour"
+_ADD: Final = (
+    " ON CONFLICT DO UPDATE SET n = n + excluded.n, total = total + excluded.total,"
+    " low = min(low, excluded.low), high = max(high, excluded.high)"
 )
-_TALLY: Final = (
-    f"{insert_into('tally')} ON CONFLICT (site, run, event, hour) DO UPDATE SET"
-    " n = tally.n + excluded.n, total = tally.total + excluded.total,"
-    f" low = {_LEAST.format('low')}, high = {_MOST.format('high')},"
-    f" first_ns = {_LEAST.format('first_ns')},"
-    f" last_ns = {_MOST.format('last_ns')}"
+ADD_HOUR: Final = insert_into("hour") + _ADD
+_ADD_TALLY: Final = (
+    f"{insert_into('tally')}{_ADD},"
+    " first_ns = min(first_ns, excluded.first_ns), last_ns = max(last_ns, excluded.last_ns)"
 )
 _ENDS: Final = (
     "SELECT first_ns, last_ns FROM tally WHERE site = :site AND run = :run AND event = :event"
@@ -130,50 +126,12 @@ _FIRST: Final = _ENDS.format("ASC")
 _LAST: Final = _ENDS.format("DESC")
 
 
-def _upsert_hours(log: SiteLog, hours: dict[tuple[int, int], list[Sequence[float]]]) -> None:
-    rows: list[tuple[Any, ...]] = []
-    found = _hours_of(log, hours)
-    # In the order of the table, so that each of its pages is visited once.
-    for (series, hour), scans in sorted(hours.items()):
-        n, total, low, high = found.get((series, hour)) or _no_hour(len(scans[0]))
-        for values in scans:
-            for sensor, value in enumerate(values):
-                if not -_LARGEST < value < _LARGEST:  # nor NaN, see `is_counted`
-                    continue
-                if not n[sensor]:
-                    low[sensor] = high[sensor] = value
-                n[sensor] += 1
-                total[sensor] += value
-                low[sensor] = min(low[sensor], value)
-                high[sensor] = max(high[sensor], value)
-        # Digits of a sum beyond 15 are noise, and take space.
-        sums = ",".join([f"{number:.15g}" for number in total])
-        texts = json_text(n), f"[{sums}]", json_text(low), json_text(high)
-        rows.append((log.site, series, hour, *texts))
-    log.execute_many(upsert_into("hour"), rows)
-
-
-def _hours_of(log: SiteLog, keys: Iterable[tuple[int, int]]) -> dict[tuple[int, int], Any]:
-    """The stored lists of these (series, hour) pairs, as far as they exist."""
-    by_hour: dict[int, list[int]] = {}
-    for series, hour in keys:
-        by_hour.setdefault(hour, []).append(series)
-    rows = [
-        row
-        for hour, of_hour in by_hour.items()
-        for row in log.execute(
-            _OF_HOUR.format(",".join(map(str, of_hour))), {"hour": hour}
-        ).fetchall()
-    ]
-    try:
-        lists = json.loads("[" + ",".join([f"[{','.join(row[2:])}]" for row in rows]) + "]")
-    except ValueError:
-        raise DamagedFile("an hour in the journal is not a list of numbers") from None
-    return {row[:2]: of_row for row, of_row in zip(rows, lists, strict=True)}
-
-
-def _no_hour(width: int) -> tuple[list[int], list[float], list[Any], list[Any]]:
-    return [0] * width, [0.0] * width, [None] * width, [None] * width
+def _collect(
+    hours: dict[tuple[int, int, int], list[float]], at: tuple[int, int], values: Sequence[float]
+) -> None:
+    for sensor, value in enumerate(values):
+        if -_LARGEST < value < _LARGEST:  # nor NaN, see `is_counted`
+            hours.setdefault((*at, sensor), []).append(value)
 
 
 def _tally(

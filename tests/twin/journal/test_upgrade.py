@@ -1,4 +1,4 @@
-"""A journal of an earlier version is upgraded: all answers stay the same, whatever happens meanwhile."""
+"""A journal of an earlier version is upgraded: all answers stay, whatever happens meanwhile."""
 
 import errno
 import json

@@ -8,7 +8,7 @@ added.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from lupin_twin.core.history import KIND_TAG_READING

@@ -49,7 +49,10 @@ _WITHIN: Final = (
     "FROM scan WHERE site = :site AND series = :series AND stamp_ns >= :start AND stamp_ns < :end"
     " AND is_copy = 0"
 )
-_HOURS_WITHIN: Final = "FROM hour WHERE site = :site AND series = :series AND hour >= :first AND hour < :last AND sensor = :place"
+_HOURS_WITHIN: Final = (
+    "FROM hour WHERE site = :site AND series = :series AND hour >= :first AND hour < :last"
+    " AND sensor = :place"
+)
 
 
 def series(connection: Any, request: SeriesRequest, now_ns: int) -> SeriesPast:

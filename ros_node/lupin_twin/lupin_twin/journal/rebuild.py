@@ -1,7 +1,8 @@
 """Upgrades a journal of an earlier version, and vacuums a journal.
 
 An upgrade builds a new file beside the journal, syncs it, and renames it: if the process is killed
-meanwhile, the old file is intact. The old file stays beside the new one, as `NAME.v4` for version 4.
+meanwhile, the old file is intact. The old file stays beside the new one; one of version 4, as
+`NAME.v4`.
 """
 
 from __future__ import annotations
@@ -152,7 +153,7 @@ def _copy_version4(
     with transaction(target):
         for table in ("site", "meta", *TABLES):
             if table != "hour":
-                target.execute(f"INSERT OR REPLACE INTO {table} SELECT * FROM old.{table}")
+                target.execute(f"INSERT OR REPLACE INTO {table} SELECT * FROM old.{table}")  # noqa: S608
         target.execute(HOURS_OF_LISTS.format(lists="old.hour", each="json_each(n) AS each"))
     return 0
 

@@ -14,9 +14,9 @@ corrected a little. Rows refer to the run, never to the step. `ended_stamp_ns` i
 current run, and in a step.
 
 Counts are written with their rows, without copies, and outlive them. `hour` has the count, sum,
-minimum and maximum of a sensor's finite readings; `sensor` is its place in `sensors`, from 0. `tally`
-has the same of the site's scans, failures and inspections, with the first and the
-last stamp. `event` has what is rare: pests seen and cleared, with the number of bugs, and silences
+minimum and maximum of a sensor's finite readings; `sensor` is its place in `sensors`, from 0.
+`tally` has the same of the site's scans, failures and inspections, with the first and the last
+stamp. `event` has what is rare: pests seen and cleared, with the number of bugs, and silences
 (more than ten minutes without an attempt), in ns.
 """
 

@@ -8,7 +8,8 @@ added.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final
 
 from lupin_twin.core.history import KIND_TAG_READING
@@ -45,38 +46,36 @@ def count_rows(log: SiteLog, after: int, until: int, counted_ns: Mapping[int, in
     """
     within = {"after": after, "until": until}
     scans = log.execute(_SCANS, within).fetchall()
-    hours: dict[tuple[int, int, int], list[float]] = {}
-    tallies: dict[tuple[int, str, int], tuple[int, ...]] = {}
-    stamps: dict[int, list[int]] = {}
+    inspections = [
+        row
+        for row in log.execute(_INSPECTIONS, within).fetchall()
+        if row[1] > counted_ns.get(row[0], -1)
+    ]
+    hours: dict[tuple[int, int, int], list[float]] = defaultdict(list)
+    # Of attempts: value and stamp.
+    tallies: dict[tuple[int, str, int], list[tuple[int, int]]] = defaultdict(list)
+    stamps: dict[int, list[int]] = defaultdict(list)
     readings = numbers_of([row[-1] for row in scans])
     for (run, series, kind, stamp_ns, status, _), values in zip(scans, readings, strict=True):
         if kind is None:
             raise DamagedFile("a scan has no series")
         if stamp_ns <= counted_ns.get(run, -1):
             continue
-        stamps.setdefault(run, []).append(stamp_ns)
+        stamps[run].append(stamp_ns)
         hour = stamp_ns // HOUR_NS
         if status != STATUS_OK:
-            _tally(tallies, (run, Event.FAILURES, hour), status, stamp_ns)
+            tallies[run, Event.FAILURES, hour].append((status, stamp_ns))
         elif kind == KIND_TAG_READING:
-            _tally(tallies, (run, Event.SCANS, hour), len(values), stamp_ns)
-        _collect(hours, (series, hour), values)
-    inspections = [
-        row
-        for row in log.execute(_INSPECTIONS, within).fetchall()
-        if row[1] > counted_ns.get(row[0], -1)
-    ]
+            tallies[run, Event.SCANS, hour].append((len(values), stamp_ns))
+        for sensor, value in enumerate(values):
+            hours[series, hour, sensor].append(value)
     for run, stamp_ns, _, _, _, bug_count in inspections:
-        stamps.setdefault(run, []).append(stamp_ns)
-        _tally(tallies, (run, Event.INSPECTIONS, stamp_ns // HOUR_NS), bug_count, stamp_ns)
+        stamps[run].append(stamp_ns)
+        tallies[run, Event.INSPECTIONS, stamp_ns // HOUR_NS].append((bug_count, stamp_ns))
     for run, of_run in stamps.items():
         _note_silences(log, run, sorted(of_run))
-    # In the order of the tables, so that each of their pages is visited once.
-    each = [(*key, len(of), sum(of), min(of), max(of)) for key, of in sorted(hours.items())]
-    log.execute_many(ADD_HOUR, [(log.site, *entry) for entry in each])
-    log.execute_many(
-        _ADD_TALLY, [(log.site, *key, *entry) for key, entry in sorted(tallies.items())]
-    )
+    log.execute_many(ADD_HOUR, list(_of_hours(log, hours)))
+    log.execute_many(_ADD_TALLY, list(_of_tallies(log, tallies)))
     for inspection in inspections:
         _note_pests(log, *inspection)
 
@@ -126,27 +125,24 @@ _FIRST: Final = _ENDS.format("ASC")
 _LAST: Final = _ENDS.format("DESC")
 
 
-def _collect(
-    hours: dict[tuple[int, int, int], list[float]], at: tuple[int, int], values: Sequence[float]
-) -> None:
-    for sensor, value in enumerate(values):
-        if -_LARGEST < value < _LARGEST:  # nor NaN, see `is_counted`
-            hours.setdefault((*at, sensor), []).append(value)
+# In the order of the tables, so that each of their pages is visited once.
 
 
-def _tally(
-    tallies: dict[tuple[int, str, int], tuple[int, ...]],
-    key: tuple[int, str, int],
-    value: int,
-    stamp_ns: int,
-) -> None:
-    n, total, low, high, first_ns, last_ns = tallies.get(
-        key, (0, 0, value, value, stamp_ns, stamp_ns)
-    )
-    tallies[key] = (
-        *(n + 1, total + value, min(low, value), max(high, value)),
-        *(min(first_ns, stamp_ns), max(last_ns, stamp_ns)),
-    )
+def _of_hours(
+    log: SiteLog, hours: Mapping[tuple[int, int, int], Iterable[float]]
+) -> Iterator[tuple[object, ...]]:
+    for key, values in sorted(hours.items()):
+        if of := [value for value in values if is_counted(value)]:
+            yield log.site, *key, len(of), sum(of), min(of), max(of)
+
+
+def _of_tallies(
+    log: SiteLog, tallies: Mapping[tuple[int, str, int], Iterable[tuple[int, int]]]
+) -> Iterator[tuple[object, ...]]:
+    for key, attempts in sorted(tallies.items()):
+        of, stamps = zip(*attempts, strict=True)
+        counts = len(of), sum(of), min(of), max(of)
+        yield log.site, *key, *counts, min(stamps), max(stamps)
 
 
 # --- one by one -----------------------------------------------------------------------------------

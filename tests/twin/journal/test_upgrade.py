@@ -239,5 +239,5 @@ def test_a_file_without_its_tables_is_quarantined(tmp_path: Path) -> None:
         connection.execute("DROP TABLE run")
     with started(path) as journal:
         wait_for(lambda: journal.condition.state is JournalState.RECORDING, "recording", 30.0)
-        assert "j.sqlite.damaged-" in journal.condition.set_aside
+        assert "j.sqlite.damaged-" in journal.condition.quarantined
     assert old_version(path) is None

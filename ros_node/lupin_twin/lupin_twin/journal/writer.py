@@ -426,7 +426,7 @@ class Journal:
             state,
             detail,
             file_bytes=file.size(),
-            set_aside=self._quarantined,
+            quarantined=self._quarantined,
             simulated_ns=file.simulated,
             kept_ns=file.kept(),
             journal_id=file.journal_id,

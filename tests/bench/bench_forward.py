@@ -16,13 +16,13 @@ WEEK = Greenhouse(tags=30, days=7.0, every_s=120.0, inspection_days=0.0, failing
 
 def main() -> None:
     """Print the figures."""
-    journal = filled(WEEK)
+    journal, scans = filled(WEEK), WEEK.scans * WEEK.tags
     with server(fsync=True) as postgresql:
         archive = Archive(postgresql)
         begun_s = time.monotonic()
         forward_once(archive, journal.path)
         took_s = time.monotonic() - begun_s
-        assert len(archive.rows()["scan"]) == (scans := WEEK.scans * WEEK.tags)
+        assert len(archive.rows()["scan"]) == scans
         with psycopg.connect(archive.owner) as connection:
             ((size,),) = connection.execute(
                 "SELECT sum(pg_total_relation_size(oid)) FROM pg_class WHERE relkind = 'r'"

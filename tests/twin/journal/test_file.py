@@ -2,6 +2,7 @@ import shutil
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
+from random import Random
 
 import pytest
 
@@ -12,6 +13,7 @@ from lupin_twin.journal.salvage import quarantine
 from tests.support.journal import (
     CLOCK,
     NOW,
+    SECOND,
     append,
     is_whole,
     known,
@@ -33,6 +35,18 @@ def test_a_row_that_cannot_be_written_is_lost_alone(path: Path) -> None:
     no_number = replace(scan("8"), readings=(Reading("t", "x"),))  # type: ignore[arg-type]
     assert append(path, [scan("1"), too_late, no_number, scan("2")]) == (2, 2)
     assert known(path) == {scan("1"), scan("2")}
+
+
+def test_a_reading_with_all_digits_takes_at_most_60_bytes(path: Path) -> None:
+    chance, sensors = Random(1), ("temperature", "humidity", "co2", "light", "soil_moisture")
+    rows = [
+        scan(
+            str(number % 20), NOW + number * 30 * SECOND, **{of: chance.random() for of in sensors}
+        )
+        for number in range(3_000)
+    ]
+    append(path, rows)
+    assert path.stat().st_size / (len(rows) * len(sensors)) < 60
 
 
 def test_runs_are_written_to_a_replaced_file(path: Path) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import psycopg
 
-from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.schema import TABLES, open_reader
 from tests.support import processes
 from tests.support.domains import ros_env
 from tests.support.postgres import Postgres
@@ -21,7 +21,6 @@ from tests.support.processes import Process
 from tests.support.waiting import wait_for
 
 # What has to be equal; the archive has its own values of the rest.
-TABLES = ("run", "series", "scan", "look", "place", "hour", "tally", "event", "note")
 _NUMBERS = count()
 
 
@@ -112,7 +111,7 @@ class Archive:
                     (
                         row[1:]
                         for row in connection.execute(
-                            f"SELECT {_columns(table)} FROM {table} WHERE site = %s",
+                            f"SELECT * FROM {table} WHERE site = %s",
                             (site or self.site,),
                         ).fetchall()
                     ),
@@ -120,11 +119,6 @@ class Archive:
                 )
                 for table in TABLES
             }
-
-
-def _columns(table: str) -> str:
-    lists = "".join(f", {name}::text" for name in ("n", "total", "low", "high"))
-    return f"site, series, hour{lists}" if table == "hour" else "*"
 
 
 def rows_of(journal: Path) -> dict[str, list[tuple[Any, ...]]]:

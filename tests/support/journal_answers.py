@@ -19,7 +19,9 @@ from lupin_twin.journal.queries import series
 from lupin_twin.journal.writes import rows
 
 JOURNALS: Final = Path(__file__).parents[1] / "fixtures" / "journals"
-NAMES: Final = sorted(path.stem for path in JOURNALS.glob("*.sqlite"))
+NAMES: Final = sorted(
+    str(path.relative_to(JOURNALS).with_suffix("")) for path in JOURNALS.rglob("*.sqlite")
+)
 
 
 def old(name: str, folder: Path) -> Path:
@@ -29,7 +31,7 @@ def old(name: str, folder: Path) -> Path:
 
 def answers(name: str) -> list[tuple[list[Any], Any]]:
     """Queries, with the answers of the old build; an estimate now uses other readings of a day."""
-    text = gzip.decompress((JOURNALS / f"{name}.answers.json.gz").read_bytes())
+    text = gzip.decompress((JOURNALS / f"{Path(name).name}.answers.json.gz").read_bytes())
     # Infinite values are stored as null now.
     found: list[tuple[list[Any], Any]] = json.loads(text, parse_constant=lambda _: math.nan)
     return [(query, right) for query, right in found if query[0] in _ANSWERS]

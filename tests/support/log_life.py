@@ -111,7 +111,7 @@ class Life:
             while purge_step(self.connection, Limits(0.0, 10**12), before_ns):
                 pass
 
-    def _holds(self) -> list[tuple[int, Write]]:
+    def holds(self) -> list[tuple[int, Write]]:
         axis = spans(runs(self.connection.execute))
         return [
             (number, row)
@@ -120,7 +120,7 @@ class Life:
         ]
 
     def _of(self, tag_id: str) -> list[tuple[int, Write]]:
-        return [(n, row) for n, row in self._holds() if tag_id in (EVERY_TAG, row.tag_id)]
+        return [(n, row) for n, row in self.holds() if tag_id in (EVERY_TAG, row.tag_id)]
 
     # --- the expected rows --------------------------------------------------------------------
 
@@ -152,7 +152,7 @@ class Life:
         return sorted(found)
 
     def _changes(self, tag_id: str, *, is_seen: bool) -> list[Entry]:
-        held = {number for number, _ in self._holds()}
+        held = {number for number, _ in self.holds()}
         found = []
         had: dict[tuple[int, str], bool] = {}
         looks = [(row.stamp_ns, n, run, row) for n, (run, row) in enumerate(self.rows)]
@@ -191,7 +191,7 @@ class Life:
             if isinstance(row, Pin):
                 for run in range(since, self.run + 1):
                     places.setdefault((run, row.tag_id), (row.pose.x, row.pose.y))
-        held = {number for number, _ in self._holds()}
+        held = {number for number, _ in self.holds()}
         scans = sorted(
             (row.stamp_ns, number, run, row)
             for number, (run, row) in enumerate(self.rows)

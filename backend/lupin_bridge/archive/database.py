@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 from lupin_bridge.console import CommandError
 from lupin_bridge.settings import SettingError, variable
-from lupin_twin.journal.schema import POSTGRESQL_TABLES
+from lupin_twin.journal.schema import HOURS_OF_LISTS, POSTGRESQL_HOUR, POSTGRESQL_TABLES
 
 if TYPE_CHECKING:
     import psycopg
 
-VERSION: Final = 1
+VERSION: Final = 2
 # Listeners are notified of a site with new rows: a hint, which may be lost.
 CHANNEL: Final = "lupin_log"
 _OLDEST_SERVER: Final = 150_000
@@ -210,13 +210,17 @@ def check_version(connection: psycopg.Connection[Any]) -> None:
         psycopg.Error: it is no archive, see `explaining`.
 
     """
-    found = connection.execute("SELECT version FROM archive").fetchone()
-    version = 0 if found is None else int(found[0])
+    version = _version(connection)
     if version != VERSION:
         raise ArchiveError(
             f"the archive is of version {version}, expected {VERSION}:"
             + (" lupin-twin archive migrate" if version < VERSION else " update lupin-twin here")
         )
+
+
+def _version(connection: psycopg.Connection[Any]) -> int:
+    found = connection.execute("SELECT version FROM archive").fetchone()
+    return 0 if found is None else int(found[0])
 
 
 def init(connection: psycopg.Connection[Any]) -> None:
@@ -245,16 +249,32 @@ def init(connection: psycopg.Connection[Any]) -> None:
         connection.execute(_text("roles.sql"))
 
 
+_FROM_VERSION1: Final = ";".join(
+    (
+        "ALTER TABLE hour RENAME TO lists",
+        "ALTER INDEX hour_pkey RENAME TO lists_pkey",
+        POSTGRESQL_HOUR.strip().rstrip(";"),
+        HOURS_OF_LISTS.format(
+            lists="lists", each="generate_series(0, json_array_length(n) - 1) AS each(key)"
+        ),
+        "DROP TABLE lists",
+        f"UPDATE archive SET version = {VERSION}",
+    )
+)
+
+
 def migrate(connection: psycopg.Connection[Any]) -> None:
-    """Bring tables (there is one version of them so far) and roles up to date.
+    """Bring tables and roles up to date, all or nothing.
 
     Raises:
         ArchiveError: the archive is newer than this.
         psycopg.Error: whatever the database says.
 
     """
-    check_version(connection)
     with connection.transaction():
+        if _version(connection) == 1:
+            connection.execute(_FROM_VERSION1)
+        check_version(connection)
         connection.execute(_text("roles.sql"))
 
 

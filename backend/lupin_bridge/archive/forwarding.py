@@ -123,8 +123,8 @@ class Sink:
         (is_ours,) = execute(_LOCK, {"name": f"lupin-twin forward {self._site}"}).fetchone()
         if not is_ours:
             other = execute(_OTHER).fetchone()
-            told = "{} (process {}) since {}".format(*other) if other else "another machine"
-            raise ArchiveError(f"site {self._site} is already forwarded by {told}: only one may")
+            holder = "{} (process {}) since {}".format(*other) if other else "another machine"
+            raise ArchiveError(f"site {self._site} is already forwarded by {holder}: only one may")
         execute(_HERE, {"machine": socket.gethostname(), "process": os.getpid()})
         execute("INSERT INTO site VALUES (:site, '') ON CONFLICT DO NOTHING")
 
@@ -132,7 +132,7 @@ class Sink:
         """Note in the archive that this forwarder is alive, and can write."""
         self._log.execute("UPDATE forwarder SET heard_at = now() WHERE site = :site")
 
-    def begin(self, source: Source, say: Callable[[str], None]) -> Epoch:
+    def begin(self, source: Source, report: Callable[[str], None]) -> Epoch:
         """Lock the site; returns the epoch in which the journal goes on.
 
         A journal that is not the last one forwarded begins a new epoch. So does one that was
@@ -149,7 +149,7 @@ class Sink:
             last = Epoch(self._site, *numbers)
             if journal_id == source.journal_id and self._goes_on(source, last):
                 return last
-            say(f"site {self._site} has a different journal than before: all of it is forwarded")
+            report(f"site {self._site} has a different journal than before: all of it is forwarded")
             (runs,) = self._log.execute(_RUNS).fetchone()
             seqs = last.seq_offset + last.forwarded_seq
             epoch = Epoch(self._site, last.number + 1, seqs, runs, 0)
@@ -242,7 +242,7 @@ class Forwarder:
         url: str,
         site: str,
         path: Callable[[], Path],
-        say: Callable[[str], None],
+        report: Callable[[str], None],
         give: Callable[[Note], None] | None = None,
     ) -> None:
         check_site("--site", site)
@@ -250,7 +250,7 @@ class Forwarder:
         self._url = url
         self._site = site
         self._path = path
-        self._say = say
+        self._report = report
         self._give = give
         self._last_problem = ""
         self._wait_s = FIRST_WAIT_S
@@ -280,7 +280,7 @@ class Forwarder:
             if str(error) != self._last_problem:
                 self._last_problem = str(error)
                 again = "" if once else "; it will be retried"
-                self._say(f"site {self._site} is not forwarded: {error}{again}")
+                self._report(f"site {self._site} is not forwarded: {error}{again}")
             return True
         return False
 
@@ -288,8 +288,8 @@ class Forwarder:
         # Even if the archive is down: from now on, the twin keeps what is not there yet.
         source.claim()
         with closing(Sink(self._url, self._site)) as sink:
-            epoch = sink.begin(source, self._say)
-            is_full, is_said, beaten_s = True, False, 0.0
+            epoch = sink.begin(source, self._report)
+            is_full, is_reported, beaten_s = True, False, 0.0
             while not source.is_replaced():
                 if source.has_changed() or is_full:
                     batch = source.batch(epoch)
@@ -297,9 +297,9 @@ class Forwarder:
                         epoch = sink.put(batch, epoch)
                     source.note(epoch.forwarded_seq)
                     is_full = batch.is_full
-                if not is_said:  # not earlier: a reachable archive may still refuse every batch
-                    self._last_problem, self._wait_s, is_said = "", FIRST_WAIT_S, True
-                    self._say(f"site {self._site} is forwarded to {place_of(self._url)}")
+                if not is_reported:  # not earlier: a reachable archive may still refuse every batch
+                    self._last_problem, self._wait_s, is_reported = "", FIRST_WAIT_S, True
+                    self._report(f"site {self._site} is forwarded to {place_of(self._url)}")
                 # Not earlier either: a forwarder that cannot write is not live.
                 if time.monotonic() - beaten_s >= _HEARTBEAT_S:
                     beaten_s = time.monotonic()

@@ -45,14 +45,13 @@ _QUANTILES: Final = (0.25, 0.5, 0.75)
 _DIGITS: Final = 9
 
 _HOURS: Final = """
-SELECT site, (hour - %(origin)s) / %(width)s AS bucket, sum(CAST(n ->> place AS BIGINT)),
-    sum(CAST(total ->> place AS DOUBLE PRECISION))
+SELECT site, (hour - %(origin)s) / %(width)s AS bucket, sum(n), sum(total)
 FROM hour JOIN (
     SELECT site, series, array_position(
         ARRAY(SELECT json_array_elements_text(CAST(sensors AS json))), %(sensor)s) - 1 AS place
     FROM series WHERE site = ANY(%(sites)s) AND kind = 0
 ) AS of_sensor USING (site, series)
-WHERE place IS NOT NULL AND hour >= %(origin)s AND hour < %(last)s GROUP BY site, bucket
+WHERE sensor = place AND hour >= %(origin)s AND hour < %(last)s GROUP BY site, bucket
 """
 
 

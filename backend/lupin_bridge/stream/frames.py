@@ -120,7 +120,7 @@ class Status:
             {drop.reason: drop.count.bit_length() for drop in now.drops},
             journal.state,
             "" if journal.state == JournalState.SLOW else journal.detail,
-            journal.set_aside,
+            journal.quarantined,
             journal.simulated_ns,
             self.outward,
             now.origin,
@@ -162,7 +162,7 @@ def _journal(journal: Condition) -> dict[str, Any]:
     return {
         "state": journal.state.value,
         "detail": journal.detail,
-        "set_aside": journal.set_aside,
+        "set_aside": journal.quarantined,
         "simulated": simulated and {"start": stamp(simulated[0]), "end": stamp(simulated[1])},
     }
 

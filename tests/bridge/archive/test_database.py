@@ -51,7 +51,7 @@ def test_a_forwarder_may_only_append_to_its_site(two_sites: Archive) -> None:
         SCAN.format("gh2"),
         "INSERT INTO meta VALUES ('gh2', 'a', 'b')",
         "UPDATE epoch SET forwarded_seq = 0 WHERE site = 'gh2'",
-        "UPDATE hour SET n = '[]' WHERE site = 'gh2'",
+        "UPDATE hour SET n = 0 WHERE site = 'gh2'",
         "UPDATE scan SET readings = '[2]'",
         "DELETE FROM scan",
         "DELETE FROM hour",
@@ -75,7 +75,7 @@ def test_the_page_reads_every_site_and_writes_notes_alone(two_sites: Archive) ->
         SCAN.format("gh1"),
         "DELETE FROM note",
         "UPDATE note SET text = ''",
-        "UPDATE hour SET n = '[]'",
+        "UPDATE hour SET n = 0",
     ):
         assert refused(two_sites, "page", sql), sql
 
@@ -109,14 +109,42 @@ def test_migrating_gives_the_roles_back_what_they_may(two_sites: Archive) -> Non
         assert len(connection.execute("SELECT site FROM scan").fetchall()) == 2
 
 
+_LISTS = """
+CREATE TABLE lists (
+    site TEXT NOT NULL, series BIGINT NOT NULL, hour BIGINT NOT NULL, n JSON NOT NULL,
+    total JSON NOT NULL, low JSON NOT NULL, high JSON NOT NULL, PRIMARY KEY (site, series, hour)
+);
+INSERT INTO lists SELECT site, series, hour, json_build_array(0, n), json_build_array(0.0, total),
+    json_build_array(NULL, low), json_build_array(NULL, high) FROM hour;
+DROP TABLE hour;
+ALTER TABLE lists RENAME TO hour;
+ALTER INDEX lists_pkey RENAME TO hour_pkey;
+UPDATE archive SET version = 1
+"""
+
+
+def test_migrating_from_version_1_keeps_every_hour(two_sites: Archive) -> None:
+    before = two_sites.rows("gh1")["hour"]
+    two_sites.do(_LISTS)
+    assert (
+        "of version 1, expected 2: lupin-twin archive migrate"
+        in command("info", two_sites.owner).stderr
+    )
+    assert command("migrate", two_sites.owner).returncode == 0
+    # Then, the first sensor had no reading in that hour.
+    assert two_sites.rows("gh1")["hour"] == [(*row[:2], 1, *row[3:]) for row in before] != []
+    with psycopg.connect(two_sites.url("page")) as connection:
+        assert len(connection.execute("SELECT site FROM hour").fetchall()) == 2
+
+
 def test_what_is_no_archive_or_another_one_is_named_and_left_alone(
     archive: Archive, postgresql: Postgres
 ) -> None:
     archive.do("UPDATE archive SET version = 9")
     for action, url, said in (
         ("init", archive.owner, "already has an archive"),
-        ("migrate", archive.owner, "is of version 9, expected 1: update lupin-twin here"),
-        ("check", archive.owner, "is of version 9, expected 1: update lupin-twin here"),
+        ("migrate", archive.owner, "is of version 9, expected 2: update lupin-twin here"),
+        ("check", archive.owner, "is of version 9, expected 2: update lupin-twin here"),
         ("info", postgresql.url_of("postgres"), "has no archive: lupin-twin archive init"),
     ):
         done = command(action, url)

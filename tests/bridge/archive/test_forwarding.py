@@ -16,10 +16,9 @@ from lupin_twin.journal.paths import mark_of
 from lupin_twin.journal.rebuild import vacuum
 from lupin_twin.journal.retention import Limits, forget
 from lupin_twin.journal.runs import Clock
-from lupin_twin.journal.schema import SiteLog, open_reader
+from lupin_twin.journal.schema import TABLES, SiteLog, open_reader
 from lupin_twin.journal.writes import notes
 from tests.support.archive import (
-    TABLES,
     Archive,
     forward_once,
     forwarder,

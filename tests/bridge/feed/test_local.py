@@ -79,8 +79,8 @@ async def test_damage_found_by_a_query_quarantines_the_file(domain: int, tmp_pat
         except NotRemembered as error:
             refused = error
         assert refused is None or "is damaged" in str(refused)
-        await until(lambda: twin.journal().set_aside, "the damaged file to be set aside")
-        assert Path(twin.journal().set_aside).exists()
+        await until(lambda: twin.journal().quarantined, "the damaged file to be quarantined")
+        assert Path(twin.journal().quarantined).exists()
         await until(lambda: twin.journal().state is JournalState.RECORDING, "a new file")
         assert 0 < sum([lot async for lot in twin.rows(0, end_ns, None, None, len)]) < 5_000
 

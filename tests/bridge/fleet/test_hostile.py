@@ -327,7 +327,7 @@ def test_nothing_that_a_site_writes_stops_the_overview_of_the_others(
                 running.site("gh2", is_live=at == "infinity")
                 assert running.site("gh1")["is_live"], at
             site.execute("UPDATE epoch SET seq_offset = 9223372036854775807")
-            site.execute("UPDATE hour SET n = '[\"some\"]'")
+            site.execute("UPDATE hour SET total = 1.7e308")
             looks = running.metric("lupin_fleet_looks")
             wait_for(lambda: running.metric("lupin_fleet_looks") > looks + 1, "two looks")
         assert running.site("gh1")["is_live"]
@@ -384,7 +384,7 @@ def test_an_error_that_may_pass_is_reported_and_the_page_is_served(archive: Arch
             lambda: "version 99" in page.http.get("/readyz").json()["message"], "the reason there"
         )
         assert page.sites() == {}
-        archive.do("UPDATE archive SET version = 1")
+        archive.do("UPDATE archive SET version = 2")
         wait_for(lambda: page.http.get("/readyz").status_code == 200, "an archive that is read")
         assert page.sites() == {}, "an archive without sites is an empty overview"
         metrics = page.http.get("/metrics").text

@@ -158,7 +158,7 @@ def test_a_change_of_the_journals_state_is_news() -> None:
     recording = status(JournalState.RECORDING, written=1)
     assert recording.is_news_after(failing)
     assert not status(JournalState.RECORDING, written=2, waiting=3).is_news_after(recording)
-    aside = status(JournalState.RECORDING, set_aside="/old")
+    aside = status(JournalState.RECORDING, quarantined="/old")
     assert aside.is_news_after(recording)
     assert schema.StatusFrame.model_validate(aside.frame()).journal.set_aside == "/old"
     # Its delay changes every second.

@@ -119,7 +119,7 @@ def test_the_journals_report_is_parsed_back() -> None:
         waiting=2,
         lost=3,
         refused=1,
-        set_aside="/j.sqlite.damaged",
+        quarantined="/j.sqlite.damaged",
         simulated_ns=(1_763_440_800_000_000_001, 1_763_700_000_000_000_000),
         complete_ns=1_763_700_000_000_000_002,
         kept_ns=((0, 5), (7, 2**63 - 1)),

@@ -2,6 +2,7 @@ import shutil
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
+from random import Random
 
 import pytest
 
@@ -12,6 +13,7 @@ from lupin_twin.journal.salvage import quarantine
 from tests.support.journal import (
     CLOCK,
     NOW,
+    SECOND,
     append,
     is_whole,
     known,
@@ -33,6 +35,19 @@ def test_a_row_that_cannot_be_written_is_lost_alone(path: Path) -> None:
     no_number = replace(scan("8"), readings=(Reading("t", "x"),))  # type: ignore[arg-type]
     assert append(path, [scan("1"), too_late, no_number, scan("2")]) == (2, 2)
     assert known(path) == {scan("1"), scan("2")}
+
+
+def test_a_reading_with_all_digits_takes_at_most_60_bytes(path: Path) -> None:
+    chance = Random(1)
+    rows = [
+        replace(
+            scan(str(number % 20), NOW + number * 30 * SECOND),
+            readings=tuple(Reading(name, chance.random()) for name in "abcde"),
+        )
+        for number in range(3_000)
+    ]
+    append(path, rows)
+    assert path.stat().st_size / (5 * len(rows)) < 60
 
 
 def test_runs_are_written_to_a_replaced_file(path: Path) -> None:

@@ -106,7 +106,7 @@ def test_later_rows_are_not_in_it(living: Living) -> None:
 
 
 def check(found: dict[str, Any], life: Life, start_ns: int, end_ns: int) -> None:
-    known = [(n, row) for n, row in life._holds() if row.stamp_ns < end_ns]
+    known = [(n, row) for n, row in life.holds() if row.stamp_ns < end_ns]
     reported = sorted(
         (
             write(number, life.rows[number][0], row)

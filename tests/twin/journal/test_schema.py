@@ -9,9 +9,9 @@ import pytest
 
 from lupin_twin.journal import schema
 from lupin_twin.journal.checking import find_damage
-from lupin_twin.journal.rebuild import is_version3
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
+    UPGRADED,
     VERSION,
     DamagedFile,
     Empty,
@@ -92,13 +92,13 @@ def test_a_file_being_created_is_called_empty_and_not_damaged(tmp_path: Path) ->
         assert find_damage(path) is None
 
 
-@pytest.mark.parametrize("version", [1, 2, 3, VERSION + 1])
+@pytest.mark.parametrize("version", [1, 2, *UPGRADED, VERSION + 1])
 def test_another_version_is_left_alone_and_the_message_says_what_happens_to_it(
     path: Path, version: int
 ) -> None:
     with closing(sqlite3.connect(path)) as connection:
         connection.execute(f"PRAGMA user_version = {version}")
-    what = "a twin that starts with it upgrades it" if is_version3(path) else "it cannot be read"
+    what = "a twin that starts with it upgrades it" if version in UPGRADED else "it cannot be read"
     with pytest.raises(Foreign, match=f"version {version}, this is version {VERSION}: {what}"):
         open_writer(path)
 

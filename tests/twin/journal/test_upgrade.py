@@ -1,6 +1,7 @@
-"""A journal of version 3 is upgraded: all answers stay the same, whatever happens meanwhile."""
+"""A journal of an earlier version is upgraded: all answers stay, whatever happens meanwhile."""
 
 import errno
+import json
 import shutil
 import signal
 import sqlite3
@@ -14,14 +15,21 @@ from typing import Any
 import pytest
 
 from lupin_twin.core.diagnostics import JournalState
+from lupin_twin.core.past import DAY_NS
 from lupin_twin.journal.checking import find_all_damage
-from lupin_twin.journal.rebuild import is_version3, upgrade
-from lupin_twin.journal.schema import open_reader
+from lupin_twin.journal.rebuild import old_version, upgrade
+from lupin_twin.journal.runs import Clock
+from lupin_twin.journal.schema import TABLES, open_reader
 from lupin_twin.journal.writer import Journal
+from tests.support.journal import LIMITS
 from tests.support.journal_answers import NAMES, answer, answers, old, same
-from tests.support.upgrade_child import CLOCK, LIMITS
 from tests.support.waiting import wait_for
 from tests.twin.journal.conftest import fail_on_a_full_disk
+
+T0 = 1_763_683_200 * 10**9
+CLOCK = Clock(T0 + 30 * DAY_NS, T0 + 30 * DAY_NS, is_simulated=False)
+# One with counts of deleted rows, and a note.
+VERSION4 = "version4/purged"
 
 
 @contextmanager
@@ -50,21 +58,24 @@ def names_in(folder: Path) -> set[str]:
 # --- content --------------------------------------------------------------------------------------
 
 
-def test_the_old_file_stays_unchanged_beside_the_new_one(tmp_path: Path) -> None:
-    path = old("day", tmp_path)
+@pytest.mark.parametrize(("name", "kept"), [("day", "j.sqlite.v3"), (VERSION4, "j.sqlite.v4")])
+def test_the_old_file_stays_unchanged_beside_the_new_one(
+    name: str, kept: str, tmp_path: Path
+) -> None:
+    path = old(name, tmp_path)
     path.chmod(0o640)
     content = path.read_bytes()
     shares: list[float] = []
     assert upgrade(path, shares.append) == ""
-    assert names_in(tmp_path) == {"j.sqlite", "j.sqlite.v3"}
-    assert path.with_name("j.sqlite.v3").read_bytes() == content
+    assert names_in(tmp_path) == {"j.sqlite", kept}
+    assert path.with_name(kept).read_bytes() == content
     assert path.stat().st_mode & 0o777 == 0o640
     assert shares == sorted(shares)
     # Put back and upgraded again, nothing is overwritten.
     path.unlink()
     path.write_bytes(content)
     upgrade(path, shares.append)
-    assert names_in(tmp_path) == {"j.sqlite", "j.sqlite.v3", "j.sqlite.v3-1"}
+    assert names_in(tmp_path) == {"j.sqlite", kept, f"{kept}-1"}
 
 
 def test_the_wal_of_a_killed_twin_is_upgraded_too(tmp_path: Path) -> None:
@@ -97,7 +108,7 @@ def test_damaged_rows_are_left_out_and_reported(tmp_path: Path) -> None:
 def test_the_answers_are_those_of_the_old_file(name: str, tmp_path: Path) -> None:
     path = old(name, tmp_path)
     upgrade(path, lambda share: None)
-    assert not is_version3(path)
+    assert old_version(path) is None
     with closing(open_reader(path)) as connection:
         assert list(find_all_damage(connection, lambda what, share: None)) == []
         for query, right in answers(name):
@@ -110,13 +121,33 @@ def is_another(name: str, query: list[Any]) -> bool:
     if query[0] != "series":
         return False
     _, tag_id, sensor, *_ = query
-    if name == "purged":
+    if name in ("purged", VERSION4):
         # For deleted attempts the old build had counts by five minutes, now there are hours; a
         # pause is then longer than the usual interval of hours, not of five minutes.
         return tag_id == "*" and sensor in ("~scans", "~failures", "~looks", "~silences")
     # The old build had counted damaged rows: in an hour, in five minutes, and in the total of
     # an index. Now such a row is nowhere.
     return name in ("flipped", "damaged")
+
+
+def test_version_4_keeps_its_identity_and_every_row(tmp_path: Path) -> None:
+    path = old(VERSION4, tmp_path)
+    upgrade(path, lambda share: None)
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("ATTACH ? AS old", (f"{path}.v4",))
+        for table in ("site", "meta", *TABLES):
+            rows, before = (
+                connection.execute(f"SELECT * FROM {of}.{table}").fetchall()
+                for of in ("main", "old")
+            )
+            if table == "hour":
+                lists = [map(json.loads, row[3:]) for row in before]
+                before = [
+                    (*row[:3], sensor, *counts)
+                    for row, of in zip(before, lists, strict=True)
+                    for sensor, counts in enumerate(zip(*of, strict=True))
+                ]
+            assert rows == before != [], table
 
 
 # --- interruptions --------------------------------------------------------------------------------
@@ -127,23 +158,26 @@ def child(path: Path, number: int) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, check=False, capture_output=True, text=True)
 
 
-def test_killed_at_any_moment_it_is_completed_at_the_next_start(tmp_path: Path) -> None:
-    whole = old("late", tmp_path)
+@pytest.mark.parametrize(("name", "kept"), [("late", "j.sqlite.v3"), (VERSION4, "j.sqlite.v4")])
+def test_killed_at_any_moment_it_is_completed_at_the_next_start(
+    name: str, kept: str, tmp_path: Path
+) -> None:
+    whole = old(name, tmp_path)
     content = whole.read_bytes()
-    moments, _ = map(int, child(whole, 0).stdout.split())
+    moments = int(child(whole, 0).stdout)
     assert moments > 10
     for number in range(1, moments + 1):
         folder = tmp_path / str(number)
         folder.mkdir()
-        path = old("late", folder)
+        path = old(name, folder)
         assert child(path, number).returncode == -signal.SIGKILL
         # Until it is done, all is in the old file.
-        assert not is_version3(path) or path.read_bytes() == content
+        assert old_version(path) is None or path.read_bytes() == content
         with started(path) as journal:
             assert journal.take_restored(30.0) is not None, number
-        assert names_in(folder) == {"j.sqlite", "j.sqlite.v3", "j.sqlite.lock"}
-        assert path.with_name("j.sqlite.v3").read_bytes() == content
-        check_states(path, "late")
+        assert names_in(folder) == {"j.sqlite", kept, "j.sqlite.lock"}
+        assert path.with_name(kept).read_bytes() == content
+        check_states(path, name)
 
 
 def test_a_disk_that_fills_leaves_the_old_file_unchanged(tmp_path: Path) -> None:
@@ -205,5 +239,5 @@ def test_a_file_without_its_tables_is_quarantined(tmp_path: Path) -> None:
         connection.execute("DROP TABLE run")
     with started(path) as journal:
         wait_for(lambda: journal.condition.state is JournalState.RECORDING, "recording", 30.0)
-        assert "j.sqlite.damaged-" in journal.condition.set_aside
-    assert not is_version3(path)
+        assert "j.sqlite.damaged-" in journal.condition.quarantined
+    assert old_version(path) is None

@@ -111,7 +111,7 @@ def test_a_damaged_file_is_quarantined_and_the_twin_goes_on(path: Path) -> None:
         journal.write(scan())
         wait_for(lambda: journal.condition.written == 1, "the row")
         condition = wait_state(journal, JournalState.RECORDING, "quarantined as")
-        assert Path(condition.set_aside).read_text() == "nothing of the kind" * 1000
+        assert Path(condition.quarantined).read_text() == "nothing of the kind" * 1000
     assert known(path) == {scan()}
 
 
@@ -154,7 +154,7 @@ def test_a_file_that_fails_while_recording_keeps_its_rows_even_if_it_is_quaranti
         journal.write(scan("2"))
         wait_for(lambda: journal.condition.written == 2, "the row after it")
         condition = wait_state(journal, JournalState.RECORDING)
-        assert Path(condition.set_aside).is_file() is is_quarantined
+        assert Path(condition.quarantined).is_file() is is_quarantined
         # It may have lost any row up to now: the last ones too.
         assert (condition.kept_ns[0][0] > begun_ns) is is_quarantined
     assert known(path) == {scan("1"), scan("2")}

@@ -103,17 +103,17 @@ def test_damage_found_by_a_reader_quarantines_the_file_while_the_twin_records(
         with pytest.raises(NotRemembered, match="the twin quarantines it and retains what"):
             how_many(memory)
         memory.apply(SCAN, NOW)
-        wait_for(lambda: memory.condition.set_aside, "the damaged file to be set aside")
+        wait_for(lambda: memory.condition.quarantined, "the damaged file to be quarantined")
         wait_for(lambda: memory.condition.written == 2, "what came meanwhile, and its place")
-        assert Path(memory.condition.set_aside).exists()
+        assert Path(memory.condition.quarantined).exists()
         # A few pages are lost, and the rest is salvaged.
         wait_for(lambda: count * 0.9 < how_many(memory) <= count, "what can be read")
         # If this were an error of a query and no damage, copies would fill the disk.
-        before = memory.condition.set_aside
+        before = memory.condition.quarantined
         memory.journal.heal("again, the same day")
         memory.apply(replace(SCAN, stamp_ns=NOW + 9, own_stamp_ns=NOW + 9), NOW)
         wait_for(lambda: memory.condition.written == 3, "what came after it")
-        assert memory.condition.set_aside == before
+        assert memory.condition.quarantined == before
         assert len(list(tmp_path.glob("*.damaged-*Z"))) == 1
     assert is_whole(path)
 

@@ -85,7 +85,7 @@ class Condition:
 
     `waiting` rows are queued but not written yet, the oldest of them for `behind_s`. `lost` rows
     were discarded because too many were waiting. `refused` rows were invalid themselves, and
-    `repeated` rows were already stored. `set_aside` names the last quarantined file.
+    `repeated` rows were already stored. `quarantined` names the last quarantined file.
     `simulated_ns` is the period of ROS time, start and end, that a simulation filled in and no
     robot observed; None if there is none.
 
@@ -105,7 +105,7 @@ class Condition:
     lost: int = 0
     refused: int = 0
     file_bytes: int = 0
-    set_aside: str = ""
+    quarantined: str = ""
     simulated_ns: tuple[int, int] | None = None
     complete_ns: int | None = None
     kept_ns: tuple[tuple[int, int], ...] = ()
@@ -216,7 +216,7 @@ def findings(health: Health) -> Iterator[Finding]:
             "waiting": str(journal.waiting),
             "lost": str(journal.lost),
             "refused": str(journal.refused),
-            "set aside": journal.set_aside,
+            "set aside": journal.quarantined,
             # Start and end of the simulated past. This and the next two are ns of ROS time.
             "simulated": _stretches((journal.simulated_ns,) if journal.simulated_ns else ()),
             "complete to": "" if journal.complete_ns is None else str(journal.complete_ns),
@@ -324,7 +324,7 @@ def _journal(finding: Finding) -> Condition:
         waiting=_number(values, "waiting"),
         lost=_number(values, "lost"),
         refused=_number(values, "refused"),
-        set_aside=shown(values.get("set aside", "")),
+        quarantined=shown(values.get("set aside", "")),
         simulated_ns=simulated[0] if len(simulated) == 1 else None,
         complete_ns=int(complete) if _are_stamps(complete) else None,
         kept_ns=_read_stretches(values.get("kept", "")),

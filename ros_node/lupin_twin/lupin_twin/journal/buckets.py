@@ -32,15 +32,13 @@ def bounds(span: Span) -> dict[str, Any]:
 class Table:
     """Where values are stored, as SQL: their `rows`, and their hourly counts `hours`, if any.
 
-    `read` converts the rows' `value` to numbers. `sums` are the columns of an hour: count, sum,
-    minimum and maximum.
+    `read` converts the rows' `value` to numbers.
     """
 
     rows: str
     value: str
     read: Callable[[list[Any]], list[float]]
     hours: str = ""
-    sums: tuple[str, ...] = ("n", "total", "low", "high")
 
 
 class Part:
@@ -69,8 +67,7 @@ class Part:
         """Number of values, by the hourly counts."""
         if not self._table.hours:
             return 0
-        n, *_ = self._table.sums
-        return int(self.ask(f"SELECT coalesce(sum({n}), 0) {self._table.hours}")[0][0])
+        return int(self.ask(f"SELECT coalesce(sum(n), 0) {self._table.hours}")[0][0])
 
     def oldest(self) -> list[int]:
         """The first stamp, or the beginning of the first hour where rows were deleted."""
@@ -92,17 +89,15 @@ class Part:
         steps, rest = buckets.grid, [self.span]
         if self._table.hours and steps.bucket_ns >= HOUR_NS:
             hours, rest = whole_hours(self.span, self._deleted_ns)
-            n, total, low, high = self._table.sums
             for index, count, *numbers in self.ask(
-                f"SELECT (hour - :origin) / :width AS bucket, sum({n}), sum({total}), min({low}),"
-                f" max({high}) {self._table.hours} GROUP BY bucket",
+                "SELECT (hour - :origin) / :width AS bucket, sum(n), sum(total), min(low),"
+                f" max(high) {self._table.hours} GROUP BY bucket",
                 first=hours[0],
                 last=hours[1],
                 origin=steps.start_ns // HOUR_NS,
                 width=steps.bucket_ns // HOUR_NS,
             ):
-                if count:
-                    buckets.add(index, int(count), *map(float, numbers))
+                buckets.add(index, int(count), *map(float, numbers))
         for span in rest:
             for stamp_ns, _, value in self.entries("", span):
                 if is_counted(value):

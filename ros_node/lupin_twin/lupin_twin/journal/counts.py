@@ -8,15 +8,15 @@ added.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final
 
 from lupin_twin.core.history import KIND_TAG_READING
 from lupin_twin.core.past import HOUR_NS, Event
 from lupin_twin.core.state import STATUS_OK
 from lupin_twin.journal.rows import numbers_of
-from lupin_twin.journal.schema import DamagedFile, SiteLog, insert_into, json_text, upsert_into
+from lupin_twin.journal.schema import DamagedFile, SiteLog, insert_into
 
 # A shorter time without an attempt is no silence, whatever interval is usual.
 SILENCE_NS: Final = 600 * 1_000_000_000
@@ -46,35 +46,36 @@ def count_rows(log: SiteLog, after: int, until: int, counted_ns: Mapping[int, in
     """
     within = {"after": after, "until": until}
     scans = log.execute(_SCANS, within).fetchall()
-    hours: dict[tuple[int, int], list[Sequence[float]]] = {}
-    tallies: dict[tuple[int, str, int], tuple[int, ...]] = {}
-    stamps: dict[int, list[int]] = {}
+    inspections = [
+        row
+        for row in log.execute(_INSPECTIONS, within).fetchall()
+        if row[1] > counted_ns.get(row[0], -1)
+    ]
+    hours: dict[tuple[int, int, int], list[float]] = defaultdict(list)
+    # Of attempts: value and stamp.
+    tallies: dict[tuple[int, str, int], list[tuple[int, int]]] = defaultdict(list)
+    stamps: dict[int, list[int]] = defaultdict(list)
     readings = numbers_of([row[-1] for row in scans])
     for (run, series, kind, stamp_ns, status, _), values in zip(scans, readings, strict=True):
         if kind is None:
             raise DamagedFile("a scan has no series")
         if stamp_ns <= counted_ns.get(run, -1):
             continue
-        stamps.setdefault(run, []).append(stamp_ns)
+        stamps[run].append(stamp_ns)
         hour = stamp_ns // HOUR_NS
         if status != STATUS_OK:
-            _tally(tallies, (run, Event.FAILURES, hour), status, stamp_ns)
+            tallies[run, Event.FAILURES, hour].append((status, stamp_ns))
         elif kind == KIND_TAG_READING:
-            _tally(tallies, (run, Event.SCANS, hour), len(values), stamp_ns)
-        if values:
-            hours.setdefault((series, hour), []).append(values)
-    inspections = [
-        row
-        for row in log.execute(_INSPECTIONS, within).fetchall()
-        if row[1] > counted_ns.get(row[0], -1)
-    ]
+            tallies[run, Event.SCANS, hour].append((len(values), stamp_ns))
+        for sensor, value in enumerate(values):
+            hours[series, hour, sensor].append(value)
     for run, stamp_ns, _, _, _, bug_count in inspections:
-        stamps.setdefault(run, []).append(stamp_ns)
-        _tally(tallies, (run, Event.INSPECTIONS, stamp_ns // HOUR_NS), bug_count, stamp_ns)
+        stamps[run].append(stamp_ns)
+        tallies[run, Event.INSPECTIONS, stamp_ns // HOUR_NS].append((bug_count, stamp_ns))
     for run, of_run in stamps.items():
         _note_silences(log, run, sorted(of_run))
-    _upsert_hours(log, hours)
-    log.execute_many(_TALLY, [(log.site, *key, *entry) for key, entry in sorted(tallies.items())])
+    log.execute_many(ADD_HOUR, list(_of_hours(log, hours)))
+    log.execute_many(_ADD_TALLY, list(_of_tallies(log, tallies)))
     for inspection in inspections:
         _note_pests(log, *inspection)
 
@@ -107,20 +108,14 @@ _INSPECTIONS: Final = (
 
 # --- by the hour ----------------------------------------------------------------------------------
 
-_LEAST: Final = "CASE WHEN excluded.{0} < tally.{0} THEN excluded.{0} ELSE tally.{0} END"
-_MOST: Final = "CASE WHEN excluded.{0} > tally.{0} THEN excluded.{0} ELSE tally.{0} END"
-
-
-_OF_HOUR: Final = (
-    "SELECT series, hour, CAST(n AS TEXT), CAST(total AS TEXT), CAST(low AS TEXT),"
-    " CAST(high AS TEXT) FROM hour WHERE site = :site AND series IN ({}) AND hour = :hour"
+_ADD: Final = (
+    " ON CONFLICT DO UPDATE SET n = n + excluded.n, total = total + excluded.total,"
+    " low = min(low, excluded.low), high = max(high, excluded.high)"
 )
-_TALLY: Final = (
-    f"{insert_into('tally')} ON CONFLICT (site, run, event, hour) DO UPDATE SET"
-    " n = tally.n + excluded.n, total = tally.total + excluded.total,"
-    f" low = {_LEAST.format('low')}, high = {_MOST.format('high')},"
-    f" first_ns = {_LEAST.format('first_ns')},"
-    f" last_ns = {_MOST.format('last_ns')}"
+ADD_HOUR: Final = insert_into("hour") + _ADD
+_ADD_TALLY: Final = (
+    f"{insert_into('tally')}{_ADD},"
+    " first_ns = min(first_ns, excluded.first_ns), last_ns = max(last_ns, excluded.last_ns)"
 )
 _ENDS: Final = (
     "SELECT first_ns, last_ns FROM tally WHERE site = :site AND run = :run AND event = :event"
@@ -130,65 +125,24 @@ _FIRST: Final = _ENDS.format("ASC")
 _LAST: Final = _ENDS.format("DESC")
 
 
-def _upsert_hours(log: SiteLog, hours: dict[tuple[int, int], list[Sequence[float]]]) -> None:
-    rows: list[tuple[Any, ...]] = []
-    found = _hours_of(log, hours)
-    # In the order of the table, so that each of its pages is visited once.
-    for (series, hour), scans in sorted(hours.items()):
-        n, total, low, high = found.get((series, hour)) or _no_hour(len(scans[0]))
-        for values in scans:
-            for sensor, value in enumerate(values):
-                if not -_LARGEST < value < _LARGEST:  # nor NaN, see `is_counted`
-                    continue
-                if not n[sensor]:
-                    low[sensor] = high[sensor] = value
-                n[sensor] += 1
-                total[sensor] += value
-                low[sensor] = min(low[sensor], value)
-                high[sensor] = max(high[sensor], value)
-        # Digits of a sum beyond 15 are noise, and take space.
-        sums = ",".join([f"{number:.15g}" for number in total])
-        texts = json_text(n), f"[{sums}]", json_text(low), json_text(high)
-        rows.append((log.site, series, hour, *texts))
-    log.execute_many(upsert_into("hour"), rows)
+# In the order of the tables, so that each of their pages is visited once.
 
 
-def _hours_of(log: SiteLog, keys: Iterable[tuple[int, int]]) -> dict[tuple[int, int], Any]:
-    """The stored lists of these (series, hour) pairs, as far as they exist."""
-    by_hour: dict[int, list[int]] = {}
-    for series, hour in keys:
-        by_hour.setdefault(hour, []).append(series)
-    rows = [
-        row
-        for hour, of_hour in by_hour.items()
-        for row in log.execute(
-            _OF_HOUR.format(",".join(map(str, of_hour))), {"hour": hour}
-        ).fetchall()
-    ]
-    try:
-        lists = json.loads("[" + ",".join([f"[{','.join(row[2:])}]" for row in rows]) + "]")
-    except ValueError:
-        raise DamagedFile("an hour in the journal is not a list of numbers") from None
-    return {row[:2]: of_row for row, of_row in zip(rows, lists, strict=True)}
+def _of_hours(
+    log: SiteLog, hours: Mapping[tuple[int, int, int], Iterable[float]]
+) -> Iterator[tuple[object, ...]]:
+    for key, values in sorted(hours.items()):
+        if of := [value for value in values if is_counted(value)]:
+            yield log.site, *key, len(of), sum(of), min(of), max(of)
 
 
-def _no_hour(width: int) -> tuple[list[int], list[float], list[Any], list[Any]]:
-    return [0] * width, [0.0] * width, [None] * width, [None] * width
-
-
-def _tally(
-    tallies: dict[tuple[int, str, int], tuple[int, ...]],
-    key: tuple[int, str, int],
-    value: int,
-    stamp_ns: int,
-) -> None:
-    n, total, low, high, first_ns, last_ns = tallies.get(
-        key, (0, 0, value, value, stamp_ns, stamp_ns)
-    )
-    tallies[key] = (
-        *(n + 1, total + value, min(low, value), max(high, value)),
-        *(min(first_ns, stamp_ns), max(last_ns, stamp_ns)),
-    )
+def _of_tallies(
+    log: SiteLog, tallies: Mapping[tuple[int, str, int], Iterable[tuple[int, int]]]
+) -> Iterator[tuple[object, ...]]:
+    for key, attempts in sorted(tallies.items()):
+        of, stamps = zip(*attempts, strict=True)
+        counts = len(of), sum(of), min(of), max(of)
+        yield log.site, *key, *counts, min(stamps), max(stamps)
 
 
 # --- one by one -----------------------------------------------------------------------------------

@@ -111,8 +111,8 @@ _OTHER_EVENTS: Final = f"{_WITH} DELETE FROM event WHERE site = :site AND {_EVEN
 _HOURS_OF: Final = (
     "SELECT count(*) FROM hour WHERE site = :site AND series = :series AND hour <= :hour"
 )
-# Size of an hour as a row.
-_HOUR_BYTES: Final = 120
+# Size of a sensor's hour as a row.
+_HOUR_BYTES: Final = 80
 # Errors that rows of a hostile or damaged journal raise. Other errors of `sqlite3` are the file's.
 _UNUSABLE: Final = (
     *(ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RecursionError),

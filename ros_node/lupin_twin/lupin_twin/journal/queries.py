@@ -51,16 +51,7 @@ _WITHIN: Final = (
 )
 _HOURS_WITHIN: Final = (
     "FROM hour WHERE site = :site AND series = :series AND hour >= :first AND hour < :last"
-)
-# An element of a JSON list, in the SQL of both SQLite and PostgreSQL.
-_IN_HOUR: Final = tuple(
-    f"CAST({name} ->> CAST(:place AS INTEGER) AS {kind})"
-    for name, kind in (
-        ("n", "BIGINT"),
-        ("total", "DOUBLE PRECISION"),
-        ("low", "DOUBLE PRECISION"),
-        ("high", "DOUBLE PRECISION"),
-    )
+    " AND sensor = :place"
 )
 
 
@@ -134,7 +125,7 @@ def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> 
             if request.sensor_type in names:
                 place = names.index(request.sensor_type)
                 read = partial(_at, text, place)
-                table = Table(_WITHIN, "readings", read, _HOURS_WITHIN, _IN_HOUR)
+                table = Table(_WITHIN, "readings", read, _HOURS_WITHIN)
                 found.append(Part(log, span, table, {"series": number, "place": place}))
     return found
 

@@ -1,7 +1,8 @@
-"""Upgrades a journal of version 3, and vacuums a journal.
+"""Upgrades a journal of an earlier version, and vacuums a journal.
 
 An upgrade builds a new file beside the journal, syncs it, and renames it: if the process is killed
-meanwhile, the old file is intact. The old file stays beside the new one as `NAME.v3`.
+meanwhile, the old file is intact. The old file stays beside the new one; one of version 4, as
+`NAME.v4`.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import os
 import shutil
 import sqlite3
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from itertools import islice
 from pathlib import Path
@@ -17,8 +18,8 @@ from typing import Final
 
 from lupin_twin.core.past import HOUR_NS
 from lupin_twin.journal.appending import Appender, copy_known
-from lupin_twin.journal.checking import Progress, find_all_damage
-from lupin_twin.journal.counts import DELETED
+from lupin_twin.journal.checking import Progress, find_all_damage, size_of
+from lupin_twin.journal.counts import ADD_HOUR, DELETED
 from lupin_twin.journal.fold import copies
 from lupin_twin.journal.paths import writing_alone
 from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS
@@ -26,7 +27,10 @@ from lupin_twin.journal.runs import Run, put_run
 from lupin_twin.journal.salvage import numbered
 from lupin_twin.journal.schema import (
     APPLICATION_ID,
+    HOURS_OF_LISTS,
     LOCAL_SITE,
+    TABLES,
+    UPGRADED,
     DamagedFile,
     NotPossible,
     insert_into,
@@ -36,14 +40,16 @@ from lupin_twin.journal.schema import (
     sync,
     transaction,
 )
-from lupin_twin.journal.version3 import VERSION, Bucket, OldRun, Version3
+from lupin_twin.journal.version3 import VERSION, OldRun, Version3
 
 _ROWS: Final = 5_000
+# Between two calls while a long SQL statement runs.
+_INSTRUCTIONS: Final = 100_000
 _NUMBERS: Final = (RETENTION_NS, RETENTION_BYTES, "simulated_from_ns", "simulated_until_ns")
 
 
-def is_version3(path: Path) -> bool:
-    """Whether a file is a journal of version 3; False if it does not exist.
+def old_version(path: Path) -> int | None:
+    """The version of a journal that has to be upgraded; None of any other file, and without one.
 
     Only its first bytes are read (https://www.sqlite.org/fileformat2.html, 1.3).
     """
@@ -51,13 +57,13 @@ def is_version3(path: Path) -> bool:
         with path.open("rb") as file:
             header = file.read(100)
     except FileNotFoundError:
-        return False
-    numbers = (int.from_bytes(header[at : at + 4], "big") for at in (60, 68))
-    return tuple(numbers) == (VERSION, APPLICATION_ID)
+        return None
+    version, application_id = (int.from_bytes(header[at : at + 4], "big") for at in (60, 68))
+    return version if application_id == APPLICATION_ID and version in UPGRADED else None
 
 
 def upgrade(path: Path, report: Callable[[float], None]) -> str:
-    """Upgrade a journal of version 3; the caller holds its lock.
+    """Upgrade a journal that has an `old_version`; the caller holds its lock.
 
     `report(share)` is called as the work goes on. Returns, in words, which rows were left out
     because they are damaged; usually empty.
@@ -67,7 +73,7 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
             the disk is full.
 
     """
-    new = path.with_name(path.name + ".upgrade")
+    version, new = old_version(path), path.with_name(path.name + ".upgrade")
     try:
         with closing(sqlite3.connect(path, isolation_level=None, timeout=5.0)) as connection:
             # First move the WAL into the file: otherwise it would be taken for the new file's WAL.
@@ -80,9 +86,12 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
                 # A failed upgrade begins again, so nothing has to be durable before it is done.
                 target.execute("PRAGMA journal_mode = MEMORY")
                 target.execute("PRAGMA synchronous = OFF")
-                damaged = _Upgrade(Version3(connection), target, report).run()
+                if version == VERSION:
+                    damaged = _Upgrade(Version3(connection), target, report).run()
+                else:
+                    damaged = _copy_version4(path, new, target, report)
         sync(new)
-        kept = _keep(path)
+        kept = _keep(path, version)
     except BaseException as error:
         _remove(new)
         if isinstance(error, sqlite3.OperationalError) and str(error).startswith("no such"):
@@ -109,9 +118,9 @@ def _remove(new: Path) -> None:
         new.with_name(new.name + end).unlink(missing_ok=True)
 
 
-def _keep(path: Path) -> Path:
+def _keep(path: Path, version: int | None) -> Path:
     """Give the old file a second name, and return that; no other file is overwritten."""
-    for kept in numbered(path, f".v{VERSION}"):
+    for kept in numbered(path, f".v{version}"):
         if not kept.exists():
             break
         if kept.samefile(path):  # an earlier upgrade was killed after this step
@@ -129,6 +138,24 @@ def _keep(path: Path) -> Path:
         part.rename(kept)
     sync(path.parent)
     return kept
+
+
+def _copy_version4(
+    old: Path, new: Path, target: sqlite3.Connection, report: Callable[[float], None]
+) -> int:
+    """Copy a journal of version 4, whose hours are lists; a damaged row ends the upgrade."""
+
+    def go_on() -> None:
+        report(min(1.0, size_of(new) / size_of(old)))
+
+    target.set_progress_handler(go_on, _INSTRUCTIONS)
+    target.execute("ATTACH ? AS old", (str(old),))
+    with transaction(target):
+        for table in ("site", "meta", *TABLES):
+            if table != "hour":
+                target.execute(f"INSERT OR REPLACE INTO {table} SELECT * FROM old.{table}")  # noqa: S608
+        target.execute(HOURS_OF_LISTS.format(lists="old.hour", each="json_each(n) AS each"))
+    return 0
 
 
 class _Upgrade:
@@ -189,15 +216,14 @@ class _Upgrade:
         hour = purged_ns // HOUR_NS
         self._appender.counted_ns[run] = (hour + 1) * HOUR_NS - 1
         set_meta(self._target, f"{DELETED}{run}", purged_ns)
-        self._target.executemany(insert_into("hour"), self._hours(run, hour))
+        self._target.executemany(ADD_HOUR, self._hours(run, hour))
         for table in ("tally", "event"):
             rows = ((LOCAL_SITE, run, *row) for row in getattr(self._old, table)(run, hour))
             self._target.executemany(insert_into(table), rows)
 
-    def _hours(self, run: int, until: int) -> list[tuple[object, ...]]:
+    def _hours(self, run: int, until: int) -> Iterator[tuple[object, ...]]:
         """Rows of `hour`; series of the old file that differ only by source become one."""
         numbers: dict[tuple[str, int, tuple[str, ...]], int] = {}
-        found: dict[tuple[int, int], list[Bucket]] = {}
         for tag_id, kind, sensors, hour, buckets in self._old.hours(run, until):
             key = (tag_id, kind, sensors)
             if key not in numbers:
@@ -205,27 +231,9 @@ class _Upgrade:
                 numbers[key] = self._appender.last_seq
                 row = (LOCAL_SITE, numbers[key], run, tag_id, kind, json_text(sensors))
                 self._target.execute(insert_into("series"), row)
-            at = (numbers[key], hour)
-            found[at] = list(map(_joined, found[at], buckets)) if at in found else buckets
-        return [
-            (LOCAL_SITE, *at, *map(json_text, zip(*map(_finite, buckets), strict=True)))
-            for at, buckets in sorted(found.items())
-            if any(n for n, *_ in buckets)
-        ]
-
-
-def _joined(one: Bucket, other: Bucket) -> Bucket:
-    """The counts of both."""
-    low, high = min(one[2], other[2]), max(one[3], other[3])
-    return one[0] + other[0], one[1] + other[1], low, high
-
-
-def _finite(bucket: Bucket) -> tuple[float | None, ...]:
-    """A bucket as stored in `hour`: without a reading there is no minimum and no maximum."""
-    return bucket if bucket[0] else (0, 0.0, None, None)
-
-
-_INSTRUCTIONS: Final = 100_000
+            for sensor, bucket in enumerate(buckets):
+                if bucket[0]:
+                    yield LOCAL_SITE, numbers[key], hour, sensor, *bucket
 
 
 def vacuum(path: Path, holder: str, report: Progress) -> tuple[int, int]:

@@ -27,6 +27,7 @@ from lupin_twin.journal.schema import (
     FILE_ERRORS,
     LOCAL_SITE,
     PAGE_SIZE,
+    TABLES,
     WRITTEN,
     Foreign,
     SiteLog,
@@ -58,9 +59,6 @@ _SERIES_OF: Final = (
     "SELECT site, series, run, tag, kind, sensors FROM series INDEXED BY series_of"
     " WHERE site = 'local'"
 )
-_TABLES: Final = (
-    "run", "series", "scan", "look", "place", "hour", "tally", "event", "note"
-)  # fmt: skip
 # Small tables, and the column by which each is ordered.
 _SMALL: Final = {"run": "run", "series": "series", "place": "seq", "note": "id"}
 _NO_RUN: Final = "run NOT IN (SELECT run FROM run)"
@@ -236,7 +234,7 @@ def _opened(path: Path) -> sqlite3.Connection:
 
 def _has_tables(old: sqlite3.Connection) -> bool:
     try:
-        for table in _TABLES:
+        for table in TABLES:
             old.execute(f"SELECT site FROM {table} WHERE 0").fetchall()
     except FILE_ERRORS:
         return False
@@ -263,7 +261,7 @@ def _mend(quarantined: Path, mended: Path) -> None:
 
 def _copy(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> None:
     with transaction(new):
-        for table in _TABLES:
+        for table in TABLES:
             new.execute(f"DELETE FROM {table}")
         purged = _copy_facts(old, new, size)
         for table, by in _SMALL.items():

@@ -13,10 +13,10 @@ the first copy. A step is a row of `run` that `joins` another: the same run, who
 corrected a little. Rows refer to the run, never to the step. `ended_stamp_ns` is NULL in the
 current run, and in a step.
 
-Counts are written with their rows, without copies, and outlive them (see `hours`). `hour` has the
-finite readings of each sensor, in the order of `sensors`, as JSON lists: count, sum, minimum and
-maximum. `tally` has the same of the site's scans, failures and inspections, with the first and the
-last stamp. `event` has what is rare: pests seen and cleared, with the number of bugs, and silences
+Counts are written with their rows, without copies, and outlive them. `hour` has the count, sum,
+minimum and maximum of a sensor's finite readings; `sensor` is its place in `sensors`, from 0.
+`tally` has the same of the site's scans, failures and inspections, with the first and the last
+stamp. `event` has what is rare: pests seen and cleared, with the number of bugs, and silences
 (more than ten minutes without an attempt), in ns.
 """
 
@@ -35,17 +35,28 @@ from typing import Any, Final
 from urllib.parse import quote
 
 APPLICATION_ID: Final = 0x4C55504A  # "LUPJ"
-VERSION: Final = 4
+VERSION: Final = 5
+# Earlier versions that are upgraded (see `rebuild`); no release wrote others.
+UPGRADED: Final = (3, 4)
 LOCAL_SITE: Final = "local"
-# The tables of observations.
+# All tables but `site` and `meta`; those of observations.
+TABLES: Final = ("run", "series", "scan", "look", "place", "hour", "tally", "event", "note")
 WRITTEN: Final = ("scan", "look")
 
 # A commit has a few scans, and writes whole pages: this size was measured to write fewest bytes.
 PAGE_SIZE: Final = 1024
 
-# {key}: a clause that only SQLite has. {json}: a type that has `->>` in both. {months}: PostgreSQL
-# partitions large tables by month of the stamp, which then is part of the key.
-_TABLES: Final = """
+# {key}: a clause that only SQLite has. {months}: PostgreSQL partitions large tables by month of the
+# stamp, which then is part of the key.
+_HOUR: Final = """
+CREATE TABLE hour (
+    site TEXT NOT NULL, series BIGINT NOT NULL, hour BIGINT NOT NULL, sensor INTEGER NOT NULL,
+    n BIGINT NOT NULL, total DOUBLE PRECISION NOT NULL, low DOUBLE PRECISION NOT NULL,
+    high DOUBLE PRECISION NOT NULL, PRIMARY KEY (site, series, hour, sensor)
+){key};
+"""
+_TABLES: Final = (
+    """
 CREATE TABLE meta (
     site TEXT NOT NULL, key TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (site, key)
 ){key};
@@ -89,11 +100,6 @@ CREATE TABLE place (
     qw DOUBLE PRECISION NOT NULL, is_copy INTEGER NOT NULL, PRIMARY KEY (site, seq)
 ){key};
 CREATE INDEX place_of ON place (site, run, tag);
-CREATE TABLE hour (
-    site TEXT NOT NULL, series BIGINT NOT NULL, hour BIGINT NOT NULL, n {json} NOT NULL,
-    total {json} NOT NULL, low {json} NOT NULL, high {json} NOT NULL,
-    PRIMARY KEY (site, series, hour)
-){key};
 CREATE TABLE tally (
     site TEXT NOT NULL, run BIGINT NOT NULL, event TEXT NOT NULL, hour BIGINT NOT NULL,
     n BIGINT NOT NULL, total BIGINT NOT NULL, low BIGINT NOT NULL, high BIGINT NOT NULL,
@@ -111,11 +117,22 @@ CREATE TABLE note (
     PRIMARY KEY (site, id)
 ){key};
 """
+    + _HOUR
+)
 _KEYED: Final = " WITHOUT ROWID"
-SQLITE_TABLES: Final = _TABLES.format(key=_KEYED, months=_KEYED, stamp="", json="TEXT")
+SQLITE_TABLES: Final = _TABLES.format(key=_KEYED, months=_KEYED, stamp="")
 # The archive creates the partitions.
 POSTGRESQL_TABLES: Final = _TABLES.format(
-    key="", months=" PARTITION BY RANGE (stamp_ns)", stamp=", stamp_ns", json="JSON"
+    key="", months=" PARTITION BY RANGE (stamp_ns)", stamp=", stamp_ns"
+)
+POSTGRESQL_HOUR: Final = _HOUR.format(key="")
+# Up to version 4, an hour had a JSON list in each column, with an element for each sensor. {lists}
+# is that table, {each} has the `key` of each element.
+HOURS_OF_LISTS: Final = (
+    "INSERT INTO hour SELECT site, series, hour, each.key, CAST(n ->> each.key AS BIGINT),"
+    " CAST(total ->> each.key AS DOUBLE PRECISION), CAST(low ->> each.key AS DOUBLE PRECISION),"
+    " CAST(high ->> each.key AS DOUBLE PRECISION) FROM {lists}, {each}"
+    " WHERE CAST(n ->> each.key AS BIGINT) > 0"
 )
 
 _MAGIC: Final = b"SQLite format 3\0"
@@ -311,9 +328,8 @@ def _check_identity(connection: sqlite3.Connection, path: Path) -> frozenset[byt
             raise DamagedFile(f"{path} is a journal with a damaged header")
         raise Foreign(f"{path} is a database, but not a journal of lupin-twin")
     if version != VERSION:
-        # No release wrote a version before that (see `rebuild`).
-        is_before = version == VERSION - 1
-        what = "a twin that starts with it upgrades it" if is_before else "it cannot be read"
+        is_upgraded = version in UPGRADED
+        what = "a twin that starts with it upgrades it" if is_upgraded else "it cannot be read"
         raise Foreign(
             f"{path} is a journal of version {version}, this is version {VERSION}: {what}"
         )

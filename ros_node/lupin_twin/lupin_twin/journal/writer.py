@@ -26,7 +26,7 @@ from lupin_twin.field.explored import OccupancyMap, text_of
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
 from lupin_twin.journal.paths import InUse, Lock
-from lupin_twin.journal.rebuild import is_version3, upgrade
+from lupin_twin.journal.rebuild import old_version, upgrade
 from lupin_twin.journal.retention import Limits
 from lupin_twin.journal.rows import weight
 from lupin_twin.journal.runs import Clock, Run, Turn
@@ -302,7 +302,7 @@ class Journal:
         if self._is_sound is False:
             quarantine(self._path)
             self._is_sound = None  # if its salvage fails, only that is done again
-        elif is_version3(self._path):
+        elif old_version(self._path) is not None:
             self._left_out = upgrade(self._path, self._report_progress)
         file = JournalFile(self._path, self._limits, is_sound=bool(self._is_sound))
         try:
@@ -426,7 +426,7 @@ class Journal:
             state,
             detail,
             file_bytes=file.size(),
-            set_aside=self._quarantined,
+            quarantined=self._quarantined,
             simulated_ns=file.simulated,
             kept_ns=file.kept(),
             journal_id=file.journal_id,

@@ -1,7 +1,7 @@
 /** The routes of the past: the state at a moment, and what happened when. Times are ROS seconds. */
-import { answer, get, momentParameter, read, route, withQuery } from './api';
+import { answer, bodyOf, get, momentParameter, route, withQuery } from './api';
 import { filledHealth, filledTag } from './frames';
-import type { History, Latest, Timeline } from './types';
+import type { History, Latest, Schemas, Timeline } from './types';
 
 /** Stamps are exact to the nanosecond, requested moments to the millisecond. */
 const SAME_MOMENT_S = 0.0005;
@@ -17,9 +17,9 @@ export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Lat
   const [state, health] = await Promise.all([
     get(withQuery('api/state', query), signal).then((it) => {
       isWhole = holdsAll(it, at);
-      return read('TwinState', it);
+      return bodyOf<Schemas['TwinState']>(it);
     }),
-    answer('Judgement', signal, 'api/health', query),
+    answer<Schemas['Judgement']>(signal, 'api/health', query),
   ]);
   const { sec, nanosec } = state.header.stamp;
   const answered = sec + nanosec / 1e9;
@@ -57,7 +57,7 @@ export const fetchTimeline = (
   signal: AbortSignal,
   tagId?: string,
 ): Promise<Timeline> =>
-  answer('Timeline', signal, 'api/timeline', {
+  answer(signal, 'api/timeline', {
     points,
     from: span ? momentParameter(span.from) : undefined,
     to: span ? momentParameter(span.to) : undefined,
@@ -87,7 +87,7 @@ export const fetchSeries = (
   points: number,
   signal: AbortSignal,
 ): Promise<History> =>
-  answer('History', signal, 'api/history', {
+  answer(signal, 'api/history', {
     ...parameters(query),
     points: Math.min(MAX_POINTS, points),
   });

@@ -104,14 +104,7 @@ test('a frame changes what it names, and one that is whole takes the place of al
   expect([...withFrame(second, frame([site('c')])).keys()]).toEqual(['c']);
 });
 
-test.each([
-  [null],
-  [new ArrayBuffer(1)],
-  ['{'],
-  ['{"type":"state"}'],
-  [JSON.stringify({ ...frame([]), sites: [{ site: 'a' }] })],
-  [JSON.stringify({ ...frame([]), archive: null })],
-])('%j is no frame', (data) => {
+test.each([[null], [new ArrayBuffer(1)], ['{'], ['{"type":"state"}']])('%j is no frame', (data) => {
   expect(parseSites(data)).toBeNull();
 });
 

@@ -1,6 +1,5 @@
 /** The server's data on all sites, and their order, groups and filter on the page. Pure. */
 import { timeOfDay } from '../clock';
-import { isObject } from '../contract/check';
 import type { Verdict, WireTime } from '../contract/types';
 import { groupedBy } from '../domain/memo';
 import { LANGUAGE, LOCALE } from '../strings';
@@ -56,30 +55,14 @@ export type Filter = (typeof FILTERS)[number];
 /** The worst first. Not imported from `domain/health`, which the first view here does not need. */
 const VERDICTS: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'healthy'];
 
-function isSite(value: unknown): value is Site {
-  return (
-    isObject(value) &&
-    typeof value['site'] === 'string' &&
-    typeof value['name'] === 'string' &&
-    VERDICTS.includes(value['verdict'] as Verdict) &&
-    typeof value['is_live'] === 'boolean' &&
-    typeof value['origin'] === 'string'
-  );
-}
-
-/** null: no frame of the contract. */
+/** null: no frame of sites. */
 export function parseSites(data: unknown): SitesFrame | null {
-  if (typeof data !== 'string') return null;
-  let frame: unknown;
   try {
-    frame = JSON.parse(data);
+    const frame = JSON.parse(String(data)) as SitesFrame | { readonly type: '' };
+    return frame.type === 'sites' ? frame : null;
   } catch {
     return null;
   }
-  if (!isObject(frame) || frame['type'] !== 'sites') return null;
-  const { sites, gone, archive } = frame;
-  if (!Array.isArray(sites) || !Array.isArray(gone) || !isObject(archive)) return null;
-  return sites.every(isSite) ? (frame as unknown as SitesFrame) : null;
 }
 
 export function withFrame(before: Sites, frame: SitesFrame): Sites {

@@ -196,8 +196,14 @@ class Hmi:
     def choose_sensor(self, label: str) -> None:
         self.page.locator(".sensors label", has_text=label).click()
 
+    def open_details(self, is_open: bool = True) -> None:
+        """Open or close the legend's details, with its choice of colours."""
+        if self.page.locator(".legend-facts").last.is_visible() != is_open:
+            self.page.locator(".legend-more summary").click()
+
     def colour_by_value(self) -> None:
         """The page opens in the colours of the ideal range."""
+        self.open_details()
         self.page.get_by_role("radio", name="Value").check()
 
     # --- the map, pixel by pixel ------------------------------------------------------------

@@ -66,7 +66,9 @@ def scenes(page: Page) -> Iterator[int]:
     page.wait_for_load_state("networkidle")
     yield READ
     page.keyboard.press("Escape")
-    page.get_by_test_id("heat-legend").select_option("estimate")
+    page.get_by_role("button", name="Layers").click()
+    page.get_by_test_id("heat").select_option("estimate")
+    page.keyboard.press("Escape")
     expect(page.get_by_test_id("estimate-key")).to_be_visible()
     page.wait_for_load_state("networkidle")
     page.wait_for_timeout(1_000)

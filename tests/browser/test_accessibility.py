@@ -142,6 +142,7 @@ def test_high_contrast_shows_what_is_chosen_and_what_a_colour_means(
         }"""
     )
     (highlight,) = colours(hmi.page.locator("#probe"))
+    hmi.open_details()
     for one, other in (
         (".sensors label:has(:checked)", ".sensors label:not(:has(:checked))"),
         (".colouring label:has(:checked)", ".colouring label:not(:has(:checked))"),

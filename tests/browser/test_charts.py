@@ -17,7 +17,7 @@ from PIL import Image
 from playwright.sync_api import Locator, expect
 
 from tests.browser.hmi import PHONE, WIDE, Hmi, OpenPage
-from tests.browser.places import places
+from tests.browser.places import place, places
 from tests.support.messages import inspection, scan, set_stamp
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -187,7 +187,7 @@ def test_many_come_in_buckets_and_a_drag_brings_readings(
     garden: Garden, open_page: OpenPage
 ) -> None:
     # A wider chart has room for each of them.
-    narrow = {"width": 1200, "height": 900}
+    narrow = {"width": 800, "height": 900}
     hmi = open_page(garden.bridge.url, f"chart.tag=2&{garden.period}", viewport=narrow)
     picture = plotted(hmi)
     reported = garden.history(**requested(hmi))
@@ -231,6 +231,12 @@ def test_hover_shows_the_time_and_a_click_goes_there(garden: Garden, open_page: 
     hmi = open_page(garden.bridge.url, f"tag=1&{garden.period}")
     hmi.page.keyboard.press("c")
     picture = plotted(hmi)
+    # The whole page, but for the first thing to do.
+    charts = place(hmi.test_id("chart-view"))
+    assert charts.right - charts.left > WIDE["width"] - 4
+    expect(hmi.row("1")).to_be_hidden()
+    expect(hmi.test_id("tag-card")).to_be_hidden()
+    expect(hmi.test_id("health-strip")).to_be_visible()
     inside = plot(hmi).locator(".u-over")
     inside.hover(position={"x": picture.width * 0.25, "y": 30})
     expect(hmi.page.locator(".plot-time").first).to_have_text(re.compile(r"\d\d:\d\d:\d\d"))
@@ -239,8 +245,13 @@ def test_hover_shows_the_time_and_a_click_goes_there(garden: Garden, open_page: 
     at = float(dict(parse_qsl(urlsplit(hmi.address()).fragment))["at"])
     quarter = garden.from_s + 0.25 * (garden.now_s - garden.from_s)
     assert at == pytest.approx(quarter, abs=60)
-    hmi.page.keyboard.press("Escape")
+    # Another tag without the list; and the way back to it.
+    choice = hmi.page.get_by_role("combobox", name="Tags")
+    choice.select_option("2")
+    expect(plot(hmi)).to_have_attribute("aria-label", re.compile("Tag 2:"))
+    hmi.page.get_by_role("button", name="Close", exact=True).click()
     expect(hmi.test_id("chart-view")).to_have_count(0)
+    expect(hmi.card("2")).to_be_visible()
 
 
 def test_the_day_before_is_compared_and_the_axis_is_in_the_pages_language(

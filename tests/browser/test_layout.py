@@ -73,7 +73,9 @@ def test_everything_can_be_clicked(open_at: Callable[..., Hmi]) -> None:
         has_tabs = hmi.page.locator(".pane-tabs").is_visible()
         expect(hmi.test_id("health-strip")).to_be_visible(visible=has_tabs)
         for mode in ("Ideal", "Value", "Fixed"):
+            hmi.open_details()
             hmi.page.get_by_role("radio", name=mode).check()
+            hmi.open_details(False)
             if mode == "Value":
                 continue  # "Fixed" has everything that it has
             # Lower than this, a greenhouse of ten metres is the size of a stamp.
@@ -114,7 +116,7 @@ def test_below_the_layers_their_labelled_choices_are_always_in_sight(
         expect(hmi.test_id("legend")).to_contain_text("difference")
         expect(choice).to_be_in_viewport(ratio=1)
     expect(hmi.page.locator(".layers").get_by_text("Heat map shows")).to_be_visible()
-    heat = place(hmi.test_id("heat-layers"))
+    heat = place(hmi.test_id("heat"))
     assert heat.top >= place(hmi.page.locator(".layer-list")).bottom
 
 
@@ -131,33 +133,23 @@ def test_the_label_of_now_has_one_line_of_the_time_bar(
     assert words_below(hmi, ".timebar-when", ".timebar-period") == []
 
 
-# How much narrower a choice is than its words, px.
-_CUT_CHOICE = """(e) => {
-  const width = e.offsetWidth;
-  e.style.maxWidth = 'none';
-  const whole = e.offsetWidth;
-  e.style.maxWidth = '';
-  return whole - width;
-}"""
-
-
-def test_a_laptop_has_room_for_what_the_heat_map_shows(
+def test_the_legend_is_one_line_and_its_details_open_over_the_map(
     greenhouse: Bridge, open_page: OpenPage
 ) -> None:
-    for language in LANGUAGES:
-        hmi = open_page(
-            greenhouse.url, query=f"?lang={language}", viewport={"width": 1100, "height": 720}
-        )
-        choice = hmi.test_id("heat-legend")
-        expect(choice).to_be_visible()
-        assert choice.evaluate(_CUT_CHOICE) <= 0, language
+    for language, width in (*((each, 1100) for each in LANGUAGES), ("de", 1440)):
+        viewport = {"width": width, "height": 900}
+        hmi = open_page(greenhouse.url, query=f"?lang={language}", viewport=viewport)
         scale = place(hmi.test_id("ideal-scale"))
         assert scale.bottom - scale.top < 36, f"{language}: one line below the colours"
-        one_line = [places(hmi, ".legend .heat-choice", ".legend summary")]
-        one_line.append(places(hmi, ".sensors label", ".sensors label:last-child"))
-        for first, last in one_line:
-            assert first.top < last.bottom, language
-            assert last.top < first.bottom, language
+        for line in (
+            (".legend-title", ".legend summary"),
+            (".sensors label", ".sensors :last-child"),
+        ):
+            first, last = places(hmi, *line)
+            assert first.top < last.bottom, (language, width)
+            assert last.top < first.bottom, (language, width)
+        hmi.open_details()
+        assert place(hmi.page.locator(".legend-more .legend-facts")).bottom <= scale.top
 
 
 def test_an_upright_window_has_the_map_or_the_table_and_a_card_below_the_map(
@@ -196,8 +188,6 @@ def test_a_phone_has_room_for_the_facts_a_fixed_range_and_missing_data(
     assert place(facts).bottom <= place(legend).top
     hmi.turn("sensor=soil_moisture&colour=value")
     hmi.page.get_by_role("radio", name="Fixed").check()
-    title, control = place(hmi.page.locator(".legend-title")), place(hmi.page.locator(".range"))
-    assert title.bottom <= control.top
     hmi.turn("sensor=radiation")
     expect(hmi.test_id("notice")).to_have_attribute("data-notice", "no-reading")
     notice, frame = places(hmi, "[data-testid=notice]", "[data-testid=map]")

@@ -158,7 +158,7 @@ def test_the_readout_shows_what_is_known_and_the_map_zooms_about_the_pointer(hmi
 
 def test_each_layer_can_be_hidden_and_shown(hmi: Hmi) -> None:
     # At some scales Chromium rounds a few pixels of an image differently when it paints it again.
-    hmi.resize(1440, 862)
+    hmi.resize(1440, 824)
     hmi.page.get_by_role("button", name="Layers").click()
     panel = hmi.page.locator(".layers .disclosure-panel")
     # The part of the map outside the panel, which changes with each click.

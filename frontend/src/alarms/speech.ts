@@ -25,7 +25,7 @@ export function selectNow(
 ): Now | null {
   const tag = selectLatestTag(state, alarm.tag_id);
   const health = selectLatestHealth(state)?.byTag.get(alarm.tag_id);
-  const before = tag ? thenOf(selectHourAgoNow(state, last), tag, alarm.reason.sensor) : null;
+  const before = tag ? thenOf(selectHourAgoNow(state, last), tag) : null;
   return nowOf(alarm, tag && health ? { tag, health } : null, before, isReceivingNow(state));
 }
 

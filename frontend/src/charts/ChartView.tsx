@@ -10,9 +10,9 @@ import { saveCsv } from '../export/save';
 import { act, prefer, store, useApp } from '../store/app';
 import { selectCatalogue, selectSensor } from '../store/derived';
 import { rosNow, selectTags } from '../store/moment';
-import { type Charted, MOST_CHARTED, withChart } from '../store/view';
+import { type Charted, MOST_CHARTED, withChart, withTag } from '../store/view';
 import { S } from '../strings';
-import { Icon, IconButton, Segmented, useFocusBack } from '../widgets/controls';
+import { Icon, IconButton, Segmented, Select, useFocusBack } from '../widgets/controls';
 import { useSize } from '../widgets/useSize';
 import { ChartTables } from './SeriesTable';
 import { ChartState, LineSign, LineValue, MarksKey, PlotView, SensorChoice } from './PlotView';
@@ -26,7 +26,7 @@ const LEAST_HEIGHT = { tag: 64, sensor: 152 } as const;
 /** Height of a chart's title and margins, CSS pixels. */
 const AROUND = 42;
 
-/** The charts of a tag or a sensor, in place of the map; they have the time bar's period. */
+/** The charts of a tag or a sensor, in place of map and list; they have the time bar's period. */
 export default function ChartView({ charted }: { charted: Charted }): JSX.Element {
   const sensor = useApp((state) => state.view.sensor);
   const hasDayBefore = useApp((state) => state.settings.dayBefore);
@@ -50,6 +50,9 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const size = useSize(body);
   const [tagId = ''] = charted.tagIds;
   const sensors = useSensorsOf(tagId);
+  const tags = useApp(selectTags);
+  // A tag in a link may not be received yet.
+  const tagIds = [...new Set([...tags.map(({ id }) => id), tagId])];
 
   const plans = useMemo(() => plansOf(charted, sensors, sensor), [charted, sensors, sensor]);
   const { fetched, models } = useCharts(plans, pointsFor(size.width), hasDayBefore);
@@ -82,6 +85,17 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
             act(withChart({ by, tagIds: charted.tagIds }));
           }}
         />
+        {charted.by === 'tag' && (
+          <Select
+            aria-label={S.tags}
+            value={tagId}
+            options={tagIds}
+            text={tagLabel}
+            onChange={(next) => {
+              act(withTag(next));
+            }}
+          />
+        )}
         <div className="chart-tools">
           <IconButton
             icon="later"
@@ -101,13 +115,16 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
               setTable(!isTable);
             }}
           />
-          <IconButton
-            icon="close"
-            label={S.cardClose}
+          <button
+            type="button"
+            className="text-button chart-close"
             onClick={() => {
               act(withChart(null));
             }}
-          />
+          >
+            <Icon name="close" />
+            {S.cardClose}
+          </button>
         </div>
       </header>
       {charted.by === 'sensor' && <TagChoice tagIds={charted.tagIds} model={withLines[0]} />}

@@ -71,10 +71,23 @@ function drawIdeal({ context, ratio, x, y, model, colour }: Frame): void {
 function drawGaps(frame: Frame, { series }: Line): void {
   frame.context.strokeStyle = frame.colour('chart-gap');
   frame.context.lineWidth = frame.ratio;
-  hatched(frame, series.gaps, 1);
+  hatched(frame, without(series.gaps, series.missing), 1);
   // Leaning the other way: whether anything was received is not known.
   hatched(frame, series.missing, -1);
 }
+
+/** What is left of spans outside others. */
+export const without = (spans: readonly Span[], others: readonly Span[]): readonly Span[] =>
+  others.reduce(
+    (left, other) =>
+      left.flatMap(({ from, to }) =>
+        [
+          { from, to: Math.min(to, other.from) },
+          { from: Math.max(from, other.to), to },
+        ].filter((part) => part.to > part.from),
+      ),
+    spans,
+  );
 
 function hatched({ context, box, ratio, x }: Frame, spans: readonly Span[], slant: 1 | -1): void {
   const edges = [box.top + box.height, box.top] as const;

@@ -43,6 +43,8 @@ const DASH_BEFORE = [3, 3];
 const SHORTEST_DRAG = 6;
 /** Room for the names of limits right of the plot, in font sizes. */
 const LIMITS_ROOM = 8;
+/** Room right of the plot for half of the last time below it, in font sizes. */
+const HALF_A_TIME = 2;
 /** All charts share one cursor. */
 const SYNC_KEY = 'lupin-charts';
 /** In the page's language: uPlot uses the browser's. */
@@ -81,7 +83,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
         ...size,
         class: 'plot',
         legend: { show: false },
-        padding: [8, (hasNames(first) ? LIMITS_ROOM : 1) * fontPx(), 0, 0],
+        padding: [8, (hasNames(first) ? LIMITS_ROOM : HALF_A_TIME) * fontPx(), 0, 0],
         cursor: {
           y: false,
           dataIdx: heldIndex,

@@ -79,10 +79,8 @@ export function connect(url: string, handlers: ConnectionHandlers) {
       const parsed = parseFrame(data);
       if (parsed.kind === 'passed over') return;
       if (parsed.kind === 'bad') {
+        // A lost delta shows in the next one, which does not fit (`latestAfter`).
         handlers.onBad(parsed.why);
-        // Its changes are lost, and later deltas build on them: reconnect, which starts with a
-        // full state.
-        if (parsed.isDelta) dispatch('broken');
         return;
       }
       const { frame } = parsed;

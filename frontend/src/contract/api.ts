@@ -1,6 +1,5 @@
 /** The bridge's routes. Addresses are relative to the page, so any path prefix works. */
-import { checkOf } from './check';
-import type { Field, FieldQuality, Schemas, TagHistory } from './types';
+import type { Field, FieldQuality, TagHistory } from './types';
 
 export class Refusal extends Error {
   constructor(
@@ -42,13 +41,9 @@ export const momentParameter = (at: number): string => Math.max(0, at).toFixed(3
 export const get = (path: string, signal: AbortSignal): Promise<Response> =>
   request(path, { signal, cache: 'no-cache' });
 
-/** An answer, checked against the server's schema of that name. */
-export const answer = async <Name extends keyof Schemas>(
-  name: Name,
-  signal: AbortSignal,
-  path: string,
-  query?: Query,
-): Promise<Schemas[Name]> => read(name, await get(query ? withQuery(path, query) : path, signal));
+/** An answer in JSON. The server's tests compare its answers with the schemas that its types here are from. */
+export const answer = async <T>(signal: AbortSignal, path: string, query?: Query): Promise<T> =>
+  bodyOf<T>(await get(query ? withQuery(path, query) : path, signal));
 
 /** A refusal is thrown with its reason. */
 export async function request(path: string, init: RequestInit): Promise<Response> {
@@ -69,17 +64,6 @@ export async function bodyOf<T>(response: Response): Promise<T> {
     throw new Error(`${pathname}: answered with ${String(body)}`);
   }
   return body as T;
-}
-
-/** The body, checked against the server's schema of that name. */
-export async function read<Name extends keyof Schemas>(
-  name: Name,
-  response: Response,
-): Promise<Schemas[Name]> {
-  const body = await bodyOf<Schemas[Name]>(response);
-  const fault = checkOf(name)(body);
-  if (fault !== null) throw new Error(name + fault);
-  return body;
 }
 
 /** Both kinds of refusal in the contract carry their reason in one field. */
@@ -158,12 +142,10 @@ export const fetchQuality = (
   signal: AbortSignal,
   at?: number,
 ): Promise<FieldQuality> =>
-  answer('FieldQuality', signal, 'api/field/quality', { sensor_type: sensor, at: at?.toFixed(3) });
+  answer(signal, 'api/field/quality', { sensor_type: sensor, at: at?.toFixed(3) });
 
 export const fetchHistory = (tagId: string, signal: AbortSignal): Promise<TagHistory> =>
-  answer('TagHistory', signal, `api/tags/${encodeURIComponent(tagId)}/history`);
-
-const MAGIC = '\x93NUMPY';
+  answer(signal, `api/tags/${encodeURIComponent(tagId)}/history`);
 
 /**
  * Numbers in the given dimensions, row-major, in the one NPY format that the bridge sends: version 1,
@@ -173,26 +155,13 @@ export function npyOf(
   buffer: ArrayBuffer,
   dimensions: number,
 ): { readonly shape: readonly number[]; readonly values: Float32Array } {
-  const bytes = new Uint8Array(buffer);
-  const magic = String.fromCharCode(...bytes.subarray(0, MAGIC.length));
-  if (magic !== MAGIC) throw new Error(`npy: magic is ${JSON.stringify(magic)}`);
-
-  // After the version, 1.0, and the header's length.
+  // After the magic word and the version: the header's length, and the header.
   const start = 10;
-  if (buffer.byteLength < start) throw new Error(`npy: only ${buffer.byteLength} bytes`);
-  const length = new DataView(buffer).getUint16(8, true);
-  const header = new TextDecoder('latin1').decode(bytes.subarray(start, start + length));
-
-  const type = /'descr':\s*'([^']+)'/.exec(header)?.[1];
-  if (type !== '<f4') throw new Error(`npy: type is ${String(type)}, expected <f4`);
-  if (!/'fortran_order':\s*False/.test(header)) throw new Error('npy: not in C order');
+  const length = buffer.byteLength < start ? 0 : new DataView(buffer).getUint16(8, true);
+  const header = new TextDecoder('latin1').decode(buffer.slice(start, start + length));
   const shape = /'shape':\s*\(([\d,\s]+)\)/.exec(header)?.[1]?.match(/\d+/g)?.map(Number) ?? [];
   if (shape.length !== dimensions) {
     throw new Error(`npy: header is ${JSON.stringify(header)}, expected ${dimensions} dimensions`);
   }
-  const body = buffer.slice(start + length);
-  if (body.byteLength !== shape.reduce((size, each) => size * each, 4)) {
-    throw new Error(`npy: ${body.byteLength} bytes of data, expected ${shape.join(' x ')} x 4`);
-  }
-  return { shape, values: new Float32Array(body) };
+  return { shape, values: new Float32Array(buffer.slice(start + length)) };
 }

@@ -129,7 +129,7 @@ export function isOldReading(sensor: string, { tag, health }: TagThen): boolean 
   );
 }
 
-export function sameReading(sensor: string, a: Tag, b: Tag): boolean {
+function sameReading(sensor: string, a: Tag, b: Tag): boolean {
   const at = ({ wire }: Tag): string =>
     JSON.stringify(wire.readings.find(({ name }) => name === sensor)?.observed_at ?? null);
   return at(a) !== 'null' && at(a) === at(b);

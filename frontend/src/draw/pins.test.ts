@@ -147,8 +147,20 @@ test('blooms share a sprite a colour, each in its place; what is out of sight is
 
 test('the chosen pin’s label comes before all others', () => {
   const pins = [pin({ priority: 9 }), pin({ id: '2' })];
-  const [a, b] = labelRequests(pins, 100, '2', (text) => text.length);
+  const [a, b] = labelRequests({ pins, spacing: Infinity }, 100, '2', (text) => text.length);
   expect(b?.priority).toBeGreaterThan(a?.priority ?? NaN);
+});
+
+test('among crowded pins only the worst and the chosen are named, or few that a filter lists', () => {
+  const named = (pins: readonly Pin[], scale: number): string[] =>
+    labelRequests({ pins, spacing: 1 }, scale, '7', () => 20).map(({ id }) => id);
+  const pins = Array.from({ length: 99 }, (_, index) =>
+    pin({ id: `${index}`, verdict: index === 3 ? 'critical' : 'stressed', pest: index === 5 }),
+  );
+  expect(named(pins, 10)).toEqual(['3', '5', '7']);
+  expect(named(pins, 40)).toHaveLength(99);
+  const few = pins.map((each, index) => (index < 9 ? each : { ...each, texts: [] }));
+  expect(named(few, 10)).toHaveLength(99);
 });
 
 test('labels are copied relative to the map’s origin', () => {

@@ -5,7 +5,7 @@ import { rgbText } from '../domain/ramp';
 import type { LabelRequest, PlacedLabel } from '../geometry/clear';
 import { type MapPoint, toCanvas } from '../geometry/coordinates';
 import type { Colours } from './colours';
-import type { Pin, Scene } from './scene';
+import { CROWD, type Pin, type Scene } from './scene';
 import type { Pen, Surface } from './surface';
 
 /** `text`: scale of the page's text, usually 1. */
@@ -194,9 +194,15 @@ function paintBug(context: CanvasRenderingContext2D, colour: Colours): void {
   context.fill();
 }
 
-/** Input of `placeLabels`, relative to the map's origin. */
+/** Pins closer together than a label is high cannot all be named, CSS pixels. */
+const LABELLED_PX = 28;
+
+/**
+ * Input of `placeLabels`, relative to the map's origin. Among pins too crowded for labels, only the worst are
+ * named, over their neighbours: labels of those at the edge alone would say nothing.
+ */
 export function labelRequests(
-  pins: readonly Pin[],
+  { pins, spacing }: Pick<Scene, 'pins' | 'spacing'>,
   scale: number,
   first: string | null,
   widthOf: (text: string) => number,
@@ -204,7 +210,12 @@ export function labelRequests(
   const radius = pinRadius(scale);
   // Clear of the rings of selection and pests.
   const around = (pin: Pin): number => (pin.id === first ? 10 : pin.pest ? 6 : 0);
-  return pins.map((pin) => ({
+  const listed = pins.filter(({ texts }) => texts.length > 0);
+  const isCrowded = listed.length >= CROWD && spacing * scale < LABELLED_PX;
+  const named = isCrowded
+    ? listed.filter(({ id, verdict, pest }) => verdict === 'critical' || pest || id === first)
+    : pins;
+  return named.map((pin) => ({
     id: pin.id,
     x: pin.at.x * scale,
     y: -pin.at.y * scale,

@@ -56,7 +56,7 @@ export function buildScene(input: SceneInput): Scene {
 }
 
 /** Fewer pins never hide what is below them. */
-const CROWD = 60;
+export const CROWD = 60;
 
 /** The side of each pin's square if pins were spread evenly over their bounds. */
 function spacingOf(pins: readonly Pin[]): number {

@@ -1,6 +1,5 @@
 /** The server's data on all sites, and their order, groups and filter on the page. Pure. */
 import { timeOfDay } from '../clock';
-import { isObject } from '../contract/check';
 import type { HealthReason, Verdict, WireTime } from '../contract/types';
 import { groupedBy } from '../domain/memo';
 import { LANGUAGE, LOCALE } from '../strings';
@@ -67,14 +66,12 @@ const VERDICTS: readonly Verdict[] = ['critical', 'stressed', 'unknown', 'health
 
 /** null: no frame of the overview. */
 export function parseSites(data: unknown): SitesFrame | null {
-  if (typeof data !== 'string') return null;
-  let frame: unknown;
   try {
-    frame = JSON.parse(data);
+    const frame = JSON.parse(String(data)) as SitesFrame | { readonly type: '' };
+    return frame.type === 'sites' ? frame : null;
   } catch {
     return null;
   }
-  return isObject(frame) && frame['type'] === 'sites' ? (frame as unknown as SitesFrame) : null;
 }
 
 export function withFrame(before: Sites, frame: SitesFrame): Sites {

@@ -3,7 +3,7 @@ import { useMemo } from 'react';
 
 import type { Speech } from '../alarms/words';
 import { pause } from '../clock';
-import { bodyOf, get } from '../contract/api';
+import { answer } from '../contract/api';
 import type { SensorsFile } from '../contract/types';
 import { cataloguesOf, NO_CATALOGUES } from '../domain/sensors';
 import { type Fetched, useFetched } from '../store/fetcher';
@@ -26,7 +26,7 @@ export function useAnswer<T>(path: string, everyMs: number, news = ''): Fetched<
           group: path,
           run: async (signal) => {
             await pause(SETTLE_MS);
-            return bodyOf<T>(await get(path, signal));
+            return answer<T>(signal, path);
           },
         },
     SETTLE_MS,

@@ -289,7 +289,7 @@ export class Painter {
       room: Room | null,
     ) =>
       placeLabels(
-        labelRequests(scene.pins, scale, first, (text) => this.#widthOf(text, widths)),
+        labelRequests(scene, scale, first, (text) => this.#widthOf(text, widths)),
         labelHeight(this.#textScale),
         room,
       ),

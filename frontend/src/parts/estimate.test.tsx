@@ -116,10 +116,6 @@ describe('legend', () => {
     );
     expect(text('legend')).toContain('90 % interval');
     expect(screen.queryByTestId('estimate-warning')).toBeNull();
-    expect(screen.getByRole('combobox', { name: 'Heat map shows' })).toHaveProperty(
-      'value',
-      'estimate',
-    );
   });
 
   test('counts each scan while there are fewer than ten', async () => {

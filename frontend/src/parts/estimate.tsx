@@ -3,7 +3,15 @@ import '../styles/estimate.css';
 import type { JSX } from 'react';
 
 import { answer } from '../contract/api';
-import type { Field, Grade, Place, Schemas, TagHealth } from '../contract/types';
+import type {
+  Advice,
+  ExpectedTags,
+  Field,
+  Grade,
+  Place,
+  Schemas,
+  TagHealth,
+} from '../contract/types';
 import { cellAt, errorColours, NINE_OF_TEN, plusMinus } from '../domain/field';
 import {
   differenceNumber,
@@ -39,7 +47,7 @@ export function EstimateFacts(): JSX.Element {
   const isNow = useApp((state) => selectShown(state).moment === null);
   const isError = useApp((state) => state.view.heat === 'error');
   const hasTags = useApp((state) => selectTags(state).length > 0);
-  const graded = useEstimateQuery('EstimateQualities', 'quality').value?.sensors ?? {};
+  const graded = useEstimateQuery<Schemas['EstimateQualities']>('quality').value?.sensors ?? {};
   const grade = Object.hasOwn(graded, sensor.name) ? (graded[sensor.name] ?? null) : null;
   if (!isMeasured(sensor)) {
     return (
@@ -214,7 +222,7 @@ export function CardEstimate({
   const unit = useApp((state) => state.settings.unit);
   // Expected values exist for now only.
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const expected = useEstimateQuery('ExpectedTags', 'tags').value?.tags ?? {};
+  const expected = useEstimateQuery<ExpectedTags>('tags').value?.tags ?? {};
   const own = isNow && Object.hasOwn(expected, tag.id) ? expected[tag.id] : undefined;
   const changed = new Set(
     (health?.reasons ?? []).filter(({ kind }) => kind === 'changed').map((each) => each.sensor),
@@ -247,7 +255,7 @@ const PLACES = 5;
 /** Where another tag would help: numbers on the map, a list for screen readers. */
 export function AdviceMarks(): JSX.Element {
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const { value, state, message } = useEstimateQuery('Advice', 'advice', PLACES);
+  const { value, state, message } = useEstimateQuery<Advice>('advice', PLACES);
   if (!isNow) return <Note text={E.adviceNow} />;
   if (!value) {
     return <Note text={state === 'failed' ? E.adviceFailed(shown(message, 160)) : ''} />;
@@ -325,15 +333,11 @@ const EVERY_MS = 10_000;
  * The bridge's answer about the shown sensor, polled over HTTP while connected, one request at a time.
  * The answer about another sensor is dropped.
  */
-function useEstimateQuery<Name extends 'EstimateQualities' | 'ExpectedTags' | 'Advice'>(
-  name: Name,
-  what: string,
-  places?: number,
-): Fetched<Schemas[Name]> {
+function useEstimateQuery<T>(what: string, places?: number): Fetched<T> {
   const sensor = useApp((state) => state.view.sensor);
   const isOpen = useApp((state) => state.twin.connection.socket.kind === 'open');
   const turn = useTicking((at) => String(Math.floor(at / EVERY_MS)));
-  const { value, ...rest } = useFetched<{ readonly of: string; readonly result: Schemas[Name] }>(
+  const { value, ...rest } = useFetched<{ readonly of: string; readonly result: T }>(
     isOpen
       ? {
           key: turn,
@@ -342,7 +346,7 @@ function useEstimateQuery<Name extends 'EstimateQualities' | 'ExpectedTags' | 'A
             const query = { sensor_type: sensor, places };
             return {
               of: sensor,
-              result: await answer(name, signal, `api/estimate/${what}`, query),
+              result: await answer(signal, `api/estimate/${what}`, query),
             };
           },
         }

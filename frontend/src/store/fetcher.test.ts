@@ -130,33 +130,6 @@ describe('while dragging', () => {
   });
 });
 
-test('what came a moment ago is there at once, but not for ever', async () => {
-  fetcher.want(task('a'));
-  await answer('a');
-  await pass(100);
-  fetcher.want(task('b'));
-  await answer('b');
-  fetcher.want(task('a'));
-  expect(received).toEqual(['a', 'b', 'a']);
-  expect(started).toEqual(['a', 'b']);
-  await pass(31_000);
-  fetcher.want(task('b'));
-  expect(started).toEqual(['a', 'b', 'b']);
-});
-
-test('the cache is bounded, and the oldest goes', async () => {
-  for (let index = 0; index <= 60; index++) {
-    fetcher.want(task(`${index}`));
-    await pass(100);
-    await answer(`${index}`);
-  }
-  fetcher.want(task('1'));
-  expect(received.at(-1)).toBe('1');
-  fetcher.want(task('0'));
-  await pass(100);
-  expect(started.filter((key) => key === '0' || key === '1')).toEqual(['0', '1', '0']);
-});
-
 test('nothing wanted ends all, and leaves nothing behind', async () => {
   fetcher.want(task('a'));
   fetcher.want(null);

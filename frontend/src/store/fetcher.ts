@@ -15,9 +15,6 @@ const MOST_DRAGGED = 2;
 /** After this long without change, the drag has settled; older fetches then end. */
 const SETTLED_MS = 250;
 const TIMEOUT_MS = 30_000;
-/** Cache TTL while dragging: late readings may still change the past. */
-const CACHE_MS = 30_000;
-const MOST_CACHED = 60;
 /** Shortest pause after a failure. */
 const CALM_MS = 500;
 const RETRY_FIRST_MS = 2_000;
@@ -53,7 +50,7 @@ export interface FetchTask<T> {
 export interface FetcherOptions<T> {
   /** Shortest time between two starts, ms. */
   readonly paceMs: number;
-  /** For a dragged value: two concurrent fetches, and cached answers. */
+  /** For a dragged value: two concurrent fetches. */
   readonly isDragged?: boolean;
   /** Receives a wanted value, never older than the previous one. */
   readonly onValue: (value: T) => void;
@@ -85,7 +82,6 @@ export function createFetcher<T>({
   let retryAt = -Infinity;
   let failures = 0;
   let timer: ReturnType<typeof setTimeout> | undefined;
-  const cached = new Map<string, { readonly value: T; readonly since: number }>();
 
   const end = (which: (each: Running) => boolean = () => true): void => {
     for (const each of running.filter(which)) each.abort.abort();
@@ -100,15 +96,6 @@ export function createFetcher<T>({
     // Nothing waits for earlier tasks any more.
     end((each) => each.order < mine && each.key !== wanted?.key);
     onValue(value);
-  };
-
-  const cache = (key: string, value: T): void => {
-    cached.delete(key);
-    cached.set(key, { value, since: now() });
-    for (const oldest of cached.keys()) {
-      if (cached.size <= MOST_CACHED) break;
-      cached.delete(oldest);
-    }
   };
 
   /** Starts the wanted task, or schedules its start. */
@@ -150,7 +137,6 @@ export function createFetcher<T>({
     task.run(abort.signal).then(
       (value) => {
         if (isOver()) return;
-        if (isDragged) cache(task.key, value);
         handOn(task.key, mine.order, value);
         pump();
       },
@@ -186,14 +172,10 @@ export function createFetcher<T>({
       if (isOther) {
         clearTimeout(timer);
         end();
-        cached.clear();
         done = null;
         startedAt = -Infinity;
       }
-      if (!task) return;
-      const known = cached.get(task.key);
-      if (known && now() - known.since < CACHE_MS) handOn(task.key, ++order, known.value);
-      else pump();
+      if (task) pump();
     },
   };
 }

@@ -1,10 +1,10 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
 import { judgement } from '../testing/health';
-import { readings, stateFrame, tag, wireTag } from '../testing/tags';
+import { readings, stateFrame, wireTag } from '../testing/tags';
 import { connection, goLive, showTags, status } from '../testing/page';
 import { act, prefer, receive } from './app';
-import { hourAgo, startHourAgo, thenOf } from './hourAgo';
+import { hourAgo, startHourAgo } from './hourAgo';
 import { NO_HOUSE, withPast, withState } from './twin';
 
 const NOW_S = 100_000;
@@ -39,12 +39,6 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-/** Read now. */
-const at = (temperature: number) => {
-  const observed_at = { sec: NOW_S, nanosec: 0 };
-  return tag({ readings: readings({ temperature }).map((it) => ({ ...it, observed_at })) });
-};
-
 const pass = (ms: number): Promise<unknown> => vi.advanceTimersByTimeAsync(ms);
 
 test('an hour before now is asked for once, and again after some minutes', async () => {
@@ -60,36 +54,6 @@ test('an hour before now is asked for once, and again after some minutes', async
   receiveState(NOW_S + 302);
   await pass(1_000);
   expect(requests).toHaveLength(2);
-});
-
-test('what a reading of now is compared with stays until there is a newer one', async () => {
-  stop = startHourAgo();
-  await pass(10);
-  const first = hourAgo.get()?.tags.get('1');
-  expect(thenOf(hourAgo.get(), at(22), 'temperature')).toBe(first);
-  receiveState(NOW_S + 302);
-  await pass(1_000);
-  const second = hourAgo.get()?.tags.get('1');
-  expect(second).not.toBe(first);
-  expect(thenOf(hourAgo.get(), at(22), 'temperature')).toBe(first);
-  expect(thenOf(hourAgo.get(), at(23), 'temperature')).toBe(second);
-  // At a past moment it is the state an hour before, however the moment was reached.
-  act({ moment: 50_000 });
-  receive(withPast({ at: 50_000, house: NO_HOUSE }));
-  await pass(1_000);
-  expect(thenOf(hourAgo.get(), at(23), 'temperature')).not.toBe(second);
-  expect(thenOf(null, at(23), 'temperature')).toBeNull();
-});
-
-test('a reading that is an hour old itself is compared with none that is older', async () => {
-  stop = startHourAgo();
-  await pass(10);
-  const known = hourAgo.get();
-  if (!known) throw new Error('nothing known');
-  expect(thenOf(known, at(22), 'temperature')).toBe(known.tags.get('1'));
-  const later = { tag: at(22), health: { verdict: 'healthy', reasons: [] } } as const;
-  const next = { ...known, tags: new Map([['1', later]]) };
-  expect(thenOf(next, at(22), 'temperature')).toBe(later);
 });
 
 test('where a day is a short one, so is its hour', async () => {

@@ -3,7 +3,7 @@ import { now } from '../clock';
 import { fetchStateAt } from '../contract/past';
 import { intervalText } from '../domain/format';
 import { secondsOf } from '../domain/time';
-import { sameReading, type TagThen } from '../domain/difference';
+import type { TagThen } from '../domain/difference';
 import { snapshotOf, type Tag } from '../domain/twin';
 import { keepFetched, store, type AppState } from './app';
 import { createStore } from './create';
@@ -28,7 +28,6 @@ const PACE_MS = 1_000;
 export interface HourAgo {
   /** One hour after the answer's moment, ROS seconds. */
   readonly of: number;
-  readonly isNow: boolean;
   readonly tags: ReadonlyMap<string, TagThen>;
 }
 
@@ -50,24 +49,9 @@ export function selectHourAgoNow(state: AppState, last: HourAgo | null): HourAgo
   return isNear ? last : null;
 }
 
-/** What each current reading was first compared with, by tag and sensor. */
-const compared = new Map<string, { readonly reading: string; readonly then: TagThen }>();
-
-/**
- * What a tag's reading is compared with. For a current reading it stays until the next one, or for
- * an hour: readings change a trend, time alone does not.
- */
-export function thenOf(last: HourAgo | null, tag: Tag, sensor: string): TagThen | null {
-  const then = last?.tags.get(tag.id) ?? null;
-  if (!then || !last?.isNow || sameReading(sensor, tag, then.tag)) return then;
-  const { value, observed_at: at } = tag.wire.readings.find(({ name }) => name === sensor) ?? {};
-  const reading = JSON.stringify([value, at]);
-  const key = JSON.stringify([tag.id, sensor]);
-  const known = compared.get(key);
-  if (known?.reading === reading) return known.then;
-  compared.set(key, { reading, then });
-  return then;
-}
+/** What a tag is compared with. */
+export const thenOf = (last: HourAgo | null, tag: Tag): TagThen | null =>
+  last?.tags.get(tag.id) ?? null;
 
 export function startHourAgo(): () => void {
   // On failure, the table and the alarms show no trend.
@@ -88,13 +72,12 @@ export function startHourAgo(): () => void {
             tag.id,
             { tag, health: latest.health.tags[tag.id] ?? NOT_JUDGED },
           ]);
-          return { of: base, isNow: moment === null, tags: new Map(known) };
+          return { of: base, tags: new Map(known) };
         }),
     };
   });
   return () => {
     stop();
     hourAgo.set(null);
-    compared.clear();
   };
 }

@@ -49,7 +49,7 @@ export function startLive(): () => void {
     try {
       receive(withState(latest, arrivedAt, stateAgeSeconds));
     } catch (error) {
-      // The frame check missed something: the page keeps its state.
+      // Not a frame of the contract: the page keeps its state.
       reportBad(String(error));
       link.dispatch('broken');
     }

@@ -1,7 +1,7 @@
 /** Fetches what frames do not carry, whenever the twin's revision changes. */
 import { now } from '../clock';
-import { answer, bodyOf, fetchQuality, get } from '../contract/api';
-import type { Field, FieldQuality, SensorsFile } from '../contract/types';
+import { answer, fetchQuality, get } from '../contract/api';
+import type { Field, FieldQuality, OccupancyGrid, SensorsFile } from '../contract/types';
 import { cataloguesOf } from '../domain/sensors';
 import { type MapPicture, mapPlacement, opaqueBox, pixelBoxCorners } from '../geometry/image';
 import { act, type AppState, keepFetched, onChange, receive, store } from './app';
@@ -115,9 +115,6 @@ function baseKey(state: AppState): string | null {
 
 const SENSORS_INTERVAL_MS = 500;
 
-const fetchFile = async (signal: AbortSignal): Promise<SensorsFile> =>
-  bodyOf(await get('api/sensors', signal));
-
 /** Fetches the file of sensors at the start and on each new connection, as the server may be another. */
 export function startSensors(): () => void {
   let known = '';
@@ -146,7 +143,7 @@ export function startSensors(): () => void {
       // The first connection opens during this fetch, and to the same bridge.
       key: String(Math.max(1, connection.epoch)),
       group: 'sensors',
-      run: fetchFile,
+      run: (signal) => answer(signal, 'api/sensors'),
     }),
   );
 }
@@ -157,7 +154,7 @@ export function startSensors(): () => void {
  */
 async function loadMap(signal: AbortSignal): Promise<MapPicture> {
   const [grid, blob] = await Promise.all([
-    answer('OccupancyGrid', signal, 'api/map'),
+    answer<OccupancyGrid>(signal, 'api/map'),
     get('api/map.png', signal).then((response) => response.blob()),
   ]);
   const bitmap = await createImageBitmap(blob);

@@ -87,6 +87,8 @@ export function Slider({
   };
 
   const cursor = moment ?? Math.min(nowS, to);
+  // The bar ends in a whole bucket: within it, nothing may stand right of "now".
+  const lastIn = timeline && to - nowS < timeline.bucketS ? to : cursor;
   const place = (seconds: number): number => Math.min(width, Math.max(0, xOf(axis, seconds)));
   const isOutside = cursor < from || cursor > to;
   return (
@@ -123,7 +125,7 @@ export function Slider({
         data-live={moment === null}
         data-awaited={awaited !== null}
         data-outside={isOutside}
-        style={{ left: `${place(cursor)}px` }}
+        style={{ left: `${place(moment ?? lastIn)}px` }}
       />
       {ofChart !== null && ofChart >= from && ofChart <= to && (
         <span

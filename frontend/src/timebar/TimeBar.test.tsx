@@ -116,6 +116,14 @@ describe('the slider', () => {
     expect(cursor()['live']).toBe('false');
   });
 
+  test('has nothing right of now: the last bucket ends there', () => {
+    render(<TimeBar />);
+    flush(() => {
+      remember(9_004, NOW + 4);
+    });
+    expect(document.querySelector<HTMLElement>('.timebar-cursor')?.style.left).toBe('1000px');
+  });
+
   test('steps by a pixel, by ten, by a tenth, to its ends, and into now', () => {
     render(<TimeBar />);
     const press = (key: string, shiftKey = false): number | null => {

@@ -84,9 +84,6 @@ function OwnMoment({ at }: { at: number }): JSX.Element {
   );
 }
 
-/** A phone has that choice in the layers menu; a hidden element takes no focus. */
-const CHOOSES_HEAT = '.layers > button, .legend .heat-choice';
-
 /** Legend of the heat map while it shows a difference; null: it shows none. */
 export function DifferenceLegend({ kiosk }: { kiosk: boolean }): JSX.Element | null {
   const compare = useApp((state) => state.view.compare);
@@ -105,8 +102,8 @@ export function DifferenceLegend({ kiosk }: { kiosk: boolean }): JSX.Element | n
             type="button"
             className="text-button"
             onClick={() => {
-              // The focus must not go with the button: to the heat map's choice, if it is in view.
-              for (const each of document.querySelectorAll<HTMLElement>(CHOOSES_HEAT)) each.focus();
+              // The focus must not go with the button: to the menu of the comparison.
+              document.querySelector<HTMLElement>('.layers > button')?.focus();
               act({ compare: null });
             }}
           >

@@ -149,14 +149,19 @@ describe('legend', () => {
 
   test('tells of a difference alone while there is one, and has nothing to choose its colours by', () => {
     act({ compare: { by: 'ago', seconds: 86_400 } });
-    render(<Legend kiosk={false} />);
+    render(
+      <div className="layers">
+        <button>Layers</button>
+        <Legend kiosk={false} />
+      </div>,
+    );
     expect(screen.getByTestId('difference-legend')).toBeTruthy();
     expect(screen.queryByTestId('range-low')).toBeNull();
     expect(screen.queryByRole('radio')).toBeNull();
     fireEvent.click(screen.getByRole('button', { name: 'Stop comparing' }));
     expect(screen.getByTestId('range-low')).toBeTruthy();
     // The button is gone; its focus must not be.
-    expect(document.activeElement).toBe(screen.getByTestId('heat-legend'));
+    expect(document.activeElement).toBe(screen.getByRole('button', { name: 'Layers' }));
   });
 
   test('a fixed range stays while the data change, and can be typed', () => {

@@ -85,15 +85,6 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
           </div>
         </>
       )}
-      {!kiosk && (
-        <div className="legend-controls">
-          <HeatControl place="legend" />
-          {hasIdeal && !isError && !isCompared && <ColouringControl />}
-          {!isIdeal && !isError && !isCompared && (
-            <WithParts>{(parts) => <parts.RangeControl sensor={sensor} range={range} />}</WithParts>
-          )}
-        </div>
-      )}
       <WithParts>{(parts) => <parts.DifferenceLegend kiosk={kiosk} />}</WithParts>
       {isOld && (
         <span className="legend-old" data-testid="legend-old">
@@ -113,6 +104,16 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
       <details className="legend-more" open={kiosk}>
         <summary>{S.legendMore}</summary>
         <div className="legend-facts">
+          {!kiosk && !isError && !isCompared && (
+            <div className="legend-controls">
+              {hasIdeal && <ColouringControl />}
+              {!isIdeal && (
+                <WithParts>
+                  {(parts) => <parts.RangeControl sensor={sensor} range={range} />}
+                </WithParts>
+              )}
+            </div>
+          )}
           <span data-testid="sample-count">
             {samples > 0 ? S.legendTags(samples) : isFetching ? S.legendFetching : S.legendNoTags}
           </span>
@@ -263,17 +264,13 @@ function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
   );
 }
 
-/**
- * Chooses how the heat map is computed; part of the permalink. It is in the layers menu on a narrow
- * screen, elsewhere in the legend.
- */
-export function HeatControl({ place }: { place: 'legend' | 'layers' }): JSX.Element {
+/** Chooses how the heat map is computed; part of the permalink. */
+export function HeatControl(): JSX.Element {
   const heat = useApp((state) => state.view.heat);
   return (
     <Select
-      className="heat-choice"
       aria-label={S.heat}
-      data-testid={`heat-${place}`}
+      data-testid="heat"
       value={heat}
       options={HEATS}
       text={(kind) => S.heats[kind]}

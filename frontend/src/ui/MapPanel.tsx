@@ -98,9 +98,9 @@ function LayerList(): JSX.Element {
         ))}
         <WithParts>{(parts) => <parts.InLayers />}</WithParts>
       </div>
-      <label className="layer-choice heat-choice">
+      <label className="layer-choice">
         <span>{S.heat}</span>
-        <HeatControl place="layers" />
+        <HeatControl />
       </label>
       <WithParts>{(parts) => <parts.CompareControl />}</WithParts>
     </>

@@ -281,7 +281,7 @@ function TrendLine({
   unit: TemperatureUnit;
 }): JSX.Element | null {
   const value = tag.readings.get(sensor.name);
-  const trend = trendOf(sensor.name, { tag, health }, thenOf(then, tag, sensor.name));
+  const trend = trendOf(sensor.name, { tag, health }, thenOf(then, tag));
   if (!trend || value == null) return null;
   const title = S.trendTitle(shown(sensor.label, 32), shortHourText());
   if (!then || trend.kind !== 'by') {

@@ -185,7 +185,6 @@ describe('table', () => {
       flush(() => {
         hourAgo.set({
           of: at.sec,
-          isNow: true,
           tags: new Map([['a', { tag: before, health: { verdict: 'healthy', reasons: [] } }]]),
         });
       });
@@ -202,7 +201,7 @@ describe('table', () => {
     goLive(status());
     // An outdated answer does not count.
     flush(() => {
-      hourAgo.set({ of: at.sec - 601, isNow: true, tags: new Map() });
+      hourAgo.set({ of: at.sec - 601, tags: new Map() });
     });
     expect(trends()[0]).toBe('an hour ago: unknown');
     hourAgo.set(null);

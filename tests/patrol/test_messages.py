@@ -9,8 +9,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from lupin_patrol import node as messages
 from lupin_patrol.greenhouse import Rect
-from lupin_patrol.mission import Visited, pose_of
-from lupin_twin.core.state import Bloom, Flower, Inspection
+from lupin_patrol.mission import ScanStatus, Visited, pose_of
+from lupin_twin.core.state import Bloom, Flower, Inspection, Scan
 
 STAMP_NS = 12_000_000_034
 POSE = pose_of((1.5, 2.5), pi / 2)
@@ -27,6 +27,24 @@ def over_the_wire(message: Any) -> Any:
     received = deserialize_message(serialize_message(message), type(message))
     assert received == message
     return received
+
+
+@pytest.mark.parametrize(
+    ("status", "expected"),
+    [
+        (ScanStatus.UNREACHABLE, Observation.STATUS_UNREACHABLE),
+        (ScanStatus.SCAN_FAILED, Observation.STATUS_SCAN_FAILED),
+    ],
+)
+def test_a_failed_scan_has_a_reason_and_no_pose(status: ScanStatus, expected: int) -> None:
+    failed = Visited(3.0, 0, 0.0, Scan("7", 0, (), None, status, "the way is blocked"))
+    message = over_the_wire(messages.observation(failed, STAMP_NS, "map"))
+    assert message.status == expected
+    assert message.status_detail == "the way is blocked"
+    assert message.tag_reading.tag_id == "7"
+    assert len(message.tag_reading.readings) == 0
+    # Quaternion.w is 1 by default, which would put the tag at the origin.
+    assert message.tag_pose_in_map.orientation.w == 0.0
 
 
 def test_a_flower_observation() -> None:

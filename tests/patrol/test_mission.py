@@ -6,6 +6,7 @@ from itertools import pairwise
 from math import dist
 from typing import TypeVar
 
+import numpy as np
 import pytest
 from greenhouse_sim.simulator import GreenhouseSimulator
 
@@ -13,13 +14,16 @@ from lupin_patrol.mission import (
     DOCK,
     START_OF_DAY_S,
     Event,
+    MapGrown,
     Mission,
     PassCompleted,
     RobotMoved,
     ScanStatus,
+    TagsDiscovered,
     Visited,
 )
 from lupin_twin.core.state import Scan
+from tests.support.climate import known_in
 
 DEFAULT_SEED = 0
 DAY_SPEED = 60.0
@@ -64,6 +68,31 @@ def many_first_passes() -> list[list[Event]]:
 def test_the_same_seed_gives_the_same_events(patrol: list[Event]) -> None:
     random.seed(2026)  # the simulator uses the global random generator
     assert played(passes=PASSES) == patrol
+
+
+# --- the map -------------------------------------------------------------------------------------
+
+
+def test_the_map_grows_and_never_forgets(patrol: list[Event]) -> None:
+    grids = [event.grid for event in only(MapGrown, list(until(1, iter(patrol))))]
+    assert len(grids) > 10
+    for before, after in pairwise(grids):
+        assert known_in(after) > known_in(before)
+        old, new = (np.frombuffer(grid.cells, dtype=np.int8) for grid in (before, after))
+        assert (new[old != -1] == old[old != -1]).all()
+
+
+# --- discovery -----------------------------------------------------------------------------------
+
+
+def test_a_tag_is_discovered_before_its_first_attempt(many_first_passes: list[list[Event]]) -> None:
+    for events in many_first_passes:
+        discovered: set[str] = set()
+        for event in events:
+            if isinstance(event, TagsDiscovered):
+                discovered = {tag.tag_id for tag in event.tags}
+            elif isinstance(event, Visited):
+                assert event.write.tag_id in discovered
 
 
 # --- scans ---------------------------------------------------------------------------------------

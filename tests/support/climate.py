@@ -1,4 +1,4 @@
-"""The truth in the simulated greenhouse."""
+"""The truth in the simulated greenhouse, and the known part of its floor."""
 
 from copy import deepcopy
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 from greenhouse_sim.simulator import SensorRegistry
 
 from lupin_patrol.greenhouse import Point
-from lupin_patrol.perception import value_of
+from lupin_patrol.perception import UNKNOWN, Grid, value_of
 
 
 class Truth:
@@ -25,3 +25,8 @@ class Truth:
 
     def of(self, sensor: str, position: Point, time_of_day_s: float) -> float:
         return value_of(self._registry, sensor, position, time_of_day_s)
+
+
+def known_in(grid: Grid) -> int:
+    """How many cells of a map are known."""
+    return len(grid.cells) - grid.cells.count(UNKNOWN.to_bytes(1, "little", signed=True))

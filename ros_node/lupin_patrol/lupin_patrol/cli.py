@@ -50,6 +50,7 @@ def parser() -> argparse.ArgumentParser:
         default=0.0,
         help="where the patrol starts, in patrol seconds after nine o'clock (default 0)",
     )
+    made.add_argument("--once", action="store_true", help="exit after one pass and its retries")
     made.add_argument(
         "--end-with-parent",
         action="store_true",
@@ -89,6 +90,7 @@ def main() -> int:
             mission.events(),
             begin_s=begin_s,
             speed=options.speed,
+            once=options.once,
             ros_arguments=sys.argv,
         )
     except ParameterError as error:

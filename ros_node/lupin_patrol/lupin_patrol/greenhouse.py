@@ -173,7 +173,10 @@ class Greenhouse:
 
 
 def read_greenhouse(simulator: Any) -> Greenhouse:
-    """Read the layout of a `greenhouse_sim.simulator.GreenhouseSimulator`."""
+    """Read the layout of a `greenhouse_sim.simulator.GreenhouseSimulator`.
+
+    Raises ValueError when a tag has no aisle that the robot fits into.
+    """
     size = simulator.sim_config["visualization"]
     interior = Rect(0.0, 0.0, float(size["greenhouse_width_m"]), float(size["greenhouse_height_m"]))
     # The simulator's tag manager drops the tables when it loads this file.
@@ -201,6 +204,11 @@ def _place_tag(tag_id: str, position: Point, sensors: list[str], greenhouse: Gre
                 away_m = round(dist(position, edge), 3)
                 sides.append((away_m, -stand_off_m, order, edge, facing, stop))
                 break
+    if not sides:
+        raise ValueError(
+            f"tag {tag_id} at {position}: no aisle beside {table.name} is as wide as"
+            f" {2 * CLEARANCE_M} m"
+        )
     *_, edge, facing, stop = min(sides)
     return Tag(tag_id, position, tuple(sensors), table, edge, facing, stop)
 
@@ -232,12 +240,17 @@ class Roadmap:
         self._length, self._next = self._shortest_between_corners()
 
     def way(self, start: Point, goal: Point) -> list[Point]:
-        """Return the shortest path as a polyline from start to goal, both included."""
+        """Return the shortest path as a polyline from start to goal, both included.
+
+        Raises ValueError when there is no path.
+        """
         if not crossings(start, np.array([goal]), self._obstacles).any():
             return [start, goal]
         total = (
             self._straight(start)[:, np.newaxis] + self._length + self._straight(goal)[np.newaxis]
         )
+        if not np.isfinite(total).any():
+            raise ValueError(f"no way from {start} to {goal} is {2 * CLEARANCE_M} m wide")
         first, last = np.unravel_index(np.argmin(total), total.shape)
         corner, bends = int(first), []
         while corner != last:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from itertools import count
-from math import atan2, cos, sin
+from math import atan2, cos, dist, sin
 from typing import Any, Final
 
 from lupin_patrol.greenhouse import (
@@ -25,9 +25,9 @@ from lupin_patrol.greenhouse import (
 )
 from lupin_patrol.perception import (
     SECONDS_PER_DAY,
+    Exploration,
     Grid,
     Plants,
-    floor_map,
     readings_at,
     stream,
 )
@@ -48,8 +48,8 @@ def pose_of(position: Point, yaw: float) -> Pose:
 
 
 @dataclass(frozen=True, slots=True)
-class MapKnown:
-    """The map of the floor, sent at the start."""
+class MapGrown:
+    """More cells of the map have become known."""
 
     at_s: float
     grid: Grid
@@ -57,7 +57,7 @@ class MapKnown:
 
 @dataclass(frozen=True, slots=True)
 class TagsDiscovered:
-    """Perception's list of tags, sent at the start and at the end of each pass."""
+    """Perception's list of all tags seen so far, sent when it grows and at the end of each pass."""
 
     at_s: float
     tags: tuple[Tag, ...]
@@ -104,16 +104,19 @@ class RobotMoved:
     battery: float
 
 
-Event = MapKnown | TagsDiscovered | Visited | PassCompleted | WayPlanned | RobotMoved
+Event = MapGrown | TagsDiscovered | Visited | PassCompleted | WayPlanned | RobotMoved
 
 
 DOCK: Point = (0.4, 0.4)
 START_OF_DAY_S = 9 * 3600.0
 
 _ROBOT_SPEED_M_S = 1.2
-_MOVE_PERIOD_S = 0.2
+_OBSERVE_PERIOD_S = 0.2
+_MAP_PERIOD_S = 1.0
 _READ_S = 0.3
 _PICTURE_S = 0.2
+# A tag within this distance is seen.
+_TAG_RANGE_M = 1.2
 # Range of a full battery; the dock recharges it completely.
 _BATTERY_M = 400.0
 
@@ -147,6 +150,8 @@ class Mission:
         self._sensors = simulator.sensor_registry
         self._plants = Plants(self.greenhouse, seed, first_pass)
         self._roadmap = Roadmap(self.greenhouse)
+        self._exploration = Exploration(self.greenhouse)
+        self._seen: tuple[Tag, ...] = ()
         self._seed = seed
         self._day_speed = day_speed
         self._position = DOCK
@@ -154,23 +159,23 @@ class Mission:
         self._battery_m = _BATTERY_M
         self._now_s = begin_s
         self._first_pass = first_pass
-        self._is_silent = False
+        self._is_observing = True
+        self._map_due_s = begin_s
+        self._map_is_new = False
         order = tour(self._roadmap, DOCK, [tag.stop for tag in self.greenhouse.tags])
         self._tour = [self.greenhouse.tags[index] for index in order]
 
     def events(self) -> Iterator[Event]:
         """Patrol forever. Call it once: the mission holds the state of one robot."""
-        yield MapKnown(self._now_s, floor_map(self.greenhouse))
-        yield TagsDiscovered(self._now_s, self.greenhouse.tags)
-        yield self._moved()
+        yield from self._observe()
         for pass_index in count(self._first_pass):
             yield from self._patrol(pass_index)
             yield from self._drive(DOCK)
             self._battery_m = _BATTERY_M
 
     def visits(self) -> Iterator[Visited]:
-        """Yield only the visits of `events`, at a tenth of the work: nothing on the way."""
-        self._is_silent = True
+        """Yield only the visits of `events`, at a tenth of the work: no observing on the way."""
+        self._is_observing = False
         for event in self.events():
             if isinstance(event, Visited):
                 yield event
@@ -190,7 +195,9 @@ class Mission:
             yield from self._visit(tag, pass_index, 1, status)
             if status is not ScanStatus.OK:
                 lost.append(tag.tag_id)
-        yield TagsDiscovered(self._now_s, self.greenhouse.tags)
+        if self._map_is_new:
+            yield self._map()
+        yield TagsDiscovered(self._now_s, self._seen)
         yield PassCompleted(self._now_s, pass_index, tuple(lost))
 
     def _planned_failures(self, pass_index: int) -> dict[str, ScanStatus]:
@@ -226,23 +233,40 @@ class Mission:
             yield Visited(self._now_s, pass_index, time_of_day_s, seen)
 
     def _drive(self, goal: Point) -> Iterator[Event]:
-        """Drive to a goal, and report the way."""
+        """Drive to a goal, and observe on the way."""
         way = self._roadmap.way(self._position, goal)
-        if not self._is_silent:
+        if self._is_observing:
             yield WayPlanned(self._now_s, tuple(way))
-        step_m = _ROBOT_SPEED_M_S * _MOVE_PERIOD_S
+        step_m = _ROBOT_SPEED_M_S * _OBSERVE_PERIOD_S
         for position, driven_m in walk(way, step_m):
             (x, y), self._position = self._position, position
             if position != (x, y):
                 self._yaw = atan2(position[1] - y, position[0] - x)
             self._now_s += driven_m / _ROBOT_SPEED_M_S
             self._battery_m -= driven_m
-            if not self._is_silent:
-                yield self._moved()
+            yield from self._observe()
 
-    def _moved(self) -> RobotMoved:
+    def _observe(self) -> Iterator[Event]:
+        if not self._is_observing:
+            return
         battery = self._battery_m / _BATTERY_M
-        return RobotMoved(self._now_s, self._position, self._yaw, battery)
+        yield RobotMoved(self._now_s, self._position, self._yaw, battery)
+        new = [
+            tag
+            for tag in self.greenhouse.tags
+            if tag not in self._seen and dist(tag.edge, self._position) <= _TAG_RANGE_M
+        ]
+        if new:
+            self._seen = (*self._seen, *new)
+            yield TagsDiscovered(self._now_s, self._seen)
+        self._map_is_new |= self._exploration.observe_from(self._position)
+        if self._map_is_new and self._now_s >= self._map_due_s:
+            yield self._map()
+
+    def _map(self) -> MapGrown:
+        self._map_is_new = False
+        self._map_due_s = self._now_s + _MAP_PERIOD_S
+        return MapGrown(self._now_s, self._exploration.snapshot())
 
 
 # --- the past: what the patrol would have observed in the last three simulated days ---------------

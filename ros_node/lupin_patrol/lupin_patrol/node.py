@@ -9,9 +9,10 @@ not check fields, and serialises a wrong type as garbage.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import cos, sin
+from threading import Event as Flag
 from time import monotonic
 from typing import Any
 
@@ -19,13 +20,14 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Pose, PoseStamped, PoseWithCovarianceStamped, Quaternion
 from lupin_msgs.msg import DiscoveredTag, DiscoveredTags, Observation
 from nav_msgs.msg import OccupancyGrid, Path
+from rclpy.duration import Duration
 from rclpy.node import Node
 from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Header
 
 from lupin_patrol.mission import (
     Event,
-    MapKnown,
+    MapGrown,
     PassCompleted,
     RobotMoved,
     ScanStatus,
@@ -44,6 +46,8 @@ from lupin_twin.runtime import process
 # A running twin is discovered within this time. Without the wait, a fast patrol's first
 # observations would drop out of the latch before any subscriber could receive them.
 _SUBSCRIBERS_S = 3.0
+# How long a finished patrol waits until its last messages are acknowledged.
+_DELIVERY_S = 5.0
 _POLL_S = 0.05
 
 
@@ -62,7 +66,7 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
         self.observations = self._latched(
             Observation, "observations_topic", interfaces.OBSERVATIONS.depth
         )
-        # Each message has all tags, so only the latest is latched.
+        # Each message repeats all earlier content, so only the latest is latched.
         self._discovered_tags = self._latched(DiscoveredTags, "discovered_tags_topic", 1)
         self._map = self._latched(OccupancyGrid, "map_topic", 1)
         self._pose, self._plan, self._battery = (
@@ -78,7 +82,7 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
         """Publish an event, stamped with the current ROS time."""
         stamp = self.get_clock().now().to_msg()
         match event:
-            case MapKnown():
+            case MapGrown():
                 self._map.publish(occupancy_grid(event, stamp, self._frame_id))
             case TagsDiscovered():
                 self._discovered_tags.publish(discovered_tags(event, stamp, self._frame_id))
@@ -100,6 +104,13 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
                     f" tags without a successful scan: {', '.join(event.failed) or 'none'}"
                 )
 
+    def is_delivered(self) -> bool:
+        """Whether every subscriber has acknowledged everything."""
+        return all(
+            publisher.wait_for_all_acked(Duration())
+            for publisher in (self.observations, self._discovered_tags, self._map)
+        )
+
     def _latched(self, message: type[Any], parameter: str, depth: int) -> Any:
         topic = getattr(self._parameters, parameter)
         with naming(parameter, topic):
@@ -107,9 +118,9 @@ class PatrolNode(Node):  # type: ignore[misc]  # rclpy is not typed
 
 
 def play(
-    events: Iterator[Event], *, begin_s: float, speed: float, ros_arguments: list[str]
+    events: Iterator[Event], *, begin_s: float, speed: float, once: bool, ros_arguments: list[str]
 ) -> None:
-    """Play events until a stop signal comes, or there are no more.
+    """Play events until a stop signal comes or, with `once`, the first pass is completed.
 
     Playing starts at the patrol time `begin_s`; no event is earlier. `speed` is patrol seconds per
     second. `ros_arguments` is the whole command line.
@@ -120,15 +131,26 @@ def play(
         node = PatrolNode()
         with spinning(node):
             node.get_logger().info(f"patrol starts at speed {speed:g}")
-            deadline = monotonic() + _SUBSCRIBERS_S
-            while not node.observations.get_subscription_count() and monotonic() < deadline:
-                if stop.wait(_POLL_S):
-                    return
+            subscribers = node.observations.get_subscription_count
+            if _stopped_before(stop, lambda: subscribers() > 0, _SUBSCRIBERS_S):
+                return
             start = monotonic()
             for event in events:
                 if stop.wait(max(0.0, start + (event.at_s - begin_s) / speed - monotonic())):
                     return
                 node.publish(event)
+                if once and isinstance(event, PassCompleted):
+                    break
+            _stopped_before(stop, node.is_delivered, _DELIVERY_S)
+
+
+def _stopped_before(stop: Flag, condition: Callable[[], bool], timeout_s: float) -> bool:
+    """Wait for a condition, at most `timeout_s`; returns whether a stop signal came."""
+    deadline = monotonic() + timeout_s
+    while not condition() and monotonic() < deadline:
+        if stop.wait(_POLL_S):
+            return True
+    return False
 
 
 SOURCE = "lupin_patrol"
@@ -156,7 +178,7 @@ def discovered_tags(event: TagsDiscovered, stamp: Time, frame_id: str) -> Discov
     )
 
 
-def occupancy_grid(event: MapKnown, stamp: Time, frame_id: str) -> OccupancyGrid:
+def occupancy_grid(event: MapGrown, stamp: Time, frame_id: str) -> OccupancyGrid:
     """Return the map."""
     grid = event.grid
     message = OccupancyGrid(header=Header(stamp=stamp, frame_id=frame_id))

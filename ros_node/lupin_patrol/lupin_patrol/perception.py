@@ -4,8 +4,9 @@ Plants and climate follow from the seed, the pass and the time of day, and hold 
 inspection of one tag never depends on the others. Sensors have the units of
 `lupin_msgs/SensorReading`: temperature °C, humidity % relative, co2 ppm, light lx, soil_moisture %.
 
-The map is row-major with row 0 at the smallest y, as in nav_msgs/OccupancyGrid: 0 free, 100
-occupied. The outermost ring of cells is the greenhouse's wall.
+The occupancy grid only grows. It is row-major with row 0 at the smallest y, as in
+nav_msgs/OccupancyGrid: -1 unknown, 0 free, 100 occupied. The outermost ring of cells is the
+greenhouse's wall.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from random import Random
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lupin_patrol.greenhouse import TABLE_HEIGHT_M, Greenhouse, Point, Table, Tag
 from lupin_twin.core.state import Bloom, Flower, Reading
@@ -38,7 +40,8 @@ SPECIES = ("lupin", "tulip", "gerbera", "orchid", "rose")
 
 _PLANT_SPACING_M = 0.09
 _IN_FLOWER = 0.75
-_OFF_GRID_M = 0.01
+_POSITION_NOISE_M = 0.01
+_OVERLOOKED = 0.06
 # Probability of a pest outbreak per pass.
 _OUTBREAK = 0.2
 
@@ -71,14 +74,19 @@ class Plants:
         return bugs if breaks_out and where == tag_id else 0
 
     def inspect(self, tag_id: str, pass_index: int, attempt: int) -> Flower:
-        """Inspect the plants of a tag."""
+        """Inspect the plants of a tag: some flowers are missed, the others are located to 1 cm."""
         chance = stream(self._seed, "look", tag_id, pass_index, attempt)
         bugs = self.bugs(tag_id, pass_index)
         blooms = self._blooms[tag_id]
         infested = set(chance.sample(range(len(blooms)), min(len(blooms), bugs, 3)))
         seen = tuple(
-            replace(bloom, confidence=chance.uniform(0.72, 0.99), anomaly=index in infested)
+            replace(
+                _jittered(bloom, chance),
+                confidence=chance.uniform(0.72, 0.99),
+                anomaly=index in infested,
+            )
             for index, bloom in enumerate(blooms)
+            if index in infested or chance.random() > _OVERLOOKED
         )
         return Flower(
             species=self.species(tag_id),
@@ -92,7 +100,7 @@ class Plants:
 
 
 def _grow(table: Table, species: str, seed: int) -> Iterator[Bloom]:
-    """Plant a table in rows that are not quite straight; most plants flower."""
+    """Plant a table in rows, spaced wider than the position noise; most plants flower."""
     chance = stream(seed, "grow", table.name)
     rect = table.rect
     columns = max(1, round((rect.x1 - rect.x0) / _PLANT_SPACING_M))
@@ -103,13 +111,18 @@ def _grow(table: Table, species: str, seed: int) -> Iterator[Bloom]:
             y = rect.y0 + (row + 0.5) * (rect.y1 - rect.y0) / rows
             height_m = chance.uniform(0.12, 0.38)
             if chance.random() < _IN_FLOWER:
-                x, y = (at + chance.uniform(-_OFF_GRID_M, _OFF_GRID_M) for at in (x, y))
                 z = TABLE_HEIGHT_M + height_m
-                yield Bloom(x, y, z, height_m, species, 1.0, anomaly=False)
+                yield _jittered(Bloom(x, y, z, height_m, species, 1.0, anomaly=False), chance)
 
 
 def _nearest(tags: list[Tag], position: Point) -> Tag:
     return min(tags, key=lambda tag: dist(tag.position, position))
+
+
+def _jittered(bloom: Bloom, chance: Random) -> Bloom:
+    noise = _POSITION_NOISE_M
+    x, y = (at + chance.uniform(-noise, noise) for at in (bloom.x, bloom.y))
+    return replace(bloom, x=x, y=y)
 
 
 SECONDS_PER_DAY = 86_400.0
@@ -138,12 +151,14 @@ def value_of(registry: Any, sensor: str, position: Point, time_of_day_s: float) 
 
 
 RESOLUTION_M = 0.05
-FREE, OCCUPIED = 0, 100
+VIEW_RADIUS_M = 2.0
+
+UNKNOWN, FREE, OCCUPIED = -1, 0, 100
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """The map: `cells` are int8 bytes, row-major; the origin is cell 0's corner."""
+    """One state of the map: `cells` are int8 bytes, row-major; the origin is cell 0's corner."""
 
     width: int
     height: int
@@ -152,18 +167,34 @@ class Grid:
     cells: bytes
 
 
-def floor_map(greenhouse: Greenhouse) -> Grid:
-    """The complete map, as a robot has it that has patrolled for days."""
-    inside = greenhouse.interior
-    origin = (inside.x0 - RESOLUTION_M, inside.y0 - RESOLUTION_M)
-    columns, rows = (
-        2 + ceil(round(extent / RESOLUTION_M, 6))
-        for extent in (inside.x1 - inside.x0, inside.y1 - inside.y0)
-    )
-    row, column = np.mgrid[:rows, :columns]
-    x, y = (origin[i] + (n + 0.5) * RESOLUTION_M for i, n in enumerate((column, row)))
-    occupied = (row == 0) | (row == rows - 1) | (column == 0) | (column == columns - 1)
-    for box in (table.rect for table in greenhouse.tables):
-        occupied |= (box.x0 < x) & (x < box.x1) & (box.y0 < y) & (y < box.y1)
-    cells = np.where(occupied, OCCUPIED, FREE).astype(np.int8)
-    return Grid(columns, rows, RESOLUTION_M, origin, cells.tobytes())
+class Exploration:
+    """What the robot has seen of the floor so far. Cells become known and never unknown again."""
+
+    def __init__(self, greenhouse: Greenhouse) -> None:
+        inside = greenhouse.interior
+        self._origin = (inside.x0 - RESOLUTION_M, inside.y0 - RESOLUTION_M)
+        columns, rows = (
+            2 + ceil(round(extent / RESOLUTION_M, 6))
+            for extent in (inside.x1 - inside.x0, inside.y1 - inside.y0)
+        )
+        row, column = np.mgrid[:rows, :columns]
+        self._x = self._origin[0] + (column + 0.5) * RESOLUTION_M
+        self._y = self._origin[1] + (row + 0.5) * RESOLUTION_M
+        occupied = (row == 0) | (row == rows - 1) | (column == 0) | (column == columns - 1)
+        for box in (table.rect for table in greenhouse.tables):
+            inside_x = (box.x0 < self._x) & (self._x < box.x1)
+            occupied |= inside_x & (box.y0 < self._y) & (self._y < box.y1)
+        self._truth = np.where(occupied, OCCUPIED, FREE).astype(np.int8)
+        self._cells = np.full((rows, columns), UNKNOWN, dtype=np.int8)
+
+    def observe_from(self, position: Point) -> bool:
+        """Add the cells within VIEW_RADIUS_M of a position; returns whether any of them was new."""
+        near = np.hypot(self._x - position[0], self._y - position[1]) <= VIEW_RADIUS_M
+        new: NDArray[np.bool_] = near & (self._cells == UNKNOWN)
+        self._cells[new] = self._truth[new]
+        return bool(new.any())
+
+    def snapshot(self) -> Grid:
+        """Return an immutable copy of the current map."""
+        rows, columns = self._cells.shape
+        return Grid(columns, rows, RESOLUTION_M, self._origin, self._cells.tobytes())

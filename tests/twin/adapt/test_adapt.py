@@ -187,6 +187,7 @@ WRONG: list[tuple[Callable[[Robot], None], str]] = [
         "behind ROS time here, the limit is 10 s: is a clock wrong",
     ),
     (lambda robot: robot.read(20.0, 6e307), "humidity is inf, expected a finite number"),
+    (lambda robot: robot.be_at(0.0, "m" * 250_000), "bytes, the limit is 200000"),
     (lambda robot: robot.fixed(800.0), "field value: 'Float32' object has no attribute"),
 ]
 

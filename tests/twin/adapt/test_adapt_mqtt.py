@@ -1,8 +1,10 @@
 """Fixed sensors at a real broker, in the state of a twin that knows no MQTT."""
 
 import json
+import socket
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -141,6 +143,34 @@ def test_a_flood_a_megabyte_and_a_topic_for_each_message_do_no_harm(
         peer.until(lambda: robot.reported("it is not JSON"), "the complaint")
         assert process.output.count("it is not JSON") < 10
         assert process.exit_code is None
+
+
+def test_a_topic_that_is_not_utf8_costs_no_other(domain: int, tmp_path: Path) -> None:
+    """Mosquitto would not forward it; EMQX does."""
+
+    def serve(listener: socket.socket) -> None:
+        client, _ = listener.accept()
+        with client:
+            client.recv(4_096)
+            client.sendall(b"\x20\x02\x00\x00")  # CONNACK
+            client.recv(4_096)  # SUBSCRIBE
+            for topic in (b"plain/Gew\xe4chs/co2", b"plain/bench/co2"):
+                body = len(topic).to_bytes(2, "big") + topic + b"800"
+                client.sendall(bytes((0x30, len(body))) + body)  # PUBLISH
+            while client.recv(4_096):
+                pass
+
+    with socket.create_server(("127.0.0.1", 0)) as listener, ThreadPoolExecutor(1) as pool:
+        serving = pool.submit(serve, listener)
+        with (
+            adapted(domain, Broker(tmp_path, listener.getsockname()[1])) as process,
+            Peer(domain) as peer,
+        ):
+            robot = Robot(peer)
+            peer.until(lambda: robot.reported("topic is not UTF-8"), "the complaint")
+            peer.until(lambda: robot.observations, "the good one behind it")
+            assert "Traceback" not in process.output
+        serving.result()
 
 
 def test_check_reports_what_comes_from_the_broker(domain: int, tmp_path: Path) -> None:

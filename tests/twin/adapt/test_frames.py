@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from lupin_twin.adapt.messages import (
+    MAX_FRAMES,
     MAX_STEPS,
     WAIT_NS,
     FrameError,
@@ -93,6 +94,8 @@ def test_the_latest_transform_counts_and_a_static_one_has_no_age() -> None:
         step("map", math.inf, 0, 0),
         step("map", 0, 0, 0, turn=(0, 0, 0, 0)),
         step("map", 0, 0, 0, turn=(0, math.nan, 0, 1)),
+        step("", 0, 0, 0),
+        step("m" * 300, 0, 0, 0),
     ],
 )
 def test_an_invalid_transform_is_refused(transform: Transform) -> None:
@@ -100,6 +103,28 @@ def test_an_invalid_transform_is_refused(transform: Transform) -> None:
     with pytest.raises(FrameError):
         frames.put("base", transform)
     assert "base" not in frames
+
+
+def test_too_many_moving_frames_replace_the_one_updated_longest_ago_and_no_static_one() -> None:
+    frames = frames_of(camera=step("base", 0, 1, 0, stamp_ns=None), base=step("map", 0, 0, 0))
+    for number in range(2 * MAX_FRAMES):
+        if number % 500 == 0:
+            frames.put("base", step("map", 2, 0, 0))
+        frames.put(f"f{number}", step("map", 0, 0, 0))
+    assert frames.place("camera", "map", NOW, S) == (2, 1, 0)
+    assert "f0" not in frames
+    assert frames.place(f"f{2 * MAX_FRAMES - 1}", "map", NOW, S) == (0, 0, 0)
+
+
+def test_static_frames_are_bounded_apart_from_the_moving_ones() -> None:
+    frames = Frames()
+    for number in range(MAX_FRAMES):
+        frames.put(f"f{number}", step("map", 0, 0, 0, stamp_ns=None))
+    with pytest.raises(FrameError, match="more than 1000 static frames"):
+        frames.put("one more", step("map", 0, 0, 0, stamp_ns=None))
+    frames.put("f0", step("map", 1, 0, 0, stamp_ns=None))
+    frames.put("base", step("f0", 0, 1, 0))
+    assert frames.place("base", "map", NOW, S) == (1, 1, 0)
 
 
 def test_a_sighting_waits_for_its_transform_and_no_longer() -> None:

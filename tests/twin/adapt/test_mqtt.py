@@ -151,6 +151,7 @@ def test_the_broker_and_its_credentials_are_configurable(tmp_path: Path) -> None
         ("A/j", b"[" * 50_000, "it is not JSON"),
         ("A/j", b"[1]", "it has none of t"),
         ("A/j", b'{"t": true}', "t is True, expected a number"),
+        ("A/j", b'{"t": {}}', "t is {}, expected a number"),
         (
             "A/j",
             b'{"t": 1, "at": "yesterday"}',
@@ -158,6 +159,7 @@ def test_the_broker_and_its_credentials_are_configurable(tmp_path: Path) -> None
         ),
         ("A/j", b'{"t": 1, "at": -5}', "its time is -5"),
         ("A/j", b'{"t": 1, "at": 1e999}', "its time is inf"),
+        ("A/j", b'{"t": 1, "at": true}', "its time is True"),
         ("A/j", b'{"t": 1, "at": "1970-01-01T00:01:00Z"}', "before 2001: was its clock"),
     ],
 )
@@ -184,12 +186,16 @@ def test_a_message_without_a_value_is_named(topic: str, payload: bytes, complain
         ({"topic": "{tag}", "sensor": "t", "availability": "lwt"}, {}, "expected {tag} in 'lwt'"),
         ({"topic": "{tag}"}, {}, "a payload that is a number needs {sensor} in its topic"),
         ({"topic": "{tag}", "preset": "zwave"}, {}, "preset is 'zwave', expected one of zigbee"),
+        ({"topic": "{tag}", "sensor": "t", "unit": "C"}, {}, "'unit' is not known, expected one"),
         ({"topic": "{tag}", "values": {"t": 5}}, {}, "mqtt.topics[0].values.t is 5"),
         ({"topic": "{tag}", "sensor": "t"}, {"url": "http://x"}, "mqtt.url is 'http://x'"),
+        ({"topic": "{tag}", "sensor": "t"}, {"url": "mqtt://x:99999"}, "mqtt.url is"),
         ({"topic": "{tag}", "sensor": "t"}, {"url": "mqtt://[::1"}, "mqtt.url is"),
         ({"topic": "{tag}/{tag}", "sensor": "t"}, {}, "'{tag}/{tag}' has one of them twice"),
+        ({"topic": "a\0/{tag}", "sensor": "t"}, {}, "printable characters"),
         ({"topic": "{tag}", "sensor": "t"}, {"url": "mqtt://u:p@x"}, "has a user in it"),
         ({"topic": "{tag}", "sensor": "t"}, {"password_file": "/none"}, "No such file"),
+        ({"topic": "{tag}", "sensor": "t"}, {"topics": []}, "mqtt.topics is [], expected a list"),
     ],
 )
 def test_an_invalid_topic_configuration_is_reported_by_name(

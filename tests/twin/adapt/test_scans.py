@@ -1,8 +1,11 @@
 """Readings become scans: which tag they belong to, and the mean over a stop."""
 
+import statistics
 from types import SimpleNamespace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from lupin_twin.adapt.config import Config, Robot
 from lupin_twin.adapt.scans import FIXED_SOURCE, SCAN_FAILED, VISIT_SOURCE, Scans
@@ -146,6 +149,18 @@ def test_a_found_tag_counts_as_new_and_then_like_a_surveyed_one() -> None:
     (scan,) = scans.lose(3 * S)
     assert (scan.tag_id, scan.pose) == ("C", Pose.at(5.5, 0))
     assert scans.tag is None
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=50))
+def test_mean_and_spread_match_their_definitions(values: list[float]) -> None:
+    scans = scans_of()
+    move(scans, 0, 0.0)
+    for value in values:
+        read(scans, 1, value)
+    (scan,) = move(scans, 2, 9.0)
+    assert scan.readings[0].value == pytest.approx(statistics.fmean(values), abs=1e-6)
+    spread = float(scan.status_detail.split("±")[1].split()[0])
+    assert spread == pytest.approx(statistics.stdev(values), rel=0.06, abs=1e-6)
 
 
 @pytest.mark.parametrize(

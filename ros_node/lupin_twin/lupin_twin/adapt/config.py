@@ -27,6 +27,7 @@ from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TAGS
 from lupin_twin.core.parameters import FARTHEST_M
 from lupin_twin.core.state import Pose
 
+MAX_FILE_BYTES: Final = 4_000_000
 _TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Za-z][A-Za-z0-9]*")
 _FIELD: Final = re.compile(r"[a-z]\w*(\[\d{1,9}\])?(\.[a-z]\w*(\[\d{1,9}\])?)*")
 
@@ -260,15 +261,31 @@ def read_yaml(path: Path) -> Any:
     """Return the content of a YAML file.
 
     Raises:
-        ConfigError: it cannot be read, or is not YAML.
+        ConfigError: it cannot be read, is too large, or is not YAML.
 
     """
     import yaml  # noqa: PLC0415  # commands that read no YAML start without it
 
+    class Loader(yaml.SafeLoader):
+        """Refuses aliases: a few lines of them can expand to more than any memory holds."""
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.AliasEvent):
+                alias = self.peek_event()  # type: ignore[no-untyped-call]  # PyYAML is not
+                raise yaml.composer.ComposerError(
+                    None, None, f"the alias *{alias.anchor} is not taken", alias.start_mark
+                )
+            return super().compose_node(parent, index)
+
     try:
-        return yaml.safe_load(path.read_bytes())
+        with path.open("rb") as file:
+            content = file.read(MAX_FILE_BYTES + 1)
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror}") from None
-    # PyYAML passes on Python's errors about encoding and long numbers.
-    except (yaml.YAMLError, ValueError) as error:
+    if len(content) > MAX_FILE_BYTES:
+        raise ConfigError(f"{path} has more than {MAX_FILE_BYTES} bytes, the limit")
+    try:
+        return yaml.load(content, Loader)  # noqa: S506  # it is a SafeLoader
+    # PyYAML passes on Python's errors about encoding, numbers of thousands of digits, and [[[[[...
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ConfigError(f"{path} is not YAML: {' '.join(str(error).split())[:200]}") from None

@@ -17,8 +17,10 @@ from lupin_twin.adapt.table import ConfigError
 from lupin_twin.core.diagnostics import OK, WARN, Finding
 from lupin_twin.core.drops import DropCounts
 
+MAX_FRAMES: Final = 1_000
 # A chain goes from a tag over camera, arm, base and odometry to the map; a longer one is a loop.
 MAX_STEPS: Final = 32
+MAX_NAME: Final = 256
 # A stamp may be this far in the future: a clock may be ahead, and AMCL post-dates its transforms.
 _AHEAD_NS: Final = 10_000_000_000
 # How long a detection waits for its transform.
@@ -54,25 +56,46 @@ class Transform:
         )
 
 
-class Frames(dict[str, Transform]):
-    """The latest transform of each frame."""
+class Frames:
+    """The latest transform of each frame.
+
+    Too many moving frames replace the one updated longest ago. A static frame is sent only once, so
+    it stays.
+    """
+
+    def __init__(self) -> None:
+        # The one updated longest ago is the first.
+        self._moving: dict[str, Transform] = {}
+        self._static: dict[str, Transform] = {}
+
+    def __contains__(self, frame: str) -> bool:
+        return frame in self._moving or frame in self._static
 
     def put(self, frame: str, transform: Transform) -> None:
         """Store a transform as the frame's latest.
 
         Raises:
-            FrameError: it is not finite, or without rotation.
+            FrameError: not finite, without rotation, a bad name, or one static frame too many.
 
         """
         numbers = (*transform.move, *transform.turn)
         length = math.hypot(*transform.turn)
         if not all(abs(number) < 1e6 for number in numbers) or length < 1e-3:  # NaN is neither
             raise FrameError(f"the transform to {frame[:64]!r} has {numbers}, which is invalid")
-        self[frame] = transform
+        if not 0 < len(frame) <= MAX_NAME or not 0 < len(transform.parent) <= MAX_NAME:
+            raise FrameError(f"a frame's name has {len(frame)} characters, the limit: {MAX_NAME}")
+        table = self._moving if transform.stamp_ns is not None else self._static
+        if table is self._static and frame not in table and len(table) >= MAX_FRAMES:
+            raise FrameError(f"more than {MAX_FRAMES} static frames, the limit")
+        self._moving.pop(frame, None)
+        self._static.pop(frame, None)
+        table[frame] = transform
+        if len(table) > MAX_FRAMES:
+            del table[next(iter(table))]
 
     def stamp_ns(self, frame: str) -> int | None:
         """Stamp of the frame's own transform; None if there is none, or it is static."""
-        found = self.get(frame)
+        found = self._moving.get(frame)
         return None if found is None else found.stamp_ns
 
     def place(
@@ -88,7 +111,7 @@ class Frames(dict[str, Transform]):
         for _ in range(MAX_STEPS):
             if name == inside:
                 return at
-            step = self.get(name)
+            step = self._moving.get(name) or self._static.get(name)
             if step is None:
                 raise FrameError(
                     f"TF has no path from {frame!r} to {inside!r} (frame_id): it ends at {name!r}"
@@ -111,8 +134,9 @@ class Sightings:
 
     def see(self, frame: str, tag_id: str, stamp_ns: int, now_ns: int) -> None:
         """Add a tag that was detected at `stamp_ns`; its transform is that of `frame`."""
-        begun_ns = self._waiting.get(frame, ("", 0, now_ns))[2]
-        self._waiting[frame] = (tag_id, stamp_ns, begun_ns)
+        if len(self._waiting) < MAX_FRAMES:
+            begun_ns = self._waiting.get(frame, ("", 0, now_ns))[2]
+            self._waiting[frame] = (tag_id, stamp_ns, begun_ns)
 
     def come(self, frames: Frames) -> list[tuple[str, str]]:
         """Tag and frame of each detection whose transform has arrived."""

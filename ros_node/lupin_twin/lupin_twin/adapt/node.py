@@ -49,6 +49,8 @@ from lupin_twin.ros.base_node import NodeUtilities, latched, qos_of, waker
 MAX_TOPIC_LENGTH: Final = 1_000
 # Matches every publisher, also BEST_EFFORT ones.
 ANY_PUBLISHER: Final = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
+# A message of this size that claims one element per byte takes 45 MB before it is refused.
+MAX_MESSAGE_BYTES: Final = 200_000
 # A stamp that is farther than this from now comes from a wrong clock.
 MAX_SKEW_S: Final = 10.0
 # Odometry arrives at 100 Hz; the nearest tag is searched only as often as a robot can reach one.
@@ -132,6 +134,11 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         def read(data: bytes) -> None:
             source.received += 1
             source.received_s = time.monotonic()
+            if len(data) > MAX_MESSAGE_BYTES:
+                self._drop(
+                    Reason.SIZE, topic, f"{len(data)} bytes, the limit is {MAX_MESSAGE_BYTES}"
+                )
+                return
             try:
                 message = deserialize_message(data, kind)
             except Exception as error:  # noqa: BLE001  # rclpy raises several kinds
@@ -305,7 +312,11 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
         assert self._config.broker is not None
         for message in self._mqtt.take():
             self._sources[MQTT].received += 1
-            topic = message.topic
+            try:
+                topic = message.topic
+            except UnicodeDecodeError as error:  # some brokers let it pass
+                self._drop(Reason.UNREADABLE, MQTT, f"topic is not UTF-8: {error}", case="topic")
+                continue
             if len(topic) > MAX_TOPIC_LENGTH:
                 why = f"its topic has {len(topic)} characters, the limit: {MAX_TOPIC_LENGTH}"
                 self._drop(Reason.SIZE, f"MQTT {topic[:80]}", why, case="topic")

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from statistics import fmean, stdev
 from typing import Final
 
 from lupin_twin.adapt.config import Config
@@ -32,17 +31,37 @@ SCAN_FAILED: Final = 2
 
 
 @dataclass(slots=True)
+class _Mean:
+    """Running mean and spread (Welford 1962)."""
+
+    number: int = 0
+    mean: float = 0.0
+    squares: float = 0.0
+
+    def add(self, value: float) -> None:
+        self.number += 1
+        step = value - self.mean
+        self.mean += step / self.number
+        self.squares += step * (value - self.mean)
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the readings; 0 for a single one."""
+        return math.sqrt(self.squares / (self.number - 1)) if self.number > 1 else 0.0
+
+
+@dataclass(slots=True)
 class _Window:
     """Readings at one tag since `begun_ns`."""
 
     begun_ns: int
     newest_ns: int = 0
-    values: dict[str, list[float]] = field(default_factory=dict)
+    means: dict[str, _Mean] = field(default_factory=dict)
 
     def add(self, sensor: str, value: float, stamp_ns: int) -> bool:
-        if sensor not in self.values and len(self.values) >= MAX_SENSORS_PER_TAG:
+        if sensor not in self.means and len(self.means) >= MAX_SENSORS_PER_TAG:
             return False
-        self.values.setdefault(sensor, []).append(value)
+        self.means.setdefault(sensor, _Mean()).add(value)
         self.newest_ns = max(self.newest_ns, stamp_ns)
         return True
 
@@ -139,19 +158,16 @@ class Scans:
         window, tag_id = self._visit, self.tag
         if window is None or tag_id is None:
             return
-        if window.values:
+        if window.means:
             yield self._scan(tag_id, window)
         elif now_ns - window.begun_ns >= STAYED_NS:
             stayed_s = (now_ns - window.begun_ns) / NANOSECONDS_PER_SECOND
             yield self.failed(tag_id, f"no reading in {stayed_s:.0f} s here", now_ns)
 
     def _scan(self, tag_id: str, window: _Window, *, is_fixed: bool = False) -> Scan:
-        sensors = sorted(window.values.items())
-        detail = ", ".join(
-            f"{name} ±{stdev(values) if values[1:] else 0.0:.2g} of {len(values)}"
-            for name, values in sensors
-        )
-        readings = tuple(Reading(name, fmean(values)) for name, values in sensors)
+        means = sorted(window.means.items())
+        detail = ", ".join(f"{name} ±{mean.spread:.2g} of {mean.number}" for name, mean in means)
+        readings = tuple(Reading(name, mean.mean) for name, mean in means)
         return self._built(tag_id, window.newest_ns, readings, detail, is_fixed=is_fixed)
 
     def _built(

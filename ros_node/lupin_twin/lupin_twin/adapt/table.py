@@ -96,8 +96,12 @@ def check_text(what: str, value: Any) -> str:
 
 def is_number(value: Any) -> bool:
     """Whether it is a finite number."""
-    is_plain = isinstance(value, int | float) and not isinstance(value, bool)
-    return is_plain and abs(value) < math.inf
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer of hundreds of digits
+        return False
 
 
 _SHORT: Final = reprlib.Repr()
@@ -106,7 +110,10 @@ _SHORT.maxstring = 80
 
 def shown(value: Any) -> str:
     """The value for an error message; long text and nested content are cut."""
-    text = _SHORT.repr(value)
+    try:
+        text = _SHORT.repr(value)
+    except ValueError:  # an integer of thousands of digits
+        text = f"a very large {type(value).__name__}"
     return text if len(text) <= 80 else f"{text[:79]}…"
 
 

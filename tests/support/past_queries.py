@@ -12,7 +12,6 @@ from lupin_bridge.past.plans import Answered
 from lupin_bridge.serving.admission import Answer
 from lupin_twin.core.past import PastRefused
 from lupin_twin.core.state import Snapshot
-from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.runtime.workers import ShouldStop
 
 
@@ -65,17 +64,6 @@ class Body:
     def __call__(self, find: Find, should_stop: ShouldStop) -> Answered:
         """See `PastQuery`."""
         return Answered("x", Answer(b"7" * self.count, "text/plain", {}))
-
-
-@dataclass(frozen=True, slots=True)
-class MapCells:
-    """The number of cells of the map that is sent with it, and the map's identity over there."""
-
-    occupancy: OccupancyMap
-
-    def __call__(self, find: Find, should_stop: ShouldStop) -> tuple[int, int]:
-        """See `PastQuery`."""
-        return (self.occupancy.cells.size, id(self.occupancy))
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import io
 import itertools
 import logging
 import os
@@ -20,7 +19,6 @@ from typing import Any, Final, TypeVar
 from lupin_bridge.feed.query import HEAD, Now, PastQuery
 from lupin_bridge.feed.tasks import end
 from lupin_twin.core.past import NotRemembered
-from lupin_twin.field.explored import OccupancyMap
 
 log = logging.getLogger(__name__)
 
@@ -54,8 +52,7 @@ class PastProcess:
         self._queries: asyncio.StreamWriter | None = None
         # When the process has to have reacted; None: it has.
         self._patience: asyncio.Timeout
-        self._unsent: dict[int, tuple[bytes, OccupancyMap | None]] = {}
-        self._sent_map: OccupancyMap | None = None
+        self._unsent: dict[int, bytes] = {}
         self._life: asyncio.Task[None] | None = None
 
     async def stop(self) -> None:
@@ -76,12 +73,11 @@ class PastProcess:
             raise NotRemembered(self.why_down)
         if len(self.pending) >= MAX_PENDING:
             raise NotRemembered(f"{MAX_PENDING} requests about the past are under way, the limit")
-        packer = _Packer()
-        packer.dump((query, now, cost_s))
+        message = pickle.dumps((query, now, cost_s), 5)
         number = next(self._numbers)
         answer = self.pending[number] = asyncio.get_running_loop().create_future()
         try:
-            self._unsent[number] = packer.file.getvalue(), packer.map
+            self._unsent[number] = message
             if self._life is None:
                 self._life = asyncio.create_task(self._live(), name="past")
             self._send()
@@ -103,10 +99,7 @@ class PastProcess:
     def _send(self) -> None:
         if self._queries is None:
             return
-        for number, (query, occupancy_map) in self._unsent.items():
-            if occupancy_map is not None and occupancy_map is not self._sent_map:
-                self._sent_map = occupancy_map
-                self._queries.write(pickle.dumps((0, occupancy_map), 5))
+        for number, query in self._unsent.items():
             self._queries.write(pickle.dumps((number, query), 5))
         self._unsent.clear()
 
@@ -142,7 +135,7 @@ class PastProcess:
         assert process.stdin is not None
         assert process.stdout is not None
         self.starts += 1
-        self.pid, self._queries, self._sent_map = process.pid, process.stdin, None
+        self.pid, self._queries = process.pid, process.stdin
         try:
             self._send()
             async with asyncio.timeout(None) as self._patience:
@@ -172,22 +165,6 @@ class PastProcess:
             answer.set_exception(value)
         else:
             answer.set_result(value)
-
-
-class _Packer(pickle.Pickler):
-    """Pickles a query without its map, which may be large: `map` is sent once."""
-
-    def __init__(self) -> None:
-        self.file = io.BytesIO()
-        super().__init__(self.file, 5)
-        self.map: OccupancyMap | None = None
-
-    def persistent_id(self, value: Any) -> str | None:
-        """The placeholder of a map; None: any other value is pickled."""
-        if not isinstance(value, OccupancyMap):
-            return None
-        self.map = value
-        return "map"
 
 
 def _exit_text(code: int) -> str:

@@ -8,7 +8,6 @@ loads no ROS.
 from __future__ import annotations
 
 import gc
-import io
 import os
 import pickle
 import signal
@@ -104,16 +103,14 @@ Search = Callable[[Any, ShouldStop], Any]
 class Child:
     """Answers queries until its input ends; `recall` runs them on the log.
 
-    The input is pairs of a number and one of these: a query, pickled with its `Now` and its cost;
-    None, which cancels the query of that number; or the map that later queries refer to.
+    The input is pairs of a number and a query, pickled with its `Now` and its cost; or None, which
+    cancels the query of that number.
     """
 
     def __init__(self, recall: type[Recall] = Recall) -> None:
         self._condition = UNKNOWN_JOURNAL
         self._recall = recall(lambda: self._condition)
         self._running: dict[int, Future[Any]] = {}
-        # Untyped: the module of its type is not imported before a map comes.
-        self._map: Any = None
         self._sending = threading.Lock()
         self._out: IO[bytes]
 
@@ -125,10 +122,8 @@ class Child:
                 number, message = pickle.load(queries)  # noqa: S301  # the parent's own
             except EOFError:
                 return
-            if isinstance(message, bytes):
+            if message is not None:
                 self._ask(number, message)
-            elif message is not None:
-                self._map = message
             else:
                 if (running := self._running.pop(number, None)) is not None:
                     running.cancel()
@@ -136,7 +131,7 @@ class Child:
 
     def _ask(self, number: int, message: bytes) -> None:
         try:
-            query, now, cost_s = _Unpickler(message, self._map).load()
+            query, now, cost_s = pickle.loads(message)  # noqa: S301  # the parent's own
             search = self._search(query, now)
         except Exception as error:  # noqa: BLE001  # goes to the caller
             self._send(number, True, error)
@@ -170,18 +165,6 @@ class Child:
         with self._sending:
             self._out.writelines((HEAD.pack(number, len(answer)), answer))
             self._out.flush()
-
-
-class _Unpickler(pickle.Unpickler):
-    """Unpickles a query, whose map was sent before it (see `past_process`)."""
-
-    def __init__(self, message: bytes, occupancy_map: Any) -> None:
-        super().__init__(io.BytesIO(message))
-        self._map = occupancy_map
-
-    def persistent_load(self, _: Any) -> Any:
-        """The map."""
-        return self._map
 
 
 _OF_LOG: Final[dict[Any, Callable[[sqlite3.Connection, Any], Any]]] = {

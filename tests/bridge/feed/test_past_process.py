@@ -11,7 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from lupin_bridge.feed import past_process
@@ -20,11 +19,9 @@ from lupin_bridge.feed.query import NICENESS, Now, export_step
 from lupin_bridge.past.plans import Answered
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
-from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.writes import Export
 from tests.support.journal import NOW, SECOND, append, scan
-from tests.support.maps import map_of
-from tests.support.past_queries import Body, Count, Endless, Failing, MapCells, Running
+from tests.support.past_queries import Body, Count, Endless, Failing, Running
 from tests.support.waiting import until
 
 pytestmark = pytest.mark.usefixtures("children_know_the_tests")
@@ -114,20 +111,6 @@ def test_a_query_that_is_no_longer_awaited_ends_in_the_process(path: Path, run: 
         while (await past.ask(Running(), now(path), 0.0))[0]:
             pass
         assert past.pending == {}
-
-    run(test)
-
-
-def test_a_map_is_sent_to_the_process_once(path: Path, run: Run) -> None:
-    def a_map(revision: int) -> OccupancyMap:
-        return map_of(np.zeros((revision, 1_000)), revision=revision)
-
-    async def test(past: PastProcess) -> None:
-        first, second = a_map(1), a_map(2)
-        cells, over_there = await past.ask(MapCells(first), now(path), 0.0)
-        assert cells == 1_000
-        assert (await past.ask(MapCells(first), now(path), 0.0))[1] == over_there
-        assert (await past.ask(MapCells(second), now(path), 0.0))[0] == 2_000
 
     run(test)
 

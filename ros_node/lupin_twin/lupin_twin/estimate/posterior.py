@@ -217,7 +217,7 @@ class Posterior:
             found = left_out.changed()
             for row in judged.tolist():
                 z, offset, since_s = found[row]
-                _, expected, sd = self._said_of(tags[row], left_out.last(row, since_s))
+                expected, sd = self._expected_of(tags[row], left_out.last(row, since_s))
                 change = Change(z, offset * self.scale.spread, expected, sd, since_s)
                 result[self._tags[tags[row]]] = change
         return tuple(result)
@@ -287,15 +287,15 @@ class Posterior:
             rows = np.searchsorted(numbers, np.sort(tags))
             yield LeftOut.of(self._factor(near), INFLATION), numbers, rows
 
-    def _said_of(self, tag: int, off: Off) -> tuple[float, float, float]:
-        """A tag's latest reading, and the mean and sd predicted for it from the others.
+    def _expected_of(self, tag: int, off: Off) -> tuple[float, float]:
+        """The mean and sd predicted for a tag's latest reading from the others.
 
         The inflation applies to the true value, not to the noise of a reading.
         """
         newest = float(self._present.value[self._present.tag == tag][-1])
         noise, spread = self.hyper.noise, self.scale.spread
         true = max(off.variance - noise, 0.0)
-        return newest, newest - off.off * spread, (INFLATION**2 * true + noise) ** 0.5 * spread
+        return newest - off.off * spread, (INFLATION**2 * true + noise) ** 0.5 * spread
 
     def _in_unit(self, mean: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray]:
         scale = self.scale

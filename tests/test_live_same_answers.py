@@ -23,6 +23,9 @@ OF_A_MOMENT = (
     "/api/field.json?sensor_type=temperature&",
     "/api/field.npy?sensor_type=vpd&",
     "/api/field/quality?sensor_type=temperature&",
+    "/api/estimate/quality?",
+    "/api/estimate/tags?sensor_type=temperature&",
+    "/api/estimate/advice?sensor_type=temperature&",
 )
 # Routes whose answers have all that they had in commit 0f2ad56, and in the same form.
 UNCHANGED = ("/api/history?", "/api/field", "/api/export.csv?")

@@ -21,6 +21,7 @@ from lupin_bridge.judge.judging import NOTHING_JUDGED, Criteria, Judge, Judged, 
 from lupin_bridge.metrics import Metrics, Sample, route_class
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.messages import GreenhouseState
+from lupin_bridge.past.fields import Reported
 from lupin_bridge.past.plans import Answered
 from lupin_bridge.serving.admission import Admission, Answer, AnswerCache, Limits, RateLimit
 from lupin_bridge.settings import Settings
@@ -32,6 +33,7 @@ from lupin_bridge.viewers.rosbridge_session import Writer
 from lupin_twin.core.diagnostics import Origin
 from lupin_twin.core.drops import Reason
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
+from lupin_twin.runtime.estimates import Report, ReportRequest
 
 log = logging.getLogger(__name__)
 
@@ -92,7 +94,7 @@ class Bridge:
         self._states_unjudged = 0
         self._is_judge_failing = False
         self.estimates = EstimatePoller(
-            source,
+            self._report_on,
             lambda: None if self.latest is None else self.latest.snapshot,
             self.judge.note_changed,
         )
@@ -328,6 +330,16 @@ class Bridge:
         self._judged = self._judge_state(state.snapshot)
         self.hub.publish(self.frames.state(state.snapshot, state.revision, self._judged), now_s)
         self.metrics.push_seconds.observe(time.monotonic() - state.made_s)
+
+    async def _report_on(self, sensor: str, snapshot: Snapshot) -> Report:
+        wanted = Reported(
+            ReportRequest(sensor),
+            None,
+            snapshot.now_ns or snapshot.stamp_ns,
+            self.source.world.day_length_s,
+            self.criteria.sensors,
+        )
+        return await self.source.ask(wanted, wanted.cost_s(len(snapshot.tags)))
 
     def _judge_state(self, snapshot: Snapshot) -> Judged:
         try:

@@ -2,16 +2,17 @@
 
 On the greenhouses of `other_worlds`, at a moment of the second day. A sensor that has changed reads
 3 more from one scan on; all tags but that one are false alarms, and all in greenhouses where none
-has. An estimate is trusted by the scans of ten rounds, each compared with all tags but those
-beside it; its real accuracy is the mean coverage of all cells in these rounds. In half of the
-greenhouses the air becomes restless as they begin: parameters of a calm day are wrong then.
+has. An estimate is trusted by the scans of ten rounds, each predicted from earlier ones of all tags
+but those beside it. Its real accuracy is the mean coverage of all cells in these rounds. In half of
+the greenhouses the air becomes restless as they begin: parameters of a calm day are wrong then.
 """
 
 from collections import Counter
 
 import numpy as np
 
-from lupin_twin.estimate.engine import Record, Tally, thinned
+from lupin_twin.estimate.engine import thinned
+from lupin_twin.estimate.grading import Record, Tally, predicted
 from lupin_twin.estimate.kernel import Readings
 from lupin_twin.estimate.model import fit
 from lupin_twin.estimate.posterior import Posterior
@@ -58,20 +59,20 @@ def found_after(all_read: Readings, tag: int) -> tuple[dict[int, bool], int]:
 
 
 def trust(world: World, all_read: Readings) -> tuple[bool | None, float]:
-    """The verdict of ten rounds, and the mean coverage of all cells in them."""
-    scans = inside = 0
+    """The verdict of ten rounds by a model of the day before; the mean coverage of all cells."""
+    end_s = AT_S + ROUNDS * world.round_s
+    received = thinned(all_read.take(all_read.time_s <= AT_S), AT_S, DAY_S)
+    since = all_read.time_s > AT_S - DAY_S
+    graded = predicted(fit(received), all_read.take(since & (all_read.time_s <= end_s)), AT_S)
+    inside = [off <= INTERVAL_SDS * sd for _, off, sd in graded]
     covers = []
     places = case_of(world, "after one round", 0).places
     for number in range(1, ROUNDS + 1):
         at_s = AT_S + number * world.round_s
-        posterior = posterior_at(all_read, at_s)
-        held = posterior.left_out(np.arange(len(world.xy)))
-        scans += len(held)
-        inside += sum(abs(read - mean) <= INTERVAL_SDS * sd for read, mean, sd in held)
-        mean, sd = posterior.points(places)
+        mean, sd = posterior_at(all_read, at_s).points(places)
         truth = world.truth(places, np.full(len(places), at_s))
         covers.append((np.abs(truth - mean) <= INTERVAL_SDS * sd).mean())
-    tally = Tally(scans, inside)
+    tally = Tally(len(inside), sum(inside))
     return Record(0, tally, tally).is_trusted, float(np.mean(covers))
 
 

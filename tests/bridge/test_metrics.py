@@ -9,7 +9,7 @@ from websockets.sync.client import connect
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.metrics import CONTENT_TYPE, METRICS
 from lupin_bridge.settings import Settings
-from lupin_twin.estimate.engine import Record, Tally
+from lupin_twin.estimate.grading import Record, Tally
 from lupin_twin.runtime.estimates import Report
 from tests.bridge.test_bridge import Script
 from tests.support.messages import scan
@@ -70,7 +70,7 @@ def test_wrong_estimates_are_counted_by_sensor() -> None:
     bridge = Bridge(source, Settings())
     right, wrong = (Record(1, tally, tally) for tally in (Tally(90, 81), Tally(90, 10)))
     for name, record, problem in (("co2", right, "singular"), ("light", wrong, "")):
-        bridge.estimates.known[name] = Report(1, 1, problem, record)
+        bridge.estimates.known[name] = Report(1, True, problem, record)
     text = bridge.metrics.text().decode()
     for name, sensor, value in (
         ("trusted", "co2", 1.0),

@@ -60,8 +60,8 @@ def taken(browser: Browser, folder: Path) -> None:
         known = [row for row in reported if row.stamp_ns <= end_ns]
         robot = Robot(row for row in reported if isinstance(row, Scan) and row.stamp_ns > end_ns)
         append(journal, known, Clock(now_ns, now_ns, is_simulated=False))
-        world = ("--world", f"day_length_s={DAY_S}")
-        with bridge(*world, "--ros-args", "-p", f"journal:={journal}") as running:
+        day = ("-p", f"day_length_s:={DAY_S}.0")
+        with bridge("--ros-args", "-p", f"journal:={journal}", *day) as running:
             running.peer.publish_map(greenhouse_map())
             wait_for(lambda: is_fitted(running), "a model, and the map", READY_S)
             for name, before_s in PAST.items():

@@ -1,10 +1,10 @@
-"""`lupin-twin` with other limits, another world, or faults: for tests only.
+"""`lupin-twin` with other limits or faults: for tests only.
 
-`python -m tests.support.limited [--limit NAME=VALUE] [--world NAME=VALUE]
-[--constant MODULE:NAME=VALUE] [--raise MODULE:NAME:MARKER[:TIMES]] [--hang MODULE:NAME:MARKER]
-ROLE ...`, each as often as needed, is the command `lupin-twin ROLE ...`, whose `Limits`, `World`
-and modules have these values. `--raise` lets a function or method fail when the marker occurs in
-its arguments' text, TIMES times (1 without it); with `--hang` it prints "hangs" and never returns.
+`python -m tests.support.limited [--limit NAME=VALUE] [--constant MODULE:NAME=VALUE]
+[--raise MODULE:NAME:MARKER[:TIMES]] [--hang MODULE:NAME:MARKER] ROLE ...`, each as often as needed,
+is the command `lupin-twin ROLE ...`, whose `Limits` and modules have these values. `--raise` lets a
+function or method fail when the marker occurs in its arguments' text, TIMES times (1 without it);
+with `--hang` it prints "hangs" and never returns.
 """
 
 import argparse
@@ -19,7 +19,6 @@ from typing import Any
 
 from lupin_bridge.cli import command as cli_command
 from lupin_bridge.serving.admission import Limits
-from lupin_twin.core.parameters import World
 from lupin_twin.runtime.process import limit_blas_threads
 
 
@@ -57,7 +56,7 @@ def _sabotage(fault: str, do: Callable[[str], None]) -> None:
 
 def command() -> None:
     parser = argparse.ArgumentParser(allow_abbrev=False)
-    for name in ("--limit", "--world", "--constant", "--raise", "--hang"):
+    for name in ("--limit", "--constant", "--raise", "--hang"):
         parser.add_argument(name, action="append", default=[])
     options, rest = parser.parse_known_args()
     sys.argv[1:] = rest
@@ -70,7 +69,7 @@ def command() -> None:
     from lupin_bridge.cli import roles
 
     limits = partial(Limits, **_values(options.limit))
-    vars(roles).update(Limits=limits, World=partial(World, **_values(options.world)))
+    vars(roles).update(Limits=limits)
     for place, value in _values(options.constant).items():
         module, _, name = place.partition(":")
         vars(import_module(module))[name] = value

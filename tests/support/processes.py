@@ -188,7 +188,7 @@ def twin_node(domain: int, *ros_args: str, afresh: bool = False, **env: str) -> 
 def lupin_twin(domain: int, role: str, *args: str, afresh: bool = False, **env: str) -> Process:
     """`lupin-twin ROLE` on a free port; `url_of` gives its address."""
     has_faults = bool({"--raise", "--hang"} & {*args})
-    is_other = has_faults or {"--limit", "--world", "--constant"} & {*args}
+    is_other = has_faults or {"--limit", "--constant"} & {*args}
     module = "tests.support.limited" if is_other else "lupin_bridge.cli.command"
     command = [sys.executable, "-m", module, role, "--port", "0", *args]
     # A failing function has to be replaced before anything imports it.

@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-import math
 import os
 import socket
 import subprocess
@@ -46,7 +45,8 @@ from lupin_bridge.serving.server import (
 )
 from lupin_bridge.settings import Secrets, SettingError, Settings, option, unix_path, variable
 from lupin_bridge.stream.frames import STALE_AFTER_S
-from lupin_twin.core.parameters import ParameterError, World
+from lupin_twin.core.diagnostics import Origin
+from lupin_twin.core.parameters import ParameterError
 from lupin_twin.journal.appending import is_empty, simulated
 from lupin_twin.journal.paths import demo_journal_path
 from lupin_twin.journal.schema import FILE_ERRORS, Foreign, open_reader
@@ -63,14 +63,14 @@ _TIMEOUT_S: Final = 30.0
 class Feed:
     """What feeds a demo's twin: a module and its arguments, run in a process of its own.
 
-    `twin_args` are arguments of ROS for the twin alone, and `world` is what it then observes.
+    `twin_args` are arguments of ROS for the twin alone; `origin` is that of its observations.
     `journal` is the file to fill with a past of this patrol; None: there is none to fill.
     """
 
     what: str
     command: list[str]
     twin_args: list[str]
-    world: World
+    origin: Origin
     journal: Path | None = None
     patrol_args: Sequence[str] = ()
 
@@ -94,8 +94,13 @@ def patrolled(
     return Feed(
         "patrol",
         ["lupin_patrol", "--end-with-parent", *patrol_args, *ros_args],
-        [] if path is None else ["--ros-args", "-p", f"journal:={json.dumps(str(path))}", "--"],
-        World("simulated", DAY_S / _speed(patrol_args)),
+        _parameters(
+            # The robot reports the whole floor: fields end at the walls.
+            clip_to_explored=True,
+            day_length_s=float(DAY_S / _speed(patrol_args)),
+            **({} if path is None else {"journal": str(path)}),
+        ),
+        "simulated",
         None if is_another else path,
         patrol_args,
     )
@@ -116,18 +121,19 @@ def recorded(
     with Recording([Path(file) for file in files]) as recording:
         inputs = recording.inputs
     journal = folder / "journal.sqlite"
-    values = {INPUTS[kind].parameter: json.dumps(name) for name, kind in inputs.items()}
-    values |= {"journal": json.dumps(str(journal)), "use_sim_time": "true"}
+    topics = {INPUTS[kind].parameter: name for name, kind in inputs.items()}
     return Feed(
         "player",
         ["lupin_bridge.bags.player", *files, *play_args, *ros_args],
-        [
-            "--ros-args",
-            *(word for name, value in values.items() for word in ("-p", f"{name}:={value}")),
-            "--",
-        ],
-        World("recorded"),
+        _parameters(**topics, journal=str(journal), use_sim_time=True),
+        "recorded",
     )
+
+
+def _parameters(**values: object) -> list[str]:
+    """Arguments of ROS that set parameters."""
+    words = (("-p", f"{name}:={json.dumps(value)}") for name, value in values.items())
+    return ["--ros-args", *(word for pair in words for word in pair), "--"]
 
 
 def with_past(feed: Feed) -> Feed:
@@ -178,8 +184,8 @@ def since_morning_s(past_ns: int, patrol_args: Sequence[str], now_ns: int) -> fl
 
 def _speed(patrol_args: Sequence[str]) -> float:
     speed = float(_option("speed", patrol_args) or 1.0)
-    # The patrol itself refuses what is no speed.
-    return speed if 0.0 < speed < math.inf else 1.0
+    # The patrol itself refuses any other.
+    return speed if 0.1 <= speed <= 50.0 else 1.0
 
 
 def _option(name: str, patrol_args: Sequence[str]) -> str:
@@ -324,8 +330,8 @@ def _source_of(
         )
     # The feed's arguments are for the twin alone: its feeder has no journal.
     own_args = [] if feed is None else feed.twin_args
-    world = World() if feed is None else feed.world
-    return LocalTwin(ros_args=[*own_args, *ros_args], timeout_s=timeout_s, world=world)
+    origin: Origin = "robot" if feed is None else feed.origin
+    return LocalTwin(ros_args=[*own_args, *ros_args], timeout_s=timeout_s, origin=origin)
 
 
 class Feeder:

@@ -11,13 +11,12 @@ from typing import Any, TypeVar
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
 from lupin_bridge.feed.source import TwinUpdate
-from lupin_twin.core.diagnostics import Condition
+from lupin_twin.core.diagnostics import Condition, Origin
 from lupin_twin.core.notes import Note
-from lupin_twin.core.parameters import World
+from lupin_twin.core.parameters import DAY_S, World
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
 from lupin_twin.ros.node import TwinNode
-from lupin_twin.runtime.estimates import Report, ReportRequest
 
 ResultT = TypeVar("ResultT")
 
@@ -29,10 +28,11 @@ class LocalTwin(RosSource[TwinNode]):
     """`TwinSource` over a `TwinNode` of this process."""
 
     def __init__(
-        self, *, ros_args: Sequence[str], timeout_s: float, world: World = World()
+        self, *, ros_args: Sequence[str], timeout_s: float, origin: Origin = "robot"
     ) -> None:
         super().__init__(ros_args=ros_args, timeout_s=timeout_s)
-        self._world = world
+        self._origin = origin
+        self._day_length_s = DAY_S
         # A restarted server must never match an ETag of its predecessor, whose counts it repeats.
         self.identity = uuid.uuid4().hex[:12]
         # Never None once started: the first one comes before `start` returns.
@@ -44,7 +44,8 @@ class LocalTwin(RosSource[TwinNode]):
         """Start the ROS thread with its node; see `TwinSource.start`."""
 
         def make_node(context: Any, post: Post) -> TwinNode:
-            node = TwinNode(context=context, world=self._world)
+            node = TwinNode(context=context, origin=self._origin)
+            self._day_length_s = node.parameters.day_length_s
 
             def notify(snapshot: Snapshot) -> None:
                 post(
@@ -69,15 +70,11 @@ class LocalTwin(RosSource[TwinNode]):
     @property
     def world(self) -> World:
         """See `TwinSource`."""
-        return self._world
+        return World(self._origin, self._day_length_s)
 
     def journal(self) -> Condition:
         """The node's journal."""
         return self.update.journal
-
-    async def estimate_report(self, request: ReportRequest) -> Report:
-        """The report that the node makes of its log."""
-        return await self._in_time(self._result(lambda node: node.estimates.report(request)))
 
     writes_notes = True
 

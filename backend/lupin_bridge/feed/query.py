@@ -122,7 +122,7 @@ class Child:
                 number, message = pickle.load(queries)  # noqa: S301  # the parent's own
             except EOFError:
                 return
-            if isinstance(message, bytes):
+            if message is not None:
                 self._ask(number, message)
             else:
                 if (running := self._running.pop(number, None)) is not None:

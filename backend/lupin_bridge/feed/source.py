@@ -27,7 +27,6 @@ from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Scan, Snapshot
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.writes import NOTES_S, STRETCH_S, WRITES_S, Export
-from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 
 # A stamp farther ahead of the twin's time than this comes from a wrong clock.
@@ -272,15 +271,6 @@ class TwinSource(ABC):
     def occupancy_map(self) -> OccupancyMap | None:
         """The latest map, if any has come."""
         return None if self.update is None else self.update.occupancy_map
-
-    @abstractmethod
-    async def estimate_report(self, request: ReportRequest) -> Report:
-        """The report on the quality of a sensor's estimates.
-
-        Raises:
-            TwinUnavailableError: no twin answers.
-
-        """
 
     async def robot(self, now_ns: int | None) -> Robot | None:  # noqa: ARG002  # for RosSource
         """What the robot has reported since the last call; None: this source never receives it.

@@ -21,13 +21,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from lupin_msgs.srv import GetEstimateReport, GetWrites
-
 from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.ros_source import Post, RosSource, now_ns_of
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.tasks import Guard, Periodic, end
-from lupin_bridge.feed.web_node import WebNode, check_ok
+from lupin_bridge.feed.web_node import WebNode
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastRefused
@@ -36,7 +34,6 @@ from lupin_twin.journal.follow import Followed, Lot, NotALotError, followed, wri
 from lupin_twin.journal.paths import journal_path
 from lupin_twin.journal.schema import FILE_ERRORS, Empty, Foreign, is_damage_error
 from lupin_twin.ros import convert_services
-from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
@@ -248,9 +245,6 @@ _LOOK_S: Final = 1.0
 # again when the silence has doubled, or has grown by this, whichever is first.
 _REJOIN_AGAIN_S: Final = 300.0
 
-# Rough worst-case time to read one tag of an answer.
-_READ_TAG_S: Final = 20e-6
-
 
 class WebTwin(RosSource[WebNode]):
     """`TwinSource` over the ROS contracts of a twin in another process.
@@ -375,18 +369,6 @@ class WebTwin(RosSource[WebNode]):
             UNKNOWN_JOURNAL if self.update is None else self.update.journal
         )
 
-    async def estimate_report(self, request: ReportRequest) -> Report:
-        """The answer of the twin's service."""
-        wanted = convert_services.report_request_message(request)
-        response = await self._request(GetEstimateReport, wanted)
-        check_ok(response)
-        cost_s = len(response.tag_ids) * _READ_TAG_S
-        reading = self.workers.submit(lambda _: convert_services.report_of(response), cost_s)
-        try:
-            return await asyncio.wrap_future(reading)
-        except ValueError as error:
-            raise TwinUnavailableError(f"the twin's answer cannot be used: {error}") from error
-
     async def now(self) -> Now:
         """See `TwinSource`."""
         if self.update is not None:
@@ -405,11 +387,7 @@ class WebTwin(RosSource[WebNode]):
         return await self._log.explain(error)
 
     async def _rows_behind(self, after: int) -> Lot:
-        response = await self._request(GetWrites, convert_services.rows_request_message(after))
-        return convert_services.lot_of(response, after)
-
-    async def _request(self, service: Any, request: Any) -> Any:
-        """The twin's response; `service` is the service's type.
+        """The rows of the twin's log after a number, from the twin's service.
 
         Raises:
             TwinUnavailableError: no twin answers in time.
@@ -421,15 +399,17 @@ class WebTwin(RosSource[WebNode]):
             raise TwinUnavailableError(
                 f"{self._silence(self._stale_after_s)}: is the twin running?"
             )
-        if why := await self.thread.call(lambda node: node.why_not(service)):
+        if why := await self.thread.call(lambda node: node.why_no_rows()):
             raise TwinUnavailableError(why)
-        return await self._in_time(
+        request = convert_services.rows_request_message(after)
+        response = await self._in_time(
             self.thread.ask(
-                lambda node: node.clients_of_twin[service].call_async(request),
+                lambda node: node.rows.call_async(request),
                 # Or rclpy would keep it for ever.
-                lambda node, future: node.clients_of_twin[service].remove_pending_request(future),
+                lambda node, future: node.rows.remove_pending_request(future),
             )
         )
+        return convert_services.lot_of(response, after)
 
 
 def _folder(node: WebNode) -> Path | None:

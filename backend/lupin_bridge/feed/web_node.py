@@ -9,18 +9,16 @@ from dataclasses import replace
 from hashlib import blake2b
 from typing import Any, Final
 
-from lupin_msgs.srv import GetEstimateReport, GetWrites
+from lupin_msgs.srv import GetWrites
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.validate_topic_name import validate_topic_name
 
-from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_twin.core import interfaces
 from lupin_twin.core.clock import StampWatch
 from lupin_twin.core.diagnostics import SelfReport, self_report
 from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.core.past import PastRefused, error_of
 from lupin_twin.core.state import Snapshot, TagState
-from lupin_twin.field.engine import FieldRefused, FieldRules
+from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap, digest_of
 from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import SERVICE_QOS, NodeUtilities
@@ -52,6 +50,7 @@ SHARED_PARAMETERS: Final = (
     "idw_power",
     "idw_falloff_radius_m",
     "idw_max_distance_m",
+    "clip_to_explored",
     "max_grid_cells",
 )
 
@@ -127,13 +126,9 @@ class WebNode(AdjustableNode):
         # Never called from here; roslib clients get its name.
         with naming("field_service_name", p.field_service_name):
             validate_topic_name(p.field_service_name, is_service=True)
-        self.clients_of_twin: dict[Any, Any] = {
-            kind: self.create_client(kind, name, qos_profile=SERVICE_QOS, callback_group=group)
-            for kind, name in (
-                (GetWrites, interfaces.GET_WRITES.name),
-                (GetEstimateReport, interfaces.GET_ESTIMATE_REPORT.name),
-            )
-        }
+        self.rows = self.create_client(
+            GetWrites, interfaces.GET_WRITES.name, qos_profile=SERVICE_QOS, callback_group=group
+        )
 
     # --- for the source, on this node's thread ------------------------------------------------
 
@@ -167,15 +162,15 @@ class WebNode(AdjustableNode):
         is_recent = time.monotonic() - self._reported_s < REPORT_HOLDS_S
         return self._report if is_recent else SelfReport()
 
-    def why_not(self, service: Any) -> str:
-        """Why the service cannot be called, for a person; empty: a twin offers it."""
-        if self.clients_of_twin[service].service_is_ready():
+    def why_no_rows(self) -> str:
+        """Why the log's rows cannot be requested, for a person; empty: a twin offers them."""
+        if self.rows.service_is_ready():
             return ""
         if self.count_publishers(self._topics["state_topic"]):
             guess = "the twin's state is received, so try again; is the service renamed there?"
         else:
             guess = "is it running?"
-        return f"no twin offers {self.clients_of_twin[service].service_name}: {guess}"
+        return f"no twin offers {self.rows.service_name}: {guess}"
 
     # --- callbacks ----------------------------------------------------------------------------
 
@@ -257,13 +252,3 @@ def _digest_of(tags: Sequence[TagState]) -> str:
         text = repr((tag.tag_id, tag.pose, readings))
         digest.update(text.encode("utf-8", "surrogatepass"))
     return digest.hexdigest()
-
-
-def check_ok(response: Any) -> None:
-    """Raise the error that a service's refusal states."""
-    if response.ok:
-        return
-    error = error_of(response.error_message)
-    if isinstance(error, PastRefused):
-        raise FieldRefused(str(error))
-    raise TwinUnavailableError(str(error))

@@ -26,11 +26,10 @@ from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.notes import Note, NotesUnwritable
 from lupin_twin.core.parameters import TwinParameters, World
-from lupin_twin.core.past import NotFound, NotRemembered
+from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import same_tags
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
-from lupin_twin.runtime.estimates import Report, ReportRequest
 from lupin_twin.runtime.workers import Workers
 
 log = logging.getLogger(__name__)
@@ -127,7 +126,6 @@ class Watching:
 # --- the source of one site's page ----------------------------------------------------------------
 
 HEARTBEAT_S: Final = 1.0
-_NO_REPORT: Final = "only the greenhouse's own twin knows how right estimates were"
 
 
 class SiteTwin(TwinSource):
@@ -276,10 +274,6 @@ class SiteTwin(TwinSource):
             kept_ns=() if reported is None else reported.kept_ns,
             journal_id=self.site,
         )
-
-    async def estimate_report(self, request: ReportRequest) -> Report:  # noqa: ARG002  # none
-        """Always raises `NotFound`: only the twin counts how right estimates were."""
-        raise NotFound(_NO_REPORT)
 
     writes_notes = True
 

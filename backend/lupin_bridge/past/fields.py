@@ -6,9 +6,8 @@ An estimate uses only what the log has up to its moment.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from typing import Final
 
 import orjson
@@ -17,10 +16,11 @@ from lupin_bridge import field as formats
 from lupin_bridge.feed.query import Find
 from lupin_bridge.field import JSON, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.judging import Criteria
-from lupin_bridge.judge.quantities import DAILY, Sensor
+from lupin_bridge.judge.quantities import DAILY, Sensor, Sensors
 from lupin_bridge.judge.verdict import plausible, with_derived
 from lupin_bridge.past.plans import Plan, StateQuery, etag_of, plan_of, series_s, with_daily
 from lupin_bridge.serving.admission import REVALIDATE, Answer
+from lupin_bridge.stream.pollers import sensors_of
 from lupin_twin.core.past import MAX_POINTS
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, TagState, samples_of
 from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast, moment_of
@@ -39,7 +39,16 @@ from lupin_twin.field.engine import (
 from lupin_twin.field.explored import OccupancyMap, digest_of
 from lupin_twin.field.grid import FieldGrid, far_off_tags
 from lupin_twin.journal.queries import NEWEST_S_PER_TAG
-from lupin_twin.runtime.estimates import AS_OF, estimate_at, readings_at
+from lupin_twin.runtime.estimates import (
+    AS_OF,
+    REPORT_DAYS,
+    REPORT_S,
+    Report,
+    ReportRequest,
+    estimate_at,
+    readings_at,
+    report_of,
+)
 from lupin_twin.runtime.workers import ShouldStop
 
 # Costs, s of one core, at worst: to write a cell or pixel, to judge a tag.
@@ -47,23 +56,21 @@ _WRITE_CELL_S: Final = 50e-9
 _JUDGE_TAG_S: Final = 20e-6
 # The cost of a field that will be refused.
 _LARGE_S: Final = 1.0
-# Cached for the map in use, which many fields share.
-_digest_of: Final = lru_cache(maxsize=1)(digest_of)
 
 
 @dataclass(frozen=True, slots=True)
 class Field(StateQuery):
-    """A field in a format (None: its quality), by these rules, on the current map.
+    """A field in a format (None: its quality), by these rules.
 
     The default box is that of the tags as they were pinned then. Daily quantities are derived from
     each tag's readings of a day; the clock decides whether it was day. Live and past fields differ
-    in the source of the snapshot, and in their ETags (`newest_etag`).
+    in the source of the snapshot, and in their ETags (`newest_etag`). Only a live field is clipped
+    to the map: the log does not have the map of a past moment.
     """
 
     query: FieldQuery
     field_format: FieldFormat | None
     rules: FieldRules
-    occupancy: OccupancyMap | None = field(compare=False)
     criteria: Criteria = field(compare=False)
 
     def check(self) -> None:
@@ -107,8 +114,13 @@ class Field(StateQuery):
             snapshot = replace(snapshot, tags=tuple(tags))
         return self.plan(snapshot)
 
-    def plan(self, snapshot: Snapshot, etag: str | None = None) -> Plan:
-        """The plan of the answer from a snapshot; `etag` None: it is made of content.
+    def plan(
+        self,
+        snapshot: Snapshot,
+        etag: str | None = None,
+        occupancy: OccupancyMap | None = None,
+    ) -> Plan:
+        """The plan of the answer from a snapshot; `etag` None: it is made of content, without a map.
 
         Raises:
             lupin_twin.field.engine.FieldRefused: a bad request.
@@ -121,13 +133,11 @@ class Field(StateQuery):
         far_off = far_off_tags(snapshot.tags)
 
         def content_etag(kind: str, *content: object) -> str:
-            # By content: the revision of a map is one process's own.
-            digest = None if self.occupancy is None else _digest_of(self.occupancy)
-            built_from = (request, samples, *content, far_off, self.rules, digest, sensors.text)
+            built_from = (request, samples, *content, far_off, self.rules, sensors.text)
             return etag_of(kind, built_from)
 
         def quality(should_stop: ShouldStop) -> bytes:
-            grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)
+            grid = compute_field(request, samples, occupancy, self.rules, should_stop)
             return _quality(grid, tags, sensor, self.rules, should_stop)
 
         if self.field_format is None:
@@ -138,7 +148,7 @@ class Field(StateQuery):
         etag = etag or content_etag(f"field {field_format.name} {scale}")
 
         def write(should_stop: ShouldStop) -> Answer:
-            grid = compute_field(request, samples, self.occupancy, self.rules, should_stop)
+            grid = compute_field(request, samples, occupancy, self.rules, should_stop)
             body = formats.write(grid, field_format, request.sensor_type, sensors, scale)
             metadata = formats.metadata(grid, sensor)
             return _answer(body, field_format, sensor, etag, metadata=metadata, far_off=far_off)
@@ -280,3 +290,94 @@ def _that_count(pasts: Sequence[TagPast], since_ns: int, sensor: Sensor) -> list
 
     those = (replace(past, readings=tuple(filter(counts, past.readings))) for past in pasts)
     return [past for past in those if past.readings]
+
+
+# --- reports on estimates ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Reported:
+    """A `PastQuery` for the report on a sensor's estimates, as of a moment of the log.
+
+    Without a moment it is that of the current estimate, see `Estimated`. `occupancy` is where
+    another tag could stand.
+    """
+
+    request: ReportRequest
+    at_ns: int | None
+    now_ns: int
+    day_length_s: float
+    sensors: Sensors = field(compare=False)
+    occupancy: OccupancyMap | None = field(default=None, compare=False)
+
+    def __call__(self, find: Find, should_stop: ShouldStop) -> Report:
+        """Make the report of what the log has."""
+        pasts, at_ns = self.look_up(find)
+        return self.report(pasts, at_ns, should_stop)
+
+    @property
+    def up_to_ns(self) -> int:
+        """The moment up to which the log counts."""
+        return self.now_ns if self.at_ns is None else self.at_ns
+
+    @staticmethod
+    def cost_s(tags: int) -> float:
+        """The approximate cost of a report, s of one core."""
+        return REPORT_DAYS * tags * NEWEST_S_PER_TAG + REPORT_S
+
+    def look_up(self, find: Find) -> tuple[list[TagPast], int]:
+        """The plausible readings of `REPORT_DAYS`, and the moment of the report."""
+        name, day_s = self.request.sensor_type, self.day_length_s
+        up_to_ns = self.up_to_ns
+        find(up_to_ns)  # refuses a moment that is yet to come
+        pasts: list[TagPast] = find(
+            lambda log: readings_at(log, name, up_to_ns, day_s, REPORT_DAYS)
+        )
+        at_ns = moment_of(pasts, up_to_ns, day_s) if self.at_ns is None else self.at_ns
+        return _that_count(pasts, 0, self.sensors.named(name)), at_ns
+
+    def report(self, pasts: Sequence[TagPast], at_ns: int, should_stop: ShouldStop) -> Report:
+        """The report of these readings."""
+        day_s = self.day_length_s
+        return report_of(
+            self.request, pasts, at_ns, day_s, occupancy=self.occupancy, should_stop=should_stop
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Reports:
+    """The report that is wanted, or those on all sensors, as JSON by a function of `pollers`."""
+
+    wanted: Reported
+    is_of_all: bool
+    write_json: Callable[[Mapping[str, Report]], bytes]
+
+    def cost_s(self, tags: int) -> float:
+        """See `Query`: a greenhouse has a handful of sensors."""
+        return self.wanted.cost_s(tags) * (5 if self.is_of_all else 1)
+
+    def look(self, find: Find) -> Plan:
+        """See `Query`."""
+        every = [self.wanted]
+        if self.is_of_all:
+            snapshot: Snapshot = find(self.wanted.up_to_ns)
+            names = sensors_of(snapshot)
+            every = [replace(self.wanted, request=ReportRequest(name)) for name in names]
+        found = [(one, *one.look_up(find)) for one in every]
+        occupancy = self.wanted.occupancy
+        built_from = (
+            [(one.request, at_ns, pasts) for one, pasts, at_ns in found],
+            self.wanted.day_length_s,
+            self.wanted.sensors.text,
+            None if occupancy is None else digest_of(occupancy),
+        )
+
+        def write(should_stop: ShouldStop) -> bytes:
+            return self.write_json(
+                {
+                    one.request.sensor_type: one.report(pasts, at_ns, should_stop)
+                    for one, pasts, at_ns in found
+                }
+            )
+
+        return plan_of(etag_of(f"estimate {self.write_json.__name__}", built_from), write)

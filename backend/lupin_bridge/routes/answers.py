@@ -382,8 +382,9 @@ async def newest_field(bridge: Bridge, client: str, field: Field, etag: str) -> 
         bridge.admission.computing(client, is_large=cost_s > SMALL_S) as times,
         bridge.metrics.field_seconds.time(),
     ):
+        occupancy = bridge.source.occupancy_map()
         answer = await on_worker(
-            bridge, lambda stop: field.plan(snapshot, etag).write(stop), cost_s * times
+            bridge, lambda stop: field.plan(snapshot, etag, occupancy).write(stop), cost_s * times
         )
     bridge.cache.put(etag, answer)
     return answer

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final
 
 from annotated_types import Interval
 from fastapi import APIRouter, Request, Response
@@ -14,11 +14,10 @@ from pydantic import BaseModel
 from lupin_bridge import field as formats
 from lupin_bridge import query_string
 from lupin_bridge.access.middleware import client_of
-from lupin_bridge.bridge import Bridge
 from lupin_bridge.field import FORMATS, JSON, PNG, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.quantities import DAILY
-from lupin_bridge.past.fields import Estimated, Field
-from lupin_bridge.query_string import Name, needed, parameter, parameters_of, read
+from lupin_bridge.past.fields import Estimated, Field, Reported, Reports
+from lupin_bridge.query_string import AT, Name, needed, parameter, parameters_of, read
 from lupin_bridge.routes.answers import (
     NOT_REMEMBERED,
     REFUSALS,
@@ -28,7 +27,6 @@ from lupin_bridge.routes.answers import (
     list_header,
     newest_field,
     newest_of,
-    on_worker,
     read_route,
     refusal,
     refusing,
@@ -36,12 +34,11 @@ from lupin_bridge.routes.answers import (
     respond_as_of,
     respond_past,
 )
-from lupin_bridge.serving.admission import Answer, ClientLimitError, content_answer
+from lupin_bridge.serving.admission import ClientLimitError
 from lupin_bridge.stream import pollers, schema
-from lupin_bridge.stream.pollers import sensors_of
 from lupin_twin.core.past import PastRefused
 from lupin_twin.field.engine import FieldRefused
-from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, ReportRequest
+from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, Report, ReportRequest
 
 router = APIRouter()
 
@@ -143,7 +140,8 @@ FIELDS: Final = InFormats(
     summary="The field of one sensor",
     description="""Inverse-distance-weighted from the pinned tags; unknown where no tag is near.
 
-With `at`, it uses the tags as they were at that moment, with the current parameters and map.""",
+With `at`, it uses the tags as they were at that moment, with the current parameters. A field of the
+past is never clipped to the map: the log does not have the map of that moment.""",
     parameters=parameters_of(FieldQuery),
     model=schema.GetFieldResponse,
 )
@@ -157,7 +155,7 @@ async def _answer(request: Request, field_format: FieldFormat | None) -> Respons
     at_ns = query_string.at_of(query.at, now_ns)
     if at_ns is None and query.sensor_type in DAILY and now_ns is not None:
         at_ns = now_ns - now_ns % _MINUTE_NS
-    field = Field(at_ns, query, field_format, source.rules, source.occupancy_map(), bridge.criteria)
+    field = Field(at_ns, query, field_format, source.rules, bridge.criteria)
     field.check()
     if at_ns is None:
         etag, client = field.newest_etag(source.revision()), client_of(request)
@@ -203,7 +201,7 @@ async def _estimate(request: Request, field_format: FieldFormat) -> Response:
     now_ns, source = bridge.ros_time_ns, bridge.source
     at_ns = query_string.at_of(query.at, now_ns)
     estimated = Estimated(
-        *(at_ns, query, field_format, source.rules, None, bridge.criteria),
+        *(at_ns, query, field_format, source.rules, bridge.criteria),
         day_length_s=source.world.day_length_s,
         now_ns=now_ns or 0,
     )
@@ -225,6 +223,7 @@ class QualityQuery:
     """The parameters of `/api/estimate/quality`."""
 
     sensor_type: Name | None = parameter("this sensor only; default: all")
+    at: str | None = parameter(AT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,6 +231,7 @@ class TagsQuery:
     """The parameters of `/api/estimate/tags`."""
 
     sensor_type: Name = needed("name of a sensor, as in a reading")
+    at: str | None = parameter(AT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,81 +243,75 @@ class AdviceQuery(TagsQuery):
     )
 
 
-QueryT = TypeVar("QueryT", QualityQuery, TagsQuery, AdviceQuery)
-
-_REPORTED: Final = {**NOT_REMEMBERED, **refusing({404: "only the site's own twin has it"})}
-
-# Rough time to write a tag, s.
-_WRITE_TAG_S: Final = 10e-6
-
-
 @read_route(
     router,
     "/api/estimate/quality",
     summary="How often the estimates of each sensor were right",
-    responses={**_REPORTED, 200: {"model": pollers.EstimateQualities}},
+    responses={**NOT_REMEMBERED, 200: {"model": pollers.EstimateQualities}},
     openapi_extra={"parameters": parameters_of(QualityQuery)},
 )
 async def quality(request: Request) -> Response:
-    """Each new scan is compared with a prediction that leaves out its own tag and those beside it.
+    """Each new scan is compared with a prediction from what was known before it.
 
-    This shows how accurate the estimate is between tags: 9 of 10 scans should lie in the predicted
-    interval. Counts are hourly, over the last day and week, since the twin started.
+    Its own tag and those beside it are left out, which shows how accurate the estimate is between
+    tags: 9 of 10 scans should lie in the predicted interval. Scans of the last day and week count,
+    up to the last whole hour.
     """
-
-    async def body(bridge: Bridge, query: QualityQuery) -> bytes:
-        names = [query.sensor_type] if query.sensor_type else sensors_of(newest_of(bridge))
-        reports = {name: await bridge.source.estimate_report(ReportRequest(name)) for name in names}
-        return pollers.qualities(reports)
-
-    return await _report(request, QualityQuery, body)
+    query = read(QualityQuery, request.query_params.multi_items())
+    # With `is_of_all`, the name is only a placeholder.
+    wanted = ReportRequest(query.sensor_type or "all")
+    is_of_all = query.sensor_type is None
+    return await _reports(request, wanted, query.at, pollers.quality, is_of_all=is_of_all)
 
 
 @read_route(
     router,
     "/api/estimate/tags",
     summary="The expected value of each tag's newest reading, and which tags have changed",
-    responses={**_REPORTED, 200: {"model": pollers.ExpectedTags}},
+    responses={**NOT_REMEMBERED, 200: {"model": pollers.ExpectedTags}},
     openapi_extra={"parameters": parameters_of(TagsQuery)},
 )
 async def tags(request: Request) -> Response:
     """Predicted from all other tags, and from the tag's own readings except the latest ones."""
-
-    async def body(bridge: Bridge, query: TagsQuery) -> bytes:
-        sensor = query.sensor_type
-        report = await bridge.source.estimate_report(ReportRequest(sensor))
-        cost_s = len(report.tags) * _WRITE_TAG_S
-        return await on_worker(bridge, lambda _: pollers.tags(sensor, report), cost_s)
-
-    return await _report(request, TagsQuery, body)
+    query = read(TagsQuery, request.query_params.multi_items())
+    return await _reports(request, ReportRequest(query.sensor_type), query.at, pollers.tags)
 
 
 @read_route(
     router,
     "/api/estimate/advice",
     summary="Where an additional tag would help the estimate most",
-    responses={**_REPORTED, 200: {"model": pollers.Advice}},
+    responses={**NOT_REMEMBERED, 200: {"model": pollers.Advice}},
     openapi_extra={"parameters": parameters_of(AdviceQuery)},
 )
 async def advice(request: Request) -> Response:
-    """Places on the map's free floor or, without a map, around the tags; the best first."""
+    """Places on the map's free floor, the best first.
 
-    async def body(bridge: Bridge, query: AdviceQuery) -> bytes:
-        wanted = ReportRequest(query.sensor_type, query.places)
-        return pollers.advice(query.sensor_type, await bridge.source.estimate_report(wanted))
-
-    return await _report(request, AdviceQuery, body)
-
-
-Body = Callable[[Bridge, QueryT], Awaitable[bytes]]
+    Without a map, and with `at`, they are around the tags: the log does not have past maps.
+    """
+    query = read(AdviceQuery, request.query_params.multi_items())
+    wanted = ReportRequest(query.sensor_type, query.places)
+    return await _reports(request, wanted, query.at, pollers.advice)
 
 
-async def _report(request: Request, kind: type[QueryT], body: Body[QueryT]) -> Response:
+async def _reports(
+    request: Request,
+    report: ReportRequest,
+    at: str | None,
+    write: Callable[[Mapping[str, Report]], bytes],
+    *,
+    is_of_all: bool = False,
+) -> Response:
     bridge = bridge_of(request)
-    query = read(kind, request.query_params.multi_items())
-
-    async def compute() -> Answer:
-        with bridge.admission.computing(client_of(request), is_large=True):
-            return content_answer(await body(bridge, query))
-
-    return await respond(request, query, compute)
+    source = bridge.source
+    now_ns = (await source.now()).stamp_ns
+    at_ns = query_string.at_of(at, now_ns)
+    wanted = Reported(
+        report,
+        at_ns,
+        now_ns,
+        source.world.day_length_s,
+        bridge.criteria.sensors,
+        source.occupancy_map() if report.max_places and at_ns is None else None,
+    )
+    return await respond_past(request, Reports(wanted, is_of_all, write), "estimate")

@@ -384,7 +384,7 @@ class _RosbridgeConversation(_Conversation):
 
     async def _values(self, query: FieldQuery, held: ExitStack) -> bytes:
         bridge, source = self._bridge, self._bridge.source
-        field = Field(None, query, JSON, source.rules, source.occupancy_map(), bridge.criteria)
+        field = Field(None, query, JSON, source.rules, bridge.criteria)
         field.check()
         # Under the ETag of the same field over HTTP: it is the same body.
         etag = field.newest_etag(source.revision())

@@ -1,4 +1,4 @@
-"""Polls the twin for the quality of its estimates, and for what the robot reports of itself.
+"""Polls the log for the quality of estimates, and the twin for what the robot reports of itself.
 
 Has the types of both for the web contract (see `schema`), their JSON, and the polling loops.
 
@@ -7,9 +7,11 @@ No state frame waits for this: the judge gets a result when it has come.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import math
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Final
 
 import orjson
@@ -23,9 +25,8 @@ from lupin_bridge.stream.schema import Contract, Time
 from lupin_bridge.stream.state_json import moment, stamp
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Snapshot
-from lupin_twin.field.engine import FieldRefused
-from lupin_twin.runtime.estimates import Report, ReportRequest
-from lupin_twin.runtime.workers import in_turns
+from lupin_twin.runtime import estimates
+from lupin_twin.runtime.estimates import Report
 
 
 class GetEstimateResponse(Contract):
@@ -48,7 +49,7 @@ class GetEstimateResponse(Contract):
 
 
 class Graded(Contract):
-    """New scans predicted from other tags, and how many were inside the 90 % interval."""
+    """Scans predicted from earlier ones of other tags, and how many were in the 90 % interval."""
 
     scans: int
     inside: int
@@ -57,9 +58,11 @@ class Graded(Contract):
 class EstimateQuality(Contract):
     """How often a sensor's estimates were right; a day lasts the twin's `day_length_s`."""
 
-    fitted_at: Time | None = Field(description="null: no model has been fitted yet")
-    fit_problem: str = Field(description="why the last fit failed; empty: it did not")
-    graded_since: Time | None = Field(description="start of the counts; null: none yet")
+    fitted_at: Time | None = Field(
+        description="the moment of the report; null: no model can be fitted"
+    )
+    fit_problem: str = Field(description="why the fit failed; empty: it did not")
+    graded_since: Time | None = Field(description="first scan that was compared; null: none")
     day: Graded
     week: Graded
     share_day: float | None = Field(description="inside divided by scans; null: no scans")
@@ -118,13 +121,14 @@ class Advice(Contract):
 # --- as JSON text --------------------------------------------------------------------------------
 
 
-def qualities(reports: Mapping[str, Report]) -> bytes:
+def quality(reports: Mapping[str, Report]) -> bytes:
     """`EstimateQualities`."""
     return orjson.dumps({"sensors": {name: _quality(one) for name, one in reports.items()}})
 
 
-def tags(sensor_type: str, report: Report) -> bytes:
-    """`ExpectedTags`. Call it on a worker: thousands of tags take a while."""
+def tags(reports: Mapping[str, Report]) -> bytes:
+    """`ExpectedTags` of the one report."""
+    [(sensor_type, report)] = reports.items()
     found = {
         tag.tag_id: {
             "measured": tag.measured,
@@ -135,20 +139,21 @@ def tags(sensor_type: str, report: Report) -> bytes:
             "offset": tag.offset,
             "left_out": tag.changed_since_ns is not None,
         }
-        for tag in in_turns(report.tags)
+        for tag in report.tags
     }
     return orjson.dumps({"sensor_type": sensor_type, "at": stamp(report.at_ns), "tags": found})
 
 
-def advice(sensor_type: str, report: Report) -> bytes:
-    """`Advice`."""
+def advice(reports: Mapping[str, Report]) -> bytes:
+    """`Advice` of the one report."""
+    [(sensor_type, report)] = reports.items()
     return orjson.dumps({"sensor_type": sensor_type, "places": report.places})
 
 
 def _quality(report: Report) -> dict[str, Any]:
     record = report.record
     return {
-        "fitted_at": moment(report.fitted_at_ns),
+        "fitted_at": moment(report.at_ns if report.is_fitted else None),
         "fit_problem": report.fit_problem,
         "graded_since": moment(record.since_ns),
         "day": record.day,
@@ -163,8 +168,9 @@ def _quality(report: Report) -> dict[str, Any]:
 
 log = logging.getLogger(__name__)
 
-# The twin makes a new report at most every 30 s (`estimate_service.REST_S`).
 PERIOD_S: Final = 15.0
+# The reports of all sensors take at most a tenth of a core: a pause is that many times as long.
+REST_FACTOR: Final = 9.0
 # A greenhouse has a handful of sensors; past this limit, the alphabetically first ones are taken.
 MAX_SENSORS: Final = 32
 
@@ -173,36 +179,42 @@ Changed = Mapping[str, Mapping[str, int]]
 
 
 class EstimatePoller(Periodic):
-    """Fetches every sensor's estimate report, from `start` to `stop`. Belongs to the event loop.
+    """Makes every sensor's estimate report, from `start` to `stop`. Belongs to the event loop.
 
-    `snapshot` returns the newest state; `on_changed` gets the tags whose sensors have changed.
+    `report_on` makes the report on a sensor as of a snapshot, and `snapshot` returns the newest.
+    `on_changed` gets the tags whose sensors have changed.
     """
 
     def __init__(
         self,
-        source: TwinSource,
+        report_on: Callable[[str, Snapshot], Awaitable[Report]],
         snapshot: Callable[[], Snapshot | None],
         on_changed: Callable[[Changed], None],
     ) -> None:
-        super().__init__(self.update, PERIOD_S, "what estimates are worth")
+        super().__init__(self._poll, PERIOD_S, "what estimates are worth")
         self.known: dict[str, Report] = {}
-        self._source = source
+        self._report_on = report_on
         self._snapshot = snapshot
         self._on_changed = on_changed
 
+    async def _poll(self) -> None:
+        begun_s = time.monotonic()
+        await self.update()
+        await asyncio.sleep(REST_FACTOR * (time.monotonic() - begun_s))
+
     async def update(self) -> None:
-        """Fetch the report of each sensor, one after the other."""
+        """Make the report of each sensor, one after the other."""
         snapshot = self._snapshot()
         if snapshot is None:
             return
         known: dict[str, Report] = {}
-        for sensor in sensors_of(snapshot):
+        for name in sensors_of(snapshot):
             try:
-                known[sensor] = await self._source.estimate_report(ReportRequest(sensor))
-            except (FieldRefused, NotRemembered, TwinUnavailableError) as error:
-                log.debug("what estimates of %s are worth is not known: %s", sensor, error)
-                if sensor in self.known:
-                    known[sensor] = self.known[sensor]
+                known[name] = await self._report_on(name, snapshot)
+            except (NotRemembered, TwinUnavailableError) as error:
+                log.debug("what estimates of %s are worth is not known: %s", name, error)
+                if name in self.known:
+                    known[name] = self.known[name]
         self.known = known
         self._on_changed(changed_of(known))
 
@@ -223,9 +235,8 @@ def changed_of(known: Mapping[str, Report]) -> Changed:
     """The changed sensors, which estimates leave out, by tag and sensor."""
     changed: dict[str, dict[str, int]] = {}
     for sensor, report in known.items():
-        for tag in report.tags:
-            if tag.changed_since_ns is not None:
-                changed.setdefault(tag.tag_id, {})[sensor] = tag.changed_since_ns
+        for tag_id, since_ns in estimates.changed_of(report.tags).items():
+            changed.setdefault(tag_id, {})[sensor] = since_ns
     return changed
 
 

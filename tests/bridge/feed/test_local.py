@@ -13,14 +13,16 @@ from lupin_bridge.feed.local import LocalTwin
 from lupin_bridge.feed.query import as_found
 from lupin_bridge.feed.source import TwinTimeoutError
 from lupin_twin.core.diagnostics import JournalState
+from lupin_twin.core.notes import COMMENT, Note
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.journal.runs import Clock
 from lupin_twin.ros.node import TwinNode
-from lupin_twin.runtime.estimates import ReportRequest
 from tests.support.inprocess import started
 from tests.support.journal import SECOND, append, scan
 from tests.support.past_queries import Endless
 from tests.support.waiting import PATIENCE_S, until
+
+NOTE = Note("", time.time_ns(), "anna", COMMENT, "site", "a comment")
 
 
 async def test_a_busy_thread_ends_a_request_after_the_configured_timeout(domain: int) -> None:
@@ -34,11 +36,11 @@ async def test_a_busy_thread_ends_a_request_after_the_configured_timeout(domain:
         held = asyncio.create_task(twin.thread.call(hold))
         await until(busy.is_set, "the thread to be held")
         with pytest.raises(TwinTimeoutError, match=r"within 0\.2 s"):
-            await twin.estimate_report(ReportRequest("co2"))
+            await twin.write_note(NOTE)
         gate.set()
         assert await held
         twin.timeout_s = PATIENCE_S
-        assert (await twin.estimate_report(ReportRequest("co2"))).tags == ()
+        assert (await twin.write_note(NOTE)).text == NOTE.text
 
 
 async def test_names_and_limits_are_those_of_the_node(domain: int) -> None:

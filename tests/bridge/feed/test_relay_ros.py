@@ -17,7 +17,6 @@ from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.feed.web import WebTwin
 from lupin_twin.core.interfaces import Topic
 from lupin_twin.ros import convert
-from lupin_twin.runtime.estimates import ReportRequest
 from tests.support.inprocess import started
 from tests.support.messages import occupancy_grid, scan
 from tests.support.processes import OFTEN, twin_node
@@ -130,4 +129,4 @@ async def test_a_twins_topics_are_relayed_byte_for_byte(
     # A thread that has not ended in time is left behind, and ends by itself.
     await until(lambda: not source.thread.is_alive, "its end")
     with pytest.raises(TwinUnavailableError):
-        await source.estimate_report(ReportRequest("co2"))
+        await source.robot(None)

@@ -12,7 +12,7 @@ from unittest.mock import AsyncMock
 import pytest
 from geometry_msgs.msg import Point, Pose, PoseStamped
 from lupin_msgs.msg import Observation, SensorReading, TwinState, TwinTagState
-from lupin_msgs.srv import GetEstimateReport
+from lupin_msgs.srv import GetWrites
 from rclpy.parameter import Parameter
 
 from lupin_bridge.feed import web
@@ -24,9 +24,7 @@ from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Reading, Scan
-from lupin_twin.field.engine import FieldRefused
 from lupin_twin.journal.follow import Lot, write
-from lupin_twin.runtime.estimates import ReportRequest
 from lupin_twin.runtime.workers import Workers
 from tests.support.inprocess import started
 from tests.support.journal import NOW, recording, scan
@@ -34,8 +32,8 @@ from tests.support.messages import occupancy_grid
 from tests.support.ros import Peer, latched
 from tests.support.waiting import until, until_answered, wait_for
 
-SAYS = {"refused": "not that one", "busy": "32 fields are being computed: ask again later"}
-NAME = "/twin/get_estimate_report"
+SAYS = "32 requests are being answered: ask again later"
+NAME = "/twin/get_writes"
 LOOK = "the look for a lost twin"
 
 
@@ -69,14 +67,14 @@ async def test_a_new_map_is_a_new_revision_and_no_sign_of_life(domain: int) -> N
 async def test_without_a_twin_the_missing_service_is_named(domain: int) -> None:
     async with started(WebTwin) as (twin, _):
         with pytest.raises(TwinUnavailableError, match=f"no twin offers {NAME}: is it running"):
-            await twin.estimate_report(ReportRequest("co2"))
+            await twin._rows_behind(0)
     assert all(task.get_name() != LOOK for task in asyncio.all_tasks()), "it goes on searching"
 
 
 async def test_after_a_silence_a_new_node_recovers_everything(domain: int) -> None:
     scans, samples = list[Observation](), list[Sample]()
     with Peer(domain) as peer:
-        peer.node.create_service(GetEstimateReport, NAME, lambda _, response: response)
+        peer.node.create_service(GetWrites, NAME, lambda _, response: response)
         peer.node.create_subscription(
             Observation, "/floranova/observations", scans.append, latched(50)
         )
@@ -123,7 +121,7 @@ async def test_after_a_silence_a_new_node_recovers_everything(domain: int) -> No
             twin.rejoin_after_s = 0.1
             # The peer does not spin: it never answers.
             with pytest.raises(TwinUnavailableError, match="not running"):
-                await twin.estimate_report(ReportRequest("co2"))
+                await twin._rows_behind(0)
             twin.rejoin_after_s = math.inf
             await until_answered(is_joined, "the new node")
             await goes_both_ways(2.0)
@@ -183,17 +181,17 @@ async def test_a_node_is_replaced_after_ever_longer_silences_of_five_minutes_at_
 
 
 async def test_refusals_are_the_services_and_no_wait_is_endless(domain: int) -> None:
-    def answer(request: Any, response: Any) -> Any:
-        response.error_message = SAYS[request.sensor_type]
+    def answer(_: Any, response: Any) -> Any:
+        response.error_message = SAYS
         return response
 
     with Peer(domain) as peer:
-        peer.node.create_service(GetEstimateReport, NAME, answer)
+        peer.node.create_service(GetWrites, NAME, answer)
         async with started(WebTwin, timeout_s=0.5) as (twin, _):
 
             async def is_given_up() -> bool:
                 try:
-                    await twin.estimate_report(ReportRequest("refused"))
+                    await twin._rows_behind(0)
                 except TwinTimeoutError as error:
                     return "within 0.5 s" in str(error)
                 except TwinUnavailableError:  # not found yet
@@ -202,12 +200,11 @@ async def test_refusals_are_the_services_and_no_wait_is_endless(domain: int) -> 
 
             await until_answered(is_given_up, "the peer, which does not spin", bool)
             twin.timeout_s = 20.0
-            for sensor, kind in (("refused", FieldRefused), ("busy", TwinUnavailableError)):
-                requested = asyncio.create_task(twin.estimate_report(ReportRequest(sensor)))
-                while not requested.done():
-                    await asyncio.to_thread(peer.spin_briefly)
-                with pytest.raises(kind, match=SAYS[sensor]):
-                    await requested
+            requested = asyncio.create_task(twin._rows_behind(0))
+            while not requested.done():
+                await asyncio.to_thread(peer.spin_briefly)
+            with pytest.raises(NotRemembered, match=SAYS):
+                await requested
 
 
 # --- copies of journals ---------------------------------------------------------------------------

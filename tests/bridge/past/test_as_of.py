@@ -20,12 +20,10 @@ from lupin_twin.core.past import PastWrite, RecentRequest
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
 from lupin_twin.estimate.engine import TagPast
 from lupin_twin.field.engine import FieldRefused, FieldRules
-from lupin_twin.field.explored import OccupancyMap
-from tests.support.maps import map_of
 
 NS = 10**9
 CRITERIA = Criteria(own_sensors(), None, ClockDay(UTC))
-RULES = FieldRules(2.0, 1.5, 1.5, max_grid_cells=10_000)
+RULES = FieldRules(2.0, 1.5, 1.5, max_grid_cells=10_000, clip_to_explored=True)
 
 
 def tag(tag_id: str, x: float, value: float, at_ns: int = NS) -> TagState:
@@ -36,16 +34,10 @@ def tag(tag_id: str, x: float, value: float, at_ns: int = NS) -> TagState:
 SITE = Snapshot(5 * NS, "map", (tag("a", 0.0, 400.0), tag("b", 1.0, 500.0)))
 
 
-def a_map(revision: int, free: int = 0) -> OccupancyMap:
-    return map_of([[free, -1]], stamp_ns=revision, resolution=0.5, revision=revision)
-
-
-def requested(
-    rules: FieldRules = RULES, occupancy: OccupancyMap | None = None, **parameters: Any
-) -> Field:
+def requested(rules: FieldRules = RULES, **parameters: Any) -> Field:
     values = {"sensor_type": "co2", **parameters}
     query = read(FieldQuery, [(name, str(value)) for name, value in values.items()])
-    return Field(None, query, None, rules, occupancy, CRITERIA)
+    return Field(None, query, None, rules, CRITERIA)
 
 
 def field_of(greenhouse: Snapshot, field: Field, field_format: FieldFormat | None = None) -> Plan:
@@ -81,7 +73,7 @@ def test_a_broken_sensor_is_not_used_for_a_field() -> None:
 
 def test_a_broken_sensor_is_not_used_for_an_estimate() -> None:
     query = read(EstimateQuery, [("sensor_type", "co2")])
-    estimated = Estimated(5 * NS, query, JSON, RULES, None, CRITERIA, 86_400.0)
+    estimated = Estimated(5 * NS, query, JSON, RULES, CRITERIA, 86_400.0)
 
     def made_of(*readings: tuple[int, float]) -> str:
         past = TagPast("a", 0.0, 0.0, readings)
@@ -113,12 +105,6 @@ def test_before_the_first_observation_state_and_field_are_empty() -> None:
     assert body(WholeState(1).look(lambda _: nothing))["tags"] == []
     found = body(field_of(nothing, requested(), JSON))
     assert (found["sample_count"], set(found["values"])) == (0, {None})
-
-
-def test_a_past_field_is_clipped_to_the_current_map() -> None:
-    box = {"bbox_min_x": 0, "bbox_min_y": 0, "bbox_max_x": 1, "bbox_max_y": 0.5, "resolution": 0.5}
-    found = body(field_of(SITE, requested(RULES, a_map(1), **box), JSON))
-    assert [value is None for value in found["values"]] == [False, True]
 
 
 def judged_at(at_s: float, *tags: TagState, before_s: Sequence[float] = ()) -> Plan:
@@ -194,8 +180,6 @@ def plans(greenhouse: Snapshot, field: Field) -> list[str]:
         requested(resolution=0.2),
         requested(bbox_min_x=0, bbox_min_y=0, bbox_max_x=1, bbox_max_y=1),
         requested(replace(RULES, idw_power=3.0)),
-        requested(RULES, a_map(1)),
-        requested(RULES, a_map(1, free=-1)),
     ],
 )
 def test_another_field_has_another_etag(other: Field) -> None:

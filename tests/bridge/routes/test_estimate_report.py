@@ -39,8 +39,9 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
     From a journal: scan by scan, a report would be ready before the last scan arrives.
     """
     journal, begun_ns = tmp_path_factory.mktemp("journal") / "j.sqlite", now_s() * SECOND
+    placed_ns = (now_s() - 20 * 1800) * SECOND
     rows: list[Write] = [
-        Pin(tag_id, Pose(*at, 0.0, 0.0, 0.0, 0.0, 1.0), begun_ns, begun_ns)
+        Pin(tag_id, Pose(*at, 0.0, 0.0, 0.0, 0.0, 1.0), placed_ns, placed_ns)
         for tag_id, at in PLACES.items()
     ]
     rows += [
@@ -109,13 +110,23 @@ def test_the_hit_rate_is_reported_for_all_sensors_or_for_one(live: Bridge) -> No
     assert list(both["sensors"]) == ["temperature"], "co2 has no place"
     one = live.json("/api/estimate/quality", sensor_type="co2")["sensors"]["co2"]
     assert (one["fitted_at"], one["is_trusted"]) == (None, None)
-    etag = live.get("/api/estimate/quality").headers["etag"]
-    assert wait_for(
-        lambda: (
-            live.get("/api/estimate/quality", headers={"If-None-Match": etag}).status_code == 304
-        ),
-        "no fit in between",
-    )
+
+
+def test_a_report_as_of_a_moment_is_that_of_the_log_up_to_then(live: Bridge) -> None:
+    """At that moment, the last scan of the tag was the first one that was off."""
+    at = now_s() - 4 * 1800 + 600
+    tags = live.json("/api/estimate/tags", **SENSOR, at=at)
+    assert tags["at"]["sec"] == at
+    assert tags["tags"]["d"]["measured"] == temperature("d", 4)
+    assert not tags["tags"]["d"]["left_out"], "one reading is no change"
+    quality = live.get("/api/estimate/quality", sensor_type="temperature", at=at)
+    assert quality.json()["sensors"]["temperature"]["fitted_at"]["sec"] == at
+    etag = quality.headers["etag"]
+    path = f"/api/estimate/quality?sensor_type=temperature&at={at}"
+    assert live.get(path, {"If-None-Match": etag}).status_code == 304
+    later = live.get(f"/api/estimate/tags?sensor_type=co2&at={now_s() + 86_400}")
+    assert later.status_code == 400
+    assert "later than now" in later.json()["detail"]
 
 
 def test_where_another_tag_would_help_is_reported_with_its_gain(live: Bridge) -> None:
@@ -140,7 +151,7 @@ def test_where_another_tag_would_help_is_reported_with_its_gain(live: Bridge) ->
         ("advice", {**SENSOR, "places": "x"}, "places is 'x': input should be a valid integer"),
         ("advice", {}, "sensor_type: field required"),
         ("tags", {}, "sensor_type: field required"),
-        ("tags", {**SENSOR, "at": 1}, "parameter 'at' is unknown"),
+        ("tags", {**SENSOR, "to": 1}, "parameter 'to' is unknown"),
         ("quality", {"sensor_type": ""}, "sensor_type is '': string should have"),
     ],
 )

@@ -11,12 +11,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from PIL import Image
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
 
 from lupin_bridge.stream import schema
 from tests.oracle_idw import field_by_loop
 from tests.support.messages import discovered, occupancy_grid, pose, scan
 from tests.support.processes import limits
-from tests.support.waiting import PATIENCE_S
+from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
 
 # These tests send more requests than a browser may.
@@ -241,6 +243,37 @@ def test_an_etag_holds_until_the_field_could_have_changed(changing: Bridge) -> N
         for _ in range(2):
             listener.until("state")
     assert changing.get("/api/field", {"If-None-Match": mapped}, **QUERY).status_code == 304
+
+
+def test_only_with_clip_to_explored_a_live_field_ends_where_the_map_does(
+    changing: Bridge,
+) -> None:
+    changing.peer.observe(scan("1", {"temperature": 20.0}, at=(1, 1)))
+    observed = changing.tag("1")["last_observed"]
+    whole = changing.json("/api/field", **QUERY)["values"]
+    before = etag(changing)
+    # The cells of x < 1 m and y < 1 m are known.
+    changing.peer.publish_map(occupancy_grid([[0, -1], [-1, -1]]))
+    wait_for(lambda: etag(changing) != before, "the map")
+    assert changing.json("/api/field", **QUERY)["values"] == whole
+    wanted = Parameter("clip_to_explored", value=True).to_parameter_msg()
+    service = "/lupin_twin/set_parameters"
+    [result] = changing.peer.call(SetParameters, service, parameters=[wanted]).results
+    assert result.successful, result.reason
+
+    def known() -> int:
+        return int(np.isfinite(npy(changing, **QUERY)).sum())
+
+    wait_for(lambda: known() < sum(value is not None for value in whole), "the clipped field")
+    clipped = npy(changing, **QUERY)
+    np.testing.assert_array_equal(changing.peer.get_field(**QUERY).values, clipped.ravel())
+    assert np.isfinite(clipped[2:6, :4]).any()
+    assert np.isnan(clipped[6:]).all()
+    assert np.isnan(clipped[:, 4:]).all()
+    # The log does not have the map of a past moment.
+    at = observed["sec"] + 1
+    wait_for(lambda: changing.get("/api/state", at=at).status_code == 200, "that moment")
+    assert changing.json("/api/field", **QUERY, at=at)["values"] == whole
 
 
 # --- quality ------------------------------------------------------------------------------------

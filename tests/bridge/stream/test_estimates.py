@@ -2,7 +2,6 @@
 
 import asyncio
 import math
-from typing import Any
 
 import pytest
 
@@ -16,8 +15,7 @@ from lupin_bridge.stream.pollers import (
     sensors_of,
 )
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
-from lupin_twin.estimate.engine import Record, Tally
-from lupin_twin.runtime.estimates import Report, ReportRequest, TagCheck
+from lupin_twin.runtime.estimates import Report, TagCheck
 from tests.support.waiting import until
 
 HERE = Pose(1.0, 2.0, 0.5, 0.0, 0.0, 0.0, 1.0)
@@ -27,7 +25,7 @@ def report(at_ns: int, changed: dict[str, int | None]) -> Report:
     tags = tuple(
         TagCheck(tag_id, 1.0, 1, 1.0, 1.0, 0.0, 0.0, since) for tag_id, since in changed.items()
     )
-    return Report(at_ns, 1, "", Record(None, Tally(), Tally()), tags)
+    return Report(at_ns, is_fitted=True, tags=tags)
 
 
 def snapshot(**latest: int) -> Snapshot:
@@ -60,14 +58,14 @@ class Stage:
         self.reported: list[Changed] = []
         self.snapshot: Snapshot | None = None
         self.answers: dict[str, Report] = {}
-        stage: Any = self
-        self.poller = EstimatePoller(stage, lambda: self.snapshot, self.reported.append)
+        self.poller = EstimatePoller(self.report_on, lambda: self.snapshot, self.reported.append)
 
-    async def estimate_report(self, request: ReportRequest) -> Report:
-        self.requested.append(request.sensor_type)
-        if request.sensor_type not in self.answers:
+    async def report_on(self, sensor: str, snapshot: Snapshot) -> Report:
+        assert snapshot is self.snapshot
+        self.requested.append(sensor)
+        if sensor not in self.answers:
             raise TwinUnavailableError("nobody is there")
-        return self.answers[request.sensor_type]
+        return self.answers[sensor]
 
 
 async def test_changes_are_passed_on_in_their_current_form() -> None:

@@ -6,14 +6,14 @@ import json
 
 from lupin_bridge.stream import pollers
 from lupin_bridge.stream.pollers import EstimateQualities
-from lupin_twin.estimate.engine import Record, Tally
+from lupin_twin.estimate.grading import Record, Tally
 from lupin_twin.estimate.solution import Place
 from lupin_twin.runtime.estimates import Report, TagCheck
 
 S = 1_000_000_000
 REPORT = Report(
     5 * S,
-    4 * S,
+    True,
     "why",
     Record(3 * S + 7, Tally(10, 9), Tally(70, 30)),
     (
@@ -22,14 +22,14 @@ REPORT = Report(
     ),
     (Place(1.0, 2.0, 0.75),),
 )
-BARE = Report(S, None, "", Record(None, Tally(), Tally()))
+BARE = Report(S)
 
 
 def test_the_hit_rate_of_estimates() -> None:
-    body = json.loads(pollers.qualities({"co2": REPORT, "ph": BARE}))
+    body = json.loads(pollers.quality({"co2": REPORT, "ph": BARE}))
     EstimateQualities.model_validate(body)
     assert body["sensors"]["co2"] == {
-        "fitted_at": {"sec": 4, "nanosec": 0},
+        "fitted_at": {"sec": 5, "nanosec": 0},
         "fit_problem": "why",
         "graded_since": {"sec": 3, "nanosec": 7},
         "day": {"scans": 10, "inside": 9},

@@ -23,7 +23,10 @@ DEFAULTS = {
     "idw_power": 2.0,
     "idw_falloff_radius_m": 1.5,
     "idw_max_distance_m": 1.5,
+    "clip_to_explored": False,
     "max_grid_cells": 1_000_000,
+    "field_cache_mb": 64.0,
+    "day_length_s": 86_400.0,
     "layers": (),
     "journal": "",
     "journal_days": 90.0,
@@ -49,6 +52,10 @@ def test_the_shipped_file_has_every_parameter_at_its_default() -> None:
     [
         ("idw_power", 0.0),
         ("idw_power", math.nan),
+        ("clip_to_explored", 1),
+        ("field_cache_mb", -1.0),
+        ("day_length_s", 0.0),
+        ("day_length_s", 86_401.0),
         ("idw_power", math.inf),
         ("idw_power", "two"),
         ("idw_max_distance_m", math.inf),
@@ -97,6 +104,7 @@ CHANGEABLE = {
     "idw_falloff_radius_m": 2.0,
     "idw_max_distance_m": 2.0,
     "max_pose_m": 2000.0,
+    "clip_to_explored": True,
 }
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from lupin_twin.estimate.kernel import Hyper, Readings, Scale
 from lupin_twin.estimate.model import Model, fit
 from lupin_twin.estimate.posterior import INFLATION
-from lupin_twin.estimate.solution import MAX_EXACT, gap_of
+from lupin_twin.estimate.solution import MAX_EXACT
 from lupin_twin.field.grid import FloatArray
 from tests.support import textbook_gp
 from tests.support.estimates import DAY_S, a_day, hypers, some_readings, spots_of
@@ -39,24 +39,6 @@ def test_the_prediction_is_the_textbooks_without_the_last_four_readings(
         mean, sd = by_the_textbook(readings, own[-4:], h)
         assert change.expected == pytest.approx(mean, rel=1e-5, abs=1e-5)
         assert change.expected_sd == pytest.approx(sd, rel=1e-5)
-
-
-def test_a_tag_is_left_out_with_all_that_are_nearer_than_tags_are_to_gaps() -> None:
-    day = a_day(tags=9, passes=5)
-    xy = day.xy.copy()
-    xy[8] = xy[7] + 0.05  # beside another, which must not help it
-    beside = Readings(day.time_s, day.tag, day.value, xy)
-    h = Hyper(1.0, 5.0, 1.0, 1.0, 0.5, 8.0, 0.4, 2.5, 0.15, 0.3)
-    posterior = Model(Scale(20.0, 2.0), DAY_S, h).posterior(beside, DAY_S)
-    [(measured, mean, sd)] = posterior.left_out(np.array([7]))
-    gap = gap_of(xy)
-    near = [tag for tag in range(9) if np.hypot(*(xy[tag] - xy[7])) < gap]
-    assert 8 in near
-    order = np.argsort(beside.time_s)
-    rows = [int(row) for row in order if beside.tag[row] in near and beside.tag[row] != 7]
-    rows += [int(row) for row in order if beside.tag[row] == 7]
-    assert measured == beside.value[rows[-1]]
-    assert (mean, sd) == pytest.approx(by_the_textbook(beside, rows, h), rel=1e-6)
 
 
 def with_offset(day: Readings, tag: int, scans: int, offset: float) -> tuple[Readings, FloatArray]:
@@ -102,7 +84,3 @@ def test_with_many_tags_each_is_judged_by_those_near_it() -> None:
     change = found[50]
     assert change is not None
     assert change.since_s == since[0]
-    held = model.posterior(day, DAY_S).left_out(np.arange(200))
-    inside = [abs(measured - mean) <= 1.645 * sd for measured, mean, sd in held]
-    assert len(inside) == 200
-    assert np.mean(inside) > 0.8

@@ -1,32 +1,86 @@
-"""Whether an estimate's intervals hold, counted by the hour."""
+"""Whether an estimate's intervals hold, over a day and a week."""
 
-from lupin_twin.estimate.engine import LEAST_SCANS, Grades, Record, Tally
+import numpy as np
+import pytest
+
+from lupin_twin.estimate.engine import TagPast
+from lupin_twin.estimate.grading import (
+    LEAST_SCANS,
+    NOT_GRADED,
+    Record,
+    Tally,
+    predicted,
+    record_of,
+)
+from lupin_twin.estimate.kernel import Hyper, Readings, Scale
+from lupin_twin.estimate.model import Model
+from lupin_twin.estimate.posterior import INFLATION
+from lupin_twin.estimate.solution import gap_of
 from tests.bench.bench_estimate_checks import AT_S, ROUNDS, trust
 from tests.bench.other_worlds import restless, world_of
+from tests.support import textbook_gp
+from tests.support.estimates import DAY_S, a_day, spots_of
 
 HOUR_NS = 3_600 * 1_000_000_000
 
 
-def test_counts_cover_the_last_day_and_week() -> None:
-    grades = Grades(86_400.0)
-    assert grades.record(0) == Record(None, Tally(), Tally())
-    grades.add(Tally(), 5)
-    assert grades.record(5).since_ns is None, "nothing was held to its word"
-    grades.add(Tally(10, 9), 5)
-    grades.add(Tally(2, 1), 3 * HOUR_NS)
-    assert grades.record(3 * HOUR_NS) == Record(5, Tally(12, 10), Tally(12, 10))
-    assert grades.record(24 * HOUR_NS) == Record(5, Tally(2, 1), Tally(12, 10))
-    assert grades.record(7 * 24 * HOUR_NS) == Record(5, Tally(), Tally(2, 1))
-    grades.add(Tally(1, 1), 8 * 24 * HOUR_NS)
-    assert grades.record(8 * 24 * HOUR_NS) == Record(5, Tally(1, 1), Tally(1, 1))
+NS = 1_000_000_000
+DAY_NS = 86_400 * NS
 
 
-def test_a_clock_that_goes_back_drops_the_future() -> None:
-    grades = Grades(86_400.0)
-    grades.add(Tally(5, 5), 10 * HOUR_NS)
-    grades.add(Tally(1, 0), 2 * HOUR_NS)
-    assert grades.record(2 * HOUR_NS) == Record(2 * HOUR_NS, Tally(1, 0), Tally(1, 0))
-    assert grades.record(10 * HOUR_NS).day == Tally(1, 0)
+def pasts_of(readings: Readings, hours: int = 0) -> list[TagPast]:
+    """The tags' readings, so many hours later."""
+    rows = zip(readings.tag, readings.time_s, readings.value, strict=True)
+    read: list[list[tuple[int, float]]] = [[] for _ in readings.xy]
+    for tag, time_s, value in rows:
+        read[tag].append((round(time_s * NS) + hours * HOUR_NS, float(value)))
+    return [
+        TagPast(f"tag-{number}", float(x), float(y), tuple(read[number]))
+        for number, (x, y) in enumerate(readings.xy)
+    ]
+
+
+def test_scans_of_the_last_day_and_week_are_graded_up_to_the_last_whole_hour() -> None:
+    """Days of eight tags, the last of which ends at 0 h of day 9."""
+    tags = pasts_of(a_day(passes=12), 8 * 24)
+    assert record_of([], 9 * DAY_NS, DAY_S) == NOT_GRADED
+    first = record_of(tags, 9 * DAY_NS, DAY_S)
+    assert first.day == first.week
+    assert 8 * DAY_NS < (first.since_ns or 0) < 9 * DAY_NS
+    assert 7 * len(tags) < first.day.scans <= 8 * len(tags), "eight of each at most"
+    assert (first.day.share or 0.0) > 0.8
+    assert record_of(tags, 9 * DAY_NS + HOUR_NS - 1, DAY_S) == first, "in the same hour"
+    week_later = record_of(tags, 15 * DAY_NS, DAY_S)
+    assert (week_later.day, week_later.week) == (Tally(), first.week)
+    assert record_of(tags, 16 * DAY_NS, DAY_S) == NOT_GRADED
+    assert record_of(tags, 8 * DAY_NS, DAY_S) == NOT_GRADED, "they are yet to come"
+
+
+def test_a_scan_is_predicted_from_what_was_known_before_it() -> None:
+    """By the textbook: from earlier readings of tags that are not beside its own."""
+    day = a_day(tags=9, passes=5)
+    xy = day.xy.copy()
+    xy[8] = xy[7] + 0.05
+    beside = Readings(day.time_s, day.tag, day.value, xy)
+    h = Hyper(1.0, 5.0, 1.0, 1.0, 0.5, 8.0, 0.4, 2.5, 0.15, 0.3)
+    model = Model(Scale(20.0, 2.0), DAY_S, h)
+    found = {at_s: (off, sd) for at_s, off, sd in predicted(model, beside, 0.0)}
+    gap = gap_of(xy)
+    for row, (at_s, tag) in enumerate(zip(beside.time_s, beside.tag, strict=True)):
+        near = np.hypot(*(xy - xy[tag]).T) < gap
+        is_known = (beside.time_s < at_s) & ~near[beside.tag]
+        both = beside.take(np.r_[np.flatnonzero(is_known), row])
+        y = (both.value - 20.0) / 2.0
+        mean, covariance = textbook_gp.left_out(spots_of(both), y, [len(both) - 1], h)
+        noise = h.tau**2 + 0.02**2
+        true = float(covariance[-1, -1]) - noise
+        off = abs(float(beside.value[row]) - 20.0 - 2.0 * float(mean[-1]))
+        sd = 2.0 * (INFLATION**2 * true + noise) ** 0.5
+        assert found[float(at_s)] == pytest.approx((off, sd), rel=1e-5, abs=1e-6)
+
+
+def test_with_fewer_than_five_tags_nothing_is_graded() -> None:
+    assert record_of(pasts_of(a_day(tags=4)), DAY_NS, DAY_S) == NOT_GRADED
 
 
 def test_a_model_is_trusted_by_its_day_and_week_and_few_scans_change_nothing() -> None:

@@ -48,6 +48,7 @@ def rules_of(**changes: Any) -> FieldRules:
         "falloff_radius_m": 1.5,
         "max_distance_m": 1.5,
         "max_grid_cells": MAX_CELLS,
+        "clip_to_explored": True,
     }
     return FieldRules(**{**given, **changes})
 
@@ -188,7 +189,8 @@ def test_a_map_clips_to_known_cells_wherever_the_box_begins(store: TwinStore) ->
     request, samples = request_of(bbox_min_x=1.0), store.samples_for_sensor("temperature")
     occupancy = map_of([[0, -1, 0, 0], [0, 0, 0, -1]])
     unclipped, clipped = (
-        compute_field(request, samples, it, rules_of()).values for it in (None, occupancy)
+        compute_field(request, samples, occupancy, rules_of(clip_to_explored=it)).values
+        for it in (False, True)
     )
     assert not np.isnan(unclipped).any()
     known = np.array([0, 1, 1, 1, 1, 0], dtype=np.bool_)

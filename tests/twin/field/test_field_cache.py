@@ -1,12 +1,10 @@
 """The cache of fields: what it stores, what it evicts, what it counts."""
 
-import pytest
-
 from lupin_twin.field.engine import MAX_ENTRIES, FieldCache, FieldKey, FieldRequest, FieldRules
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import compute_idw_field
 
-RULES = FieldRules(2.0, 1.5, 1.5, 1_000)
+RULES = FieldRules(2.0, 1.5, 1.5, 1_000, clip_to_explored=False)
 
 
 def key(number: int, sensor_type: str = "temperature") -> FieldKey:
@@ -31,7 +29,7 @@ def grid(cells: int) -> FieldGrid:
 
 
 def test_64_fields_are_cached_and_the_least_recently_used_goes_first() -> None:
-    cache = FieldCache()
+    cache = FieldCache(1e6)
     for number in range(MAX_ENTRIES):
         cache.put(key(number), grid(1))
     assert cache.get(key(0)) is not None
@@ -43,9 +41,8 @@ def test_64_fields_are_cached_and_the_least_recently_used_goes_first() -> None:
     assert cache.get(key(2)) is not None
 
 
-def test_the_total_bytes_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lupin_twin.field.engine.MAX_BYTES", 100)
-    cache = FieldCache()
+def test_the_total_bytes_are_limited() -> None:
+    cache = FieldCache(100)
     for number in range(5):
         cache.put(key(number), grid(10))
     assert (cache.bytes, len(cache)) == (80, 2)
@@ -55,11 +52,8 @@ def test_the_total_bytes_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (cache.bytes, len(cache)) == (100, 1)
 
 
-def test_a_field_larger_than_the_cache_is_not_cached_and_evicts_nothing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("lupin_twin.field.engine.MAX_BYTES", 100)
-    cache = FieldCache()
+def test_a_field_larger_than_the_cache_is_not_cached_and_evicts_nothing() -> None:
+    cache = FieldCache(100)
     cache.put(key(1), grid(10))
     cache.put(key(2), grid(26))
     assert cache.get(key(2)) is None

@@ -1,24 +1,13 @@
 """GetEstimate over DDS: refusals, and a flood; `routes/test_estimate` has the answers."""
 
-import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future
-from dataclasses import replace
-from threading import Event
-from types import SimpleNamespace
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from builtin_interfaces.msg import Time
 from lupin_msgs.srv import GetEstimate, GetEstimateReport
 
-from lupin_twin.core.diagnostics import WARN
-from lupin_twin.core.state import TwinStore
-from lupin_twin.estimate.engine import Grades, Record, TagPast, Tally
-from lupin_twin.ros import estimate_service
-from lupin_twin.ros.estimate_service import EstimateService
-from lupin_twin.runtime.estimates import LastResult, Report, ReportRequest
-from lupin_twin.runtime.workers import MAX_QUERIES, JobQueue, Workers
+from lupin_twin.runtime.workers import MAX_QUERIES
 from tests.support import messages
 from tests.support.domains import own_domain
 from tests.support.journal import select
@@ -36,7 +25,6 @@ BOX: dict[str, Any] = {
     "bbox_max_x": 2.0,
     "bbox_max_y": 3.0,
 }
-NOW_S = int(time.time())
 
 
 @pytest.fixture(scope="module")
@@ -114,76 +102,3 @@ def test_a_flood_of_expensive_requests_delays_no_observation_and_no_field(peer: 
     assert all(one.error_message.endswith("ask again later") for one in answers(False))
     for client in clients:
         peer.node.destroy_client(client)
-
-
-def test_a_report_is_reused_for_a_while_and_a_mistake_is_reported_once(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    pasts: list[TagPast] = []
-    searches: list[str] = []
-
-    def read(_: object, sensor: str, *__: object) -> list[TagPast]:
-        searches.append(sensor)
-        return list(pasts)
-
-    def query(search: Callable[[Any, Any], Any], _: float) -> Future[Any]:
-        found: Future[Any] = Future()
-        found.set_result(search(None, None))
-        return found
-
-    monkeypatch.setattr(estimate_service, "readings_at", read)
-    recall: Any = SimpleNamespace(query=query)
-    came = Event()
-    reported: list[str] = []
-    utilities: Any = SimpleNamespace(is_behind=False, warn=lambda _, text: reported.append(text))
-    workers = Workers("test")
-    queue = JobQueue(workers, came.set)
-    service = EstimateService(
-        utilities,
-        queue,
-        TwinStore(),
-        recall,
-        occupancy=lambda: None,
-        day_length_s=86_400.0,
-        max_grid_cells=100,
-        now_ns=lambda: int(NOW_S * 1e9),
-    )
-
-    def report() -> Report:
-        answer = service.report(ReportRequest("co2"))
-
-        def is_there() -> bool:
-            queue.deliver()
-            return answer.done() or came.wait(0.1)
-
-        wait_for(lambda: is_there() and answer.done(), "a report")
-        return answer.result()
-
-    assert report().fitted_at_ns is None
-    assert report().tags == ()
-    assert len(searches) == 2, "nothing was found that could serve"
-    at_ns = int(NOW_S * 1e9)
-    pasts[:] = [TagPast(str(n), n / 10.0, 0.0, ((at_ns, 20.0),)) for n in range(10_001)]
-    assert report().fit_problem.startswith("10001 tags have this sensor")
-    assert report().places == (), "no places without a request"
-    assert len(searches) == 3, "it serves for half a minute"
-    wording = service.finding()
-    assert (wording.level, wording.message) == (WARN, f"co2: {report().fit_problem}")
-    assert wording.values == {"fits failed": "1"}
-    graded = Record(1, Tally(40, 10), Tally(40, 10))
-    narrow = LastResult(Report(at_ns, at_ns, "", graded), Grades(86_400.0))
-    wording = replace(service, _known={"light": narrow}).finding()
-    assert (wording.level, wording.message) == (WARN, "light: the predicted range is too narrow")
-    assert replace(service, _known={}).finding().message == "nothing is wrong"
-    assert reported == [f"no new model of co2: {report().fit_problem}"]
-    searches.clear()
-    left, waits = [service.report(ReportRequest(name)) for name in ("a", "b", "c")][1:]
-    left.cancel()
-
-    def has_come() -> bool:
-        queue.deliver()
-        return waits.done()
-
-    wait_for(has_come, "a report")
-    assert searches == ["a", "c"], "who has left takes nobody's time"
-    workers.close()

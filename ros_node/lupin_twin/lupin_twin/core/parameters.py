@@ -17,6 +17,8 @@ from lupin_twin.core.diagnostics import Origin
 FARTHEST_M: Final = 1_000_000.0
 # Names in a parameter that is a list.
 MAX_NAMES: Final = 16
+# An ordinary day, s.
+DAY_S: Final = 86_400.0
 # A century.
 MAX_JOURNAL_DAYS: Final = 36_500.0
 # Characters of a value that an error message repeats.
@@ -25,13 +27,10 @@ MAX_SHOWN: Final = 80
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """The observed world: a real greenhouse, or a demo's simulated one. It is no user setting.
-
-    `day_length_s` is the length of a day, s of ROS time; the estimate's daily course depends on it.
-    """
+    """What a log notes of the observed greenhouse: its origin, and the twin's `day_length_s`."""
 
     origin: Origin = "robot"
-    day_length_s: float = 86_400.0
+    day_length_s: float = DAY_S
 
 
 class ParameterError(ValueError):
@@ -113,8 +112,17 @@ class TwinParameters:
     idw_max_distance_m: float = _parameter(
         1.5, "a cell farther than this from its nearest tag is NaN, m", 0.001, 10_000.0
     )
+    clip_to_explored: bool = _parameter(
+        default=False, description="whether a cell that is unknown on the map is NaN"
+    )
     max_grid_cells: int = _parameter(
         1_000_000, "largest field served, cells", 1, 100_000_000, fixed=_MADE
+    )
+    field_cache_mb: float = _parameter(
+        64.0, "size of the cache of fields, MB", 0.0, 100_000.0, fixed=_MADE
+    )
+    day_length_s: float = _parameter(
+        DAY_S, "length of a day, s of ROS time; shorter in a simulation", 1.0, DAY_S, fixed=_MEANING
     )
 
     layers: tuple[str, ...] = _parameter(

@@ -1,15 +1,13 @@
-"""GetEstimate without ROS: which readings count, what an answer is, and whether it is calibrated.
+"""GetEstimate without ROS: which readings count, and what an answer is.
 
-Calibration is the share of predicted readings that lay in their intervals, over the last day and
-week. It is counted by the hour, a 24th of the greenhouse's own day. Pure. Metres in the map frame,
-times ns of ROS time.
+Pure. Metres in the map frame, times ns of ROS time.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -68,22 +66,24 @@ def moment_of(tags: Sequence[TagPast], now_ns: int, day_length_s: float) -> int:
     return max(now_ns - now_ns % minute_ns, max(stamps_ns, default=0))
 
 
-def readings_of(tags: Sequence[TagPast], at_ns: int, day_length_s: float) -> Readings:
-    """Select the readings that count as of `at_ns`; their times are s from then, at most 0.
-
-    They are those of a day, see `thinned`; tag numbers are indices of `tags`.
-
-    Raises:
-        FieldRefused: there is no reading within a day, or there are too many tags.
-
-    """
-    all_of = Readings(
+def all_readings(tags: Sequence[TagPast], at_ns: int) -> Readings:
+    """All readings, their times s from `at_ns` on; tag numbers are indices of `tags`."""
+    return Readings(
         np.array([(ns - at_ns) / NANOSECONDS_PER_SECOND for tag in tags for ns, _ in tag.readings]),
         np.array([index for index, tag in enumerate(tags) for _ in tag.readings], dtype=np.int64),
         np.array([value for tag in tags for _, value in tag.readings]),
         np.array([(tag.x, tag.y) for tag in tags]).reshape(-1, 2),
     )
-    those = thinned(all_of, 0.0, day_length_s)
+
+
+def readings_of(tags: Sequence[TagPast], at_ns: int, day_length_s: float) -> Readings:
+    """Select the readings that count as of `at_ns`: those of a day, see `thinned`.
+
+    Raises:
+        FieldRefused: there is no reading within a day, or there are too many tags.
+
+    """
+    those = thinned(all_readings(tags, at_ns), 0.0, day_length_s)
     present = len(np.unique(those.tag))
     if present > MAX_TAGS:
         raise FieldRefused(
@@ -100,6 +100,15 @@ def thinned(readings: Readings, at_s: float, day_length_s: float) -> Readings:
     tags = len(np.unique(readings.tag[(age_s >= 0.0) & (age_s <= day_length_s)]))
     per_tag = max(MAX_EXACT // max(tags, 1), PER_TAG)
     return readings.recent(at_s, day_length_s=day_length_s, per_tag=min(per_tag, MAX_PER_TAG))
+
+
+def within(tags: Sequence[TagPast], after_ns: int, until_ns: int) -> tuple[TagPast, ...]:
+    """The tags that have readings after one moment up to another, with only these."""
+    found = (
+        replace(tag, readings=tuple(one for one in tag.readings if after_ns < one[0] <= until_ns))
+        for tag in tags
+    )
+    return tuple(tag for tag in found if tag.readings)
 
 
 def unchanged(tags: Sequence[TagPast], changed: Mapping[str, int]) -> list[TagPast]:
@@ -121,74 +130,3 @@ def cost_s(request: EstimateRequest, tags: int, max_grid_cells: int) -> float:
     readings = min(MAX_EXACT, MAX_PER_TAG * tags)
     is_exact = tags * PER_TAG <= MAX_EXACT
     return (readings**2 * _PAIR_S if is_exact else tags * _TAG_S) + width * height * _CELL_S
-
-
-# Half of the predicted interval, in sds: 9 of 10 readings should lie inside.
-HALF_WIDTH_SDS: Final = 1.645
-HOURS_A_DAY: Final = 24
-HOURS_A_WEEK: Final = 7 * HOURS_A_DAY
-# Lowest share that is accepted where 0.9 is expected; that of a wrong model soon falls below.
-LEAST_SHARE: Final = 0.8
-# Scans of one hour are correlated: fewer than this prove nothing.
-LEAST_SCANS: Final = 40
-
-
-@dataclass(frozen=True, slots=True)
-class Tally:
-    """Scans predicted without their tag and its neighbours, and how many lay in the interval."""
-
-    scans: int = 0
-    inside: int = 0
-
-    @property
-    def share(self) -> float | None:
-        """Share of the scans inside; None if none was predicted."""
-        return self.inside / self.scans if self.scans else None
-
-
-@dataclass(frozen=True, slots=True)
-class Record:
-    """Calibration of a sensor's estimates; `since_ns` is when the first one was compared."""
-
-    since_ns: int | None
-    day: Tally
-    week: Tally
-
-    @property
-    def is_trusted(self) -> bool | None:
-        """Whether enough scans of the day and the week lay inside; None if there are too few."""
-        enough = [one for one in (self.day, self.week) if one.scans >= LEAST_SCANS]
-        return all(one.inside >= LEAST_SHARE * one.scans for one in enough) if enough else None
-
-
-@dataclass(slots=True)
-class Grades:
-    """Counts of one sensor by the hour; `day_length_s` is a greenhouse's day, s of ROS time."""
-
-    day_length_s: float
-    _since_ns: int | None = None
-    _hours: dict[int, Tally] = field(default_factory=dict)
-
-    def add(self, graded: Tally, now_ns: int) -> None:
-        """Add scans that were compared now; drops later hours, from before a clock went back."""
-        if not graded.scans:
-            return
-        hour = self._hour(now_ns)
-        self._hours = {
-            when: tally for when, tally in self._hours.items() if hour - HOURS_A_WEEK < when <= hour
-        }
-        was = self._hours.get(hour, Tally())
-        self._hours[hour] = Tally(was.scans + graded.scans, was.inside + graded.inside)
-        self._since_ns = now_ns if self._since_ns is None else min(self._since_ns, now_ns)
-
-    def record(self, now_ns: int) -> Record:
-        """Return the calibration as of now."""
-        hour = self._hour(now_ns)
-        return Record(self._since_ns, self._sum(hour, HOURS_A_DAY), self._sum(hour, HOURS_A_WEEK))
-
-    def _sum(self, hour: int, hours: int) -> Tally:
-        those = [one for when, one in self._hours.items() if hour - hours < when <= hour]
-        return Tally(sum(one.scans for one in those), sum(one.inside for one in those))
-
-    def _hour(self, now_ns: int) -> int:
-        return int(now_ns / (self.day_length_s / HOURS_A_DAY * NANOSECONDS_PER_SECOND))

@@ -180,13 +180,19 @@ def _some(readings: Readings, day_length_s: float) -> Readings:
     """Choose at most `MAX_FITTED` of the readings."""
     if len(readings) <= MAX_FITTED:
         return readings.of_present()
-    of = readings.of_present()
-    if len(of.xy) > _TAGS:
-        along = np.lexsort((of.xy[:, 1], of.xy[:, 0]))
-        middles = along[np.linspace(0, len(along) - 1, _TAGS // _TOGETHER + 2).astype(int)[1:-1]]
-        apart = np.square(of.xy[middles, None] - of.xy[None]).sum(axis=2)
-        chosen = np.unique(np.argpartition(apart, _TOGETHER - 1, axis=1)[:, :_TOGETHER])
-        of = of.take(np.isin(of.tag, chosen)).of_present()
+    of = of_neighbours(readings)
     per_tag = max(MAX_FITTED // len(of.xy), 1)
     at_s = float(of.time_s.max())
     return of.recent(at_s, day_length_s=day_length_s, per_tag=per_tag).of_present()
+
+
+def of_neighbours(readings: Readings) -> Readings:
+    """The readings, sorted by tag and time; of many tags, those of groups of neighbours."""
+    of = readings.of_present()
+    if len(of.xy) <= _TAGS:
+        return of
+    along = np.lexsort((of.xy[:, 1], of.xy[:, 0]))
+    middles = along[np.linspace(0, len(along) - 1, _TAGS // _TOGETHER + 2).astype(int)[1:-1]]
+    apart = np.square(of.xy[middles, None] - of.xy[None]).sum(axis=2)
+    chosen = np.unique(np.argpartition(apart, _TOGETHER - 1, axis=1)[:, :_TOGETHER])
+    return of.take(np.isin(of.tag, chosen)).of_present()

@@ -27,7 +27,6 @@ from lupin_twin.estimate.solution import (
     Place,
     Solved,
     best_places,
-    gap_of,
     shared_out,
 )
 from lupin_twin.field.grid import BoolArray, CellGrid, FloatArray, cell_centres, grid_dimensions
@@ -155,8 +154,6 @@ def _shares(cells: FloatArray, places: FloatArray) -> list[tuple[slice, slice, F
 INFLATION: Final = 1.3
 # Numbers in an array of places by tags that is computed at once.
 _AT_ONCE: Final = 4_000_000
-# A tag that is left out is predicted from at least this many others.
-_LEAST_OTHERS: Final = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,30 +217,10 @@ class Posterior:
             found = left_out.changed()
             for row in judged.tolist():
                 z, offset, since_s = found[row]
-                _, expected, sd = self._said_of(tags[row], left_out.last(row, since_s))
+                expected, sd = self._expected_of(tags[row], left_out.last(row, since_s))
                 change = Change(z, offset * self.scale.spread, expected, sd, since_s)
                 result[self._tags[tags[row]]] = change
         return tuple(result)
-
-    def left_out(self, tags: IntArray) -> list[tuple[float, float, float]]:
-        """For each of these tags: its latest reading, and the mean and sd predicted for it.
-
-        The prediction is made without the tag and the tags nearer to it than `gap_of`, the typical
-        distance from the floor to its nearest tag. So it shows how good estimates between tags are.
-        A tag with too few others is omitted.
-        """
-        of, result = self._present, []
-        gap = gap_of(of.xy)
-        wanted = np.flatnonzero(np.isin(self._tags, tags))
-        for left_out, numbers, judged in self._left_out(wanted):
-            for row in judged.tolist():
-                xy = of.xy[numbers]
-                near = np.flatnonzero(np.hypot(*(xy - xy[row]).T) < gap)
-                near = np.union1d(near, [row])
-                if len(xy) - len(near) < _LEAST_OTHERS:
-                    continue
-                result.append(self._said_of(numbers[row], left_out.newest(row, without=near)))
-        return result
 
     def advice(self, places: FloatArray, count: int, *, over: FloatArray) -> list[Place]:
         """Choose `count` of `places` (k, 2), m, where another tag helps most; the best first.
@@ -295,38 +272,30 @@ class Posterior:
                 factor = self._factor(near)
                 yield factor.solved(self.hyper, self.at_s, self.day_length_s), rows
 
-    @cached_property
-    def _left_out_exactly(self) -> LeftOut:
-        return LeftOut.of(self._factor(self._present), INFLATION)
-
-    def _left_out(
-        self, wanted: IntArray | None = None
-    ) -> Iterator[tuple[LeftOut, IntArray, IntArray]]:
-        """Yield the wanted tags (None: all) in groups, each tag once.
+    def _left_out(self) -> Iterator[tuple[LeftOut, IntArray, IntArray]]:
+        """Yield all tags in groups, each tag once.
 
         A group is its predictor, the tags that its rows of `xy` are, and the rows to be judged.
         """
         of = self._present
-        every = np.arange(len(of.xy)) if wanted is None else wanted
         if self._is_exact:
-            yield self._left_out_exactly, np.arange(len(of.xy)), every
+            every = np.arange(len(of.xy))
+            yield LeftOut.of(self._factor(of), INFLATION), every, every
             return
         for tags, _ in shared_out(of.xy, np.empty((0, 2))):
-            judged = np.intersect1d(tags, every)
-            if len(judged):
-                near, numbers = self._neighbours.around(tags)
-                rows = np.searchsorted(numbers, judged)
-                yield LeftOut.of(self._factor(near), INFLATION), numbers, rows
+            near, numbers = self._neighbours.around(tags)
+            rows = np.searchsorted(numbers, np.sort(tags))
+            yield LeftOut.of(self._factor(near), INFLATION), numbers, rows
 
-    def _said_of(self, tag: int, off: Off) -> tuple[float, float, float]:
-        """A tag's latest reading, and the mean and sd predicted for it from the others.
+    def _expected_of(self, tag: int, off: Off) -> tuple[float, float]:
+        """The mean and sd predicted for a tag's latest reading from the others.
 
         The inflation applies to the true value, not to the noise of a reading.
         """
         newest = float(self._present.value[self._present.tag == tag][-1])
         noise, spread = self.hyper.noise, self.scale.spread
         true = max(off.variance - noise, 0.0)
-        return newest, newest - off.off * spread, (INFLATION**2 * true + noise) ** 0.5 * spread
+        return newest - off.off * spread, (INFLATION**2 * true + noise) ** 0.5 * spread
 
     def _in_unit(self, mean: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray]:
         scale = self.scale

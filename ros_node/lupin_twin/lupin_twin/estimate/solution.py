@@ -239,11 +239,6 @@ class LeftOut:
             left.remove(worst)
         return result
 
-    def newest(self, tag: int, *, without: FloatArray | IntArray) -> Off:
-        """Deviation of a tag's latest reading, predicted without its tag and the tags `without`."""
-        block = np.flatnonzero(np.isin(self.readings.tag, without))
-        return self._off(block, self._own(tag)[-1])
-
     def last(self, tag: int, since_s: float | None) -> Off:
         """Deviation of a tag's latest reading, without its last four, or those since its change."""
         own = self._own(tag)

@@ -34,7 +34,6 @@ from lupin_twin.field.idw import (
 )
 
 MAX_ENTRIES: Final = 64
-MAX_BYTES: Final = 64_000_000
 
 
 # m, if a request gives none.
@@ -95,6 +94,7 @@ class FieldRules:
     falloff_radius_m: float
     max_distance_m: float
     max_grid_cells: int
+    clip_to_explored: bool
 
     @classmethod
     def of(cls, parameters: TwinParameters) -> Self:
@@ -104,13 +104,15 @@ class FieldRules:
             falloff_radius_m=parameters.idw_falloff_radius_m,
             max_distance_m=parameters.idw_max_distance_m,
             max_grid_cells=parameters.max_grid_cells,
+            clip_to_explored=parameters.clip_to_explored,
         )
 
 
 class FieldKey(NamedTuple):
     """Everything that a field depends on, as the key of the cache.
 
-    `observation_count` stands for the store's whole content. `map_revision` is None without a map.
+    `observation_count` stands for the store's whole content. `map_revision` is None if no map clips
+    the field.
     """
 
     request: FieldRequest
@@ -120,9 +122,10 @@ class FieldKey(NamedTuple):
 
 
 class FieldCache:
-    """An LRU of at most `MAX_ENTRIES` fields whose values take at most `MAX_BYTES` together."""
+    """An LRU of at most `MAX_ENTRIES` fields whose values take at most `max_bytes` together."""
 
-    def __init__(self) -> None:
+    def __init__(self, max_bytes: float) -> None:
+        self._max_bytes = max_bytes
         self._grids: OrderedDict[FieldKey, FieldGrid] = OrderedDict()
 
     @property
@@ -142,11 +145,11 @@ class FieldCache:
 
     def put(self, key: FieldKey, grid: FieldGrid) -> None:
         """Cache `grid`, unless it exceeds the limit alone; drops the least recently used ones."""
-        if grid.values.nbytes > MAX_BYTES:
+        if grid.values.nbytes > self._max_bytes:
             return
         self._grids[key] = grid
         self._grids.move_to_end(key)
-        while len(self._grids) > MAX_ENTRIES or self.bytes > MAX_BYTES:
+        while len(self._grids) > MAX_ENTRIES or self.bytes > self._max_bytes:
             self._grids.popitem(last=False)
 
 
@@ -205,7 +208,7 @@ def compute_field(
     rules: FieldRules,
     should_stop: Callable[[], bool] = never,
 ) -> FieldGrid:
-    """Compute the field of `samples`; with a map, cells that are unknown on it are NaN.
+    """Compute the field of `samples`; if the rules say so, cells unknown on the map are NaN.
 
     Raises:
         FieldRefused: see `check_request`.
@@ -213,7 +216,7 @@ def compute_field(
 
     """
     mask = None
-    if occupancy is not None:
+    if occupancy is not None and rules.clip_to_explored:
         width, height = check_request(request, rules.max_grid_cells)
         mask = explored_mask(
             occupancy,

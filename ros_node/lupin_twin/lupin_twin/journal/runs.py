@@ -18,7 +18,7 @@ from enum import Enum
 from typing import Any, Final
 
 from lupin_twin.core.diagnostics import origin_of
-from lupin_twin.core.parameters import World
+from lupin_twin.core.parameters import DAY_S, World
 from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.journal.schema import DAY_LENGTH, LOCAL_SITE, ORIGIN, SiteLog, insert_into
 
@@ -145,7 +145,7 @@ def world_of(log: SiteLog) -> World:
     except ValueError:
         day_s = 0.0
     # Any other length is invalid: displays and estimates by the day would fail with it.
-    return World(origin, day_s) if 1.0 <= day_s <= World().day_length_s else World(origin)
+    return World(origin, day_s) if 1.0 <= day_s <= DAY_S else World(origin)
 
 
 def cut(axis: Iterable[Span], start_ns: int, end_ns: int) -> list[Span]:

@@ -19,7 +19,6 @@ from lupin_msgs.srv import (
     GetWrites,
 )
 
-from lupin_twin.core.drops import MAX_TAGS
 from lupin_twin.core.past import (
     DEFAULT_POINTS,
     DEFAULT_WRITES,
@@ -33,18 +32,15 @@ from lupin_twin.core.past import (
     error_of,
 )
 from lupin_twin.core.state import Snapshot
-from lupin_twin.estimate.engine import Estimate, EstimateRequest, Record, Tally
-from lupin_twin.estimate.solution import Place
+from lupin_twin.estimate.engine import Estimate, EstimateRequest
 from lupin_twin.field.engine import NUMBERS, FieldRequest
 from lupin_twin.field.grid import FieldGrid
 from lupin_twin.journal.follow import Lot, NotALotError
 from lupin_twin.ros import convert
 from lupin_twin.runtime.estimates import (
     DEFAULT_PLACES,
-    MAX_PLACES,
     Report,
     ReportRequest,
-    TagCheck,
 )
 from lupin_twin.runtime.workers import in_turns
 
@@ -96,13 +92,6 @@ def report_request_of(msg: Any) -> ReportRequest:
     return ReportRequest(msg.sensor_type, int(msg.max_places) or DEFAULT_PLACES)
 
 
-def report_request_message(request: ReportRequest) -> Any:
-    """The inverse of `report_request_of`."""
-    return GetEstimateReport.Request(
-        sensor_type=request.sensor_type, max_places=request.max_places or 0
-    )
-
-
 # Attributes that have the same names in a `TagCheck` and in the response.
 _NUMBERS: Final = ("measured", "expected", "expected_sd", "z", "offset")
 
@@ -113,7 +102,7 @@ def report_response(report: Report) -> Any:
     return GetEstimateReport.Response(
         ok=True,
         at=convert.time_msg(report.at_ns),
-        fitted_at=convert.time_msg(report.fitted_at_ns or 0),
+        fitted_at=convert.time_msg(report.at_ns if report.is_fitted else 0),
         fit_problem=report.fit_problem,
         graded_since=convert.time_msg(record.since_ns or 0),
         day_scans=record.day.scans,
@@ -128,54 +117,6 @@ def report_response(report: Report) -> Any:
         place_x=[place.x for place in places],
         place_y=[place.y for place in places],
         error_ratio=[place.error_ratio for place in places],
-    )
-
-
-# Columns of a report, in the order of `TagCheck`.
-_CHECKED: Final = (
-    *("measured", "observed_at", "expected", "expected_sd", "z", "offset", "changed_since"),
-)
-
-
-def report_of(response: Any) -> Report:
-    """A GetEstimateReport.Response that is `ok`, as a value: the inverse of `report_response`.
-
-    Raises:
-        ValueError: its lists differ in length, or are longer than any twin's.
-
-    """
-    tags = [getattr(response, name) for name in ("tag_ids", *_CHECKED, "left_out")]
-    places = response.place_x, response.place_y, response.error_ratio
-    for what, columns, most in (("tags", tags, MAX_TAGS), ("places", places, MAX_PLACES)):
-        lengths = {len(column) for column in columns}
-        if len(lengths) > 1 or max(lengths) > most:
-            raise ValueError(f"lists of {what} are {sorted(lengths)} long, {most} at most")
-    checks = tuple(
-        TagCheck(
-            tag_id,
-            measured,
-            convert.nanoseconds(at),
-            expected,
-            sd,
-            z,
-            offset,
-            convert.nanoseconds(since) if is_left_out else None,
-        )
-        for tag_id, measured, at, expected, sd, z, offset, since, is_left_out in zip(
-            *tags, strict=True
-        )
-    )
-    return Report(
-        convert.nanoseconds(response.at),
-        convert.nanoseconds(response.fitted_at) or None,
-        response.fit_problem,
-        Record(
-            convert.nanoseconds(response.graded_since) or None,
-            Tally(int(response.day_scans), int(response.day_inside)),
-            Tally(int(response.week_scans), int(response.week_inside)),
-        ),
-        checks,
-        tuple(Place(*map(float, place)) for place in zip(*places, strict=True)),
     )
 
 

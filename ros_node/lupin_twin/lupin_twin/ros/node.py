@@ -53,12 +53,12 @@ class TwinNode(AdjustableNode):
 
     """
 
-    def __init__(self, *, context: Any = None, world: World = World()) -> None:
+    def __init__(self, *, context: Any = None, origin: Origin = "robot") -> None:
         with naming_own_parameters():
             super().__init__(NODE_NAME, context=context)
         self.utilities = NodeUtilities(self)
         self.parameters = declare(self)
-        self._world = world
+        self._origin = origin
         self.store = TwinStore()
         self.memory = self._memory()
         self.lateness = Lateness()
@@ -85,7 +85,7 @@ class TwinNode(AdjustableNode):
             self.utilities,
             self._workers,
             JobQueue(self._workers, wake, large_at_once=LARGE_THREADS),
-            FieldCache(),
+            FieldCache(self.parameters.field_cache_mb * 1e6),
             lambda: self.rules,
             self.store,
             lambda: self.occupancy_map,
@@ -97,7 +97,7 @@ class TwinNode(AdjustableNode):
             self.store,
             self.memory.recall,
             occupancy=lambda: self.occupancy_map,
-            day_length_s=world.day_length_s,
+            day_length_s=self.parameters.day_length_s,
             max_grid_cells=self.parameters.max_grid_cells,
             now_ns=self.now_ns,
         )
@@ -110,7 +110,7 @@ class TwinNode(AdjustableNode):
             snapshot=self.snapshot,
             now_ns=self.now_ns,
             written=lambda: self.memory.condition.written,
-            day_length_s=world.day_length_s,
+            day_length_s=self.parameters.day_length_s,
             wake=wake,
         )
         self._connect()
@@ -153,7 +153,8 @@ class TwinNode(AdjustableNode):
                 f"parameter journal is empty, and there is no home to keep one in: {error}"
             ) from error
         name = self.get_fully_qualified_name()
-        journal = open_journal(path, name, p.journal_days, p.journal_max_mb, self._world)
+        world = World(self._origin, p.day_length_s)
+        journal = open_journal(path, name, p.journal_days, p.journal_max_mb, world)
         return Memory(self.store, journal)
 
     def _connect(self) -> None:
@@ -304,7 +305,7 @@ class TwinNode(AdjustableNode):
             fields_computing=self._field_service.queue.waiting,
             fields_computed=self._field_service.queue.answered,
             slowest_field_s=self._field_service.queue.slowest_s,
-            others=(self.estimates.finding(), self.layers.finding()),
+            others=(self.layers.finding(),),
             origin=self.origin,
             input_problems=self.utilities.check_inputs(),
         )
@@ -329,7 +330,7 @@ class TwinNode(AdjustableNode):
     @property
     def origin(self) -> Origin:
         """Where the observations come from."""
-        return origin_of(self._world.origin, is_simulated=self.get_clock().ros_time_is_active)
+        return origin_of(self._origin, is_simulated=self.get_clock().ros_time_is_active)
 
     # --- small parts ------------------------------------------------------------------------
 

@@ -76,7 +76,8 @@ class FieldService:
         wanted = convert_services.field_request_of(request)
         rules, occupancy = self.rules(), self.occupancy()
         check_request(wanted, rules.max_grid_cells)
-        revision = None if occupancy is None else occupancy.revision
+        is_clipped = occupancy is not None and rules.clip_to_explored
+        revision = occupancy.revision if occupancy is not None and is_clipped else None
         key = FieldKey(wanted, self.store.observation_count, revision, rules)
         if (found := self.cache.get(key)) is not None:
             reply(convert_services.field_response(found))

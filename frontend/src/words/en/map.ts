@@ -121,7 +121,7 @@ export const TAGS = {
       : `${whole(shown)} of ${counted(all, 'tag', 'tags')}`,
   nothingMatches: 'No tag matches the filter.',
   columns: {
-    health: 'Health',
+    health: 'Status',
     tag: 'Tag',
     species: 'Species',
     flowers: 'Blooms',

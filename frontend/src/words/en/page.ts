@@ -153,8 +153,8 @@ export const PAGE = {
   saveCsvShort: 'CSV',
   report: 'Shift report',
   print: 'Print',
-  kiosk: 'Kiosk mode',
-  kioskLeave: 'Exit kiosk',
+  kiosk: 'Wall screen',
+  kioskLeave: 'Exit wall screen',
   cycleNext: (sensor: string, time: string): string => `next: ${sensor} in ${time}`,
   cycleRefused: (asked: string, least: number, most: number): string =>
     `cycle=${asked} is ignored: use ${least} to ${most} seconds.`,

@@ -97,7 +97,10 @@ export function useSince(tagId: string, reason: HealthReason): string | null {
   return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
 }
 
-/** What to do first: where, why, what, and since when; otherwise the greenhouse's status. */
+/**
+ * What to do first: where, why, what, and since when; otherwise the greenhouse's status. A single line has
+ * no room for the names of other tags with the same task: it counts them.
+ */
 export function DoNow({
   most = MOST_TAGS,
   id = 'health-driver',
@@ -112,8 +115,9 @@ export function DoNow({
   // While the twin is silent, its last tasks stay listed.
   const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict) || isSilent(health));
   const count = hasOwn && most > 1 ? most - 1 : most;
+  const hasAlso = most > 1;
   const lines = byTodo(urgent).slice(0, count);
-  const rest = urgent.length - lines.flat().length;
+  const rest = urgent.length - (hasAlso ? lines.flat() : lines).length;
   return (
     <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
       {isOfTags ? (
@@ -130,7 +134,7 @@ export function DoNow({
               <Todo
                 tagId={tagId}
                 reason={reasons[0]}
-                also={others}
+                also={hasAlso ? others : []}
                 id={index === 0 ? id : undefined}
               />
             </button>

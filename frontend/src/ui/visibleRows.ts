@@ -184,6 +184,15 @@ function keepInView(frame: Element, chosen: string, height: number): void {
   if (row && down && down > 0 && down - row.clientHeight < height) row.scrollIntoView(NEAREST);
 }
 
+/** A new filter scrolls a list back to its first row; on a narrow screen, the panel around it scrolls. */
+export function useTopAfter(list: RefObject<HTMLElement | null>, filter: string): void {
+  useEffect(() => {
+    for (const each of [list.current, list.current?.closest('.tags-panel')]) {
+      if (each) each.scrollTop = 0;
+    }
+  }, [list, filter]);
+}
+
 interface HeldRows {
   /** Rows, with area headings between them. */
   readonly lines: readonly Line[];

@@ -35,7 +35,7 @@ import { LONGEST_FILTER } from '../../store/view';
 import { S } from '../../strings';
 import { Disclosure, Icon, Select } from '../../widgets/controls';
 import { HealthMark } from '../HealthMark';
-import { useChosenInSight, usePaper } from '../visibleRows';
+import { useChosenInSight, usePaper, useTopAfter } from '../visibleRows';
 import { AlarmTimes, ResolvedNote } from './AlarmFacts';
 import { AlarmNotes, AlarmsWait, LastActionLine, NotifySettings, SharingNote } from './AlarmNotes';
 import { Acknowledge, AlarmRow, ignoreDoubleClick } from './AlarmRow';
@@ -78,6 +78,7 @@ export function AlarmPanel(): JSX.Element {
     useApp((state) => state.view.selected),
     ids,
   );
+  useTopAfter(list, filter);
   const hasAny = all.active.length + all.shelved.length > 0;
   return (
     <>

@@ -166,7 +166,7 @@ function CardBody({
           )}
           {tag.species && !tag.sureSpecies && ` (${S.notSure})`}
         </Fact>
-        <Fact label={S.cardBlooms}>{tag.flowerCount}</Fact>
+        <Fact label={S.columns.flowers}>{tag.flowerCount}</Fact>
         <Fact label={S.cardPosition}>
           {at ? (
             <button

@@ -237,7 +237,7 @@ function Reading({
     return (
       <span className="faint">
         <span aria-hidden="true">{S.noValue}</span>
-        <span className="unseen">{S.noSensorLong}</span>
+        <span className="unseen">{S.pinLacking}</span>
       </span>
     );
   }

@@ -329,7 +329,7 @@ function CauseHeading({
       <div className="alarm-tools">
         {group === 'active' && (
           <Acknowledge
-            label={S.alarmAcknowledgeOf(cause)}
+            label={S.alarmWhat(S.alarmAcknowledge, cause)}
             text={S.alarmAcknowledgeAll(waiting.length)}
             status={
               waiting.length > 0

@@ -44,7 +44,6 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmStart: 'Zum Beginn',
   alarmActionsOf: (what) => `Aktionen: ${what}`,
   alarmAcknowledge: 'Quittieren',
-  alarmAcknowledgeOf: (what) => `Quittieren: ${what}`,
   alarmAcknowledgeAll: (count) => `Alle quittieren (${count})`,
   alarmUnacknowledge: 'Quittierung aufheben',
   alarmShelve: 'Zurückstellen',
@@ -53,8 +52,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     'Ein Alarm, der kritisch ist oder war, lässt sich höchstens 1 h zurückstellen, und nur mit Begründung.',
   alarmShelfReason: 'Begründung',
   alarmShelfReasonOptional: 'Begründung (optional)',
-  alarmShelveMinutes: (minutes) => `Für ${minutes} min`,
-  alarmShelveHours: (hours) => `Für ${hours} h`,
+  alarmShelveFor: (time) => `Für ${time}`,
   alarmShelved: (until, reason, by) =>
     `zurückgestellt ${by === '' ? '' : `von ${by} `}bis ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Wieder aktivieren',

@@ -243,7 +243,6 @@ export const PAST: In<typeof EN.PAST> = {
 
   timebar: 'Zeitleiste',
   timebarSlider: 'Angezeigte Zeit',
-  timebarLive: 'Live',
   timebarPeriod: 'Zeitraum',
   timebarPeriods: {
     hour: 'Letzte Stunde',

@@ -40,7 +40,6 @@ export const ALARMS = {
   alarmStart: 'Go to start',
   alarmActionsOf: (what: string): string => `Actions: ${what}`,
   alarmAcknowledge: 'Acknowledge',
-  alarmAcknowledgeOf: (what: string): string => `Acknowledge: ${what}`,
   alarmAcknowledgeAll: (count: number): string => `Acknowledge all (${count})`,
   alarmUnacknowledge: 'Unacknowledge',
   alarmShelve: 'Shelve',
@@ -49,8 +48,7 @@ export const ALARMS = {
     'An alarm that is or was critical can be shelved for at most 1 h, and needs a reason.',
   alarmShelfReason: 'Reason',
   alarmShelfReasonOptional: 'Reason (optional)',
-  alarmShelveMinutes: (minutes: number): string => `For ${minutes} min`,
-  alarmShelveHours: (hours: number): string => `For ${hours} h`,
+  alarmShelveFor: (time: string): string => `For ${time}`,
   alarmShelved: (until: string, reason: string, by: string): string =>
     `shelved ${by === '' ? '' : `by ${by} `}until ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Unshelve',

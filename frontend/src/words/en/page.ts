@@ -242,7 +242,6 @@ export const PAST = {
 
   timebar: 'Time bar',
   timebarSlider: 'Time shown',
-  timebarLive: 'Live',
   timebarPeriod: 'Period',
   timebarPeriods: {
     hour: 'Last hour',

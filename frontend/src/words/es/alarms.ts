@@ -38,7 +38,6 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmStart: 'Ir al inicio',
   alarmActionsOf: (what) => `Acciones: ${what}`,
   alarmAcknowledge: 'Reconocer',
-  alarmAcknowledgeOf: (what) => `Reconocer: ${what}`,
   alarmAcknowledgeAll: (count) => `Reconocer todas (${count})`,
   alarmUnacknowledge: 'Anular reconocimiento',
   alarmShelve: 'Aplazar',
@@ -47,8 +46,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     'Si la alarma es o fue crítica, se puede aplazar 1 h como máximo, indicando el motivo.',
   alarmShelfReason: 'Motivo',
   alarmShelfReasonOptional: 'Motivo (opcional)',
-  alarmShelveMinutes: (minutes) => `Durante ${minutes} min`,
-  alarmShelveHours: (hours) => `Durante ${hours} h`,
+  alarmShelveFor: (time) => `Durante ${time}`,
   alarmShelved: (until, reason, by) =>
     `aplazada ${by === '' ? '' : `por ${by} `}hasta ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Reactivar',

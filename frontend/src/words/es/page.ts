@@ -237,7 +237,6 @@ export const PAST: In<typeof EN.PAST> = {
 
   timebar: 'Barra de tiempo',
   timebarSlider: 'Momento mostrado',
-  timebarLive: 'En directo',
   timebarPeriod: 'Periodo',
   timebarPeriods: {
     hour: 'Última hora',

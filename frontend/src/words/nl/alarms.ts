@@ -36,7 +36,6 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmStart: 'Naar begin',
   alarmActionsOf: (what) => `Acties: ${what}`,
   alarmAcknowledge: 'Bevestigen',
-  alarmAcknowledgeOf: (what) => `Bevestigen: ${what}`,
   alarmAcknowledgeAll: (count) => `Alles bevestigen (${count})`,
   alarmUnacknowledge: 'Bevestiging intrekken',
   alarmShelve: 'Uitstellen',
@@ -45,8 +44,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     'Een alarm dat kritiek is of was, kunt u hoogstens 1 uur uitstellen, met opgave van reden.',
   alarmShelfReason: 'Reden',
   alarmShelfReasonOptional: 'Reden (optioneel)',
-  alarmShelveMinutes: (minutes) => `${minutes} min`,
-  alarmShelveHours: (hours) => `${hours} uur`,
+  alarmShelveFor: (time) => `Gedurende ${time}`,
   alarmShelved: (until, reason, by) =>
     `uitgesteld ${by === '' ? '' : `door ${by} `}tot ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Uitstel opheffen',

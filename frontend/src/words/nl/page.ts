@@ -240,7 +240,6 @@ export const PAST: In<typeof EN.PAST> = {
 
   timebar: 'Tijdbalk',
   timebarSlider: 'Getoonde tijd',
-  timebarLive: 'Live',
   timebarPeriod: 'Periode',
   timebarPeriods: {
     hour: 'Afgelopen uur',

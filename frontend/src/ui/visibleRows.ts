@@ -193,19 +193,12 @@ export function useTopAfter(list: RefObject<HTMLElement | null>, filter: string)
   }, [list, filter]);
 }
 
-interface HeldRows {
-  /** Rows, with area headings between them. */
-  readonly lines: readonly Line[];
-  readonly onPointerEnter: () => void;
-  readonly onPointerLeave: () => void;
-}
-
 /** The table's rows. While a pointer is on them, none moves and new ones come last. */
-export function useHeldRows(): HeldRows {
+export function useHeldRows() {
   const rows = useApp(selectRows);
   const areaOf = useApp(selectAreaOf);
   const [held, setHeld] = useState<ReadonlyMap<string, number> | null>(null);
-  const lines = useMemo(() => {
+  const lines = useMemo((): readonly Line[] => {
     const place = ({ tag }: Row): number => held?.get(tag.id) ?? Infinity;
     const shown = held
       ? [...rows].sort((a, b) => (place(a) === place(b) ? 0 : place(a) - place(b)))
@@ -213,6 +206,7 @@ export function useHeldRows(): HeldRows {
     return areaOf ? withHeads(inAreas(shown, areaOf)) : shown;
   }, [rows, held, areaOf]);
   return {
+    /** Rows, with area headings between them. */
     lines,
     onPointerEnter: () => {
       setHeld(new Map(rows.map(({ tag }, index) => [tag.id, index])));

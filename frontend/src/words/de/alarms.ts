@@ -92,16 +92,20 @@ export const ALARMS: In<typeof EN.ALARMS> = {
 
   alarmNotifyMe: 'Alarme melden',
   alarmSound: 'Ton',
-  alarmSoundHint: 'Ein kurzer Ton bei neuen Alarmen, höchstens einer in 10 s.',
-  alarmSoundWaits: 'Der Browser erlaubt den Ton nach Ihrem ersten Klick auf dieser Seite.',
-  alarmSoundNone: 'Dieser Browser kann keinen Ton abspielen.',
+  alarmSoundHints: {
+    ready: 'Ein kurzer Ton bei neuen Alarmen, höchstens einer in 10 s.',
+    waits: 'Der Browser erlaubt den Ton nach Ihrem ersten Klick auf dieser Seite.',
+    none: 'Dieser Browser kann keinen Ton abspielen.',
+  },
   alarmNotify: 'Benachrichtigung',
   alarmNotifyHint: 'Der Browser meldet neue Alarme, auch wenn Sie gerade etwas anderes ansehen.',
-  alarmNotifyInsecure:
-    'Browser erlauben das nur bei Adressen, die mit https:// oder http://localhost beginnen.',
-  alarmNotifyRefused:
-    'Dieser Browser blockiert Benachrichtigungen. Bitte in seinen Einstellungen für diese Seite erlauben.',
-  alarmNotifyNone: 'Dieser Browser unterstützt keine Benachrichtigungen.',
+  alarmNotifyNot: {
+    insecure:
+      'Browser erlauben das nur bei Adressen, die mit https:// oder http://localhost beginnen.',
+    refused:
+      'Dieser Browser blockiert Benachrichtigungen. Bitte in seinen Einstellungen für diese Seite erlauben.',
+    none: 'Dieser Browser unterstützt keine Benachrichtigungen.',
+  },
   alarmNotifyTitle: (count) => counted(count, 'neuer Alarm', 'neue Alarme'),
 
   alarmsRaised: (alarms, more) => `Neu: ${alarms.join('; ')}${furtherText(more)}`,

@@ -92,16 +92,18 @@ export const ALARMS = {
 
   alarmNotifyMe: 'Notify me of alarms',
   alarmSound: 'Sound',
-  alarmSoundHint: 'A short sound for new alarms, at most one in 10 s.',
-  alarmSoundWaits: 'The browser allows sound after your first click on this page.',
-  alarmSoundNone: 'This browser cannot play sound.',
+  alarmSoundHints: {
+    ready: 'A short sound for new alarms, at most one in 10 s.',
+    waits: 'The browser allows sound after your first click on this page.',
+    none: 'This browser cannot play sound.',
+  },
   alarmNotify: 'Notification',
   alarmNotifyHint: 'The browser notifies you of new alarms while you look at something else.',
-  alarmNotifyInsecure:
-    'Browsers allow this only on addresses that begin with https:// or http://localhost.',
-  alarmNotifyRefused:
-    'This browser blocks notifications. Allow them for this page in its settings.',
-  alarmNotifyNone: 'This browser does not support notifications.',
+  alarmNotifyNot: {
+    insecure: 'Browsers allow this only on addresses that begin with https:// or http://localhost.',
+    refused: 'This browser blocks notifications. Allow them for this page in its settings.',
+    none: 'This browser does not support notifications.',
+  },
   alarmNotifyTitle: (count: number): string => counted(count, 'new alarm', 'new alarms'),
 
   /** For screen readers and notifications; `alarmsMeanwhile` while a past moment is shown. */

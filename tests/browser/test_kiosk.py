@@ -124,7 +124,7 @@ def test_on_a_phone_open_actions_come_first_in_full_and_the_page_scrolls(
     wall.map.scroll_into_view_if_needed()
     assert wall.page.evaluate("scrollY") > 0
     wall.page.evaluate("scrollTo(0, 0)")
-    leave = wall.page.get_by_role("button", name="Exit wall screen")
+    leave = wall.page.get_by_role("button", name="Exit")
     expect(leave.locator("kbd")).to_be_hidden()
     leave.tap()
     expect(wall.map).to_have_attribute("role", "application")

@@ -147,7 +147,7 @@ export const PAGE = {
   report: 'Shift report',
   print: 'Print',
   kiosk: 'Wall screen',
-  kioskLeave: 'Exit wall screen',
+  kioskLeave: 'Exit',
   cycleNext: (sensor: string, time: string): string => `next: ${sensor} in ${time}`,
   cycleRefused: (asked: string, least: number, most: number): string =>
     `cycle=${asked} is ignored: use ${least} to ${most} seconds.`,

@@ -11,7 +11,7 @@ from typing import Any
 from playwright.sync_api import Locator, expect
 
 from tests.browser.hmi import PHONE, WIDE, Hmi, OpenPage
-from tests.browser.places import LINES, out_of_reach, place, places
+from tests.browser.places import LINES, out_of_reach, place, places, words_below
 from tests.support.messages import scan
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
@@ -264,8 +264,15 @@ def test_nothing_moves_while_a_finger_rests_on_the_list(domain: int, open_page: 
         robot.observe(*[warm(f"{at}", at + 3.0) for at in (40, 41, 42)] * 2)
         hmi.page.locator("[data-group=active] .alarm-cause .alarm-go").click()
         values = fact(hmi.page.locator("[data-group=active]"), "now")
+        caused = hmi.page.locator("[data-caused=true] [data-alarm]")
         expect(values).to_have_count(6)
         assert len({place(each).left for each in values.all()}) == 1
+        # On a phone each is three lines, and no button covers a word.
+        hmi.resize(390, 844)
+        assert all(place(row).bottom - place(row).top <= 64 for row in caused.all())
+        assert words_below(hmi, "[data-caused=true] .alarm-go", ".alarm-tools > *") == []
+        assert out_of_reach(hmi, "[data-caused=true] button") == []
+        hmi.resize(**WIDE)
         # No line break within a tag's name: half a number is another tag.
         hmi.go("list=alarms", "?lang=de")
         worst = fact(hmi.page.locator("[data-group=active] .alarm-cause"), "now")

@@ -64,5 +64,5 @@ def test_the_table_by_area_has_the_worst_first(greenhouse: Bridge, open_page: Op
     hmi.expect_rows(*TAGS)
     expect(heads).to_have_count(0)
     hmi.page.get_by_role("button", name="Columns and rows").click()
-    expect(hmi.page.get_by_role("checkbox", name="Health")).to_be_visible()
+    expect(hmi.page.get_by_role("checkbox", name="Status")).to_be_visible()
     expect(hmi.page.get_by_role("checkbox", name="Group by area")).to_have_count(0)

@@ -1,6 +1,5 @@
 """A wall screen, for viewing only: an accidental touch changes nothing."""
 
-import json
 import re
 from typing import Final
 
@@ -125,7 +124,7 @@ def test_on_a_phone_open_actions_come_first_in_full_and_the_page_scrolls(
     wall.map.scroll_into_view_if_needed()
     assert wall.page.evaluate("scrollY") > 0
     wall.page.evaluate("scrollTo(0, 0)")
-    leave = wall.page.get_by_role("button", name="Exit kiosk")
+    leave = wall.page.get_by_role("button", name="Exit")
     expect(leave.locator("kbd")).to_be_hidden()
     leave.tap()
     expect(wall.map).to_have_attribute("role", "application")
@@ -148,4 +147,3 @@ def test_a_wall_screen_that_fails_recovers_by_itself(
     expect(wall.test_id("failed-page")).to_contain_text("reloads automatically")
     wall.expect_samples(3)
     assert wall.page.evaluate("window.stayed") is None
-    assert json.loads(wall.page.evaluate("sessionStorage['lupin-twin.reload']"))["failures"] == 1

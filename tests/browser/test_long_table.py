@@ -100,6 +100,11 @@ def test_axe_and_windows_of_any_size(open_greenhouse: OpenGreenhouse) -> None:
         assert violations(hmi) == []
     hmi.page.emulate_media(forced_colors="active")
     assert hmi.row("3").evaluate("row => getComputedStyle(row).outlineWidth") == "3px"
+    # A new filter leads to its first match, also on a phone, where the panel scrolls.
+    hmi.page.locator(".tags-panel").evaluate("e => { e.scrollTop = e.scrollHeight; }")
+    hmi.expect(lambda: hmi.page.locator(".tags-panel").evaluate("e => e.scrollTop > 0"), "scrolled")
+    hmi.page.evaluate("location.hash = 'filter=lupin'")
+    expect(hmi.row("1")).to_be_in_viewport()
 
 
 def test_all_rows_have_the_same_height(open_greenhouse: OpenGreenhouse) -> None:

@@ -120,7 +120,7 @@ class Field(StateQuery):
         etag: str | None = None,
         occupancy: OccupancyMap | None = None,
     ) -> Plan:
-        """The plan of the answer from a snapshot; `etag` None: it is made of content, without a map.
+        """The plan of the answer from a snapshot; `etag` None: it is made of content, no map.
 
         Raises:
             lupin_twin.field.engine.FieldRefused: a bad request.

@@ -7,7 +7,7 @@ import { secondsOf } from '../domain/time';
 import { compareIds } from '../domain/twin';
 import { toShown, unitOf } from '../domain/format';
 import { S } from '../strings';
-import { causeOf, MOST_LOOSE, type AlarmList, type Item, type Wrong } from './list';
+import { causeOf, inEach, MOST_LOOSE, type AlarmList, type Item, type Wrong } from './list';
 import {
   inOnePiece,
   lastKnown,
@@ -48,11 +48,7 @@ export function filtered(
       alarm.tag_id,
       `${nameText(alarm, speech)} ${causeText(alarm, speech)} ${S.health[verdict]}`.toLowerCase(),
     );
-  return {
-    active: list.active.filter(has),
-    shelved: list.shelved.filter(has),
-    resolved: list.resolved.filter(has),
-  };
+  return inEach(list, (items) => items.filter(has));
 }
 
 /** Blocks in the given order. `items` come worst first, or last resolved first. */

@@ -40,6 +40,16 @@ export interface AlarmList {
 export const groupOf = ({ alarm, shelf }: Item): keyof AlarmList =>
   alarm.cleared_at !== null ? 'resolved' : shelf !== null ? 'shelved' : 'active';
 
+/** A list with each of its groups changed. */
+export const inEach = (
+  list: AlarmList,
+  change: (items: readonly Item[], group: keyof AlarmList) => readonly Item[],
+): AlarmList => ({
+  active: change(list.active, 'active'),
+  shelved: change(list.shelved, 'shelved'),
+  resolved: change(list.resolved, 'resolved'),
+});
+
 export const EMPTY_LIST: AlarmList = { active: [], shelved: [], resolved: [] };
 
 /**
@@ -184,15 +194,9 @@ export interface HeldList {
 
 export function heldList(held: AlarmList, now: AlarmList): HeldList {
   const items = new Map(itemsOf(now).map((item) => [item.alarm.id, item]));
-  const keep = (rows: readonly Item[]): readonly Item[] =>
-    rows.map((item) => items.get(item.alarm.id) ?? item);
   const known = new Set(itemsOf(held).map(({ alarm }) => alarm.id));
   return {
-    shown: {
-      active: keep(held.active),
-      shelved: keep(held.shelved),
-      resolved: keep(held.resolved),
-    },
+    shown: inEach(held, (rows) => rows.map((item) => items.get(item.alarm.id) ?? item)),
     added: now.active.filter(({ alarm }) => !known.has(alarm.id)),
   };
 }
@@ -206,18 +210,13 @@ export const itemsOf = ({ active, shelved, resolved }: AlarmList): readonly Item
 /** `now`, reusing equal objects of `before`, so that what is memoised on them stays valid. */
 export function sharedList(before: AlarmList, now: AlarmList): AlarmList {
   const known = new Map(itemsOf(before).map((item) => [item.alarm.id, item]));
-  const share = (was: readonly Item[], is: readonly Item[]): readonly Item[] => {
+  const shared = inEach(now, (is, group) => {
+    const was = before[group];
     const items = is.map((item) => {
-      const before = known.get(item.alarm.id);
-      return before && equal(before, item) ? before : item;
+      const same = known.get(item.alarm.id);
+      return same && equal(same, item) ? same : item;
     });
-    return items.length === was.length && items.every((item, index) => item === was[index])
-      ? was
-      : items;
-  };
-  return withParts(before, {
-    active: share(before.active, now.active),
-    shelved: share(before.shelved, now.shelved),
-    resolved: share(before.resolved, now.resolved),
+    return items.length === was.length && items.every((item, at) => item === was[at]) ? was : items;
   });
+  return withParts(before, shared);
 }

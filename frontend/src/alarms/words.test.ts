@@ -153,25 +153,22 @@ test('since when and until when: of today the time alone, to the minute', () => 
   expect(whenText(100, 200)).toBe('sim 00:01:40');
 });
 
-test('for how long comes first, with the day only where it is another, and the end once it is resolved', () => {
+test('a row says since when, for how long only if it began today, and the end once it is resolved', () => {
   const since = alarm('a', { raised: NOON });
-  expect(timesOf(since, NOON + 7_500, false)).toEqual({
-    length: '2\u00a0h\u00a05\u00a0min',
-    note: '',
-  });
-  expect(timesOf(since, NOON + 86_400, false).note).toBe('14 Nov');
-  expect(timesOf(since, null, false).length).toBe('14 Nov, 12:00');
-  expect(timesOf(since, NOON - 60, false).length).toBe('12:00');
+  const text = (nowS: number | null): string => timesOf(since, nowS, false).text;
+  expect(text(NOON + 7_500)).toBe('since 12:00 (2\u00a0h)');
+  expect(text(NOON + 86_400)).toBe('since 14 Nov, 12:00');
+  expect(text(null)).toBe('since 14 Nov, 12:00');
+  expect(text(NOON - 60)).toBe('since 12:00');
   const over = alarm('a', { raised: NOON, cleared: NOON + 600 });
   expect(timesOf(over, NOON + 1_500, true)).toEqual({
-    length: '10\u00a0min',
+    text: '10\u00a0min',
     note: 'resolved 12:10',
   });
   // A simulated clock has no days.
-  expect(timesOf(alarm('a', { raised: 100 }), 160, false)).toEqual({
-    length: '1\u00a0min',
-    note: '',
-  });
+  expect(timesOf(alarm('a', { raised: 100 }), 160, false).text).toMatch(
+    /^since sim .* \(1\u00a0min\)$/,
+  );
 });
 
 test('of several the first are named', () => {

@@ -6,6 +6,7 @@ import {
   beyondLimitText,
   minuteText,
   readingText,
+  shortAgeText,
   type TemperatureUnit,
 } from '../domain/format';
 import { beyondText, isOfRange, reasonText, sideOf, todoText } from '../domain/health';
@@ -137,21 +138,21 @@ export function spanText({ raised_at, cleared_at }: Alarm, nowS: number | null):
   return S.alarmUntil(begin, end, lengthText(until - from));
 }
 
-/** Duration, and the day it began, if not today; with `isOver`, the time it was resolved instead. */
+/** Since when, and if that is today, for how long in short; with `isOver`, how long it was and when it ended. */
 export function timesOf(
   { raised_at, cleared_at }: Alarm,
   nowS: number | null,
   isOver: boolean,
-): { readonly length: string; readonly note: string } {
+): { readonly text: string; readonly note: string } {
   const from = secondsOf(raised_at);
   const until = cleared_at ? secondsOf(cleared_at) : nowS;
-  if (until === null || secondsSince(from, until) === null) {
-    return { length: whenText(from, nowS), note: '' };
+  const length = until === null ? null : secondsSince(from, until);
+  if (isOver && until !== null && length !== null) {
+    return { text: lengthText(length), note: `${S.alarmResolved} ${whenText(until, nowS)}` };
   }
-  const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? until);
-  const day = isOfToday ? '' : dayFormat.format(from * 1000);
-  const note = isOver ? `${S.alarmResolved} ${whenText(until, nowS)}` : day;
-  return { length: lengthText(until - from), note };
+  const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? from);
+  const short = length === null || !isOfToday ? null : shortAgeText(length);
+  return { text: S.alarmSince(whenText(from, nowS), short), note: '' };
 }
 
 const lengthText = (seconds: number): string => inOnePiece(ageText(Math.max(0, seconds)));

@@ -52,8 +52,8 @@ export function retainEqual<Value extends object>(
 export function groupedBy<Item>(
   items: readonly Item[],
   groupOf: (item: Item) => string,
-): ReadonlyMap<string, readonly Item[]> {
-  const groups = new Map<string, Item[]>();
+): ReadonlyMap<string, readonly [Item, ...Item[]]> {
+  const groups = new Map<string, [Item, ...Item[]]>();
   for (const item of items) {
     const group = groupOf(item);
     const there = groups.get(group);

@@ -212,12 +212,11 @@ function Cards({
 
 function GroupOf({ group, ...listed }: Listed & { group: Group }): JSX.Element {
   const { name, sites } = group;
-  const worst = sites[0];
   return (
     <details className="fleet-group" open>
       <summary>
         <h2>{name || words.others}</h2>
-        {worst && <HealthMark verdict={worst.verdict} word={false} />}
+        <HealthMark verdict={sites[0].verdict} word={false} />
         <span className="fleet-line">{groupText(sites)}</span>
       </summary>
       <List sites={sites} {...listed} />

@@ -7,6 +7,7 @@ import { rosText } from '../domain/time';
 import { useApp } from '../store/app';
 import { mayWithdraw, person, useSelected } from '../store/create';
 import { selectShown } from '../store/moment';
+import { S } from '../strings';
 import { Disclosure, useClose } from '../widgets/controls';
 import { C, standingNotes, type StandingNote } from './NoteMarks';
 
@@ -33,7 +34,7 @@ export function Comments({
           ref={button}
           type="button"
           className="comment-button"
-          aria-label={C.commentOf(name)}
+          aria-label={S.alarmWhat(C.comment, name)}
           aria-expanded={isOpen}
           onClick={() => {
             setOpen(!isOpen);
@@ -104,7 +105,7 @@ function CommentRow({
         <button
           type="button"
           className="text-button"
-          aria-label={C.withdrawOf(shown(text, 40))}
+          aria-label={S.alarmWhat(C.withdraw, shown(text, 40))}
           onClick={() => {
             withdrawComment(id).catch((error: unknown) => {
               setFault(C.failed(failureText(error)));
@@ -185,7 +186,7 @@ export function SiteComment(): JSX.Element | null {
   if (!mayWrite) return null;
   return (
     <Disclosure
-      label={C.commentOf(C.site)}
+      label={S.alarmWhat(C.comment, C.site)}
       button={C.comment}
       className="site-comment"
       look="text-button"

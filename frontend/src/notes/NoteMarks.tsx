@@ -8,7 +8,7 @@ import { rosText, secondsOf, type Span } from '../domain/time';
 import { act, keepFetched, useApp } from '../store/app';
 import { createStore, useSelected } from '../store/create';
 import { LANGUAGE, S } from '../strings';
-import { COMMENTS } from '../words/comments';
+import { NOTES } from '../words/notes';
 
 export type StandingNote = ReturnType<typeof standing>[number];
 
@@ -59,7 +59,7 @@ export function clustersOf(found: readonly StandingNote[], { from, to }: Span) {
   return clusters;
 }
 
-export const C = COMMENTS[LANGUAGE];
+export const C = NOTES[LANGUAGE];
 
 /** The tag of a note's subject; null: the greenhouse, or an alarm unknown to the page. */
 function tagIdOf(subject: string, alarms: readonly Alarm[]): string | null {
@@ -82,8 +82,8 @@ function subjectText(subject: string, alarms: readonly Alarm[]): string {
 
 function noteText({ kind, text, until }: StandingNote): string {
   if (kind === 'comment') return text;
-  const shelved = until === null ? C.unshelved : C.shelved(rosText(until));
-  const what = kind === 'acknowledge' ? C.acknowledged : shelved;
+  const shelved = until === null ? C.unshelved : S.alarmShelved(rosText(until), '', '');
+  const what = kind === 'acknowledge' ? S.healthAcknowledged : shelved;
   return text === '' ? what : `${what}: ${text}`;
 }
 
@@ -137,7 +137,9 @@ export function NoteMarks({
               </svg>
               <span className="comment-text" data-side={share > 0.5 ? 'before' : 'after'}>
                 {texts}
-                {found.length > texts.length && <span>{C.more(found.length - texts.length)}</span>}
+                {found.length > texts.length && (
+                  <span>{S.attentionMore(found.length - texts.length)}</span>
+                )}
               </span>
             </button>
           </li>

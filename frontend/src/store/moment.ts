@@ -186,7 +186,7 @@ export const latestWord = (): string => {
   const state = store.get();
   if (state.twin.phase !== 'live') return phaseWord(state);
   if (selectIsPaused(state)) return S.recordedIs.paused;
-  return selectIsRecorded(state) ? S.origin.recorded : S.timebarLive;
+  return selectIsRecorded(state) ? S.origin.recorded : S.phase.live;
 };
 
 export function backToLive(): void {

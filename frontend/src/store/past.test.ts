@@ -4,10 +4,7 @@ import { npyEstimate, npyField } from '../testing/field';
 import { goLive, goLost, showTags } from '../testing/page';
 import { judgement, reason } from '../testing/health';
 import { readings, stateFrame, wireTag } from '../testing/tags';
-import { wireStretch, wireTimeline } from '../testing/timeline';
-import { timelineOf } from '../domain/timeline';
 import { act, receive, store } from './app';
-import { ready } from './fetcher';
 import { withConnection, withPast } from './twin';
 import { selectHealth, selectMapped } from './derived';
 import { selectAwaited, selectShown } from './moment';
@@ -251,22 +248,27 @@ test('an estimate that is chosen goes the same way: with its state, the newest f
     await vi.dynamicImportSettled();
     await pass(100);
   }
-  const estimates = requests.filter(({ path }) => path === '/api/estimate.npy');
-  expect(estimates.filter(({ signal }) => !signal.aborted)).toHaveLength(2);
+  const states = requests.filter(({ path }) => path === '/api/state');
+  expect(states.filter(({ signal }) => !signal.aborted)).toHaveLength(2);
+  const { at = 0 } = states.at(-1) ?? {};
+  await answerAll(at);
   expect(requests.some(({ path }) => path === '/api/field.npy')).toBe(false);
-  const { at = 0 } = estimates.at(-1) ?? {};
   await answerAll(at);
   expect(shown()).toEqual([at, at, at]);
   expect(selectShown(store.get()).field.value?.sureness?.sdKnown).toBe(1);
   await pass(2_000);
   // The error of the nearest readings is not needed.
   expect(requests.some(({ path }) => path.endsWith('field/quality'))).toBe(false);
-  // Before all data there is none to ask for.
-  const value = timelineOf(wireTimeline({ from: 0, to: 90, reach: wireStretch(9, 90) }), 90);
-  receive({ remembered: ready(value) });
-  requests = [];
+});
+
+test('before all data there is no estimate to ask for, even if a link leads there', async () => {
+  act({ heat: 'estimate' });
   go(8);
-  await pass(100);
-  expect(requests.map(({ path }) => path)).toContain('/api/field.npy');
-  expect(requests.map(({ path }) => path)).not.toContain('/api/estimate.npy');
+  for (const { path, answer } of [...requests]) {
+    await answer(
+      path === '/api/state' ? Response.json(stateFrame([], { sec: 8 }).state) : undefined,
+    );
+  }
+  expect(selectShown(store.get())).toMatchObject({ moment: 8, snapshot: { tags: [] } });
+  expect(requests.map(({ path }) => path)).toEqual(['/api/state', '/api/health']);
 });

@@ -6,8 +6,8 @@ import type { Field, FieldQuality } from '../contract/types';
 import { snapshotOf } from '../domain/twin';
 import { type AppState, keepFetched, receive, store } from './app';
 import { sourceOf } from './derived';
-import { fetchHeat, fieldResolution } from './heat';
-import { isBeforeAll, selectLatest, selectPast } from './moment';
+import { boxOfPins, fetchHeat, fieldResolution } from './heat';
+import { selectLatest, selectPast } from './moment';
 import { DRAG_PACE_MS, failed, type Fetched, NOTHING, ready, type FetchTask } from './fetcher';
 import { NO_HOUSE, type Past, withPast } from './twin';
 
@@ -104,30 +104,38 @@ function qualityTask(state: AppState): FetchTask<FieldQuality> | null {
 
 function taskFor(state: AppState, at: number, epoch: number): FetchTask<Past> {
   const { sensor } = state.view;
-  // Before all data the server would refuse an estimate.
-  const source = isBeforeAll(state, at) ? 'nearest' : sourceOf(state);
+  const source = sourceOf(state);
   const resolution = fieldResolution(selectLatest(state).snapshot);
   return {
     key: `${epoch}|${at}|${sensor}|${resolution}|${source}`,
     run: async (signal) => {
+      const then = fetchStateAt(at, signal).then((latest) => {
+        const before = selectPast(store.get())?.house.snapshot ?? null;
+        // In milliseconds of ROS time: only differences count.
+        const snapshot = snapshotOf(latest, at * 1000, before);
+        return { snapshot, health: latest.health };
+      });
+      // The server refuses an estimate without a tag, so that has to be known first.
+      const known = source === 'estimate' ? await then : null;
+      const isNowhere = known && !boxOfPins(known.snapshot);
       // Both or neither: no moment shows the field of another one.
-      const [latest, field] = await Promise.all([
-        fetchStateAt(at, signal),
-        fetchHeat(source, { sensor, resolution, at }, signal).then(
-          ready,
-          (error: unknown): Fetched<Field> => {
-            // A temporary failure is retried together with the state.
-            if (!(error instanceof Refusal) || error.status !== 400) throw error;
-            return failed(error.message);
-          },
-        ),
+      const [{ snapshot, health }, field] = await Promise.all([
+        then,
+        isNowhere
+          ? NOTHING
+          : fetchHeat(source, { sensor, resolution, at }, signal).then(
+              ready,
+              (error: unknown): Fetched<Field> => {
+                // A temporary failure is retried together with the state.
+                if (!(error instanceof Refusal) || error.status !== 400) throw error;
+                return failed(error.message);
+              },
+            ),
       ]);
-      const before = selectPast(store.get())?.house.snapshot ?? null;
-      // In milliseconds of ROS time: only differences count.
-      const snapshot = snapshotOf(latest, at * 1000, before);
-      const hasPins = snapshot.tags.some((tag) => tag.at);
-      const { health } = latest;
-      return { at, house: { ...NO_HOUSE, snapshot, health, field: hasPins ? field : NOTHING } };
+      return {
+        at,
+        house: { ...NO_HOUSE, snapshot, health, field: boxOfPins(snapshot) ? field : NOTHING },
+      };
     },
   };
 }

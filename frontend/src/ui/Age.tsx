@@ -36,7 +36,7 @@ export function Age({ when, format = agoText }: { when: When; format?: Format })
   if (when === 'never') {
     return (
       <span className="age faint" title={isWhole ? S.neverObservedLong : S.notKnownThenLong}>
-        {isWhole ? S.neverObserved : S.notKnownThen}
+        {isWhole ? S.neverObserved : S.notKnown}
       </span>
     );
   }

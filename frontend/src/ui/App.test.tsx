@@ -137,8 +137,8 @@ describe('page', () => {
     render(<App kiosk />);
     expect(screen.queryByRole('button', { name: 'Menu' })).toBeNull();
     expect(screen.queryByRole('table')).toBeNull();
-    const [first] = document.querySelectorAll('.attention li');
+    const [first, second] = document.querySelectorAll('.attention > ul > li');
     expect(first?.textContent).toContain('4 pests seen');
-    expect(first?.textContent).toContain('CO₂ 3,200');
+    expect(second?.textContent).toContain('CO₂ 3,200');
   });
 });

@@ -3,7 +3,6 @@ import { useRef, type CSSProperties, type JSX } from 'react';
 import { byCause, tagsText } from '../alarms/arrange';
 import { selectSpeech } from '../alarms/speech';
 import { timeOfDay } from '../clock';
-import type { HealthReason } from '../contract/types';
 import { minuteText, shortAgeText } from '../domain/format';
 import { isBad, severity, todoText, type HouseHealth } from '../domain/health';
 import { shown } from '../domain/text';
@@ -21,17 +20,17 @@ import { Reasons, useReasonText } from './Reasons';
 
 /** Most lines that a wall screen can hold. */
 const MOST_LINES = 40;
-/** Reasons shown per tag. */
+/** Reasons shown per task. */
 const MOST_REASONS = 2;
 
 interface Line {
   readonly key: string;
-  /** Null: the line is about a single tag. */
+  /** Null: the line is one tag's task. */
   readonly cause: string | null;
-  readonly tags: readonly [Urgent, ...Urgent[]];
+  readonly tags: readonly Urgent[];
 }
 
-/** For a wall screen: the tags that need attention, in the order of `useUrgent`. */
+/** For a wall screen: what needs attention, in the order of `useUrgent`. */
 export function AttentionList(): JSX.Element {
   const urgent = useUrgent();
   const lines = useLines(urgent);
@@ -56,35 +55,31 @@ export function AttentionList(): JSX.Element {
   );
 }
 
-/** One line per tag, or per cause that more than a few share, as in the alarm list. */
+/** One line per task of a tag, or per cause that more than a few share, as in the alarm list. */
 function useLines(urgent: readonly Urgent[]): readonly Line[] {
   const speech = useApp(selectSpeech);
-  const ofOne = (each: Urgent): Line => ({ key: each.tagId, cause: null, tags: [each] });
-  const wrong = urgent.map((own) => ({
-    own,
-    alarm: { id: own.tagId, tag_id: own.tagId, reason: own.reasons[0] },
-  }));
-  return byCause(wrong, speech).flatMap(({ key, cause, items }): Line[] => {
-    const [first, ...others] = items.map(({ own }) => own);
-    if (!first) return [];
-    return cause === null
-      ? [first, ...others].map(ofOne)
-      : [{ key, cause, tags: [first, ...others] }];
+  const wrong = urgent.map((own) => {
+    const [reason] = own.reasons;
+    const id = `${own.tagId} ${todoText(reason)}`;
+    return { own, alarm: { id, tag_id: own.tagId, reason } };
   });
+  return byCause(wrong, speech).flatMap(({ key, cause, items }): Line[] =>
+    cause === null
+      ? items.map(({ own, alarm }) => ({ key: alarm.id, cause, tags: [own] }))
+      : [{ key, cause, tags: items.map(({ own }) => own) }],
+  );
 }
 
 /** Where, what is wrong and what to do; for a group: how many, the worst tag, and which tags. */
 function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.Element {
   const badness = ({ reasons: [reason] }: Urgent): number =>
     severity({ verdict: reason.verdict, reasons: [reason] });
-  const worst = tags.reduce((a, b) => (badness(b) > badness(a) ? b : a));
-  const { tagId, reasons } = worst;
+  const { tagId, reasons } = tags.reduce((a, b) => (badness(b) > badness(a) ? b : a));
   const [reason] = reasons;
   const { verdict } = reason;
   const why = S.healthDriver(shown(tagId, 16), useReasonText(reason, true, tagId));
   const since = useSince(tagId, reason);
   const isOne = cause === null;
-  const all = isOne ? reasons.slice(0, MOST_REASONS) : tags.map((each) => each.reasons[0]);
   const facts = isOne ? [since] : [why, since, tagsText(tags.map((each) => each.tagId))];
   return (
     <li data-fits={fits} {...(isOne ? { 'data-tag-id': tagId } : { 'data-cause': cause })}>
@@ -101,33 +96,19 @@ function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.
           </span>
         )}
         <span className="attention-do">
-          <Todo reasons={all} />{' '}
+          <strong>{todoText(reason)}</strong>{' '}
           <small className="faint">
-            <Dotted texts={facts.filter((fact) => fact !== null)} />
+            <span className="dotted">
+              {facts
+                .filter((fact) => fact !== null)
+                .map((fact) => (
+                  <span key={fact}>{fact}</span>
+                ))}
+            </span>
           </small>
         </span>
       </span>
     </li>
-  );
-}
-
-/** What to do about the reasons, without duplicates. */
-function Todo({ reasons }: { reasons: readonly HealthReason[] }): JSX.Element {
-  return (
-    <strong>
-      <Dotted texts={[...new Set(reasons.map(todoText))]} />
-    </strong>
-  );
-}
-
-function Dotted({ texts }: { texts: readonly string[] }): JSX.Element | null {
-  if (texts.length === 0) return null;
-  return (
-    <span className="dotted">
-      {texts.map((text) => (
-        <span key={text}>{text}</span>
-      ))}
-    </span>
   );
 }
 

@@ -15,6 +15,7 @@ import {
   VERDICTS,
 } from '../domain/health';
 import { secondsOf } from '../domain/time';
+import { groupedBy } from '../domain/memo';
 import { rowsOf } from '../domain/table';
 import { shown } from '../domain/text';
 import { act, store, useApp } from '../store/app';
@@ -37,18 +38,18 @@ const MOST_TAGS = 2;
 /** Most other tags with the same action that are named. */
 const MOST_ALSO = 3;
 
-/** A tag that needs attention. */
+/** One task at one tag. */
 export interface Urgent {
   readonly tagId: string;
-  /** Shelved ones excluded; the first is why it needs attention. */
+  /** All with this task, shelved ones excluded; the first is the most severe. */
   readonly reasons: readonly [HealthReason, ...HealthReason[]];
   /** Whether the first reason's alarm is acknowledged. */
   readonly isAcknowledged: boolean;
 }
 
 /**
- * Tags that need attention, with reasons, most severe first; values back in range come last.
- * Old readings do not count: they wait for the robot's next visit.
+ * What needs attention, most severe first; values back in range come last. Old readings do not count:
+ * they wait for the robot's next visit.
  */
 export function useUrgent(): readonly Urgent[] {
   const tags = useApp(selectTags);
@@ -67,14 +68,15 @@ export function useUrgent(): readonly Urgent[] {
           const judged = { verdict: isBack(reason) ? 'healthy' : own, reasons: [reason] };
           return severity(judged, has(acknowledged, id, reason));
         };
-        const [first, ...rest] = reasons
-          .filter((reason) => !has(alarms.shelved, id, reason))
+        const open = reasons
+          .filter((reason) => rank(reason) > 0 && !has(alarms.shelved, id, reason))
           .sort((a, b) => rank(b) - rank(a));
-        if (!first || rank(first) === 0) return [];
-        const isAcknowledged = has(acknowledged, id, first);
-        return [
-          { tagId: id, reasons: [first, ...rest] as const, isAcknowledged, rank: rank(first) },
-        ];
+        return [...groupedBy(open, todoText).values()].map(([first, ...rest]) => ({
+          tagId: id,
+          reasons: [first, ...rest] as const,
+          isAcknowledged: has(acknowledged, id, first),
+          rank: rank(first),
+        }));
       })
       .sort((a, b) => b.rank - a.rank);
   }, [tags, health, isNow, alarms]);
@@ -95,7 +97,10 @@ export function useSince(tagId: string, reason: HealthReason): string | null {
   return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
 }
 
-/** What to do first: where, why, what, and since when; otherwise the greenhouse's status. */
+/**
+ * What to do first: where, why, what, and since when; otherwise the greenhouse's status. A single line has
+ * no room for the names of other tags with the same task: it counts them.
+ */
 export function DoNow({
   most = MOST_TAGS,
   id = 'health-driver',
@@ -110,8 +115,9 @@ export function DoNow({
   // While the twin is silent, its last tasks stay listed.
   const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict) || isSilent(health));
   const count = hasOwn && most > 1 ? most - 1 : most;
+  const hasAlso = most > 1;
   const lines = byTodo(urgent).slice(0, count);
-  const rest = urgent.length - lines.flat().length;
+  const rest = urgent.length - (hasAlso ? lines.flat() : lines).length;
   return (
     <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
       {isOfTags ? (
@@ -128,7 +134,7 @@ export function DoNow({
               <Todo
                 tagId={tagId}
                 reason={reasons[0]}
-                also={others}
+                also={hasAlso ? others : []}
                 id={index === 0 ? id : undefined}
               />
             </button>
@@ -159,17 +165,10 @@ export function DoNow({
   );
 }
 
-/** Groups tags by action, the first one leading; acknowledged tags form groups of their own. */
-function byTodo(urgent: readonly Urgent[]): readonly (readonly [Urgent, ...Urgent[]])[] {
-  const found = new Map<string, [Urgent, ...Urgent[]]>();
-  for (const each of urgent) {
-    const key = `${todoText(each.reasons[0])}|${String(each.isAcknowledged)}`;
-    const line = found.get(key);
-    if (line) line.push(each);
-    else found.set(key, [each]);
-  }
-  return [...found.values()];
-}
+/** Grouped by task, the most severe tag first; acknowledged ones form groups of their own. */
+const byTodo = (urgent: readonly Urgent[]) => [
+  ...groupedBy(urgent, (each) => `${todoText(each.reasons[0])}|${each.isAcknowledged}`).values(),
+];
 
 /** Other tags of the group, some by name; the verdict's mark precedes a name where it changes. */
 function Also({ of, than }: { of: readonly Urgent[]; than: Verdict }): JSX.Element {

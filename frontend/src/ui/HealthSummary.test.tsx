@@ -71,7 +71,7 @@ test('says what to do first, and since when', () => {
   });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
     expect.stringMatching(/^CriticalTag 5: 2 pests seen.* acknowledged$/),
-    expect.stringMatching(/^UnknownTag 2: .*\+ 1 more$/),
+    expect.stringMatching(/^StressedTag 5: Temperature .* no alarm yet\+ 2 more$/),
   ]);
   stop();
 });

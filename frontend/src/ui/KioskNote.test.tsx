@@ -15,7 +15,7 @@ afterEach(() => {
 test('names the key that leads out and says the time, and nothing else without a round', () => {
   showTags([]);
   render(<KioskNote cycle={NONE} />);
-  expect(screen.getByTestId('kiosk-note').textContent).toMatch(/^Exit kiosk Esc\d\d:\d\d$/);
+  expect(screen.getByTestId('kiosk-note').textContent).toMatch(/^Exit Esc\d\d:\d\d$/);
   expect(screen.getByRole('button')).toBeInstanceOf(HTMLButtonElement);
 });
 

@@ -166,7 +166,7 @@ function CardBody({
           )}
           {tag.species && !tag.sureSpecies && ` (${S.notSure})`}
         </Fact>
-        <Fact label={S.cardBlooms}>{tag.flowerCount}</Fact>
+        <Fact label={S.columns.flowers}>{tag.flowerCount}</Fact>
         <Fact label={S.cardPosition}>
           {at ? (
             <button
@@ -275,12 +275,10 @@ function Attempts({ attempts }: { attempts: readonly PastAttempt[] }): JSX.Eleme
   );
 }
 
-const kindOf = (kind: number | null): string =>
-  kind === 0
-    ? S.cardAttemptKinds.scan
-    : kind === 1
-      ? S.cardAttemptKinds.look
-      : S.cardAttemptKinds.any;
+const kindOf = (kind: number | null): string => {
+  const { scan, look, any } = S.cardAttemptKinds;
+  return [scan, look][kind ?? -1] ?? any;
+};
 
 /** The history up to `moment`, ROS seconds; null: all of it. */
 export const asOf = memoLast((history: TagHistory, moment: number | null): TagHistory => {

@@ -1,6 +1,5 @@
 import { Fragment, memo, type JSX, type ReactNode } from 'react';
 
-import type { TagHealth } from '../contract/types';
 import { differenceShown, trendOf } from '../domain/difference';
 import {
   farOffText,
@@ -20,23 +19,18 @@ import {
 } from '../domain/health';
 import { speciesText } from '../domain/marks';
 import type { Catalogue, Sensor } from '../domain/sensors';
+import type { Row } from '../domain/table';
 import { shown } from '../domain/text';
 import type { When } from '../domain/time';
-import type { Tag } from '../domain/twin';
 import { shortHourText, thenOf, type HourAgo } from '../store/hourAgo';
 import { isColumnShown } from '../store/settings';
 import { S } from '../strings';
 import { Age, FailedAttemptText, useAgeStep } from './Age';
 import { HealthMark } from './HealthMark';
 
-interface Props {
-  /** Position among all rows, from 0. */
-  readonly index: number;
-  readonly tag: Tag;
-  readonly health: TagHealth;
+/** What all rows have in common. */
+export interface RowLook {
   readonly catalogue: Catalogue;
-  /** Empty: in no area, or the area's heading says it. */
-  readonly area: string;
   /** Sensors that have a column. */
   readonly sensors: readonly Sensor[];
   readonly chosen: string;
@@ -45,24 +39,21 @@ interface Props {
   readonly hidden: readonly string[];
   /** State an hour ago; null: unknown. */
   readonly then: HourAgo | null;
+}
+
+interface Props extends Row {
+  /** Position among all rows, from 0. */
+  readonly index: number;
+  readonly look: RowLook;
+  /** Empty: in no area, or the area's heading says it. */
+  readonly area: string;
   readonly selected: boolean;
   readonly hovered: boolean;
 }
 
-export const TagRow = memo(function TagRow({
-  index,
-  tag,
-  health,
-  catalogue,
-  area,
-  sensors,
-  chosen,
-  unit,
-  hidden,
-  then,
-  selected,
-  hovered,
-}: Props): JSX.Element {
+export const TagRow = memo(function TagRow(props: Props): JSX.Element {
+  const { index, tag, health, look, area, selected, hovered } = props;
+  const { catalogue, sensors, chosen, unit, hidden } = look;
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
   const all = reasonsText(catalogue, health.reasons, unit);
   // Mention a failed scan once, with its age.
@@ -143,15 +134,9 @@ export const TagRow = memo(function TagRow({
           className={sensor.name === chosen ? 'number chosen' : 'number other'}
           data-sensor={sensor.name}
         >
-          <TableReading
-            sensor={sensor}
-            tag={tag}
-            health={health}
-            catalogue={catalogue}
-            unit={unit}
-          />
+          <TableReading sensor={sensor} row={props} look={look} />
           {sensor.name === chosen && has('trend') && (
-            <TrendLine sensor={sensor} tag={tag} health={health} then={then} unit={unit} />
+            <TrendLine sensor={sensor} row={props} look={look} />
           )}
         </td>
       ))}
@@ -178,31 +163,20 @@ export const TagRow = memo(function TagRow({
   );
 });
 
+interface CellProps {
+  readonly sensor: Sensor;
+  readonly row: Row;
+  readonly look: RowLook;
+}
+
 /** A value styled by its age; one older than the row's scan also shows its own age. */
-function TableReading({
-  sensor,
-  tag,
-  health,
-  catalogue,
-  unit,
-}: {
-  sensor: Sensor;
-  tag: Tag;
-  health: TagHealth;
-  catalogue: Catalogue;
-  unit: TemperatureUnit;
-}): JSX.Element {
-  const when = tag.readAt.get(sensor.name) ?? 'never';
+function TableReading(cell: CellProps): JSX.Element {
+  const { tag } = cell.row;
+  const when = tag.readAt.get(cell.sensor.name) ?? 'never';
   const step = useAgeStep(when);
   return (
     <span className="reading" data-age={when === 'never' ? undefined : step}>
-      <Reading
-        sensor={sensor}
-        value={tag.readings.get(sensor.name)}
-        health={health}
-        catalogue={catalogue}
-        unit={unit}
-      />
+      <Reading {...cell} />
       {isOlder(when, tag.scannedAt) && (
         <span className="own-age">
           {' '}
@@ -220,24 +194,13 @@ const isOlder = (when: When, row: When): boolean =>
   when !== 'never' &&
   (typeof when === 'number' && typeof row === 'number' ? row - when > ONE_SCAN_MS : when !== row);
 
-function Reading({
-  sensor,
-  value,
-  health,
-  catalogue,
-  unit,
-}: {
-  sensor: Sensor;
-  value: number | null | undefined;
-  health: TagHealth;
-  catalogue: Catalogue;
-  unit: TemperatureUnit;
-}): JSX.Element {
+function Reading({ sensor, row: { tag, health }, look }: CellProps): JSX.Element {
+  const value = tag.readings.get(sensor.name);
   if (value === undefined) {
     return (
       <span className="faint">
         <span aria-hidden="true">{S.noValue}</span>
-        <span className="unseen">{S.noSensorLong}</span>
+        <span className="unseen">{S.pinLacking}</span>
       </span>
     );
   }
@@ -249,7 +212,7 @@ function Reading({
     );
   }
   const reason = rangeReason(health, sensor.name);
-  const beyond = reason && !isBack(reason) ? beyondText(catalogue, reason, unit) : null;
+  const beyond = reason && !isBack(reason) ? beyondText(look.catalogue, reason, look.unit) : null;
   return (
     <>
       {reason && beyond !== null && (
@@ -258,7 +221,7 @@ function Reading({
           <span className="unseen">{beyond}: </span>
         </span>
       )}
-      {valueText(sensor, value, unit)}
+      {valueText(sensor, value, look.unit)}
     </>
   );
 }
@@ -266,22 +229,10 @@ function Reading({
 export const ARROWS = { up: '\u2197', down: '\u2198', level: '\u2192' } as const;
 
 /** A reading's change over an hour: an arrow and the difference, or why there is none. */
-function TrendLine({
-  sensor,
-  tag,
-  health,
-  then,
-  unit,
-}: {
-  sensor: Sensor;
-  tag: Tag;
-  health: TagHealth;
-  /** Null: the state an hour ago is unknown. */
-  then: HourAgo | null;
-  unit: TemperatureUnit;
-}): JSX.Element | null {
+function TrendLine({ sensor, row, look: { then, unit } }: CellProps): JSX.Element | null {
+  const { tag } = row;
   const value = tag.readings.get(sensor.name);
-  const trend = trendOf(sensor.name, { tag, health }, thenOf(then, tag));
+  const trend = trendOf(sensor.name, row, thenOf(then, tag));
   if (!trend || value == null) return null;
   const title = S.trendTitle(shown(sensor.label, 32), shortHourText());
   if (!then || trend.kind !== 'by') {

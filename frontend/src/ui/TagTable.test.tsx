@@ -107,7 +107,7 @@ describe('table', () => {
 
   test('sorts by a column, up and down, and says so', () => {
     render(<TagTable />);
-    expect(head(/^Health/).getAttribute('aria-sort')).toBe('descending');
+    expect(head(/^Status/).getAttribute('aria-sort')).toBe('descending');
     press(/^Temperature/);
     expect(head(/^Temperature/).getAttribute('aria-sort')).toBe('ascending');
     expect(head(/^Tag/).getAttribute('aria-sort')).toBe('none');

@@ -45,6 +45,11 @@ export function TagTable(): JSX.Element {
   const hidden = useApp((state) => state.settings.hidden);
   const last = useSelected(hourAgo);
   const then = useApp((state) => selectHourAgo(state, last));
+  // One object for all rows, or each state would render them anew.
+  const look = useMemo(
+    () => ({ catalogue, sensors, chosen, unit, hidden, then }),
+    [catalogue, sensors, chosen, unit, hidden, then],
+  );
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
   const body = useRef<HTMLTableSectionElement>(null);
   const sight = useVisibleRows(body, lines.length);
@@ -140,15 +145,9 @@ export function TagTable(): JSX.Element {
               <TagRow
                 key={`tag ${row.tag.id}`}
                 index={part.index}
-                tag={row.tag}
-                health={row.health}
-                catalogue={catalogue}
+                {...row}
+                look={look}
                 area={isByArea ? '' : catalogue.areaOf(row.tag.id)}
-                sensors={sensors}
-                chosen={chosen}
-                unit={unit}
-                hidden={hidden}
-                then={then}
                 selected={row.tag.id === selected}
                 hovered={row.tag.id === hovered}
               />

@@ -1,4 +1,4 @@
-import { useEffect, useRef, type JSX } from 'react';
+import { useRef, type JSX } from 'react';
 
 import { act, useApp } from '../store/app';
 import { selectRows } from '../store/derived';
@@ -11,7 +11,7 @@ import { HealthSummary } from './HealthSummary';
 import { loadParts, WithParts } from './loadDeferred';
 import { EmptyTable } from './Notices';
 import { TagTable } from './TagTable';
-import { LONGEST_ON_PAPER } from './visibleRows';
+import { LONGEST_ON_PAPER, useTopAfter } from './visibleRows';
 
 export function TagsPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
   const list = useApp((state) => state.view.list);
@@ -37,9 +37,7 @@ function Rows(): JSX.Element {
   const filter = useApp(({ view }) => view.filter);
   const status = useApp(({ view }) => view.health);
   const frame = useRef<HTMLDivElement>(null);
-  useEffect(() => {
-    if (frame.current) frame.current.scrollTop = 0;
-  }, [filter, status]);
+  useTopAfter(frame, `${status ?? ''} ${filter}`);
   return (
     // A scroll container, so the keyboard must be able to reach it.
     <div

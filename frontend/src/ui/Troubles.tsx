@@ -77,15 +77,15 @@ function troublesOf(
 /** Longest input problem that the twin reports, in characters: its end says what to do. */
 const MAX_PROBLEM = 500;
 
-const JOURNAL_TROUBLES = new Map<string, { title: string; hint: string }>(
-  Object.entries(S.journal),
-);
+/** A text by a name from the server, which may be of a later version; undefined: none. */
+const textFor = <Text,>(texts: Readonly<Record<string, Text>>, name = ''): Text | undefined =>
+  Object.hasOwn(texts, name) ? texts[name] : undefined;
 
 /** A journal that does not record, or a damaged one that was quarantined. */
 function journalTroubles(journal: Journal | undefined): readonly Trouble[] {
   if (!journal) return [];
   const troubles: Trouble[] = [];
-  const trouble = JOURNAL_TROUBLES.get(journal.state);
+  const trouble = textFor(S.journal, journal.state);
   if (trouble) {
     const detail = `${sentence(journal.detail)} ${trouble.hint}`.trim();
     troubles.push({
@@ -102,15 +102,13 @@ function journalTroubles(journal: Journal | undefined): readonly Trouble[] {
   return troubles;
 }
 
-const CHANNELS = new Map<string, string>(Object.entries(S.notificationChannels));
-
 /** Failing notification channels. A channel unknown to this page is called by its name. */
 function notificationTroubles(channels: readonly Outward[]): readonly Trouble[] {
   return channels
     .filter((it) => it.is_failing)
     .map(({ channel, detail }) => ({
       id: `outward ${channel}`,
-      title: CHANNELS.get(channel) ?? S.notificationOther(shown(channel, 40)),
+      title: textFor(S.notificationChannels, channel) ?? S.notificationOther(shown(channel, 40)),
       detail: `${sentence(detail)} ${S.notificationHint}`.trim(),
     }));
 }
@@ -143,16 +141,14 @@ export function Troubles(): JSX.Element {
 
 /** Why the bridge calls the twin offline, in words for an operator. */
 export function offlineReason(status: StatusFrame | null): string {
-  return (status && S.offlineWhy[status.reason]) || S.frozenWhy.offline;
+  return textFor(S.offlineWhy, status?.reason) ?? S.frozenWhy.offline;
 }
 
 /** The same for whoever maintains the system; empty: nothing to add. */
 export const offlineMore = (status: StatusFrame | null): string =>
   status?.reason === 'clock_doubted'
     ? sentence(status.journal.detail, MAX_PROBLEM)
-    : status
-      ? S.offlineMore[status.reason]
-      : '';
+    : (textFor(S.offlineMore, status?.reason) ?? '');
 
 /** Banner across the page while it is not live. */
 export function FrozenBanner(): JSX.Element | null {

@@ -184,7 +184,7 @@ export function Keys(): JSX.Element {
       {unknown && (
         <li>
           <BloomKey look={UNKNOWN_SPECIES} />
-          {S.legendUnknownSpecies}
+          {S.unclassified}
         </li>
       )}
     </ul>

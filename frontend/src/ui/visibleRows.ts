@@ -184,19 +184,21 @@ function keepInView(frame: Element, chosen: string, height: number): void {
   if (row && down && down > 0 && down - row.clientHeight < height) row.scrollIntoView(NEAREST);
 }
 
-interface HeldRows {
-  /** Rows, with area headings between them. */
-  readonly lines: readonly Line[];
-  readonly onPointerEnter: () => void;
-  readonly onPointerLeave: () => void;
+/** A new filter scrolls a list back to its first row; on a narrow screen, the panel around it scrolls. */
+export function useTopAfter(list: RefObject<HTMLElement | null>, filter: string): void {
+  useEffect(() => {
+    for (const each of [list.current, list.current?.closest('.tags-panel')]) {
+      if (each) each.scrollTop = 0;
+    }
+  }, [list, filter]);
 }
 
 /** The table's rows. While a pointer is on them, none moves and new ones come last. */
-export function useHeldRows(): HeldRows {
+export function useHeldRows() {
   const rows = useApp(selectRows);
   const areaOf = useApp(selectAreaOf);
   const [held, setHeld] = useState<ReadonlyMap<string, number> | null>(null);
-  const lines = useMemo(() => {
+  const lines = useMemo((): readonly Line[] => {
     const place = ({ tag }: Row): number => held?.get(tag.id) ?? Infinity;
     const shown = held
       ? [...rows].sort((a, b) => (place(a) === place(b) ? 0 : place(a) - place(b)))
@@ -204,6 +206,7 @@ export function useHeldRows(): HeldRows {
     return areaOf ? withHeads(inAreas(shown, areaOf)) : shown;
   }, [rows, held, areaOf]);
   return {
+    /** Rows, with area headings between them. */
     lines,
     onPointerEnter: () => {
       setHeld(new Map(rows.map(({ tag }, index) => [tag.id, index])));

@@ -110,27 +110,12 @@ const english = saidBy({ ...ENGLISH, ...ESTIMATE }, parameters);
 /** Texts that are the same in English and another language: names, signs and shared words. */
 const SAME: Readonly<Record<string, readonly string[]>> = {
   de: [
-    ...[
-      'phase.live',
-      'timebarLive',
-      'keys.time.3.1',
-      'themes.system',
-      'attemptOutcomes.ok',
-      'sensors',
-    ],
+    ...['phase.live', 'keys.time.3.1', 'themes.system', 'attemptOutcomes.ok', 'sensors'],
     ...['cardPosition', 'rangeAuto', 'saveCsvShort', 'legendMore'],
     ...['keys.global.11.0', 'idealParts.any', 'colourings.ideal'],
   ],
   nl: [
-    ...[
-      'phase.live',
-      'timebarLive',
-      'keys.time.3.1',
-      'menu',
-      'attemptOutcomes.ok',
-      'sensors',
-      'alarmCount',
-    ],
+    ...['phase.live', 'keys.time.3.1', 'menu', 'attemptOutcomes.ok', 'sensors', 'alarmCount'],
     ...['rangeAuto', 'saveCsvShort', 'trend', 'legendMore', 'robotLayer', 'robotAt'],
     ...['keys.global.11.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
     ...['speciesNames.gerbera', 'phase.offline', 'reasons.wasBeyond'],

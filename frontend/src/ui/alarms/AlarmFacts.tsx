@@ -40,7 +40,7 @@ export function useValues(alarm: Alarm): ValuesNow {
   return { ...values, todo, state };
 }
 
-/** Duration and verdict; also the day it began, if not today, or when it was resolved. */
+/** Verdict, and since when; of a resolved alarm, for how long and until when. */
 export function AlarmTimes({
   alarm,
   first,
@@ -54,16 +54,16 @@ export function AlarmTimes({
 }): JSX.Element {
   const nowOf = (at: number): number | null => rosNow(store.get(), at);
   const span = useTicking((at) => spanText(alarm, nowOf(at)));
-  const length = useTicking((at) => timesOf(alarm, nowOf(at), isOver).length);
+  const text = useTicking((at) => timesOf(alarm, nowOf(at), isOver).text);
   const note = useTicking((at) => timesOf(alarm, nowOf(at), isOver).note);
   return (
     <span
       className="alarm-times"
       data-fact="since"
-      title={[span, first].filter((text) => text !== null).join(', ')}
+      title={[span, first].filter((each) => each !== null).join(', ')}
     >
       <span>
-        {length} <small className="faint">{note}</small>
+        {text} <small className="faint">{note}</small>
       </span>
       <HealthMark verdict={verdict} text={verdict === 'healthy' ? S.alarmBack : undefined} />
     </span>

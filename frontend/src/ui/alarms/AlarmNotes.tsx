@@ -1,21 +1,14 @@
 import { useId, useMemo, type JSX, type ReactNode } from 'react';
 
 import { alarmOf, isAwaited } from '../../alarms/list';
-import {
-  notifyState,
-  soundState,
-  setNotify,
-  setSound,
-  type NotifyState,
-  type SoundState,
-} from '../../alarms/notify';
+import { notifyState, soundState, setNotify, setSound } from '../../alarms/notify';
 import { lastAction, own, undo } from '../../alarms/own';
 import { textNow } from '../../alarms/speech';
 import { alarmList, meanwhile } from '../../alarms/watch';
 import { shown } from '../../domain/text';
 import { rosText, secondsOf } from '../../domain/time';
 import { act, useApp, type AppState } from '../../store/app';
-import { person, useSelected } from '../../store/create';
+import { useSelected } from '../../store/create';
 import { selectLatestHealth } from '../../store/derived';
 import {
   selectClockFault,
@@ -28,7 +21,6 @@ import { Check } from '../../widgets/controls';
 import { HealthMark } from '../HealthMark';
 import { selectAreAlarmsKnown } from '../Reasons';
 import { ignoreDoubleClick } from './AlarmRow';
-import { sharingText } from './people';
 
 /** How many tags have a reason that waits for a second scan; null: none, or unknown. */
 export function AlarmsWait(): JSX.Element | null {
@@ -80,12 +72,6 @@ export function AlarmNotes({ isEmpty }: { isEmpty: boolean }): JSX.Element {
       )}
     </div>
   );
-}
-
-/** Below the list: whether actions stay in this browser or are shared. */
-export function SharingNote(): JSX.Element {
-  const who = useSelected(person);
-  return <p className="sharing-note faint">{sharingText(who)}</p>;
 }
 
 /**
@@ -149,24 +135,12 @@ export function LastActionLine({
   );
 }
 
-/** The hint for a state of the sound. */
-const soundHint = (state: SoundState): string =>
-  ({ ready: S.alarmSoundHint, waits: S.alarmSoundWaits, none: S.alarmSoundNone })[state];
-
-const notifyHint = (state: NotifyState): string =>
-  ({
-    granted: S.alarmNotifyHint,
-    prompt: S.alarmNotifyHint,
-    refused: S.alarmNotifyRefused,
-    insecure: S.alarmNotifyInsecure,
-    none: S.alarmNotifyNone,
-  })[state];
-
 /** Opt-in sound and notifications for alarms while nobody is looking at the page. */
 export function NotifySettings(): JSX.Element {
   const local = useSelected(own);
   const sound = useSelected(soundState);
   const notify = useSelected(notifyState);
+  const isPossible = notify === 'granted' || notify === 'prompt';
   return (
     <>
       <Way
@@ -174,14 +148,14 @@ export function NotifySettings(): JSX.Element {
         isOn={local.sound && sound !== 'none'}
         isPossible={sound !== 'none'}
         // While sound is off, "waits" does not apply.
-        hint={soundHint(local.sound || sound === 'none' ? sound : 'ready')}
+        hint={S.alarmSoundHints[local.sound || sound === 'none' ? sound : 'ready']}
         onChange={setSound}
       />
       <Way
         label={S.alarmNotify}
         isOn={local.notify && notify === 'granted'}
-        isPossible={notify === 'granted' || notify === 'prompt'}
-        hint={notifyHint(notify)}
+        isPossible={isPossible}
+        hint={isPossible ? S.alarmNotifyHint : S.alarmNotifyNot[notify]}
         onChange={setNotify}
       />
     </>

@@ -18,7 +18,6 @@ import {
   oldestOf,
   unacknowledged,
   type AlarmList,
-  type HeldList,
   type Item,
 } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
@@ -35,12 +34,12 @@ import { LONGEST_FILTER } from '../../store/view';
 import { S } from '../../strings';
 import { Disclosure, Icon, Select } from '../../widgets/controls';
 import { HealthMark } from '../HealthMark';
-import { useChosenInSight, usePaper } from '../visibleRows';
+import { useChosenInSight, usePaper, useTopAfter } from '../visibleRows';
 import { AlarmTimes, ResolvedNote } from './AlarmFacts';
-import { AlarmNotes, AlarmsWait, LastActionLine, NotifySettings, SharingNote } from './AlarmNotes';
+import { AlarmNotes, AlarmsWait, LastActionLine, NotifySettings } from './AlarmNotes';
 import { Acknowledge, AlarmRow, ignoreDoubleClick } from './AlarmRow';
 import { ALARMS_ID, ListChoice } from './ListChoice';
-import { useIsRefused, useWhoAcknowledged } from './people';
+import { sharingText, useIsRefused, useWhoAcknowledged } from './people';
 
 /** Rows shown first for a shared cause; for others, and with each "more", `MOST_ROWS`. */
 const MOST_OF_CAUSE = 5;
@@ -69,7 +68,7 @@ export function AlarmPanel(): JSX.Element {
   // Counts follow the live list, like all others on the page, even while the order is held.
   const counted = filtered(all, filter, speech, isTag);
   const waiting = calling(seen);
-  const isAble = useSelected(person, mayAct);
+  const who = useSelected(person);
   const isRefused = useIsRefused();
   const count = seen.active.length + seen.shelved.length + seen.resolved.length;
   const list = useRef<HTMLDivElement>(null);
@@ -78,6 +77,7 @@ export function AlarmPanel(): JSX.Element {
     useApp((state) => state.view.selected),
     ids,
   );
+  useTopAfter(list, filter);
   const hasAny = all.active.length + all.shelved.length > 0;
   return (
     <>
@@ -125,7 +125,7 @@ export function AlarmPanel(): JSX.Element {
         </button>
       </div>
       <LastActionLine added={added.length} onShow={showNew}>
-        {isAble && (
+        {mayAct(who) && (
           <button
             type="button"
             className="text-button acknowledge-all"
@@ -176,7 +176,8 @@ export function AlarmPanel(): JSX.Element {
             {name === 'active' && hasAny && <AlarmsWait />}
           </Fragment>
         ))}
-        {hasAny && <SharingNote />}
+        {/* Whether actions stay in this browser or are shared. */}
+        {hasAny && <p className="sharing-note faint">{sharingText(who)}</p>}
       </div>
     </>
   );
@@ -328,7 +329,7 @@ function CauseHeading({
       <div className="alarm-tools">
         {group === 'active' && (
           <Acknowledge
-            label={S.alarmAcknowledgeOf(cause)}
+            label={S.alarmWhat(S.alarmAcknowledge, cause)}
             text={S.alarmAcknowledgeAll(waiting.length)}
             status={
               waiting.length > 0
@@ -354,17 +355,8 @@ function lastOfOne(alarms: readonly Alarm[]): Alarm | null {
   return alarms.every((alarm) => alarm.acknowledged_by === last?.acknowledged_by) ? last : null;
 }
 
-interface HeldOrder extends HeldList {
-  /** Shows the new alarms, and holds that order. */
-  readonly showNew: () => void;
-  readonly onPointerEnter: () => void;
-  readonly onPointerLeave: () => void;
-  readonly onFocus: (event: FocusEvent) => void;
-  readonly onBlur: (event: FocusEvent) => void;
-}
-
 /** Holds the order while the pointer or keyboard focus is in the list: no row moves. */
-function useHeldOrder(list: AlarmList): HeldOrder {
+function useHeldOrder(list: AlarmList) {
   const [hasPointer, setPointer] = useState(false);
   const [hasFocus, setFocus] = useState(false);
   const [held, setHeld] = useState<AlarmList | null>(null);
@@ -374,6 +366,7 @@ function useHeldOrder(list: AlarmList): HeldOrder {
   if (isHeld ? !hasRows && held !== list : held !== null) setHeld(isHeld ? list : null);
   return {
     ...heldList(held ?? list, list),
+    /** Shows the new alarms, and holds that order. */
     showNew: () => {
       setHeld(null);
     },
@@ -384,10 +377,10 @@ function useHeldOrder(list: AlarmList): HeldOrder {
       setPointer(false);
     },
     // A clicked button keeps the focus; without `:focus-visible` it holds nothing once the pointer leaves.
-    onFocus: ({ target, currentTarget }) => {
+    onFocus: ({ target, currentTarget }: FocusEvent) => {
       setFocus(target !== currentTarget && target.matches(':focus-visible'));
     },
-    onBlur: ({ relatedTarget, currentTarget }) => {
+    onBlur: ({ relatedTarget, currentTarget }: FocusEvent) => {
       if (!currentTarget.contains(relatedTarget)) setFocus(false);
     },
   };

@@ -13,7 +13,7 @@ import {
 } from '../../alarms/own';
 import { selectSpeech } from '../../alarms/speech';
 import { lastKnown, nameText, whereText } from '../../alarms/words';
-import { minuteText } from '../../domain/format';
+import { durationText, minuteText } from '../../domain/format';
 import { C } from '../../notes/NoteMarks';
 import { CommentField, CommentList } from '../../notes/Comments';
 import { useApp } from '../../store/app';
@@ -91,7 +91,7 @@ export const AlarmRow = memo(function AlarmRow({
       </button>
       <div className="alarm-tools">
         <Acknowledge
-          label={S.alarmAcknowledgeOf(name)}
+          label={S.alarmWhat(S.alarmAcknowledge, name)}
           text={S.alarmAcknowledge}
           status={status}
           onAcknowledge={() => {
@@ -218,7 +218,7 @@ function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
               shelveAlarm(item, minutes, given);
             })}
           >
-            {minutes < 60 ? S.alarmShelveMinutes(minutes) : S.alarmShelveHours(minutes / 60)}
+            {S.alarmShelveFor(durationText(minutes * 60))}
           </button>
         ))}
       </div>

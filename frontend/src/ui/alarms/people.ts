@@ -14,9 +14,9 @@ import { createFetcher } from '../../store/fetcher';
 import { rosNow, selectIsDisconnected } from '../../store/moment';
 import { person, useSelected } from '../../store/create';
 import { say } from '../toast';
-import { LANGUAGE, S } from '../../strings';
+import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
-import { PEOPLE } from '../../words/people';
+import { C } from '../../notes/NoteMarks';
 import {
   acting,
   lastAction,
@@ -25,8 +25,6 @@ import {
   faultKey,
   type LocalAlarms,
 } from '../../alarms/own';
-
-export const P = PEOPLE[LANGUAGE];
 
 const PACE_MS = 500;
 
@@ -131,7 +129,7 @@ async function share(before: LocalAlarms, next: LocalAlarms): Promise<void> {
   }
   pending -= 1;
   if (failure !== null) {
-    say(P.failed(failure));
+    say(C.failed(failure));
     lastAction.set(null);
   }
   // The frame with the changes may follow the answer; merging the old frame would revert them.
@@ -178,8 +176,8 @@ export function useIsRefused(): boolean {
 /** Says whether actions stay in this browser or are shared. */
 export function sharingText(who: Session | null): string {
   if (!who?.name) return S.alarmsMine;
-  if (who.can_write_notes) return P.shared(who.name);
-  return (who.role === 'viewer' ? P.reads : P.elsewhere)(who.name);
+  if (who.can_write_notes) return C.shared(who.name);
+  return (who.role === 'viewer' ? C.reads : C.elsewhere)(who.name);
 }
 
 /** Who acknowledged an alarm, and when; null: no name known. */
@@ -187,5 +185,5 @@ export function useWhoAcknowledged(alarm: Alarm | null): string | null {
   const name = alarm?.acknowledged_by;
   const at = alarm?.acknowledged_at;
   const when = useTicking((tick) => (at ? whenText(secondsOf(at), rosNow(store.get(), tick)) : ''));
-  return name && when !== '' ? P.acknowledged(name, when) : null;
+  return name && when !== '' ? C.acknowledged(name, when) : null;
 }

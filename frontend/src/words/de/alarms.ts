@@ -44,7 +44,6 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmStart: 'Zum Beginn',
   alarmActionsOf: (what) => `Aktionen: ${what}`,
   alarmAcknowledge: 'Quittieren',
-  alarmAcknowledgeOf: (what) => `Quittieren: ${what}`,
   alarmAcknowledgeAll: (count) => `Alle quittieren (${count})`,
   alarmUnacknowledge: 'Quittierung aufheben',
   alarmShelve: 'Zurückstellen',
@@ -53,8 +52,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     'Ein Alarm, der kritisch ist oder war, lässt sich höchstens 1 h zurückstellen, und nur mit Begründung.',
   alarmShelfReason: 'Begründung',
   alarmShelfReasonOptional: 'Begründung (optional)',
-  alarmShelveMinutes: (minutes) => `Für ${minutes} min`,
-  alarmShelveHours: (hours) => `Für ${hours} h`,
+  alarmShelveFor: (time) => `Für ${time}`,
   alarmShelved: (until, reason, by) =>
     `zurückgestellt ${by === '' ? '' : `von ${by} `}bis ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Wieder aktivieren',
@@ -94,16 +92,20 @@ export const ALARMS: In<typeof EN.ALARMS> = {
 
   alarmNotifyMe: 'Alarme melden',
   alarmSound: 'Ton',
-  alarmSoundHint: 'Ein kurzer Ton bei neuen Alarmen, höchstens einer in 10 s.',
-  alarmSoundWaits: 'Der Browser erlaubt den Ton nach Ihrem ersten Klick auf dieser Seite.',
-  alarmSoundNone: 'Dieser Browser kann keinen Ton abspielen.',
+  alarmSoundHints: {
+    ready: 'Ein kurzer Ton bei neuen Alarmen, höchstens einer in 10 s.',
+    waits: 'Der Browser erlaubt den Ton nach Ihrem ersten Klick auf dieser Seite.',
+    none: 'Dieser Browser kann keinen Ton abspielen.',
+  },
   alarmNotify: 'Benachrichtigung',
   alarmNotifyHint: 'Der Browser meldet neue Alarme, auch wenn Sie gerade etwas anderes ansehen.',
-  alarmNotifyInsecure:
-    'Browser erlauben das nur bei Adressen, die mit https:// oder http://localhost beginnen.',
-  alarmNotifyRefused:
-    'Dieser Browser blockiert Benachrichtigungen. Bitte in seinen Einstellungen für diese Seite erlauben.',
-  alarmNotifyNone: 'Dieser Browser unterstützt keine Benachrichtigungen.',
+  alarmNotifyNot: {
+    insecure:
+      'Browser erlauben das nur bei Adressen, die mit https:// oder http://localhost beginnen.',
+    refused:
+      'Dieser Browser blockiert Benachrichtigungen. Bitte in seinen Einstellungen für diese Seite erlauben.',
+    none: 'Dieser Browser unterstützt keine Benachrichtigungen.',
+  },
   alarmNotifyTitle: (count) => counted(count, 'neuer Alarm', 'neue Alarme'),
 
   alarmsRaised: (alarms, more) => `Neu: ${alarms.join('; ')}${furtherText(more)}`,

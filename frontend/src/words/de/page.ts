@@ -35,7 +35,6 @@ export const PAGE: In<typeof EN.PAGE> = {
     stale: 'Die Verbindung besteht, aber es kommt nichts mehr an.',
     reconnecting: 'Keine Verbindung zum Server.',
     connecting: 'Warten auf Antwort des Servers.',
-    live: '',
     offline: 'Der Server antwortet, der Zwilling aber nicht.',
   },
   clockTodo: {
@@ -44,8 +43,6 @@ export const PAGE: In<typeof EN.PAGE> = {
     clock_doubted: 'Bitte die Uhr des Zwillings stellen.',
   },
   offlineWhy: {
-    live: '',
-    paused: '',
     no_clock:
       'Von dort kommt die Zeit des Zwillings; noch fehlt sie. Das Alter der Werte ist unbekannt.',
     clock_stopped:
@@ -59,15 +56,11 @@ export const PAGE: In<typeof EN.PAGE> = {
     shutting_down: 'Der Server wird gerade beendet.',
   },
   offlineMore: {
-    live: '',
-    paused: '',
     no_clock: 'Der Zwilling läuft mit simulierter Zeit, und auf /clock kommt nichts.',
     clock_stopped: 'Der Zwilling läuft mit simulierter Zeit, und auf /clock kommt nichts mehr.',
-    clock_doubted: '',
     never_seen: 'Zwilling und Bridge müssen in derselben ROS-Domain laufen (ROS_DOMAIN_ID).',
     stale: 'Die Bridge läuft, aber auf /twin/state wird nichts mehr veröffentlicht.',
     thread_dead: 'Der ROS-Thread der Bridge ist beendet; warum, steht in ihrem Log.',
-    shutting_down: '',
   },
 
   serverBusy: 'Der Server kann gerade nicht antworten.',
@@ -243,7 +236,6 @@ export const PAST: In<typeof EN.PAST> = {
 
   timebar: 'Zeitleiste',
   timebarSlider: 'Angezeigte Zeit',
-  timebarLive: 'Live',
   timebarPeriod: 'Zeitraum',
   timebarPeriods: {
     hour: 'Letzte Stunde',

@@ -40,7 +40,6 @@ export const ALARMS = {
   alarmStart: 'Go to start',
   alarmActionsOf: (what: string): string => `Actions: ${what}`,
   alarmAcknowledge: 'Acknowledge',
-  alarmAcknowledgeOf: (what: string): string => `Acknowledge: ${what}`,
   alarmAcknowledgeAll: (count: number): string => `Acknowledge all (${count})`,
   alarmUnacknowledge: 'Unacknowledge',
   alarmShelve: 'Shelve',
@@ -49,8 +48,7 @@ export const ALARMS = {
     'An alarm that is or was critical can be shelved for at most 1 h, and needs a reason.',
   alarmShelfReason: 'Reason',
   alarmShelfReasonOptional: 'Reason (optional)',
-  alarmShelveMinutes: (minutes: number): string => `For ${minutes} min`,
-  alarmShelveHours: (hours: number): string => `For ${hours} h`,
+  alarmShelveFor: (time: string): string => `For ${time}`,
   alarmShelved: (until: string, reason: string, by: string): string =>
     `shelved ${by === '' ? '' : `by ${by} `}until ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Unshelve',
@@ -94,16 +92,18 @@ export const ALARMS = {
 
   alarmNotifyMe: 'Notify me of alarms',
   alarmSound: 'Sound',
-  alarmSoundHint: 'A short sound for new alarms, at most one in 10 s.',
-  alarmSoundWaits: 'The browser allows sound after your first click on this page.',
-  alarmSoundNone: 'This browser cannot play sound.',
+  alarmSoundHints: {
+    ready: 'A short sound for new alarms, at most one in 10 s.',
+    waits: 'The browser allows sound after your first click on this page.',
+    none: 'This browser cannot play sound.',
+  },
   alarmNotify: 'Notification',
   alarmNotifyHint: 'The browser notifies you of new alarms while you look at something else.',
-  alarmNotifyInsecure:
-    'Browsers allow this only on addresses that begin with https:// or http://localhost.',
-  alarmNotifyRefused:
-    'This browser blocks notifications. Allow them for this page in its settings.',
-  alarmNotifyNone: 'This browser does not support notifications.',
+  alarmNotifyNot: {
+    insecure: 'Browsers allow this only on addresses that begin with https:// or http://localhost.',
+    refused: 'This browser blocks notifications. Allow them for this page in its settings.',
+    none: 'This browser does not support notifications.',
+  },
   alarmNotifyTitle: (count: number): string => counted(count, 'new alarm', 'new alarms'),
 
   /** For screen readers and notifications; `alarmsMeanwhile` while a past moment is shown. */

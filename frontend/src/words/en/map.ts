@@ -65,7 +65,6 @@ export const MAP = {
   valueRange: (low: string, high: string): string => `${low}\u00a0to\u00a0${high}`,
   legendEach: (part: string): string => `${part} per species`,
   legendOthers: 'others',
-  legendUnknownSpecies: 'Not classified',
   pinLacking: 'no sensor',
   pinFailed: 'sensor failed',
   pinPest: 'pest seen',
@@ -121,7 +120,7 @@ export const TAGS = {
       : `${whole(shown)} of ${counted(all, 'tag', 'tags')}`,
   nothingMatches: 'No tag matches the filter.',
   columns: {
-    health: 'Health',
+    health: 'Status',
     tag: 'Tag',
     species: 'Species',
     flowers: 'Blooms',
@@ -138,7 +137,6 @@ export const TAGS = {
   ageUnknownLong: 'The age is unknown until the twin’s time is known.',
   neverObserved: 'never',
   neverObservedLong: 'No scan has returned a reading yet.',
-  notKnownThen: 'unknown',
   notKnownThenLong: 'This is no longer stored, or was not recorded yet.',
   ageUnreportedLong: 'This twin does not report when readings were taken.',
   attemptOutcomes: {
@@ -149,7 +147,6 @@ export const TAGS = {
     failed: 'failed',
   },
   noValue: '–',
-  noSensorLong: 'no sensor',
   sensorFailed: 'failed',
   sensorFailedLong: 'The sensor returned no value',
   confidence: (percent: string): string => `${percent} certain`,
@@ -190,7 +187,6 @@ export const TAGS = {
   cardNoReadings: 'No readings yet.',
   cardHistory: (count: number, from: string, to: string): string =>
     `Last ${count} readings, between ${from} and ${to}`,
-  cardBlooms: 'Blooms',
   cardSource: 'Source',
   cardFixed: 'Fixed sensor',
   cardVisited: 'Visited by the robot',

@@ -35,7 +35,6 @@ export const PAGE = {
     stale: 'The connection is open, but no data arrives.',
     reconnecting: 'Connection to the server lost.',
     connecting: 'Waiting for the server to respond.',
-    live: '',
     offline: 'The server responds, but the twin does not.',
   },
   /** What to do about a twin without a valid time; the reasons below continue it. */
@@ -45,8 +44,6 @@ export const PAGE = {
     clock_doubted: 'Set the twin’s clock.',
   },
   offlineWhy: {
-    live: '',
-    paused: '',
     no_clock:
       'The twin’s time comes from there, and there is none yet. The age of the readings is unknown.',
     clock_stopped:
@@ -60,15 +57,11 @@ export const PAGE = {
   },
   /** For whoever maintains the system; empty: nothing to add. */
   offlineMore: {
-    live: '',
-    paused: '',
     no_clock: 'The twin uses simulated time, but nothing is published on /clock.',
     clock_stopped: 'The twin uses simulated time, but /clock has stopped.',
-    clock_doubted: '',
     never_seen: 'Twin and bridge must use the same ROS domain (ROS_DOMAIN_ID).',
     stale: 'The bridge is running, but nothing is published on /twin/state.',
     thread_dead: 'The bridge’s ROS thread has ended; its log says why.',
-    shutting_down: '',
   },
 
   /** Replaces the server's error if it may recover soon. */
@@ -153,8 +146,8 @@ export const PAGE = {
   saveCsvShort: 'CSV',
   report: 'Shift report',
   print: 'Print',
-  kiosk: 'Kiosk mode',
-  kioskLeave: 'Exit kiosk',
+  kiosk: 'Wall screen',
+  kioskLeave: 'Exit',
   cycleNext: (sensor: string, time: string): string => `next: ${sensor} in ${time}`,
   cycleRefused: (asked: string, least: number, most: number): string =>
     `cycle=${asked} is ignored: use ${least} to ${most} seconds.`,
@@ -242,7 +235,6 @@ export const PAST = {
 
   timebar: 'Time bar',
   timebarSlider: 'Time shown',
-  timebarLive: 'Live',
   timebarPeriod: 'Period',
   timebarPeriods: {
     hour: 'Last hour',

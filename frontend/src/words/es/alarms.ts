@@ -38,7 +38,6 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmStart: 'Ir al inicio',
   alarmActionsOf: (what) => `Acciones: ${what}`,
   alarmAcknowledge: 'Reconocer',
-  alarmAcknowledgeOf: (what) => `Reconocer: ${what}`,
   alarmAcknowledgeAll: (count) => `Reconocer todas (${count})`,
   alarmUnacknowledge: 'Anular reconocimiento',
   alarmShelve: 'Aplazar',
@@ -47,8 +46,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     'Si la alarma es o fue crítica, se puede aplazar 1 h como máximo, indicando el motivo.',
   alarmShelfReason: 'Motivo',
   alarmShelfReasonOptional: 'Motivo (opcional)',
-  alarmShelveMinutes: (minutes) => `Durante ${minutes} min`,
-  alarmShelveHours: (hours) => `Durante ${hours} h`,
+  alarmShelveFor: (time) => `Durante ${time}`,
   alarmShelved: (until, reason, by) =>
     `aplazada ${by === '' ? '' : `por ${by} `}hasta ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Reactivar',
@@ -90,16 +88,20 @@ export const ALARMS: In<typeof EN.ALARMS> = {
 
   alarmNotifyMe: 'Avisarme de las alarmas',
   alarmSound: 'Sonido',
-  alarmSoundHint: 'Un sonido breve con las alarmas nuevas, como mucho uno cada 10 s.',
-  alarmSoundWaits: 'El navegador permite el sonido tras su primer clic en esta página.',
-  alarmSoundNone: 'Este navegador no puede reproducir sonido.',
+  alarmSoundHints: {
+    ready: 'Un sonido breve con las alarmas nuevas, como mucho uno cada 10 s.',
+    waits: 'El navegador permite el sonido tras su primer clic en esta página.',
+    none: 'Este navegador no puede reproducir sonido.',
+  },
   alarmNotify: 'Notificación',
   alarmNotifyHint: 'El navegador avisa de las alarmas nuevas aunque usted esté en otra ventana.',
-  alarmNotifyInsecure:
-    'Los navegadores solo lo permiten en direcciones que empiezan por https:// o http://localhost.',
-  alarmNotifyRefused:
-    'Este navegador bloquea las notificaciones. Permítalas para esta página en sus ajustes.',
-  alarmNotifyNone: 'Este navegador no admite notificaciones.',
+  alarmNotifyNot: {
+    insecure:
+      'Los navegadores solo lo permiten en direcciones que empiezan por https:// o http://localhost.',
+    refused:
+      'Este navegador bloquea las notificaciones. Permítalas para esta página en sus ajustes.',
+    none: 'Este navegador no admite notificaciones.',
+  },
   alarmNotifyTitle: (count) => counted(count, 'alarma nueva', 'alarmas nuevas'),
 
   alarmsRaised: (alarms, more) => `Nuevas: ${alarms.join('; ')}${more > 0 ? ` y ${more} más` : ''}`,

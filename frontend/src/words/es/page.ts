@@ -33,7 +33,6 @@ export const PAGE: In<typeof EN.PAGE> = {
     stale: 'La conexión está abierta, pero no llegan datos.',
     reconnecting: 'Sin conexión con el servidor.',
     connecting: 'Esperando la respuesta del servidor.',
-    live: '',
     offline: 'El servidor responde, pero el gemelo no.',
   },
   clockTodo: {
@@ -42,8 +41,6 @@ export const PAGE: In<typeof EN.PAGE> = {
     clock_doubted: 'Ponga en hora el reloj del gemelo.',
   },
   offlineWhy: {
-    live: '',
-    paused: '',
     no_clock:
       'El gemelo toma de ella la hora y aún no la tiene. Se desconoce la antigüedad de las lecturas.',
     clock_stopped:
@@ -56,16 +53,12 @@ export const PAGE: In<typeof EN.PAGE> = {
     shutting_down: 'El servidor se está apagando.',
   },
   offlineMore: {
-    live: '',
-    paused: '',
     no_clock: 'El gemelo funciona con tiempo simulado y no llega nada por /clock.',
     clock_stopped: 'El gemelo funciona con tiempo simulado y ya no llega nada por /clock.',
-    clock_doubted: '',
     never_seen:
       'El gemelo y el puente («bridge») deben estar en el mismo dominio de ROS (ROS_DOMAIN_ID).',
     stale: 'El puente («bridge») funciona, pero ya no se publica nada en /twin/state.',
     thread_dead: 'El hilo de ROS del puente («bridge») ha terminado; su registro dice por qué.',
-    shutting_down: '',
   },
 
   serverBusy: 'El servidor no puede responder ahora.',
@@ -237,7 +230,6 @@ export const PAST: In<typeof EN.PAST> = {
 
   timebar: 'Barra de tiempo',
   timebarSlider: 'Momento mostrado',
-  timebarLive: 'En directo',
   timebarPeriod: 'Periodo',
   timebarPeriods: {
     hour: 'Última hora',

@@ -36,7 +36,6 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmStart: 'Naar begin',
   alarmActionsOf: (what) => `Acties: ${what}`,
   alarmAcknowledge: 'Bevestigen',
-  alarmAcknowledgeOf: (what) => `Bevestigen: ${what}`,
   alarmAcknowledgeAll: (count) => `Alles bevestigen (${count})`,
   alarmUnacknowledge: 'Bevestiging intrekken',
   alarmShelve: 'Uitstellen',
@@ -45,8 +44,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     'Een alarm dat kritiek is of was, kunt u hoogstens 1 uur uitstellen, met opgave van reden.',
   alarmShelfReason: 'Reden',
   alarmShelfReasonOptional: 'Reden (optioneel)',
-  alarmShelveMinutes: (minutes) => `${minutes} min`,
-  alarmShelveHours: (hours) => `${hours} uur`,
+  alarmShelveFor: (time) => `Gedurende ${time}`,
   alarmShelved: (until, reason, by) =>
     `uitgesteld ${by === '' ? '' : `door ${by} `}tot ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Uitstel opheffen',
@@ -86,16 +84,19 @@ export const ALARMS: In<typeof EN.ALARMS> = {
 
   alarmNotifyMe: 'Alarmen melden',
   alarmSound: 'Geluid',
-  alarmSoundHint: 'Een kort geluid bij nieuwe alarmen, hoogstens één per 10 s.',
-  alarmSoundWaits: 'De browser staat geluid toe na uw eerste klik op deze pagina.',
-  alarmSoundNone: 'Deze browser kan geen geluid afspelen.',
+  alarmSoundHints: {
+    ready: 'Een kort geluid bij nieuwe alarmen, hoogstens één per 10 s.',
+    waits: 'De browser staat geluid toe na uw eerste klik op deze pagina.',
+    none: 'Deze browser kan geen geluid afspelen.',
+  },
   alarmNotify: 'Melding',
   alarmNotifyHint: 'De browser meldt nieuwe alarmen, ook als u in een ander venster werkt.',
-  alarmNotifyInsecure:
-    'Browsers staan dit alleen toe op adressen die beginnen met https:// of http://localhost.',
-  alarmNotifyRefused:
-    'Deze browser blokkeert meldingen. Sta ze voor deze pagina toe in de instellingen.',
-  alarmNotifyNone: 'Deze browser ondersteunt geen meldingen.',
+  alarmNotifyNot: {
+    insecure:
+      'Browsers staan dit alleen toe op adressen die beginnen met https:// of http://localhost.',
+    refused: 'Deze browser blokkeert meldingen. Sta ze voor deze pagina toe in de instellingen.',
+    none: 'Deze browser ondersteunt geen meldingen.',
+  },
   alarmNotifyTitle: (count) => counted(count, 'nieuw alarm', 'nieuwe alarmen'),
 
   alarmsRaised: (alarms, more) => `Nieuw: ${alarms.join('; ')}${more > 0 ? ` en nog ${more}` : ''}`,

@@ -33,7 +33,6 @@ export const PAGE: In<typeof EN.PAGE> = {
     stale: 'De verbinding is er, maar er komen geen gegevens binnen.',
     reconnecting: 'Geen verbinding met de server.',
     connecting: 'Wachten op antwoord van de server.',
-    live: '',
     offline: 'De server antwoordt, maar de digital twin niet.',
   },
   clockTodo: {
@@ -42,8 +41,6 @@ export const PAGE: In<typeof EN.PAGE> = {
     clock_doubted: 'Zet de klok van de digital twin gelijk.',
   },
   offlineWhy: {
-    live: '',
-    paused: '',
     no_clock:
       'Daar haalt de digital twin zijn tijd vandaan; die is er nog niet. Hoe oud de meetwaarden zijn, is onbekend.',
     clock_stopped:
@@ -58,16 +55,12 @@ export const PAGE: In<typeof EN.PAGE> = {
     shutting_down: 'De server wordt afgesloten.',
   },
   offlineMore: {
-    live: '',
-    paused: '',
     no_clock: 'De digital twin draait op gesimuleerde tijd, en op /clock komt niets binnen.',
     clock_stopped:
       'De digital twin draait op gesimuleerde tijd, en op /clock komt niets meer binnen.',
-    clock_doubted: '',
     never_seen: 'Digital twin en bridge moeten in hetzelfde ROS-domein draaien (ROS_DOMAIN_ID).',
     stale: 'De bridge draait, maar op /twin/state wordt niets meer gepubliceerd.',
     thread_dead: 'De ROS-thread van de bridge is gestopt; zijn log zegt waarom.',
-    shutting_down: '',
   },
 
   serverBusy: 'De server kan nu even niet antwoorden.',
@@ -240,7 +233,6 @@ export const PAST: In<typeof EN.PAST> = {
 
   timebar: 'Tijdbalk',
   timebarSlider: 'Getoonde tijd',
-  timebarLive: 'Live',
   timebarPeriod: 'Periode',
   timebarPeriods: {
     hour: 'Afgelopen uur',

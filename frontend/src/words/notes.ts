@@ -1,7 +1,7 @@
-/** Texts about people, bundled with their components; few, so all languages are in one file. */
+/** Texts about people's notes, bundled with their components; few, so all languages are in one file. */
 import type { Language } from './languages';
 
-export const PEOPLE = {
+export const NOTES = {
   en: {
     shared: (name: string): string =>
       `Signed in as ${name}: everybody sees what you acknowledge or shelve.`,
@@ -11,6 +11,15 @@ export const PEOPLE = {
       `Signed in as ${name}: this server stores no notes, so you cannot acknowledge or shelve alarms here.`,
     acknowledged: (name: string, at: string): string => `acknowledged by ${name}, ${at}`,
     failed: (why: string): string => `Not saved: ${why}`,
+    title: 'Comments',
+    comment: 'Comment',
+    site: 'greenhouse',
+    alarm: (tag: string): string => (tag ? `alarm at ${tag}` : 'alarm'),
+    unshelved: 'no longer shelved',
+    now: 'Comment (now)',
+    then: (at: string): string => `Comment (${at})`,
+    send: 'Save',
+    withdraw: 'Withdraw',
   },
   de: {
     shared: (name: string): string =>
@@ -21,6 +30,15 @@ export const PEOPLE = {
       `Angemeldet als ${name}: Dieser Server speichert keine Notizen. Alarme können Sie hier nicht quittieren oder zurückstellen.`,
     acknowledged: (name: string, at: string): string => `quittiert von ${name}, ${at}`,
     failed: (why: string): string => `Nicht gespeichert: ${why}`,
+    title: 'Kommentare',
+    comment: 'Kommentieren',
+    site: 'Gewächshaus',
+    alarm: (tag: string): string => (tag ? `Alarm an ${tag}` : 'Alarm'),
+    unshelved: 'wieder aktiviert',
+    now: 'Kommentar (jetzt)',
+    then: (at: string): string => `Kommentar (${at})`,
+    send: 'Speichern',
+    withdraw: 'Zurücknehmen',
   },
   nl: {
     shared: (name: string): string =>
@@ -31,6 +49,15 @@ export const PEOPLE = {
       `Aangemeld als ${name}: deze server slaat geen notities op; u kunt hier geen alarmen bevestigen of uitstellen.`,
     acknowledged: (name: string, at: string): string => `bevestigd door ${name}, ${at}`,
     failed: (why: string): string => `Niet opgeslagen: ${why}`,
+    title: 'Opmerkingen',
+    comment: 'Opmerking',
+    site: 'kas',
+    alarm: (tag: string): string => (tag ? `alarm bij ${tag}` : 'alarm'),
+    unshelved: 'niet meer uitgesteld',
+    now: 'Opmerking (nu)',
+    then: (at: string): string => `Opmerking (${at})`,
+    send: 'Opslaan',
+    withdraw: 'Intrekken',
   },
   es: {
     shared: (name: string): string =>
@@ -41,5 +68,14 @@ export const PEOPLE = {
       `Sesión iniciada como ${name}: este servidor no guarda notas; aquí no puede reconocer ni aplazar alarmas.`,
     acknowledged: (name: string, at: string): string => `reconocida por ${name}, ${at}`,
     failed: (why: string): string => `No se ha guardado: ${why}`,
+    title: 'Comentarios',
+    comment: 'Comentar',
+    site: 'invernadero',
+    alarm: (tag: string): string => (tag ? `alarma en ${tag}` : 'alarma'),
+    unshelved: 'reactivada',
+    now: 'Comentario (ahora)',
+    then: (at: string): string => `Comentario (${at})`,
+    send: 'Guardar',
+    withdraw: 'Retirar',
   },
 } as const satisfies Record<Language, unknown>;

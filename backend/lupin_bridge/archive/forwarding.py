@@ -19,7 +19,7 @@ import socket
 import sys
 import time
 from collections.abc import Awaitable, Callable
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
@@ -39,10 +39,19 @@ from lupin_bridge.archive.database import (
 from lupin_bridge.archive.journal_reader import Batch, Epoch, Source, without_nul
 from lupin_bridge.console import CommandError
 from lupin_bridge.feed.source import TwinUnavailableError
-from lupin_bridge.feed.tasks import end
+from lupin_bridge.feed.tasks import Guard, end
 from lupin_bridge.settings import Settings, option, variable
-from lupin_twin.core.notes import MAX_NOTES, Note, NotesRequest, NotesUnwritable
+from lupin_twin.core.notes import (
+    KINDS,
+    MAX_NOTES,
+    SHELF_S,
+    SHELVE,
+    Note,
+    NotesRequest,
+    NotesUnwritable,
+)
 from lupin_twin.core.past import DAY_NS, NotRemembered
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.journal.retention import RECORD
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
@@ -84,9 +93,11 @@ _LOCK: Final = "SELECT pg_try_advisory_lock(hashtextextended(:name, 0))"
 _OTHER: Final = (
     "SELECT machine, process, date_trunc('second', since) FROM forwarder WHERE site = :site"
 )
-# Notes of the fleet in one go, and characters of one: more than people write.
+# Notes of the fleet in one go, characters of one, and notes of a journal past which it takes none:
+# more than people write.
 _MAX_RETURNED: Final = 50
 _MAX_TEXT: Final = 4_000
+_MAX_KNOWN: Final = 100_000
 _HERE: Final = (
     "INSERT INTO forwarder VALUES (:site, :machine, :process, now(), now())"
     " ON CONFLICT (site) DO UPDATE SET"
@@ -191,17 +202,13 @@ class Sink:
         found = notes(self._log, self._read)
         if found.notes is not None:
             self._read, self._lacking = NotesRequest(found.journal, found.count), found.notes
-        if self._lacking:
-            known, most = source.note_ids(), source.last_seq() + MAX_NOTES
-            self._lacking = tuple(
-                note
-                for note in self._lacking
-                # A number far ahead is that of a journal before this one, or nonsense.
-                if note.id not in known
-                and number_of(note.id) <= most
-                and len(note.text) + len(note.by) + len(note.subject) <= _MAX_TEXT
-            )
-        return self._lacking[:_MAX_RETURNED]
+        if not self._lacking:
+            return ()
+        known, most = source.note_ids(), source.last_seq() + MAX_NOTES
+        self._lacking = tuple(
+            note for note in self._lacking if note.id not in known and _is_sound(note, most)
+        )
+        return self._lacking[: max(0, min(_MAX_RETURNED, _MAX_KNOWN - len(known)))]
 
     def _make_months(self, batch: Batch) -> None:
         """Create the partitions of the batch's months, and of the month after each."""
@@ -213,6 +220,20 @@ class Sink:
         for day in days - self._days:
             self._log.execute("SELECT make_months(:moment)", {"moment": day * 86_400})
             self._days.add(day)
+
+
+def _is_sound(note: Note, most: int) -> bool:
+    """Whether a person can have made a note: others may write to the archive too.
+
+    A number above `most` is that of a journal before this one, or nonsense.
+    """
+    longest_ns = SHELF_S * NANOSECONDS_PER_SECOND
+    return (
+        note.kind in KINDS
+        and number_of(note.id) <= most
+        and sum(map(len, (note.id, note.by, note.subject, note.text))) <= _MAX_TEXT
+        and (note.kind != SHELVE or (note.until_ns or 0) <= note.made_at_ns + longest_ns)
+    )
 
 
 # --- again and again ------------------------------------------------------------------------------
@@ -365,6 +386,9 @@ class Forwarding:
     async def stop(self) -> None:
         """End the process, which is safe at any moment: the next one goes on from there."""
         await end(self._task)
+        await self._kill()
+
+    async def _kill(self) -> None:
         if self._process is not None and self._process.returncode is None:
             self._process.kill()
             await self._process.wait()
@@ -375,6 +399,9 @@ class Forwarding:
         while not (journal := self._journal()):
             await asyncio.sleep(_LOOK_S)
         words = ("forward", "--end-with-input", "--journal", journal)
+        # If it is not written now, it comes again.
+        known = NotesUnwritable, NotRemembered, TwinUnavailableError
+        guard = Guard("a note of the fleet was not written", *known)
         while True:
             try:
                 self._process = await asyncio.create_subprocess_exec(
@@ -385,11 +412,15 @@ class Forwarding:
                 )
                 assert self._process.stdout is not None
                 async for line in self._process.stdout:
-                    # If it is not written now, it comes again.
-                    with suppress(NotesUnwritable, NotRemembered, TwinUnavailableError):
-                        await self._put(Note(**json.loads(line)))
+                    await guard.run(self._write(line))
                 ended = f"has ended with code {await self._process.wait()}"
             except OSError as error:
                 ended = f"cannot be started: {error}"
+            except ValueError as error:
+                ended = f"writes a line without an end: {error}"
+                await self._kill()
             log.error("the forwarder %s; it is restarted", ended)
             await asyncio.sleep(_RESTART_S)
+
+    async def _write(self, line: bytes) -> None:
+        await self._put(Note(**json.loads(line)))

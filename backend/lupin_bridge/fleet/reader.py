@@ -35,7 +35,7 @@ from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.retention import Stretches, kept
 from lupin_twin.journal.runs import runs, span_at, world_of
 from lupin_twin.journal.schema import MAP, DamagedFile, SiteLog
-from lupin_twin.journal.writes import last_number, put_note
+from lupin_twin.journal.writes import put_note
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -120,8 +120,8 @@ def _write_note(site: str, note: Note, should_stop: ShouldStop) -> Note:
         connection.execute(f"SET LOCAL statement_timeout = {_WRITE_MS}")
         log = SiteLog(connection, site)
         (forwarded,) = log.execute(_FORWARDED).fetchone() or (0,)
-        # After all that were forwarded, and before those that the twin has yet to write.
-        written = put_note(log, max(forwarded, last_number(log)) + 1, note)
+        # Not after the last note: that may be of an earlier journal, which had far more rows.
+        written = put_note(log, forwarded + 1, note)
         connection.execute("SELECT pg_notify(%s, %s)", (CHANNEL, site))
         if should_stop():
             raise CancelledError

@@ -43,7 +43,7 @@ from lupin_bridge.routes.pages import language_of
 from lupin_bridge.serving.admission import AdmissionError, Answer, ClientLimitError, RateLimit
 from lupin_bridge.stream import routes_schema
 from lupin_bridge.stream.state_json import note_json, stamp
-from lupin_twin.core.notes import COMMENT, SHELVE, WITHDRAW, WITHDRAWN, Note, withdrawals
+from lupin_twin.core.notes import COMMENT, SHELF_S, SHELVE, WITHDRAW, WITHDRAWN, Note, withdrawals
 from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Pose, Reading, Scan
 
@@ -54,9 +54,8 @@ router = APIRouter(default_response_class=Response)
 MAX_LISTED: Final = 2_000
 MAX_AUDITED: Final = 2_000
 _TOO_MANY_NOTES: Final = f"written more than {NOTE_BURST} notes and {NOTES_PER_MINUTE} a minute"
-# Longest time for which a critical alarm, and any other alarm, may be shelved.
+# Longest time for which a critical alarm may be shelved; any other one: `SHELF_S`.
 CRITICAL_SHELF_S: Final = 3_600
-SHELF_S: Final = 8 * 3_600
 # How far a page's clock may be ahead: it requests an hour from its own now on.
 _SLACK_S: Final = 10
 

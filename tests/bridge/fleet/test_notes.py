@@ -11,6 +11,8 @@ import psycopg
 import pytest
 
 from lupin_bridge.access.credentials import digest
+from lupin_bridge.archive.forwarding import Forwarder
+from lupin_twin.core.notes import Note
 from tests.support.access import served
 from tests.support.archive import Archive, forward_once, rows_of
 from tests.support.fleet import Page, fleet, forward, recent_scans
@@ -84,12 +86,38 @@ def test_an_acknowledged_alarm_is_shown_by_every_replica(here: Here) -> None:
         # A withdrawn note stays stored.
         assert anna.delete(f"{NOTES}/{note['id']}").status_code == 200
         wait_for(lambda: "acknowledged_by" not in alarm_of(vera), "the alarm as before")
-        kinds = archive.select("SELECT kind FROM note ORDER BY id")
+        kinds = archive.select("SELECT kind FROM note ORDER BY made_at_ns")
         assert kinds == [("acknowledge",), ("withdraw",)]
         # A later row of the journal changes none of it.
         forward_once(archive, here.journal)
-        assert archive.select("SELECT kind FROM note ORDER BY id") == kinds
+        assert archive.select("SELECT kind FROM note ORDER BY made_at_ns") == kinds
         assert rows_of(here.journal)["note"] == []
+
+
+def test_what_people_wrote_comes_back_and_nothing_else(here: Here) -> None:
+    archive, now_ns = here.archive, time.time_ns()
+    with signed_in(here.page.url, "anna") as anna:
+        before = archive.select("SELECT id FROM note")
+        # Of an earlier journal with far more rows, of no kind, too long, and for a century.
+        values = (
+            (2**40, "comment", "site", "x", None),
+            (1, "k" * 100_000, "site", "x", None),
+            (1, "comment", "site", "x" * 5_000, None),
+            (1, "shelve", "alarm:a", "x", now_ns + 100 * 365 * 86_400 * 10**9),
+        )
+        for n, (number, kind, subject, text, until_ns) in enumerate(values):
+            until = "NULL" if until_ns is None else until_ns
+            archive.do(
+                f"INSERT INTO note VALUES ('gh1', '{number:016x}{n:08x}', {now_ns}, 'eve',"
+                f" '{kind}', '{subject}', '{text}', {until})"
+            )
+        alarm_of(anna)
+        note = post(anna, kind="comment", subject="site", text="vents checked").json()
+        given = list[Note]()
+        journal, url = here.journal, archive.url()
+        assert Forwarder(url, "gh1", lambda: journal, print, given.append).run(once=True)
+        assert sorted(it.id for it in given) == sorted([note["id"], *(it for (it,) in before)])
+        archive.do("DELETE FROM note WHERE made_by = 'eve'")
 
 
 def test_a_person_without_the_right_is_refused(here: Here) -> None:

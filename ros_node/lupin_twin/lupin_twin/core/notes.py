@@ -16,7 +16,10 @@ SHELVE: Final = "shelve"
 COMMENT: Final = "comment"
 # Its subject is `note:ID`.
 WITHDRAW: Final = "withdraw"
+KINDS: Final = frozenset({ACKNOWLEDGE, SHELVE, COMMENT, WITHDRAW})
 WITHDRAWN: Final = "note:"
+# Longest time for which an alarm may be shelved.
+SHELF_S: Final = 8 * 3_600
 # At most this many notes of a journal are read: the latest.
 MAX_NOTES: Final = 5_000
 

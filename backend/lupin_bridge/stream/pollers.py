@@ -23,8 +23,9 @@ from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.hub import Hub
 from lupin_bridge.stream.schema import Contract, Time
 from lupin_bridge.stream.state_json import moment, stamp
-from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.core.state import Snapshot
+from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime import estimates
 from lupin_twin.runtime.estimates import Report
 
@@ -211,7 +212,7 @@ class EstimatePoller(Periodic):
         for name in sensors_of(snapshot):
             try:
                 known[name] = await self._report_on(name, snapshot)
-            except (NotRemembered, TwinUnavailableError) as error:
+            except (FieldRefused, NotRemembered, PastRefused, TwinUnavailableError) as error:
                 log.debug("what estimates of %s are worth is not known: %s", name, error)
                 if name in self.known:
                     known[name] = self.known[name]

@@ -14,7 +14,9 @@ from lupin_bridge.stream.pollers import (
     changed_of,
     sensors_of,
 )
+from lupin_twin.core.past import PastRefused
 from lupin_twin.core.state import Pose, Reading, Snapshot, TagState
+from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import Report, TagCheck
 from tests.support.waiting import until
 
@@ -58,13 +60,14 @@ class Stage:
         self.reported: list[Changed] = []
         self.snapshot: Snapshot | None = None
         self.answers: dict[str, Report] = {}
+        self.error: Exception = TwinUnavailableError("nobody is there")
         self.poller = EstimatePoller(self.report_on, lambda: self.snapshot, self.reported.append)
 
     async def report_on(self, sensor: str, snapshot: Snapshot) -> Report:
         assert snapshot is self.snapshot
         self.requested.append(sensor)
         if sensor not in self.answers:
-            raise TwinUnavailableError("nobody is there")
+            raise self.error
         return self.answers[sensor]
 
 
@@ -86,13 +89,23 @@ async def test_changes_are_passed_on_in_their_current_form() -> None:
     assert stage.reported[-1] == {}, "no tag has that sensor any more"
 
 
-async def test_where_a_report_fails_the_last_one_holds() -> None:
+@pytest.mark.parametrize(
+    "error",
+    [
+        TwinUnavailableError("nobody is there"),
+        # A clock that went back, and a sensor without a name.
+        PastRefused("at is 9 s, later than now, 8 s"),
+        FieldRefused("sensor_type is empty, must name a sensor"),
+    ],
+)
+async def test_where_a_report_fails_the_last_one_holds(error: Exception) -> None:
     stage = Stage()
-    stage.snapshot, stage.answers = snapshot(co2=5), {"co2": report(9, {"co2": 5})}
+    stage.snapshot, stage.error = snapshot(co2=5, light=6), error
+    stage.answers = {"co2": report(9, {"co2": 5}), "light": report(9, {})}
     await stage.poller.update()
-    stage.answers = {}
+    stage.answers = {"light": report(9, {"light": 6})}
     await stage.poller.update()
-    assert stage.reported[-1] == {"co2": {"co2": 5}}
+    assert stage.reported[-1] == {"co2": {"co2": 5}, "light": {"light": 6}}
 
 
 def test_the_number_of_queried_sensors_is_limited() -> None:

@@ -46,8 +46,6 @@ POLL_S: Final = 0.3
 RETRY_S: Final = 1.0
 # Longest wait for a log: a live twin reports within a second where its journal is.
 FOUND_S: Final = 3.0
-# Longest wait for rows: a killed twin leaves a request unanswered, and the next one soon runs.
-ROWS_S: Final = 5.0
 # A copy that was not written for this long is deleted at the start, unless it is the newest.
 RETAINED_S: Final = 90 * 86_400.0
 # Estimated time to write a lot into the file, s.
@@ -59,9 +57,9 @@ _ERRORS: Final = (NotALotError, NotRemembered, PastRefused, TwinUnavailableError
 class FollowedLog:
     """Finds the log of a twin in another process, or keeps a copy of it up to date.
 
-    `query(after)` returns the rows after a row number. `named` is the path of the twin's own file
-    on this machine, read even before the twin is received; None: the path that the twin reports.
-    `world` is what the twin observes, by the log. Belongs to the event loop.
+    `query(after)` returns the rows after a row number, within its own time-out. `named` is the path
+    of the twin's own file on this machine, read even before the twin is received; None: the path
+    that the twin reports. `world` is what the twin observes, by the log. Belongs to the event loop.
     """
 
     def __init__(
@@ -168,10 +166,7 @@ class FollowedLog:
         try:
             # Read each time: another `web` may write it too, and anybody may delete it.
             after = await self._on_worker(lambda: _last(here))
-            try:
-                lot = await asyncio.wait_for(self._query(after), ROWS_S)
-            except TimeoutError:
-                raise TwinUnavailableError("the twin does not answer; it is asked again") from None
+            lot = await self._query(after)
             if lot.journal != twin.journal_id:
                 return RETRY_S  # the twin has begun a new journal, and soon reports that
             self._followed = await self._on_worker(

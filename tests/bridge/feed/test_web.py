@@ -24,10 +24,11 @@ from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Reading, Scan
-from lupin_twin.journal.follow import Lot, write
+from lupin_twin.journal.follow import Lot, followed, write
 from lupin_twin.runtime.workers import Workers
 from tests.support.inprocess import started
 from tests.support.journal import NOW, recording, scan
+from tests.support.journal_answers import old
 from tests.support.messages import occupancy_grid
 from tests.support.ros import Peer, latched
 from tests.support.waiting import until, until_answered, wait_for
@@ -246,15 +247,18 @@ def test_the_latest_copy_stays_whatever_its_age(tmp_path: Path) -> None:
     assert left_after_start(tmp_path) == (str(latest), [latest])
 
 
-def test_a_request_that_a_killed_twin_leaves_unanswered_is_soon_made_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("is_old", [False, True])
+def test_rows_that_do_not_come_are_requested_again_and_an_old_copy_is_made_anew(
+    tmp_path: Path, *, is_old: bool
 ) -> None:
-    monkeypatch.setattr(web, "ROWS_S", 0.05)
-    requests = list[int]()
+    copy, requests = tmp_path / "j.sqlite", list[int]()
+    if is_old:
+        old("version4/purged", tmp_path)
 
     async def query(after: int) -> Lot:
         requests.append(after)
-        await asyncio.sleep(3_600.0 if len(requests) < 2 else 0.0)
+        if len(requests) < 2:
+            raise TwinTimeoutError("did not answer within 10 s")
         return Lot("j", (), 0, is_all=True)
 
     async def test() -> None:
@@ -265,7 +269,8 @@ def test_a_request_that_a_killed_twin_leaves_unanswered_is_soon_made_again(
         await log.stop()
 
     asyncio.run(test())
-    assert len(requests) >= 2
+    assert requests[:2] == [0, 0]
+    assert followed(copy).journal == "j"
 
 
 def test_a_configured_file_is_read_before_its_twin_is_received(tmp_path: Path) -> None:

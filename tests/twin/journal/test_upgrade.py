@@ -233,10 +233,19 @@ def test_it_waits_for_readers_of_the_file(tmp_path: Path) -> None:
     check_states(path, "day")
 
 
-def test_a_file_without_its_tables_is_quarantined(tmp_path: Path) -> None:
-    path = old("day", tmp_path)
-    with closing(sqlite3.connect(path)) as connection:
-        connection.execute("DROP TABLE run")
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [
+        ("day", "DROP TABLE run"),
+        (VERSION4, "UPDATE hour SET n = '[1'"),
+    ],
+)
+def test_a_file_that_cannot_be_upgraded_is_quarantined(
+    name: str, damage: str, tmp_path: Path
+) -> None:
+    path = old(name, tmp_path)
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute(damage)
     with started(path) as journal:
         wait_for(lambda: journal.condition.state is JournalState.RECORDING, "recording", 30.0)
         assert "j.sqlite.damaged-" in journal.condition.quarantined

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import groupby, islice
 from operator import itemgetter
 from pathlib import Path
@@ -43,6 +43,8 @@ from lupin_twin.journal.runs import Clock, Run, runs, span_at
 from lupin_twin.journal.schema import FILE_ERRORS, open_named
 
 _REPORT_EVERY: Final = 20_000
+# Characters of a line; a field of the csv module has 131,072 at most.
+_MAX_LINE: Final = 1_000_000
 # Lines that are named for each reason of refusal, after their count.
 _EXAMPLES: Final = 3
 
@@ -167,8 +169,15 @@ def columns_of(content: Any) -> Columns:
 
 
 def counted(file: TextIO, report_every: Callable[[int], None]) -> Iterator[str]:
-    """Yield the lines of a file; reports now and then how many bytes were read."""
-    for number, line in enumerate(iter(file.readline, "")):
+    """Yield the lines of a file; reports now and then how many bytes were read.
+
+    Raises:
+        csv.Error: a line is too long.
+
+    """
+    for number, line in enumerate(iter(partial(file.readline, _MAX_LINE), "")):
+        if len(line) == _MAX_LINE:
+            raise csv.Error(f"line {number + 1} has {_MAX_LINE:,} characters or more")
         if number % _REPORT_EVERY == 0:
             report_every(file.buffer.tell())
         # InfluxDB's annotations

@@ -239,6 +239,7 @@ def test_a_time_without_offset_is_in_the_given_zone_and_an_hour_may_occur_twice(
         (WIDE | {"places": {"A": [1, "x"]}}, ROWS, "places.A is [1, 'x'], expected [x, y] or"),
         (WIDE, b"\xff\xfe\x00", "is not CSV in UTF-8"),
         (WIDE, 'at,bench,t,rh\n"' + "x" * 200_000, "is not CSV in UTF-8: field larger than"),
+        (WIDE, "at,bench,t,rh\n" + "," * 1_000_001, "line 2 has 1,000,000 characters or more"),
     ],
 )
 def test_a_file_that_cannot_be_imported_is_refused_in_one_line(

@@ -227,7 +227,13 @@ class People:
             with closing(Accounts(self._path, is_writer=True)) as accounts:
                 return work(accounts, int(time.time()))
 
-        return await self._on_thread(do, 2 * MAX_WAITING)
+        try:
+            return await self._on_thread(do, 2 * MAX_WAITING)
+        except AccountError:
+            # A process has one WAL index for a file, read-only if the first reader found it so:
+            # let the next reader open the file again.
+            self._inode = 0
+            raise
 
     async def _on_thread(self, work: Callable[[], ResultT], most: int = MAX_WAITING) -> ResultT:
         if self._waiting >= most:

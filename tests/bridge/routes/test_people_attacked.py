@@ -17,12 +17,14 @@ import pytest
 from lupin_bridge.access.credentials import digest
 from tests.support import raw_http
 from tests.support.access import served
+from tests.support.disk import Disk, build
 from tests.support.messages import inspection
 from tests.support.people import (
     BEARER,
     OWN,
     TOKEN,
     add,
+    changing,
     end_of,
     in_s,
     notes,
@@ -221,3 +223,24 @@ def test_open_connections_end_when_the_first_account_is_created_and_when_the_fil
             refused = live.get("/api/state", BEARER)
             assert (refused.status_code, "cannot be read" in refused.text) == (503, True)
             assert "the session has ended" in end_of(stream)
+
+
+def test_accounts_on_a_disk_that_was_read_only_at_the_start_can_be_written_after(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    path, disk = folder / "accounts.sqlite", Disk(folder, build(tmp_path), tmp_path / "control")
+    add(path, anna="operator")
+    # As after a power cut: the file's log is there.
+    with changing(path) as accounts:
+        accounts.listed("account")
+        disk.be("readonly")
+        with (
+            served("--accounts", str(path), trust=False, afresh=True, **disk.env) as live,
+            live.client() as browser,
+        ):
+            refused = sign_in(browser, "anna")
+            assert (refused.status_code, "readonly" in refused.text) == (503, True)
+            disk.be("well")
+            assert sign_in(browser, "anna").status_code == 204

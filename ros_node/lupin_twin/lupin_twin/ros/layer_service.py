@@ -34,7 +34,6 @@ from lupin_twin.field.engine import (
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.idw import Abandoned
 from lupin_twin.ros.base_node import NO_EVENTS, NodeUtilities, qos_of
-from lupin_twin.ros.estimate_service import EstimateService
 from lupin_twin.ros.layers import (
     MAX_POINTS,
     MarkerArrays,
@@ -47,6 +46,7 @@ from lupin_twin.ros.layers import (
     topics_of,
 )
 from lupin_twin.ros.parameters import naming
+from lupin_twin.ros.services import EstimateService
 from lupin_twin.runtime.estimates import are_enough
 from lupin_twin.runtime.workers import JobQueue, Query, ShouldStop, Workers
 

@@ -30,11 +30,10 @@ from lupin_twin.journal.runs import Clock as RunClock
 from lupin_twin.ros import convert, message_limits
 from lupin_twin.ros.base_node import NO_EVENTS, NodeUtilities, qos_of, waker
 from lupin_twin.ros.convert import diagnostics
-from lupin_twin.ros.estimate_service import EstimateService
 from lupin_twin.ros.inputs import TwinCount
 from lupin_twin.ros.layer_service import LayerService
 from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
-from lupin_twin.ros.services import FieldService, PastService, Responses
+from lupin_twin.ros.services import EstimateService, FieldService, PastService, Responses
 from lupin_twin.runtime.memory import Memory, open_journal
 from lupin_twin.runtime.workers import LARGE_THREADS, JobQueue, Workers
 

@@ -1,6 +1,6 @@
 """Access control: checks the policy, credentials and method of every request.
 
-The outer middleware is `AccessControl` (403, 401, 429, 414, security headers), the inner one
+The outer middleware is `AccessControl` (403, 401, 429, 413, 414, security headers), the inner one
 `ReadOnly` (405).
 """
 

@@ -65,7 +65,7 @@ class Field(StateQuery):
     The default box is that of the tags as they were pinned then. Daily quantities are derived from
     each tag's readings of a day; the clock decides whether it was day. Live and past fields differ
     in the source of the snapshot, and in their ETags (`newest_etag`). Only a live field is clipped
-    to the map: the log does not have the map of a past moment.
+    to the map, and not one of a daily quantity: the log does not have the map of a past moment.
     """
 
     query: FieldQuery

@@ -141,7 +141,8 @@ FIELDS: Final = InFormats(
     description="""Inverse-distance-weighted from the pinned tags; unknown where no tag is near.
 
 With `at`, it uses the tags as they were at that moment, with the current parameters. A field of the
-past is never clipped to the map: the log does not have the map of that moment.""",
+past is never clipped to the map: the log does not have the map of that moment. Nor is one of a
+daily quantity, which is made from the log.""",
     parameters=parameters_of(FieldQuery),
     model=schema.GetFieldResponse,
 )

@@ -50,12 +50,16 @@ def bound_unsent(transport: asyncio.BaseTransport) -> None:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT_BYTES)
 
 
+# How asyncio fails on a TLS transport that uvicorn closed twice, and that ends by itself.
+_UNLESS_FORGOTTEN: Final = suppress(AttributeError)
+
+
 def tear_down(transport: asyncio.WriteTransport) -> None:
     """End a connection now; one whose other side does not read is reset.
 
     If only closed, its socket would keep the unread data for another four minutes.
     """
-    with _unless_forgotten():
+    with _UNLESS_FORGOTTEN:
         if transport.get_write_buffer_size() > 0:
             reset(transport)
         else:
@@ -65,16 +69,11 @@ def tear_down(transport: asyncio.WriteTransport) -> None:
 def reset(transport: asyncio.WriteTransport) -> None:
     """End a connection now with a TCP reset, so that the other side sees that it was cut off."""
     no_lingering = struct.pack("ii", 1, 0)
-    with _unless_forgotten():
+    with _UNLESS_FORGOTTEN:
         connection: socket.socket | None = transport.get_extra_info("socket")
         if connection is not None and connection.fileno() >= 0:  # else it has ended already
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, no_lingering)
         transport.abort()
-
-
-def _unless_forgotten() -> suppress:
-    """Ignore how asyncio fails on a TLS transport that uvicorn closed twice; it ends by itself."""
-    return suppress(AttributeError)
 
 
 # Bytes read from a connection at once: clients send little, and all others wait while it is parsed,

@@ -75,22 +75,6 @@ def test_a_failing_query_is_answered_and_delays_nobody(made: Stage) -> None:
     assert made.queue.waiting == 0
 
 
-def test_a_cancelled_query_is_not_started_and_takes_no_place(made: Stage) -> None:
-    are_there = True
-    first = made.query(cost_s=LARGE_S)
-    for _ in range(MAX_QUERIES - 1):
-        made.queue.ask(
-            Query(pytest.fail, made.answers.append, str, LARGE_S, is_wanted=lambda: are_there)
-        )
-    are_there = False
-    after = made.query(cost_s=LARGE_S)
-    first.set_result(1)
-    assert made.delivered() == "1"
-    after.set_result(2)
-    assert made.delivered() == "2"
-    assert made.begun == [first, after]
-
-
 def test_an_answer_that_cannot_be_sent_delays_nobody(made: Stage) -> None:
     def reply(answer: str) -> None:
         raise RuntimeError(answer)

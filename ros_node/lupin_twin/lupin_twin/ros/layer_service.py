@@ -202,18 +202,19 @@ class LayerService:
         request = self._request(sensor, snapshot)
         samples = self.store.samples_for_sensor(sensor)
         compute = partial(compute_field, request, samples, self.occupancy(), self.rules())
-        task = self.estimates.prepare(EstimateRequest(request))
+        estimates, wanted, now_ns = self.estimates, EstimateRequest(request), self.now_ns()
 
         def make(found: Sequence[TagPast]) -> bytes:
             grid = compute(should_stop)
             estimate = None
             if are_enough(found):
                 with suppress(FieldRefused):  # nothing can be made of them
-                    estimate = task.make(found, should_stop).grid
+                    estimate = estimates.make(wanted, now_ns, found, should_stop).grid
             (self._estimated.discard if estimate is None else self._estimated.add)(sensor)
             return cloud(points(grid, estimate), snapshot.stamp_ns, frame_id)
 
-        return Query(partial(_or_nothing, task.look_up), reply, make, _COST_S)
+        look_up = partial(estimates.look_up, wanted, now_ns)
+        return Query(partial(_or_nothing, look_up), reply, make, _COST_S)
 
     def _request(self, sensor: str, snapshot: Snapshot) -> FieldRequest:
         """The request for a sensor's field; its box, that of all tags, is the same for all."""

@@ -187,19 +187,6 @@ class PastService:
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
-    """A requested estimate, and its approximate cost, `cost_s` s of one core.
-
-    `look_up()`, on the node's thread, starts the query for the readings. `make`, on any thread,
-    makes the estimate from them.
-    """
-
-    cost_s: float
-    look_up: Callable[[], Future[Sequence[TagPast]]]
-    make: Callable[[Sequence[TagPast], ShouldStop], Estimate]
-
-
-@dataclass(slots=True)
 class EstimateService:
     """The estimate's services on one node; belongs to the node's thread.
 
@@ -225,37 +212,33 @@ class EstimateService:
         )
         offer(node, group, plans, self.queue, self.utilities.report)
 
-    def prepare(self, request: EstimateRequest) -> Task:
-        """Check a request, and return the task of making its estimate.
+    def look_up(self, request: EstimateRequest, now_ns: int) -> Future[Sequence[TagPast]]:
+        """Start the query for an estimate's readings."""
+        sensor, at_ns, day_s = request.box.sensor_type, request.at_ns or now_ns, self.day_length_s
+        return self.recall.query(
+            lambda log, _: readings_at(log, sensor, at_ns, day_s), self._search_s
+        )
 
-        Raises:
-            FieldRefused, PastRefused: the request is invalid.
-
-        """
-        now_ns, day_s = self.now_ns(), self.day_length_s
-        check_moment(request.at_ns, now_ns)
-        tags = min(engine.MAX_TAGS, self.store.size[0])
-        cost = AS_OF * engine.cost_s(request, tags, self.max_grid_cells)
-
-        def make(found: Sequence[TagPast], should_stop: ShouldStop) -> Estimate:
-            at_ns = request.at_ns or moment_of(found, now_ns, day_s)
-            return estimate_at(replace(request, at_ns=at_ns), found, day_s, should_stop)
-
-        def look_up() -> Future[Sequence[TagPast]]:
-            sensor, at_ns = request.box.sensor_type, request.at_ns or now_ns
-            return self.recall.query(
-                lambda log, _: readings_at(log, sensor, at_ns, day_s), self._search_s
-            )
-
-        return Task(cost, look_up, make)
+    def make(
+        self,
+        request: EstimateRequest,
+        now_ns: int,
+        found: Sequence[TagPast],
+        should_stop: ShouldStop = never,
+    ) -> Estimate:
+        """Make an estimate of the readings found, in any thread."""
+        at_ns = request.at_ns or moment_of(found, now_ns, self.day_length_s)
+        return estimate_at(replace(request, at_ns=at_ns), found, self.day_length_s, should_stop)
 
     def _estimate(self, request: Any, reply: Callable[[Any], None]) -> Query:
-        task = self.prepare(convert_services.estimate_request_of(request))
+        wanted, now_ns = convert_services.estimate_request_of(request), self.now_ns()
+        check_moment(wanted.at_ns, now_ns)
+        tags = min(engine.MAX_TAGS, self.store.size[0])
         return Query(
-            task.look_up,
+            partial(self.look_up, wanted, now_ns),
             reply,
-            lambda found: convert_services.response_of(task.make(found, never)),
-            task.cost_s,
+            lambda found: convert_services.response_of(self.make(wanted, now_ns, found)),
+            AS_OF * engine.cost_s(wanted, tags, self.max_grid_cells),
         )
 
     def _report(self, request: Any, reply: Callable[[Any], None]) -> Query:

@@ -206,15 +206,14 @@ class Query:
     """What to look up, how to make the answer from the result, and who gets the answer.
 
     `look_up` begins the search. `make`, if given, is called with its result on a worker; `cost_s`
-    is its estimated cost, s of one core. `reply` gets the answer, or the exception. A query that is
-    no longer wanted when its turn comes is dropped. `since_s` is when it was made, steady clock.
+    is its estimated cost, s of one core. `reply` gets the answer, or the exception. `since_s` is
+    when it was made, steady clock.
     """
 
     look_up: Callable[[], Future[Any]]
     reply: Callable[[Any], None]
     make: Callable[[Any], Any] | None = None
     cost_s: float = 0.0
-    is_wanted: Callable[[], bool] = lambda: True
     since_s: float = field(default_factory=time.monotonic)
 
 
@@ -259,7 +258,6 @@ class JobQueue:
 
         """
         lane = self._lane(query)
-        lane.waiting = deque(it for it in lane.waiting if it.is_wanted())
         if lane.count >= MAX_QUERIES:
             raise NotRemembered(f"{MAX_QUERIES} requests wait, which is the limit")
         lane.waiting.append(query)
@@ -300,10 +298,9 @@ class JobQueue:
             if self._is_behind() and now_s - lane.begun_s < PACE_S:
                 return
             query = lane.waiting.popleft()
-            if query.is_wanted():
-                lane.begun_s = now_s
-                lane.under_way += 1
-                self._look_up(query)
+            lane.begun_s = now_s
+            lane.under_way += 1
+            self._look_up(query)
 
     def _look_up(self, query: Query) -> None:
         def put(answer: Any) -> None:

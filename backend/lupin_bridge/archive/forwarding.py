@@ -41,15 +41,7 @@ from lupin_bridge.console import CommandError
 from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.feed.tasks import Guard, end
 from lupin_bridge.settings import Settings, option, variable
-from lupin_twin.core.notes import (
-    KINDS,
-    MAX_NOTES,
-    SHELF_S,
-    SHELVE,
-    Note,
-    NotesRequest,
-    NotesUnwritable,
-)
+from lupin_twin.core.notes import KINDS, MAX_NOTES, SHELF_S, Note, NotesRequest, NotesUnwritable
 from lupin_twin.core.past import DAY_NS, NotRemembered
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.journal.retention import RECORD
@@ -232,7 +224,7 @@ def _is_sound(note: Note, most: int) -> bool:
         note.kind in KINDS
         and number_of(note.id) <= most
         and sum(map(len, (note.id, note.by, note.subject, note.text))) <= _MAX_TEXT
-        and (note.kind != SHELVE or (note.until_ns or 0) <= note.made_at_ns + longest_ns)
+        and (note.until_ns or 0) <= note.made_at_ns + longest_ns
     )
 
 

@@ -180,8 +180,9 @@ def test_killed_at_any_moment_it_is_completed_at_the_next_start(
         check_states(path, name)
 
 
-def test_a_disk_that_fills_leaves_the_old_file_unchanged(tmp_path: Path) -> None:
-    path = old("day", tmp_path)
+@pytest.mark.parametrize("name", ["day", VERSION4])
+def test_a_disk_that_fills_leaves_the_old_file_unchanged(name: str, tmp_path: Path) -> None:
+    path = old(name, tmp_path)
     content = path.read_bytes()
     code = "from lupin_twin.journal.rebuild import upgrade; upgrade(path, print)"
     fail_on_a_full_disk(code, path, 50_000)

@@ -38,7 +38,6 @@ from lupin_bridge.archive.database import (
 )
 from lupin_bridge.archive.journal_reader import Batch, Epoch, Source, without_nul
 from lupin_bridge.console import CommandError
-from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.feed.tasks import end
 from lupin_bridge.settings import Settings, option, variable
 from lupin_twin.core.notes import MAX_NOTES, Note, NotesRequest, NotesUnwritable
@@ -383,6 +382,8 @@ class Forwarding:
                     stdin=asyncio.subprocess.PIPE,
                     stdout=asyncio.subprocess.PIPE,
                 )
+                from lupin_bridge.feed.source import TwinUnavailableError  # noqa: PLC0415  # numpy
+
                 assert self._process.stdout is not None
                 async for line in self._process.stdout:
                     # If it is not written now, it comes again.

@@ -27,14 +27,12 @@ from lupin_bridge.serving.server import (
 )
 from lupin_bridge.settings import Settings
 from lupin_twin.runtime.process import END_S, IDLE_WORKERS_END_S
-from tests.support.live import attached, wait_until_ready
-from tests.support.processes import Process, faults, lupin_twin, twin_node, url_of
+from tests.support.messages import scan
+from tests.support.processes import Process, faults, lupin_twin, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Listener, bridge, deaf_client, listener, overfill
 
-# What queries the twin itself, in its ROS thread or through its service.
-REPORT = "/api/estimate/quality?sensor_type=co2"
 # Too much for the event loop: a worker computes and writes it.
 MILLION_CELLS = (
     "/api/field?sensor_type=co2&resolution=0.001"
@@ -163,53 +161,35 @@ def test_a_signal_ends_it_and_all_clients_are_notified_whether_they_read_or_not(
         assert_quiet(running_bridge.process)
 
 
-# All of these hang: a worker that computes a field, one that writes it, the ROS thread. Each
-# hangs for its own sensor, which is queried by that path.
-HANGS = (
-    ("lupin_bridge.past.fields:compute_field:co2", MILLION_CELLS),
-    ("lupin_bridge.field:write:light", MILLION_CELLS),
-    ("lupin_twin.ros.estimate_service:EstimateService.report:humidity", REPORT),
+# All of these hang: a worker that computes a field, one that writes it, and the ROS thread with an
+# observation. Each hangs for its own sensor.
+HANGS = tuple(
+    f"{function}:{sensor}"
+    for function, sensor in (
+        ("lupin_bridge.past.fields:compute_field", "co2"),
+        ("lupin_bridge.field:write", "light"),
+        ("lupin_twin.core.ingest:apply", "humidity"),
+    )
 )
 
 
 def test_fields_that_never_finish_do_not_delay_the_shutdown(domain: int) -> None:
-    hangs = faults("--hang", *(hang for hang, _ in HANGS))
     with (
-        lupin_twin(domain, "serve", *hangs) as process,
+        lupin_twin(domain, "serve", *faults("--hang", *HANGS)) as process,
+        Peer(domain) as peer,
         listener(url_of(process)) as healthy,
         ExitStack() as stack,
     ):
         healthy.until("state")
         answers = []
-        for hang, path in HANGS:
-            _, what, sensor = hang.split(":")
-            requested = waiting_for(url_of(process), path.replace("co2", sensor))
+        for sensor, what in (("co2", "compute_field"), ("light", "write")):
+            requested = waiting_for(url_of(process), MILLION_CELLS.replace("co2", sensor))
             answers.append(stack.enter_context(requested))
             process.wait_for_output(f"{what} hangs")
+        peer.observe(scan("1", {"humidity": 50.0}))
+        process.wait_for_output("apply hangs")
         assert process.stop(signal.SIGINT) == 0
         for answer in answers:
-            assert_sent_away(answer)
-        assert last_words(healthy) == ("shutting_down", 1012)
-        assert_quiet(process)
-
-
-def test_a_remote_twin_that_does_not_answer_does_not_delay_it_either(domain: int) -> None:
-    with (
-        twin_node(domain) as twin,
-        lupin_twin(domain, "web") as process,
-        Peer(domain) as peer,
-        attached(process, peer) as live,
-        live.listen() as healthy,
-    ):
-        wait_until_ready(live)
-        wait_for(lambda: live.get(REPORT).status_code == 200, "the twin's service")
-        twin.freeze()
-        with waiting_for(live.url, REPORT.replace("co2", "light")) as answer:
-            wait_for(
-                lambda: "\nlupin_fields_computing 1.0" in live.get("/metrics").text,
-                "the request to be under way",
-            )
-            assert process.stop(signal.SIGINT) == 0
             assert_sent_away(answer)
         assert last_words(healthy) == ("shutting_down", 1012)
         assert_quiet(process)

@@ -105,7 +105,7 @@ def answer_to(address: tuple[str, int], request: bytes) -> bytes:
             answer = b""
             while block := client.recv(65_536):
                 answer += block
-        except ConnectionError:  # reset: it has not read all of what we sent
+        except OSError:  # reset: it has not read all of what we sent
             return b""
         return answer
 

@@ -89,9 +89,8 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
         twin.freeze()
         wait_for(lambda: live.get("/readyz").status_code == 503, "its silence")
         assert field_of(live, **FIELD).json()["sample_count"] == 1, "what is known of it still is"
-        refused = live.get("/api/estimate/advice", sensor_type="temperature")
-        assert refused.status_code == 503
-        assert "nothing was received on /twin/state for 3 s" in refused.json()["detail"]
+        advice = live.get("/api/estimate/advice", sensor_type="temperature")
+        assert advice.status_code == 200, "it is made of the log"
 
         twin.thaw()
         wait_until_ready(live)

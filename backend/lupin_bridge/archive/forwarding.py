@@ -38,7 +38,6 @@ from lupin_bridge.archive.database import (
 )
 from lupin_bridge.archive.journal_reader import Batch, Epoch, Source, without_nul
 from lupin_bridge.console import CommandError
-from lupin_bridge.feed.source import TwinUnavailableError
 from lupin_bridge.feed.tasks import Guard, end
 from lupin_bridge.settings import Settings, option, variable
 from lupin_twin.core.notes import KINDS, MAX_NOTES, SHELF_S, Note, NotesRequest, NotesUnwritable
@@ -390,6 +389,8 @@ class Forwarding:
             return
         while not (journal := self._journal()):
             await asyncio.sleep(_LOOK_S)
+        from lupin_bridge.feed.source import TwinUnavailableError  # noqa: PLC0415  # numpy
+
         words = ("forward", "--end-with-input", "--journal", journal)
         # If it is not written now, it comes again.
         known = NotesUnwritable, NotRemembered, TwinUnavailableError

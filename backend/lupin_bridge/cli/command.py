@@ -54,6 +54,9 @@ MAX_KINDS: Final = 1_000
 
 _NUMBER: Final = re.compile(r"(?:0x)?[0-9a-f]*[0-9][0-9a-f]*", re.IGNORECASE)
 
+# uvicorn's message, whose trace is of no use: a client sent the bytes.
+_NO_TEXT: Final = "Invalid UTF-8 sequence received from client."
+
 
 class JsonFormatter(logging.Formatter):
     """One JSON object per record: time (UTC), level, logger, message, and the error if any."""
@@ -95,6 +98,8 @@ class OnceInAWhile(logging.Filter):
                 self._held_back[kind] += 1
             return False
         held_back = self._held_back.pop(kind, 0)
+        if record.msg == _NO_TEXT:
+            record.exc_info = record.exc_text = None
         if held_back:
             record.msg = f"{record.msg} ({held_back} more since the last time)"
         return True

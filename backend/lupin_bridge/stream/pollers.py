@@ -227,7 +227,7 @@ def sensors_of(snapshot: Snapshot) -> list[str]:
         for tag in snapshot.tags
         if tag.pose is not None
         for reading in tag.readings
-        if math.isfinite(reading.value)
+        if reading.name and math.isfinite(reading.value)
     }
     return sorted(names)[:MAX_SENSORS]
 

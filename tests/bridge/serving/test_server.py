@@ -27,7 +27,9 @@ from lupin_bridge.serving.server import (
 )
 from lupin_bridge.settings import Settings
 from lupin_twin.runtime.process import END_S, IDLE_WORKERS_END_S
+from tests.support.messages import scan
 from tests.support.processes import Process, faults, lupin_twin, url_of
+from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Listener, bridge, deaf_client, listener, overfill
 
@@ -159,24 +161,33 @@ def test_a_signal_ends_it_and_all_clients_are_notified_whether_they_read_or_not(
         assert_quiet(running_bridge.process)
 
 
-# Both hang: a worker that computes a field, and one that writes it; each for its own sensor.
-HANGS = ("lupin_bridge.past.fields:compute_field:co2", "lupin_bridge.field:write:light")
+# All of these hang: a worker that computes a field, one that writes it, and the ROS thread with an
+# observation. Each hangs for its own sensor.
+HANGS = tuple(
+    f"{function}:{sensor}"
+    for function, sensor in (
+        ("lupin_bridge.past.fields:compute_field", "co2"),
+        ("lupin_bridge.field:write", "light"),
+        ("lupin_twin.core.ingest:apply", "humidity"),
+    )
+)
 
 
 def test_fields_that_never_finish_do_not_delay_the_shutdown(domain: int) -> None:
-    hangs = faults("--hang", *HANGS)
     with (
-        lupin_twin(domain, "serve", *hangs) as process,
+        lupin_twin(domain, "serve", *faults("--hang", *HANGS)) as process,
+        Peer(domain) as peer,
         listener(url_of(process)) as healthy,
         ExitStack() as stack,
     ):
         healthy.until("state")
         answers = []
-        for hang in HANGS:
-            _, what, sensor = hang.split(":")
+        for sensor, what in (("co2", "compute_field"), ("light", "write")):
             requested = waiting_for(url_of(process), MILLION_CELLS.replace("co2", sensor))
             answers.append(stack.enter_context(requested))
             process.wait_for_output(f"{what} hangs")
+        peer.observe(scan("1", {"humidity": 50.0}))
+        process.wait_for_output("apply hangs")
         assert process.stop(signal.SIGINT) == 0
         for answer in answers:
             assert_sent_away(answer)

@@ -93,9 +93,9 @@ async def test_changes_are_passed_on_in_their_current_form() -> None:
     "error",
     [
         TwinUnavailableError("nobody is there"),
-        # A clock that went back, and a sensor without a name.
+        # A clock that went back, and a name that is too long.
         PastRefused("at is 9 s, later than now, 8 s"),
-        FieldRefused("sensor_type is empty, must name a sensor"),
+        FieldRefused("sensor_type has 300 characters, the limit is 256"),
     ],
 )
 async def test_where_a_report_fails_the_last_one_holds(error: Exception) -> None:

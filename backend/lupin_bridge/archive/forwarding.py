@@ -371,18 +371,11 @@ class Forwarding:
             variable("site"): settings.site,
             variable("archive_url"): settings.archive_url,
         }
-        self._process: asyncio.subprocess.Process | None = None
         self._task = asyncio.create_task(self._keep(), name="forwarding")
 
     async def stop(self) -> None:
         """End the process, which is safe at any moment: the next one goes on from there."""
         await end(self._task)
-        await self._kill()
-
-    async def _kill(self) -> None:
-        if self._process is not None and self._process.returncode is None:
-            self._process.kill()
-            await self._process.wait()
 
     async def _keep(self) -> None:
         if not self._env[variable("site")]:
@@ -396,22 +389,26 @@ class Forwarding:
         known = NotesUnwritable, NotRemembered, TwinUnavailableError
         guard = Guard("a note of the fleet was not written", *known)
         while True:
+            process = None
             try:
-                self._process = await asyncio.create_subprocess_exec(
+                process = await asyncio.create_subprocess_exec(
                     *(sys.executable, "-P", "-m", "lupin_bridge.cli.command", *words),
                     env=self._env,
                     stdin=asyncio.subprocess.PIPE,
                     stdout=asyncio.subprocess.PIPE,
                 )
-                assert self._process.stdout is not None
-                async for line in self._process.stdout:
+                assert process.stdout is not None
+                async for line in process.stdout:
                     await guard.run(self._write(line))
-                ended = f"has ended with code {await self._process.wait()}"
+                ended = f"has ended with code {await process.wait()}"
             except OSError as error:
                 ended = f"cannot be started: {error}"
             except ValueError as error:
                 ended = f"writes a line without an end: {error}"
-                await self._kill()
+            finally:
+                if process is not None and process.returncode is None:
+                    process.kill()
+                    await process.wait()
             log.error("the forwarder %s; it is restarted", ended)
             await asyncio.sleep(_RESTART_S)
 

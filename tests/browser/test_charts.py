@@ -229,6 +229,7 @@ def test_many_come_in_buckets_and_a_drag_brings_readings(
 
 def test_hover_shows_the_time_and_a_click_goes_there(garden: Garden, open_page: OpenPage) -> None:
     hmi = open_page(garden.bridge.url, f"tag=1&{garden.period}")
+    expect(hmi.test_id("card-chart")).to_be_visible()
     hmi.page.keyboard.press("c")
     picture = plotted(hmi)
     # The whole page, but for the first thing to do.

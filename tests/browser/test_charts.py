@@ -297,6 +297,7 @@ def test_on_a_phone_the_card_makes_room_for_its_charts(garden: Garden, open_page
     expect(hmi.test_id("card-chart")).to_be_in_viewport()
     # Elsewhere the chart's line of facts shares that of its choice.
     hmi.resize(**WIDE)
+    expect(hmi.page.locator(".card-chart header")).to_be_visible()
     choice, facts = places(hmi, ".card-chart > select", ".card-chart header")
     assert (choice.right <= facts.left, facts.bottom) == (True, choice.bottom)
 

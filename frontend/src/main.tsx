@@ -80,7 +80,7 @@ const root = document.getElementById('root');
 if (!root) throw new Error('index.html has no #root');
 createRoot(root).render(
   <StrictMode>
-    <ErrorBoundary kiosk={kiosk}>
+    <ErrorBoundary>
       <App kiosk={kiosk} cycle={cycle} />
     </ErrorBoundary>
   </StrictMode>,

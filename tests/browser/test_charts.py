@@ -229,6 +229,7 @@ def test_many_come_in_buckets_and_a_drag_brings_readings(
 
 def test_hover_shows_the_time_and_a_click_goes_there(garden: Garden, open_page: OpenPage) -> None:
     hmi = open_page(garden.bridge.url, f"tag=1&{garden.period}")
+    expect(hmi.test_id("card-chart")).to_be_visible()
     hmi.page.keyboard.press("c")
     picture = plotted(hmi)
     # The whole page, but for the first thing to do.
@@ -237,6 +238,8 @@ def test_hover_shows_the_time_and_a_click_goes_there(garden: Garden, open_page: 
     expect(hmi.row("1")).to_be_hidden()
     expect(hmi.test_id("tag-card")).to_be_hidden()
     expect(hmi.test_id("health-strip")).to_be_visible()
+    # The row or card that led here is out of sight: the keyboard goes on in the charts.
+    expect(hmi.test_id("chart-view")).to_be_focused()
     inside = plot(hmi).locator(".u-over")
     inside.hover(position={"x": picture.width * 0.25, "y": 30})
     expect(hmi.page.locator(".plot-time").first).to_have_text(re.compile(r"\d\d:\d\d:\d\d"))
@@ -249,9 +252,9 @@ def test_hover_shows_the_time_and_a_click_goes_there(garden: Garden, open_page: 
     choice = hmi.page.get_by_role("combobox", name="Tags")
     choice.select_option("2")
     expect(plot(hmi)).to_have_attribute("aria-label", re.compile("Tag 2:"))
-    hmi.page.get_by_role("button", name="Close", exact=True).click()
+    hmi.page.keyboard.press("Escape")
     expect(hmi.test_id("chart-view")).to_have_count(0)
-    expect(hmi.card("2")).to_be_visible()
+    expect(hmi.card("2").get_by_role("button", name="Charts", exact=True)).to_be_focused()
 
 
 def test_the_day_before_is_compared_and_the_axis_is_in_the_pages_language(
@@ -294,6 +297,7 @@ def test_on_a_phone_the_card_makes_room_for_its_charts(garden: Garden, open_page
     expect(hmi.test_id("card-chart")).to_be_in_viewport()
     # Elsewhere the chart's line of facts shares that of its choice.
     hmi.resize(**WIDE)
+    expect(hmi.page.locator(".card-chart header")).to_be_visible()
     choice, facts = places(hmi, ".card-chart > select", ".card-chart header")
     assert (choice.right <= facts.left, facts.bottom) == (True, choice.bottom)
 

@@ -1,4 +1,4 @@
-import { Fragment, type JSX, useEffect, useMemo, useRef, useState } from 'react';
+import { Fragment, type JSX, useLayoutEffect, useMemo, useRef, useState } from 'react';
 
 import { now } from '../clock';
 import { exportAddress } from '../contract/past';
@@ -23,8 +23,8 @@ import { useZoomed, zoomBack, zoomBy } from './zoom';
 
 /** Least height of each chart of a tag, and of the one chart of a sensor, without the times; CSS pixels. */
 const LEAST_HEIGHT = { tag: 64, sensor: 152 } as const;
-/** Height of a chart's title and margins, CSS pixels. */
-const AROUND = 42;
+/** Height of a chart's title, CSS pixels. */
+const AROUND = 32;
 
 /** The charts of a tag or a sensor, in place of map and list; they have the time bar's period. */
 export default function ChartView({ charted }: { charted: Charted }): JSX.Element {
@@ -34,18 +34,18 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   const [isTable, setTable] = useState(false);
   const root = useRef<HTMLElement>(null);
   useFocusBack(root);
-  // On closing, the card shows its own chart again, with the button that led here.
-  useEffect(
-    () => () => {
+  // What led here is out of sight. On closing, the card shows its own chart again, with the button for these.
+  useLayoutEffect(() => {
+    root.current?.focus({ preventScroll: true });
+    return () => {
       requestAnimationFrame(() => {
         if (document.activeElement !== document.body) return;
         const from = document.querySelector<HTMLElement>('.card-chart > .text-button');
         from?.focus({ preventScroll: true });
         from?.parentElement?.scrollIntoView({ block: 'nearest' });
       });
-    },
-    [],
-  );
+    };
+  }, []);
   const body = useRef<HTMLDivElement>(null);
   const size = useSize(body);
   const [tagId = ''] = charted.tagIds;
@@ -68,7 +68,13 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
   };
 
   return (
-    <section ref={root} className="chart-view" aria-label={S.charts} data-testid="chart-view">
+    <section
+      ref={root}
+      className="chart-view"
+      aria-label={S.charts}
+      tabIndex={-1}
+      data-testid="chart-view"
+    >
       <header>
         {/* To the eye, the choice says it; on paper there is none. */}
         <h2 className="unseen">

@@ -129,7 +129,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
             ...axis(),
             size: 48,
             // Steps are 1, 2 or 5 times a power of ten: room for six gives at least three ticks.
-            space: (_self, _axis, _min, _max, height) => Math.min(34, height / 6),
+            space: (_self, _i, _a, _b, height) => Math.max(fontPx(), Math.min(34, height / 6)),
             values: (_self, splits) => splits.map((at) => AXIS_NUMBER.format(at)),
           },
         ],

@@ -153,13 +153,12 @@ export function estimatedField(sensor: string, estimate: Estimate): Field {
   };
 }
 
-/** An estimate has a number for every cell; outside the greenhouse it is dropped. */
+/** Outside the greenhouse nothing is coloured: neither an estimate nor the past is clipped to the map. */
 export function onExplored(
   field: Field,
   { placement, pixels }: Pick<MapPicture, 'placement' | 'pixels'>,
 ): Field {
   const { sureness, width, originX, originY, resolution } = field;
-  if (!sureness) return field;
   const cos = Math.cos(placement.yaw);
   const sin = Math.sin(placement.yaw);
   const isExplored = (cell: number): boolean => {
@@ -172,11 +171,11 @@ export function onExplored(
     return (pixels.data[pixel * 4 + 3] ?? 0) > 0;
   };
   const values = field.values.slice();
-  const sd = sureness.sd.slice();
+  const sd = sureness?.sd.slice();
   for (let cell = 0; cell < values.length; cell++) {
     if (isExplored(cell)) continue;
     values[cell] = NaN;
-    sd[cell] = NaN;
+    if (sd) sd[cell] = NaN;
   }
-  return { ...field, values, sureness: { ...sureness, sd } };
+  return sureness && sd ? { ...field, values, sureness: { ...sureness, sd } } : { ...field, values };
 }

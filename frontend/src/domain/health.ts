@@ -136,7 +136,7 @@ export function reasonText(
   const sensor = sensors.named(name);
   const label = name === '' ? '' : shown(sensor.label, LONGEST_NAME);
   const R = S.reasons;
-  const ago = age === null ? '' : ` ${S.agoSuffix(shortAgeText(age))}`;
+  const ago = age === null ? '' : ` (${S.agoSuffix(shortAgeText(age))})`;
   if (isOfRange(reason)) {
     const edge = reason.release ?? reason.limit;
     const reading = beyondLimitText(sensor, reason.value, edge, unit);

@@ -31,7 +31,7 @@ if (element) {
   const show = (seen: Seen): void => {
     root.render(
       <StrictMode>
-        <ErrorBoundary kiosk={isKiosk}>
+        <ErrorBoundary>
           <Overview seen={seen} isKiosk={isKiosk} />
         </ErrorBoundary>
       </StrictMode>,

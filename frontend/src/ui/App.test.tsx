@@ -11,10 +11,12 @@ import { NO_HOUSE, withPast } from '../store/twin';
 import { S } from '../strings';
 import { judgement, reason } from '../testing/health';
 import { fieldWith } from '../testing/field';
-import { goLive, goLost, showField, showTags } from '../testing/page';
+import { goLive, goLost, showField, showTags, status } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { App } from './App';
+import { ErrorBoundary } from './ErrorBoundary';
 import { loadParts } from './loadDeferred';
+import * as reload from './reload';
 
 beforeAll(() => loadParts());
 
@@ -42,6 +44,22 @@ const goBack = (): void => {
 };
 
 describe('page', () => {
+  test('which cannot show what an updated server sends says so, and loads anew', () => {
+    vi.spyOn(console, 'error').mockImplementation(() => undefined);
+    vi.spyOn(reload, 'reloadByItself').mockReturnValue(() => undefined);
+    render(
+      <ErrorBoundary>
+        <App kiosk={false} />
+      </ErrorBoundary>,
+    );
+    const { type, twin, reason } = status();
+    flush(() => {
+      goLive({ type, twin, reason } as ReturnType<typeof status>);
+    });
+    expect(screen.getByTestId('failed-page').textContent).toContain('reloads automatically');
+    expect(reload.reloadByItself).toHaveBeenCalledOnce();
+  });
+
   test('carries the connection’s state for style sheets and tests', () => {
     render(<App kiosk={false} />);
     expect(app().dataset).toMatchObject({ connectionState: 'live', fresh: 'true' });

@@ -4,13 +4,8 @@ import { shown } from '../domain/text';
 import { S } from '../strings';
 import { reloadByItself, reloadNow } from './reload';
 
-interface Props {
-  readonly kiosk: boolean;
-  readonly children: ReactNode;
-}
-
-/** Replaces a page that has failed with the error and a reload button: never a blank screen. */
-export class ErrorBoundary extends Component<Props, Readonly<{ why: string | null }>> {
+/** Replaces a page that has failed with the error, and loads it anew: never a blank screen. */
+export class ErrorBoundary extends Component<{ readonly children: ReactNode }> {
   override state: Readonly<{ why: string | null }> = { why: null };
 
   static getDerivedStateFromError(error: unknown): { readonly why: string } {
@@ -19,19 +14,17 @@ export class ErrorBoundary extends Component<Props, Readonly<{ why: string | nul
 
   override render(): ReactNode {
     const { why } = this.state;
-    return why === null ? this.props.children : <Failed why={why} kiosk={this.props.kiosk} />;
+    return why === null ? this.props.children : <Failed why={why} />;
   }
 }
 
-function Failed({ why, kiosk }: { why: string; kiosk: boolean }): JSX.Element {
-  // On a wall screen, nobody can press the button.
-  useEffect(() => (kiosk ? reloadByItself() : undefined), [kiosk]);
+function Failed({ why }: { why: string }): JSX.Element {
+  // Nobody may be there to press the button. An updated server's new page reads what the old one could not.
+  useEffect(() => reloadByItself(), []);
   return (
     <main className="failed-page" role="alert" data-testid="failed-page">
       <h1>{S.failedTitle}</h1>
-      <p>
-        {S.failedHint} {kiosk && S.failedAgain}
-      </p>
+      <p>{S.failedHint}</p>
       <p>
         <code>{shown(why, 300)}</code>
       </p>

@@ -157,7 +157,7 @@ test('a value that is too old says its age, and an attempt that of the last one'
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect([...todo.children].map(({ textContent }) => textContent)).toEqual([
     expect.stringMatching(
-      /^CriticalTag 5: Temperature 6.6\u00a0°C 40\u00a0min ago, below 10.0Heat/,
+      /^CriticalTag 5: Temperature 6.6\u00a0°C \(40\u00a0min ago\), below 10.0Heat/,
     ),
     expect.stringMatching(/^UnknownTag 6: Last scan failed: not reachable, 1\u00a0min ago/),
   ]);
@@ -166,7 +166,7 @@ test('a value that is too old says its age, and an attempt that of the last one'
     showTags([cold], judgement({ 5: [reason()] }));
     goLost();
   });
-  expect(todo.textContent).toMatch(/^CriticalTag 5: Temperature 6.6\u00a0°C 40\u00a0min ago, /);
+  expect(todo.textContent).toMatch(/^CriticalTag 5: Temperature 6.6\u00a0°C \(40\u00a0min ago\), /);
 });
 
 test('what is back in its range is to be watched', () => {

@@ -13,6 +13,7 @@ import { selectNow, selectSpeech } from '../../alarms/speech';
 import type { Alarm, Verdict } from '../../contract/types';
 import { ageSeconds } from '../../domain/time';
 import { differenceShown } from '../../domain/difference';
+import { C } from '../../notes/NoteMarks';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { hourAgo, shortHourText } from '../../store/hourAgo';
@@ -40,7 +41,7 @@ export function useValues(alarm: Alarm): ValuesNow {
   return { ...values, todo, state };
 }
 
-/** Verdict, and since when; of a resolved alarm, for how long and until when. */
+/** Verdict, and since when the alarm is active, not since when it is back to normal; of a resolved alarm, for how long and until when. */
 export function AlarmTimes({
   alarm,
   first,
@@ -63,6 +64,7 @@ export function AlarmTimes({
       title={[span, first].filter((each) => each !== null).join(', ')}
     >
       <span>
+        {verdict === 'healthy' && `${C.alarm('')} `}
         {text} <small className="faint">{note}</small>
       </span>
       <HealthMark verdict={verdict} text={verdict === 'healthy' ? S.alarmBack : undefined} />

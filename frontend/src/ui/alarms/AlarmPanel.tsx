@@ -161,7 +161,8 @@ export function AlarmPanel(): JSX.Element {
         {filter !== '' && count === 0 && <p className="faint">{S.alarmsNoMatch}</p>}
         {(['active', 'shelved', 'resolved'] as const).map((name) => (
           <Fragment key={name}>
-            {seen[name].length > 0 && (
+            {/* A filter that hides all active alarms must not look as if there were none. */}
+            {(name === 'active' ? shown : seen)[name].length > 0 && (
               <Group
                 name={name}
                 count={

@@ -23,7 +23,7 @@ import { Disclosure, Icon, useClose } from '../../widgets/controls';
 import { AlarmFacts, AlarmTimes, useValues } from './AlarmFacts';
 import { useIsRefused, useWhoAcknowledged } from './people';
 
-/** One alarm: duration, what, where, value now and at worst; a click shows its tag live. */
+/** One alarm: since when, what, where, value now and at worst; a click shows its tag live. */
 export const AlarmRow = memo(function AlarmRow({
   item,
   group,

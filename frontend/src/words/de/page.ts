@@ -128,8 +128,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     `Lesbare Daten wurden übernommen, die Aufzeichnung läuft weiter. Die beschädigte Datei ist ${name}.`,
   failedTitle: 'Diese Seite ist abgestürzt',
   failedHint:
-    'Verlassen Sie sich nicht auf ihre Anzeige. Zwilling und Server sind nicht betroffen.',
-  failedAgain: 'Sie lädt sich von selbst neu.',
+    'Verlassen Sie sich nicht auf ihre Anzeige. Zwilling und Server sind nicht betroffen. Die Seite lädt sich von selbst neu.',
   reload: 'Neu laden',
 
   menu: 'Menü',

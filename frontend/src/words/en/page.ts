@@ -130,8 +130,8 @@ export const PAGE = {
   quarantinedHint: (name: string): string =>
     `Readable data was kept, and recording continues. The damaged file is ${name}.`,
   failedTitle: 'The page has failed',
-  failedHint: 'Do not rely on what it shows. The twin and the server are not affected.',
-  failedAgain: 'It reloads automatically.',
+  failedHint:
+    'Do not rely on what it shows. The twin and the server are not affected. The page reloads automatically.',
   reload: 'Reload',
 
   menu: 'Menu',

@@ -124,8 +124,8 @@ export const PAGE: In<typeof EN.PAGE> = {
   quarantinedHint: (name) =>
     `Se han conservado los datos legibles y el registro continúa. El archivo dañado es ${name}.`,
   failedTitle: 'La página ha fallado',
-  failedHint: 'No se fíe de lo que muestra. El gemelo y el servidor no se ven afectados.',
-  failedAgain: 'Se recarga sola.',
+  failedHint:
+    'No se fíe de lo que muestra. El gemelo y el servidor no se ven afectados. La página se recarga sola.',
   reload: 'Recargar',
 
   menu: 'Menú',

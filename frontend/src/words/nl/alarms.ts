@@ -44,7 +44,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     'Een alarm dat kritiek is of was, kunt u hoogstens 1 uur uitstellen, met opgave van reden.',
   alarmShelfReason: 'Reden',
   alarmShelfReasonOptional: 'Reden (optioneel)',
-  alarmShelveFor: (time) => `Gedurende ${time}`,
+  alarmShelveFor: (time) => `Voor ${time}`,
   alarmShelved: (until, reason, by) =>
     `uitgesteld ${by === '' ? '' : `door ${by} `}tot ${until}${reason === '' ? '' : `: ${reason}`}`,
   alarmUnshelve: 'Uitstel opheffen',

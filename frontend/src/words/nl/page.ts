@@ -127,8 +127,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     `Leesbare gegevens zijn bewaard en het vastleggen gaat door. Het bestand heet ${name}.`,
   failedTitle: 'Deze pagina is vastgelopen',
   failedHint:
-    'Vertrouw niet op wat u hier ziet. De digital twin en de server hebben er geen last van.',
-  failedAgain: 'De pagina laadt vanzelf opnieuw.',
+    'Vertrouw niet op wat u hier ziet. De digital twin en de server hebben er geen last van. De pagina laadt vanzelf opnieuw.',
   reload: 'Opnieuw laden',
 
   menu: 'Menu',

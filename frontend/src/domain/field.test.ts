@@ -165,8 +165,12 @@ test('an estimate ends where the map does, and where nothing is explored', () =>
   expect(known(turned.values)).toEqual([true, false, false, false]);
 });
 
-test('what the twin has clipped already stays the same', () => {
-  const { sureness, ...field } = estimated([20, 21], [1, 1]);
+test('so does a field of the nearest readings, which has no error', () => {
+  const { sureness, ...field } = estimated([20, 21, 22, 23], [1, 1, 1, 1]);
   expect(sureness).toBeDefined();
-  expect(onExplored(field, map())).toBe(field);
+  const clipped = onExplored(field, map());
+  expect([known(clipped.values), clipped.sureness]).toEqual([
+    [false, true, false, false],
+    undefined,
+  ]);
 });

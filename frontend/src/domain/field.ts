@@ -177,5 +177,7 @@ export function onExplored(
     values[cell] = NaN;
     if (sd) sd[cell] = NaN;
   }
-  return sureness && sd ? { ...field, values, sureness: { ...sureness, sd } } : { ...field, values };
+  return sureness && sd
+    ? { ...field, values, sureness: { ...sureness, sd } }
+    : { ...field, values };
 }

@@ -202,8 +202,9 @@ export function selectHeat(state: AppState): Heat | null {
   const { compare } = state.view;
   if (compare) {
     const { value } = state.twin.difference;
-    if (value?.field.sensor !== state.view.sensor || value.field.sampleCount === 0) return null;
-    const field = onMap(value.field)(selectShown(state).map.value);
+    const given = value?.field;
+    if (given?.sensor !== state.view.sensor || given.sampleCount === 0) return null;
+    const field = onMap(given)(selectShown(state).map.value);
     const old = sourceOf(state) === 'nearest' ? selectOld(state, field) : null;
     const range = retainedDifference(symmetricRange(field, selectSensor(state)));
     return retainedHeat({ ...PLAIN, field, range, difference: value, old });

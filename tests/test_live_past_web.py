@@ -258,8 +258,11 @@ def test_a_damaged_copy_is_made_anew(apart: Apart, harm: str) -> None:
         elif harm == "folder":
             file.mkdir()
         elif harm == "foreign":
-            with closing(sqlite3.connect(file)) as other:
+            # Made elsewhere: the bridge may copy again as soon as its own is gone.
+            theirs = file.with_name("theirs")
+            with closing(sqlite3.connect(theirs)) as other:
                 other.execute("CREATE TABLE theirs (x)")
+            theirs.replace(file)
     at_s = T + 60.0 * OBSERVED
     apart.peer.observe(scan(harm, {"co2": 1.0}, stamp_s=at_s))
     requested(apart.following, f"/api/tags/{harm}", at=at_s)

@@ -6,6 +6,7 @@ the sensors file.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -398,8 +399,8 @@ class _Page:
         return self.say("date", day=at.day, month=month, year=at.year, clock=f"{at:%H:%M}")
 
     def _clock(self, when: Mapping[str, int]) -> str:
-        """A moment in a row, without the date if it is on the report's first day."""
-        return self._at(when).removeprefix(self._day)
+        """A moment in a row: without the date on the report's first day, and never with a year."""
+        return re.sub("\u00a0\\d{4},", ",", self._at(when).removeprefix(self._day))
 
     def _number(self, value: float | None, sensor: str, limit: float | None = None) -> str:
         """A value as the page writes it; if it rounds to its limit, with the side that it is on."""

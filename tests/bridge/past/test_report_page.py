@@ -127,8 +127,8 @@ def test_times_are_those_of_the_greenhouse_or_of_the_readers_zone() -> None:
     page = page_of(
         hours=20, alarms=[alarm(raised_at=at(19 * HOUR_S)), alarm(raised_at=at(-8 * HOUR_S))]
     )
-    assert "7 28 Nov 2026, 01:00" in page
-    assert "7 26 Nov 2026, 22:00" in page
+    assert "7 28 Nov, 01:00" in page
+    assert "7 26 Nov, 22:00" in page
 
 
 def test_a_zone_that_this_machine_does_not_know_is_reported() -> None:

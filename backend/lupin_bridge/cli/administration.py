@@ -68,6 +68,7 @@ from lupin_bridge.settings import (
     settings_from,
     variable,
 )
+from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import MAX_JOURNAL_DAYS
 from lupin_twin.runtime.process import USAGE_ERROR
 
@@ -167,16 +168,19 @@ def _archive(options: argparse.Namespace, url: str) -> int:
         return FAILED if wrong else 0
 
 
+def _give(note: Note) -> None:
+    """Hand a note of the fleet to `Forwarding`, a line each."""
+    tell(json.dumps(asdict(note)))
+
+
 def _forward(options: argparse.Namespace, environ: Mapping[str, str], url: str) -> int:
-    give = None
     if options.end_with_input:
-        # Notes of the fleet, a line each, see `Forwarding`.
-        give = lambda note: tell(json.dumps(asdict(note)))  # noqa: E731
         os.nice(_NICENESS)
         threading.Thread(target=_end_with_input, name="end", daemon=True).start()
 
     # Looked for each time: the journal may not exist yet.
     path = partial(journal.path_of, options, environ)
+    give = _give if options.end_with_input else None
     forwarder = Forwarder(url, _given(options, environ, "site"), path, say, give)
     return 0 if forwarder.run(once=options.once) else FAILED
 

@@ -95,7 +95,7 @@ def patrolled(
         "patrol",
         ["lupin_patrol", "--end-with-parent", *patrol_args, *ros_args],
         _parameters(
-            # The robot reports the whole floor: fields end at the walls.
+            # The robot maps the floor: fields end at its walls.
             clip_to_explored=True,
             day_length_s=float(DAY_S / _speed(patrol_args)),
             **({} if path is None else {"journal": str(path)}),

@@ -21,7 +21,7 @@ from lupin_bridge.judge.verdict import Kind, Reason, Verdict
 from lupin_twin.core.past import FOREVER_NS, HOUR_NS, PastWrite, RunSpan
 from lupin_twin.core.state import Reading
 
-# Writes kept for all tags together, roughly; each tag has an equal share. They take 12 MB.
+# Writes kept for all tags together, roughly; each tag has an equal share. They take 9 MB.
 KEPT: Final = 20_000
 # Interval of dropping what is over and no longer reported.
 FORGET_EVERY_NS: Final = HOUR_NS

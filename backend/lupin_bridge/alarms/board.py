@@ -173,28 +173,32 @@ def notes_of_alarms(
         # An acknowledgement ends when the alarm gets worse.
         if kind == ACKNOWLEDGE and note.made_at_ns >= worse_ns.get(name, 0):
             found[name] = AlarmNotes(acknowledged=note)
-        elif kind == SHELVE and (note.until_ns or 0) > now_ns:
+        elif kind == SHELVE:
             shelves[name] = note
-    for name, note in _shelved(alarms, shelves).items() if shelves else ():
+    for name, note in _shelved(alarms, shelves, now_ns).items() if shelves else ():
         found[name] = replace(found.get(name, NOTHING_SAID), shelved=note)
     return found
 
 
-def _shelved(alarms: Sequence[Alarm], shelves: Mapping[str, Note]) -> Mapping[str, Note]:
+def _shelved(
+    alarms: Sequence[Alarm], shelves: Mapping[str, Note], now_ns: int
+) -> Mapping[str, Note]:
     """The note that shelves each alarm, by the alarm's id. It ends when the alarm gets worse.
 
-    It also covers an alarm that returns: one of the same tag, kind, sensor and side.
+    It also covers an alarm that returns: one of the same tag, kind, sensor and side. So of all
+    notes on these, the last one holds, even if it ends the shelf.
     """
-    held: dict[object, tuple[Note, int]] = {}
-    for alarm in alarms:
-        note = shelves.get(alarm.id)
-        known = held.get(alarm.cause)
-        if note is not None and (known is None or known[0].made_at_ns <= note.made_at_ns):
-            held[alarm.cause] = note, ORDER[_verdict_at(alarm, note.made_at_ns)]
+    noted = [(note, alarm) for alarm in alarms if (note := shelves.get(alarm.id)) is not None]
+    noted.sort(key=lambda it: (it[0].made_at_ns, it[0].id))
+    held = {
+        alarm.cause: (note, ORDER[_verdict_at(alarm, note.made_at_ns)]) for note, alarm in noted
+    }
     return {
         alarm.id: shelf[0]
         for alarm in alarms
-        if (shelf := held.get(alarm.cause)) and ORDER[alarm.reason.verdict] >= shelf[1]
+        if (shelf := held.get(alarm.cause))
+        and (shelf[0].until_ns or 0) > now_ns
+        and ORDER[alarm.reason.verdict] >= shelf[1]
     }
 
 

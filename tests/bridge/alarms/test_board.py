@@ -160,3 +160,14 @@ def test_an_alarm_that_comes_back_stays_shelved_unless_it_is_worse_or_of_another
     elsewhere = replace(again, tag_id="8")
     for other, is_shelved in ((again, True), (worse, False), (warm, False), (elsewhere, False)):
         assert ("b" in notes_of_alarms([COLD, other], [SHELF], NOW)) is is_shelved, other
+
+
+@pytest.mark.parametrize("until_ns", [None, NOW + HOUR // 2])
+def test_the_last_note_on_an_alarm_that_came_back_ends_the_shelf_from_before(
+    until_ns: int | None,
+) -> None:
+    again = replace(COLD, id="b")
+    ended = Note("2", NOW + 1, "bert", SHELVE, "alarm:b", "", until_ns)
+    for notes in ([SHELF, ended], [ended, SHELF]):
+        for alarms in ([COLD, again], [again, COLD]):
+            assert notes_of_alarms(alarms, notes, NOW + HOUR // 2) == {}

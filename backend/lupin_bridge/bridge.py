@@ -100,12 +100,7 @@ class Bridge:
         )
         self.alarms = AlarmBoard(self._on_alarms)
         self.alarm_feed = AlarmFeed(
-            source,
-            self.criteria,
-            self.alarms,
-            lambda: self.ros_time_ns,
-            limits.alarm_days,
-            note_days=self.judge.note_days,
+            source, self.judge, self.alarms, lambda: self.ros_time_ns, limits.alarm_days
         )
         self.robot = RobotPoller(source, self.hub, lambda: self.ros_time_ns, clock)
         self._has_alarms = asyncio.Event()

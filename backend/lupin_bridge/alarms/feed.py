@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Final, TypeVar
@@ -26,7 +26,7 @@ from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdat
 from lupin_bridge.feed.tasks import Guard, end
 from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, AlarmFold, Found
 from lupin_bridge.judge.episodes import Alarm, silence
-from lupin_bridge.judge.judging import Criteria, Judge
+from lupin_bridge.judge.judging import Judge
 from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
 from lupin_twin.core.past import (
@@ -42,7 +42,6 @@ from lupin_twin.core.past import (
 )
 from lupin_twin.core.state import (
     STATUS_OK,
-    Reading,
     Snapshot,
     TagState,
     sure_species,
@@ -129,25 +128,22 @@ ResultT = TypeVar("ResultT")
 class AlarmFeed:
     """Keeps `board` up to date with the twin's observations. Belongs to the event loop.
 
-    `now_ns` returns ROS time; None: not known. `days` is how far back the past is read. `note_days`
-    gets the daily quantities, by tag.
+    `now_ns` returns ROS time; None: not known. `days` is how far back the past is read. `judge`
+    gets what no state shows: daily quantities, and writes that came late or soon after another.
     """
 
     def __init__(
         self,
         source: TwinSource,
-        criteria: Criteria,
+        judge: Judge,
         board: AlarmBoard,
         now_ns: Callable[[], int | None],
         days: float,
-        *,
-        note_days: Callable[[Mapping[str, Sequence[Reading]]], None],
     ) -> None:
         self._source = source
-        self._criteria = criteria
+        self.judge = judge
         self._board = board
         self._now_ns = now_ns
-        self._note_days = note_days
         self._reach_ns = int(days * DAY_NS)
         self._wake = asyncio.Event()
         self._fold: AlarmFold | None = None
@@ -271,7 +267,7 @@ class AlarmFeed:
     async def _take_received(self) -> None:
         lot, self._received = self._received, []
         if self._fold is None:
-            self._fold = AlarmFold(self._criteria, _ALL_TIME)
+            self._fold = AlarmFold(self.judge.criteria, _ALL_TIME)
         for first in range(0, len(lot), LOT):
             await self._take(lot[first : first + LOT])
         await self._publish()
@@ -288,8 +284,10 @@ class AlarmFeed:
                 self._begin("journal")
                 continue
             if self._fold is None:
-                self._fold = AlarmFold(self._criteria, past.spans)
+                self._fold = AlarmFold(self.judge.criteria, past.spans)
             self._journal, self._last = past.journal, past.last
+            if self._is_caught_up:
+                self.judge.note_writes(past.of_newest_run)
             await self._take(past.writes)
             if generation != self._generation:
                 return
@@ -335,7 +333,7 @@ class AlarmFeed:
 
         board, change, found = await self._on_worker(find)
         self._due_ns = found.due_ns
-        self._note_days(found.days)
+        self.judge.note_days(found.days)
         is_past, self._is_caught_up = not self._is_caught_up, True
         begins_ns = moment_ns if self._since_ns is None else self._since_ns
         self._board.put(board, replace(change, is_past=is_past), self._alarm_source, begins_ns)

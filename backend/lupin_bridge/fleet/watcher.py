@@ -292,6 +292,8 @@ class Watcher:
                 past = writes(log, replace(request, after=0))
             judged.alarm_fold = AlarmFold(self._criteria, past.spans)
         judged.alarm_fold.take(past.writes)
+        if judged.is_caught_up:
+            judged.judge.note_writes(past.of_newest_run)
         judged.after, judged.is_caught_up = past.last, past.is_all
 
 

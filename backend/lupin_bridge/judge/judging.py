@@ -24,7 +24,6 @@ from lupin_bridge.judge.scans import (
     SHORTEST_NS,
     Patrol,
     RecentScans,
-    Scans,
     holds_ns,
     interval_ns,
 )
@@ -218,7 +217,7 @@ class Judge:
         max_at_once: float = MAX_AT_ONCE,
         knows_recent: bool = True,
     ) -> None:
-        self._criteria = criteria
+        self.criteria = criteria
         self._max_at_once = max_at_once
         self._tags: dict[str, _Tag] = {}
         self._recent = RecentScans(criteria.day)
@@ -230,7 +229,6 @@ class Judge:
         self._known_ns = 0
         self._waiting: dict[str, None] = {}
         self._counts = Counter[Verdict]()
-        self._scans = Scans()
         self._overdue = 0
         self._once = 0
         self._judged = NOTHING_JUDGED
@@ -245,10 +243,8 @@ class Judge:
         self._known_ns = self._known_ns if now_ns is None else now_ns
         if is_back:
             # Earlier scans are not part of any interval.
-            self._scans.forget()
-            self._recent = RecentScans(self._criteria.day)
-            _, stamps_ns = self._recent.see(snapshot.tags)
-            self._scans.add_stamps(stamps_ns, now_ns)
+            self._recent = RecentScans(self.criteria.day)
+            self._recent.see(snapshot.tags)
         news, gone = self._news(snapshot)
         day = self._recent.day(snapshot.stamp_ns)
         if now_ns is None or self._now_ns is None or is_back:
@@ -269,13 +265,13 @@ class Judge:
     def learn(self, writes: Iterable[PastWrite], first: Snapshot | None = None) -> None:
         """Take what was recent at the first snapshot; `first`: that, if it has not been seen."""
         tags = [kept.state for kept in self._tags.values()] if first is None else first.tags
-        self._recent = RecentScans.of(tags, writes, self._criteria.day)
-        # Begin anew with all scans: the last scan of each tag alone gives no interval.
-        self._scans.forget()
-        self._scans.add_stamps(
-            self._recent.stamps_ns(), self._now_ns if first is None else first.now_ns
-        )
+        self._recent = RecentScans.of(tags, writes, self.criteria.day)
         self._waiting |= dict.fromkeys(self._tags)
+
+    def note_writes(self, writes: Iterable[PastWrite]) -> None:
+        """Take writes of the log, for the next snapshot: no state shows all of them."""
+        tags = {tag_id: kept.state for tag_id, kept in self._tags.items()}
+        self._waiting |= dict.fromkeys(self._recent.note(writes, tags))
 
     def note_changed(self, changed: Mapping[str, Mapping[str, int]]) -> None:
         """Set, for the next snapshot, the sensors that deviate from predictions, and since when."""
@@ -307,9 +303,7 @@ class Judge:
             kept.state = tag
             news[tag.tag_id] = None
             states.append(tag)
-        others, stamps_ns = self._recent.see(states)
-        news |= dict.fromkeys(others)
-        self._scans.add_stamps(stamps_ns, snapshot.now_ns)
+        news |= dict.fromkeys(self._recent.see(states))
         gone: list[str] = []
         if len(self._tags) != len(snapshot.tags):
             there = {tag.tag_id for tag in snapshot.tags}
@@ -347,7 +341,7 @@ class Judge:
         kept = self._tags[tag_id]
         if now_ns is None:
             return _UNKNOWN
-        recent, by = self._recent.tag(tag_id), self._criteria
+        recent, by = self._recent.tag(tag_id), self.criteria
         holds = kept.holds_ns = by.holds_ns(recent.stamps_ns)
         was_once = kept.is_once
         kept.is_once = len(recent.stamps_ns) == 1 and by.recent_s is None
@@ -394,7 +388,7 @@ class Judge:
             tags = {**tags, **changed}
             for tag_id in gone:
                 tags.pop(tag_id, None)
-        patrol = self._scans.patrol(self._overdue)
+        patrol = self._recent.patrol(now_ns or self._now_ns, self._overdue)
         once = self._once if self.knows_recent else 0
         stop = stopped(patrol.last_scan_ns, now_ns, once, len(tags))
         house = judge_site(self._counts, is_silent=now_ns is None, stopped=stop)

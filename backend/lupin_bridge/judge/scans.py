@@ -10,9 +10,10 @@ has not. So a tag's readings are valid for three times the median of its own las
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections import defaultdict, deque
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from heapq import nlargest
 from itertools import groupby, pairwise, takewhile
 from operator import attrgetter, itemgetter
 from statistics import median
@@ -20,7 +21,7 @@ from typing import Final
 
 from lupin_bridge.judge.day import LEFT_OUT_NS, LIGHT, Day, Light, says_day
 from lupin_twin.core.past import PastWrite
-from lupin_twin.core.state import TagState, sure_species
+from lupin_twin.core.state import Reading, TagState, sure_species
 
 _S: Final = 1_000_000_000
 SHORTEST_NS: Final = 600 * _S
@@ -56,39 +57,14 @@ LAP_INTERVALS: Final = 30
 class Patrol:
     """How the greenhouse is scanned; `interval_ns` is the median of the last intervals of any tags.
 
-    None: fewer than two scans are known, or none. `overdue` counts the tags whose readings are all
-    too old, including those that never had one.
+    Each tag's recent scans count, those of one time once. None: fewer than two scans are known, or
+    none. `overdue` counts the tags whose readings are all too old, including those that never had
+    one.
     """
 
     interval_ns: int | None = None
     last_scan_ns: int | None = None
     overdue: int = 0
-
-
-class Scans:
-    """The times of the last scans of any tags; scans of the same time count once."""
-
-    def __init__(self) -> None:
-        self._scans_ns: deque[int] = deque(maxlen=LAP_INTERVALS + 1)
-
-    def add_stamps(self, stamps_ns: Iterable[int], now_ns: int | None) -> None:
-        """Add the stamps later than the last known one; stamps in the future are ignored."""
-        for stamp_ns in sorted(set(stamps_ns)):
-            is_later = not self._scans_ns or stamp_ns > self._scans_ns[-1]
-            if is_later and (now_ns is None or stamp_ns <= now_ns):
-                self._scans_ns.append(stamp_ns)
-
-    def forget(self) -> None:
-        """Forget all scans: the clock has gone back, so they are not part of any interval."""
-        self._scans_ns.clear()
-
-    def patrol(self, overdue: int) -> Patrol:
-        """How the greenhouse is scanned now."""
-        scans = list(self._scans_ns)
-        if not scans:
-            return Patrol(overdue=overdue)
-        intervals = [after - before for before, after in pairwise(scans)]
-        return Patrol(int(median(intervals)) if intervals else None, scans[-1], overdue)
 
 
 # Pauses kept at most: those of some months, at least.
@@ -215,8 +191,14 @@ class Recent:
         behind = bisect_right(self.scans, at_ns, before, key=_stamp_ns)
         scans = (*self.scans[:before], scan, *self.scans[behind:])
         if len(scans) > INTERVALS + 1:
-            kept = {reading.observed_at_ns for reading in tag.readings}
-            older = (it for it in scans[: -INTERVALS - 1] if it.stamp_ns in kept)
+            kept: dict[int, dict[str, float]] = {}
+            for reading in tag.readings:
+                kept.setdefault(reading.observed_at_ns or 0, {})[reading.name] = reading.value
+            older = (
+                replace(it, values=kept[it.stamp_ns])
+                for it in scans[: -INTERVALS - 1]
+                if it.stamp_ns in kept
+            )
             scans = (*older, *scans[-INTERVALS - 1 :])
         self.scans = scans
 
@@ -239,16 +221,16 @@ class Recent:
                 return says_day(scan.values[LIGHT])
         return None
 
-    def news(self, tag: TagState) -> dict[int, dict[str, float]]:
-        """The scans of a state that are new or have changed, by stamp."""
+    def news(self, readings: Iterable[Reading]) -> dict[int, dict[str, float]]:
+        """The scans that are new or have changed by these readings, by stamp."""
         known = {scan.stamp_ns: scan.values for scan in self.scans}
         found: dict[int, dict[str, float]] = {}
-        for reading in tag.readings:
+        for reading in readings:
             at_ns = reading.observed_at_ns
             if at_ns is None:
                 continue
             # As text, because NaN is not equal to itself.
-            before = known.get(at_ns, {})
+            before = found.get(at_ns) or known.get(at_ns, {})
             if repr(before.get(reading.name)) != repr(reading.value):
                 found.setdefault(at_ns, dict(before))[reading.name] = reading.value
         return found
@@ -271,6 +253,8 @@ class RecentScans:
         self._tags: defaultdict[str, Recent] = defaultdict(Recent)
         self._light = Light()
         self._newest_ns = -1
+        # The last scans of any tags; None: to be found again.
+        self._lap_ns: list[int] | None = None
 
     @classmethod
     def of(
@@ -303,30 +287,65 @@ class RecentScans:
         """A tag's recent scans and inspections."""
         return self._tags[tag_id]
 
-    def stamps_ns(self) -> Iterator[int]:
-        """The stamps of the recent scans of all tags."""
-        return (scan.stamp_ns for recent in self._tags.values() for scan in recent.scans)
+    def patrol(self, now_ns: int | None, overdue: int) -> Patrol:
+        """How the greenhouse is scanned; scans after `now_ns` do not count."""
+        if self._lap_ns is None:
+            last = ((it.scans[-1].stamp_ns, name) for name, it in self._tags.items() if it.scans)
+            lap = [self._tags[name].scans for _, name in nlargest(LAP_INTERVALS + 1, last)]
+            self._lap_ns = sorted({scan.stamp_ns for scans in lap for scan in scans})
+        scans = [at_ns for at_ns in self._lap_ns if now_ns is None or at_ns <= now_ns]
+        if not scans:
+            return Patrol(overdue=overdue)
+        return Patrol(interval_ns(scans[-LAP_INTERVALS - 1 :]), scans[-1], overdue)
 
     def day(self, at_ns: int) -> Day:
         """Whether it is day at a moment, by the last scans of all tags."""
         return self._day_of(self._light.is_day, at_ns)
 
-    def see(self, tags: Iterable[TagState]) -> tuple[set[str], list[int]]:
-        """Take changed tags; returns those with scans now judged otherwise, and the new stamps."""
+    def see(self, tags: Iterable[TagState]) -> set[str]:
+        """Take changed tags; returns those with scans that are now judged otherwise."""
         scans: list[TakenScan] = []
         for tag in tags:
             recent = self.tag(tag.tag_id)
             recent.see(_inspection_of(tag))
-            scans += [(at_ns, tag, values) for at_ns, values in recent.news(tag).items()]
-        return self.take(scans), [at_ns for at_ns, *_ in scans]
+            scans += [(at_ns, tag, values) for at_ns, values in recent.news(tag.readings).items()]
+        return self.take(scans)
+
+    def note(self, writes: Iterable[PastWrite], tags: Mapping[str, TagState]) -> set[str]:
+        """Take writes that the states of `tags` may never show; returns the tags with news.
+
+        That is so if they came late, or soon after one another.
+        """
+        scans: list[TakenScan] = []
+        others: set[str] = set()
+        for write in writes:
+            tag, recent = tags.get(write.tag_id), self.tag(write.tag_id)
+            if tag is None:
+                continue
+            if write.has_seen:
+                before = recent.looks
+                recent.see([(write.stamp_ns, write.species)])
+                others |= {write.tag_id} if recent.looks != before else set()
+                continue
+            if len(recent.scans) > INTERVALS and write.stamp_ns < recent.stamps_ns[0]:
+                continue
+            own = {(it.name, it.observed_at_ns) for it in tag.readings}
+            readings = (
+                Reading(name, value, write.stamp_ns)
+                for name, value in zip(write.sensors, write.values, strict=True)
+                # The state takes precedence over the log.
+                if (name, write.stamp_ns) not in own
+            )
+            scans += [(at_ns, tag, values) for at_ns, values in recent.news(readings).items()]
+        return others | self.take(scans) | {tag.tag_id for _, tag, _ in scans}
 
     def take(self, scans: Sequence[TakenScan]) -> set[str]:
         """Add scans; returns the tags with a scan that is judged by another light than before."""
-        others: set[str] = set()
+        self._lap_ns = None if scans else self._lap_ns
+        late_ns: int | None = None
         in_time = sorted(scans, key=lambda scan: (scan[0], scan[1].tag_id))
         for at_ns, group in groupby(in_time, key=itemgetter(0)):
             taken = list(group)
-            before = self._light.is_day
             for _, tag, values in taken:
                 recent = self.tag(tag.tag_id)
                 recent.put(tag, at_ns, values)
@@ -336,35 +355,30 @@ class RecentScans:
                 is_day = self.day(at_ns).is_day
                 for _, tag, _ in taken:
                     self.tag(tag.tag_id).decide(at_ns, is_day=is_day)
-            else:
-                others |= self._decide_since(at_ns, all_of_it=self._light.is_day is not before)
-        return others
+            elif late_ns is None:
+                late_ns = at_ns
+        return set() if late_ns is None else self._decide_since(late_ns)
 
     def forget(self, tag_id: str) -> None:
         """Forget a tag that is gone."""
         self._tags.pop(tag_id, None)
+        self._lap_ns = None
         self._light.put(tag_id, None)
 
-    def _decide_since(self, at_ns: int, *, all_of_it: bool) -> set[str]:
-        """After a late scan, decide day or night again at its moment and, if `all_of_it`, since."""
-        until_ns = self._newest_ns if all_of_it else at_ns
-        stamps = {
-            scan.stamp_ns
-            for recent in self._tags.values()
-            for scan in recent.scans
-            if at_ns <= scan.stamp_ns <= until_ns
-        }
-        others: set[str] = set()
-        for stamp_ns in stamps:
-            light = Light()
-            for tag_id, recent in self._tags.items():
-                light.put(tag_id, recent.day_at(stamp_ns))
+    def _decide_since(self, at_ns: int) -> set[str]:
+        """After a late scan, decide day or night again of all scans since; returns their tags."""
+        light, others = Light(), set[str]()
+        since: list[tuple[int, str]] = []
+        for tag_id, recent in self._tags.items():
+            light.put(tag_id, recent.day_at(at_ns - 1))
+            first = bisect_left(recent.scans, at_ns, key=_stamp_ns)
+            since += [(scan.stamp_ns, tag_id) for scan in recent.scans[first:]]
+        for stamp_ns, group in groupby(sorted(since), key=itemgetter(0)):
+            tag_ids = [tag_id for _, tag_id in group]
+            for tag_id in tag_ids:
+                light.put(tag_id, self._tags[tag_id].day_at(stamp_ns))
             is_day = self._day_of(light.is_day, stamp_ns).is_day
-            others |= {
-                tag_id
-                for tag_id, recent in self._tags.items()
-                if recent.decide(stamp_ns, is_day=is_day)
-            }
+            others |= {it for it in tag_ids if self._tags[it].decide(stamp_ns, is_day=is_day)}
         return others
 
 

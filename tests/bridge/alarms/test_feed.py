@@ -11,7 +11,7 @@ from lupin_bridge.alarms.board import AlarmBoard, Change
 from lupin_bridge.alarms.feed import AlarmFeed, writes_between
 from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
 from lupin_bridge.judge import alarm_fold
-from lupin_bridge.judge.judging import Criteria
+from lupin_bridge.judge.judging import Criteria, Judge
 from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import PastWrite, PastWrites, RunSpan, WritesRequest
@@ -77,7 +77,7 @@ async def following(*writes: PastWrite) -> AsyncIterator[tuple[AlarmFeed, AlarmB
     source, board = Journal(), AlarmBoard()
     source.writes_now = list(writes)
     criteria = Criteria.of(Settings())
-    feed = AlarmFeed(source, criteria, board, lambda: NOW, 7.0, note_days=lambda _: None)  # type: ignore[arg-type]
+    feed = AlarmFeed(source, Judge(criteria), board, lambda: NOW, 7.0)  # type: ignore[arg-type]
     feed.start()
     try:
         if writes:
@@ -93,6 +93,25 @@ async def changed(board: AlarmBoard) -> None:
     """Wait for the next change of the board."""
     number = board.now.number
     await until(lambda: board.now.number > number, "the next change")
+
+
+async def test_a_late_scan_which_no_state_shows_counts_for_the_status() -> None:
+    """The tag's readings are then valid for three times ten minutes, not for a day."""
+    async with following(pest(1, 1)) as (feed, _, source):
+        store, judge = TwinStore(), feed.judge
+        store.record(Scan("a", NOW, (Reading("temperature", 22.0),)))
+        judge.see(store.snapshot(NOW, "map"))
+        assert judge.holds_ns() == {"a": 86_400 * 10**9}
+        late = PastWrite(2, 1, "a", NOW - 600 * 10**9, 0, 0, ("temperature",), (22.0,))
+        source.writes_now += [late, replace(late, number=3, run=0, stamp_ns=NOW - 10**9)]
+        source.written = 2
+        feed.on_state(reported(1))
+
+        def holds_ns() -> dict[str, int]:
+            judge.see(store.snapshot(NOW, "map"))
+            return judge.holds_ns()
+
+        await until(lambda: holds_ns() == {"a": 1_800 * 10**9}, "the scan")
 
 
 async def test_it_reads_the_past_once_then_new_writes_and_a_new_journal_whole() -> None:

@@ -2,7 +2,7 @@ from dataclasses import replace
 from importlib.resources import files
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from lupin_bridge.judge.day import Day
@@ -209,28 +209,40 @@ VALUES = st.dictionaries(
     max_size=3,
 )
 LOOK = st.sampled_from([None, None, Flower("tulip", 0.9), Flower("orchid", 0.4), Flower()])
-EVENTS = st.tuples(st.sampled_from("abc"), VALUES, LOOK, st.integers(0, 7200))
+# The last number: by how much a write comes late, s.
+EVENTS = st.tuples(
+    st.sampled_from("abc"),
+    VALUES,
+    LOOK,
+    st.integers(0, 7200),
+    st.sampled_from([0, 0, 0, 700, 20_000]),
+)
 
 
 @settings(max_examples=100)
-@given(st.lists(EVENTS, max_size=40))
+@given(st.lists(EVENTS, max_size=9))
+@example([("a", {"light": 900.0}, None, 0, 0)] + [("b", {"temperature": 1.0}, None, 60, 0)] * 40)
+@example([("a", {"temperature": 22.0}, None, 90_000 * (n < 4), 0) for n in range(6)])
 def test_incremental_judging_equals_judging_the_whole_log(
-    events: list[tuple[str, dict[str, float], Flower | None, int]],
+    events: list[tuple[str, dict[str, float], Flower | None, int, int]],
 ) -> None:
-    """Live, as of a moment, and after a restart: the same."""
+    """Live, as of a moment, and after a restart: the same, also with what came late."""
     judge, store, log = Judge(BY_LIGHT), TwinStore(), list[PastWrite]()
     now_ns = START
-    for number, (tag_id, values, flower, step_s) in enumerate(events):
+    for number, (tag_id, values, flower, step_s, late_s) in enumerate(events):
         now_ns += step_s * S
+        at_ns = now_ns - late_s * S
         if flower is not None:
-            store.record_inspection(Inspection(tag_id, now_ns, flower))
+            store.record_inspection(Inspection(tag_id, at_ns, flower))
             species = sure_species(flower.species, flower.confidence)
-            log.append(PastWrite(number, 1, tag_id, now_ns, 1, 0, (), (), True, species))
+            log.append(PastWrite(number, 1, tag_id, at_ns, 1, 0, (), (), True, species))
         elif values:
             readings = tuple(Reading(*each) for each in values.items())
-            store.record(Scan(tag_id, now_ns, readings))
-            log.append(replace(scan(tag_id, now_ns, **values), number=number))
+            store.record(Scan(tag_id, at_ns, readings))
+            log.append(replace(scan(tag_id, at_ns, **values), number=number))
         then = store.snapshot(now_ns, "map")
+        judge.see(then)
+        judge.note_writes(log[-1:])
         live, recent = judge.see(then), recent_of(log, now_ns)
         past = judge_once(then, recent, BY_LIGHT)
         started = Judge(BY_LIGHT)

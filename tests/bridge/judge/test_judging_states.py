@@ -127,7 +127,7 @@ def judged(state: dict[str, Any]) -> Judged:
 async def alarms(state: dict[str, Any]) -> list[list[str]]:
     """What is active then, as `/api/alarms` has it; a feed hears what the bridge's would."""
     source, board, moment_ns = Journal(), AlarmBoard(), now_ns(state)
-    feed = AlarmFeed(source, criteria(), board, lambda: moment_ns, 7.0, note_days=lambda _: None)  # type: ignore[arg-type]
+    feed = AlarmFeed(source, Judge(criteria()), board, lambda: moment_ns, 7.0)  # type: ignore[arg-type]
     feed.start()
     try:
         source.writes_now = journal_rows(writes_of(state))

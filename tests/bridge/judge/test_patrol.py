@@ -1,29 +1,32 @@
-from lupin_bridge.judge.scans import LAP_INTERVALS, Patrol, Scans
+from lupin_bridge.judge.scans import LAP_INTERVALS, Patrol, RecentScans
+from tests.support.seen import BY_LIGHT, tag
 
 S = 1_000_000_000
 
 
-def add_stamps(*stamps_s: float) -> Patrol:
-    scans = Scans()
-    scans.add_stamps([int(stamp * S) for stamp in stamps_s], None)
-    return scans.patrol(0)
+def scanned(*stamps_s: float, tags: int = 10) -> RecentScans:
+    """As many tags, scanned in turn."""
+    scans = RecentScans(BY_LIGHT.day)
+    for number, stamp_s in enumerate(stamps_s):
+        scans.see([tag(str(number % tags), int(stamp_s * S), temperature=22.0)])
+    return scans
+
+
+def interval_ns(*stamps_s: float) -> int | None:
+    return scanned(*stamps_s).patrol(None, 0).interval_ns
 
 
 def test_a_way_back_or_a_pause_does_not_change_the_interval() -> None:
-    assert add_stamps(0, 40, 80, 120, 700, 740).interval_ns == 40 * S
+    assert interval_ns(0, 40, 80, 120, 700, 740) == 40 * S
 
 
 def test_only_the_last_intervals_count() -> None:
     slow = [i * 600 for i in range(2 * LAP_INTERVALS)]
     fast = [slow[-1] + 5 * (i + 1) for i in range(LAP_INTERVALS)]
-    assert add_stamps(*slow, *fast).interval_ns == 5 * S
+    assert interval_ns(*slow, *fast) == 5 * S
 
 
-def test_scans_already_counted_or_still_to_come_do_not_count() -> None:
-    scans = Scans()
-    scans.add_stamps([100 * S, 140 * S], 150 * S)
-    scans.add_stamps([151 * S, 140 * S, 100 * S, 120 * S], 150 * S)
-    scans.add_stamps([149 * S, 145 * S], 150 * S)
-    assert scans.patrol(0) == Patrol(5 * S, 149 * S, 0)
-    scans.add_stamps([151 * S], 151 * S)
-    assert scans.patrol(0).last_scan_ns == 151 * S
+def test_scans_at_one_moment_count_once_and_those_still_to_come_do_not_count() -> None:
+    scans = scanned(100, 140, 120, 140, 151)
+    assert scans.patrol(150 * S, 0) == Patrol(20 * S, 140 * S, 0)
+    assert scans.patrol(151 * S, 0).last_scan_ns == 151 * S

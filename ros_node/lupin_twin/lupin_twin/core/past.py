@@ -228,10 +228,8 @@ class PastRow:
 
 DEFAULT_WRITES: Final = 1_000
 MAX_WRITES: Final = 2_000
-# A tag's recent writes at a moment: its last scans and inspections, at most this many of each, and
-# none older than `RECENT_NS`.
+# A tag's recent writes at a moment: its last scans and inspections, at most this many of each.
 RECENT_COUNT: Final = 9
-RECENT_NS: Final = 3 * DAY_NS
 # Scans in one answer: they take some seconds of one core.
 MAX_SCANS: Final = 200_000
 
@@ -334,8 +332,7 @@ def recent_of(writes: Iterable[PastWrite], at_ns: int) -> tuple[PastWrite, ...]:
     """Select the writes that are recent at a moment, from those of one run in any order."""
     by_tag: dict[tuple[str, int], list[PastWrite]] = {}
     for write in writes:
-        is_in_time = at_ns - RECENT_NS <= write.stamp_ns <= at_ns
-        if is_in_time and (write.values or write.has_seen):
+        if write.stamp_ns <= at_ns and (write.values or write.has_seen):
             by_tag.setdefault((write.tag_id, write.kind), []).append(write)
     found: list[PastWrite] = []
     for mine in by_tag.values():
@@ -361,3 +358,8 @@ class PastWrites:
     writes: tuple[PastWrite, ...]
     last: int
     is_all: bool
+
+    @property
+    def of_newest_run(self) -> list[PastWrite]:
+        """Those of the run of the clock that goes on."""
+        return [write for write in self.writes if write.run == self.spans[-1].run]

@@ -20,7 +20,7 @@ from lupin_bridge.judge.verdict import ORDER, Health, Kind, Verdict, derive, wor
 from lupin_bridge.stream.frames import text_frame
 from lupin_bridge.stream.state_json import moment, reason_json, stamp
 from lupin_twin.core.diagnostics import Origin
-from lupin_twin.core.state import TagState
+from lupin_twin.core.state import Reading, TagState
 from lupin_twin.field.grid import reach_of
 
 # Positions along each side. Of several tags at one position, the worst is drawn, so that no map is
@@ -109,9 +109,9 @@ def verdict_now(alarm: Mapping[str, Any]) -> Verdict:
 def now_json(
     alarm: Alarm, tags: Mapping[str, TagState], healths: Mapping[str, Health]
 ) -> dict[str, Any] | None:
-    """An alarm's value now, with its verdict and reason, if it is out of range.
+    """An alarm's value at a moment, with its verdict, its reason if out of range, and its time.
 
-    None: it has no value, or its last reading says nothing about now.
+    None: it has no value, or its last reading says nothing about that moment.
     """
     kind, sensor = alarm.reason.kind, alarm.reason.sensor
     tag, health = tags.get(alarm.tag_id), healths.get(alarm.tag_id)
@@ -121,14 +121,17 @@ def now_json(
     if is_old and kind is not Kind.PEST:
         return None
     said = next((it for it in health.reasons if (it.kind, it.sensor) == (kind, sensor)), None)
-    readings = {it.name: it.value for it in (*tag.readings, *derive(tag.readings))}
-    value = readings.get(sensor) if said is None else said.value
+    reading = next(
+        (it for it in (*tag.readings, *derive(tag.readings)) if it.name == sensor), Reading("", 0.0)
+    )
+    value = said.value if said else reading.value if reading.name else None
     if kind is not Kind.PEST and (value is None or not math.isfinite(value)):
         return None
     return {
         "value": value,
         "verdict": Verdict.HEALTHY if said is None else said.verdict,
         "reason": None if said is None else reason_json(said),
+        "observed_at": moment(reading.observed_at_ns),
     }
 
 

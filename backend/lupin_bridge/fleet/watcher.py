@@ -26,16 +26,17 @@ from lupin_bridge.feed.query import main as serve
 from lupin_bridge.fleet.overview import LIVE_S, Site, causes, dots, now_json, worst_first
 from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.episodes import Alarm, silence
-from lupin_bridge.judge.judging import Criteria, Judge
+from lupin_bridge.judge.judging import Criteria, Judge, judge_once
+from lupin_bridge.judge.verdict import Health
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import alarm_json
 from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note, NotesRequest
 from lupin_twin.core.past import FOREVER_NS, NotRemembered, RecentRequest, WritesRequest
-from lupin_twin.core.state import Snapshot, same_tags
+from lupin_twin.core.state import Snapshot, TagState, same_tags
 from lupin_twin.journal.fold import state_at
-from lupin_twin.journal.runs import runs, span_at
+from lupin_twin.journal.runs import runs, span_at, world_of
 from lupin_twin.journal.schema import ORIGIN, DamagedFile, SiteLog
 from lupin_twin.journal.writes import notes, recent, writes
 from lupin_twin.runtime.journal_queries import Recall
@@ -81,6 +82,24 @@ _RECEIVED: Final = (
 _NOW: Final = "SELECT CAST(extract(epoch FROM now()) * 1e9 AS BIGINT)"
 
 
+@dataclass(frozen=True, slots=True)
+class _HourAgo:
+    """Tags an hour before a moment; an hour is a 24th of the site's day, which is short in a demo.
+
+    As on the page of a greenhouse, it serves for a twelfth of that.
+    """
+
+    names: frozenset[str]
+    of_ns: int
+    hour_s: float
+    tags: Mapping[str, TagState]
+    healths: Mapping[str, Health]
+
+    def serves(self, names: frozenset[str], moment_ns: int) -> bool:
+        """Whether it is that of a moment, and has these tags."""
+        return names <= self.names and 0 <= moment_ns - self.of_ns < self.hour_s / 12 * 1e9
+
+
 @dataclass(slots=True)
 class _Judged:
     """What is kept of a site to judge it again; `seq` is the last number that was judged.
@@ -100,6 +119,7 @@ class _Judged:
     is_caught_up: bool = False
     is_failing: bool = False
     judged_s: float = 0.0
+    hour_ago: _HourAgo | None = None
 
 
 def _origin(name: str, judged: _Judged) -> Origin:
@@ -244,7 +264,7 @@ class Watcher:
         if judged.is_caught_up:
             said = notes_of_alarms(alarms, judged.notes, now_ns)
             tags = {tag.tag_id: tag for tag in judged.snapshot.tags} if site.is_live else {}
-            active = [
+            active: list[tuple[Alarm, dict[str, Any]]] = [
                 (
                     alarm,
                     {
@@ -257,6 +277,7 @@ class Watcher:
             ]
             active.sort(key=lambda it: worst_first(it[1]))
             calling = [it for it in active if "shelved_by" not in it[1]]
+            self._add_hour_ago(log, judged, active[:MAX_ALARMS], moment_ns)
             site = replace(
                 site,
                 active_alarms=len(calling),
@@ -269,6 +290,30 @@ class Watcher:
             verdict=judgement.house.verdict,
             dots=dots(judged.snapshot.tags, judgement.tags),
         )
+
+    def _add_hour_ago(
+        self,
+        log: Any,
+        judged: _Judged,
+        shown: Sequence[tuple[Alarm, dict[str, Any]]],
+        moment_ns: int,
+    ) -> None:
+        """Add to shown alarms their value an hour of the site's day ago, for a trend."""
+        names = frozenset(alarm.tag_id for alarm, entry in shown if entry["now"])
+        before = judged.hour_ago
+        if names and not (before and before.serves(names, moment_ns)):
+            hour_s = world_of(log).day_length_s / 24
+            at_ns = moment_ns - int(hour_s * 1e9)
+            with self.connection.transaction():
+                found = state_at(log, at_ns, "")
+                then = replace(found, tags=tuple(it for it in found.tags if it.tag_id in names))
+                healths = judge_once(then, recent(log, RecentRequest(at_ns)), self._criteria).tags
+            tags = {tag.tag_id: tag for tag in then.tags}
+            before = judged.hour_ago = _HourAgo(names, moment_ns, hour_s, tags, healths)
+        for alarm, entry in shown if before else ():
+            assert before is not None
+            known = now_json(alarm, before.tags, before.healths) if entry["now"] else None
+            entry |= {"hour_ago": known, "hour_s": before.hour_s}
 
     def _read(self, log: Any, judged: _Judged) -> None:
         span = span_at(runs(log.execute), FOREVER_NS)

@@ -1,9 +1,10 @@
 /** A field minus that of another moment: yesterday against today. Pure. */
-import type { Field, TagHealth } from '../contract/types';
+import type { Field, TagHealth, WireTime } from '../contract/types';
 import { S } from '../strings';
-import { differenceNumber, type TemperatureUnit, withUnit } from './format';
+import { differenceNumber, intervalText, type TemperatureUnit, withUnit } from './format';
 import { fraction, mix, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
 import type { Ranges, Sensor } from './sensors';
+import { secondsOf } from './time';
 import type { Tag } from './twin';
 
 /** What the shown moment is compared with: a number of seconds before it, or a fixed moment. */
@@ -112,8 +113,27 @@ export function trendOf(sensor: string, now: TagThen, then: TagThen | null) {
   if (value === null) return null;
   const before = then && held(sensor, then);
   if (then === null || before === null) return { kind: 'none' } as const;
-  if (sameReading(sensor, now.tag, then.tag)) return { kind: 'same' } as const;
-  return { kind: 'by', by: value - before } as const;
+  return changeOf(
+    { value, observed_at: takenAt(sensor, now.tag) },
+    { value: before, observed_at: takenAt(sensor, then.tag) },
+  );
+}
+
+/** The length of a greenhouse's hour, seconds, if shorter than a real hour; else null. */
+export const hourText = (seconds: number): string | null =>
+  seconds < 3_600 ? intervalText(seconds) : null;
+
+/** A valid reading; `observed_at` null: unknown, as of a derived value. */
+export interface Taken {
+  readonly value: number;
+  readonly observed_at: WireTime | null;
+}
+
+/** A reading compared with one before; same: it is still that reading. */
+export function changeOf(now: Taken, then: Taken) {
+  const [a, b] = [now.observed_at, then.observed_at];
+  if (a && b && secondsOf(a) === secondsOf(b)) return { kind: 'same' } as const;
+  return { kind: 'by', by: now.value - then.value } as const;
 }
 
 /** The value of a reading that is not too old; null: there is none. */
@@ -129,11 +149,8 @@ export function isOldReading(sensor: string, { tag, health }: TagThen): boolean 
   );
 }
 
-function sameReading(sensor: string, a: Tag, b: Tag): boolean {
-  const at = ({ wire }: Tag): string =>
-    JSON.stringify(wire.readings.find(({ name }) => name === sensor)?.observed_at ?? null);
-  return at(a) !== 'null' && at(a) === at(b);
-}
+const takenAt = (sensor: string, { wire }: Tag): WireTime | null =>
+  wire.readings.find(({ name }) => name === sensor)?.observed_at ?? null;
 
 /**
  * The difference to an hour before, as precise as the sensor's values: what rounds to 0 is level.

@@ -4,9 +4,11 @@ import { useMemo, type JSX } from 'react';
 import { type Now, valuesOf, whenText, whereText, type Speech } from '../alarms/words';
 import { timeOfDay } from '../clock';
 import type { Alarm } from '../contract/types';
+import { changeOf, hourText, type Taken } from '../domain/difference';
 import { secondsOf } from '../domain/time';
 import { LANGUAGE, S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
+import { Trend } from '../ui/Trend';
 import { VIEW_WORDS } from '../words/fleetViews';
 import { alarmCount, ms, namesOf, type Site, siteLink, timeText, words } from './sites';
 import { useAnswer, useSpeech } from './useAnswer';
@@ -16,8 +18,14 @@ interface SiteAlarm extends Alarm {
   readonly name: string;
   readonly is_live: boolean;
   /** null: it has no value, or that is not known. */
-  readonly now: Omit<Extract<Now, { kind: 'known' }>, 'kind' | 'trend'> | null;
+  readonly now: Reported | null;
+  /** The same an hour of that greenhouse before, and how long that is, seconds. */
+  readonly hour_ago?: Reported | null;
+  readonly hour_s?: number;
 }
+
+type Reported = Omit<Extract<Now, { kind: 'known' }>, 'kind' | 'trend'> &
+  Pick<Taken, 'observed_at'>;
 
 const W = VIEW_WORDS[LANGUAGE];
 
@@ -68,7 +76,8 @@ export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Eleme
 function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Element {
   const raised = secondsOf(alarm.raised_at);
   const state = alarm.is_live && alarm.now ? alarm.now : null;
-  const values = valuesOf(alarm, speech, state && { kind: 'known', trend: null, ...state });
+  const trend = state && trendOf(state, alarm.hour_ago);
+  const values = valuesOf(alarm, speech, state && { kind: 'known', trend, ...state });
   const { verdict } = alarm.now ?? alarm.reason;
   return (
     <li data-live={alarm.is_live} data-shelved={Boolean(alarm.shelved_by)}>
@@ -78,7 +87,15 @@ function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Eleme
         <span>{whereText(alarm)}</span>
         <span className="fleet-alarm-what">{values.what}</span>
         <span className="fleet-alarm-what">
-          {values.now}
+          {values.now}{' '}
+          {trend !== null && (
+            <Trend
+              of={alarm.reason.sensor}
+              by={trend}
+              hour={hourText(alarm.hour_s ?? 3_600)}
+              speech={speech}
+            />
+          )}
           {values.worst !== null && (
             <span className="fleet-line">
               {values.now !== null && <HealthMark verdict={alarm.reason.verdict} word={false} />}
@@ -98,6 +115,12 @@ function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Eleme
       </a>
     </li>
   );
+}
+
+function trendOf(now: Reported, then?: Reported | null): number | null {
+  if (now.value === null || !then || then.value === null) return null;
+  const change = changeOf({ ...now, value: now.value }, { ...then, value: then.value });
+  return change.kind === 'by' ? change.by : null;
 }
 
 function saidOf(alarm: SiteAlarm): readonly string[] {

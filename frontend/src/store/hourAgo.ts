@@ -1,9 +1,8 @@
 /** The greenhouse an hour before the shown moment, for the table's trends; fetched rarely. */
 import { now } from '../clock';
 import { fetchStateAt } from '../contract/past';
-import { intervalText } from '../domain/format';
+import { hourText, type TagThen } from '../domain/difference';
 import { secondsOf } from '../domain/time';
-import type { TagThen } from '../domain/difference';
 import { snapshotOf, type Tag } from '../domain/twin';
 import { keepFetched, store, type AppState } from './app';
 import { createStore } from './create';
@@ -15,10 +14,7 @@ import { NOT_JUDGED } from '../domain/health';
 const selectHourS = (state: AppState): number => selectDayS(state) / 24;
 
 /** The length of the greenhouse's hour if shorter than a real hour; else null. */
-export function shortHourText(): string | null {
-  const hourS = selectHourS(store.get());
-  return hourS < 3_600 ? intervalText(hourS) : null;
-}
+export const shortHourText = (): string | null => hourText(selectHourS(store.get()));
 
 /** Cache TTL as a share of an hour: too short to show in a trend. */
 const SERVES = 1 / 12;

@@ -27,6 +27,7 @@ import { isColumnShown } from '../store/settings';
 import { S } from '../strings';
 import { Age, FailedAttemptText, useAgeStep } from './Age';
 import { HealthMark } from './HealthMark';
+import { ARROWS } from './Trend';
 
 /** What all rows have in common. */
 export interface RowLook {
@@ -225,8 +226,6 @@ function Reading({ sensor, row: { tag, health }, look }: CellProps): JSX.Element
     </>
   );
 }
-
-export const ARROWS = { up: '\u2197', down: '\u2198', level: '\u2192' } as const;
 
 /** A reading's change over an hour: an arrow and the difference, or why there is none. */
 function TrendLine({ sensor, row, look: { then, unit } }: CellProps): JSX.Element | null {

@@ -56,6 +56,7 @@ def every(shared_archive: Archive, tmp_path_factory: pytest.TempPathFactory) -> 
         "well": recent_scans(temperature=22.0),
         "over": recent_scans(temperature=45.0, tags=1),
         "mild": [
+            scan("0", wall().stamp_ns - 4_000 * SECOND, temperature=30.0),
             *recent_scans(temperature=45.0, tags=1),
             scan("0", wall().stamp_ns, temperature=28.0),
         ],
@@ -99,6 +100,7 @@ def test_alarms_of_all_sites_come_with_the_worst_first(every: All) -> None:
     assert (first.pop("site"), first.pop("name")) == ("gh2", "gh2")
     assert first.pop("is_live") is True
     assert first.pop("now")["value"] == 45.0
+    assert (first.pop("hour_ago"), first.pop("hour_s")) == (None, 3_600.0)
     wait_for(
         lambda: first in page.http.get("/sites/gh2/api/alarms").json()["alarms"],
         f"the same alarm below its site's path: {first}",
@@ -116,6 +118,9 @@ def test_an_alarm_comes_with_its_value_now_beside_its_worst(every: All) -> None:
     assert (found["reason"]["verdict"], found["worst"]) == ("critical", 45.0)
     assert (found["now"]["value"], found["now"]["verdict"]) == (28.0, "stressed")
     assert found["now"]["reason"]["limit"] < 28.0
+    # And an hour ago, for its trend.
+    assert (found["hour_ago"]["value"], found["hour_s"]) == (30.0, 3_600.0)
+    assert found["now"]["observed_at"]["sec"] - found["hour_ago"]["observed_at"]["sec"] == 4_000
 
 
 def test_cleared_alarms_are_gone_and_the_etag_changes(every: All) -> None:

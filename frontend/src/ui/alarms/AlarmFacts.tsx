@@ -12,7 +12,6 @@ import {
 import { selectNow, selectSpeech } from '../../alarms/speech';
 import type { Alarm, Verdict } from '../../contract/types';
 import { ageSeconds } from '../../domain/time';
-import { differenceShown } from '../../domain/difference';
 import { C } from '../../notes/NoteMarks';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
@@ -21,7 +20,7 @@ import { rosNow, selectClockFault, selectHasTime } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { HealthMark } from '../HealthMark';
-import { ARROWS } from '../TagRow';
+import { Trend } from '../Trend';
 
 interface ValuesNow extends Values {
   readonly state: Now | null;
@@ -85,11 +84,19 @@ export function AlarmFacts({
   item: Item;
   values: ValuesNow;
 }): JSX.Element {
+  const speech = useApp(selectSpeech);
   return (
     <>
       {state?.kind === 'known' && current !== null && (
         <Fact name="now" verdict={state.verdict} text={current}>
-          {state.value !== null && state.trend !== null && <Trend alarm={alarm} by={state.trend} />}
+          {state.value !== null && state.trend !== null && (
+            <Trend
+              of={alarm.reason.sensor}
+              by={state.trend}
+              hour={shortHourText()}
+              speech={speech}
+            />
+          )}
         </Fact>
       )}
       {state?.kind === 'unknown' && <NotKnown alarm={alarm} state={state} />}
@@ -134,22 +141,6 @@ function NotKnown({
   return (
     <span data-fact="now" data-status="unknown" title={text}>
       {text}
-    </span>
-  );
-}
-
-/** Up, down or level compared with an hour ago. */
-function Trend({ alarm, by }: { alarm: Alarm; by: number }): JSX.Element {
-  const { sensors, unit } = useApp(selectSpeech);
-  const sensor = sensors.named(alarm.reason.sensor);
-  const { way, text, rate } = differenceShown(sensor, by, unit);
-  const title = `${S.trendTitle(sensor.label, shortHourText())}: ${text}`;
-  return (
-    <span data-trend={way} title={title}>
-      <span aria-hidden="true">
-        {ARROWS[way]} {rate}
-      </span>{' '}
-      <span className="unseen">{title}</span>
     </span>
   );
 }

@@ -21,14 +21,13 @@ from lupin_bridge.alarms.board import (
     board_of,
     change_between,
 )
-from lupin_bridge.feed.query import as_found
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.tasks import Guard, end
 from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, AlarmFold, Found
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Judge
+from lupin_bridge.judge.scans import recent_writes, writes_of
 from lupin_twin.core.diagnostics import JournalState
-from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
 from lupin_twin.core.past import (
     DAY_NS,
     FOREVER_NS,
@@ -36,63 +35,26 @@ from lupin_twin.core.past import (
     PastRefused,
     PastWrite,
     PastWrites,
-    RecentRequest,
     RunSpan,
     WritesRequest,
 )
-from lupin_twin.core.state import (
-    STATUS_OK,
-    Snapshot,
-    TagState,
-    sure_species,
-)
+from lupin_twin.core.state import Snapshot, TagState
 
 # The run of the clock of all writes that are made from states.
 RUN = 0
-_UNKNOWN = TagState("")
+_NO_TAG = TagState("")
 
 
 def writes_between(before: Snapshot | None, now: Snapshot, number: int) -> list[PastWrite]:
-    """The scans, inspections and failed attempts between two states, numbered from `number` on.
-
-    If there were several attempts at one tag, all but the last may be missed. A failed attempt
-    counts as a failed scan.
-    """
+    """What happened between two states (see `writes_of`), numbered from `number` on."""
     known = {} if before is None else {tag.tag_id: tag for tag in before.tags}
     found = [
         write
         for tag in now.tags
-        if (old := known.get(tag.tag_id, _UNKNOWN)) is not tag
-        for write in _of_tag(old, tag)
+        if (old := known.get(tag.tag_id, _NO_TAG)) is not tag
+        for write in writes_of(old, tag)
     ]
-    return [replace(write, number=number + index) for index, write in enumerate(found)]
-
-
-def _of_tag(before: TagState, tag: TagState) -> list[PastWrite]:
-    """The new writes of one tag, in the order of time."""
-    found: list[PastWrite] = []
-    known = {(reading.name, reading.observed_at_ns) for reading in before.readings}
-    scans: dict[int, list[tuple[str, float]]] = {}
-    for reading in tag.readings:
-        at_ns = reading.observed_at_ns
-        if at_ns is not None and (reading.name, at_ns) not in known:
-            scans.setdefault(at_ns, []).append((reading.name, reading.value))
-    for at_ns, readings in scans.items():
-        names, values = zip(*readings, strict=True)
-        scan = PastWrite(0, RUN, tag.tag_id, at_ns, KIND_TAG_READING, STATUS_OK, names, values)
-        found.append(scan)
-    at_ns = tag.looked_at_ns
-    if at_ns is not None and (at_ns, tag.flower) != (before.looked_at_ns, before.flower):
-        flower = tag.flower
-        species = sure_species(flower.species, flower.confidence)
-        seen = (True, species, flower.anomaly, flower.bug_count)
-        look = PastWrite(0, RUN, tag.tag_id, at_ns, KIND_FLOWER, STATUS_OK, (), (), *seen)
-        found.append(look)
-    last = tag.last_try
-    if last is not None and last.status != STATUS_OK and last != before.last_try:
-        failed = PastWrite(0, RUN, tag.tag_id, last.stamp_ns, KIND_TAG_READING, last.status)
-        found.append(failed)
-    return sorted(found, key=lambda write: write.stamp_ns)
+    return [replace(write, run=RUN, number=number + at) for at, write in enumerate(found)]
 
 
 # --- the feed -------------------------------------------------------------------------------------
@@ -380,7 +342,7 @@ async def learn_recent(source: TwinSource, judge: Judge, first: Snapshot) -> Non
 
     Retries while the log cannot be read; until then, the judge knows only what is received.
     """
-    recent = partial(as_found, RecentRequest(first.stamp_ns))
+    recent = partial(recent_writes, first.stamp_ns)
     while True:
         try:
             judge.learn(await source.ask(recent, len(first.tags) * RECENT_S_PER_TAG))

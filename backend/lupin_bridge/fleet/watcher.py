@@ -27,18 +27,26 @@ from lupin_bridge.fleet.overview import LIVE_S, Site, causes, dots, now_json, wo
 from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge, judge_once
+from lupin_bridge.judge.scans import recent_writes
 from lupin_bridge.judge.verdict import Health
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import alarm_json
 from lupin_twin.core.diagnostics import Origin, origin_of
 from lupin_twin.core.notes import Note, NotesRequest
-from lupin_twin.core.past import FOREVER_NS, NotRemembered, RecentRequest, WritesRequest
+from lupin_twin.core.past import (
+    FOREVER_NS,
+    NotRemembered,
+    PastWrite,
+    RecentRequest,
+    ScansRequest,
+    WritesRequest,
+)
 from lupin_twin.core.state import Snapshot, TagState, same_tags
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.runs import runs, span_at, world_of
 from lupin_twin.journal.schema import ORIGIN, DamagedFile, SiteLog
-from lupin_twin.journal.writes import notes, recent, writes
+from lupin_twin.journal.writes import notes, recent, scans, writes
 from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
@@ -307,7 +315,7 @@ class Watcher:
             with self.connection.transaction():
                 found = state_at(log, at_ns, "")
                 then = replace(found, tags=tuple(it for it in found.tags if it.tag_id in names))
-                healths = judge_once(then, recent(log, RecentRequest(at_ns)), self._criteria).tags
+                healths = judge_once(then, _recent(log, at_ns), self._criteria).tags
             tags = {tag.tag_id: tag for tag in then.tags}
             before = judged.hour_ago = _HourAgo(names, moment_ns, hour_s, tags, healths)
         for alarm, entry in shown if before else ():
@@ -326,7 +334,7 @@ class Watcher:
         judged.snapshot = replace(found, stamp_ns=newest_ns, tags=tags)
         if before is None and tags:
             judged.judge.see(judged.snapshot)
-            judged.judge.learn(recent(log, RecentRequest(newest_ns)))
+            judged.judge.learn(_recent(log, newest_ns))
 
     def _follow(self, log: Any, judged: _Judged) -> None:
         request = WritesRequest(judged.after, Limits().alarm_days * 86_400, _REACH_COUNT, _LOT)
@@ -340,6 +348,13 @@ class Watcher:
         if judged.is_caught_up:
             judged.judge.note_writes(past.of_newest_run)
         judged.after, judged.is_caught_up = past.last, past.is_all
+
+
+def _recent(log: Any, at_ns: int) -> list[PastWrite]:
+    def find(need: RecentRequest | ScansRequest) -> tuple[PastWrite, ...]:
+        return recent(log, need) if isinstance(need, RecentRequest) else scans(log, need)
+
+    return recent_writes(at_ns, find)
 
 
 def _alarms(site: Site, judged: _Judged, moment_ns: int) -> list[Alarm]:

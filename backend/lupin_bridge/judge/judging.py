@@ -26,6 +26,7 @@ from lupin_bridge.judge.scans import (
     RecentScans,
     holds_ns,
     interval_ns,
+    writes_of,
 )
 from lupin_bridge.judge.verdict import (
     FORGOTTEN_NS,
@@ -144,6 +145,7 @@ def unix_s(stamp_ns: int) -> float | None:
 # Readings judged per snapshot, where each tag counts as one more: some 20 ms.
 MAX_AT_ONCE: Final = 6_000
 _UNKNOWN: Final = Health(Verdict.UNKNOWN)
+_NO_TAG: Final = TagState("")
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,8 +245,7 @@ class Judge:
         self._known_ns = self._known_ns if now_ns is None else now_ns
         if is_back:
             # Earlier scans are not part of any interval.
-            self._recent = RecentScans(self.criteria.day)
-            self._recent.see(snapshot.tags)
+            self._recent = RecentScans.of(snapshot.tags, (), self.criteria.day)
         news, gone = self._news(snapshot)
         day = self._recent.day(snapshot.stamp_ns)
         if now_ns is None or self._now_ns is None or is_back:
@@ -271,7 +272,7 @@ class Judge:
     def note_writes(self, writes: Iterable[PastWrite]) -> None:
         """Take writes of the log, for the next snapshot: no state shows all of them."""
         tags = {tag_id: kept.state for tag_id, kept in self._tags.items()}
-        self._waiting |= dict.fromkeys(self._recent.note(writes, tags))
+        self._waiting |= dict.fromkeys(self._recent.take(writes, tags))
 
     def note_changed(self, changed: Mapping[str, Mapping[str, int]]) -> None:
         """Set, for the next snapshot, the sensors that deviate from predictions, and since when."""
@@ -292,18 +293,16 @@ class Judge:
         """The tags whose state has changed since the last snapshot, and those that are gone."""
         if snapshot.tags == self._seen:
             return {}, []
-        news: dict[str, None] = {}
-        states: list[TagState] = []
+        states: dict[str, TagState] = {}
+        writes: list[PastWrite] = []
         for tag in snapshot.tags:
             kept = self._tags.get(tag.tag_id)
             if kept is None:
-                kept = self._tags[tag.tag_id] = _Tag(tag)
-            elif kept.state is tag:
-                continue
-            kept.state = tag
-            news[tag.tag_id] = None
-            states.append(tag)
-        news |= dict.fromkeys(self._recent.see(states))
+                kept = self._tags[tag.tag_id] = _Tag(_NO_TAG)
+            if kept.state is not tag:
+                writes += writes_of(kept.state, tag)
+                kept.state = states[tag.tag_id] = tag
+        news = dict.fromkeys((*states, *self._recent.take(writes, states)))
         gone: list[str] = []
         if len(self._tags) != len(snapshot.tags):
             there = {tag.tag_id for tag in snapshot.tags}

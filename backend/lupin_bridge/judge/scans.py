@@ -14,14 +14,15 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from heapq import nlargest
-from itertools import groupby, pairwise, takewhile
+from itertools import chain, groupby, pairwise, takewhile
 from operator import attrgetter, itemgetter
 from statistics import median
 from typing import Final
 
-from lupin_bridge.judge.day import LEFT_OUT_NS, LIGHT, Day, Light, says_day
-from lupin_twin.core.past import PastWrite
-from lupin_twin.core.state import Reading, TagState, sure_species
+from lupin_bridge.judge.day import LEFT_OUT_NS, LIGHT, SINCE_NS, Day, Light, says_day
+from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
+from lupin_twin.core.past import PastWrite, RecentRequest, ScansRequest
+from lupin_twin.core.state import STATUS_OK, TagState, sure_species
 
 _S: Final = 1_000_000_000
 SHORTEST_NS: Final = 600 * _S
@@ -173,22 +174,25 @@ class Recent:
         """The stamps of its last scans."""
         return tuple(scan.stamp_ns for scan in self.scans[-INTERVALS - 1 :])
 
-    def see(self, looks: Iterable[tuple[int, str]]) -> None:
-        """Add inspections; for one moment, the last one counts."""
-        known = dict(self.looks)
-        known.update(looks)
-        found = tuple(sorted(known.items()))[-INTERVALS - 1 :]
-        if found != self.looks:
-            self.looks = found
+    def see(self, at_ns: int, species: str) -> bool:
+        """Add an inspection; returns whether it is news. For one moment, the last one counts."""
+        before = self.looks
+        self.looks = tuple(sorted({**dict(before), at_ns: species}.items()))[-INTERVALS - 1 :]
+        if self.looks != before:
             self.scans = tuple(
                 replace(scan, species=self.species_at(scan.stamp_ns)) for scan in self.scans
             )
+        return self.looks != before
 
-    def put(self, tag: TagState, at_ns: int, values: Mapping[str, float]) -> None:
-        """Add a scan, and drop those that no judgement needs any more."""
-        scan = Scanned(at_ns, values, species=self.species_at(at_ns))
+    def put(self, tag: TagState, at_ns: int, values: Mapping[str, float]) -> bool:
+        """Add a scan, and drop those that no judgement needs; returns whether it is news."""
         before = bisect_left(self.scans, at_ns, key=_stamp_ns)
         behind = bisect_right(self.scans, at_ns, before, key=_stamp_ns)
+        known = self.scans[before].values if before < behind else {}
+        scan = Scanned(at_ns, {**known, **values}, species=self.species_at(at_ns))
+        # As text, because NaN is not equal to itself.
+        if repr(known) == repr(scan.values):
+            return False
         scans = (*self.scans[:before], scan, *self.scans[behind:])
         if len(scans) > INTERVALS + 1:
             kept: dict[int, dict[str, float]] = {}
@@ -201,6 +205,7 @@ class Recent:
             )
             scans = (*older, *scans[-INTERVALS - 1 :])
         self.scans = scans
+        return any(it.stamp_ns == at_ns for it in scans)
 
     def decide(self, at_ns: int, *, is_day: bool) -> bool:
         """Set day or night for the scan of a moment; returns whether that has changed."""
@@ -220,20 +225,6 @@ class Recent:
             if LIGHT in scan.values:
                 return says_day(scan.values[LIGHT])
         return None
-
-    def news(self, readings: Iterable[Reading]) -> dict[int, dict[str, float]]:
-        """The scans that are new or have changed by these readings, by stamp."""
-        known = {scan.stamp_ns: scan.values for scan in self.scans}
-        found: dict[int, dict[str, float]] = {}
-        for reading in readings:
-            at_ns = reading.observed_at_ns
-            if at_ns is None:
-                continue
-            # As text, because NaN is not equal to itself.
-            before = found.get(at_ns) or known.get(at_ns, {})
-            if repr(before.get(reading.name)) != repr(reading.value):
-                found.setdefault(at_ns, dict(before))[reading.name] = reading.value
-        return found
 
     def species_at(self, at_ns: int) -> str:
         """The last species until then that the camera was sure of; empty: none."""
@@ -262,25 +253,9 @@ class RecentScans:
     ) -> RecentScans:
         """The recent scans of a state; `writes` is the log of them (see `RecentRequest`)."""
         found = cls(day_of)
-        scans: dict[tuple[int, str], dict[str, float]] = {}
-        looks: dict[str, list[tuple[int, str]]] = {}
-        for write in writes:
-            if write.has_seen:
-                looks.setdefault(write.tag_id, []).append((write.stamp_ns, write.species))
-            else:
-                scan = scans.setdefault((write.stamp_ns, write.tag_id), {})
-                scan.update(zip(write.sensors, write.values, strict=True))
-        for tag in tags:
-            for reading in tag.readings:
-                if reading.observed_at_ns is not None:
-                    # The state takes precedence over the log.
-                    key = reading.observed_at_ns, tag.tag_id
-                    scans.setdefault(key, {})[reading.name] = reading.value
-            found.tag(tag.tag_id).see((*looks.get(tag.tag_id, ()), *_inspection_of(tag)))
-        by_id = {tag.tag_id: tag for tag in tags}
-        found.take(
-            [(at_ns, by_id[name], it) for (at_ns, name), it in scans.items() if name in by_id]
-        )
+        # Of one moment, the state takes precedence over the log.
+        of_state = (write for tag in tags for write in writes_of(_UNKNOWN, tag))
+        found.take(chain(writes, of_state), {tag.tag_id: tag for tag in tags})
         return found
 
     def tag(self, tag_id: str) -> Recent:
@@ -302,62 +277,34 @@ class RecentScans:
         """Whether it is day at a moment, by the last scans of all tags."""
         return self._day_of(self._light.is_day, at_ns)
 
-    def see(self, tags: Iterable[TagState]) -> set[str]:
-        """Take changed tags; returns those with scans that are now judged otherwise."""
-        scans: list[TakenScan] = []
-        for tag in tags:
-            recent = self.tag(tag.tag_id)
-            recent.see(_inspection_of(tag))
-            scans += [(at_ns, tag, values) for at_ns, values in recent.news(tag.readings).items()]
-        return self.take(scans)
-
-    def note(self, writes: Iterable[PastWrite], tags: Mapping[str, TagState]) -> set[str]:
-        """Take writes that the states of `tags` may never show; returns the tags with news.
-
-        That is so if they came late, or soon after one another.
-        """
-        scans: list[TakenScan] = []
+    def take(self, writes: Iterable[PastWrite], tags: Mapping[str, TagState]) -> set[str]:
+        """Add writes of `tags`, as these are now; returns those that are judged otherwise."""
+        scans: dict[tuple[int, str], dict[str, float]] = {}
         others: set[str] = set()
         for write in writes:
-            tag, recent = tags.get(write.tag_id), self.tag(write.tag_id)
-            if tag is None:
-                continue
-            if write.has_seen:
-                before = recent.looks
-                recent.see([(write.stamp_ns, write.species)])
-                others |= {write.tag_id} if recent.looks != before else set()
-                continue
-            if len(recent.scans) > INTERVALS and write.stamp_ns < recent.stamps_ns[0]:
-                continue
-            own = {(it.name, it.observed_at_ns) for it in tag.readings}
-            readings = (
-                Reading(name, value, write.stamp_ns)
-                for name, value in zip(write.sensors, write.values, strict=True)
-                # The state takes precedence over the log.
-                if (name, write.stamp_ns) not in own
-            )
-            scans += [(at_ns, tag, values) for at_ns, values in recent.news(readings).items()]
-        return others | self.take(scans) | {tag.tag_id for _, tag, _ in scans}
-
-    def take(self, scans: Sequence[TakenScan]) -> set[str]:
-        """Add scans; returns the tags with a scan that is judged by another light than before."""
-        self._lap_ns = None if scans else self._lap_ns
+            name = write.tag_id
+            if name in tags and write.has_seen:
+                others |= {name} if self.tag(name).see(write.stamp_ns, write.species) else set()
+            elif name in tags and write.values:
+                scan = scans.setdefault((write.stamp_ns, name), {})
+                scan.update(zip(write.sensors, write.values, strict=True))
         late_ns: int | None = None
-        in_time = sorted(scans, key=lambda scan: (scan[0], scan[1].tag_id))
-        for at_ns, group in groupby(in_time, key=itemgetter(0)):
-            taken = list(group)
-            for _, tag, values in taken:
-                recent = self.tag(tag.tag_id)
-                recent.put(tag, at_ns, values)
-                self._light.put(tag.tag_id, recent.day_at(recent.scans[-1].stamp_ns))
+        for at_ns, group in groupby(sorted(scans), key=itemgetter(0)):
+            names = [it for _, it in group if self.tag(it).put(tags[it], at_ns, scans[at_ns, it])]
+            for name in names:
+                recent = self.tag(name)
+                self._light.put(name, recent.day_at(recent.scans[-1].stamp_ns))
+            if names:
+                self._lap_ns = None
+                others |= {*names}
             if at_ns > self._newest_ns:
                 self._newest_ns = at_ns
                 is_day = self.day(at_ns).is_day
-                for _, tag, _ in taken:
-                    self.tag(tag.tag_id).decide(at_ns, is_day=is_day)
-            elif late_ns is None:
+                for name in names:
+                    self.tag(name).decide(at_ns, is_day=is_day)
+            elif names and late_ns is None:
                 late_ns = at_ns
-        return set() if late_ns is None else self._decide_since(late_ns)
+        return others if late_ns is None else others | self._decide_since(late_ns)
 
     def forget(self, tag_id: str) -> None:
         """Forget a tag that is gone."""
@@ -382,11 +329,58 @@ class RecentScans:
         return others
 
 
-# The stamp, the tag, and the values by sensor.
-TakenScan = tuple[int, TagState, Mapping[str, float]]
+_UNKNOWN: Final = TagState("")
 
 
-def _inspection_of(tag: TagState) -> Sequence[tuple[int, str]]:
-    if tag.looked_at_ns is None:
-        return ()
-    return ((tag.looked_at_ns, sure_species(tag.flower.species, tag.flower.confidence)),)
+def writes_of(before: TagState, tag: TagState) -> list[PastWrite]:
+    """What happened at a tag between two of its states, oldest first, without run and number.
+
+    If there were several attempts, all but the last may be missed. A failed attempt counts as a
+    failed scan.
+    """
+    # As text, because NaN is not equal to itself.
+    known = {repr(reading) for reading in before.readings}
+    scans: dict[int, list[tuple[str, float]]] = {}
+    for reading in tag.readings:
+        at_ns = reading.observed_at_ns
+        if at_ns is not None and repr(reading) not in known:
+            scans.setdefault(at_ns, []).append((reading.name, reading.value))
+    found = []
+    for at_ns, readings in scans.items():
+        names, values = zip(*readings, strict=True)
+        scan = PastWrite(0, 0, tag.tag_id, at_ns, KIND_TAG_READING, STATUS_OK, names, values)
+        found.append(scan)
+    looked_ns, flower, last = tag.looked_at_ns, tag.flower, tag.last_try
+    if looked_ns is not None and (looked_ns, flower) != (before.looked_at_ns, before.flower):
+        seen = sure_species(flower.species, flower.confidence), flower.anomaly, flower.bug_count
+        look = PastWrite(0, 0, tag.tag_id, looked_ns, KIND_FLOWER, STATUS_OK, (), (), True, *seen)
+        found.append(look)
+    if last is not None and last.status != STATUS_OK and last != before.last_try:
+        found.append(PastWrite(0, 0, tag.tag_id, last.stamp_ns, KIND_TAG_READING, last.status))
+    return sorted(found, key=_stamp_ns)
+
+
+def recent_writes(
+    at_ns: int, find: Callable[[RecentRequest | ScansRequest], tuple[PastWrite, ...]], *_: object
+) -> list[PastWrite]:
+    """All that `RecentScans` needs of the log at a moment; `find` looks it up.
+
+    That is what was recent, and what light sensors said before that, by which it is judged.
+    """
+    before = find(ScansRequest(max(0, at_ns - SINCE_NS), at_ns, frozenset({LIGHT})))
+    return [*light_turns(before), *find(RecentRequest(at_ns))]
+
+
+def light_turns(scans: Iterable[PastWrite]) -> Iterator[PastWrite]:
+    """Yield the scans, oldest first, at which what a tag's light sensor says changes."""
+    said: dict[str, tuple[bool | None, int]] = {}
+    for scan in scans:
+        before, light_ns = said.get(scan.tag_id, (None, 0))
+        if LIGHT in scan.sensors:
+            says: bool | None = says_day(scan.values[scan.sensors.index(LIGHT)])
+            said[scan.tag_id] = says, scan.stamp_ns
+        else:
+            says = None if scan.stamp_ns - light_ns > LEFT_OUT_NS else before
+            said[scan.tag_id] = says, light_ns
+        if says is not before:
+            yield scan

@@ -21,6 +21,7 @@ from lupin_bridge.field import matches
 from lupin_bridge.judge.day import LIGHT, SINCE_NS, days_of, nights_by_light
 from lupin_bridge.judge.judging import Criteria, judge_once
 from lupin_bridge.judge.quantities import DAILY, DERIVED, Daily, Derived, IsDay, Sensors
+from lupin_bridge.judge.scans import light_turns
 from lupin_bridge.past import bodies
 from lupin_bridge.serving.admission import REVALIDATE, Answer, content_answer
 from lupin_bridge.stream.state_json import StateJson, history, judgement
@@ -178,10 +179,10 @@ class Health(StateQuery):
         by, at_ns = self.criteria, self.at_ns or 0
         snapshot: Snapshot = find(at_ns)
         recent: tuple[PastWrite, ...] = find(RecentRequest(at_ns))
-        sensors = frozenset(by.sensors.judged_by_the_day)
+        sensors = frozenset({LIGHT, *by.sensors.judged_by_the_day})
         scans: tuple[PastWrite, ...] = find(ScansRequest(max(0, at_ns - SINCE_NS), at_ns, sensors))
         days = days_of(scans, by.sensors, by.is_day, by.day_number)
-        judged = judge_once(snapshot, recent, by, days=days)
+        judged = judge_once(snapshot, (*light_turns(scans), *recent), by, days=days)
         body = judgement(judged)
         return plan_of(etag_of("health", (snapshot.stamp_ns, body.decode())), lambda _: body)
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from lupin_bridge.judge.day import Day
 from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, Judged, judge_once
-from lupin_bridge.judge.scans import Patrol
+from lupin_bridge.judge.scans import Patrol, light_turns
 from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict
 from lupin_twin.core.past import PastWrite, recent_of
@@ -220,7 +220,7 @@ EVENTS = st.tuples(
 
 
 @settings(max_examples=100)
-@given(st.lists(EVENTS, max_size=9))
+@given(st.lists(EVENTS, max_size=40))
 @example([("a", {"light": 900.0}, None, 0, 0)] + [("b", {"temperature": 1.0}, None, 60, 0)] * 40)
 @example([("a", {"temperature": 22.0}, None, 90_000 * (n < 4), 0) for n in range(6)])
 def test_incremental_judging_equals_judging_the_whole_log(
@@ -243,7 +243,9 @@ def test_incremental_judging_equals_judging_the_whole_log(
         then = store.snapshot(now_ns, "map")
         judge.see(then)
         judge.note_writes(log[-1:])
-        live, recent = judge.see(then), recent_of(log, now_ns)
+        in_time = sorted(log, key=lambda write: (write.stamp_ns, write.number))
+        scans = [write for write in in_time if not write.has_seen]
+        live, recent = judge.see(then), [*light_turns(scans), *recent_of(log, now_ns)]
         past = judge_once(then, recent, BY_LIGHT)
         started = Judge(BY_LIGHT)
         started.see(then)

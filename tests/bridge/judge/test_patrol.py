@@ -1,5 +1,7 @@
 from lupin_bridge.judge.scans import LAP_INTERVALS, Patrol, RecentScans
-from tests.support.seen import BY_LIGHT, tag
+from lupin_twin.core.past import PastWrite
+from lupin_twin.core.state import TagState
+from tests.support.seen import BY_LIGHT
 
 S = 1_000_000_000
 
@@ -8,7 +10,9 @@ def scanned(*stamps_s: float, tags: int = 10) -> RecentScans:
     """As many tags, scanned in turn."""
     scans = RecentScans(BY_LIGHT.day)
     for number, stamp_s in enumerate(stamps_s):
-        scans.see([tag(str(number % tags), int(stamp_s * S), temperature=22.0)])
+        name = str(number % tags)
+        write = PastWrite(0, 0, name, int(stamp_s * S), 0, 0, ("temperature",), (22.0,))
+        scans.take([write], {name: TagState(name)})
     return scans
 
 

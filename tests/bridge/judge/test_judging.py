@@ -221,6 +221,10 @@ EVENTS = st.tuples(
 
 @settings(max_examples=100)
 @given(st.lists(EVENTS, max_size=40))
+@example(
+    [("b", {"light": 0.0}, None, 0, 0), ("a", {"temperature": 25.8}, None, 60, 0)]
+    + [("b", {"light": 900.0}, None, 60, 0)] * 12
+)
 @example([("a", {"light": 900.0}, None, 0, 0)] + [("b", {"temperature": 1.0}, None, 60, 0)] * 40)
 @example([("a", {"temperature": 22.0}, None, 90_000 * (n < 4), 0) for n in range(6)])
 def test_incremental_judging_equals_judging_the_whole_log(

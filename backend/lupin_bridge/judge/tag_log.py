@@ -1,7 +1,7 @@
 """One tag's log in one run of the clock, and the states derived from it. Pure.
 
-Writes that come in order extend the state. A late write is inserted at its place, and all states
-after it are computed again. Writes that the log has no room for survive as the state they led to.
+Writes that come in order extend the states. A late write is inserted at its place, and the states
+are computed again. Writes that the log has no room for survive as the states that they led to.
 """
 
 from __future__ import annotations
@@ -11,17 +11,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import attrgetter
-from typing import Final, Generic, TypeVar
 
 from lupin_bridge.judge.day import LEFT_OUT_NS, LIGHT, Turn, says_day
 from lupin_bridge.judge.episodes import TagEpisodes, readings_of
 from lupin_bridge.judge.quantities import IsDay
 from lupin_bridge.judge.scans import INTERVALS, SHORTEST_NS
-from lupin_twin.core.past import PastWrite
-
-# Occasions between two checkpoints of a tag's state.
-MARK: Final = 64
-StateT = TypeVar("StateT")
+from lupin_twin.core.past import FOREVER_NS, PastWrite
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,154 +79,70 @@ _stamp_ns = attrgetter("stamp_ns")
 _order = attrgetter("stamp_ns", "number")
 
 
-class TagLog:
-    """The writes of one tag, ordered by stamp and number."""
-
-    def __init__(self) -> None:
-        self._writes: list[PastWrite] = []
-
-    def __len__(self) -> int:
-        return len(self._writes)
-
-    @property
-    def last_ns(self) -> int:
-        """The stamp of the newest; -1: there is none."""
-        return self._writes[-1].stamp_ns if self._writes else -1
-
-    def put(self, write: PastWrite) -> bool:
-        """Insert a write at its place; False: it is there already."""
-        at = bisect_right(self._writes, _order(write), key=_order)
-        if at and _order(self._writes[at - 1]) == _order(write):
-            return False
-        self._writes.insert(at, write)
-        return True
-
-    def occasions(self, after_ns: int, until_ns: int | None = None) -> Iterator[list[PastWrite]]:
-        """The writes of each stamp, oldest first."""
-        end = len(self) if until_ns is None else self._count(until_ns)
-        for _, group in groupby(self._writes[self._count(after_ns) : end], key=_stamp_ns):
-            yield list(group)
-
-    def newest(self, count: int) -> int:
-        """A stamp after which there are about `count` writes."""
-        return self._writes[-count - 1].stamp_ns if count < len(self) else -1
-
-    def drop(self, until_ns: int) -> None:
-        """Drop all writes up to and including a stamp."""
-        del self._writes[: self._count(until_ns)]
-
-    def _count(self, until_ns: int) -> int:
-        return bisect_right(self._writes, until_ns, key=_stamp_ns)
-
-
-class Replay(Generic[StateT]):
-    """The state that a log leads to, with checkpoints; `step` applies one occasion to a state.
-
-    The first checkpoint is the state after the writes that the log has dropped.
-    """
-
-    def __init__(
-        self,
-        state: StateT,
-        step: Callable[[StateT, Sequence[PastWrite]], StateT],
-        copy: Callable[[StateT], StateT],
-    ) -> None:
-        self._step, self._copy = step, copy
-        self._marks = [(-1, copy(state))]
-        self._at_ns, self._state, self._since_mark = -1, state, 0
-
-    def state(self, log: TagLog) -> StateT:
-        """The state after the whole log; the caller must not change it."""
-        for group in log.occasions(self._at_ns):
-            self._state = self._step(self._state, group)
-            self._at_ns = group[0].stamp_ns
-            self._since_mark += 1
-            if self._since_mark >= MARK:
-                self._since_mark = 0
-                mark = self._at_ns, self._copy(self._state)
-                self._marks = [self._marks[0], *self._marks[1:][-1:], mark]
-        return self._state
-
-    def back_to(self, before_ns: int) -> None:
-        """Return to a checkpoint before a stamp, so that all from there on is computed again."""
-        if before_ns > self._at_ns:
-            return
-        while len(self._marks) > 1 and self._marks[-1][0] >= before_ns:
-            self._marks.pop()
-        self._at_ns, state = self._marks[-1]
-        self._state, self._since_mark = self._copy(state), 0
-
-    def each(self, change: Callable[[StateT], StateT]) -> None:
-        """Change every checkpoint, and the current state."""
-        self._marks = [(at_ns, change(state)) for at_ns, state in self._marks]
-        self._state = change(self._state)
-
-    def settle(self, log: TagLog, until_ns: int) -> None:
-        """Move the first checkpoint to `until_ns`: the log is about to drop all until then."""
-        at_ns, state = self._marks[0]
-        for group in log.occasions(at_ns, until_ns):
-            state = self._step(state, group)
-        self._marks = [(until_ns, state), *(m for m in self._marks[1:] if m[0] > until_ns)]
-        if self._at_ns < until_ns:
-            self.back_to(self._at_ns)
-
-
 class TagStates:
     """One tag in one run of the clock: its log, and the trail and episodes derived from it."""
 
     def __init__(
         self, episodes: TagEpisodes, holds_ns: HoldsNs, matters: Matters, is_day: IsDay
     ) -> None:
-        self._log = TagLog()
+        self._holds_ns, self._matters, self._is_day = holds_ns, matters, is_day
+        # The writes that are kept, by stamp and number; and the states after all before them.
+        self._log: list[PastWrite] = []
         self._settled_ns = -1
-
-        def stepped(before: TagEpisodes, group: Sequence[PastWrite]) -> TagEpisodes:
-            before.step(group, is_day)
-            return before
-
-        self._trail: Replay[Trail] = Replay(
-            Trail(), lambda trail, group: trail.after(group, holds_ns, matters), lambda it: it
-        )
-        self._episodes: Replay[TagEpisodes] = Replay(episodes, stepped, TagEpisodes.copy)
+        self._first = Trail(), episodes
+        # The states after all writes up to these stamps.
+        self._trail, self._trail_ns = self._first[0], -1
+        self._episodes, self._episodes_ns = episodes.copy(), -1
 
     @property
     def last_ns(self) -> int:
         """The stamp of its newest write; -1: none is kept."""
-        return self._log.last_ns
+        return self._log[-1].stamp_ns if self._log else -1
 
     @property
     def trail(self) -> Trail:
         """Its gaps between scans, and the turns of its light."""
-        return self._trail.state(self._log)
+        for group in self._occasions(self._trail_ns):
+            self._trail = self._trail.after(group, self._holds_ns, self._matters)
+            self._trail_ns = group[0].stamp_ns
+        return self._trail
 
     @property
     def episodes(self) -> TagEpisodes:
         """Its episodes; the caller must not change them."""
-        return self._episodes.state(self._log)
+        for group in self._occasions(self._episodes_ns):
+            self._episodes.step(group, self._is_day)
+            self._episodes_ns = group[0].stamp_ns
+        return self._episodes
 
     def add(self, write: PastWrite) -> bool:
         """Add a write; False: it is older than what the log keeps."""
         if write.stamp_ns <= self._settled_ns:
             return False
-        if self._log.put(write):
-            self._trail.back_to(write.stamp_ns)
-            self._episodes.back_to(write.stamp_ns)
+        at = bisect_right(self._log, _order(write), key=_order)
+        if at and _order(self._log[at - 1]) == _order(write):
+            return True  # it is there already
+        self._log.insert(at, write)
+        if write.stamp_ns <= self._trail_ns:
+            self._trail, self._trail_ns = self._first[0], self._settled_ns
+        self.judge_anew(write.stamp_ns)
         return True
 
     def judge_anew(self, from_ns: int) -> None:
-        """Compute the episodes again from a moment on: day and night have changed."""
-        self._episodes.back_to(from_ns)
+        """Compute the episodes again: from a moment on, day and night or the log have changed."""
+        if from_ns <= self._episodes_ns:
+            self._episodes, self._episodes_ns = self._first[1].copy(), self._settled_ns
 
     def keep(self, count: int) -> None:
         """Shrink the log to about `count` writes, once there are a quarter more."""
         if len(self._log) > count + max(1, count // 4):
-            self._settle(self._log.newest(count))
+            self._settle(self._log[-count - 1].stamp_ns)
 
     def forget(self, before_ns: int) -> int:
         """Drop what was over before a moment; returns the start of the oldest gap that is kept."""
-        self._trail.state(self._log)
         self._settle(before_ns - 1)
-        self._trail.each(lambda trail: trail.since(before_ns))
+        self._first = self._first[0].since(before_ns), self._first[1]
+        self._trail = self.trail.since(before_ns)
         return min((gap.start_ns for gap in self.gaps), default=before_ns)
 
     @property
@@ -242,14 +153,27 @@ class TagStates:
             return trail.gaps
         return (*trail.gaps, Gap(trail.scans_ns[-1], None, trail.holds_ns))
 
+    def _occasions(self, after_ns: int, until_ns: int = FOREVER_NS) -> Iterator[list[PastWrite]]:
+        """The writes of each stamp, oldest first."""
+        first, end = (bisect_right(self._log, at, key=_stamp_ns) for at in (after_ns, until_ns))
+        for _, group in groupby(self._log[first:end], key=_stamp_ns):
+            yield list(group)
+
     def _settle(self, until_ns: int) -> None:
-        until_ns = min(until_ns, self._log.last_ns)
+        """Drop the writes up to a moment, and keep the states that they led to."""
+        until_ns = min(until_ns, self.last_ns)
         if until_ns <= self._settled_ns:
             return
-        self._trail.settle(self._log, until_ns)
-        self._episodes.settle(self._log, until_ns)
-        self._settled_ns = until_ns
-        self._log.drop(until_ns)
+        trail, episodes = self._first
+        for group in self._occasions(self._settled_ns, until_ns):
+            trail = trail.after(group, self._holds_ns, self._matters)
+            episodes.step(group, self._is_day)
+        self._first, self._settled_ns = (trail, episodes), until_ns
+        if self._trail_ns < until_ns:
+            self._trail, self._trail_ns = trail, until_ns
+        if self._episodes_ns < until_ns:
+            self._episodes, self._episodes_ns = episodes.copy(), until_ns
+        del self._log[: bisect_right(self._log, until_ns, key=_stamp_ns)]
 
 
 def is_long(start_ns: int, end_ns: int) -> bool:

@@ -21,7 +21,7 @@ import orjson
 from lupin_bridge.alarms.board import active_first, notes_of_alarms
 from lupin_bridge.feed.query import Find
 from lupin_bridge.judge.alarm_fold import AlarmFold
-from lupin_bridge.judge.episodes import SITE, Alarm, readings_of
+from lupin_bridge.judge.episodes import SITE, readings_of
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.scans import SHORTEST_NS, TIMES_MEDIAN
 from lupin_bridge.judge.verdict import Verdict, derive
@@ -224,8 +224,17 @@ class _Fold:
         """`routes_schema.ShiftReport`; `known` are the tags known at its end."""
         start_ns, end_ns = self._of.start_ns, self._of.end_ns
         notes = [note for note in notes if note.made_at_ns < end_ns]
-        alarms = self._alarms()
-        said = notes_of_alarms(alarms, notes, end_ns)
+        known_ns = self._of.known_ns - 1
+        every = self._alarm_fold.found(known_ns).alarms if self._alarm_fold else ()
+        # As they were at the end of the period, if they were active at any time of it.
+        alarms = [
+            alarm
+            for alarm in every
+            if alarm.raised_at_ns < end_ns
+            and (alarm.cleared_at_ns is None or alarm.cleared_at_ns >= start_ns)
+        ]
+        # An alarm that came back stays shelved by a note on the one before it.
+        said = notes_of_alarms(every, notes, end_ns)
         gone = withdrawals(notes)
         spoken = [it for it in notes if it.kind != WITHDRAW and it.made_at_ns >= start_ns]
         silences = self._silences()
@@ -269,18 +278,6 @@ class _Fold:
             },
             **bodies.period_fields(self._of.journal, start_ns, end_ns),
         }
-
-    def _alarms(self) -> list[Alarm]:
-        """The alarms that were active at any time of the period, as they were at its end."""
-        start_ns, end_ns = self._of.start_ns, self._of.end_ns
-        if self._alarm_fold is None:
-            return []
-        return [
-            alarm
-            for alarm in self._alarm_fold.found(self._of.known_ns - 1).alarms
-            if alarm.raised_at_ns < end_ns
-            and (alarm.cleared_at_ns is None or alarm.cleared_at_ns >= start_ns)
-        ]
 
     def _of_sensor(self, name: str) -> dict[str, Any]:
         of = self._sensors[name]

@@ -20,9 +20,12 @@ from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.report import Report
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.history import kind_of
+from lupin_twin.core.notes import SHELVE, Note
 from lupin_twin.core.past import PastWrite, RunSpan
 from lupin_twin.core.state import Inspection, Pin, Reading
 from lupin_twin.journal.runs import runs, spans
+from lupin_twin.journal.schema import SiteLog
+from lupin_twin.journal.writes import put_note
 from tests.support.alarms_reference import Plain, alarms
 from tests.support.journal import scan
 from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, steps
@@ -82,6 +85,19 @@ def test_hundreds_of_alarms_of_one_tag_are_all_counted(living: Living) -> None:
     with living([("rows", scans)]) as life:
         counts = report(life.connection, BEGUN, END)["counts"]
     assert (counts["raised"], counts["cleared"]) == (150, 150)
+
+
+def test_an_alarm_that_came_back_is_shelved_as_in_the_list_of_alarms(living: Living) -> None:
+    values = [40.0, 40.0, 21.0, 21.0, 40.0, 40.0]
+    scans = [scan(at_ns=BEGUN + at * MINUTE, temperature=it) for at, it in enumerate(values)]
+    with living([("rows", scans)]) as life:
+        every = report(life.connection, BEGUN, END)["alarms"]
+        first = next(it["id"] for it in every if it["cleared_at"])
+        at_ns = BEGUN + 2 * MINUTE
+        note = Note("", at_ns, "anna", SHELVE, f"alarm:{first}", "fan", at_ns + 60 * MINUTE)
+        put_note(SiteLog(life.connection), 1_000, note)
+        (found,) = report(life.connection, BEGUN + 4 * MINUTE, BEGUN + 6 * MINUTE)["alarms"]
+    assert (found["cleared_at"], found["shelved_by"]) == (None, "anna")
 
 
 def test_later_rows_are_not_in_it(living: Living) -> None:

@@ -333,8 +333,8 @@ class AlarmFeed:
 
 # Pause between two attempts to read the log, s.
 LEARN_AGAIN_S: Final = 2.0
-# Rough time to look up what is recent of a tag, and to judge by it.
-RECENT_S_PER_TAG: Final = 2e-4
+# Rough time to look up what is recent, and the light of three days.
+RECENT_S: Final = 0.5
 
 
 async def learn_recent(source: TwinSource, judge: Judge, first: Snapshot) -> None:
@@ -345,7 +345,7 @@ async def learn_recent(source: TwinSource, judge: Judge, first: Snapshot) -> Non
     recent = partial(recent_writes, first.stamp_ns)
     while True:
         try:
-            judge.learn(await source.ask(recent, len(first.tags) * RECENT_S_PER_TAG))
+            judge.learn(await source.ask(recent, RECENT_S))
         except (NotRemembered, TwinUnavailableError):
             judge.knows_recent = True
             await asyncio.sleep(LEARN_AGAIN_S)

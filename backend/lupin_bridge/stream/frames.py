@@ -8,20 +8,22 @@ an argument, s of a monotonic clock.
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from itertools import islice
+from typing import Any, Final, Literal
 
 import orjson
 from websockets.frames import Frame, Opcode
 
-from lupin_bridge.alarms.board import Board, notes_of_alarms
+from lupin_bridge.alarms.board import Board, notes_of_alarms, worst_first
 from lupin_bridge.feed.source import TwinUpdate
+from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import NOTHING_JUDGED, Judged
 from lupin_bridge.stream.state_json import (
     StateJson,
     alarms_body,
-    alarms_in_frame,
     header,
     judgement,
     judgement_since,
@@ -30,7 +32,7 @@ from lupin_bridge.stream.state_json import (
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.notes import Note
 from lupin_twin.core.parameters import World
-from lupin_twin.core.state import ClockState, Snapshot, TagState
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, ClockState, Snapshot, TagState
 
 # The twin publishes at least once a second (parameter state_publish_rate_hz, default 1); three
 # missed publications are no accident.
@@ -211,6 +213,20 @@ class Liveness:
 def text_frame(payload: bytes) -> bytes:
     """UTF-8 text as one WebSocket text frame; a server does not mask (RFC 6455, section 5.1)."""
     return Frame(Opcode.TEXT, payload).serialize(mask=False)
+
+
+# Alarms in a frame at most: the worst active ones take precedence over those cleared recently.
+MAX_IN_FRAME: Final = 1_000
+RECENT_NS: Final = 86_400 * NANOSECONDS_PER_SECOND
+
+
+def alarms_in_frame(board: Board, now_ns: int | None) -> list[Alarm]:
+    """The alarms of a frame: those active now or within the last 24 h, newest first."""
+    since_ns = 0 if now_ns is None else now_ns - RECENT_NS
+    active = heapq.nsmallest(MAX_IN_FRAME, board.active, key=worst_first)
+    over = (it for it in board.alarms if it.cleared_at_ns and it.cleared_at_ns >= since_ns)
+    found = (*active, *islice(over, MAX_IN_FRAME - len(active)))
+    return sorted(found, key=lambda alarm: (-alarm.raised_at_ns, alarm.id))
 
 
 def alarms_message(now: Board, now_ns: int | None, notes: tuple[Note, ...], count: int) -> bytes:

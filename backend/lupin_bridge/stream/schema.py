@@ -240,7 +240,10 @@ class Alarms(Contract):
 
 
 class AlarmsFrame(Alarms):
-    """WebSocket frame: the active alarms and those raised or cleared within 24 h, on any change."""
+    """WebSocket frame: the active alarms and those cleared within 24 h, on any change.
+
+    At most 1,000: the worst active ones come before others.
+    """
 
     type: Literal["alarms"]
     notes: int = Field(description="grows with every note: fetch `/api/notes` again")

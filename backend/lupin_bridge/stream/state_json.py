@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from itertools import islice
 from typing import TYPE_CHECKING, Any, Final
 
 import orjson
@@ -26,7 +25,7 @@ from lupin_twin.core.state import (
 )
 
 if TYPE_CHECKING:  # not loaded by modules that only need `moment`
-    from lupin_bridge.alarms.board import AlarmNotes, Board
+    from lupin_bridge.alarms.board import AlarmNotes
     from lupin_bridge.judge.episodes import Alarm
     from lupin_bridge.judge.judging import Judged
     from lupin_bridge.judge.verdict import Health, Reason
@@ -239,26 +238,6 @@ def alarms_body(
         "source": source,
         "since": moment(since_ns),
     }
-
-
-# Alarms in a frame at most: the active ones take precedence over those cleared recently.
-MAX_IN_FRAME: Final = 1_000
-RECENT_NS: Final = 86_400 * NANOSECONDS_PER_SECOND
-
-
-def alarms_in_frame(board: Board, now_ns: int | None) -> list[Alarm]:
-    """The alarms of a frame: those active now or within the last 24 h, newest first."""
-    since_ns = 0 if now_ns is None else now_ns - RECENT_NS
-    active = board.active[:MAX_IN_FRAME]
-    over = islice(
-        (
-            alarm
-            for alarm in board.alarms
-            if alarm.cleared_at_ns is not None and alarm.cleared_at_ns >= since_ns
-        ),
-        MAX_IN_FRAME - len(active),
-    )
-    return sorted((*active, *over), key=lambda alarm: (-alarm.raised_at_ns, alarm.id))
 
 
 def judgement(judged: Judged) -> bytes:

@@ -1,6 +1,8 @@
 from lupin_bridge.alarms.board import board_of
+from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.stream import schema
-from lupin_bridge.stream.state_json import MAX_IN_FRAME, alarms_body, alarms_in_frame
+from lupin_bridge.stream.frames import MAX_IN_FRAME, alarms_in_frame
+from lupin_bridge.stream.state_json import alarms_body
 from tests.support.seen import NOW_NS, alarm
 
 
@@ -17,3 +19,9 @@ def test_the_alarms_of_a_frame_are_limited_with_the_active_ones_first() -> None:
         found = alarms_in_frame(board_of([*over, *alarms]), NOW_NS)
         assert len(found) == MAX_IN_FRAME
         assert sum(one.is_active for one in found) == min(active, MAX_IN_FRAME)
+
+
+def test_the_worst_alarm_is_in_a_frame_however_many_came_later() -> None:
+    first = alarm("first", raised_ns=1)
+    later = [alarm(str(number), Verdict.STRESSED) for number in range(MAX_IN_FRAME)]
+    assert first in alarms_in_frame(board_of([first, *later]), NOW_NS)

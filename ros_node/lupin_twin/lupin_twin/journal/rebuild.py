@@ -47,8 +47,8 @@ from lupin_twin.journal.schema import (
 )
 from lupin_twin.journal.version3 import VERSION, OldRun, Version3
 
-# What one transaction copies: about a second, which is all that a killed upgrade loses.
-ROWS = 20_000
+# What one transaction copies, and a killed upgrade loses: a second, even on a small board.
+ROWS = 5_000
 # Facts about an upgraded file: the file that it was made from; the last number of that file that is
 # copied, and how many damaged rows there were before.
 _MADE_FROM: Final = "upgraded_from"

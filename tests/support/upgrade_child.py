@@ -9,7 +9,7 @@ import signal
 import sys
 from pathlib import Path
 
-from lupin_twin.journal.rebuild import upgrade
+from lupin_twin.journal import rebuild
 
 _OPERATIONS = {"open", "os.link", "os.remove", "os.rename", "os.chmod", "sqlite3.connect"}
 
@@ -29,7 +29,8 @@ def main(path: Path, kill_at: int) -> None:
             step()
 
     sys.addaudithook(watch)
-    upgrade(path, lambda share: step())
+    rebuild.ROWS = 40  # a small journal in many batches
+    rebuild.upgrade(path, lambda share: step())
     print(seen)
 
 

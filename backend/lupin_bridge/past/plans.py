@@ -52,7 +52,7 @@ from lupin_twin.core.state import (
     Snapshot,
     TagState,
 )
-from lupin_twin.journal.buckets import Buckets, individually
+from lupin_twin.journal.counts import Buckets, individually
 from lupin_twin.journal.fold import STATE_S_PER_TAG
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG
 from lupin_twin.runtime.workers import ShouldStop

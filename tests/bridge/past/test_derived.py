@@ -19,7 +19,7 @@ from lupin_twin.core.past import (
     grid,
 )
 from lupin_twin.core.state import Reading, TagState
-from lupin_twin.journal.buckets import Buckets, individually
+from lupin_twin.journal.counts import Buckets, individually
 
 S = 10**9
 NOW_NS = 1_000 * S

@@ -30,7 +30,7 @@ def test_too_many_scans_come_by_the_hour(tmp_path: Path, monkeypatch: pytest.Mon
     with lived(tmp_path / "j.sqlite") as life:
         life.write(scan(at_ns=BEGUN + n * MINUTE) for n in range(300))
         request = temperature(BEGUN, BEGUN + 300 * MINUTE, 299)
-        monkeypatch.setattr("lupin_twin.journal.buckets.MAX_ROWS", 300)
+        monkeypatch.setattr("lupin_twin.journal.counts.MAX_ROWS", 300)
         assert len(series(life.connection, request, END).stamps_ns) > 200
-        monkeypatch.setattr("lupin_twin.journal.buckets.MAX_ROWS", 299)
+        monkeypatch.setattr("lupin_twin.journal.counts.MAX_ROWS", 299)
         assert series(life.connection, request, END).counts == (60,) * 5

@@ -19,7 +19,7 @@ from lupin_twin.core.past import DAY_NS
 from lupin_twin.journal.checking import find_all_damage
 from lupin_twin.journal.rebuild import old_version, upgrade
 from lupin_twin.journal.runs import Clock
-from lupin_twin.journal.schema import TABLES, open_reader
+from lupin_twin.journal.schema import TABLES, get_meta, open_reader
 from lupin_twin.journal.writer import Journal
 from tests.support.journal import LIMITS
 from tests.support.journal_answers import NAMES, answer, answers, old, same
@@ -140,6 +140,8 @@ def test_version_4_keeps_its_identity_and_every_row(tmp_path: Path) -> None:
                 connection.execute(f"SELECT * FROM {of}.{table}").fetchall()
                 for of in ("main", "old")
             )
+            if table == "meta":
+                rows = [row for row in rows if not row[1].startswith("upgraded")]
             if table == "hour":
                 lists = [map(json.loads, row[3:]) for row in before]
                 before = [
@@ -178,6 +180,42 @@ def test_killed_at_any_moment_it_is_completed_at_the_next_start(
         assert names_in(folder) == {"j.sqlite", kept, "j.sqlite.lock"}
         assert path.with_name(kept).read_bytes() == content
         check_states(path, name)
+
+
+@pytest.mark.parametrize("name", ["flipped", "purged", VERSION4])
+def test_killed_again_and_again_it_is_completed_without_doing_anything_twice(
+    name: str, tmp_path: Path
+) -> None:
+    (tmp_path / "whole").mkdir()
+    moments = int(child(old(name, tmp_path / "whole"), 0).stdout)
+    path = old(name, tmp_path)
+    kills = 0
+    while child(path, moments // 2).returncode == -signal.SIGKILL:
+        kills += 1
+        # Half of the steps of an upgrade that begins anew would never complete it.
+        assert kills < 5
+    assert kills
+    with (
+        closing(open_reader(path)) as connection,
+        closing(open_reader(tmp_path / "whole" / "j.sqlite")) as whole,
+    ):
+        assert list(find_all_damage(connection, lambda what, share: None)) == []
+        for table in TABLES:
+            rows, at_once = (
+                log.execute(f"SELECT * FROM {table}").fetchall() for log in (connection, whole)
+            )
+            assert rows == at_once, table
+        assert get_meta(connection, "upgraded") == get_meta(whole, "upgraded")
+
+
+def test_the_remains_of_the_upgrade_of_another_file_are_not_used(tmp_path: Path) -> None:
+    path = old("day", tmp_path)
+    assert child(path, 12).returncode == -signal.SIGKILL
+    assert (tmp_path / "j.sqlite.upgrade").exists()
+    old("late", tmp_path)
+    upgrade(path, lambda share: None)
+    assert names_in(tmp_path) == {"j.sqlite", "j.sqlite.v3"}
+    check_states(path, "late")
 
 
 @pytest.mark.parametrize("name", ["day", VERSION4])

@@ -26,12 +26,18 @@ from lupin_twin.core.past import (
     SeriesRequest,
     grid,
 )
-from lupin_twin.journal.buckets import Buckets, Entry, Part, Table, answer, bounds, individually
 from lupin_twin.journal.counts import (
     SILENCE_NS,
     TALLIED,
+    Buckets,
+    Entry,
+    Part,
+    Table,
+    answer,
+    bounds,
     deleted_ns,
     extent,
+    individually,
     is_counted,
     silence_over,
 )

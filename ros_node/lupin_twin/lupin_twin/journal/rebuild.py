@@ -1,8 +1,9 @@
+# ruff: noqa: S608  # SQL is put together of constants
 """Upgrades a journal of an earlier version, and vacuums a journal.
 
-An upgrade builds a new file beside the journal, syncs it, and renames it: if the process is killed
-meanwhile, the old file is intact. The old file stays beside the new one; one of version 4, as
-`NAME.v4`.
+An upgrade builds a new file beside the journal, in batches, and renames it. If the process is
+killed meanwhile, the old file is intact, and the next upgrade goes on after the last batch. The old
+file stays beside the new one; one of version 4, as `NAME.v4`.
 """
 
 from __future__ import annotations
@@ -11,28 +12,32 @@ import os
 import shutil
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from itertools import islice
 from pathlib import Path
 from typing import Final
 
 from lupin_twin.core.past import HOUR_NS
-from lupin_twin.journal.appending import Appender, copy_known
+from lupin_twin.journal.appending import LAST_SEQ, Appender, copy_known
 from lupin_twin.journal.checking import Progress, find_all_damage, size_of
 from lupin_twin.journal.counts import ADD_HOUR, DELETED
 from lupin_twin.journal.fold import copies
 from lupin_twin.journal.paths import writing_alone
 from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS
-from lupin_twin.journal.runs import Run, put_run
+from lupin_twin.journal.runs import Run, put_run, runs
 from lupin_twin.journal.salvage import numbered
 from lupin_twin.journal.schema import (
     APPLICATION_ID,
+    FILE_ERRORS,
     HOURS_OF_LISTS,
     LOCAL_SITE,
     TABLES,
     UPGRADED,
     DamagedFile,
+    Foreign,
     NotPossible,
+    columns,
+    get_meta,
     insert_into,
     json_text,
     open_writer,
@@ -42,7 +47,12 @@ from lupin_twin.journal.schema import (
 )
 from lupin_twin.journal.version3 import VERSION, OldRun, Version3
 
-_ROWS: Final = 5_000
+# What one transaction copies, and a killed upgrade loses: a second, even on a small board.
+ROWS = 5_000
+# Facts about an upgraded file: the file that it was made from; the last number of that file that is
+# copied, and how many damaged rows there were before.
+_MADE_FROM: Final = "upgraded_from"
+_COPIED: Final = "upgraded"
 # Between two calls while a long SQL statement runs.
 _INSTRUCTIONS: Final = 100_000
 _NUMBERS: Final = (RETENTION_NS, RETENTION_BYTES, "simulated_from_ns", "simulated_until_ns")
@@ -81,15 +91,15 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
                 somebody = f"another process reads {path}, which must be upgraded"
                 raise sqlite3.OperationalError(somebody)  # noqa: TRY301
             connection.execute("PRAGMA query_only = 1")
-            _remove(new)
-            with closing(open_writer(new)) as target:
-                # A failed upgrade begins again, so nothing has to be durable before it is done.
-                target.execute("PRAGMA journal_mode = MEMORY")
-                target.execute("PRAGMA synchronous = OFF")
+            with closing(_begun(path, new)) as target:
                 if version == VERSION:
-                    damaged = _Upgrade(Version3(connection), target, report).run()
+                    steps = _Upgrade(Version3(connection), target).steps()
                 else:
-                    damaged = _copy_version4(path, new, target, report)
+                    steps = _copy_version4(path, new, target)
+                for share in steps:
+                    target.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+                    report(min(1.0, share))
+                damaged = _copied(target)[1]
         sync(new)
         kept = _keep(path, version)
     except BaseException as error:
@@ -111,6 +121,26 @@ def _is_read(connection: sqlite3.Connection) -> bool:
     connection.execute("PRAGMA busy_timeout = 1000")
     ((is_busy, *_),) = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
     return bool(is_busy)
+
+
+def _begun(path: Path, new: Path) -> sqlite3.Connection:
+    """Open what a killed upgrade of the same file has built, or else a new file."""
+    status = path.stat()
+    made_from = f"{status.st_size} {status.st_mtime_ns}"
+    with suppress(*FILE_ERRORS, Foreign):
+        target = open_writer(new)
+        if get_meta(target, _MADE_FROM) == made_from:
+            return target
+        target.close()
+    _remove(new)
+    target = open_writer(new)
+    set_meta(target, _MADE_FROM, made_from)
+    return target
+
+
+def _copied(target: sqlite3.Connection) -> tuple[int, int]:
+    after, _, damaged = (get_meta(target, _COPIED) or "0 0").partition(" ")
+    return int(after), int(damaged)
 
 
 def _remove(new: Path) -> None:
@@ -140,56 +170,77 @@ def _keep(path: Path, version: int | None) -> Path:
     return kept
 
 
-def _copy_version4(
-    old: Path, new: Path, target: sqlite3.Connection, report: Callable[[float], None]
-) -> int:
-    """Copy a journal of version 4, whose hours are lists; a damaged row ends the upgrade."""
+def _copy_version4(old: Path, new: Path, target: sqlite3.Connection) -> Iterator[float]:
+    """Copy a journal of version 4, whose hours are lists; a damaged row ends the upgrade.
 
-    def go_on() -> None:
-        report(min(1.0, size_of(new) / size_of(old)))
-
-    target.set_progress_handler(go_on, _INSTRUCTIONS)
+    Yields the share that is done after each batch. A table goes on after its last row.
+    """
     target.execute("ATTACH ? AS old", (str(old),))
-    with transaction(target):
-        for table in ("site", "meta", *TABLES):
-            if table != "hour":
-                target.execute(f"INSERT OR REPLACE INTO {table} SELECT * FROM old.{table}")  # noqa: S608
-        target.execute(HOURS_OF_LISTS.format(lists="old.hour", each="json_each(n) AS each"))
-    return 0
+    for table in ("site", "meta"):
+        target.execute(f"INSERT OR REPLACE INTO {table} SELECT * FROM old.{table}")
+    for table in TABLES:
+        names = [name for name in columns(table, of_key=True) if name != "sensor"]
+        key, marks = ", ".join(names), ", ".join("?" * len(names))
+        lot = f"(SELECT * FROM old.{table} WHERE ({key}) > ({marks}) ORDER BY {key} LIMIT {ROWS})"
+        insert = f"INSERT INTO {table} SELECT * FROM {lot}"
+        if table == "hour":
+            insert = HOURS_OF_LISTS.format(lists=lot, each="json_each(n) AS each")
+        last = f"SELECT {key} FROM {{}} ORDER BY {' DESC, '.join(names)} DESC LIMIT 1"
+        after = target.execute(last.format(table)).fetchone() or [""] * len(names)
+        while until := target.execute(last.format(lot), after).fetchone():
+            with transaction(target):
+                target.execute(insert, after)
+            after = until
+            yield size_of(new) / size_of(old)
 
 
 class _Upgrade:
-    """Copies an open journal of version 3 into an open new one."""
+    """Copies an open journal of version 3 into a new one, or goes on with that."""
 
-    def __init__(
-        self, old: Version3, target: sqlite3.Connection, report: Callable[[float], None]
-    ) -> None:
+    def __init__(self, old: Version3, target: sqlite3.Connection) -> None:
         self._old = old
         self._target = target
-        self._report = report
         self._appender = Appender(target)
-        self._begun: dict[int, Run] = {}
+        # Until the old file has no counts yet, those of hours with deleted rows are copied.
+        self._appender.counted_ns = {
+            run: (purged_ns // HOUR_NS + 1) * HOUR_NS - 1
+            for run in old.runs
+            if (purged_ns := old.meta(f"{DELETED}{run}", -1)) >= 0
+        }
+        self._begun = {run.id: run for run in runs(target.execute)}
 
-    def run(self) -> int:
-        last_id = self._old.last_id()
-        rows = iter(self._old.rows())
-        while lot := list(islice(rows, _ROWS)):
+    def steps(self) -> Iterator[float]:
+        """Copy all; yields the share that is done after each batch."""
+        after, damaged = _copied(self._target)
+        if after:
+            self._old.damaged = damaged
+        last_id, rows = self._old.last_id(), self._old.rows(after)
+        while lot := list(islice(rows, ROWS)):
             with transaction(self._target):
                 for number, run, row in lot:
+                    if row is None:
+                        self._old.damaged += 1
+                        continue
                     self._begin_until(run)
                     if self._appender.counted_ns and number > self._old.meta("rolled_id"):
-                        # From here on, the old file has no counts yet.
                         self._appender.flush()
                         self._appender.counted_ns.clear()
                     self._appender.append(run, (row,))
-                self._appender.flush()
-            self._report(min(1.0, lot[-1][0] / last_id))
+                after = lot[-1][0]
+                self._note(after)
+            yield after / last_id
         with transaction(self._target):
             self._begin_until(max(self._old.runs, default=0))
             for key in _NUMBERS:
                 if value := self._old.meta(key):
                     set_meta(self._target, key, value)
-        return self._old.damaged
+            self._note(after)
+
+    def _note(self, after: int) -> None:
+        self._appender.flush()
+        # Series without rows have numbers too.
+        set_meta(self._target, LAST_SEQ, self._appender.last_seq)
+        set_meta(self._target, _COPIED, f"{after} {self._old.damaged}")
 
     def _begin_until(self, last: int) -> None:
         """Begin the runs up to one, including earlier ones in which nothing was received."""
@@ -204,7 +255,7 @@ class _Upgrade:
         self._begun[old.id] = run
         put_run(self._target, run)
         # The last stamp of the rows that were deleted by age or size.
-        if (purged_ns := self._old.meta(f"purged_ns:{run.id}", -1)) >= 0:
+        if (purged_ns := self._old.meta(f"{DELETED}{run.id}", -1)) >= 0:
             self._carry_counts(run.id, purged_ns)
         before = None if old.follows is None else self._begun.get(old.follows)
         if before is not None:
@@ -214,7 +265,6 @@ class _Upgrade:
     def _carry_counts(self, run: int, purged_ns: int) -> None:
         """Copy the counts of hours with deleted rows; their other rows are not counted again."""
         hour = purged_ns // HOUR_NS
-        self._appender.counted_ns[run] = (hour + 1) * HOUR_NS - 1
         set_meta(self._target, f"{DELETED}{run}", purged_ns)
         self._target.executemany(ADD_HOUR, self._hours(run, hour))
         for table in ("tally", "event"):

@@ -139,7 +139,9 @@ def _delete(path: Path, *ends: str) -> None:
         path.with_name(path.name + end).unlink(missing_ok=True)
 
 
-def readable(connection: sqlite3.Connection, select: str, number: str) -> Iterator[list[Record]]:
+def readable(
+    connection: sqlite3.Connection, select: str, number: str, after: int = -1
+) -> Iterator[list[Record]]:
     """Yield lots of rows in the order of their number, the first column; an empty lot is damage.
 
     `select` is a query up to the condition on the number: "SELECT id, .. FROM table WHERE".
@@ -166,7 +168,7 @@ def readable(connection: sqlite3.Connection, select: str, number: str) -> Iterat
         # No such row before the end means that the order is damaged.
         return None if not fitting and (rows or at <= end) else fitting
 
-    at, size, end = 0, _LOT, -1
+    at, size, end = after + 1, _LOT, -1
     with suppress(*FILE_ERRORS):
         for last in connection.execute(f"{select} {number} >= 0 ORDER BY {number} DESC LIMIT 1"):
             end = last[0] if isinstance(last[0], int) else -1

@@ -68,6 +68,10 @@ class OldRun(NamedTuple):
 OldHour = tuple[str, int, tuple[str, ...], int, list[Bucket]]
 
 
+# A write's number, and its run; None for a damaged one.
+_Numbered = tuple[int, int, Write | None]
+
+
 class _Series(NamedTuple):
     run: int
     tag: int
@@ -83,7 +87,9 @@ class _BadRow(ValueError):
 
 
 class Version3:
-    """Reads an open file of version 3; `damaged` counts the rows that were left out.
+    """Reads an open file of version 3.
+
+    `damaged` counts what was left out, except the rows that `rows` returns as None.
 
     Raises:
         sqlite3.Error: the file cannot be read at all.
@@ -109,11 +115,10 @@ class Version3:
         value = self._meta.get(key)
         return value if isinstance(value, int) else default
 
-    def rows(self) -> Iterator[tuple[int, int, Write]]:
-        """(number, run, row) of each write, in the order in which they were received."""
-        yield from heapq.merge(
-            self._scans(), self._inspections(), self._pins(), key=lambda row: row[0]
-        )
+    def rows(self, after: int) -> Iterator[_Numbered]:
+        """Each write after a number, in the order in which they were received."""
+        every = self._scans(after), self._inspections(after), self._pins(after)
+        yield from heapq.merge(*every, key=lambda row: row[0])
 
     def last_id(self) -> int:
         """The approximate number of the last write."""
@@ -209,8 +214,8 @@ class Version3:
 
     # --- rows ---------------------------------------------------------------------------------
 
-    def _scans(self) -> Iterator[tuple[int, int, Write]]:
-        for row in self._table("scan", _SCAN):
+    def _scans(self, after: int) -> Iterator[_Numbered]:
+        for row in self._table("scan", _SCAN, after):
             number, series_number, stamp_ns, own_stamp_ns, lag_us, mission, detail, packed = row
             try:
                 series = self._series[series_number]
@@ -225,14 +230,14 @@ class Version3:
                     readings = tuple(map(Reading, series.sensors, values))
                     yield number, series.run, Scan(series.tag_id, stamp_ns, readings, *reported)
             except (_BadRow, KeyError):
-                self.damaged += 1
+                yield number, 0, None
 
-    def _inspections(self) -> Iterator[tuple[int, int, Write]]:
+    def _inspections(self, after: int) -> Iterator[_Numbered]:
         what = (
             "id, series, stamp_ns, own_stamp_ns, lag_us, mission, species, anomaly, flower_count,"
             " bug_count, shape"
         )
-        for row in self._table("look", what):
+        for row in self._table("look", what, after):
             number, series_number, stamp_ns, own_stamp_ns, lag_us, mission, *seen, packed = row
             species, anomaly, count, bugs = seen
             try:
@@ -246,21 +251,21 @@ class Version3:
                 reported = (None, STATUS_OK, "", series.source, *of)
                 yield number, series.run, Inspection(series.tag_id, stamp_ns, flower, *reported)
             except (_BadRow, KeyError):
-                self.damaged += 1
+                yield number, 0, None
 
-    def _pins(self) -> Iterator[tuple[int, int, Write]]:
-        for row in self._table("pin", "id, run, tag, stamp_ns, lag_us, pose"):
+    def _pins(self, after: int) -> Iterator[_Numbered]:
+        for row in self._table("pin", "id, run, tag, stamp_ns, lag_us, pose", after):
             number, run, tag, stamp_ns, lag_us, packed = row
             try:
                 pose = Pose(*_numbers(_unsealed(row[1:-1], packed), 7))
                 arrival_ns = stamp_ns + self._leads[run] + 1000 * lag_us
                 yield number, run, Pin(self._tags[tag], pose, stamp_ns, arrival_ns)
             except (_BadRow, KeyError):
-                self.damaged += 1
+                yield number, 0, None
 
-    def _table(self, table: str, what: str) -> Iterator[tuple[Any, ...]]:
-        """The rows of a table in the order of their numbers, without unreadable ones."""
-        for lot in readable(self._connection, f"SELECT {what} FROM {table} WHERE", "id"):
+    def _table(self, table: str, what: str, after: int = -1) -> Iterator[tuple[Any, ...]]:
+        """The rows of a table after a number, in their order, without unreadable ones."""
+        for lot in readable(self._connection, f"SELECT {what} FROM {table} WHERE", "id", after):
             self.damaged += not lot
             yield from lot
 

@@ -52,9 +52,10 @@ def test_the_spread_lies_between_a_tenth_of_the_median_and_that_of_the_readings(
     assert scale.standardised(np.array([23.0])).tolist() == [0.0]
 
 
-@pytest.mark.parametrize("value", [50.0, -50.0, 0.0, 1e-300, -3e38, 1e308])
+@pytest.mark.parametrize("value", [50.0, -50.0, 0.1, 0.0, 1e-300, -3e38, 1e308])
 def test_equal_readings_still_have_a_spread(value: float) -> None:
-    expected = abs(value) / 10.0 * math.sqrt(4.0 / 7.0) or 1.0
+    """And three readings of 0.1 °C are no surer than three of 3 °C."""
+    expected = max(abs(value) / 10.0, 1.0 / 3.0) * math.sqrt(4.0 / 7.0)
     assert scale_of(np.full(3, value)).spread == pytest.approx(expected)
 
 

@@ -1,8 +1,10 @@
 """Layers and markers over real DDS, of a twin in a namespace, in its own process."""
 
 import json
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -18,7 +20,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.field.engine import DEFAULT_RESOLUTION_M
 from tests.support.domains import own_domain
+from tests.support.journal import SECOND, append
+from tests.support.journal import scan as row
 from tests.support.messages import inspection, scan
+from tests.support.proc_stat import cpu_s
 from tests.support.processes import Process, twin_node
 from tests.support.ros import Peer, latched
 
@@ -201,6 +206,47 @@ def test_the_error_is_that_of_the_value_by_the_estimate(
             )
 
         viewer.until(is_as_foretold, "errors as those of the estimate")
+
+
+def test_estimates_take_a_tenth_of_a_core_however_much_is_received(
+    domain: int, tmp_path: Path
+) -> None:
+    """Without a pause, that was a whole core: each scan is a reason for new estimates."""
+    chance, now_ns, sensors = Random(1), time.time_ns(), ("co2", "temperature")
+
+    def readings() -> Any:
+        return {name: chance.gauss(20.0) for name in sensors}
+
+    rows = [
+        row(f"t{tag}", now_ns - ago * 1_200 * SECOND, **readings())
+        for ago in range(30, 0, -1)
+        for tag in range(30)
+    ]
+    append(tmp_path / "journal.sqlite", rows)
+    args = ("--ros-args", "-p", LAYERS, "-p", f"journal:={tmp_path / 'journal.sqlite'}")
+    with twin_node(domain, *args) as twin, Peer(domain) as peer:
+        peer.observe(*(scan(f"t{tag}", readings(), (tag % 6, tag // 6)) for tag in range(30)))
+        came: dict[str, list[Any]] = {name: [] for name in sensors}
+        for name in sensors:
+            topic = f"/twin/field/{name}"
+            peer.node.create_subscription(PointCloud2, topic, came[name].append, latched(1))
+
+        def both() -> bool:
+            """Whether both have come with an error; meanwhile, there is one more scan."""
+            peer.observe(scan("t0", readings()))
+            found = [it[-1] for it in came.values() if it and it[-1].width]
+            return len(found) == 2 and all(cells(it)[0, 4] >= 0.0 for it in found)
+
+        def next_s() -> float:
+            for each in came.values():
+                each.clear()
+            peer.until(both, "both layers")
+            return time.monotonic()
+
+        next_s()
+        began_s, before_s = next_s(), cpu_s(twin.pid)
+        took_s = next_s() - began_s
+        assert (cpu_s(twin.pid) - before_s) / took_s < 0.22
 
 
 def test_tags_and_planters_are_marked_by_their_state(

@@ -97,13 +97,19 @@ def test_parameters_that_a_second_node_reads_are_validated_too(domain: int) -> N
         declare(node, ["buffer_len"])
 
 
-def test_errors_name_the_parameter(domain: int) -> None:
+@pytest.mark.parametrize(
+    ("name", "why"), [("a b", "Invalid topic name"), ("{a}", "topic name '{a}' is invalid")]
+)
+def test_an_error_about_a_name_names_the_parameter(domain: int, name: str, why: str) -> None:
     with (
         node_with(domain) as node,
-        pytest.raises(ParameterError, match="parameter map_topic is 'a b': Invalid topic name"),
-        naming("map_topic", "a b"),
+        pytest.raises(ParameterError, match=f"parameter map_topic is '{name}': {why}"),
+        naming("map_topic", name),
     ):
-        node.create_subscription(Time, "a b", lambda _: None, 1)
+        node.create_subscription(Time, name, lambda _: None, 1)
+
+
+def test_an_error_about_a_parameter_of_ros_names_it(domain: int) -> None:
     with (
         pytest.raises(
             ParameterError, match="parameter start_type_description_service is not a bool"

@@ -110,17 +110,18 @@ def scale_of(values: FloatArray) -> Scale:
     """The median, and a spread that is weighted between a prior and that of the readings.
 
     The spread of few readings is accidental, so the prior, a tenth of the median, weighs as much as
-    four of them.
+    four of them. Near 0 that says nothing: 0.1 °C is no more certain than 20 °C. So the prior of a
+    single reading is at least one unit, and that of twenty a twentieth.
     """
     centre = float(np.median(values))
-    thought = abs(centre) / 10.0
     weight = min(float(len(values)), _MAX_WEIGHT)
+    thought = max(abs(centre) / 10.0, 1.0 / weight)
     # Divided by the largest before squaring: the squares of very large floats would overflow.
     off = values - centre
-    largest = max(float(np.abs(off).max()), thought) or 1.0
+    largest = max(float(np.abs(off).max()), thought)
     variance = float(np.mean((off / largest) ** 2))
     whole = _PRIOR_WEIGHT * (thought / largest) ** 2 + weight * variance
-    return Scale(centre, largest * (whole / (_PRIOR_WEIGHT + weight)) ** 0.5 or 1.0)
+    return Scale(centre, largest * (whole / (_PRIOR_WEIGHT + weight)) ** 0.5)
 
 
 HOURS: Final = 24.0

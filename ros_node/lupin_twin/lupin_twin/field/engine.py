@@ -24,11 +24,8 @@ from lupin_twin.field.explored import OccupancyMap, explored_mask
 from lupin_twin.field.grid import FieldGrid, FloatArray, grid_dimensions, reach_of
 from lupin_twin.field.idw import (
     Abandoned,
-    IndexArray,
     PairwiseIdw,
     compute_idw_field,
-    fits,
-    gap_squares,
     never,
     sample_columns,
 )
@@ -276,6 +273,10 @@ def default_request(
 
 # --- quality: the error of a field, and how much of it is known -----------------------------------
 
+# Samples that are predicted at once, from those that reach them in x; and a margin for rounding.
+_AT_ONCE: Final = 32
+_MORE: Final = 1.01
+
 
 @dataclass(frozen=True, slots=True)
 class TagError:
@@ -357,44 +358,22 @@ def _predictions(
     idw: PairwiseIdw,
     should_stop: Callable[[], bool],
 ) -> FloatArray:
-    """Predict each sample's value from the others; NaN if none is within `max_distance_m`.
-
-    The samples are halved recursively along the longer side of their box, until a part and the
-    samples that reach it make few enough pairs.
-    """
-    predicted = np.full(value.size, np.nan)
-    everyone = np.arange(value.size)
-    parts = [(everyone, everyone)] if value.size else []
+    """Predict each sample's value from the others; NaN if none is within `max_distance_m`."""
+    predicted = np.empty(value.size)
+    order = np.argsort(x, kind="stable")
+    along, reach_m = x[order], _MORE * math.sqrt(idw.reach_square)
     with np.errstate(all="ignore"):
-        while parts:
+        for first in range(0, value.size, _AT_ONCE):
             if should_stop():
                 raise Abandoned
-            part, near = parts.pop()
-            gap = gap_squares(x[near], x[part]) + gap_squares(y[near], y[part])
-            near = near[gap <= idw.reach_square]
-            if fits(near.size, part.size):
-                predicted[part] = _predict_part(part, near, (x, y, value), idw)
-                continue
-            along = x[part] if np.ptp(x[part]) > np.ptp(y[part]) else y[part]
-            order = part[np.argsort(along, kind="stable")]
-            parts.append((order[: part.size // 2], near))
-            parts.append((order[part.size // 2 :], near))
+            part = order[first : first + _AT_ONCE]
+            ends = np.searchsorted(along, (x[part[0]] - reach_m, x[part[-1]] + reach_m))
+            # In recorded order: of equally near samples, the first one counts.
+            near = np.sort(order[slice(*ends)])
+            square = idw.squares(near.size, part.size)
+            np.square(x[near][:, None] - x[part], out=square)
+            square += np.square(y[near][:, None] - y[part])
+            # A sample must not predict itself.
+            square[np.searchsorted(near, part), np.arange(part.size)] = np.inf
+            predicted[part] = idw.evaluate(square, value[near])
     return predicted
-
-
-def _predict_part(
-    part: IndexArray,
-    near: IndexArray,
-    samples: tuple[FloatArray, FloatArray, FloatArray],
-    idw: PairwiseIdw,
-) -> FloatArray:
-    x, y, value = samples
-    square = idw.squares(near.size, part.size)
-    gap = x[near][:, None] - x[part]
-    np.square(gap, out=square)
-    np.subtract(y[near][:, None], y[part], out=gap)
-    np.square(gap, out=gap)
-    np.add(square, gap, out=square)
-    # A sample must not predict itself. `near` is in recorded order and holds all of `part`.
-    square[np.searchsorted(near, part), np.arange(part.size)] = np.inf
-    return idw.evaluate(square, value[near])

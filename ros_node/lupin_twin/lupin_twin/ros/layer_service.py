@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
 
@@ -20,20 +20,18 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from lupin_twin.core.diagnostics import OK, WARN, Finding, shown
-from lupin_twin.core.interfaces import LAYERS, PLANTERS, TAGS
-from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot, TwinStore
+from lupin_twin.core.interfaces import LAYERS, PLANTERS, TAGS, Topic
+from lupin_twin.core.state import NANOSECONDS_PER_SECOND, Snapshot
 from lupin_twin.estimate.engine import MINUTES_A_DAY, EstimateRequest, TagPast
 from lupin_twin.field.engine import (
     FieldRefused,
     FieldRequest,
-    FieldRules,
     compute_field,
     default_box,
     default_request,
 )
-from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.field.idw import Abandoned
-from lupin_twin.ros.base_node import NO_EVENTS, NodeUtilities, qos_of
+from lupin_twin.ros.base_node import NO_EVENTS, qos_of
 from lupin_twin.ros.layers import (
     MAX_POINTS,
     MarkerArrays,
@@ -46,115 +44,97 @@ from lupin_twin.ros.layers import (
     topics_of,
 )
 from lupin_twin.ros.parameters import naming
-from lupin_twin.ros.services import EstimateService
+from lupin_twin.ros.services import Services, Twin
 from lupin_twin.runtime.estimates import are_enough
-from lupin_twin.runtime.workers import JobQueue, Query, ShouldStop, Workers
+from lupin_twin.runtime.workers import JobQueue, Query, Workers
 
 # A topic is published no more often than this, s, and only when something has changed.
 PERIOD_S: Final = 1.0
+# The estimates of all layers take at most a tenth of a core, however much is received: a round of
+# them is followed by a pause that is this many times as long.
+REST_FACTOR: Final = 9.0
 # Every message counts as large, s of one core: then they are made one after the other.
 _COST_S: Final = 1.0
 
 
-# Receives the message that was made; None: it has not changed.
-_Reply = Callable[[bytes | Exception | None], None]
-
-
 @dataclass(slots=True)
 class _Topic:
-    """A topic. While `key_of()` is the same, so is the message; None: not known before it is made.
+    """The topic of a sensor's layer, or of markers.
 
-    `plan(reply, should_stop)` returns the query that makes the message.
+    While `key` is the same, so is the message; None: not known before it is made. `estimate_s` is
+    what the estimate of the last message took, s of one core; 0: there was none.
     """
 
     publisher: Any
-    key_of: Callable[[], object]
-    plan: Callable[[_Reply, ShouldStop], Query]
+    sensor: str = ""
+    markers: MarkerArrays | None = None
     key: object = None
     begun_s: float = -math.inf
+    estimate_s: float = 0.0
     is_wanted: bool = False
     is_under_way: bool = False
     published: int = 0
     problem: str = ""
 
 
-@dataclass(slots=True)
 class LayerService:
     """The topics of one node; belongs to the node's thread.
 
     `wake()` is called in another thread when the queue has something to deliver.
     """
 
-    utilities: NodeUtilities
-    store: TwinStore
-    rules: Callable[[], FieldRules]
-    estimates: EstimateService
-    occupancy: Callable[[], OccupancyMap | None]
-    snapshot: Callable[[], Snapshot]
-    now_ns: Callable[[], int]
-    # Number of writes in the journal, from which estimates are made.
-    written: Callable[[], int]
-    day_length_s: float
-    wake: Callable[[], None]
-    _workers: Workers = field(
-        default_factory=lambda: Workers("layers", large_threads=1, small_threads=0)
-    )
-    _topics: list[_Topic] = field(default_factory=list)
-    queue: JobQueue = field(init=False)
-    _whole: tuple[object, FieldRequest] | None = None
-    # The sensors whose last message has an estimate.
-    _estimated: set[str] = field(default_factory=set)
+    def __init__(self, twin: Twin, services: Services, wake: Callable[[], None]) -> None:
+        self._twin, self._services = twin, services
+        self._workers = Workers("layers", large_threads=1, small_threads=0)
+        self._topics: list[_Topic] = []
+        self._whole: tuple[object, FieldRequest] | None = None
+        self.queue = JobQueue(self._workers, wake, lambda: twin.utilities.is_behind)
 
-    def __post_init__(self) -> None:
-        self.queue = JobQueue(self._workers, self.wake, lambda: self.utilities.is_behind)
-
-    def offer(self, node: Any, sensors: Sequence[str], frame_id: str) -> None:
-        """Create the topics on `node`, with names relative to its namespace.
+    def offer(self) -> None:
+        """Create the topics, with names relative to the node's namespace.
 
         Raises:
             ParameterError: a sensor gives no valid topic, or two give the same.
 
         """
-        for topic, sensor in topics_of(sensors).items():
+        of = self._twin.parameters
+        for name, sensor in topics_of(of.layers).items():
             with naming("layers", sensor):
-                publisher = node.create_publisher(
-                    PointCloud2, topic, qos_of(LAYERS), event_callbacks=NO_EVENTS
-                )
-            self._topics.append(
-                _Topic(
-                    publisher,
-                    partial(self._key_of_layer, sensor),
-                    partial(self._plan_layer, sensor, frame_id),
-                )
-            )
-        for kind, marks, make in (
+                publisher = self._publisher(PointCloud2, name, LAYERS)
+            self._topics.append(_Topic(publisher, sensor))
+        for topic, marks, make in (
             (TAGS, tag_marks, tag_markers),
             (PLANTERS, planter_marks, planter_markers),
         ):
-            arrays = MarkerArrays(marks, make, frame_id)
-            publisher = node.create_publisher(
-                MarkerArray, kind.name, qos_of(kind), event_callbacks=NO_EVENTS
-            )
-            # Markers show ages: whether they have changed is known only when they are made.
-            self._topics.append(_Topic(publisher, lambda: None, partial(self._plan_marks, arrays)))
+            publisher = self._publisher(MarkerArray, topic.name, topic)
+            markers = MarkerArrays(marks, make, of.frame_id)
+            self._topics.append(_Topic(publisher, markers=markers))
+
+    def _publisher(self, kind: Any, name: str, topic: Topic) -> Any:
+        return self._twin.utilities.node.create_publisher(
+            kind, name, qos_of(topic), event_callbacks=NO_EVENTS
+        )
 
     def check(self) -> None:
         """Begin messages that are wanted and may have changed; call it regularly."""
         self.queue.go_on()
         now_s = time.monotonic()
+        round_s = sum(topic.estimate_s for topic in self._topics if topic.is_wanted)
         for topic in self._topics:
             topic.is_wanted = topic.publisher.get_subscription_count() > 0
-            is_due = now_s - topic.begun_s >= PERIOD_S
+            rest_s = (1.0 + REST_FACTOR) * round_s if topic.estimate_s else 0.0
+            is_due = now_s - topic.begun_s >= max(PERIOD_S, rest_s)
             if topic.is_wanted and not topic.is_under_way and is_due:
                 self._begin(topic, now_s)
 
     def _begin(self, topic: _Topic, now_s: float) -> None:
-        key = topic.key_of()
-        if self.utilities.is_behind or (key is not None and key == topic.key):
+        key = self._key_of_layer(topic) if topic.markers is None else None
+        if self._twin.utilities.is_behind or (key is not None and key == topic.key):
             return
         topic.key, topic.begun_s = key, now_s
+        plan = self._plan_layer if topic.markers is None else self._plan_markers
         try:
-            query = topic.plan(partial(self._publish, topic), lambda: not topic.is_wanted)
+            query = plan(topic)
         except ValueError as error:  # a field that is refused
             self._refuse(topic, error)
             return
@@ -162,64 +142,68 @@ class LayerService:
         self.queue.ask(query)
 
     def _publish(self, topic: _Topic, made: bytes | Exception | None) -> None:
+        """Publish the message that was made; None: it has not changed."""
         topic.is_under_way = False
         if isinstance(made, Abandoned):
             topic.key = None
         elif isinstance(made, FieldRefused):
             self._refuse(topic, made)
         elif isinstance(made, Exception):
-            self.utilities.report(topic.publisher.topic_name, made)
+            self._twin.utilities.report(topic.publisher.topic_name, made)
         else:
             topic.problem = ""
             if made is not None:
-                self.utilities.drain()  # a large one takes this thread for a while
+                self._twin.utilities.drain()  # a large one takes this thread for a while
                 topic.publisher.publish(made)
                 topic.published += 1
 
     def _refuse(self, topic: _Topic, error: ValueError) -> None:
         topic.problem = str(error)
-        self.utilities.warn(
+        self._twin.utilities.warn(
             ("layers", topic.publisher.topic_name),
             f"nothing on {topic.publisher.topic_name}: {error}",
         )
 
     # --- what is made -----------------------------------------------------------------------
 
-    def _key_of_layer(self, sensor: str) -> object:
-        occupancy = self.occupancy()
+    def _key_of_layer(self, topic: _Topic) -> object:
+        twin, occupancy = self._twin, self._twin.occupancy_map
         revision = None if occupancy is None else occupancy.revision
-        key = self.store.observation_count, self.rules(), revision
-        if sensor not in self._estimated:
+        key = twin.store.observation_count, twin.rules, revision
+        if not topic.estimate_s:
             return key
         # An estimate changes from minute to minute even if nothing is received: its error grows.
-        minute_ns = int(self.day_length_s / MINUTES_A_DAY * NANOSECONDS_PER_SECOND)
-        return key, self.written(), self.now_ns() // minute_ns
+        day_s = twin.parameters.day_length_s
+        minute_ns = int(day_s / MINUTES_A_DAY * NANOSECONDS_PER_SECOND)
+        return key, twin.memory.condition.written, twin.now_ns() // minute_ns
 
-    def _plan_layer(
-        self, sensor: str, frame_id: str, reply: _Reply, should_stop: ShouldStop
-    ) -> Query:
-        snapshot = self.snapshot()
+    def _plan_layer(self, topic: _Topic) -> Query:
+        twin, services, sensor = self._twin, self._services, topic.sensor
+        snapshot, now_ns = twin.snapshot(), twin.now_ns()
         request = self._request(sensor, snapshot)
-        samples = self.store.samples_for_sensor(sensor)
-        compute = partial(compute_field, request, samples, self.occupancy(), self.rules())
-        estimates, wanted, now_ns = self.estimates, EstimateRequest(request), self.now_ns()
+        samples = twin.store.samples_for_sensor(sensor)
+        compute = partial(compute_field, request, samples, twin.occupancy_map, twin.rules)
+
+        def should_stop() -> bool:
+            return not topic.is_wanted
 
         def make(found: Sequence[TagPast]) -> bytes:
             grid = compute(should_stop)
-            estimate = None
+            estimate, topic.estimate_s = None, 0.0
             if are_enough(found):
+                wanted, begun_s = EstimateRequest(request), time.thread_time()
                 with suppress(FieldRefused):  # nothing can be made of them
-                    estimate = estimates.make(wanted, now_ns, found, should_stop).grid
-            (self._estimated.discard if estimate is None else self._estimated.add)(sensor)
-            return cloud(points(grid, estimate), snapshot.stamp_ns, frame_id)
+                    estimate = services.estimate(wanted, now_ns, found, should_stop).grid
+                topic.estimate_s = time.thread_time() - begun_s
+            return cloud(points(grid, estimate), snapshot.stamp_ns, snapshot.frame_id)
 
-        look_up = partial(estimates.look_up, wanted, now_ns)
-        return Query(partial(_or_nothing, look_up), reply, make, _COST_S)
+        look_up = partial(_or_nothing, services.readings(sensor, now_ns))
+        return Query(look_up, partial(self._publish, topic), make, _COST_S)
 
     def _request(self, sensor: str, snapshot: Snapshot) -> FieldRequest:
         """The request for a sensor's field; its box, that of all tags, is the same for all."""
-        rules = self.rules()
-        key = self.store.observation_count, rules
+        rules = self._twin.rules
+        key = self._twin.store.observation_count, rules
         if self._whole is None or self._whole[0] != key:
             places = ((tag.pose.x, tag.pose.y) for tag in snapshot.tags if tag.pose is not None)
             box = default_box(places, rules.max_distance_m)
@@ -227,10 +211,12 @@ class LayerService:
             self._whole = key, default_request(sensor, box, most)
         return replace(self._whole[1], sensor_type=sensor)
 
-    def _plan_marks(self, arrays: MarkerArrays, reply: _Reply, _: ShouldStop) -> Query:
-        snapshot = self.snapshot()
-        build = partial(self._workers.submit, lambda _: arrays.build(snapshot), _COST_S)
-        return Query(build, reply, cost_s=_COST_S)
+    def _plan_markers(self, topic: _Topic) -> Query:
+        # Markers show ages: whether they have changed is known only when they are made.
+        markers, snapshot = topic.markers, self._twin.snapshot()
+        assert markers is not None
+        build = partial(self._workers.submit, lambda _: markers.build(snapshot), _COST_S)
+        return Query(build, partial(self._publish, topic), cost_s=_COST_S)
 
     # --- the node's -------------------------------------------------------------------------
 

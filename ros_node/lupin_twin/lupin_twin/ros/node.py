@@ -23,7 +23,7 @@ from lupin_twin.core.drops import Drop
 from lupin_twin.core.history import kind_of
 from lupin_twin.core.parameters import ParameterError, TwinParameters, World
 from lupin_twin.core.state import ClockState, Inspection, Scan, Snapshot, TwinStore, Write
-from lupin_twin.field.engine import FieldCache, FieldRules
+from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.explored import OccupancyMap
 from lupin_twin.journal.paths import journal_path
 from lupin_twin.journal.runs import Clock as RunClock
@@ -33,9 +33,8 @@ from lupin_twin.ros.convert import diagnostics
 from lupin_twin.ros.inputs import TwinCount
 from lupin_twin.ros.layer_service import LayerService
 from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
-from lupin_twin.ros.services import EstimateService, FieldService, PastService, Responses
+from lupin_twin.ros.services import Responses, Services
 from lupin_twin.runtime.memory import Memory, open_journal
-from lupin_twin.runtime.workers import LARGE_THREADS, JobQueue, Workers
 
 NODE_NAME: Final = "lupin_twin"
 # How often ROS time, the layers and unsent responses are checked, s. In one timer: rclpy's executor
@@ -75,43 +74,12 @@ class TwinNode(AdjustableNode):
         self._listener: Callable[[Snapshot], None] | None = None
         self._states = convert.StateMessages()
         self._group = MutuallyExclusiveCallbackGroup()
-        self._workers = Workers("field")
         done = self.create_guard_condition(
             self.utilities.guarded("an answer", self._deliver), self._group
         )
         wake = waker(done)
-        self._field_service = FieldService(
-            self.utilities,
-            self._workers,
-            JobQueue(self._workers, wake, large_at_once=LARGE_THREADS),
-            FieldCache(self.parameters.field_cache_mb * 1e6),
-            lambda: self.rules,
-            self.store,
-            lambda: self.occupancy_map,
-        )
-        self._past_queue = JobQueue(self._workers, wake, lambda: self.utilities.is_behind)
-        self.estimates = EstimateService(
-            self.utilities,
-            self._past_queue,
-            self.store,
-            self.memory.recall,
-            occupancy=lambda: self.occupancy_map,
-            day_length_s=self.parameters.day_length_s,
-            max_grid_cells=self.parameters.max_grid_cells,
-            now_ns=self.now_ns,
-        )
-        self.layers = LayerService(
-            self.utilities,
-            self.store,
-            lambda: self.rules,
-            self.estimates,
-            occupancy=lambda: self.occupancy_map,
-            snapshot=self.snapshot,
-            now_ns=self.now_ns,
-            written=lambda: self.memory.condition.written,
-            day_length_s=self.parameters.day_length_s,
-            wake=wake,
-        )
+        self._twin_services = Services(self, wake)
+        self.layers = LayerService(self, self._twin_services, wake)
         self._connect()
         self._log_start()
         self._publish_state()
@@ -176,17 +144,8 @@ class TwinNode(AdjustableNode):
         self._times_publisher = self.create_publisher(
             TwinTimes, times.name, qos_of(times), event_callbacks=NO_EVENTS
         )
-        self._field_service.offer(self, p.field_service_name, group)
-        PastService(
-            self.utilities,
-            self._past_queue,
-            self.memory.recall,
-            self.store,
-            self.now_ns,
-            p.frame_id,
-        ).offer(self, group)
-        self.estimates.offer(self, group)
-        self.layers.offer(self, p.layers, p.frame_id)
+        self._twin_services.offer(group)
+        self.layers.offer()
         for service in self.services:  # including those for parameters
             responses.watch(service)
         self._diagnostics = self.create_publisher(
@@ -279,13 +238,12 @@ class TwinNode(AdjustableNode):
 
     def _deliver(self) -> None:
         self.utilities.drain()
-        self._field_service.queue.deliver()
-        self._past_queue.deliver()
+        self._twin_services.deliver()
         self.layers.queue.deliver()
 
     def destroy_node(self) -> None:
         """Also end the workers, whose current work is abandoned, and the journal."""
-        self._workers.close()
+        self._twin_services.close()
         self.layers.close()
         self.memory.close()
         super().destroy_node()
@@ -301,9 +259,9 @@ class TwinNode(AdjustableNode):
             late=self.lateness.counts,
             twins=self.twins.value,
             state_topic=self._state_publisher.topic_name,
-            fields_computing=self._field_service.queue.waiting,
-            fields_computed=self._field_service.queue.answered,
-            slowest_field_s=self._field_service.queue.slowest_s,
+            fields_computing=self._twin_services.fields.waiting,
+            fields_computed=self._twin_services.fields.answered,
+            slowest_field_s=self._twin_services.fields.slowest_s,
             others=(self.layers.finding(),),
             origin=self.origin,
             input_problems=self.utilities.check_inputs(),
@@ -346,7 +304,7 @@ class TwinNode(AdjustableNode):
             self._listener(self.snapshot())
 
     def _check_clock(self) -> None:
-        self._past_queue.go_on()
+        self._twin_services.go_on()
         before = self._clock_watch.state
         self.now_ns()
         if self._clock_watch.state != before:

@@ -16,11 +16,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.exceptions import (
-    InvalidParameterTypeException,
-    InvalidServiceNameException,
-    InvalidTopicNameException,
-)
+from rclpy.exceptions import InvalidParameterTypeException, NameValidationException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -127,7 +123,7 @@ def naming(parameter: str, value: str) -> Iterator[None]:
     """Turn rclpy's error about a topic's name into one that names the parameter."""
     try:
         yield
-    except (InvalidTopicNameException, InvalidServiceNameException) as error:
+    except (NameValidationException, ValueError) as error:  # the latter for `{unknown}`
         reason = " ".join(str(error).split())
         raise ParameterError(f"parameter {parameter} is {value!r}: {reason}") from error
 

@@ -15,11 +15,11 @@ import sqlite3
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Protocol
 
 from lupin_msgs.srv import (
     GetEstimate,
@@ -37,8 +37,9 @@ from lupin_twin.core.interfaces import (
     GET_STATE_AT,
     GET_WRITES,
 )
+from lupin_twin.core.parameters import TwinParameters
 from lupin_twin.core.past import EVERY_TAG, NotRemembered, PastRefused, check_moment, message_of
-from lupin_twin.core.state import TwinStore
+from lupin_twin.core.state import Snapshot, TwinStore
 from lupin_twin.estimate import engine
 from lupin_twin.estimate.engine import Estimate, EstimateRequest, TagPast, moment_of
 from lupin_twin.field.engine import (
@@ -67,110 +68,167 @@ from lupin_twin.runtime.estimates import (
     readings_at,
     report_of,
 )
-from lupin_twin.runtime.journal_queries import Recall
-from lupin_twin.runtime.workers import SMALL_S, JobQueue, Query, ShouldStop, Workers
+from lupin_twin.runtime.memory import Memory
+from lupin_twin.runtime.workers import (
+    LARGE_THREADS,
+    SMALL_S,
+    JobQueue,
+    Query,
+    ShouldStop,
+    Workers,
+)
 
 Report = Callable[[str, Exception], None]
-
-
-@dataclass(frozen=True, slots=True)
-class FieldService:
-    """The service of fields, which are computed off the node's thread unless they are cached."""
-
-    utilities: NodeUtilities
-    workers: Workers
-    queue: JobQueue
-    cache: FieldCache
-    rules: Callable[[], FieldRules]
-    store: TwinStore
-    occupancy: Callable[[], OccupancyMap | None]
-
-    def offer(self, node: Any, name: str, group: Any) -> None:
-        """Create the service on `node`.
-
-        Raises:
-            ParameterError: the name is invalid in ROS.
-
-        """
-        with naming("field_service_name", name):
-            plans = ((GetField, name, self._field),)
-            offer(node, group, plans, self.queue, self.utilities.report)
-
-    def _field(self, request: Any, reply: Callable[[Any], None]) -> Query | None:
-        wanted = convert_services.field_request_of(request)
-        rules, occupancy = self.rules(), self.occupancy()
-        check_request(wanted, rules.max_grid_cells)
-        is_clipped = occupancy is not None and rules.clip_to_explored
-        revision = occupancy.revision if occupancy is not None and is_clipped else None
-        key = FieldKey(wanted, self.store.observation_count, revision, rules)
-        if (found := self.cache.get(key)) is not None:
-            reply(convert_services.field_response(found))
-            return None
-        samples = self.store.samples_for_sensor(wanted.sensor_type)
-        compute = partial(compute_field, wanted, samples, occupancy, rules)
-        cost = cost_s(wanted, len(samples), rules)
-
-        def keep(grid: Any) -> None:
-            if not isinstance(grid, Exception):
-                self.cache.put(key, grid)
-                grid = convert_services.field_response(grid)
-            reply(grid)
-
-        return Query(partial(self.workers.submit, compute, cost), keep, cost_s=cost)
-
+Reply = Callable[[Any], None]
 
 # Worst-case cost of the message of a series, s of one core; and of that of all tags.
 MESSAGE_S: Final = SMALL_S
 EVERY_TAG_S: Final = 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class PastService:
-    """The services of the past on one node; belongs to the node's thread.
-
-    Every request gets a response; if there is no answer, it says why. The size of a past state is
-    estimated from the current one, `store`.
-    """
+class Twin(Protocol):
+    """What services and layers need of the node, on its thread."""
 
     utilities: NodeUtilities
-    queue: JobQueue
-    recall: Recall
+    parameters: TwinParameters
     store: TwinStore
-    now_ns: Callable[[], int]
-    frame_id: str
+    memory: Memory
+    rules: FieldRules
+    occupancy_map: OccupancyMap | None
 
-    def offer(self, node: Any, group: Any) -> None:
-        """Create the services on `node`, with names relative to its namespace."""
-        plans = (
-            (GetStateAt, GET_STATE_AT.name, self._state_at),
-            (GetHistory, GET_HISTORY.name, self._history),
-            (GetWrites, GET_WRITES.name, self._writes),
-        )
-        offer(node, group, plans, self.queue, self.utilities.report)
+    def now_ns(self) -> int:
+        """Return ROS time, ns."""
 
-    def _state_at(self, request: Any, reply: Callable[[Any], None]) -> Query:
-        at_ns = convert.nanoseconds(request.at)
-        check_moment(at_ns, self.now_ns())
-        tags, items = self.store.size
+    def snapshot(self) -> Snapshot:
+        """Every tag as of now."""
+
+
+class Services:
+    """The services of a twin; belongs to the node's thread.
+
+    Every request gets a response; if there is no answer, it says why. Fields are computed off the
+    node's thread unless they are cached. Estimates and reports on them are made from the journal.
+    They share a queue with the past, and fields have another, so that no field waits for them.
+    `wake()` is called in another thread when there is something to `deliver`.
+    """
+
+    def __init__(self, twin: Twin, wake: Callable[[], None]) -> None:
+        self._twin = twin
+        self._workers = Workers("field")
+        self.fields = JobQueue(self._workers, wake, large_at_once=LARGE_THREADS)
+        self._past = JobQueue(self._workers, wake, lambda: twin.utilities.is_behind)
+        self._cache = FieldCache(twin.parameters.field_cache_mb * 1e6)
+
+    def offer(self, group: Any) -> None:
+        """Create the services, with names relative to the node's namespace.
+
+        Raises:
+            ParameterError: the name of the service of fields is invalid in ROS.
+
+        """
+        name = self._twin.parameters.field_service_name
+        with naming("field_service_name", name):
+            for kind, service, plan, queue in (
+                (GetField, name, self._field, self.fields),
+                (GetEstimate, GET_ESTIMATE.name, self._estimate, self._past),
+                (GetEstimateReport, GET_ESTIMATE_REPORT.name, self._report, self._past),
+                (GetStateAt, GET_STATE_AT.name, self._state_at, self._past),
+                (GetHistory, GET_HISTORY.name, self._history, self._past),
+                (GetWrites, GET_WRITES.name, self._writes, self._past),
+            ):
+                self._twin.utilities.node.create_service(
+                    kind,
+                    service,
+                    partial(self._answer, kind, plan, queue),
+                    qos_profile=SERVICE_QOS,
+                    callback_group=group,
+                )
+
+    def deliver(self) -> None:
+        """Send responses that were made meanwhile."""
+        self.fields.deliver()
+        self._past.deliver()
+
+    def go_on(self) -> None:
+        """Begin the requests that may begin by now; to be called now and then."""
+        self._past.go_on()
+
+    def close(self) -> None:
+        """End the workers; their current work is abandoned."""
+        self._workers.close()
+
+    def _answer(
+        self,
+        kind: Any,
+        plan: Callable[[Any, Reply], Query | None],
+        queue: JobQueue,
+        request: Any,
+        _: Any,
+    ) -> Any:
+        """Return a response, or its future; `plan` returns None if it has replied already."""
+        later: Future[Any] = Future()
+        report = self._twin.utilities.report
+
+        def reply(found: Any) -> None:
+            is_error = isinstance(found, Exception)
+            later.set_result(refusal(kind, found, report) if is_error else found)
+
+        try:
+            if (query := plan(request, reply)) is not None:
+                queue.ask(query)
+        except Exception as error:  # noqa: BLE001  # no client may wait forever
+            return refusal(kind, error, report)
+        return later
+
+    def _field(self, request: Any, reply: Reply) -> Query | None:
+        twin, wanted = self._twin, convert_services.field_request_of(request)
+        rules, occupancy = twin.rules, twin.occupancy_map
+        check_request(wanted, rules.max_grid_cells)
+        is_clipped = occupancy is not None and rules.clip_to_explored
+        revision = occupancy.revision if occupancy is not None and is_clipped else None
+        key = FieldKey(wanted, twin.store.observation_count, revision, rules)
+        if (found := self._cache.get(key)) is not None:
+            reply(convert_services.field_response(found))
+            return None
+        samples = twin.store.samples_for_sensor(wanted.sensor_type)
+        compute = partial(compute_field, wanted, samples, occupancy, rules)
+        cost = cost_s(wanted, len(samples), rules)
+
+        def keep(grid: Any) -> None:
+            if not isinstance(grid, Exception):
+                self._cache.put(key, grid)
+                grid = convert_services.field_response(grid)
+            reply(grid)
+
+        return Query(partial(self._workers.submit, compute, cost), keep, cost_s=cost)
+
+    # --- the past: its size is estimated from the current state ---------------------------------
+
+    def _state_at(self, request: Any, reply: Reply) -> Query:
+        at_ns, frame_id = convert.nanoseconds(request.at), self._twin.parameters.frame_id
+        check_moment(at_ns, self._twin.now_ns())
+        tags, items = self._twin.store.size
         return Query(
-            self._search(lambda log: state_at(log, at_ns, self.frame_id), tags * STATE_S_PER_TAG),
+            self._search(lambda log: state_at(log, at_ns, frame_id), tags * STATE_S_PER_TAG),
             reply,
             convert_services.state_response,
             tags * convert_services.TAG_S + items * convert_services.ITEM_S,
         )
 
-    def _history(self, request: Any, reply: Callable[[Any], None]) -> Query:
-        query, now_ns = convert_services.series_request(request), self.now_ns()
+    def _history(self, request: Any, reply: Reply) -> Query:
+        query, now_ns = convert_services.series_request(request), self._twin.now_ns()
         is_of_all = query.tag_id == EVERY_TAG
-        search_s = SERIES_S + (self.store.size[0] * SERIES_S_PER_TAG if is_of_all else 0.0)
+        tags = self._twin.store.size[0] if is_of_all else 0
         return Query(
-            self._search(lambda log: series(log, query, now_ns), search_s),
+            self._search(
+                lambda log: series(log, query, now_ns), SERIES_S + tags * SERIES_S_PER_TAG
+            ),
             reply,
             convert_services.series_response,
             EVERY_TAG_S if is_of_all else MESSAGE_S,
         )
 
-    def _writes(self, request: Any, reply: Callable[[Any], None]) -> Query:
+    def _writes(self, request: Any, reply: Reply) -> Query:
         query = convert_services.writes_request(request)
         if request.as_rows:
             search = self._search(
@@ -183,43 +241,17 @@ class PastService:
     def _search(
         self, search: Callable[[sqlite3.Connection], Any], cost_s: float
     ) -> Callable[[], Future[Any]]:
-        return lambda: self.recall.query(lambda log, _: search(log), cost_s)
+        return lambda: self._twin.memory.recall.query(lambda log, _: search(log), cost_s)
 
+    # --- estimates ------------------------------------------------------------------------------
 
-@dataclass(frozen=True, slots=True)
-class EstimateService:
-    """The estimate's services on one node; belongs to the node's thread.
+    def readings(self, sensor: str, at_ns: int, days: float = 1.0) -> Callable[[], Future[Any]]:
+        """Return a function that starts the query for a sensor's readings of some days."""
+        day_s = self._twin.parameters.day_length_s
+        cost = days * self._twin.store.size[0] * (STATE_S_PER_TAG + NEWEST_S_PER_TAG)
+        return self._search(lambda log: readings_at(log, sensor, at_ns, day_s, days), cost)
 
-    Estimates and reports on them are made on request, from the journal. `occupancy()` is the latest
-    map, where another tag could stand. `day_length_s` is s of ROS time. Queries about the past use
-    the same `queue`, and fields another, so that no field waits for one.
-    """
-
-    utilities: NodeUtilities
-    queue: JobQueue
-    store: TwinStore
-    recall: Recall
-    occupancy: Callable[[], OccupancyMap | None]
-    day_length_s: float
-    max_grid_cells: int
-    now_ns: Callable[[], int]
-
-    def offer(self, node: Any, group: Any) -> None:
-        """Create the services on `node`, with names relative to its namespace."""
-        plans = (
-            (GetEstimate, GET_ESTIMATE.name, self._estimate),
-            (GetEstimateReport, GET_ESTIMATE_REPORT.name, self._report),
-        )
-        offer(node, group, plans, self.queue, self.utilities.report)
-
-    def look_up(self, request: EstimateRequest, now_ns: int) -> Future[Sequence[TagPast]]:
-        """Start the query for an estimate's readings."""
-        sensor, at_ns, day_s = request.box.sensor_type, request.at_ns or now_ns, self.day_length_s
-        return self.recall.query(
-            lambda log, _: readings_at(log, sensor, at_ns, day_s), self._search_s
-        )
-
-    def make(
+    def estimate(
         self,
         request: EstimateRequest,
         now_ns: int,
@@ -227,69 +259,31 @@ class EstimateService:
         should_stop: ShouldStop = never,
     ) -> Estimate:
         """Make an estimate of the readings found, in any thread."""
-        at_ns = request.at_ns or moment_of(found, now_ns, self.day_length_s)
-        return estimate_at(replace(request, at_ns=at_ns), found, self.day_length_s, should_stop)
+        day_s = self._twin.parameters.day_length_s
+        at_ns = request.at_ns or moment_of(found, now_ns, day_s)
+        return estimate_at(replace(request, at_ns=at_ns), found, day_s, should_stop)
 
-    def _estimate(self, request: Any, reply: Callable[[Any], None]) -> Query:
-        wanted, now_ns = convert_services.estimate_request_of(request), self.now_ns()
+    def _estimate(self, request: Any, reply: Reply) -> Query:
+        twin, wanted = self._twin, convert_services.estimate_request_of(request)
+        now_ns = twin.now_ns()
         check_moment(wanted.at_ns, now_ns)
-        tags = min(engine.MAX_TAGS, self.store.size[0])
+        tags = min(engine.MAX_TAGS, twin.store.size[0])
         return Query(
-            partial(self.look_up, wanted, now_ns),
+            self.readings(wanted.box.sensor_type, wanted.at_ns or now_ns),
             reply,
-            lambda found: convert_services.response_of(self.make(wanted, now_ns, found)),
-            AS_OF * engine.cost_s(wanted, tags, self.max_grid_cells),
+            lambda found: convert_services.response_of(self.estimate(wanted, now_ns, found)),
+            AS_OF * engine.cost_s(wanted, tags, twin.parameters.max_grid_cells),
         )
 
-    def _report(self, request: Any, reply: Callable[[Any], None]) -> Query:
-        wanted = convert_services.report_request_of(request)
-        now_ns, day_s, occupancy = self.now_ns(), self.day_length_s, self.occupancy()
-
-        def look_up() -> Future[Any]:
-            return self.recall.query(
-                lambda log, _: readings_at(log, wanted.sensor_type, now_ns, day_s, REPORT_DAYS),
-                REPORT_DAYS * self._search_s,
-            )
+    def _report(self, request: Any, reply: Reply) -> Query:
+        wanted, now_ns = convert_services.report_request_of(request), self._twin.now_ns()
+        day_s, occupancy = self._twin.parameters.day_length_s, self._twin.occupancy_map
 
         def make(found: Sequence[TagPast]) -> Any:
             report = report_of(wanted, found, now_ns, day_s, occupancy=occupancy)
             return convert_services.report_response(report)
 
-        return Query(look_up, reply, make, REPORT_S)
-
-    @property
-    def _search_s(self) -> float:
-        return self.store.size[0] * (STATE_S_PER_TAG + NEWEST_S_PER_TAG)
-
-
-def offer(
-    node: Any,
-    group: Any,
-    services: Iterable[tuple[Any, str, Callable[[Any, Callable[[Any], None]], Query | None]]],
-    queue: JobQueue,
-    report: Report,
-) -> None:
-    """Create services on `node`: type, name, and a function of `request` and `reply`.
-
-    The function returns the query that makes the answer, or None if it has replied already.
-    """
-    for kind, name, plan in services:
-
-        def answer(request: Any, _: Any, kind: Any = kind, plan: Any = plan) -> Any:
-            later: Future[Any] = Future()
-
-            def reply(found: Any) -> None:
-                is_error = isinstance(found, Exception)
-                later.set_result(refusal(kind, found, report) if is_error else found)
-
-            try:
-                if (query := plan(request, reply)) is not None:
-                    queue.ask(query)
-            except Exception as error:  # noqa: BLE001  # no client may wait forever
-                return refusal(kind, error, report)
-            return later
-
-        node.create_service(kind, name, answer, qos_profile=SERVICE_QOS, callback_group=group)
+        return Query(self.readings(wanted.sensor_type, now_ns, REPORT_DAYS), reply, make, REPORT_S)
 
 
 # The beginning of rclpy's warning (7.1.6) that the middleware has dropped a response.

@@ -66,6 +66,8 @@ def read(kind: type[QueryT], given: Parameters) -> QueryT:
             raise PastRefused(f"parameter {name[:64]!r} is unknown, expected {', '.join(names)}")
         if names[name] in values:
             raise PastRefused(f"{name} is given more than once, expected one value")
+        if "\0" in value:  # PostgreSQL has no such text, and ROS no such name
+            raise PastRefused(f"{name} is {value[:64]!r}, which has a NUL character")
         values[names[name]] = value
     try:
         query: QueryT = _adapter(kind).validate_python(values)  # type: ignore[arg-type]  # hashable

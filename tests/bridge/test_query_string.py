@@ -39,6 +39,7 @@ def refusal(*pairs: tuple[str, str]) -> str:
         ([("a", "1"), ("from", "6")], "from is '6': input should be less than or equal to 5"),
         ([("a", "1"), ("from", "two")], "from is 'two': input should be a valid integer"),
         ([("a", "1"), ("from", "9" * 5_000)], f"from is '{'9' * 64}': "),
+        ([("a", "1\0")], "a is '1\\x00', which has a NUL character"),
         ([("a", "1"), ("c", "z")], "c is 'z': input should be 'x' or 'y'"),
     ],
 )

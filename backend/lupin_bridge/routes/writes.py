@@ -10,6 +10,8 @@ import logging
 import math
 import time
 from contextlib import suppress
+from functools import partial
+from itertools import islice
 from typing import Final
 
 import orjson
@@ -31,6 +33,7 @@ from lupin_bridge.routes.answers import (
     NOT_REMEMBERED,
     Refused,
     bridge_of,
+    computed,
     json_response,
     person_of,
     read_body,
@@ -52,6 +55,8 @@ log = logging.getLogger(__name__)
 router = APIRouter(default_response_class=Response)
 
 MAX_LISTED: Final = 2_000
+# Worst-case time to list the notes, s.
+_LIST_S: Final = 0.02
 MAX_AUDITED: Final = 2_000
 _TOO_MANY_NOTES: Final = f"written more than {NOTE_BURST} notes and {NOTES_PER_MINUTE} a minute"
 # Longest time for which a critical alarm may be shelved; any other one: `SHELF_S`.
@@ -83,11 +88,11 @@ async def notes_route(request: Request) -> Response:
     bridge = bridge_of(request)
     given = read(OfNotes, request.query_params.multi_items())
     start_ns, end_ns = given.span(bridge.ros_time_ns)
+    key = "notes", bridge.notes.number, given
 
-    async def compute() -> Answer:
-        notes = await _known(bridge)
+    def body(notes: tuple[Note, ...]) -> bytes:
         gone = withdrawals(notes)
-        found = [
+        found = (
             note_json(note, gone)
             for note in reversed(notes)
             if note.kind != WITHDRAW
@@ -95,11 +100,14 @@ async def notes_route(request: Request) -> Response:
             and given.subject in {None, note.subject}
             and start_ns <= note.about_ns
             and (not end_ns or note.about_ns < end_ns)
-        ]
-        body = orjson.dumps({"notes": found[:MAX_LISTED]})
-        return Answer(body, "application/json", NEVER_STORE)
+        )
+        return orjson.dumps({"notes": list(islice(found, MAX_LISTED))})
 
-    return await respond(request, ("notes", bridge.notes.number, given), compute)
+    async def compute() -> Answer:
+        write = partial(body, await _known(bridge))
+        return await computed(request, key, write, "application/json", cost_s=_LIST_S)
+
+    return await respond(request, key, compute)
 
 
 @router.post(

@@ -142,7 +142,7 @@ def test_any_page_may_link_to_the_bridge(open_bridge: Served, path: str) -> None
 
 
 def test_a_request_target_has_a_length_limit(open_bridge: Served) -> None:
-    for path in ("/" + "a/" * 2_047 + "b", "/api/field?" + "a&" * 2_042 + "b"):
+    for path in ("/" + "a/" * 63 + "b", "/api/field?" + "a&" * 2_042 + "b"):
         room = MAX_TARGET_BYTES - len(path.replace("?", ""))
         longest = path + "b" * room
         assert open_bridge.get(longest).status_code in (400, 404)
@@ -151,6 +151,10 @@ def test_a_request_target_has_a_length_limit(open_bridge: Served) -> None:
         assert refusal_of(refused) == (
             f"the address has {MAX_TARGET_BYTES + 1} bytes, the limit is {MAX_TARGET_BYTES}"
         )
+    for path in ("/" + "a/" * 64, "/docs/guide/" + "%2f" * 62):
+        refused = open_bridge.get(path)
+        assert refused.status_code == 414
+        assert refusal_of(refused) == "the path has 65 segments, the limit is 64"
 
 
 # --- the token ----------------------------------------------------------------------------------

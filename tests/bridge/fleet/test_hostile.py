@@ -81,6 +81,7 @@ STRANGE = {
     b"/sites/%ff%fe/api/state": 404,
     b"/sites/" + b"x" * 4_000: 404,
     b"/sites/" + b"x" * 8_000: 414,
+    b"/sites/gh1/api/history?tag_id=%00&sensor_type=co2": 400,
     "/sites/ü/".encode(): 400,
 }
 

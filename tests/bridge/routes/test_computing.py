@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 
 from lupin_bridge.past import fields
-from lupin_bridge.routes import status
+from lupin_bridge.routes import status, writes
 from lupin_bridge.routes.answers import PIECE_BYTES
 from lupin_bridge.routes.state import AGES_HOLD_S
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.serving.http_protocol import HttpConnection
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import StateJson
+from lupin_twin.core.notes import Note, withdrawals
 from lupin_twin.core.state import Pose, Reading, Scan
 from lupin_twin.field.engine import FieldRequest, compute_field
 from lupin_twin.field.explored import OccupancyMap
@@ -179,6 +180,25 @@ async def test_a_time_out_cancels_the_work_too(
         monkeypatch.setattr(type(it.bridge.notes), "notes", None)
         monkeypatch.setattr(it.bridge.notes, "look", lambda: asyncio.sleep(PATIENCE_S))
         assert (await it.http.get("/api/notes")).status_code == 504
+
+
+async def test_a_long_list_of_notes_delays_no_other_answer(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gate, was_open = threading.Event(), []
+
+    def held(notes: tuple[Note, ...]) -> dict[str, Note]:
+        was_open.append(gate.wait(5.0))
+        return withdrawals(notes)
+
+    monkeypatch.setattr(writes, "withdrawals", held)
+    async with greenhouse() as it:
+        (listed,) = send(it, "/api/notes")
+        await until(lambda: it.bridge.admission.in_flight["127.0.0.1"] == 1, "the list's start")
+        assert (await it.http.get("/healthz")).status_code == 200
+        gate.set()
+        assert (await listed).json() == {"notes": []}
+    assert was_open == [True]
 
 
 # --- shared work ----------------------------------------------------------------------------------

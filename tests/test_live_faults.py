@@ -106,26 +106,32 @@ def test_a_twin_is_stopped_and_goes_on(domain: int) -> None:
         )
 
 
-def test_a_second_twin_is_reported_and_its_end_too(domain: int) -> None:
+def test_a_second_twin_is_reported_by_the_real_name_of_its_topic_and_its_end_too(
+    domain: int,
+) -> None:
     soon = constants(**{"lupin_twin.ros.inputs:LEFT_OVER_S": 2.0})
+    names = (("twin/state", "r1/state"), ("floranova/observations", "r1/observations"))
+    remapped = ("--ros-args", *(word for it in names for word in ("-r", "/{}:=/{}".format(*it))))
     with (
-        lupin_twin(domain, "web", *soon) as process,
-        lupin_twin(domain, "serve", *soon) as first,
+        lupin_twin(domain, "web", *soon, *remapped) as process,
+        lupin_twin(domain, "serve", *soon, *remapped) as first,
         Peer(domain) as robot,
         attached(process, robot) as live,
         live.listen() as client,
     ):
         reason(client, "live")
-        with twin_node(domain) as second:
+        with twin_node(domain, *remapped) as second:
             second.wait_for_output("lupin_twin in ROS domain")
             message = client.until("status", lambda frame: "2 twins" in frame["message"])
-            first.wait_for_output("2 nodes publish /twin/state")
+            first.wait_for_output("2 nodes publish /r1/state")
             assert (message["twin"], message["twin_count"]) == ("live", 2)
             assert "mixture" in message["message"]
             assert "2 twins" in live.json("/readyz")["message"]
-            process.wait_for_output("2 nodes publish /twin/state")
+            process.wait_for_output("2 nodes publish /r1/state")
             second.stop()
             client.until("status", lambda frame: frame["message"] == "The twin is live.")
+        robot.publish("/r1/observations", scan(""))
+        first.wait_for_output("dropped an entry on /r1/observations")
 
 
 # --- an exception in a callback -----------------------------------------------------------------

@@ -186,14 +186,22 @@ def growth() -> None:
         "sites  days       scans       MB  B/scan  state ms: least, median  a sensor, all days",
         flush=True,
     )
+
+    def forward_days(archive: Archive, days: int) -> None:
+        journal = filled(replace(DAY, days=float(days)))
+        begun_s = time.monotonic()
+        forward_once(archive, journal.path)
+        rate = journal.readings / (time.monotonic() - begun_s)
+        print(f"{rate:,.0f} readings forwarded a second, the start of a process included")
+
     with server(fsync=True) as postgresql:
         for days in (1, 10, 100):
             archive = Archive(postgresql, "gh0")
-            forward_once(archive, filled(replace(DAY, days=float(days))).path)
+            forward_days(archive, days)
             measure(archive, 1, days)
             archive.drop()
         archive, done = Archive(postgresql, "gh0"), 1
-        forward_once(archive, filled(DAY).path)
+        forward_days(archive, 1)
         for sites in (10, 100):
             archive.copy_site(*(f"gh{number}" for number in range(done, sites)))
             measure(archive, sites, 1)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+from lupin_msgs.msg import TwinState, TwinTagState
 
 from tests.support.domains import own_domain
 from tests.support.live import attached, field_of, wait_until_ready
@@ -132,6 +133,25 @@ def test_a_second_twin_is_reported_by_the_real_name_of_its_topic_and_its_end_too
             client.until("status", lambda frame: frame["message"] == "The twin is live.")
         robot.publish("/r1/observations", scan(""))
         first.wait_for_output("dropped an entry on /r1/observations")
+
+
+def test_a_twin_without_times_has_no_history_and_no_times_of_readings(domain: int) -> None:
+    """One of another build, which publishes its state alone."""
+    message = TwinState(tags=[TwinTagState(tag_id="1")])
+    message.header.frame_id = "map"
+    message.header.stamp.sec = 100
+    with (
+        Peer(domain) as peer,
+        lupin_twin(domain, "web", "--port", "0") as process,
+        attached(process, peer) as live,
+    ):
+        peer.publish("/twin/state", message, depth=1)
+        wait_for(lambda: live.get("/api/tags/1").status_code == 200, "the state")
+        answer = live.get("/api/tags/1/history")
+        assert (answer.status_code, "journal is not known" in answer.text) == (503, True)
+        tag = live.json("/api/tags/1")
+        assert (tag["last_try"], tag["last_try_status"]) == (None, None)
+        assert "looked_at" not in tag
 
 
 # --- an exception in a callback -----------------------------------------------------------------

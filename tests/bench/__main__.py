@@ -17,7 +17,6 @@ BENCHES = (
     "bench_greenhouse",
     "bench_import",
     "bench_fleet",
-    "bench_replicas",
 )
 
 

@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.estimate.engine import TagPast, readings_of
+from lupin_twin.estimate.engine import thinned
 from lupin_twin.estimate.kernel import Readings
-from lupin_twin.estimate.model import Model, fit
+from lupin_twin.estimate.model import fit
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.idw import compute_idw_field
-from tests.bench.other_worlds import HOUR_S, JUDGING, SORTS, Floats, World, world_of
+from tests.bench.other_worlds import DAY_S, HOUR_S, JUDGING, SORTS, Floats, World, world_of
 
 CELL_M = 0.25
 INTERVAL_SDS = 1.645
@@ -39,7 +39,6 @@ class Field(NamedTuple):
 class Case(NamedTuple):
     """A greenhouse at a moment: the readings that count, the cells' positions, the truth there."""
 
-    world: World
     readings: Readings
     at_s: float
     places: Floats
@@ -66,7 +65,7 @@ def case_of(world: World, phase: str, seed: int) -> Case:
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     idw = idw_of(all_read, width * CELL_M, height * CELL_M, CELL_M)
     truth = world.truth(places, np.full(len(places), at_s))
-    return Case(world, as_received(all_read, at_s), 0.0, places, truth, idw)
+    return Case(thinned(all_read, at_s, DAY_S), at_s, places, truth, idw)
 
 
 def idw_of(read: Readings, width_m: float, height_m: float, cell_m: float) -> Floats:
@@ -85,23 +84,9 @@ def idw_of(read: Readings, width_m: float, height_m: float, cell_m: float) -> Fl
     ).values.astype(np.float64)
 
 
-def as_received(read: Readings, at_s: float) -> Readings:
-    """A twin's input of an estimate, by seconds from `at_s` on."""
-    tags = []
-    for tag, (x, y) in enumerate(read.xy):
-        rows = np.flatnonzero(read.tag == tag)
-        own = zip((read.time_s[rows] * 1e9).round(), read.value[rows], strict=True)
-        tags.append(TagPast(str(tag), x, y, tuple((int(ns), float(value)) for ns, value in own)))
-    return readings_of(tags, round(at_s * 1e9), 24.0 * HOUR_S)
-
-
-def judged(case: Case, model: Model | None = None) -> Field:
-    model = fit(case.readings) if model is None else model
-    return compared(case, *model.posterior(case.readings, case.at_s).points(case.places))
-
-
-def compared(case: Case, mean: Floats, sd: Floats) -> Field:
+def judged(case: Case) -> Field:
     """An estimate of the case's positions, compared with IDW's and the truth."""
+    mean, sd = fit(case.readings).posterior(case.readings, case.at_s).points(case.places)
     painted = np.isfinite(case.idw)
     of_idw = rmse(case.idw[painted] - case.truth[painted])
     off = case.truth - mean

@@ -242,34 +242,30 @@ def test_clients_of_a_replica_that_stops_under_load_are_back_in_time(
     tmp_path: Path, number: signal.Signals
 ) -> None:
     with running(tmp_path) as greenhouse:
-        stop_under_load(greenhouse, number)
-
-
-def stop_under_load(greenhouse: Greenhouse, number: signal.Signals) -> None:
-    screens = [Screen(ws(greenhouse)) for _ in range(CLIENTS)]
-    threads = [threading.Thread(target=screen.run) for screen in screens]
-    load = Load(f"{greenhouse.url}/gh1/api/field?sensor_type=co2&resolution=0.02")
-    threads.append(threading.Thread(target=load.run))
-    for thread in threads:
-        thread.start()
-    try:
-        wait_for(lambda: all(screen.gaps_s for screen in screens), "frames at all clients")
-        wait_for(lambda: load.answers > 10, "answers under load")
-        before = load.answers
-        # A busy machine may be late once.
-        assert any(
-            longest_gap_s(greenhouse, screens, replica, number) < BACK_WITHIN_S
-            for replica in greenhouse.replicas[:2]
-        )
-        wait_for(lambda: load.answers > before + 10, "answers from the others")
-    finally:
-        load.is_over = True
-        for screen in screens:
-            screen.is_over = True
+        screens = [Screen(ws(greenhouse)) for _ in range(CLIENTS)]
+        threads = [threading.Thread(target=screen.run) for screen in screens]
+        load = Load(f"{greenhouse.url}/gh1/api/field?sensor_type=co2&resolution=0.02")
+        threads.append(threading.Thread(target=load.run))
         for thread in threads:
-            thread.join()
-    assert [screen.problem for screen in screens] == [None] * CLIENTS
-    assert load.refused == [], "nginx tries another replica"
+            thread.start()
+        try:
+            wait_for(lambda: all(screen.gaps_s for screen in screens), "frames at all clients")
+            wait_for(lambda: load.answers > 10, "answers under load")
+            before = load.answers
+            # A busy machine may be late once.
+            assert any(
+                longest_gap_s(greenhouse, screens, replica, number) < BACK_WITHIN_S
+                for replica in greenhouse.replicas[:2]
+            )
+            wait_for(lambda: load.answers > before + 10, "answers from the others")
+        finally:
+            load.is_over = True
+            for screen in screens:
+                screen.is_over = True
+            for thread in threads:
+                thread.join()
+        assert [screen.problem for screen in screens] == [None] * CLIENTS
+        assert load.refused == [], "nginx tries another replica"
 
 
 @dataclass

@@ -7,7 +7,7 @@ error than IDW's.
 """
 
 from collections import defaultdict
-from collections.abc import Iterator
+from itertools import product
 from math import erf, exp, pi, sqrt
 from typing import NamedTuple
 
@@ -46,15 +46,6 @@ class Case(NamedTuple):
     idw: Floats
 
 
-def cases() -> Iterator[tuple[str, str, Case]]:
-    """(sort, phase, case)."""
-    for sort in SORTS:
-        for seed in JUDGING:
-            world = world_of(sort, seed)
-            for phase in PHASES:
-                yield sort, phase, case_of(world, phase, seed)
-
-
 def case_of(world: World, phase: str, seed: int) -> Case:
     hours, silent_h = PHASES[phase]
     drives_s = world.round_s if hours is None else hours * HOUR_S
@@ -63,25 +54,20 @@ def case_of(world: World, phase: str, seed: int) -> Case:
     width, height = (int(side / CELL_M) for side in world.size_m)
     x, y = (np.arange(width) + 0.5) * CELL_M, (np.arange(height) + 0.5) * CELL_M
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    idw = idw_of(all_read, width * CELL_M, height * CELL_M, CELL_M)
-    truth = world.truth(places, np.full(len(places), at_s))
-    return Case(thinned(all_read, at_s, DAY_S), at_s, places, truth, idw)
-
-
-def idw_of(read: Readings, width_m: float, height_m: float, cell_m: float) -> Floats:
-    """The plain field of the latest readings over a floor, cell by cell."""
-    latest = {int(tag): row for row, tag in enumerate(read.tag)}
-    return compute_idw_field(
-        [(*read.xy[tag].tolist(), float(read.value[row])) for tag, row in latest.items()],
+    latest = {int(tag): row for row, tag in enumerate(all_read.tag)}
+    idw = compute_idw_field(
+        [(*world.xy[tag].tolist(), float(all_read.value[row])) for tag, row in latest.items()],
         bbox_min_x=0.0,
         bbox_min_y=0.0,
-        bbox_max_x=width_m,
-        bbox_max_y=height_m,
-        resolution=cell_m,
+        bbox_max_x=width * CELL_M,
+        bbox_max_y=height * CELL_M,
+        resolution=CELL_M,
         falloff_radius_m=RULES.falloff_radius_m,
         max_distance_m=RULES.max_distance_m,
         power=RULES.idw_power,
     ).values.astype(np.float64)
+    truth = world.truth(places, np.full(len(places), at_s))
+    return Case(thinned(all_read, at_s, DAY_S), at_s, places, truth, idw)
 
 
 def judged(case: Case) -> Field:
@@ -123,10 +109,12 @@ def line(name: str, fields: list[Field]) -> str:
 
 def main() -> None:
     rows: dict[str, list[Field]] = defaultdict(list)
-    for sort, phase, case in cases():
-        field = judged(case)
-        for name in (sort, phase, "all"):
-            rows[name].append(field)
+    for sort, seed in product(SORTS, JUDGING):
+        world = world_of(sort, seed)
+        for phase in PHASES:
+            field = judged(case_of(world, phase, seed))
+            for name in (sort, phase, "all"):
+                rows[name].append(field)
     print(f"{'':<26}{'fields':>7}{'to IDW':>9}{'covers':>9}{'CRPS':>9}{'narrow':>8}{'worse':>8}")
     for name in (*SORTS, *PHASES, "all"):
         print(line(name, rows[name]))

@@ -17,7 +17,7 @@ from lupin_msgs.srv import GetField
 from lupin_bridge.stream import schema
 from lupin_twin.core.drops import MAX_BLOOMS_PER_TAG, MAX_SENSORS_PER_TAG, MAX_TAGS, MAX_TEXT_LENGTH
 from tests.support.domains import own_domain
-from tests.support.hostile import ANY, MEGABYTE, NAN, TEXTS, any_state, damaged, long_lies
+from tests.support.hostile import ANY, MEGABYTE, NAN, TEXTS, anything, damaged, long_lies
 from tests.support.live import attached, field_of, serve_and_web, wait_until_ready
 from tests.support.messages import discovered, inspection, pose, scan
 from tests.support.proc_stat import peak_mb, reset_peak, resident_mb
@@ -196,7 +196,7 @@ def test_a_bridge_apart_survives_an_invalid_twin() -> None:
         peer.until(lambda: peer.node.count_subscribers(topic), "the bridge")
         memory = None
         for number in range(LOTS * LOT):
-            state = any_state(chance)
+            state = anything(TwinState, chance)
             if number % LOT == 0:
                 peer.publisher(topic, TwinState, depth=1).publish(chance.choice(state_lies))
             elif number % 2:

@@ -142,6 +142,15 @@ def pour(client: socket.socket, what: bytes) -> int:
     return taken
 
 
+def connected(stack: ExitStack, live: Served, room: int | None = None) -> socket.socket:
+    """A client, over TLS if the bridge is."""
+    client = stack.enter_context(raw_http.connect(live.url, room=room))
+    if isinstance(live.trust, ssl.SSLContext):
+        secured = live.trust.wrap_socket(client, server_hostname="127.0.0.1")
+        client = stack.enter_context(secured)
+    return client
+
+
 CHUNKS = b"1\r\na\r\n" * 10_000
 BODIES = {
     "chunks": (b"GET / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n", CHUNKS),
@@ -159,11 +168,7 @@ def test_a_body_is_refused_and_not_read(
     live = plain if over == "tcp" else secret
     head, piece = BODIES[name]
     with ExitStack() as stack:
-        client = stack.enter_context(raw_http.connect(live.url))
-        if isinstance(live.trust, ssl.SSLContext):
-            client = stack.enter_context(
-                live.trust.wrap_socket(client, server_hostname="127.0.0.1")
-            )
+        client = connected(stack, live)
         before_s = cpu_s(live.process.pid)
         client.sendall(head + HOST)
         assert status(client.recv(65_536)) == 413, "before any of the body has come"
@@ -197,11 +202,7 @@ def test_a_client_that_reads_no_refusal_is_gone_after_the_timeout(
     reset_peak(pid)
     with ExitStack() as stack:
         for refused in REFUSED.values():
-            client = stack.enter_context(raw_http.connect(live.url, room=4_096))
-            if isinstance(live.trust, ssl.SSLContext):
-                client = stack.enter_context(
-                    live.trust.wrap_socket(client, server_hostname="127.0.0.1")
-                )
+            client = connected(stack, live, room=4_096)
             client.settimeout(0.2)
             with suppress(OSError):  # it may no longer be listening
                 client.sendall(refused * 3_000)

@@ -16,14 +16,14 @@ from websockets.sync.client import connect
 
 from tests.support.access import BEARER, OWN, TOKEN
 from tests.support.domains import own_domain
-from tests.support.live import attached, wait_until_ready
-from tests.support.messages import scan
+from tests.support.live import attached, field_of, wait_until_ready
+from tests.support.messages import inspection, occupancy_grid, scan
 from tests.support.nginx import nginx
 from tests.support.processes import OFTEN, lupin_twin, twin_node
 from tests.support.ros import Peer
 from tests.support.rosbridge import Ros
 from tests.support.waiting import PATIENCE_S, wait_for
-from tests.support.web import Bridge
+from tests.support.web import Bridge, without_ages
 
 # How long a client may be without news of the twin (docs/how-to/clients-javascript.md).
 BACK_WITHIN_S = 3.5
@@ -48,17 +48,30 @@ def running(folder: Path) -> Iterator[Greenhouse]:
         peer = stack.enter_context(Peer(domain))
         options = ("--path-prefix", "/gh1", "--trusted-proxy", "127.0.0.1")
         named = ("--allow-host", "twin.example")
-        processes = [
-            stack.enter_context(lupin_twin(domain, "web", *options, *named, LUPIN_TOKEN=TOKEN))
-            for _ in range(3)
-        ]
-        replicas = [stack.enter_context(attached(process, peer)) for process in processes]
-        for replica in replicas:
-            replica.http.headers.update(BEARER)
-            wait_until_ready(replica)
+
+        def replica() -> Bridge:
+            process = lupin_twin(domain, "web", *options, *named, LUPIN_TOKEN=TOKEN)
+            made = stack.enter_context(attached(stack.enter_context(process), peer))
+            made.http.headers.update(BEARER)
+            wait_until_ready(made)
+            return made
+
+        first = replica()
+        # The others never receive the first of these maps, nor the first reading of "a".
+        peer.publish_map(occupancy_grid([[0, 0], [0, 100]]))
         peer.observe(scan("a", {"co2": 400.0}, (0, 0)))
-        for replica in replicas:
-            replica.tag("a")
+        first.tag("a")
+        wait_for(lambda: first.get("/api/map").status_code == 200, "the map")
+        peer.publish_map(occupancy_grid([[0, -1], [0, 100]]))
+        peer.observe(
+            scan("a", {"co2": 500.0}),
+            scan("b", {"co2": 700.0, "humidity": float("nan")}, (1, 0)),
+            inspection("a", "lupin", blooms=[(0.1, 0.1)], footprint=[(0, 0), (1, 0), (1, 1)]),
+        )
+        replicas = [first, replica(), replica()]
+        for each in replicas:
+            each.tag("b")
+            each.tag("a", lambda tag: tag["flowers"])
         ports = [int(replica.url.rpartition(":")[2]) for replica in replicas]
         yield Greenhouse(stack.enter_context(nginx(folder, ports)), replicas, peer)
 
@@ -126,6 +139,36 @@ def test_limits_and_logs_go_by_the_client_and_not_by_nginx(greenhouse: Greenhous
     assert "203.0.113.9" not in message
     url = f"{greenhouse.url}/gh1/api/state"
     assert httpx.get(url, headers=BEARER, trust_env=False, timeout=PATIENCE_S).is_success
+
+
+# --- the same from each replica ------------------------------------------------------------------
+
+FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.25}
+WITH_ETAGS: tuple[tuple[str, dict[str, Any]], ...] = (
+    *((f"/api/field.{suffix}", FIELD) for suffix in ("json", "npy", "png")),
+    *(("/api/map", {}), ("/api/map.png", {})),
+)
+
+
+def test_replicas_give_the_same_answers_and_take_each_others_etags(greenhouse: Greenhouse) -> None:
+    first, *others = greenhouse.replicas
+    assert field_of(first, **FIELD).json()["sample_count"] == 2
+    for other in others:
+        field_of(other, **FIELD)
+        # The latest map, and a state's times, come after the state.
+        for path, query in WITH_ETAGS:
+            wait_for(
+                lambda: first.get(path, **query).content == other.get(path, **query).content,  # noqa: B023
+                f"the same {path}",
+            )
+            etag = first.get(path, **query).headers["etag"]
+            again = other.get(path, {"If-None-Match": etag}, **query)
+            assert (again.status_code, again.headers["etag"]) == (304, etag)
+
+        def state(of: Bridge) -> Any:
+            return without_ages(of.json("/api/state"))
+
+        wait_for(lambda: state(first) == state(other), "the same state")  # noqa: B023
 
 
 # --- a replica stops ------------------------------------------------------------------------------
@@ -199,34 +242,30 @@ def test_clients_of_a_replica_that_stops_under_load_are_back_in_time(
     tmp_path: Path, number: signal.Signals
 ) -> None:
     with running(tmp_path) as greenhouse:
-        stop_under_load(greenhouse, number)
-
-
-def stop_under_load(greenhouse: Greenhouse, number: signal.Signals) -> None:
-    screens = [Screen(ws(greenhouse)) for _ in range(CLIENTS)]
-    threads = [threading.Thread(target=screen.run) for screen in screens]
-    load = Load(f"{greenhouse.url}/gh1/api/field?sensor_type=co2&resolution=0.02")
-    threads.append(threading.Thread(target=load.run))
-    for thread in threads:
-        thread.start()
-    try:
-        wait_for(lambda: all(screen.gaps_s for screen in screens), "frames at all clients")
-        wait_for(lambda: load.answers > 10, "answers under load")
-        before = load.answers
-        # A busy machine may be late once.
-        assert any(
-            longest_gap_s(greenhouse, screens, replica, number) < BACK_WITHIN_S
-            for replica in greenhouse.replicas[:2]
-        )
-        wait_for(lambda: load.answers > before + 10, "answers from the others")
-    finally:
-        load.is_over = True
-        for screen in screens:
-            screen.is_over = True
+        screens = [Screen(ws(greenhouse)) for _ in range(CLIENTS)]
+        threads = [threading.Thread(target=screen.run) for screen in screens]
+        load = Load(f"{greenhouse.url}/gh1/api/field?sensor_type=co2&resolution=0.02")
+        threads.append(threading.Thread(target=load.run))
         for thread in threads:
-            thread.join()
-    assert [screen.problem for screen in screens] == [None] * CLIENTS
-    assert load.refused == [], "nginx tries another replica"
+            thread.start()
+        try:
+            wait_for(lambda: all(screen.gaps_s for screen in screens), "frames at all clients")
+            wait_for(lambda: load.answers > 10, "answers under load")
+            before = load.answers
+            # A busy machine may be late once.
+            assert any(
+                longest_gap_s(greenhouse, screens, replica, number) < BACK_WITHIN_S
+                for replica in greenhouse.replicas[:2]
+            )
+            wait_for(lambda: load.answers > before + 10, "answers from the others")
+        finally:
+            load.is_over = True
+            for screen in screens:
+                screen.is_over = True
+            for thread in threads:
+                thread.join()
+        assert [screen.problem for screen in screens] == [None] * CLIENTS
+        assert load.refused == [], "nginx tries another replica"
 
 
 @dataclass

@@ -1,6 +1,5 @@
 """The wire format: names, types and order are shared with the robot's own packages, for good."""
 
-import re
 from pathlib import Path
 
 import pytest
@@ -105,12 +104,10 @@ def lines_of(name: str) -> list[str]:
     return (PACKAGE / name).read_text(encoding="utf-8").splitlines()
 
 
-def test_exactly_these_interfaces_exist_and_all_are_built() -> None:
+def test_exactly_these_interfaces_exist() -> None:
+    """The package's own tests check that all of them are built."""
     files = {p.relative_to(PACKAGE).as_posix() for p in PACKAGE.glob("*/*") if p.suffix in _KINDS}
     assert files == set(WIRE_FORMAT)
-    cmake = (PACKAGE / "CMakeLists.txt").read_text(encoding="utf-8")
-    built = re.findall(r"^ +((?:msg|srv|action)/\w+\.\w+)$", cmake, re.MULTILINE)
-    assert sorted(built) == sorted(WIRE_FORMAT)
 
 
 @pytest.mark.parametrize("name", WIRE_FORMAT)

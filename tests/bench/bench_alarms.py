@@ -8,7 +8,7 @@ import os
 import statistics
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from random import Random
 
 from lupin_bridge.alarms.feed import LOT, REACH_COUNT
@@ -66,24 +66,23 @@ def alarms_of(tags: int) -> None:
     row(tags, f"start: all {len(found.alarms):,} alarms reported", ms_since(start))
     took_mb = resident_mb(os.getpid()) - before_mb
     print(f"{'':>7}  memory of that, without the scans received: {took_mb:.0f} MB")
-    took = []
-    for change in range(CHANGES):
-        now_ns += S
-        one = write(len(received) + change + 1, str(change), now_ns, [*MIDDLE.values()])
-        start = time.thread_time()
-        fold.take([one])
-        fold.found(now_ns)
-        took.append(ms_since(start))
-    row(tags, "alarms: one scan", statistics.median(took), max(took))
-    took = []
-    for change in range(CHANGES):
-        late_ns = received[-1].stamp_ns - (change + 1) * (received[-1].stamp_ns // 100)
-        one = write(2 * len(received) + change, str(change), late_ns, [*MIDDLE.values()])
-        start = time.thread_time()
-        fold.take([one])
-        fold.found(now_ns)
-        took.append(ms_since(start))
-    row(tags, "alarms: one scan, hours to days late", statistics.median(took), max(took))
+
+    def changed(name: str, writes: Iterable[PastWrite], now_ns: int) -> None:
+        took = []
+        for one in writes:
+            start = time.thread_time()
+            fold.take([one])
+            fold.found(max(now_ns, one.stamp_ns))
+            took.append(ms_since(start))
+        row(tags, name, statistics.median(took), max(took))
+
+    numbers, values = range(1, CHANGES + 1), [*MIDDLE.values()]
+    news = [write(len(received) + n, str(n), now_ns + n * S, values) for n in numbers]
+    changed("alarms: one scan", news, now_ns)
+    late = [
+        write(2 * len(received) + n, str(n), now_ns - n * (now_ns // 100), values) for n in numbers
+    ]
+    changed("alarms: one scan, hours to days late", late, news[-1].stamp_ns)
 
 
 def row(tags: int, name: str, took_ms: float, most_ms: float | None = None) -> None:

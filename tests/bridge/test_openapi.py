@@ -7,16 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from lupin_bridge.app import document
-from tests.support.web import ROUTES
 
 DOCUMENT: dict[str, Any] = json.loads(document())
-
-
-def test_it_lists_every_route_of_the_contract_and_no_others() -> None:
-    described = {route for route, documented in ROUTES.items() if documented}
-    # Only for people, and only for programs: see test_people and test_observations.
-    described |= {"/api/notes/{note_id}", "/api/audit", "/api/observations", "/api/push"}
-    assert set(DOCUMENT["paths"]) == described
 
 
 def test_only_the_writing_routes_have_more_than_get() -> None:

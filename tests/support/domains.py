@@ -35,12 +35,13 @@ def own_domain() -> Iterator[int]:
     raise RuntimeError("all ROS domains are in use")
 
 
-def _is_lived_in(domain: int, table: Path = Path("/proc/net/udp")) -> bool:
+def _is_lived_in(domain: int) -> bool:
     """Whether a process that no test has started uses the domain, such as a twin at work.
 
     It would receive what tests publish, and vice versa. Found by the ports of DDS.
     """
-    addresses = (line.split()[1] for line in table.read_text(encoding="ascii").splitlines()[1:])
+    table = Path("/proc/net/udp").read_text(encoding="ascii").splitlines()[1:]
+    addresses = (line.split()[1] for line in table)
     return any(int(address.rpartition(":")[2], 16) in _ports_of(domain) for address in addresses)
 
 
@@ -49,12 +50,12 @@ def _ports_of(domain: int) -> range:
     return range(7400 + 250 * domain, 7400 + 250 * (domain + 1))
 
 
-def _remove_ports_of(domain: int, folder: Path = SHARED_MEMORY) -> None:
+def _remove_ports_of(domain: int) -> None:
     """Remove the ports of killed processes in a domain, which would block others."""
     for port in _ports_of(domain):
         for name in (f"fastrtps_port{port}", f"fastrtps_port{port}_el"):
-            (folder / name).unlink(missing_ok=True)
-        (folder / f"sem.fastrtps_port{port}_mutex").unlink(missing_ok=True)
+            (SHARED_MEMORY / name).unlink(missing_ok=True)
+        (SHARED_MEMORY / f"sem.fastrtps_port{port}_mutex").unlink(missing_ok=True)
 
 
 _leases = 0

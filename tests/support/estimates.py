@@ -33,9 +33,9 @@ def spot_at(place: FloatArray, hour: float) -> Spot:
     return Spot(float(place[0]), float(place[1]), hour)
 
 
-def a_day(tags: int = 8, passes: int = 12, seed: int = 0) -> Readings:
+def a_day(tags: int = 8, passes: int = 12) -> Readings:
     """A greenhouse with a warm end, scanned in rounds over a day, °C."""
-    chance = np.random.default_rng(seed)
+    chance = np.random.default_rng(0)
     xy = chance.uniform((0.0, 0.0), (4.0, 8.0), (tags, 2))
     time_s = np.sort(chance.uniform(0.0, DAY_S, tags * passes))
     tag = np.tile(np.arange(tags), passes)
@@ -49,16 +49,6 @@ def an_estimate(width: int, height: int, sd_known: float = 2.25) -> Estimate:
     mean, sd = cells + np.float32(20.0), cells * np.float32(0.5)
     grid = EstimateGrid(width, height, -1.0, 2.0, 0.5, mean, sd, sd < sd_known, sd_known)
     return Estimate(grid, 3, 7)
-
-
-def many_tags(tags: int, passes: int, metres: float, seed: int = 0) -> Readings:
-    """A large greenhouse, warm here and cold there, standardised, in rounds of 45 minutes."""
-    chance = np.random.default_rng(seed)
-    xy = chance.uniform(0.0, metres, (tags, 2))
-    time_s = np.sort(chance.uniform(0.0, passes * 2_700.0, tags * passes))
-    tag = np.concatenate([chance.permutation(tags) for _ in range(passes)])
-    value = np.sin(2.0 * np.pi * time_s / DAY_S) + 0.5 * np.sin(xy[tag, 0])
-    return Readings(time_s, tag, value + chance.normal(0.0, 0.15, len(tag)), xy)
 
 
 _HOURS = st.floats(0.0, 24.0).map(lambda hour: round(hour, 1))

@@ -1,6 +1,7 @@
 """ROS messages that no healthy robot sends."""
 
 import random
+import re
 from array import array
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
@@ -12,16 +13,7 @@ import nav_msgs.msg
 import rcl_interfaces.msg
 import std_msgs.msg
 import type_description_interfaces.msg
-from geometry_msgs.msg import Point, Point32, Pose, Quaternion
-from lupin_msgs.msg import (
-    DiscoveredTag,
-    DiscoveredTags,
-    FlowerPoint,
-    Observation,
-    SensorReading,
-    TwinState,
-    TwinTagState,
-)
+from lupin_msgs.msg import DiscoveredTags, Observation
 from nav_msgs.msg import OccupancyGrid
 from rclpy.serialization import serialize_message
 
@@ -48,124 +40,68 @@ TEXTS: Final = (
     *('"', "\\", "'; DROP TABLE", "nan", "null", "0", "-1", "__proto__", "x" * 256, "x" * 257),
 )
 MEGABYTE: Final = "m" * 1_000_000
-SECONDS: Final = (0, 1, -1, -(2**31), 2**31 - 1, 1_700_000_000)
-NANOSECONDS: Final = (0, 999_999_999, 1_000_000_000, 2**32 - 1)
+VALUES: Final[Mapping[str, Any]] = {
+    "string": TEXTS,
+    "double": DOUBLES,
+    "float": FLOATS,
+    "boolean": (True, False),
+    "uint8": (0, 0, 0, 1, 1, 2, 3, 255),
+    "uint16": (0, 65_535),
+    "int32": (0, 1, -1, -(2**31), 2**31 - 1, 1_700_000_000),  # seconds
+    "uint32": (0, 999_999_999, 1_000_000_000, 2**32 - 1),  # nanoseconds
+}
+Leaf = Callable[[str, random.Random], Any]
 
 
-def any_pose(chance: random.Random) -> Any:
-    """A pose with any numbers."""
-    return Pose(
-        position=Point(**{axis: chance.choice(DOUBLES) for axis in "xyz"}),
-        orientation=Quaternion(**{axis: chance.choice(DOUBLES) for axis in "xyzw"}),
-    )
+def extreme(kind: str, chance: random.Random) -> Any:
+    """A number or a text that no healthy robot sends."""
+    return chance.choice(VALUES[kind])
 
 
-def any_stamp(stamp: Any, chance: random.Random) -> None:
-    """Set a stamp to any time."""
-    stamp.sec, stamp.nanosec = chance.choice(SECONDS), chance.choice(NANOSECONDS)
+def anything(message_type: Any, chance: random.Random, leaf: Leaf = extreme) -> Any:
+    """A message of any type, with any content that its types allow."""
+    message = message_type()
+    for name, kind in message_type.get_fields_and_field_types().items():
+        setattr(message, name, _any_value(kind, chance, leaf))
+    return message
 
 
-def any_readings(chance: random.Random, count: int) -> list[Any]:
-    """Readings with any names, often the same ones."""
-    return [
-        SensorReading(name=chance.choice(TEXTS), value=chance.choice(DOUBLES)) for _ in range(count)
-    ]
-
-
-def fill_flower(flower: Any, chance: random.Random) -> None:
-    """Fill the fields that a FlowerObservation and a TwinTagState share."""
-    flower.species = chance.choice(TEXTS)
-    flower.anomaly = chance.random() < 0.5
-    flower.flower_count = flower.bug_count = 65_535
-    flower.flowers = [
-        FlowerPoint(
-            position=any_pose(chance).position,
-            height_m=chance.choice(FLOATS),
-            species=chance.choice(TEXTS),
-            confidence=chance.choice(FLOATS),
-        )
-        for _ in range(chance.randrange(5))
-    ]
-    flower.box_footprint.points = [
-        Point32(**{axis: chance.choice(FLOATS) for axis in "xyz"})
-        for _ in range(chance.randrange(80))
-    ]
+def _any_value(kind: str, chance: random.Random, leaf: Leaf) -> Any:
+    if sequence := re.fullmatch(r"sequence<(.+?)(?:, (\d+))?>", kind):
+        count = chance.randrange(min(int(sequence[2] or 12), 12) + 1)
+        return [_any_value(sequence[1], chance, leaf) for _ in range(count)]
+    if fixed := re.fullmatch(r"(.+)\[(\d+)\]", kind):
+        return [_any_value(fixed[1], chance, leaf) for _ in range(int(fixed[2]))]
+    if "/" in kind:
+        package, _, name = kind.partition("/")
+        return anything(getattr(PACKAGES[package], name), chance, leaf)
+    return leaf(kind, chance)
 
 
 def any_observation(chance: random.Random) -> Any:
-    """An observation of any kind, with any content."""
-    msg = Observation(
-        kind=chance.choice((0, 0, 1, 1, 2, 255)),
-        status=chance.choice((0, 0, 0, 1, 3, 255)),
-        mission_id=chance.choice(TEXTS),
-        source=chance.choice(TEXTS),
-        status_detail=chance.choice(TEXTS),
-        tag_pose_in_map=any_pose(chance),
-    )
+    """An observation of any kind, with any content, often in the right frame."""
+    msg = anything(Observation, chance)
     msg.header.frame_id = chance.choice(("map", "map", "", "odom", TEXTS[5]))
-    any_stamp(msg.header.stamp, chance)
-    any_stamp(msg.tag_reading.stamp, chance)
-    msg.tag_reading.tag_id = msg.flower.tag_id = chance.choice(TEXTS)
-    msg.tag_reading.sim_time_of_day_seconds = chance.choice(DOUBLES)
-    msg.tag_reading.readings = any_readings(chance, chance.randrange(12))
-    msg.flower.pose.pose = any_pose(chance)
-    msg.flower.confidence = chance.choice(FLOATS)
-    fill_flower(msg.flower, chance)
+    msg.flower.pose.header.frame_id = ""
     return msg
 
 
 def any_discovery(chance: random.Random) -> Any:
     """Discovered tags at any positions."""
-    msg = DiscoveredTags(
-        tags=[
-            DiscoveredTag(
-                tag_id=chance.choice(TEXTS),
-                pose_in_map=any_pose(chance),
-                species=chance.choice(TEXTS),
-                species_confidence=chance.choice(FLOATS),
-                sightings=2**32 - 1,
-            )
-            for _ in range(chance.randrange(9))
-        ]
-    )
+    msg = anything(DiscoveredTags, chance)
     msg.header.frame_id = chance.choice(("map", "", "odom"))
     return msg
 
 
 def any_map(chance: random.Random) -> Any:
     """A map whose size, position and cells need not agree."""
-    msg = OccupancyGrid()
+    msg = OccupancyGrid(info=anything(nav_msgs.msg.MapMetaData, chance))
     msg.header.frame_id = chance.choice(("map", "", "odom"))
-    any_stamp(msg.header.stamp, chance)
     msg.info.resolution = chance.choice((*FLOATS, 0.05, -0.05))
-    msg.info.width = chance.choice((0, 1, 3, 2**16, 2**32 - 1))
-    msg.info.height = chance.choice((0, 1, 3, 2**16, 2**32 - 1))
-    msg.info.origin = any_pose(chance)
+    msg.info.width, msg.info.height = (chance.choice((0, 1, 3, 2**16, 2**32 - 1)) for _ in "xy")
     cells = chance.choice((0, 1, 3, 9, 10))
     msg.data = array("b", [chance.randrange(-128, 128) for _ in range(cells)])
     return msg
-
-
-def any_state(chance: random.Random) -> Any:
-    """A TwinState that no twin publishes: the same tag twice, NaN and infinity."""
-    msg = TwinState(tags=[any_tag_state(chance) for _ in range(chance.randrange(20))])
-    msg.header.frame_id = chance.choice(TEXTS)
-    any_stamp(msg.header.stamp, chance)
-    return msg
-
-
-def any_tag_state(chance: random.Random) -> Any:
-    """One of its tags."""
-    tag = TwinTagState(
-        tag_id=chance.choice(TEXTS),
-        pose=any_pose(chance),
-        readings=any_readings(chance, chance.randrange(12)),
-        stale_seconds=chance.choice(FLOATS),
-        species_confidence=chance.choice(FLOATS),
-    )
-    any_stamp(tag.last_observed, chance)
-    fill_flower(tag, chance)
-    return tag
 
 
 ANY: Final[Mapping[str, Callable[[random.Random], Any]]] = {

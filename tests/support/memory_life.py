@@ -34,20 +34,30 @@ NOWHERE = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 class Twin:
     """One run of a twin over a file, without ROS; the test sets its clocks."""
 
-    def __init__(self, path: Path, at_s: float, *, is_simulated: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path | None,
+        at_s: float,
+        *,
+        is_simulated: bool = False,
+        wall_s: float | None = None,
+    ) -> None:
         self.store = TwinStore()
         self.steady_s = 1_000.0
         self.is_simulated = is_simulated
         self.memory = Memory(
             self.store, open_journal(path, "/twin", 1e4, 1e4), lambda: int(self.steady_s * S)
         )
-        self.at(at_s)
+        self.at(at_s, wall_s=wall_s)
 
-    def at(self, at_s: float, *, passed_s: float = 0.0) -> None:
-        """Set the clock to `at_s`, s after `NOW`; `passed_s` by the steady clock."""
+    def at(self, at_s: float, *, passed_s: float = 0.0, wall_s: float | None = None) -> None:
+        """Set the clock to `at_s`, s after `NOW`; `passed_s` by the steady clock.
+
+        A simulated clock counts from 0, and the wall clock may be elsewhere.
+        """
         self.steady_s += passed_s
         self.now_ns = int(at_s * S) + (0 if self.is_simulated else NOW)
-        self.wall_ns = NOW + int(at_s * S)
+        self.wall_ns = NOW + int((at_s if wall_s is None else wall_s) * S)
         now = Clock(self.now_ns, self.wall_ns, self.is_simulated)
         self.memory.follow(now)
         self.memory.clamp_to(now)
@@ -115,8 +125,9 @@ def by_id(snapshot: Snapshot) -> dict[str, TagState]:
 
 
 @contextmanager
-def twin(path: Path, at_s: float = 0.0, *, is_simulated: bool = False) -> Iterator[Twin]:
-    life = Twin(path, at_s, is_simulated=is_simulated)
+def twin(path: Path | None, at_s: float = 0.0, **of: Any) -> Iterator[Twin]:
+    """One run, with a simulated clock or another wall clock (`Twin`)."""
+    life = Twin(path, at_s, **of)
     try:
         yield life
     finally:

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import httpx
 from argon2 import PasswordHasher
-from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import ClientConnection
 
 from lupin_bridge.access.accounts import Accounts, make_file
 from lupin_bridge.access.credentials import Kind, Role, digest
@@ -104,12 +102,3 @@ def in_s(live: Bridge, seconds: float) -> str:
     """A moment of the twin's time."""
     now = live.get("/api/state", BEARER).json()["header"]["stamp"]
     return f"{now['sec'] + seconds:.0f}"
-
-
-def end_of(connection: ClientConnection) -> str:
-    """The reason with which a WebSocket was closed."""
-    try:
-        while True:
-            connection.recv(timeout=PATIENCE_S)
-    except ConnectionClosed as ended:
-        return "" if ended.rcvd is None else ended.rcvd.reason

@@ -1,7 +1,6 @@
 """An HTTP client that can send what no proper client would: bytes in, bytes out."""
 
 import socket
-import ssl
 from contextlib import suppress
 from urllib.parse import urlsplit
 
@@ -46,15 +45,11 @@ def received(client: socket.socket) -> bytes:
     return b"".join(blocks)
 
 
-def answer(url: str, message: bytes, trust: ssl.SSLContext | None = None) -> bytes:
+def answer(url: str, message: bytes) -> bytes:
     """All bytes after this request, until the other side ends the connection."""
-    with connect(url) as plain:
-        if trust is None:
-            plain.sendall(message)
-            return received(plain)
-        with trust.wrap_socket(plain, server_hostname="127.0.0.1") as client:
-            client.sendall(message)
-            return received(client)
+    with connect(url) as client:
+        client.sendall(message)
+        return received(client)
 
 
 def status(message: bytes) -> int:

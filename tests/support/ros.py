@@ -1,6 +1,7 @@
 """The other side of the topics: a ROS node of the test's own, in the test's own process."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, Self, TypeVar
 
 import rclpy
@@ -31,6 +32,19 @@ def clock_at(seconds: float) -> Clock:
     clock.clock.sec = int(seconds)
     clock.clock.nanosec = int((seconds % 1) * 1e9)
     return clock
+
+
+@contextmanager
+def node_in(domain: int, make: Callable[[Context], T], *args: str) -> Iterator[T]:
+    """A node in this process, with a context of its own; nobody spins it."""
+    context = Context()
+    rclpy.init(args=list(args), context=context, domain_id=domain)
+    try:
+        node: Any = make(context)
+        yield node
+        node.destroy_node()
+    finally:
+        rclpy.try_shutdown(context=context)
 
 
 class Peer:

@@ -78,7 +78,6 @@ class Alarms(AlarmBoard):
         self,
         alarms: Iterable[Alarm],
         source: AlarmSource = "journal",
-        since_ns: int | None = 1,
         *,
         is_past: bool = False,
     ) -> None:
@@ -86,4 +85,4 @@ class Alarms(AlarmBoard):
         before, found = self.now, board_of(alarms)
         change = change_between(before, found)
         found = before if found.alarms == before.alarms else found
-        self.put(found, replace(change, is_past=is_past), source, since_ns)
+        self.put(found, replace(change, is_past=is_past), source, 1)

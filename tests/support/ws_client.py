@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
@@ -28,3 +29,12 @@ def open_websocket(
         **options,
     )
     return connection
+
+
+def last_word(connection: ClientConnection) -> tuple[int, str]:
+    """Read on to the end; the code and the reason with which the server closed it."""
+    try:
+        while True:
+            connection.recv(timeout=PATIENCE_S)
+    except ConnectionClosed as closed:
+        return (0, "") if closed.rcvd is None else (closed.rcvd.code, closed.rcvd.reason)

@@ -19,7 +19,7 @@ from lupin_twin.journal.runs import Clock
 from lupin_twin.ros.node import TwinNode
 from tests.support.inprocess import started
 from tests.support.journal import SECOND, append, scan
-from tests.support.past_queries import Endless
+from tests.support.past_queries import endless
 from tests.support.waiting import PATIENCE_S, until
 
 NOTE = Note("", time.time_ns(), "anna", COMMENT, "site", "a comment")
@@ -92,13 +92,13 @@ async def test_a_query_that_takes_too_long_ends_and_delays_no_observation(domain
     async with started(LocalTwin) as (twin, _):
         await until(lambda: twin.journal().state == "recording", "the journal")
         await twin.past.ask(partial(as_found, 0), await twin.now(), 0.0)
-        waiting = asyncio.create_task(twin.ask(Endless(), 0.0))
+        waiting = asyncio.create_task(twin.ask(endless, 0.0))
         await until(lambda: len(twin.past.pending) == 1, "the query")
         # Meanwhile the ROS thread answers as usual.
         await twin.thread.call(lambda node: node.notify_listener())
         assert not waiting.done()
         twin.timeout_s = 0.1
         with pytest.raises(TwinTimeoutError, match=r"within 0\.1 s"):
-            await twin.ask(Endless(), 0.0)
+            await twin.ask(endless, 0.0)
         waiting.cancel()
         await until(lambda: twin.past.pending == {}, "the end of both")

@@ -25,7 +25,6 @@ from tests.support.people import (
     TOKEN,
     add,
     changing,
-    end_of,
     in_s,
     notes,
     remove,
@@ -35,7 +34,7 @@ from tests.support.people import (
 )
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
-from tests.support.ws_client import open_websocket
+from tests.support.ws_client import last_word, open_websocket
 
 COMMENT_NOW = {"kind": "comment", "subject": "site", "text": "x"}
 
@@ -104,7 +103,7 @@ def test_a_revoked_token_opens_nothing_even_when_another_has_its_name(
         add(accounts, "token", digest(fresh), plc="viewer")
         assert program.get("/api/state").status_code == 401
         assert program.get("/api/state", headers=theirs).status_code == 401
-        assert "the session has ended" in end_of(thief)
+        assert "the session has ended" in last_word(thief)[1]
         error = wait_for(lambda: reader.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR), "its end")
         assert error == errno.ECONNRESET
     assert live.get("/api/session", ours).json()["name"] == "plc"
@@ -212,7 +211,7 @@ def test_open_connections_end_when_the_first_account_is_created_and_when_the_fil
         ws = f"{live.url.replace('http', 'ws', 1)}/ws/state"
         with open_websocket(ws) as stream:
             add(path, "token", scada="viewer")
-            assert "sign in again" in end_of(stream)
+            assert "sign in again" in last_word(stream)[1]
         add(path, "token", digest(f"boss-{TOKEN}"), boss="admin")
         with closing(sqlite3.connect(path)) as file:
             file.execute("DROP TABLE audit")
@@ -222,7 +221,7 @@ def test_open_connections_end_when_the_first_account_is_created_and_when_the_fil
             path.unlink()
             refused = live.get("/api/state", BEARER)
             assert (refused.status_code, "cannot be read" in refused.text) == (503, True)
-            assert "the session has ended" in end_of(stream)
+            assert "the session has ended" in last_word(stream)[1]
 
 
 def test_accounts_on_a_disk_that_was_read_only_at_the_start_can_be_written_after(

@@ -10,12 +10,12 @@ from importlib.resources import files
 
 import httpx
 import pytest
-from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from lupin_bridge.access.credentials import SHARED_SESSION_S, Credentials
 from tests.support.access import BEARER, OWN, TOKEN, Served, served
 from tests.support.waiting import PATIENCE_S
+from tests.support.ws_client import last_word
 
 
 @pytest.fixture(scope="module")
@@ -165,15 +165,6 @@ def listening(closed: Served, headers: dict[str, str], path: str) -> Iterator[Cl
             connection.send('{"op": "subscribe", "topic": "/twin/state"}')
         connection.recv(timeout=PATIENCE_S)
         yield connection
-
-
-def last_word(connection: ClientConnection) -> tuple[int, str]:
-    """The code and the reason with which a WebSocket is closed."""
-    try:
-        while True:
-            connection.recv(timeout=PATIENCE_S)
-    except ConnectionClosed as closed:
-        return (0, "") if closed.rcvd is None else (closed.rcvd.code, closed.rcvd.reason)
 
 
 SIGNED_OUT = (1008, "the session has ended: sign in again")

@@ -21,7 +21,7 @@ from tests.support.mosquitto import Broker
 from tests.support.processes import Process, twin_node
 from tests.support.ros import Peer
 from tests.support.waiting import wait_for
-from tests.twin.adapt.test_adapt import Robot, adapt, listening
+from tests.twin.adapt.test_adapt import Watched, adapt, listening
 
 CONFIG = """
 tags: {{bench: [1.0, 2.0]}}
@@ -41,6 +41,14 @@ def adapted(domain: int, broker: Broker) -> Iterator[Process]:
     path.write_text(CONFIG.format(url=broker.url))
     with adapt(domain, "--config", str(path)) as process:
         yield process
+
+
+@contextmanager
+def all_of(domain: int, broker: Broker) -> Iterator[tuple[Process, Watched]]:
+    """The adapter, a twin, and a peer that receives what both publish."""
+    with twin_node(domain), adapted(domain, broker) as process, Peer(domain) as peer:
+        peer.listen()
+        yield process, Watched(peer)
 
 
 @contextmanager
@@ -67,15 +75,8 @@ def test_messages_of_zigbee_sensors_are_in_the_state_and_so_is_a_lost_sensor(
 ) -> None:
     broker = Broker(tmp_path)
     payload = json.dumps({"temperature": 21.5, "humidity": 60, "battery": 90})
-    with (
-        broker.running(),
-        twin_node(domain),
-        adapted(domain, broker) as process,
-        Peer(domain) as peer,
-        device(broker) as client,
-    ):
-        robot = Robot(peer)
-        peer.listen()
+    with broker.running(), device(broker) as client, all_of(domain, broker) as (process, robot):
+        peer = robot.peer
 
         def is_known() -> bool:
             client.publish("zigbee2mqtt/bench", payload)
@@ -107,9 +108,8 @@ def test_a_retained_message_counts_by_its_own_time_or_not(domain: int, tmp_path:
             ("plain/hot/temperature", 3000),
         ):
             client.publish(topic, json.dumps(payload), qos=1, retain=True).wait_for_publish(60.0)
-        with twin_node(domain), adapted(domain, broker), Peer(domain) as peer:
-            robot = Robot(peer)
-            peer.listen()
+        with all_of(domain, broker) as (_, robot):
+            peer = robot.peer
             tag = peer.tag("bench", lambda tag: tag.readings)
             assert abs(tag.last_observed.sec - then_s) < 2.0
             peer.until(lambda: robot.reported("it is retained and has no time"), "the complaint")
@@ -121,15 +121,8 @@ def test_a_flood_a_megabyte_and_a_topic_for_each_message_do_no_harm(
     domain: int, tmp_path: Path
 ) -> None:
     broker = Broker(tmp_path)
-    with (
-        broker.running(),
-        twin_node(domain),
-        adapted(domain, broker) as process,
-        Peer(domain) as peer,
-        device(broker) as client,
-    ):
-        robot = Robot(peer)
-        peer.listen()
+    with broker.running(), device(broker) as client, all_of(domain, broker) as (process, robot):
+        peer = robot.peer
         peer.until(lambda: robot.reported("connected"), "the broker")
         client.publish("zigbee2mqtt/large", b"1" * 1_000_000)
         for number in range(3_000):
@@ -166,7 +159,7 @@ def test_a_topic_that_is_not_utf8_costs_no_other(domain: int, tmp_path: Path) ->
             adapted(domain, Broker(tmp_path, listener.getsockname()[1])) as process,
             Peer(domain) as peer,
         ):
-            robot = Robot(peer)
+            robot = Watched(peer)
             peer.until(lambda: robot.reported("topic is not UTF-8"), "the complaint")
             peer.until(lambda: robot.observations, "the good one behind it")
             assert "Traceback" not in process.output
@@ -198,7 +191,7 @@ def test_a_broker_that_comes_late_or_goes_is_reported_and_found_again(
 ) -> None:
     broker = Broker(tmp_path)
     with adapted(domain, broker) as process, Peer(domain) as peer:
-        robot = Robot(peer)
+        robot = Watched(peer)
         peer.until(lambda: robot.reported("nothing answers at 127.0.0.1"), "no broker")
         with broker.running():
             peer.until(lambda: robot.reported("connected"), "the broker")

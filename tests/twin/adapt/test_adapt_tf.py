@@ -7,11 +7,8 @@ from typing import Any
 
 import pytest
 import yaml
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped
-from lupin_msgs.msg import Observation
 from rclpy.qos import QoSProfile, qos_profile_sensor_data
-from sensor_msgs.msg import Temperature
 
 from lupin_twin.adapt.check import Listener, report, suggestion
 from lupin_twin.adapt.config import config_of
@@ -19,7 +16,7 @@ from lupin_twin.adapt.node import AdaptNode
 from tests.support.docs import block_named
 from tests.support.processes import twin_node
 from tests.support.ros import Peer, latched
-from tests.twin.adapt.test_adapt import adapt, listening
+from tests.twin.adapt.test_adapt import Watched, adapt, each_is_reported, listening
 
 CONFIG = """
 robot: {tf: base_link, max_age_s: 2}
@@ -39,27 +36,19 @@ def config(tmp_path: Path) -> Path:
     return path
 
 
-class Robot:
+class Robot(Watched):
     """Nav2's frames, apriltag_ros's detections, a thermometer."""
 
     def __init__(self, peer: Peer) -> None:
         from apriltag_msgs.msg import AprilTagDetectionArray
         from tf2_msgs.msg import TFMessage
 
-        self._node = node = peer.node
-        self.reports: list[Any] = []
-        self.observations: list[Any] = []
+        super().__init__(peer)
+        node = peer.node
         self._tf = node.create_publisher(TFMessage, "/tf", QoSProfile(depth=100))
         self._static = node.create_publisher(TFMessage, "/tf_static", latched(1))
         self._seen = node.create_publisher(
             AprilTagDetectionArray, "/detections", qos_profile_sensor_data
-        )
-        self._temperature = node.create_publisher(
-            Temperature, "/temperature", qos_profile_sensor_data
-        )
-        node.create_subscription(DiagnosticArray, "/diagnostics", self.reports.append, 10)
-        node.create_subscription(
-            Observation, "/floranova/observations", self.observations.append, latched(50)
         )
         # Once, latched; the camera looks along the robot's left.
         self.stand(self.step("base_link", "camera", (0.0, 0.2, 0.5)))
@@ -67,7 +56,7 @@ class Robot:
     def step(self, parent: str, child: str, at: tuple[float, float, float]) -> TransformStamped:
         step = TransformStamped(child_frame_id=child)
         step.header.frame_id = parent
-        step.header.stamp = self._node.get_clock().now().to_msg()
+        step.header.stamp = self.now()
         move = step.transform.translation
         move.x, move.y, move.z = at
         return step
@@ -94,14 +83,6 @@ class Robot:
         detection = AprilTagDetection(family="tag36h11", id=number, hamming=hamming)
         self._seen.publish(AprilTagDetectionArray(header=step.header, detections=[detection]))
         return step
-
-    def read(self, value: float) -> None:
-        message = Temperature(temperature=value)
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        self._temperature.publish(message)
-
-    def reported(self, text: str) -> bool:
-        return any(text in it.message for report in self.reports for it in report.status)
 
 
 def test_a_seen_tag_is_on_the_map_with_the_readings_taken_there(domain: int, config: Path) -> None:
@@ -144,7 +125,7 @@ def test_a_seen_tag_is_on_the_map_with_the_readings_taken_there(domain: int, con
         assert process.stop() == 0
 
 
-WRONG: list[tuple[Callable[[Robot], object], str]] = [
+WRONG: list[tuple[Callable[[Any], object], str]] = [
     (lambda robot: None, "TF has no path from 'base_link' to 'map' (frame_id)"),
     (
         lambda robot: robot.be_at(0.0, robot.see(7, 0.3, frame="bench")),
@@ -157,13 +138,7 @@ WRONG: list[tuple[Callable[[Robot], object], str]] = [
 def test_mistakes_in_tf_are_reported_by_name(domain: int, config: Path) -> None:
     with adapt(domain, "--config", str(config)) as process, Peer(domain) as peer:
         robot = Robot(peer)
-        for do, text in WRONG:
-
-            def has_reported(do: Callable[[Robot], object] = do, text: str = text) -> bool:
-                do(robot)
-                return robot.reported(text)
-
-            peer.until(has_reported, f"{text!r} on /diagnostics")
+        each_is_reported(robot, WRONG)
         assert process.exit_code is None
 
 

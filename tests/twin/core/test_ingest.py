@@ -23,12 +23,12 @@ READINGS = (Reading("co2", 1.0),)
 SENT: dict[str, Any] = {"pose": at(1.0, 2.0), "source": "robot", "own_stamp_ns": 4 * S}
 
 
-def received_reading(tag_id: str = "1", frame_id: str = "map", **changes: Any) -> Received:
-    return Received(0, frame_id, Scan(tag_id, 3 * S, READINGS, **(SENT | changes)))
+def received_reading(frame_id: str = "map", **changes: Any) -> Received:
+    return Received(0, frame_id, Scan("1", 3 * S, READINGS, **(SENT | changes)))
 
 
-def received_inspection(tag_id: str = "1", **changes: Any) -> Received:
-    return Received(1, "map", Inspection(tag_id, 0, Flower("rose", 0.9), **(SENT | changes)))
+def received_inspection(**changes: Any) -> Received:
+    return Received(1, "map", Inspection("1", 0, Flower("rose", 0.9), **(SENT | changes)))
 
 
 def reason_of(received: Received) -> Reason | None:

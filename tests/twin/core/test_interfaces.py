@@ -6,8 +6,6 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-import rclpy
-from rclpy.context import Context
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
 from lupin_bridge.feed.web_node import WebNode
@@ -15,6 +13,7 @@ from lupin_twin.core import interfaces
 from lupin_twin.ros.node import TwinNode
 from tests.support.docs import DOCS
 from tests.support.domains import own_domain
+from tests.support.ros import node_in
 
 LAYERS = ["temperature", "co2"]
 # What rclpy gives to every node.
@@ -25,21 +24,13 @@ Node = TwinNode | WebNode
 @pytest.fixture(scope="module")
 def nodes() -> Iterator[dict[str, Node]]:
     """A twin with layers, and a `web`, as each one starts."""
-    made: dict[str, Node] = {}
-    contexts = []
     arguments = ["--ros-args", "-p", f"layers:=[{','.join(LAYERS)}]", "-p", "journal:='off'"]
-    with own_domain() as domain:
-        for make in (lambda c: TwinNode(context=c), lambda c: WebNode(lambda _: None, context=c)):
-            context = Context()
-            rclpy.init(args=arguments, context=context, domain_id=domain)
-            contexts.append(context)
-            node = make(context)
-            made[node.get_name()] = node
-        yield made
-        for node in made.values():
-            node.destroy_node()
-        for context in contexts:
-            rclpy.try_shutdown(context=context)
+    with (
+        own_domain() as domain,
+        node_in(domain, lambda it: TwinNode(context=it), *arguments) as twin,
+        node_in(domain, lambda it: WebNode(lambda _: None, context=it), *arguments) as web,
+    ):
+        yield {twin.get_name(): twin, web.get_name(): web}
 
 
 def own(found: list[tuple[str, list[str]]]) -> dict[str, str]:

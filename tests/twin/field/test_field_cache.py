@@ -7,9 +7,9 @@ from lupin_twin.field.idw import compute_idw_field
 RULES = FieldRules(2.0, 1.5, 1.5, 1_000, clip_to_explored=False)
 
 
-def key(number: int, sensor_type: str = "temperature") -> FieldKey:
+def key(number: int) -> FieldKey:
     """A key that differs from any other by its box."""
-    request = FieldRequest(sensor_type, 1.0, float(number), 0.0, number + 5.0, 5.0)
+    request = FieldRequest("temperature", 1.0, float(number), 0.0, number + 5.0, 5.0)
     return FieldKey(request, observation_count=3, map_revision=None, rules=RULES)
 
 

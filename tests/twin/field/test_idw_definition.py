@@ -1,8 +1,8 @@
 """The field against its definition, the oracle's double loop."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_twin.field import idw
-from lupin_twin.field.grid import FieldGrid
 from lupin_twin.field.idw import compute_idw_field
 from tests.oracle_idw import field_by_loop
 from tests.twin.field.test_idw import Sample
@@ -40,41 +39,26 @@ class Case:
     samples: tuple[Sample, ...]
     width: int
     height: int
-    min_x: float
-    min_y: float
-    resolution: float
-    falloff: float
-    max_distance: float
-    power: float
+    # The arguments of both, without a size.
+    rules: dict[str, Any]
     explored: npt.NDArray[np.bool_] | None = None
 
-    def by_twin(self) -> FieldGrid:
-        return compute_idw_field(
+    def compare(self) -> None:
+        low_x, low_y, cell = (self.rules[it] for it in ("bbox_min_x", "bbox_min_y", "resolution"))
+        high_x, high_y = low_x + self.width * cell, low_y + self.height * cell
+        grid = compute_idw_field(
             self.samples,
-            bbox_min_x=self.min_x,
-            bbox_min_y=self.min_y,
-            bbox_max_x=self.min_x + self.width * self.resolution,
-            bbox_max_y=self.min_y + self.height * self.resolution,
-            resolution=self.resolution,
-            falloff_radius_m=self.falloff,
-            max_distance_m=self.max_distance,
-            power=self.power,
+            bbox_max_x=high_x,
+            bbox_max_y=high_y,
             explored_mask=self.explored,
+            **self.rules,
         )
-
-    def by_loop(self) -> list[float]:
-        return field_by_loop(
-            self.samples,
-            width=self.width,
-            height=self.height,
-            bbox_min_x=self.min_x,
-            bbox_min_y=self.min_y,
-            resolution=self.resolution,
-            falloff_radius_m=self.falloff,
-            max_distance_m=self.max_distance,
-            power=self.power,
-            explored=None if self.explored is None else self.explored.tolist(),
+        assert (grid.width, grid.height) == (self.width, self.height)
+        explored = None if self.explored is None else self.explored.tolist()
+        by_loop = field_by_loop(
+            self.samples, width=self.width, height=self.height, explored=explored, **self.rules
         )
+        assert_same_values(grid.values, by_loop, self.samples)
 
 
 def positions(cells: int) -> st.SearchStrategy[float]:
@@ -105,43 +89,26 @@ def cases(draw: st.DrawFn) -> Case:
     if draw(st.integers(0, 3)) == 0:
         cells = st.lists(st.booleans(), min_size=width * height, max_size=width * height)
         explored = np.array(draw(cells), dtype=np.bool_).reshape(height, width)
-    return Case(
-        samples=tuple((min_x + x * resolution, min_y + y * resolution, v) for x, y, v in spots),
-        width=width,
-        height=height,
-        min_x=min_x,
-        min_y=min_y,
-        resolution=resolution,
-        falloff=falloff * resolution,
-        max_distance=draw(st.one_of(st.just(falloff), RADII)) * resolution,
-        power=draw(st.sampled_from([2.0, 2.0, 2.0, 0.0, 0.5, 1.0, 3.0, 4.5, 60.0])),
-        explored=explored,
-    )
+    rules = {
+        "bbox_min_x": min_x,
+        "bbox_min_y": min_y,
+        "resolution": resolution,
+        "falloff_radius_m": falloff * resolution,
+        "max_distance_m": draw(st.one_of(st.just(falloff), RADII)) * resolution,
+        "power": draw(st.sampled_from([2.0, 2.0, 2.0, 0.0, 0.5, 1.0, 3.0, 4.5, 60.0])),
+    }
+    samples = tuple((min_x + x * resolution, min_y + y * resolution, v) for x, y, v in spots)
+    return Case(samples, width, height, rules, explored)
 
 
-@contextmanager
-def small_parts() -> Iterator[None]:
-    """Make the engine split even a tiny grid, down to single cells."""
+@settings(max_examples=400)
+@given(cases(), st.booleans())
+def test_the_field_matches_its_definition_however_it_is_split(case: Case, is_split: bool) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(idw, "MAX_PAIRS", 12)
-        patch.setattr(idw, "_MIN_POINTS", 1)
-        yield
-
-
-@settings(max_examples=250)
-@given(cases())
-def test_the_field_matches_its_definition(case: Case) -> None:
-    grid = case.by_twin()
-    assert (grid.width, grid.height) == (case.width, case.height)
-    assert_same_values(grid.values, case.by_loop(), case.samples)
-
-
-@settings(max_examples=150)
-@given(cases())
-def test_the_field_matches_its_definition_however_it_is_split(case: Case) -> None:
-    with small_parts():
-        grid = case.by_twin()
-    assert_same_values(grid.values, case.by_loop(), case.samples)
+        if is_split:  # even a tiny grid, down to single cells
+            patch.setattr(idw, "MAX_PAIRS", 12)
+            patch.setattr(idw, "_MIN_POINTS", 1)
+        case.compare()
 
 
 @pytest.mark.parametrize("resolution", [0.001, 10.0])
@@ -152,15 +119,13 @@ def test_a_field_of_many_parts_matches_its_definition(
     """Large enough to be split by the engine's own limit, with a hundred tags in one cell."""
     rng = np.random.default_rng(7)
     spots = np.vstack([rng.uniform(-2, 70, (60, 2)), rng.uniform(10.0, 11.0, (100, 2))])
-    case = Case(
-        samples=tuple((x * resolution, y * resolution, 20 + x / 7) for x, y in spots.tolist()),
-        width=64,
-        height=48,
-        min_x=0.0,
-        min_y=0.0,
-        resolution=resolution,
-        falloff=falloff * 4 * resolution,
-        max_distance=max_distance * 4 * resolution,
-        power=2.0,
-    )
-    assert_same_values(case.by_twin().values, case.by_loop(), case.samples)
+    samples = tuple((x * resolution, y * resolution, 20 + x / 7) for x, y in spots.tolist())
+    rules = {
+        "bbox_min_x": 0.0,
+        "bbox_min_y": 0.0,
+        "resolution": resolution,
+        "falloff_radius_m": falloff * 4 * resolution,
+        "max_distance_m": max_distance * 4 * resolution,
+        "power": 2.0,
+    }
+    Case(samples, 64, 48, rules).compare()

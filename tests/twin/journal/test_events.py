@@ -17,10 +17,9 @@ def query(
     *,
     start: int = 0,
     end: int = 0,
-    points: int = 500,
     now: int = END,
 ) -> SeriesPast:
-    return series(connection, SeriesRequest(tag_id, event, start, end, points), now)
+    return series(connection, SeriesRequest(tag_id, event, start, end), now)
 
 
 def reported(answer: SeriesPast) -> list[tuple[int, float]]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from lupin_twin.core.notes import ACKNOWLEDGE, Note
 from lupin_twin.core.state import Write
 from lupin_twin.journal import follow
 from lupin_twin.journal.follow import Followed, Lot, NotALotError
@@ -21,9 +22,9 @@ from lupin_twin.journal.schema import (
     set_meta,
     transaction,
 )
-from tests.support.journal import NOW, SECOND, append, inspection, pin, scan
+from tests.support.journal import NOW, SECOND, append, inspection, opened, pin, scan
 
-TABLES = ("run", "series", "scan", "look", "place", "hour", "tally", "event")
+TABLES = ("run", "series", "scan", "look", "place", "hour", "tally", "event", "note")
 
 
 @contextmanager
@@ -141,7 +142,7 @@ def test_a_copy_of_a_journal_that_was_put_back_from_a_backup_is_made_anew(
 def test_whatever_happens_to_a_journal_a_whole_copy_has_the_same(  # noqa: C901  # the cases
     seed: int, tmp_path: Path
 ) -> None:
-    """Scans and inspections, late ones, deleted and forgotten ones, copied lot by lot."""
+    """Scans, inspections and notes, late ones, deleted and forgotten ones, copied lot by lot."""
     chance = random.Random(seed)
     source, target = tmp_path / "twin.sqlite", tmp_path / "web.sqlite"
     now_ns = NOW
@@ -154,13 +155,16 @@ def test_whatever_happens_to_a_journal_a_whole_copy_has_the_same(  # noqa: C901 
         return scan(tag, at_ns) if made == 1 else scan(tag, at_ns, co2=400.0)
 
     for _ in range(chance.randrange(4, 20)):
-        match chance.choice(("new", "new", "late", "delete", "forget", "copy", "whole")):
+        match chance.choice(("new", "new", "note", "late", "delete", "forget", "copy", "whole")):
             case "new":
                 rows: list[Write] = [pin(chance.choice("789"), now_ns, x=chance.random())]
                 for _ in range(chance.randrange(1, 10)):
                     now_ns += chance.choice((1, 60, 700, 3_600, 9_000)) * SECOND
                     rows.append(some(now_ns))
                 append(source, rows)
+            case "note":
+                with opened(source) as file:
+                    file.put_note(Note("", now_ns, "anna", ACKNOWLEDGE, "alarm:a", "seen"))
             case "late":
                 append(source, [some(NOW + chance.randrange(now_ns - NOW + 1))])
             case "delete":

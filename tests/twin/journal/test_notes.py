@@ -97,25 +97,6 @@ def test_of_too_many_notes_the_latest_are_known(tmp_path: Path) -> None:
     assert (found.notes[0].text, found.notes[-1].text) == ("1", str(MAX_NOTES))
 
 
-@pytest.mark.parametrize("most", [1, 2, 100])
-def test_a_copy_gets_each_once_and_in_its_place_among_the_scans(tmp_path: Path, most: int) -> None:
-    source, target = tmp_path / "twin.sqlite", tmp_path / "copy.sqlite"
-    with recording(source) as journal:
-        assert journal.take_restored(PATIENCE_S) is not None
-        for number in range(3):
-            journal.write_note(note(str(number))).result(PATIENCE_S)
-            journal.write(scan(str(number)))
-            wait_for(lambda n=number: journal.condition.written == n + 1, "the scan")  # type: ignore[misc]
-        journal.write_note(note("last")).result(PATIENCE_S)
-    after, is_all = 0, False
-    while not is_all:
-        with closing(open_reader(source)) as connection:
-            lot = follow.read(connection, after, most)
-        after, is_all = follow.write(target, lot, NOW, after).last, lot.is_all
-    assert read(target) == read(source)
-    assert select(target, "SELECT count(*) FROM scan") == [(3,)]
-
-
 def test_a_foreign_id_keeps_nobody_from_writing(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     with opened(path) as file:

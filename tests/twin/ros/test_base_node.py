@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 import rclpy
 from lupin_msgs.msg import Observation
-from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy
@@ -23,7 +22,7 @@ from lupin_twin.ros.base_node import (
 )
 from lupin_twin.ros.message_limits import MessageShape
 from tests.support.messages import INFO, scan
-from tests.support.ros import Peer
+from tests.support.ros import Peer, node_in
 from tests.support.waiting import PATIENCE_S, wait_for
 
 SHAPE = MessageShape(Observation, max_bytes=1_000)
@@ -51,13 +50,9 @@ def logged(monkeypatch: pytest.MonkeyPatch) -> Logged:
 
 @pytest.fixture
 def utilities(domain: int, logged: Logged) -> Iterator[NodeUtilities]:
-    context = Context()
-    rclpy.init(args=[], context=context, domain_id=domain)
-    node = rclpy.create_node("utilities", context=context)
-    node.get_logger = lambda: logged
-    yield NodeUtilities(node)
-    node.destroy_node()
-    rclpy.try_shutdown(context=context)
+    with node_in(domain, lambda it: rclpy.create_node("utilities", context=it)) as node:
+        node.get_logger = lambda: logged
+        yield NodeUtilities(node)
 
 
 def test_a_message_is_read_up_to_its_limit_and_dropped_beyond_it() -> None:

@@ -2,17 +2,16 @@
 
 import pytest
 
-from lupin_twin.core.state import Flower, Pose, Snapshot, TagState
+from lupin_twin.core.state import NO_FLOWER, Flower, Pose, Snapshot, TagState
 from lupin_twin.ros.layers import FRESH_S, OLD_S, PlanterMark, appearance_of, planter_marks
 
 NOW_NS = 10_000_000_000_000
 BOX = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.5, 0.0))
 
 
-def tag(name: str, x: float | None = 0.0, age_s: float = 0.0, **more: object) -> TagState:
-    pose = None if x is None else Pose(x, 2.0, 0.5, 0.0, 0.0, 0.0, 1.0)
+def tag(name: str, age_s: float = 0.0, flower: Flower = NO_FLOWER) -> TagState:
     observed_ns = NOW_NS - round(age_s * 1e9)
-    return TagState(name, pose=pose, last_observed_ns=observed_ns, **more)  # type: ignore[arg-type]
+    return TagState(name, Pose.at(0.0, 2.0, 0.5), last_observed_ns=observed_ns, flower=flower)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """The limits of each topic's messages, at the limit and one past it."""
 
-from collections.abc import Callable
+from functools import reduce
 from typing import Any
 
 import pytest
@@ -30,62 +30,42 @@ from lupin_twin.ros import message_limits
 from lupin_twin.ros.message_limits import MessageShape, TooManyError
 
 
-def readings(count: int) -> Any:
-    msg = Observation()
-    msg.tag_reading.readings = [SensorReading()] * count
-    return msg
-
-
-def flowers(count: int) -> Any:
-    msg = Observation()
-    msg.flower.flowers = [FlowerPoint()] * count
-    return msg
-
-
-def corners(count: int) -> Any:
-    msg = Observation()
-    msg.flower.box_footprint.points = [Point32()] * count
-    return msg
-
-
 @pytest.mark.parametrize(
-    ("shape", "message", "limit", "name"),
+    ("shape", "message_type", "path", "element", "limit"),
     [
-        (message_limits.OBSERVATION, readings, MAX_SENSORS_PER_TAG, "tag_reading.readings"),
-        (message_limits.OBSERVATION, flowers, MAX_BLOOMS_PER_TAG, "flower.flowers"),
-        (message_limits.OBSERVATION, corners, MAX_FOOTPRINT_POINTS, "flower.box_footprint.points"),
         (
-            message_limits.DISCOVERED_TAGS,
-            lambda count: DiscoveredTags(tags=[DiscoveredTag()] * count),
-            MAX_TAGS,
-            "tags",
+            *(message_limits.OBSERVATION, Observation, "tag_reading.readings", SensorReading),
+            MAX_SENSORS_PER_TAG,
         ),
         (
-            message_limits.STATE,
-            lambda count: TwinState(tags=[TwinTagState()] * count),
-            MAX_TAGS,
-            "tags",
+            *(message_limits.OBSERVATION, Observation, "flower.flowers", FlowerPoint),
+            MAX_BLOOMS_PER_TAG,
         ),
         (
-            message_limits.TIMES,
-            lambda count: TwinTimes(tags=[TagTimes()] * count),
-            MAX_TAGS,
-            "tags",
+            *(message_limits.OBSERVATION, Observation, "flower.box_footprint.points", Point32),
+            MAX_FOOTPRINT_POINTS,
         ),
+        (message_limits.DISCOVERED_TAGS, DiscoveredTags, "tags", DiscoveredTag, MAX_TAGS),
+        (message_limits.STATE, TwinState, "tags", TwinTagState, MAX_TAGS),
+        (message_limits.TIMES, TwinTimes, "tags", TagTimes, MAX_TAGS),
         (
-            message_limits.DIAGNOSTICS,
-            lambda count: DiagnosticArray(status=[DiagnosticStatus()] * count),
+            *(message_limits.DIAGNOSTICS, DiagnosticArray, "status", DiagnosticStatus),
             message_limits.MAX_STATUSES,
-            "status",
         ),
     ],
 )
 def test_as_many_as_can_be_stored_are_accepted_and_not_one_more(
-    shape: MessageShape, message: Callable[[int], Any], limit: int, name: str
+    shape: MessageShape, message_type: Any, path: str, element: Any, limit: int
 ) -> None:
-    assert shape.check(serialize_message(message(limit)))
-    with pytest.raises(TooManyError, match=rf"^{name}: {limit + 1}, the limit is {limit}$"):
-        shape.check(serialize_message(message(limit + 1)))
+    def message(count: int) -> bytes:
+        made = message_type()
+        *parts, name = path.split(".")
+        setattr(reduce(getattr, parts, made), name, [element()] * count)
+        return bytes(serialize_message(made))
+
+    assert shape.check(message(limit))
+    with pytest.raises(TooManyError, match=rf"^{path}: {limit + 1}, the limit is {limit}$"):
+        shape.check(message(limit + 1))
 
 
 def test_a_state_holds_as_many_items_as_a_twin_stores_and_not_one_more() -> None:

@@ -1,31 +1,21 @@
 """Parameters as ROS passes them on; real nodes, in this process."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from typing import Any
 
 import pytest
-import rclpy
 from builtin_interfaces.msg import Time
-from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from lupin_twin.core.parameters import ParameterError, TwinParameters
 from lupin_twin.ros.parameters import AdjustableNode, declare, naming, naming_own_parameters
+from tests.support.ros import node_in
 
 
-@contextmanager
-def node_with(domain: int, *overrides: str, made: Any = Node) -> Iterator[Any]:
-    context = Context()
+def node_with(domain: int, *overrides: str, made: Any = Node) -> AbstractContextManager[Any]:
     arguments = [word for override in overrides for word in ("-p", override)]
-    rclpy.init(args=["--ros-args", *arguments], context=context, domain_id=domain)
-    try:
-        node = made("any", context=context)
-        yield node
-        node.destroy_node()
-    finally:
-        rclpy.try_shutdown(context=context)
+    return node_in(domain, lambda it: made("any", context=it), "--ros-args", *arguments)
 
 
 def test_all_are_declared_and_set_values_are_read(domain: int) -> None:

@@ -6,21 +6,19 @@ from typing import Any
 
 import pytest
 import rclpy
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 
 from lupin_twin.ros.base_node import end_spinning, spin_until_shutdown
+from tests.support.ros import node_in
 from tests.support.waiting import wait_for
 
 
 class Spinning:
     """A node whose timer runs `work`, spun in a thread."""
 
-    def __init__(self, domain: int) -> None:
-        self.context = Context()
-        rclpy.init(args=[], context=self.context, domain_id=domain)
-        self.node = rclpy.create_node("spinning", context=self.context)
-        self.executor = SingleThreadedExecutor(context=self.context)
+    def __init__(self, node: Any) -> None:
+        self.node = node
+        self.executor = SingleThreadedExecutor(context=node.context)
         self.executor.add_node(self.node)
         self.errors: list[tuple[str, Exception]] = []
         self.thread = threading.Thread(target=spin_until_shutdown, args=(self.executor, self.note))
@@ -34,13 +32,12 @@ class Spinning:
 
 @pytest.fixture
 def spinning(domain: int) -> Iterator[Spinning]:
-    it = Spinning(domain)
-    yield it
-    if not it.has_ended():
-        end_spinning(it.executor)
-    it.thread.join(5)
-    it.node.destroy_node()
-    rclpy.try_shutdown(context=it.context)
+    with node_in(domain, lambda it: rclpy.create_node("spinning", context=it)) as node:
+        it = Spinning(node)
+        yield it
+        if not it.has_ended():
+            end_spinning(it.executor)
+        it.thread.join(5)
 
 
 def test_the_shutdown_breaks_no_spin_that_is_about_to_wait(

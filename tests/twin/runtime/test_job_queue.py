@@ -35,14 +35,14 @@ class Stage:
         self.begun: list[Future[int]] = []
         self.answers: list[Any] = []
 
-    def query(self, make: Any = str, cost_s: float = 0.0) -> Future[int]:
+    def query(self, cost_s: float = 0.0) -> Future[int]:
         search: Future[int] = Future()
 
         def look_up() -> Future[int]:
             self.begun.append(search)
             return search
 
-        self.queue.ask(Query(look_up, self.answers.append, make, cost_s))
+        self.queue.ask(Query(look_up, self.answers.append, str, cost_s))
         return search
 
     def delivered(self) -> Any:

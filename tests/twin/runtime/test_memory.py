@@ -1,7 +1,7 @@
 import sqlite3
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
@@ -11,39 +11,17 @@ import pytest
 
 from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.past import NotRemembered
-from lupin_twin.core.state import Flower, Inspection, Pin, Pose, Reading, Scan, TwinStore, Write
+from lupin_twin.core.state import Flower, Inspection, Pin, Reading, Scan, TwinStore, Write
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.paths import journal_path, state_folder
 from lupin_twin.journal.runs import Clock
 from lupin_twin.runtime.memory import MAX_NEW_RUNS, Memory, open_journal
 from lupin_twin.runtime.workers import ShouldStop
 from tests.support.journal import append, is_whole, scan, select
+from tests.support.memory_life import HERE, NOW, S, twin
 from tests.support.waiting import wait_for
 
-S = 1_000_000_000
-NOW = 1_900_000_000 * S
-HERE = Pose(1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 FLOWER = Flower("lupin", 0.9, False, 3, 1)
-
-
-def wall(at_s: float) -> Clock:
-    return Clock(NOW + int(at_s * S), NOW + int(at_s * S), is_simulated=False)
-
-
-def sim(at_s: float, wall_s: float) -> Clock:
-    return Clock(int(at_s * S), NOW + int(wall_s * S), is_simulated=True)
-
-
-@contextmanager
-def twin(path: Path | None, clock: Clock) -> Iterator[tuple[Memory, TwinStore]]:
-    """One run of a twin."""
-    store = TwinStore()
-    memory = Memory(store, open_journal(path, "/twin", 1e4, 1e4))
-    memory.follow(clock)
-    try:
-        yield memory, store
-    finally:
-        memory.close()
 
 
 def test_a_file_that_replaces_the_journal_is_read_once_the_twin_has_opened_it(
@@ -62,7 +40,8 @@ def test_a_file_that_replaces_the_journal_is_read_once_the_twin_has_opened_it(
             refusals.append(str(error))
             return False
 
-    with twin(path, wall(0)) as (memory, _):
+    with twin(path) as life:
+        memory = life.memory
         for count in (1, 2, 3):
             append(other, [scan(at_ns=n + 1) for n in range(count)])
             wait_for(lambda: memory.condition.inode, "the journal to be written")
@@ -92,7 +71,8 @@ def test_damage_found_by_a_reader_quarantines_the_file_while_the_twin_records(
 
         return memory.recall.query(request).result(30.0)
 
-    with twin(path, wall(5)) as (memory, _):
+    with twin(path, 5) as life:
+        memory = life.memory
         # Damage found earlier is handled by the check at the start.
         wait_for(lambda: memory.condition.state is JournalState.RECORDING, "the journal")
         # Not through the memory: its cached pages would hide the damage.
@@ -127,6 +107,12 @@ def test_the_restored_state_is_logged_in_one_line(tmp_path: Path) -> None:
         memory.close()
         return message
 
+    def wall(at_s: int) -> Clock:
+        return Clock(NOW + at_s * S, NOW + at_s * S, is_simulated=False)
+
+    def sim(at_s: int) -> Clock:
+        return Clock(at_s * S, NOW + at_s * S, is_simulated=True)
+
     path = tmp_path / "j.sqlite"
     nothing = f"journal {path}: nothing to restore"
     assert reported(path, wall(5), wall(6), writes=WRITES) == [nothing, None]
@@ -137,9 +123,8 @@ def test_the_restored_state_is_logged_in_one_line(tmp_path: Path) -> None:
         f" the oldest observation is from {oldest}"
     )
     path = tmp_path / "simulated.sqlite"
-    reported(path, sim(5, 5), writes=[at(SCAN, 4 * S)])
-    waiting = Clock(0, NOW, is_simulated=True)
-    before, after = reported(path, waiting, sim(6, 6))
+    reported(path, sim(5), writes=[at(SCAN, 4 * S)])
+    before, after = reported(path, sim(0), sim(6))
     assert before is None
     assert str(after).endswith("; the oldest observation is from second 4.000")
 
@@ -160,56 +145,56 @@ def test_a_restarted_twin_has_the_state_from_before_and_repeated_messages_change
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "j.sqlite"
-    with twin(path, wall(5)) as (memory, before):
+    with twin(path, 5) as life:
         for write in WRITES:
-            assert memory.apply(write, NOW) is None
-    with twin(path, wall(9)) as (memory, after):
-        known = {tag.tag_id: tag for tag in after.snapshot(NOW, "map").tags}
-        assert list(known) == ["7", "8", "9"]
-        for tag in before.snapshot(NOW, "map").tags:
-            same = known[tag.tag_id]
+            assert life.memory.apply(write, NOW) is None
+        before = life.live
+        count = life.store.observation_count
+    with twin(path, 9) as life:
+        assert list(life.live) == ["7", "8", "9"]
+        for tag_id, tag in before.items():
+            same = life.live[tag_id]
             assert set(same.readings) == set(tag.readings)
             assert replace(same, readings=tag.readings) == tag
-        restored, count = after.snapshot(NOW, "map"), after.observation_count
-        assert count >= before.observation_count
+        restored, again = life.live, life.store.observation_count
+        assert again >= count
         for write in WRITES:
-            memory.apply(write, NOW + 9 * S)
-        assert after.snapshot(NOW, "map") == restored
-        assert after.observation_count == count
-        wait_for(lambda: memory.condition.repeated == 5, "all that were there")
-        assert memory.condition.written == 0
+            life.memory.apply(write, NOW + 9 * S)
+        assert life.live == restored
+        assert life.store.observation_count == again
+        wait_for(lambda: life.memory.condition.repeated == 5, "all that were there")
+        assert life.memory.condition.written == 0
 
 
 def test_a_simulation_that_starts_over_is_empty_and_one_that_goes_on_is_not(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
-    with twin(path, sim(500, 500)) as (memory, _):
-        memory.apply(at(SCAN, 499 * S), NOW + 499 * S)
-        memory.apply(at(SCAN, 600 * S), NOW + 600 * S)
-    with twin(path, sim(605, 610)) as (_, store):
-        assert store.tag("7")
-    with twin(path, sim(610, 86_400)) as (_, store):
-        assert not store.tag("7")
+    with twin(path, 500, is_simulated=True) as life:
+        life.memory.apply(at(SCAN, 499 * S), NOW + 499 * S)
+        life.memory.apply(at(SCAN, 600 * S), NOW + 600 * S)
+    with twin(path, 605, is_simulated=True, wall_s=610) as life:
+        assert "7" in life.live
+    with twin(path, 610, is_simulated=True, wall_s=86_400) as life:
+        assert "7" not in life.live
 
 
 def test_nothing_is_known_before_a_simulated_clock_has_started(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
-    with twin(path, sim(5, 5)) as (memory, _):
-        memory.apply(at(SCAN, 4 * S), NOW)
-        memory.apply(at(SCAN, 300 * S), NOW + 295 * S)
-    with twin(path, Clock(0, NOW, is_simulated=True)) as (memory, store):
-        memory.apply(at(LOOK, 301 * S), NOW + 296 * S)
-        assert not store.tag("7")
-        memory.follow(sim(305, 300))
-        assert store.tag("7")
-        assert store.tag("8")
+    with twin(path, 5, is_simulated=True) as life:
+        life.memory.apply(at(SCAN, 4 * S), NOW)
+        life.memory.apply(at(SCAN, 300 * S), NOW + 295 * S)
+    with twin(path, is_simulated=True) as life:
+        life.memory.apply(at(LOOK, 301 * S), NOW + 296 * S)
+        assert "7" not in life.live
+        life.at(305, wall_s=300)
+        assert {"7", "8"} <= life.live.keys()
 
 
 def test_a_clock_that_goes_back_all_the_time_begins_few_runs(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
-    with twin(path, sim(9000, 0)) as (memory, _):
+    with twin(path, 9000, is_simulated=True, wall_s=0) as life:
         for number in range(1000):
-            memory.follow(sim(1000, number / 100))
-            memory.follow(sim(9000, number / 100))
+            life.at(1000, wall_s=number / 100)
+            life.at(9000, wall_s=number / 100)
     assert select(path, "SELECT count(*) FROM run") == [(1 + MAX_NEW_RUNS,)]
 
 
@@ -217,9 +202,10 @@ def test_off_is_a_temporary_file_that_answers_and_is_removed_at_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    with twin(None, wall(5)) as (memory, store):
+    with twin(None, 5) as life:
+        memory = life.memory
         memory.apply(SCAN, NOW)
-        assert store.tag("7")
+        assert "7" in life.live
         wait_for(lambda: memory.condition.written == 2, "the scan and its place")
         answer = memory.recall.query(lambda c, _: state_at(c, NOW, "map")).result(10.0)
         assert [tag.tag_id for tag in answer.tags] == ["7"]

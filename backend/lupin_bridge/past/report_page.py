@@ -225,10 +225,10 @@ class _Page:
         )
 
     def _alarm(self, alarm: Entry) -> Mapping[str, str]:
-        """The cells of an alarm, by their columns."""
+        """The cells of an alarm, by their columns; its status is that of its worst value."""
         reason, tag = alarm["reason"], self._tags.get(alarm["tag_id"])
         raised, cleared, limit = alarm["raised_at"], alarm["cleared_at"], reason["limit"]
-        numbers = reason["kind"] == "range"
+        numbers, verdict = reason["kind"] == "range", self._words["verdicts"][reason["verdict"]]
         number, at_end = partial(self._number, sensor=reason["sensor"]), ""
         if tag is not None:
             pests = Reading("pest", float(tag.flower.bug_count), tag.looked_at_ns)
@@ -239,13 +239,13 @@ class _Page:
                     if it.observed_at_ns is not None:
                         at_end += f" ({self._clock(stamp(it.observed_at_ns))})"
         return {
-            "alarm": f"{self._what(reason)} ({self._words['verdicts'][reason['verdict']]})",
+            "alarm": self._what(reason),
             "point": alarm["tag_id"] or self.say("house"),
             "when": self._clock(raised),
             "end": "" if cleared is None else self._clock(cleared),
             "length": "" if cleared is None else self._length(cleared["sec"] - raised["sec"]),
             "at_end": at_end,
-            "worst": number(alarm["worst"], limit=limit),
+            "worst": f"{number(alarm['worst'], limit=limit)} ({verdict})".strip(),
             "limits": self._limits(reason, tag) if numbers else "",
             "who": self._who(alarm),
         }

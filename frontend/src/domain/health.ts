@@ -190,11 +190,12 @@ export const isBack = ({ release, verdict }: HealthReason): boolean =>
   release !== undefined && verdict === 'stressed';
 
 /** For a value that is back in its range, what it must pass; null: it is beyond its limit. */
-const heldText = (
-  { release = null, verdict }: OfRange,
-  text: (value: number) => string,
-): string | null =>
-  release === null ? null : S.reasons.heldUntil(S.health[verdict].toLowerCase(), text(release));
+const heldText = (reason: OfRange, text: (value: number) => string): string | null => {
+  const { release = null, verdict } = reason;
+  if (release === null) return null;
+  const side = sideOf(reason) === 'below' ? 'above' : 'below';
+  return S.reasons.heldUntil(S.health[verdict].toLowerCase(), side, text(release));
+};
 
 /** Names sensor, side and limit, without the value, which changes. */
 export function beyondText(sensors: Catalogue, reason: OfRange, unit: TemperatureUnit): string {

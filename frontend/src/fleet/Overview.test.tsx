@@ -1,12 +1,12 @@
 import { render, screen } from '@testing-library/react';
-import { expect, test } from 'vitest';
+import { expect, test, vi } from 'vitest';
 
 import { Overview } from './Overview';
-import { type Site, type Sites, words } from './sites';
+import { type Site, type Sites, type SitesFrame, withFrame, words } from './sites';
 
 const GREENHOUSE: Site = {
   ...{ site: 'gh1', name: 'One', verdict: 'healthy', last_verdict: 'healthy', active_alarms: 0 },
-  ...{ last_received: null, lag_s: 1, is_live: true, origin: 'robot', map: null, causes: [] },
+  ...{ last_received: null, heardAt: 1, is_live: true, origin: 'robot', map: null, causes: [] },
 };
 
 test('before anything has come nothing is counted', () => {
@@ -33,4 +33,25 @@ test('of a silent greenhouse, and without a connection, nobody knows that there 
   expect(text(site({}), 1)).not.toContain(words.noAlarms);
   expect(text(site({ is_live: false }))).not.toContain(words.noAlarms);
   expect(text(site({ active_alarms: null }))).not.toContain(words.noAlarms);
+});
+
+test('since when a greenhouse is silent does not move while nothing comes from it', () => {
+  vi.useFakeTimers({ now: 1_700_000_000_000 });
+  const entry: Omit<Site, 'heardAt'> = GREENHOUSE;
+  const archive = { is_reachable: true, since: null, message: '' };
+  const frame = { type: 'sites', is_whole: true, archive, gone: [] } as const;
+  const silent: SitesFrame = { ...frame, sites: [{ ...entry, is_live: false, lag_s: 60 }] };
+  const sites = withFrame(new Map(), silent);
+  const text = (): string | null => {
+    const seen = { sites, archive, lostAt: null };
+    const { container, unmount } = render(<Overview seen={seen} isKiosk />);
+    const found = container.querySelector('.fleet-silent')?.textContent ?? null;
+    unmount();
+    return found;
+  };
+  const first = text();
+  vi.advanceTimersByTime(3_600_000);
+  // As after a search that left it out.
+  expect(text()).toBe(first);
+  vi.useRealTimers();
 });

@@ -27,7 +27,6 @@ import {
   grouped,
   groupNames,
   ms,
-  silentAt,
   type Site,
   siteLink,
   timeText,
@@ -311,8 +310,8 @@ function originText({ origin }: Site): string | null {
 }
 
 function silentText(site: Site, asOf: number | null): string {
-  if (site.lag_s === null) return words.neverForwarded;
-  const at = silentAt(site.lag_s);
+  const at = site.heardAt;
+  if (at === null) return words.neverForwarded;
   const wasLive = site.is_live || (asOf !== null && at > asOf - LIVE_MS);
   return wasLive && asOf !== null ? words.asOf(timeText(asOf)) : words.silentSince(timeText(at));
 }

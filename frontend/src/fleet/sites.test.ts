@@ -12,7 +12,9 @@ import {
   type SitesFrame,
 } from './sites';
 
-const site = (name: string, more: Partial<Site> = {}): Site => ({
+type Entry = SitesFrame['sites'][number];
+
+const site = (name: string, more: Partial<Entry> = {}): Entry => ({
   site: name,
   name,
   verdict: 'healthy',
@@ -26,7 +28,7 @@ const site = (name: string, more: Partial<Site> = {}): Site => ({
   causes: [],
   ...more,
 });
-const frame = (sites: readonly Site[], more: Partial<SitesFrame> = {}): SitesFrame => ({
+const frame = (sites: readonly Entry[], more: Partial<SitesFrame> = {}): SitesFrame => ({
   type: 'sites',
   is_whole: true,
   archive: { is_reachable: true, message: '', since: null },
@@ -34,7 +36,7 @@ const frame = (sites: readonly Site[], more: Partial<SitesFrame> = {}): SitesFra
   gone: [],
   ...more,
 });
-const of = (...sites: Site[]): ReadonlyMap<string, Site> => withFrame(new Map(), frame(sites));
+const of = (...sites: Entry[]): ReadonlyMap<string, Site> => withFrame(new Map(), frame(sites));
 
 test('the worst come first, then the most alarms, then as people count', () => {
   const sites = of(

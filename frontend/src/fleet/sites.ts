@@ -8,7 +8,7 @@ import { fleetWordsOf } from '../words/fleet';
 export const words = fleetWordsOf(LANGUAGE);
 
 /** An entry of `/api/sites`; see the server's `overview.py`. */
-export interface Site {
+interface SiteEntry {
   readonly site: string;
   readonly name: string;
   readonly verdict: Verdict;
@@ -24,6 +24,11 @@ export interface Site {
   /** Of its active alarms that are not shelved, the worst first; its silence is none. */
   readonly causes: readonly Cause[];
 }
+
+export type Site = Omit<SiteEntry, 'lag_s'> & {
+  /** When its forwarder last confirmed, ms since the epoch, to the second; null: never. */
+  readonly heardAt: number | null;
+};
 
 /** One cause of alarms: its worst alarm's reason and tag, and how many there are. */
 export interface Cause {
@@ -42,7 +47,7 @@ export interface SitesFrame {
   readonly type: 'sites';
   readonly is_whole: boolean;
   readonly archive: Archive;
-  readonly sites: readonly Site[];
+  readonly sites: readonly SiteEntry[];
   readonly gone: readonly string[];
 }
 
@@ -77,7 +82,11 @@ export function parseSites(data: unknown): SitesFrame | null {
 export function withFrame(before: Sites, frame: SitesFrame): Sites {
   const sites = new Map(frame.is_whole ? [] : before);
   for (const name of frame.gone) sites.delete(name);
-  for (const site of frame.sites) sites.set(site.site, site);
+  // An entry comes only when it changes: its lag is that of now only here.
+  for (const { lag_s: lag, ...site } of frame.sites) {
+    const heardAt = lag === null ? null : Math.round((timeOfDay() - lag * 1000) / 1000) * 1000;
+    sites.set(site.site, { ...site, heardAt });
+  }
   return sites;
 }
 
@@ -161,7 +170,3 @@ export function timeText(at: number): string {
 }
 
 export const ms = ({ sec, nanosec }: WireTime): number => sec * 1000 + nanosec / 1e6;
-
-/** The time that many seconds ago, to the second. */
-export const silentAt = (lagS: number): number =>
-  Math.round((timeOfDay() - lagS * 1000) / 1000) * 1000;

@@ -13,7 +13,7 @@ import { selectHealth, selectSensor } from '../store/derived';
 import { selectHasSnapshot } from '../store/moment';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
-import { useSince, useUrgent, type Urgent } from './DoNow';
+import { selectIsCurrent, useSince, useUrgent, type Urgent } from './DoNow';
 import { useFitting } from './fitting';
 import { HealthShape } from './HealthMark';
 import { Reasons, useReasonText } from './Reasons';
@@ -79,6 +79,7 @@ function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.
   const { verdict } = reason;
   const why = S.healthDriver(shown(tagId, 16), useReasonText(reason, true, tagId));
   const since = useSince(tagId, reason);
+  const isCurrent = useApp(selectIsCurrent);
   const isOne = cause === null;
   const facts = isOne ? [since] : [why, since, tagsText(tags.map((each) => each.tagId))];
   return (
@@ -96,7 +97,7 @@ function Row({ cause, tags, fits }: Omit<Line, 'key'> & { fits: boolean }): JSX.
           </span>
         )}
         <span className="attention-do">
-          <strong>{todoText(reason)}</strong>{' '}
+          {isCurrent && <strong>{todoText(reason)}</strong>}{' '}
           <small className="faint">
             <span className="dotted">
               {facts

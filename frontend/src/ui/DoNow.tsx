@@ -18,7 +18,7 @@ import { secondsOf } from '../domain/time';
 import { groupedBy } from '../domain/memo';
 import { rowsOf } from '../domain/table';
 import { shown } from '../domain/text';
-import { act, store, useApp } from '../store/app';
+import { act, type AppState, store, useApp } from '../store/app';
 import { withList, withTag } from '../store/view';
 import { useSelected } from '../store/create';
 import { selectHealth } from '../store/derived';
@@ -82,16 +82,19 @@ export function useUrgent(): readonly Urgent[] {
   }, [tags, health, isNow, alarms]);
 }
 
+/** Whether the tasks are those of now: what to do about past or last known values is no instruction. */
+export const selectIsCurrent = (state: AppState): boolean =>
+  selectShown(state).moment === null && !isSilent(selectHealth(state));
+
 /**
  * Text: how long a reason's alarm has been active, that it is acknowledged, or that there is none yet.
  * Null: unknown, a past moment is shown, or the banner already dates the data.
  */
 export function useSince(tagId: string, reason: HealthReason): string | null {
-  const isNow = useApp((state) => selectShown(state).moment === null);
+  const isCurrent = useApp(selectIsCurrent);
   const found = useSelected(alarmList, ({ active }) => alarmOf(active, tagId, reason));
   const isKnown = useApp(selectAreAlarmsKnown);
-  const isLast = useApp((state) => isSilent(selectHealth(state)));
-  if (!isNow || isLast) return null;
+  if (!isCurrent) return null;
   if (!found) return isKnown && isAwaited(reason) ? S.alarmNotYet : null;
   if (found.isAcknowledged) return S.healthAcknowledged;
   return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
@@ -112,14 +115,21 @@ export function DoNow({
   const health = useApp(selectHealth);
   const urgent = useUrgent();
   const hasOwn = health.reasons.length > 0;
-  // While the twin is silent, its last tasks stay listed.
-  const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict) || isSilent(health));
+  // While the twin is silent, its last tasks stay listed, below the first one: to find out why.
+  const isLast = isSilent(health);
+  const isOfTags = urgent.length > 0 && (!hasOwn || isBad(health.verdict) || isLast);
   const count = hasOwn && most > 1 ? most - 1 : most;
   const hasAlso = most > 1;
   const lines = byTodo(urgent).slice(0, count);
   const rest = urgent.length - (hasAlso ? lines.flat() : lines).length;
+  const own = isOfTags && count < most && (
+    <li>
+      <Overall health={health} id="health-own" />
+    </li>
+  );
   return (
     <ul className="do-now" aria-label={S.todoLabel} data-most={most}>
+      {isLast && own}
       {isOfTags ? (
         lines.map(([{ tagId, reasons }, ...others], index) => (
           <li key={index}>
@@ -156,11 +166,7 @@ export function DoNow({
           <Overall health={health} id={id} />
         </li>
       )}
-      {isOfTags && count < most && (
-        <li>
-          <Overall health={health} id="health-own" />
-        </li>
-      )}
+      {!isLast && own}
     </ul>
   );
 }
@@ -207,15 +213,14 @@ function Todo({
 }): JSX.Element {
   const why = S.healthDriver(shown(tagId, 24), useReasonText(reason, true, tagId));
   const since = useSince(tagId, reason);
-  // A past moment's action is not an instruction for now.
-  const isNow = useApp((state) => selectShown(state).moment === null);
+  const isCurrent = useApp(selectIsCurrent);
   return (
     <>
       <span className="do-why" title={why} data-testid={id}>
         {why}
       </span>
       <span className="do-what">
-        {isNow && <strong>{todoText(reason)}</strong>}{' '}
+        {isCurrent && <strong>{todoText(reason)}</strong>}{' '}
         {also.length > 0 && <Also of={also} than={reason.verdict} />}
         {since && <small>{since}</small>}
       </span>

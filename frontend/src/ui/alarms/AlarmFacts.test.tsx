@@ -4,6 +4,7 @@ import { expect, test } from 'vitest';
 import { startAlarms } from '../../alarms/watch';
 import { receive } from '../../store/app';
 import { alarm, alarms, reportAlarms } from '../../testing/alarms';
+import { judgement } from '../../testing/health';
 import { goLive, goLost, showTags, status } from '../../testing/page';
 import { readings, wireTag } from '../../testing/tags';
 import { AlarmPanel } from './AlarmPanel';
@@ -22,6 +23,21 @@ test('how old the last value is nobody knows after a sleep', () => {
     receive({ isTimeLost: true });
   });
   expect(now()).toBe('now unknown, last 8.0\u00a0°C');
+  stop();
+});
+
+test('back to normal is of now, not of a twin that is silent', () => {
+  showTags([wireTag({ readings: readings({ temperature: 20 }) })], judgement({ 1: 'healthy' }));
+  const stop = startAlarms();
+  const { container } = render(<AlarmPanel />);
+  flush(() => {
+    reportAlarms(alarm('a'));
+  });
+  const row = (): string | undefined => container.querySelector('[data-alarm]')?.textContent;
+  expect(row()).toContain('Back to normal');
+  flush(goLost);
+  expect(row()).toContain('Unknown');
+  expect(row()).not.toContain('Back to normal');
   stop();
 });
 

@@ -35,7 +35,8 @@ export const AlarmRow = memo(function AlarmRow({
   const { alarm, verdict, isAcknowledged } = item;
   const isSelected = useApp((state) => state.view.selected === alarm.tag_id);
   const values = useValues(alarm);
-  const current = lastKnown(values.state)?.verdict ?? verdict;
+  const known = lastKnown(values.state)?.verdict ?? verdict;
+  const isBack = known === 'healthy';
   const name = useApp((state) => nameText(alarm, selectSpeech(state)));
   const status = useStatus(item, group);
   return (
@@ -58,7 +59,8 @@ export const AlarmRow = memo(function AlarmRow({
         <AlarmTimes
           alarm={alarm}
           first={values.first}
-          verdict={current}
+          // A bad value still counts when it is old; that all was well says nothing about now.
+          verdict={isBack && values.state?.kind === 'unknown' ? 'unknown' : known}
           // Not from the alarm itself: a held row must not gain a line.
           isOver={group === 'resolved'}
         />
@@ -73,7 +75,7 @@ export const AlarmRow = memo(function AlarmRow({
           {/* A row held in "active" has no other line for the shelving reason. */}
           {group === 'active' && item.shelf?.reason && <q className="faint">{item.shelf.reason}</q>}
           {group === 'active' && !item.shelf && (
-            <span className="alarm-do" data-again={current === 'healthy' || undefined}>
+            <span className="alarm-do" data-again={isBack || undefined}>
               {values.todo}
             </span>
           )}

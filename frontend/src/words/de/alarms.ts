@@ -128,7 +128,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'unter', above: 'über' },
     wasBeyond: (side, limit) => `war ${side} ${limit}`,
-    heldUntil: (status, until) => `${status} bis ${until}`,
+    heldUntil: (status, side, until) =>
+      `${status} bis ${side === 'below' ? 'unter' : 'über'} ${until}`,
     just: {
       below: (limit) => `knapp unter ${limit}`,
       above: (limit) => `knapp über ${limit}`,

@@ -128,7 +128,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'inferior a', above: 'superior a' },
     wasBeyond: (side, limit) => `ha sido ${side} ${limit}`,
-    heldUntil: (status, until) => `${status} hasta ${until}`,
+    heldUntil: (status, side, until) =>
+      `${status} hasta ${side === 'below' ? 'bajar de' : 'superar'} ${until}`,
     just: {
       below: (limit) => `justo por debajo de ${limit}`,
       above: (limit) => `justo por encima de ${limit}`,

@@ -120,7 +120,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'onder', above: 'boven' },
     wasBeyond: (side, limit) => `was ${side} ${limit}`,
-    heldUntil: (status, until) => `${status} tot ${until}`,
+    heldUntil: (status, side, until) =>
+      `${status} tot ${side === 'below' ? 'onder' : 'boven'} ${until}`,
     just: {
       below: (limit) => `net onder ${limit}`,
       above: (limit) => `net boven ${limit}`,

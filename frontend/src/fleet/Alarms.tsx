@@ -1,15 +1,16 @@
 /** Active alarms of the shown greenhouses, the worst first. */
 import { useMemo, type JSX } from 'react';
 
-import { type Now, valuesOf, whenText, whereText, type Speech } from '../alarms/words';
+import { type Now, valuesOf, whenText, whereText } from '../alarms/words';
 import { timeOfDay } from '../clock';
 import type { Alarm } from '../contract/types';
+import type { Catalogue } from '../domain/sensors';
 import { secondsOf } from '../domain/time';
 import { LANGUAGE, S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
 import { VIEW_WORDS } from '../words/fleetViews';
 import { alarmCount, ms, namesOf, type Site, siteLink, timeText, words } from './sites';
-import { useAnswer, useSpeech } from './useAnswer';
+import { useAnswer, useSensors } from './useAnswer';
 
 interface SiteAlarm extends Alarm {
   readonly site: string;
@@ -24,7 +25,7 @@ const W = VIEW_WORDS[LANGUAGE];
 const EVERY_MS = 10_000;
 
 export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Element {
-  const speech = useSpeech();
+  const sensors = useSensors();
   const names = namesOf(shown);
   const path = names === '' ? 'api/alarms' : `api/alarms?sites=${names}`;
   // Refetch when a count changes.
@@ -41,7 +42,7 @@ export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Eleme
   const listOf = (alarms: readonly SiteAlarm[]): JSX.Element => (
     <ul className="fleet-alarm-list">
       {alarms.map((alarm) => (
-        <Row key={`${alarm.site} ${alarm.id}`} alarm={alarm} speech={speech} />
+        <Row key={`${alarm.site} ${alarm.id}`} alarm={alarm} sensors={sensors} />
       ))}
     </ul>
   );
@@ -65,10 +66,10 @@ export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Eleme
   );
 }
 
-function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Element {
+function Row({ alarm, sensors }: { alarm: SiteAlarm; sensors: Catalogue }): JSX.Element {
   const raised = secondsOf(alarm.raised_at);
   const state = alarm.is_live && alarm.now ? alarm.now : null;
-  const values = valuesOf(alarm, speech, state && { kind: 'known', trend: null, ...state });
+  const values = valuesOf(alarm, sensors, state && { kind: 'known', trend: null, ...state });
   const { verdict } = alarm.now ?? alarm.reason;
   return (
     <li data-live={alarm.is_live} data-shelved={Boolean(alarm.shelved_by)}>

@@ -3,14 +3,13 @@ import { expect, test } from 'vitest';
 import type { Alarm } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { cataloguesOf } from '../domain/sensors';
-import { CATALOGUE, FILE } from '../testing/sensors';
+import { CATALOGUE, IN_FAHRENHEIT, FILE } from '../testing/sensors';
 import { alarmsCsv, arranged, causeFacts, filtered, tagsText } from './arrange';
 import { acknowledge, NO_LOCAL_ALARMS, shelve, type LocalAlarms } from './own';
 import { causesFirst, listOf } from './list';
 import type { Now } from './words';
 
 const isTag = (): boolean => false;
-const speech = { sensors: CATALOGUE, unit: 'C' } as const;
 const AT = 1_800_000_000_000;
 
 const cold = (tag: number) => alarm(`cold${tag}`, { tag_id: String(tag), raised: 100 + tag });
@@ -26,12 +25,12 @@ const active = (...alarms: ReturnType<typeof alarm>[]) =>
   listOf(alarms, NO_LOCAL_ALARMS, null, AT).active;
 
 test('many of one cause stand together, the worst cause first; a few stand by themselves', () => {
-  const blocks = arranged(active(...many(hot, 6), ...many(cold, 5)), 'cause', speech);
+  const blocks = arranged(active(...many(hot, 6), ...many(cold, 5)), 'cause', CATALOGUE);
   expect(blocks.map(({ cause, items }) => [cause, items.length])).toEqual([
     ['Temperature too low', 5],
     ['Temperature too high', 6],
   ]);
-  const loose = arranged(active(...many(hot, 4), ...many(cold, 4)), 'cause', speech);
+  const loose = arranged(active(...many(hot, 4), ...many(cold, 4)), 'cause', CATALOGUE);
   expect(loose.map(({ cause, items }) => [cause, items.length])).toEqual([[null, 8]]);
 });
 
@@ -43,7 +42,7 @@ test('many of one cause stand where the worst of them does', () => {
   }));
   const items = active(...colds, alarm('dry', { raised: 1, reason: { sensor: 'humidity' } }));
   expect(items.map(({ alarm: { id } }) => id).slice(0, 2)).toEqual(['cold1', 'dry']);
-  const blocks = arranged(items, 'cause', speech);
+  const blocks = arranged(items, 'cause', CATALOGUE);
   expect(blocks.map(({ items: own }) => own.length)).toEqual([6, 1]);
 });
 
@@ -51,7 +50,7 @@ test('a few of several causes: the worst first, whatever the cause', () => {
   const worst = alarm('worst', { reason: { sensor: 'humidity', verdict: 'critical' } });
   const mild = { verdict: 'stressed' } as const;
   const items = active(cold(1), alarm('mild', { reason: mild }), worst, hot(1));
-  const [block] = arranged(items, 'cause', speech);
+  const [block] = arranged(items, 'cause', CATALOGUE);
   expect(block?.items.map(({ alarm: { id } }) => id)).toEqual(items.map((it) => it.alarm.id));
   expect(items.map(({ verdict }) => verdict)).toEqual([
     ...['critical', 'critical', 'stressed', 'stressed'],
@@ -62,13 +61,13 @@ test('of one cause, each area stands by itself, and is found by its name', () =>
   const areas = { North: ['1', '2', '3', '4', '5'], South: ['6', '7', '8', '9', '1*'] };
   const sensors = cataloguesOf({ ...FILE, areas }).day;
   const items = active(...many(cold, 11));
-  const found = arranged(items, 'cause', { sensors, unit: 'C' });
+  const found = arranged(items, 'cause', sensors);
   expect(found.map(({ cause, items: own }) => [cause, own.length]).sort()).toEqual([
     ['North · Temperature too low', 5],
     ['South · Temperature too low', 6],
   ]);
   const list = listOf(many(cold, 11), NO_LOCAL_ALARMS, null, AT);
-  expect(filtered(list, 'south', { sensors, unit: 'C' }, isTag).active).toHaveLength(6);
+  expect(filtered(list, 'south', sensors, isTag).active).toHaveLength(6);
 });
 
 test('of a cause how many are how bad, and the value farthest beyond', () => {
@@ -90,26 +89,26 @@ test('of a cause how many are how bad, and the value farthest beyond', () => {
       : id === 'cold1'
         ? { kind: 'known', value: 10.9, verdict: 'healthy', reason: null, trend: null }
         : null;
-  expect(causeFacts([...items.active, ...items.resolved], speech, now)).toEqual([
+  expect(causeFacts([...items.active, ...items.resolved], CATALOGUE, now)).toEqual([
     ...[
       '1 stressed, 1 back to normal',
       'now 10.4\u00a0°C (Tag\u00a02)',
       'worst 2.9\u00a0°C (Tag\u00a04)',
     ],
   ]);
-  expect(causeFacts(items.resolved, speech, now)).toEqual([
+  expect(causeFacts(items.resolved, CATALOGUE, now)).toEqual([
     '',
     '',
     'worst 2.9\u00a0°C (Tag\u00a04)',
   ]);
   const unknown = (): Now => ({ kind: 'unknown', last: 9, lastAt: 'unknown' });
-  expect(causeFacts(items.active, speech, unknown)[0], 'no word for all alike').toBe('');
+  expect(causeFacts(items.active, CATALOGUE, unknown)[0], 'no word for all alike').toBe('');
 });
 
 test('the newest first, or by tag: in one row', () => {
   const items = active(cold(10), hot(2), cold(3));
   const tags = (order: 'newest' | 'tag') =>
-    arranged(items, order, speech).map((block) => block.items.map(({ alarm: it }) => it.tag_id));
+    arranged(items, order, CATALOGUE).map((block) => block.items.map(({ alarm: it }) => it.tag_id));
   expect(tags('newest')).toEqual([['10', '3', '2']]);
   expect(tags('tag')).toEqual([['2', '3', '10']]);
 });
@@ -127,9 +126,9 @@ test('the worst cause first, then unacknowledged ones, then the most frequent', 
   const order = (local: LocalAlarms, alarms = all) => {
     const items = listOf(alarms, local, null, AT).active;
     return arranged(
-      causesFirst(items, (item) => item.alarm.reason, speech),
+      causesFirst(items, (item) => item.alarm.reason, CATALOGUE),
       'cause',
-      speech,
+      CATALOGUE,
     ).map(({ items: own }) => `${own[0]?.alarm.id.replace(/\d/, '')} ${own.length}`);
   };
   expect(order(NO_LOCAL_ALARMS)).toEqual(['worst 1', 'dry 7', 'hot 5']);
@@ -142,7 +141,7 @@ test('the worst cause first, then unacknowledged ones, then the most frequent', 
 test('a word that is exactly the id of a tag finds that tag, and no other', () => {
   const list = listOf([cold(7), cold(27), hot(71)], NO_LOCAL_ALARMS, null, AT);
   const find = (text: string, ids: readonly string[]) =>
-    filtered(list, text, speech, (id) => ids.includes(id)).active.map((it) => it.alarm.id);
+    filtered(list, text, CATALOGUE, (id) => ids.includes(id)).active.map((it) => it.alarm.id);
   expect(find('Tag 7', ['7', '27', '71'])).toEqual(['cold7']);
   expect(find('Tag 7', ['27', '71'])).toEqual(['cold7', 'cold27', 'hot71']);
 });
@@ -155,7 +154,7 @@ test.each([
   ['humidity', []],
 ])('%j finds %j', (text, ids) => {
   const list = listOf([cold(3), hot(2)], NO_LOCAL_ALARMS, null, AT);
-  expect(filtered(list, text, speech, isTag).active.map(({ alarm: it }) => it.id)).toEqual(ids);
+  expect(filtered(list, text, CATALOGUE, isTag).active.map(({ alarm: it }) => it.id)).toEqual(ids);
 });
 
 test('as a file: each state, values in the unit of the page, and no formula', () => {
@@ -163,7 +162,7 @@ test('as a file: each state, values in the unit of the page, and no formula', ()
   const rated = { alarm: evil, verdict: 'critical' } as const;
   const local = shelve(NO_LOCAL_ALARMS, rated, AT + 60_000, 'fan, off');
   const list = listOf([evil, alarm('b', { cleared: 960 })], local, 1_000, AT);
-  const [head, shelved, resolved] = alarmsCsv(list, { ...speech, unit: 'F' }, () => null)
+  const [head, shelved, resolved] = alarmsCsv(list, IN_FAHRENHEIT, () => null)
     .slice(1)
     .split('\r\n');
   expect(head?.split(',')).toHaveLength(16);

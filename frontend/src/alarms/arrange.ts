@@ -3,9 +3,10 @@ import type { Alarm, WireTime } from '../contract/types';
 import { type Cell, csv, finder, shown } from '../domain/text';
 import { isOfRange, sideOf, VERDICTS } from '../domain/health';
 import { groupedBy } from '../domain/memo';
+import type { Catalogue } from '../domain/sensors';
 import { secondsOf } from '../domain/time';
 import { compareIds } from '../domain/twin';
-import { toShown, unitOf } from '../domain/format';
+import { toShown } from '../domain/format';
 import { S } from '../strings';
 import { causeOf, inEach, MOST_LOOSE, type AlarmList, type Item, type Wrong } from './list';
 import {
@@ -17,7 +18,6 @@ import {
   whereText,
   worstOf,
   type Now,
-  type Speech,
 } from './words';
 
 export const ORDERS = ['cause', 'newest', 'tag'] as const;
@@ -38,7 +38,7 @@ export interface Block<T extends Wrong = Item> {
 export function filtered(
   list: AlarmList,
   text: string,
-  speech: Speech,
+  sensors: Catalogue,
   isTag: (id: string) => boolean,
 ): AlarmList {
   const isFound = finder(text, isTag);
@@ -46,13 +46,17 @@ export function filtered(
   const has = ({ alarm, verdict }: Item): boolean =>
     isFound(
       alarm.tag_id,
-      `${nameText(alarm, speech)} ${causeText(alarm, speech)} ${S.health[verdict]}`.toLowerCase(),
+      `${nameText(alarm, sensors)} ${causeText(alarm, sensors)} ${S.health[verdict]}`.toLowerCase(),
     );
   return inEach(list, (items) => items.filter(has));
 }
 
 /** Blocks in the given order. `items` come worst first, or last resolved first. */
-export function arranged(items: readonly Item[], order: Order, speech: Speech): readonly Block[] {
+export function arranged(
+  items: readonly Item[],
+  order: Order,
+  sensors: Catalogue,
+): readonly Block[] {
   if (order !== 'cause') {
     const by =
       order === 'newest'
@@ -60,36 +64,39 @@ export function arranged(items: readonly Item[], order: Order, speech: Speech): 
         : (a: Item, b: Item) => compareIds(a.alarm.tag_id, b.alarm.tag_id);
     return [{ key: order, cause: null, items: [...items].sort(by) }];
   }
-  return byCause(items, speech);
+  return byCause(items, sensors);
 }
 
 /** Groups items that share a cause into one block, at the place of the worst one. */
-export function byCause<T extends Wrong>(items: readonly T[], speech: Speech): readonly Block<T>[] {
-  const causes = groupedBy(items, ({ alarm }) => causeOf(alarm, speech));
+export function byCause<T extends Wrong>(
+  items: readonly T[],
+  sensors: Catalogue,
+): readonly Block<T>[] {
+  const causes = groupedBy(items, ({ alarm }) => causeOf(alarm, sensors));
   const blocks: (Block<T> & { readonly items: T[] })[] = [];
   for (const item of items) {
-    const key = causeOf(item.alarm, speech);
+    const key = causeOf(item.alarm, sensors);
     const own = causes.get(key) ?? [];
     const before = blocks.at(-1);
     if (own.length > MOST_LOOSE) {
       if (own[0] === item)
-        blocks.push({ key, cause: causeText(item.alarm, speech), items: [...own] });
+        blocks.push({ key, cause: causeText(item.alarm, sensors), items: [...own] });
     } else if (before?.cause === null) before.items.push(item);
     else blocks.push({ key: `from ${item.alarm.id}`, cause: null, items: [item] });
   }
   return blocks;
 }
 
-function causeText(alarm: Wrong['alarm'], speech: Speech): string {
-  const area = speech.sensors.areaOf(alarm.tag_id);
-  return [...(area === '' ? [] : [shown(area, 32)]), causeWords(alarm, speech)].join(' · ');
+function causeText(alarm: Wrong['alarm'], sensors: Catalogue): string {
+  const area = sensors.areaOf(alarm.tag_id);
+  return [...(area === '' ? [] : [shown(area, 32)]), causeWords(alarm, sensors)].join(' · ');
 }
 
-export function causeWords(alarm: Pick<Alarm, 'reason'>, speech: Speech): string {
+export function causeWords(alarm: Pick<Alarm, 'reason'>, sensors: Catalogue): string {
   const { reason } = alarm;
-  if (!isOfRange(reason)) return whatText(alarm, speech);
+  if (!isOfRange(reason)) return whatText(alarm, sensors);
   const beyond = sideOf(reason) === 'below' ? S.tooLow(null) : S.tooHigh(null);
-  return `${shown(speech.sensors.named(reason.sensor).label, 32)} ${beyond}`;
+  return `${shown(sensors.named(reason.sensor).label, 32)} ${beyond}`;
 }
 
 /** Lists tags by name, up to `MOST_NAMED`; instead of "1 more", it names that tag too. */
@@ -105,7 +112,7 @@ export function tagsText(ids: readonly string[]): string {
  */
 export function causeFacts(
   items: readonly Item[],
-  speech: Speech,
+  sensors: Catalogue,
   nowOf: (alarm: Alarm) => Now | null,
 ): readonly [counts: string, now: string, worst: string] {
   const all = items.map(({ alarm, verdict }) => {
@@ -125,7 +132,7 @@ export function causeFacts(
       .sort((a, b) => (isBelow ? a.value - b.value : b.value - a.value))[0]?.each;
     return (
       found && {
-        ...valuesOf(found.alarm, speech, found.now),
+        ...valuesOf(found.alarm, sensors, found.now),
         where: inOnePiece(whereText(found.alarm)),
       }
     );
@@ -153,7 +160,7 @@ const iso = (at: WireTime | null): string | null =>
 /** CSV for programs: the same column names in every language, values in the page's units. */
 export function alarmsCsv(
   list: AlarmList,
-  { sensors, unit }: Speech,
+  sensors: Catalogue,
   nowOf: (alarm: Alarm) => Now | null,
 ): string {
   const header = [
@@ -169,11 +176,11 @@ export function alarmsCsv(
       const value = (given: number | null): Cell =>
         given === null || !Number.isFinite(given)
           ? null
-          : Number((reason.sensor === '' ? given : toShown(sensor, given, unit)).toPrecision(7));
+          : Number((reason.sensor === '' ? given : toShown(sensor, given)).toPrecision(7));
       return [
         ...[state, current?.kind === 'known' ? current.verdict : null, verdict],
         ...[alarm.tag_id || null, reason.kind, reason.sensor || null],
-        ...[reason.sensor === '' ? null : unitOf(sensor, unit), value(reason.limit)],
+        ...[reason.sensor === '' ? null : sensor.unit, value(reason.limit)],
         value(current?.kind === 'known' ? current.value : null),
         ...[value(worstOf(alarm, current)), value(reason.value)],
         ...[iso(alarm.raised_at), iso(alarm.cleared_at)],

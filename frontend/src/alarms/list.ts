@@ -2,10 +2,10 @@
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import { isOfRange, severity, sideOf } from '../domain/health';
 import { groupedBy, withParts } from '../domain/memo';
+import type { Catalogue } from '../domain/sensors';
 import { secondsOf } from '../domain/time';
 import { compareIds, equal } from '../domain/twin';
 import { isShelfHeld, isWorse, faultKey, type LocalAlarms, type Shelf } from './own';
-import type { Speech } from './words';
 
 /** How long a resolved alarm stays listed, seconds. */
 export const LISTED_S = 86_400;
@@ -111,12 +111,12 @@ const byName = ({ alarm: a }: Item, { alarm: b }: Item): number =>
 export function causesFirst(
   items: readonly Item[],
   reasonOf: (item: Item) => HealthReason,
-  speech: Speech,
+  sensors: Catalogue,
 ): readonly Item[] {
   const ranked = inOrder(items, reasonOf).map((item) => ({
     item,
     urgency: Math.floor(rankOf(reasonOf(item), item.isAcknowledged)),
-    cause: causeOf(item.alarm, speech),
+    cause: causeOf(item.alarm, sensors),
   }));
   const causes = groupedBy(ranked, ({ cause }) => cause);
   const countOf = ({ cause }: (typeof ranked)[number]): number => {
@@ -129,7 +129,7 @@ export function causesFirst(
 }
 
 /** Key of a cause: kind, sensor, side and area, whatever the limit. */
-export const causeOf = ({ reason, tag_id }: Wrong['alarm'], { sensors }: Speech): string =>
+export const causeOf = ({ reason, tag_id }: Wrong['alarm'], sensors: Catalogue): string =>
   [
     ...[reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : ''],
     sensors.areaOf(tag_id),

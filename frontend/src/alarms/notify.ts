@@ -10,7 +10,7 @@ import { S } from '../strings';
 import { showAlarm } from './follow';
 import type { Item } from './list';
 import { own, updateNotifySettings } from './own';
-import { textNow, worstNow } from './speech';
+import { textNow, worstNow } from './latest';
 import { alarmList, onNews } from './watch';
 import { severalText } from './words';
 

@@ -20,7 +20,7 @@ import {
   type Item,
   type News,
 } from './list';
-import { textNow } from './speech';
+import { textNow } from './latest';
 import { severalText } from './words';
 
 /** The current alarms. */

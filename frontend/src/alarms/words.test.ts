@@ -4,7 +4,7 @@ import type { Alarm, Verdict } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { held, reason } from '../testing/health';
 import { S } from '../strings';
-import { CATALOGUE } from '../testing/sensors';
+import { CATALOGUE, IN_FAHRENHEIT } from '../testing/sensors';
 import {
   alarmText,
   nameText,
@@ -17,8 +17,8 @@ import {
   type Now,
 } from './words';
 
-const C = { sensors: CATALOGUE, unit: 'C' } as const;
-const F = { ...C, unit: 'F' } as const;
+const C = CATALOGUE;
+const F = IN_FAHRENHEIT;
 
 /** Noon in the browser's time zone, ROS seconds. */
 const NOON = new Date(2026, 10, 14, 12).getTime() / 1000;

@@ -1,14 +1,7 @@
 /** An alarm in words: what, where, value now and at worst, since when, until when. Pure. */
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import { isOldReading, trendOf, type TagThen } from '../domain/difference';
-import {
-  ageText,
-  beyondLimitText,
-  minuteText,
-  readingText,
-  shortAgeText,
-  type TemperatureUnit,
-} from '../domain/format';
+import { ageText, beyondLimitText, minuteText, readingText, shortAgeText } from '../domain/format';
 import { beyondText, isOfRange, reasonText, sideOf, todoText } from '../domain/health';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
@@ -30,23 +23,17 @@ const MOST_NAMED = 3;
 export const whereText = ({ tag_id }: Pick<Alarm, 'tag_id'>): string =>
   tag_id === '' ? S.alarmHouse : S.card(shown(tag_id, LONGEST_NAME));
 
-/** What the words need besides the alarm: the sensor catalogue and the temperature unit. */
-export interface Speech {
-  readonly sensors: Catalogue;
-  readonly unit: TemperatureUnit;
-}
-
 /** What is wrong, without its value, which changes. */
-export function whatText({ reason }: Pick<Alarm, 'reason'>, { sensors, unit }: Speech): string {
-  if (isOfRange(reason)) return beyondText(sensors, reason, unit);
+export function whatText({ reason }: Pick<Alarm, 'reason'>, sensors: Catalogue): string {
+  if (isOfRange(reason)) return beyondText(sensors, reason);
   // A pest count and a changed sensor's reading are reported as current values.
   const value = reason.kind === 'pest' ? 0 : reason.kind === 'changed' ? null : reason.value;
-  return reasonText(sensors, { ...reason, value }, unit, null);
+  return reasonText(sensors, { ...reason, value }, null);
 }
 
 /** What and where in one line, independent of time. */
-export const nameText = (alarm: Alarm, speech: Speech): string =>
-  S.alarmWhat(whereText(alarm), whatText(alarm, speech));
+export const nameText = (alarm: Alarm, sensors: Catalogue): string =>
+  S.alarmWhat(whereText(alarm), whatText(alarm, sensors));
 
 /** An alarm's values in words, rounded so that they contradict neither each other nor the limit. */
 export interface Values {
@@ -60,9 +47,8 @@ export interface Values {
   readonly first: string | null;
 }
 
-export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values {
+export function valuesOf(alarm: Alarm, sensors: Catalogue, now: Now | null): Values {
   const reason = reasonNow(alarm, now);
-  const { sensors, unit } = speech;
   const sensor = sensors.named(reason.sensor);
   const worst = worstOf(alarm, now);
   const first = alarm.reason.value;
@@ -73,8 +59,8 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
         ? String(value)
         : S.alarmPests.seen
       : isOfRange(reason)
-        ? beyondLimitText(sensor, value, reason.release ?? reason.limit, unit)
-        : readingText(sensor, value, unit);
+        ? beyondLimitText(sensor, value, reason.release ?? reason.limit)
+        : readingText(sensor, value);
   const nowText = (value: number | null): string => {
     if (value === null) {
       return isPest ? S.alarmPests.gone : S.alarmNow(S.alarmStatus.healthy);
@@ -86,7 +72,7 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
   const worstText = worst === null || (isPest && worst === 0) ? null : text(worst);
   const isMeasured = isOfRange(reason) || isPest || reason.kind === 'changed';
   return {
-    what: whatText({ ...alarm, reason }, speech),
+    what: whatText({ ...alarm, reason }, sensors),
     todo: todoText(reason),
     now: now?.kind === 'known' ? nowText(now.value) : null,
     worst:
@@ -98,8 +84,8 @@ export function valuesOf(alarm: Alarm, speech: Speech, now: Now | null): Values 
 }
 
 /** What, where and the current value in one line; the worst value if it differs. */
-export function alarmText(alarm: Alarm, speech: Speech, now: Now | null): string {
-  const { what, now: nowText, worst } = valuesOf(alarm, speech, now);
+export function alarmText(alarm: Alarm, sensors: Catalogue, now: Now | null): string {
+  const { what, now: nowText, worst } = valuesOf(alarm, sensors, now);
   const isKnown = now?.kind === 'known';
   const texts = [
     what,
@@ -117,11 +103,11 @@ const rated = (text: string, verdict: Verdict): string =>
 /** Says that the value now is unknown, and gives the last known one. */
 export function unknownText(
   { reason: { sensor: name } }: Alarm,
-  { sensors, unit }: Speech,
+  sensors: Catalogue,
   { last }: Extract<Now, { kind: 'unknown' }>,
   age: number | null,
 ): string {
-  const reading = last === null ? null : readingText(sensors.named(name), last, unit);
+  const reading = last === null ? null : readingText(sensors.named(name), last);
   return S.alarmNowUnknown(reading, age === null ? null : ageText(age));
 }
 

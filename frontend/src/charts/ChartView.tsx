@@ -257,7 +257,6 @@ function ChartFiles({
   tagId: string | undefined;
   sensor: string | undefined;
 }): JSX.Element {
-  const unit = useApp((state) => state.settings.unit);
   const catalogue = useApp(selectCatalogue);
   return (
     <footer className="chart-files">
@@ -269,7 +268,6 @@ function ChartFiles({
           const text = chartCsv(
             catalogue,
             models.flatMap(({ lines }) => lines),
-            unit,
           );
           saveCsv('chart', text, span.to * 1000);
         }}

@@ -30,7 +30,7 @@ test('with a value it says that', () => {
 });
 
 const plainModel = (sensor: string, lines: PlotModel['lines']): PlotModel => ({
-  ...{ sensor: sensorNamed(sensor), unit: 'C', lines, bands: [], isMixed: false },
+  ...{ sensor: sensorNamed(sensor), lines, bands: [], isMixed: false },
   ...{ span: { from: 90_000, to: 100_000 }, moment: null },
 });
 

@@ -3,7 +3,7 @@ import '../styles/charts.css';
 
 import { type CSSProperties, type JSX, useEffect, useMemo, useRef } from 'react';
 
-import { ageText, rangeText, readingText, type TemperatureUnit, unitOf } from '../domain/format';
+import { ageText, rangeText, readingText } from '../domain/format';
 import { rangeOf, rgbText, sensorColour } from '../domain/ramp';
 import { isHad, isOfDay, type Sensor } from '../domain/sensors';
 import { lastUntil, type Mark, type Point, pointAt, type Series } from '../domain/series';
@@ -66,7 +66,7 @@ export function PlotView({
       <header>
         <h3>
           <span className="plot-name">{shown(model.sensor.label, 32)}</span>{' '}
-          <span className="faint">{unitOf(model.sensor, model.unit)}</span>
+          <span className="faint">{model.sensor.unit}</span>
         </h3>
         {only && <LineValue line={only} model={model} />}
         {model.isMixed && <span className="faint">{S.chartIdealsDiffer}</span>}
@@ -98,7 +98,7 @@ function useReadoutTime(): { at: number | null; isPointed: boolean } {
 /** A line's value at that time, its range there, and its value the day before. */
 export function LineValue({
   line,
-  model: { sensor, unit, span },
+  model: { sensor, span },
 }: {
   line: Line;
   model: PlotModel;
@@ -117,17 +117,17 @@ export function LineValue({
   return (
     <span className="line-value">
       {isMean && <span className="faint">{S.chartColumns.mean} </span>}
-      <strong>{value === null ? S.noValue : readingText(sensor, value, unit)}</strong>
+      <strong>{value === null ? S.noValue : readingText(sensor, value)}</strong>
       {isMean && (
         <span className="faint">
           {' '}
-          {rangeText(sensor, min === null || max === null ? null : [min, max], unit)}
+          {rangeText(sensor, min === null || max === null ? null : [min, max])}
         </span>
       )}
       {line.before && (
         <span className="faint">
           {' '}
-          {S.chartBeforeWas(was === null ? S.noValue : readingText(sensor, was, unit))}
+          {S.chartBeforeWas(was === null ? S.noValue : readingText(sensor, was))}
         </span>
       )}
     </span>
@@ -238,11 +238,11 @@ export function SensorChoice({
 export const spanText = ({ from, to }: Span): string => S.chartSpan(rosText(from), rosText(to));
 
 /** The latest, least and largest value, and the number of gaps. */
-function seriesText({ points, gaps }: Series, sensor: Sensor, unit: TemperatureUnit): string {
+function seriesText({ points, gaps }: Series, sensor: Sensor): string {
   const latest = points.findLast(({ value }) => value !== null);
   const range = rangeOf(points.flatMap(({ min, max }) => [min, max]));
   if (latest?.value == null || !range) return S.chartEmpty;
-  const value = (of: number): string => readingText(sensor, of, unit);
+  const value = (of: number): string => readingText(sensor, of);
   return S.chartSummary(
     points.reduce((sum, { n }) => sum + n, 0),
     value(latest.value),
@@ -253,7 +253,7 @@ function seriesText({ points, gaps }: Series, sensor: Sensor, unit: TemperatureU
   );
 }
 
-function plotText({ sensor, unit, lines, span }: PlotModel): string {
-  const each = lines.map(({ series, label }) => `${label}: ${seriesText(series, sensor, unit)}`);
+function plotText({ sensor, lines, span }: PlotModel): string {
+  const each = lines.map(({ series, label }) => `${label}: ${seriesText(series, sensor)}`);
   return `${S.chartOf(shown(sensor.label, 32))}, ${spanText(span)}. ${each.join(' ')}`;
 }

@@ -1,6 +1,6 @@
 import { type JSX, useState } from 'react';
 
-import { ageText, readingText, type TemperatureUnit } from '../domain/format';
+import { ageText, readingText } from '../domain/format';
 import type { Sensor } from '../domain/sensors';
 import { rowsOfSeries, type SeriesRow } from '../domain/series';
 import { shown } from '../domain/text';
@@ -43,7 +43,7 @@ export function ChartTables({ models }: { models: readonly PlotModel[] }): JSX.E
 /** A chart's line as a table, for keyboard and screen readers; the latest row first. */
 function SeriesTable({ line, model }: { line: Line; model: PlotModel }): JSX.Element {
   const { series } = line;
-  const { sensor, unit } = model;
+  const { sensor } = model;
   const isBucketed = series.bucketS !== null;
   const { chartColumns: columns } = S;
   const rows = rowsOfSeries(series, line.marks).reverse();
@@ -76,7 +76,7 @@ function SeriesTable({ line, model }: { line: Line; model: PlotModel }): JSX.Ele
           {rows.map((row, index) => (
             <tr key={`${row.kind}${row.at}.${index}`} data-kind={row.kind} data-at={row.at}>
               <th scope="row">{rosText(row.at)}</th>
-              <Values row={row} isBucketed={isBucketed} sensor={sensor} unit={unit} />
+              <Values row={row} isBucketed={isBucketed} sensor={sensor} />
             </tr>
           ))}
           {rows.length === 0 && (
@@ -94,15 +94,13 @@ function Values({
   row,
   isBucketed,
   sensor,
-  unit,
 }: {
   row: SeriesRow;
   isBucketed: boolean;
   sensor: Sensor;
-  unit: TemperatureUnit;
 }): JSX.Element {
   const value = (of: number | null): JSX.Element => (
-    <td>{of === null ? S.sensorFailed : readingText(sensor, of, unit)}</td>
+    <td>{of === null ? S.sensorFailed : readingText(sensor, of)}</td>
   );
   const event = eventText(row);
   return (

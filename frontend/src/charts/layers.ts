@@ -158,7 +158,7 @@ function drawNames({ context, box, ratio, y, model, colour }: Frame): void {
     const at = Math.max(least, Math.min(y(value), most));
     least = at + height;
     const word = kind === 'ideal' ? S.idealParts.any : S.alarmStatus.critical;
-    const text = `${ARROWS[side]}${word} ${valueText(model.sensor, value, model.unit)}`;
+    const text = `${ARROWS[side]}${word} ${valueText(model.sensor, value)}`;
     context.fillStyle = kind === 'ideal' ? colour('chart-text') : colour('chart-failure');
     context.fillText(text, box.left + box.width + NAME_GAP * ratio, at);
   });

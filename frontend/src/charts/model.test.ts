@@ -18,7 +18,6 @@ import {
 
 const model = (all: readonly Series[], over: Partial<PlotModel> = {}): PlotModel => ({
   sensor: sensorNamed('temperature'),
-  unit: 'C',
   lines: all.map((each, look) => ({
     series: each,
     before: null,
@@ -158,7 +157,7 @@ describe('several lines over common times', () => {
   });
 
   test('are in the unit that is shown', () => {
-    expect(aligned(model([one], { unit: 'F' }))).toEqual([
+    expect(aligned(model([one], { sensor: sensorNamed('temperature', 'F') }))).toEqual([
       [10, 30],
       [68, 86],
     ]);
@@ -210,7 +209,9 @@ describe('the axis of the values', () => {
   });
 
   test('is in the unit that is shown', () => {
-    expect(valueRange(model([seriesWith()], { unit: 'F' }))[0]).toBeCloseTo((18 - 0.64) * 1.8 + 32);
+    expect(
+      valueRange(model([seriesWith()], { sensor: sensorNamed('temperature', 'F') }))[0],
+    ).toBeCloseTo((18 - 0.64) * 1.8 + 32);
   });
 });
 
@@ -253,7 +254,7 @@ test('the band is that of the plants, and of several kinds there is none', () =>
   const of = (...species: string[]) => {
     const lines = { series, before: new Map(), marks: new Map() };
     const span = { from: 0, to: 100 };
-    return modelOf(CATALOGUE, cataloguesOf(FILE), plan, species, lines, span, 'C', null, null);
+    return modelOf(CATALOGUE, cataloguesOf(FILE), plan, species, lines, span, null, null);
   };
   const ideals = (...species: string[]) => of(...species).bands.map(({ ranges }) => ranges.ideal);
   expect(ideals('', 'fern')).toEqual([[18, 26]]);

@@ -3,7 +3,7 @@ import uPlot from 'uplot';
 
 import { fetchSeries, fetchTimeline } from '../contract/past';
 import { type Catalogue, type Catalogues, type Ranges, rangesFor } from '../domain/sensors';
-import { type TemperatureUnit, toShown } from '../domain/format';
+import { toShown } from '../domain/format';
 import type { Shared } from '../domain/memo';
 import { rangeOf } from '../domain/ramp';
 import { laterBy, marksOf, middleOf, type Point, type Series, seriesOf } from '../domain/series';
@@ -78,10 +78,10 @@ export const hasMarks = ({ lines }: PlotModel): boolean =>
   lines.some(({ marks }) => marks.length > 0);
 
 /** Common times, and the values of each `drawnOf`: null is a break, undefined belongs to another line. */
-export const aligned = ({ lines, sensor, unit }: PlotModel): uPlot.AlignedData =>
+export const aligned = ({ lines, sensor }: PlotModel): uPlot.AlignedData =>
   uPlot.join(
     drawnOf({ lines }).map(({ series }) => {
-      const points = pointsOf(series, (value) => toShown(sensor, value, unit));
+      const points = pointsOf(series, (value) => toShown(sensor, value));
       return [points.map(({ at }) => at), points.map(({ value }) => value)];
     }),
   );
@@ -96,7 +96,7 @@ const LEAST_OF_IDEAL = 0.1;
 const LEAST_OF_VALUE = 0.1;
 
 /** The values' axis, in the shown unit. */
-export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: number, high: number] {
+export function valueRange({ lines, sensor, bands }: PlotModel): [low: number, high: number] {
   const values = drawnOf({ lines }).flatMap(({ series }) =>
     series.points.flatMap(({ min, max }) => [min, max]),
   );
@@ -125,7 +125,7 @@ export function valueRange({ lines, sensor, bands, unit }: PlotModel): [low: num
     }
   }
   const room = (high - low) * ROOM;
-  return [toShown(sensor, low - room, unit), toShown(sensor, high + room, unit)];
+  return [toShown(sensor, low - room), toShown(sensor, high + room)];
 }
 
 /**
@@ -136,7 +136,7 @@ export function limitsOf(model: PlotModel) {
   const { ideal, critical } = model.bands.at(-1)?.ranges ?? {};
   const [low, high] = valueRange(model);
   const named = (kind: 'ideal' | 'critical') => (value: number) => {
-    const at = toShown(model.sensor, value, model.unit);
+    const at = toShown(model.sensor, value);
     const side =
       at < low ? ('below' as const) : at > high ? ('above' as const) : ('inside' as const);
     return { kind, value, side };
@@ -238,7 +238,6 @@ export function modelOf(
   species: readonly string[],
   { series, before, marks }: Lines,
   span: Span,
-  unit: TemperatureUnit,
   moment: number | null,
   nowS: number | null,
 ) {
@@ -268,7 +267,6 @@ export function modelOf(
     : bandsOf(span, lines[0]?.series.nights ?? null, ranges, moment ?? nowS);
   return {
     sensor: now,
-    unit,
     span,
     /** The page's moment, ROS seconds; null: now. */
     moment,

@@ -64,7 +64,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
     box: u.bbox,
     ratio: uPlot.pxRatio,
     x: (at) => u.valToPos(at, 'x', true),
-    y: (value) => u.valToPos(toShown(model.sensor, value, model.unit), 'y', true),
+    y: (value) => u.valToPos(toShown(model.sensor, value), 'y', true),
     model,
     colour,
   });

@@ -69,7 +69,6 @@ export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = 
 
 /** The charts of plans of the same tags, as far as their lines have arrived. */
 export function useCharts(plans: readonly Plan[], points: number, hasDayBefore = false) {
-  const unit = useApp((state) => state.settings.unit);
   const moment = useApp((state) => state.view.moment);
   const catalogue = useApp(selectCatalogue);
   const both = useApp(selectCatalogues);
@@ -83,11 +82,9 @@ export function useCharts(plans: readonly Plan[], points: number, hasDayBefore =
   const models = useMemo(
     () =>
       span
-        ? plans.map((plan) =>
-            modelOf(catalogue, both, plan, species, lines, span, unit, moment, nowS),
-          )
+        ? plans.map((plan) => modelOf(catalogue, both, plan, species, lines, span, moment, nowS))
         : [],
-    [catalogue, both, plans, species, lines, span, unit, moment, nowS],
+    [catalogue, both, plans, species, lines, span, moment, nowS],
   );
   return { fetched, models };
 }

@@ -85,11 +85,11 @@ describe('its colours', () => {
 
 test('a difference has its sign and unit, and no offset of 32 °F', () => {
   const temperature = sensorNamed('temperature');
-  expect(differenceText(temperature, 1.3, 'C')).toBe('+1.3\u00a0°C');
-  expect(differenceText(temperature, -1, 'F')).toBe('\u22121.8\u00a0°F');
-  expect(differenceText(temperature, 0, 'C')).toBe('0.0\u00a0°C');
-  expect(differenceText(temperature, -0.001, 'C')).toBe('0.0\u00a0°C');
-  expect(differenceText(sensorNamed('spin'), 4, 'C')).toBe('+4.0');
+  expect(differenceText(temperature, 1.3)).toBe('+1.3\u00a0°C');
+  expect(differenceText(sensorNamed('temperature', 'F'), -1)).toBe('\u22121.8\u00a0°F');
+  expect(differenceText(temperature, 0)).toBe('0.0\u00a0°C');
+  expect(differenceText(temperature, -0.001)).toBe('0.0\u00a0°C');
+  expect(differenceText(sensorNamed('spin'), 4)).toBe('+4.0');
 });
 
 const NOT_JUDGED = { verdict: 'unknown', reasons: [] } as const;
@@ -152,5 +152,5 @@ test.each([
   // Its unit has a time already.
   ['daily_light_integral', 1, 'C', 'up', '+1.0\u00a0mol/m²/d', ''],
 ] as const)('a difference of %s by %d in °%s: %s, %s%s', (name, by, unit, way, text, per) => {
-  expect(differenceShown(sensorNamed(name), by, unit)).toEqual({ way, text, rate: text + per });
+  expect(differenceShown(sensorNamed(name, unit), by)).toEqual({ way, text, rate: text + per });
 });

@@ -1,7 +1,7 @@
 /** A field minus that of another moment: yesterday against today. Pure. */
 import type { Field, TagHealth, WireTime } from '../contract/types';
 import { S } from '../strings';
-import { differenceNumber, intervalText, type TemperatureUnit, withUnit } from './format';
+import { differenceNumber, intervalText, withUnit } from './format';
 import { fraction, mix, type Range, rangeOf, type Rgb, rgbText, type Shade } from './ramp';
 import type { Ranges, Sensor } from './sensors';
 import { secondsOf } from './time';
@@ -87,16 +87,16 @@ export const divergingColours = (): string[] =>
   });
 
 /** A difference with its sign, without its unit; no sign if it rounds to 0. */
-export function signedText(sensor: Sensor, value: number, unit: TemperatureUnit): string {
-  const text = differenceNumber(sensor, value, unit);
+export function signedText(sensor: Sensor, value: number): string {
+  const text = differenceNumber(sensor, value);
   const isNothing = !/[1-9]/.test(text);
   if (isNothing) return text.replace('\u2212', '');
   return value > 0 ? `+${text}` : text;
 }
 
 /** The same with its unit: "+1.3 °C". */
-export function differenceText(sensor: Sensor, value: number, unit: TemperatureUnit): string {
-  return withUnit(sensor, signedText(sensor, value, unit), unit);
+export function differenceText(sensor: Sensor, value: number): string {
+  return withUnit(sensor, signedText(sensor, value));
 }
 
 export interface TagThen {
@@ -159,9 +159,8 @@ const takenAt = (sensor: string, { wire }: Tag): WireTime | null =>
 export function differenceShown(
   sensor: Sensor,
   by: number,
-  unit: TemperatureUnit,
 ): { readonly way: 'up' | 'down' | 'level'; readonly text: string; readonly rate: string } {
-  const text = differenceText(sensor, by, unit);
+  const text = differenceText(sensor, by);
   const way = text.startsWith('+') ? 'up' : text.startsWith('\u2212') ? 'down' : 'level';
   if (way === 'level') return { way, text: S.trendLevel, rate: S.trendLevel };
   // A unit that has a time already, such as mol/m²/d, would be misread.

@@ -32,9 +32,9 @@ test.each([
 });
 
 test('a reading holds on to its unit', () => {
-  expect(readingText(sensorNamed('temperature'), 20, 'C')).toBe('20.0\u00a0°C');
-  expect(readingText(sensorNamed('temperature'), 20, 'F')).toBe('68.0\u00a0°F');
-  expect(readingText(sensorNamed('ph'), 7, 'C')).toBe('7.0');
+  expect(readingText(sensorNamed('temperature'), 20)).toBe('20.0\u00a0°C');
+  expect(readingText(sensorNamed('temperature', 'F'), 20)).toBe('68.0\u00a0°F');
+  expect(readingText(sensorNamed('ph'), 7)).toBe('7.0');
 });
 
 test.each([
@@ -77,8 +77,8 @@ test('shares and lengths', () => {
 
 test('a range has its unit once and never breaks; none is a dash', () => {
   const sensor = sensorNamed('temperature');
-  expect(rangeText(sensor, [-1, 30], 'C')).toBe('\u22121.0\u00a0to\u00a030.0\u00a0°C');
-  expect(rangeText(sensor, null, 'C')).toBe('–');
+  expect(rangeText(sensor, [-1, 30])).toBe('\u22121.0\u00a0to\u00a030.0\u00a0°C');
+  expect(rangeText(sensor, null)).toBe('–');
 });
 
 test('a moment has its date, in an order that sorts', () => {
@@ -93,8 +93,8 @@ test.each([
   [-0.0004, '\u22120.00040'],
   [0, '0.0'],
 ])('%d of a sensor that nobody knows reads %s, and never as nothing', (value, text) => {
-  expect(valueText(sensorNamed('spin'), value, 'C')).toBe(text);
-  expect(valueText(sensorNamed('temperature'), value, 'C')).toMatch(/^.?\d\.\d\d?$/);
+  expect(valueText(sensorNamed('spin'), value)).toBe(text);
+  expect(valueText(sensorNamed('temperature'), value)).toMatch(/^.?\d\.\d\d?$/);
 });
 
 /** Numbers of every size, the same in each run (Park and Miller 1988). */
@@ -111,16 +111,14 @@ test('of a sensor that nobody knows no text is off by more than a twentieth of i
   const sensor = sensorNamed('spin');
   for (const value of sizes(2_000)) {
     const slack = Math.abs(value) * 0.05;
-    expect(Math.abs(read(valueText(sensor, value, 'C')) - value), String(value)).toBeLessThan(
-      slack,
-    );
-    expect(differenceNumber(sensor, value, 'C')).toBe(valueText(sensor, value, 'C'));
+    expect(Math.abs(read(valueText(sensor, value)) - value), String(value)).toBeLessThan(slack);
+    expect(differenceNumber(sensor, value)).toBe(valueText(sensor, value));
   }
 });
 
 test('all values of a sensor have as many digits, whatever their size', () => {
   const texts = (name: string, ...values: number[]): string[] =>
-    values.map((value) => valueText(sensorNamed(name), value, 'C'));
+    values.map((value) => valueText(sensorNamed(name), value));
   expect(texts('temperature', 0.4, 9.96, 100.4)).toEqual(['0.4', '10.0', '100.4']);
   expect(texts('vpd', 0.04, 1.1, 12)).toEqual(['0.04', '1.10', '12.00']);
   expect(texts('co2', 0, 99.6, 1_499.6)).toEqual(['0', '100', '1,500']);
@@ -131,5 +129,5 @@ test('all values of a sensor have as many digits, whatever their size', () => {
 });
 
 test('a value at its limit is on neither side of it', () => {
-  expect(beyondLimitText(sensorNamed('temperature'), 10, 10, 'C')).toBe('10.0\u00a0°C');
+  expect(beyondLimitText(sensorNamed('temperature'), 10, 10)).toBe('10.0\u00a0°C');
 });

@@ -28,21 +28,19 @@ export const numberText = (value: number, digits: number | null = null): string 
     : written(roundedText(value, digits));
 
 /** A reading without its unit. */
-export const valueText = (sensor: Sensor, value: number, unit: TemperatureUnit): string =>
-  sized(sensor, toShown(sensor, value, unit));
+export const valueText = (sensor: Sensor, value: number): string =>
+  sized(sensor, toShown(sensor, value));
 
 /** The difference of two readings, or an error, without its unit. */
-export const differenceNumber = (sensor: Sensor, by: number, unit: TemperatureUnit): string =>
-  sized(sensor, differenceToShown(sensor, by, unit));
+export const differenceNumber = (sensor: Sensor, by: number): string =>
+  sized(sensor, differenceToShown(sensor, by));
 
 const sized = ({ digits }: Sensor, given: number): string =>
   numberText(given, digits ?? digitsOfSmall(given));
 
 /** A number's text and the sensor's unit, joined by a no-break space. */
-export function withUnit(sensor: Sensor, text: string, unit: TemperatureUnit): string {
-  const suffix = unitOf(sensor, unit);
-  return suffix ? `${text}\u00a0${suffix}` : text;
-}
+export const withUnit = ({ unit }: Sensor, text: string): string =>
+  unit ? `${text}\u00a0${unit}` : text;
 
 /** Without ranges, a small value keeps two digits; otherwise it would read as 0. */
 function digitsOfSmall(value: number): number | null {
@@ -50,26 +48,21 @@ function digitsOfSmall(value: number): number | null {
   return size === 0 || size >= 0.1 ? null : Math.min(6, 1 + Math.ceil(-Math.log10(size)));
 }
 
-export const readingText = (sensor: Sensor, value: number, unit: TemperatureUnit): string =>
-  withUnit(sensor, valueText(sensor, value, unit), unit);
+export const readingText = (sensor: Sensor, value: number): string =>
+  withUnit(sensor, valueText(sensor, value));
 
 /** A reading with its unit; if it reads like the limit that it exceeds, the text says on which side it lies. */
-export function beyondLimitText(
-  sensor: Sensor,
-  value: number,
-  limit: number,
-  unit: TemperatureUnit,
-): string {
-  const text = readingText(sensor, value, unit);
-  return value !== limit && text === readingText(sensor, limit, unit)
+export function beyondLimitText(sensor: Sensor, value: number, limit: number): string {
+  const text = readingText(sensor, value);
+  return value !== limit && text === readingText(sensor, limit)
     ? S.reasons.just[value < limit ? 'below' : 'above'](text)
     : text;
 }
 
 /** A range with its unit; an en dash if there is none. */
-export function rangeText(sensor: Sensor, range: Span | null, unit: TemperatureUnit): string {
+export function rangeText(sensor: Sensor, range: Span | null): string {
   if (!range) return '–';
-  return S.valueRange(valueText(sensor, range[0], unit), readingText(sensor, range[1], unit));
+  return S.valueRange(valueText(sensor, range[0]), readingText(sensor, range[1]));
 }
 
 /** An age in at most its two largest units. */
@@ -143,26 +136,12 @@ export function failureText(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
-/** The operator's temperature unit. Inside the page everything stays in °C. */
-export type TemperatureUnit = 'C' | 'F';
-
-const inFahrenheit = (sensor: Sensor, unit: TemperatureUnit): boolean =>
-  unit === 'F' && sensor.unit === '°C';
-
-export function unitOf(sensor: Sensor, unit: TemperatureUnit): string {
-  return inFahrenheit(sensor, unit) ? '°F' : sensor.unit;
-}
-
-export function toShown(sensor: Sensor, value: number, unit: TemperatureUnit): number {
-  return inFahrenheit(sensor, unit) ? value * 1.8 + 32 : value;
-}
+export const toShown = ({ factor, offset }: Sensor, value: number): number =>
+  value * factor + offset;
 
 /** A difference of two values as shown: without the offset of 32. */
-export function differenceToShown(sensor: Sensor, value: number, unit: TemperatureUnit): number {
-  return inFahrenheit(sensor, unit) ? value * 1.8 : value;
-}
+export const differenceToShown = ({ factor }: Sensor, value: number): number => value * factor;
 
 /** The inverse of `toShown`, for numbers that the operator types. */
-export function fromShown(sensor: Sensor, value: number, unit: TemperatureUnit): number {
-  return inFahrenheit(sensor, unit) ? (value - 32) / 1.8 : value;
-}
+export const fromShown = ({ factor, offset }: Sensor, value: number): number =>
+  (value - offset) / factor;

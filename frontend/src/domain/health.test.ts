@@ -2,7 +2,7 @@ import { describe, expect, test } from 'vitest';
 
 import { S } from '../strings';
 import { held, judgement, NOBODY, reason } from '../testing/health';
-import { CATALOGUE } from '../testing/sensors';
+import { CATALOGUE, IN_FAHRENHEIT } from '../testing/sensors';
 import { readings, tag } from '../testing/tags';
 import {
   houseHealth,
@@ -115,7 +115,7 @@ test('what was not judged is unknown, and that is no silence of the twin', () =>
 });
 
 const text = (over: Parameters<typeof reason>[0], age: number | null = null): string =>
-  reasonText(CATALOGUE, reason(over), 'C', age);
+  reasonText(CATALOGUE, reason(over), age);
 const NBSP = '\u00a0';
 const old = { kind: 'old', verdict: 'unknown', sensor: '', value: null } as const;
 
@@ -218,7 +218,7 @@ describe('a reason in words', () => {
   });
 
   test('follows the unit that is chosen', () => {
-    expect(reasonText(CATALOGUE, reason(), 'F', null)).toBe(
+    expect(reasonText(IN_FAHRENHEIT, reason(), null)).toBe(
       `Temperature 43.9${NBSP}°F, below 50.0 (critical)`,
     );
   });
@@ -231,7 +231,7 @@ describe('a reason in words', () => {
   });
 
   test('beside its mark, it does not say again how bad it is', () => {
-    expect(reasonText(CATALOGUE, reason(), 'C', null, true)).toBe(
+    expect(reasonText(CATALOGUE, reason(), null, true)).toBe(
       `Temperature 6.6${NBSP}°C, below 10.0`,
     );
   });
@@ -249,8 +249,8 @@ describe('a reason in words', () => {
 
 test('all of them are one line, the worst first', () => {
   const pest = reason({ kind: 'pest', sensor: '', value: 1, limit: null });
-  expect(reasonsText(CATALOGUE, [reason(), pest], 'C')).toBe(
+  expect(reasonsText(CATALOGUE, [reason(), pest])).toBe(
     `Temperature 6.6${NBSP}°C, below 10.0 (critical); 1 pest seen`,
   );
-  expect(reasonsText(CATALOGUE, [], 'C')).toBe('');
+  expect(reasonsText(CATALOGUE, [])).toBe('');
 });

@@ -1,14 +1,7 @@
 /** Presents the bridge's verdicts. Nothing is judged here: no rule, no range. */
 import type { HealthReason, Judgement, TagHealth, Verdict } from '../contract/types';
 import { S } from '../strings';
-import {
-  beyondLimitText,
-  durationText,
-  readingText,
-  shortAgeText,
-  type TemperatureUnit,
-  valueText,
-} from './format';
+import { beyondLimitText, durationText, readingText, shortAgeText, valueText } from './format';
 import type { Shared } from './memo';
 import type { Catalogue } from './sensors';
 import { shown } from './text';
@@ -128,7 +121,6 @@ const LONGEST_NAME = 32;
 export function reasonText(
   sensors: Catalogue,
   reason: HealthReason,
-  unit: TemperatureUnit,
   age: number | null,
   isMarked = false,
 ): string {
@@ -139,12 +131,12 @@ export function reasonText(
   const ago = age === null ? '' : ` (${S.agoSuffix(shortAgeText(age))})`;
   if (isOfRange(reason)) {
     const edge = reason.release ?? reason.limit;
-    const reading = beyondLimitText(sensor, reason.value, edge, unit);
-    const held = heldText(reason, (each) => valueText(sensor, each, unit));
+    const reading = beyondLimitText(sensor, reason.value, edge);
+    const held = heldText(reason, (each) => valueText(sensor, each));
     // "Just below 350" names the limit itself.
-    const isNear = !held && reading !== readingText(sensor, reason.value, unit);
+    const isNear = !held && reading !== readingText(sensor, reason.value);
     const side = S.reasons.sides[sideOf(reason)];
-    const limit = held ?? `${side} ${valueText(sensor, reason.limit, unit)}`;
+    const limit = held ?? `${side} ${valueText(sensor, reason.limit)}`;
     const isRated = reason.verdict === 'critical' && !isMarked && !held;
     const rated = isRated ? ` (${S.alarmStatus.critical})` : '';
     return `${label} ${reading}${ago}${isNear ? '' : `, ${limit}`}${rated}`;
@@ -156,7 +148,7 @@ export function reasonText(
     case 'reading_failed':
       return value === null
         ? R.readingFailed(label)
-        : R.implausible(`${label} ${readingText(sensor, value, unit)}`);
+        : R.implausible(`${label} ${readingText(sensor, value)}`);
     case 'scan_failed':
       return R.scanFailed(
         S.attemptOutcomes[attemptOutcome(value ?? NaN)],
@@ -176,9 +168,7 @@ export function reasonText(
     case 'stopped':
       return R.stopped;
     case 'changed':
-      return R.changed(
-        value === null ? label : `${label} ${readingText(sensor, value, unit)}${ago}`,
-      );
+      return R.changed(value === null ? label : `${label} ${readingText(sensor, value)}${ago}`);
     default:
       // A kind from a later server.
       return R.other(shown((kind as string).replaceAll('_', ' '), LONGEST_NAME), label);
@@ -198,9 +188,9 @@ const heldText = (reason: OfRange, text: (value: number) => string): string | nu
 };
 
 /** Names sensor, side and limit, without the value, which changes. */
-export function beyondText(sensors: Catalogue, reason: OfRange, unit: TemperatureUnit): string {
+export function beyondText(sensors: Catalogue, reason: OfRange): string {
   const sensor = sensors.named(reason.sensor);
-  const text = (value: number): string => readingText(sensor, value, unit);
+  const text = (value: number): string => readingText(sensor, value);
   const side = S.reasons.sides[sideOf(reason)];
   const held = heldText(reason, text);
   const limit = text(reason.limit);
@@ -222,11 +212,8 @@ export function todoText(reason: HealthReason): string {
   return (kinds as Partial<Record<string, string>>)[reason.kind] ?? kinds.other;
 }
 
-export const reasonsText = (
-  sensors: Catalogue,
-  reasons: readonly HealthReason[],
-  unit: TemperatureUnit,
-): string => reasons.map((reason) => reasonText(sensors, reason, unit, null)).join('; ');
+export const reasonsText = (sensors: Catalogue, reasons: readonly HealthReason[]): string =>
+  reasons.map((reason) => reasonText(sensors, reason, null)).join('; ');
 
 /** The outcome of an attempt, by the status of its observation (lupin_msgs/Observation). */
 type AttemptOutcome = 'ok' | 'unreachable' | 'undecoded' | 'skipped' | 'failed';

@@ -60,8 +60,8 @@ describe('excess', () => {
 
 describe('words', () => {
   const described = (name: string, value: number, unit: 'C' | 'F' = 'C'): string | null => {
-    const sensor = sensorNamed(name);
-    return idealText(sensor, sensor, value, unit);
+    const sensor = sensorNamed(name, unit);
+    return idealText(sensor, sensor, value);
   };
 
   test.each([

@@ -2,7 +2,7 @@
 import type { Field, Judgement } from '../contract/types';
 import type { MapPoint } from '../geometry/coordinates';
 import { S } from '../strings';
-import { differenceNumber, rangeText, type TemperatureUnit, withUnit } from './format';
+import { differenceNumber, rangeText, withUnit } from './format';
 import { speciesText } from './marks';
 import { mix, type Rgb, rgbText, type Shade } from './ramp';
 import { partsOf, type Ranges, rangesFor, type Sensor, type Span } from './sensors';
@@ -34,8 +34,8 @@ function reachOf(ideal: Span, critical: Span | null, isAbove: boolean): number {
 }
 
 /** The ideal of each present species with its own ranges, and that of all others; empty: none has its own. */
-export function idealsText(sensor: Sensor, tags: readonly Tag[], unit: TemperatureUnit): string {
-  const text = ({ ideal }: Ranges): string => rangeText(sensor, ideal, unit);
+export function idealsText(sensor: Sensor, tags: readonly Tag[]): string {
+  const text = ({ ideal }: Ranges): string => rangeText(sensor, ideal);
   const own = [...new Set(tags.map(({ sureSpecies }) => sureSpecies.toLowerCase()))]
     .filter((species) => sensor.species.has(species))
     .sort()
@@ -69,18 +69,13 @@ export const idealParts = (alpha = 1): Readonly<Record<'low' | 'right' | 'high',
 });
 
 /** "ideal", "too low by 2.0 °C"; null: there is no ideal. */
-export function idealText(
-  sensor: Sensor,
-  ranges: Ranges,
-  value: number,
-  unit: TemperatureUnit,
-): string | null {
+export function idealText(sensor: Sensor, ranges: Ranges, value: number): string | null {
   const by = beyond(ranges, value);
   if (by === null) return null;
   if (by === 0) return S.idealParts.any;
-  const text = differenceNumber(sensor, Math.abs(by), unit);
+  const text = differenceNumber(sensor, Math.abs(by));
   // An excess that rounds to 0 has no number.
-  const how = /[1-9]/.test(text) ? withUnit(sensor, text, unit) : null;
+  const how = /[1-9]/.test(text) ? withUnit(sensor, text) : null;
   return by < 0 ? S.tooLow(how) : S.tooHigh(how);
 }
 

@@ -2,7 +2,7 @@ import { describe, expect, test } from 'vitest';
 
 import { CATALOGUE, CATALOGUES, FILE, sensorNamed } from '../testing/sensors';
 import { cataloguesOf, isHad, isMeasured, NO_CATALOGUES, rangesFor } from './sensors';
-import { fromShown, toShown, unitOf } from './format';
+import { fromShown, toShown } from './format';
 
 test('every look comes from the file, in its order', () => {
   expect(CATALOGUE.all.map(({ name }) => name)).toEqual(Object.keys(FILE.sensors));
@@ -37,11 +37,11 @@ test('what is of a day is offered by charts, and else only while it is in view',
 });
 
 test('a sensor is called what the file calls it in that language, else its label, else its name', () => {
-  const { day: german } = cataloguesOf(FILE, 'de');
+  const { day: german } = cataloguesOf(FILE, 'C', 'de');
   expect(german.named('humidity')).toMatchObject({ label: 'Luftfeuchte', dataLabel: 'Humidity' });
   expect(german.named('co2')).toMatchObject({ label: 'CO₂', dataLabel: 'CO₂' });
   expect(german.named('ph')).toMatchObject({ label: 'ph', dataLabel: 'ph' });
-  expect(cataloguesOf(FILE, 'fr').day.named('humidity').label).toBe('Humidity');
+  expect(cataloguesOf(FILE, 'C', 'fr').day.named('humidity').label).toBe('Humidity');
 });
 
 test('the file says what is derived', () => {
@@ -120,16 +120,17 @@ test.each([
 });
 
 const temperature = sensorNamed('temperature');
-const humidity = sensorNamed('humidity');
+const fahrenheit = sensorNamed('temperature', 'F');
+const humidity = sensorNamed('humidity', 'F');
 
 test('temperatures follow the operator, other units do not', () => {
-  expect(toShown(temperature, 25, 'F')).toBe(77);
-  expect(toShown(temperature, 25, 'C')).toBe(25);
-  expect(unitOf(temperature, 'F')).toBe('°F');
-  expect(toShown(humidity, 25, 'F')).toBe(25);
-  expect(unitOf(humidity, 'F')).toBe('%');
+  expect(toShown(fahrenheit, 25)).toBe(77);
+  expect(toShown(temperature, 25)).toBe(25);
+  expect(fahrenheit.unit).toBe('°F');
+  expect(toShown(humidity, 25)).toBe(25);
+  expect(humidity.unit).toBe('%');
 });
 
 test('what is typed comes back', () => {
-  expect(fromShown(temperature, toShown(temperature, 21.5, 'F'), 'F')).toBeCloseTo(21.5);
+  expect(fromShown(fahrenheit, toShown(fahrenheit, 21.5))).toBeCloseTo(21.5);
 });

@@ -3,6 +3,9 @@ import type { SensorEntry, SensorRanges, SensorsFile } from '../contract/types';
 import { LANGUAGE } from '../strings';
 import type { Shared } from './memo';
 
+/** The operator's temperature unit. Inside the page, values stay in °C. */
+export type TemperatureUnit = 'C' | 'F';
+
 /** From low to high, both included, in the sensor's unit. */
 export type Span = readonly [low: number, high: number];
 
@@ -44,21 +47,16 @@ export const rangesFor = (sensor: Sensor, species: string): Ranges =>
 /** Most cached sensors that the file lacks; tags may invent any number. */
 const MOST_OTHERS = 1_000;
 
-function catalogueOf(
-  file: SensorsFile,
-  isDay: boolean,
-  language: string,
-  areaOf: (tagId: string) => string,
-) {
+function catalogueOf(file: SensorsFile, look: Look, areaOf: (tagId: string) => string) {
   const all = Object.entries(file.sensors).map(([name, entry]) =>
-    sensorOf(file, name, entry, isDay, language),
+    sensorOf(file, name, entry, look),
   );
   const known = new Map(all.map((sensor) => [sensor.name, sensor]));
   const others = new Map<string, Sensor>();
   const named = (name: string): Sensor => {
     const found = known.get(name) ?? others.get(name);
     if (found) return found;
-    const other = sensorOf(file, name, file.fallback, isDay, language);
+    const other = sensorOf(file, name, file.fallback, look);
     if (others.size >= MOST_OTHERS) others.clear();
     others.set(name, other);
     return other;
@@ -94,9 +92,20 @@ function areasOf({ areas = {} }: SensorsFile): (tagId: string) => string {
     byId.get(tagId) ?? begins.find(([prefix]) => tagId.startsWith(prefix))?.[1] ?? '';
 }
 
-export function cataloguesOf(file: SensorsFile, language: string = LANGUAGE) {
+/** What a sensor is shown with. */
+interface Look {
+  readonly isDay: boolean;
+  readonly unit: TemperatureUnit;
+  readonly language: string;
+}
+
+export function cataloguesOf(
+  file: SensorsFile,
+  unit: TemperatureUnit = 'C',
+  language: string = LANGUAGE,
+) {
   const areaOf = areasOf(file);
-  const by = (isDay: boolean): Catalogue => catalogueOf(file, isDay, language, areaOf);
+  const by = (isDay: boolean): Catalogue => catalogueOf(file, { isDay, unit, language }, areaOf);
   return { day: by(true), night: by(false) };
 }
 
@@ -104,10 +113,10 @@ function sensorOf(
   file: SensorsFile,
   name: string,
   entry: SensorEntry,
-  isDay: boolean,
-  language: string,
+  { isDay, unit, language }: Look,
 ) {
-  const { unit, hue, lightness, derived: madeOf = [] } = entry;
+  const { hue, lightness, derived: madeOf = [] } = entry;
+  const isFahrenheit = unit === 'F' && entry.unit === '°C';
   return {
     /** On the wire. */
     name,
@@ -115,8 +124,11 @@ function sensorOf(
     label: entry.labels?.[language] ?? (entry.label || name),
     /** The same in every language, for files that programs read. */
     dataLabel: entry.label || name,
-    /** Empty when unknown. */
-    unit,
+    /** In which its values are shown; empty when unknown. */
+    unit: isFahrenheit ? '°F' : entry.unit,
+    /** From a value of the file's unit to the shown one. */
+    factor: isFahrenheit ? 1.8 : 1,
+    offset: isFahrenheit ? 32 : 0,
     /** Degrees and percents of the ramp's colour. */
     hue,
     lightness,

@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 
-import { CATALOGUE } from '../testing/sensors';
+import { CATALOGUE, IN_FAHRENHEIT } from '../testing/sensors';
 import { bucketAt, seriesWith } from '../testing/timeline';
 import {
   chartCsv,
@@ -97,7 +97,7 @@ describe('as CSV', () => {
   const lines = (text: string): string[] => text.trimEnd().split('\r\n');
 
   test('each row has its kind, and no tag id becomes a formula', () => {
-    expect(lines(chartCsv(CATALOGUE, [{ series, marks: [failure(NOON)] }], 'C'))).toEqual([
+    expect(lines(chartCsv(CATALOGUE, [{ series, marks: [failure(NOON)] }]))).toEqual([
       '\ufefftime_iso,stamp,until,tag_id,sensor,unit,kind,n,value,min,max',
       `2026-11-21T12:00:00.000Z,${NOON},,'=2+5,temperature,°C,reading,1,20,,`,
       `2026-11-21T12:00:00.000Z,${NOON},${NOON + 10},'=2+5,temperature,°C,failure,2,,,`,
@@ -108,7 +108,7 @@ describe('as CSV', () => {
   });
 
   test('values are in the unit that is shown, and a simulated clock has no dates', () => {
-    expect(lines(chartCsv(CATALOGUE, [{ series: bucketed(1_000), marks: [] }], 'F'))[1]).toBe(
+    expect(lines(chartCsv(IN_FAHRENHEIT, [{ series: bucketed(1_000), marks: [] }]))[1]).toBe(
       ",1000,1010,'=2+5,temperature,°F,bucket,4,69.8,68,73.4",
     );
   });

@@ -7,7 +7,7 @@ import { type Cell, csv } from './text';
 import type { Shared } from './memo';
 import { hasDate, secondsOf, type Span } from './time';
 import type { Catalogue } from './sensors';
-import { type TemperatureUnit, toShown, unitOf } from './format';
+import { toShown } from './format';
 import { type Missing, missingOf, spanOfWire } from './timeline';
 
 /** A reading, or all finite readings of a bucket. */
@@ -133,17 +133,16 @@ const HEADER = [
 export function chartCsv(
   sensors: Catalogue,
   charted: readonly { readonly series: Series; readonly marks: readonly Mark[] }[],
-  unit: TemperatureUnit,
 ): string {
   const rows = charted.flatMap(({ series, marks }) => {
     const sensor = sensors.named(series.sensor);
     const shown = (value: number | null): Cell =>
-      value === null ? null : Number(toShown(sensor, value, unit).toPrecision(12));
+      value === null ? null : Number(toShown(sensor, value).toPrecision(12));
     return rowsOfSeries(series, marks).map(({ kind, at, to, n, value, min, max }): Cell[] => [
       hasDate(at) ? new Date(at * 1000).toISOString() : null,
       Number(at.toFixed(6)),
       to && Number(to.toFixed(6)),
-      ...[series.tagId, series.sensor, unitOf(sensor, unit), kind, n],
+      ...[series.tagId, series.sensor, sensor.unit, kind, n],
       ...[shown(value), shown(min), shown(max)],
     ]);
   });

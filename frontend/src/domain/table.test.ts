@@ -5,7 +5,7 @@ import { readings, tag } from '../testing/tags';
 import { houseHealth } from './health';
 import { filterRows, rowsOf, sortRows, tableCsv, type Row } from './table';
 import { compareIds } from './twin';
-import { CATALOGUE, sensorNamed } from '../testing/sensors';
+import { CATALOGUE, IN_FAHRENHEIT, sensorNamed } from '../testing/sensors';
 
 const tags = [
   tag({
@@ -102,8 +102,8 @@ describe('filter', () => {
 });
 
 test('the file has every tag, values in the shown unit, and ages of its time', () => {
-  const sensors = [sensorNamed('temperature'), sensorNamed('humidity')];
-  const text = tableCsv(rows, CATALOGUE, sensors, 'F', 10_000);
+  const sensors = [sensorNamed('temperature', 'F'), sensorNamed('humidity')];
+  const text = tableCsv(rows, IN_FAHRENHEIT, sensors, 10_000);
   const lines = text.split('\r\n');
   expect(lines[0]).toContain('Temperature [°F],Humidity [%]');
   expect(lines).toHaveLength(1 + tags.length + 1);

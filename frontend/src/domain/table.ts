@@ -7,7 +7,7 @@ import { type HouseHealth, reasonsText, severity, attemptOutcome } from './healt
 import { groupedBy, memoLast, memoOne } from './memo';
 import { speciesText } from './marks';
 import type { Catalogue, Sensor } from './sensors';
-import { type TemperatureUnit, toShown, unitOf } from './format';
+import { toShown } from './format';
 import { compareIds, type Tag } from './twin';
 
 export interface Row {
@@ -158,14 +158,13 @@ export function tableCsv(
   rows: readonly Row[],
   catalogue: Catalogue,
   sensors: readonly Sensor[],
-  unit: TemperatureUnit,
   /** When the state was taken, ms on the monotonic clock; ages are as of then. */
   now: number,
 ): string {
   const header: Cell[] = [
     ...['tag', 'health', 'reasons'],
     ...sensors.map((sensor) => {
-      const suffix = unitOf(sensor, unit);
+      const suffix = sensor.unit;
       return suffix ? `${sensor.dataLabel} [${suffix}]` : sensor.dataLabel;
     }),
     ...['species', 'species confidence', 'blooms', 'bugs', 'pest', 'age [s]'],
@@ -178,10 +177,10 @@ export function tableCsv(
       tag.id,
       // As on the wire, whatever the page's language.
       health.verdict,
-      reasonsText(catalogue, health.reasons, unit) || null,
+      reasonsText(catalogue, health.reasons) || null,
       ...sensors.map((sensor): Cell => {
         const value = tag.readings.get(sensor.name);
-        return value == null ? null : round(toShown(sensor, value, unit));
+        return value == null ? null : round(toShown(sensor, value));
       }),
       tag.species || null,
       tag.speciesConfidence === null ? null : round(tag.speciesConfidence),

@@ -21,7 +21,6 @@ const scene = (
     tags,
     health: houseHealth(tags, health, true),
     sensor: sensorNamed(sensor),
-    unit: 'C',
     now,
     ageing: GROWING,
     listed,
@@ -64,7 +63,7 @@ describe('pins', () => {
 
   test('after a reload it is full once it is known what its sensor is computed of, and how the tag is', () => {
     const tags = [tag({ readings: readings({ temperature: 20, humidity: 50 }) })];
-    const input = { tags, unit: 'C' as const, now: 0, ageing: GROWING, listed: null };
+    const input = { tags, now: 0, ageing: GROWING, listed: null };
     const unread = NO_CATALOGUES.day.named('vpd');
     const first = buildScene({ ...input, sensor: unread, health: houseHealth(tags, NOBODY, true) });
     expect(first.pins[0]).toMatchObject({ kind: 'lacking', verdict: 'unknown' });

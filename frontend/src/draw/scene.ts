@@ -1,7 +1,7 @@
 /** What to draw, derived from the data: lists of pins, blooms and boxes. Pure. */
 import type { Verdict } from '../contract/types';
 import { ageSeconds, freshness, type Ageing } from '../domain/time';
-import { readingText, type TemperatureUnit } from '../domain/format';
+import { readingText } from '../domain/format';
 import { isBad, type HouseHealth } from '../domain/health';
 import { memoLast, memoOne, type Shared } from '../domain/memo';
 import { partsOf, type Sensor } from '../domain/sensors';
@@ -31,7 +31,6 @@ export interface SceneInput {
   readonly tags: readonly Tag[];
   readonly health: HouseHealth;
   readonly sensor: Sensor;
-  readonly unit: TemperatureUnit;
   /** ms on the monotonic clock. */
   readonly now: number;
   readonly ageing: Ageing;
@@ -67,7 +66,7 @@ function spacingOf(pins: readonly Pin[]): number {
 }
 
 function pinOf(tag: Tag, at: MapPoint, input: SceneInput) {
-  const { health, sensor, unit, now, ageing, listed } = input;
+  const { health, sensor, now, ageing, listed } = input;
   const isLeftOut = listed !== null && !listed.has(tag.id);
   // A computed number is the field's and includes neighbours, so it is no label.
   const parts = partsOf(sensor, (part) => tag.readings.has(part));
@@ -97,7 +96,7 @@ function pinOf(tag: Tag, at: MapPoint, input: SceneInput) {
       : Math.max(quantised(fresh, FADE_STEPS), isWarning ? FAINTEST_WARNING : 0),
     pest: tag.anomaly && !isLeftOut,
     /** Label texts, the most detailed first. */
-    texts: isLeftOut ? [] : textsOf(tag)(sensor, unit),
+    texts: isLeftOut ? [] : textsOf(tag)(sensor),
     priority:
       (tag.anomaly ? 4 : 0) +
       (isLacking || isFailed ? 0 : 2) +
@@ -106,10 +105,10 @@ function pinOf(tag: Tag, at: MapPoint, input: SceneInput) {
 }
 
 const textsOf = memoOne((tag: Tag) =>
-  memoLast((sensor: Sensor, unit: TemperatureUnit): readonly string[] => {
+  memoLast((sensor: Sensor): readonly string[] => {
     const id = shown(tag.id, 12);
     const value = tag.readings.get(sensor.name);
-    return value == null ? [id] : [`${id} · ${readingText(sensor, value, unit)}`, id];
+    return value == null ? [id] : [`${id} · ${readingText(sensor, value)}`, id];
   }),
 );
 

@@ -48,12 +48,10 @@ function writeTable(): void {
   const state = store.get();
   const { snapshot, moment } = selectShown(state);
   if (!snapshot) return;
-  const { unit } = state.settings;
   const text = tableCsv(
     selectRows(state),
     selectCatalogue(state),
     selectColumns(state),
-    unit,
     snapshot.takenAt,
   );
   saveCsv('tags', text, epochOf(snapshot.takenAt), moment);
@@ -105,19 +103,18 @@ export async function saveMap(): Promise<void> {
 /** What the map's colours show, as in the page's legend. */
 function legendOf(state: AppState): Pick<Footer, 'title' | 'ends' | 'ramps'> {
   const sensor = selectSensor(state);
-  const { unit } = state.settings;
   const label = shown(sensor.label, 32);
   const heat = selectHeat(state);
   if (heat?.difference) {
     const { low, high } = heat.range;
     return {
       title: S.difference(label),
-      ends: [signedText(sensor, low, unit), differenceText(sensor, high, unit)],
+      ends: [signedText(sensor, low), differenceText(sensor, high)],
       ramps: [divergingColours()],
     };
   }
   if (heat?.isError) {
-    const most = withUnit(sensor, differenceNumber(sensor, heat.range.high, unit), unit);
+    const most = withUnit(sensor, differenceNumber(sensor, heat.range.high));
     return {
       title: `${label}: ${S.heats.error}`,
       ends: ['±\u00a00', `±\u00a0${most}`],
@@ -132,7 +129,7 @@ function legendOf(state: AppState): Pick<Footer, 'title' | 'ends' | 'ramps'> {
   const colour = sensorColour(sensor);
   return {
     title: label,
-    ends: range && [valueText(sensor, range.low, unit), readingText(sensor, range.high, unit)],
+    ends: range && [valueText(sensor, range.low), readingText(sensor, range.high)],
     // Pin colours above heat-map colours.
     ramps: [1, sensor.maxAlpha].map((most) => [rgbText(colour, 0), rgbText(colour, most)]),
   };

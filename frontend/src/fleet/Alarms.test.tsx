@@ -10,7 +10,7 @@ import type { Site } from './sites';
 vi.mock('./useAnswer', async (original) => ({
   ...(await original<object>()),
   useAnswer: vi.fn(),
-  useSpeech: () => ({ sensors: CATALOGUE, unit: 'C' }),
+  useSensors: () => CATALOGUE,
 }));
 
 const at = (sec: number): { sec: number; nanosec: number } => ({ sec, nanosec: 0 });

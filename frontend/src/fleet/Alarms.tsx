@@ -1,17 +1,18 @@
 /** Active alarms of the shown greenhouses, the worst first. */
 import { useMemo, type JSX } from 'react';
 
-import { type Now, valuesOf, whenText, whereText, type Speech } from '../alarms/words';
+import { type Now, valuesOf, whenText, whereText } from '../alarms/words';
 import { timeOfDay } from '../clock';
 import type { Alarm } from '../contract/types';
 import { changeOf, hourText, type Taken } from '../domain/difference';
+import type { Catalogue } from '../domain/sensors';
 import { secondsOf } from '../domain/time';
 import { LANGUAGE, S } from '../strings';
 import { HealthMark } from '../ui/HealthMark';
 import { Trend } from '../ui/Trend';
 import { VIEW_WORDS } from '../words/fleetViews';
 import { alarmCount, ms, namesOf, type Site, siteLink, timeText, words } from './sites';
-import { useAnswer, useSpeech } from './useAnswer';
+import { useAnswer, useSensors } from './useAnswer';
 
 interface SiteAlarm extends Alarm {
   readonly site: string;
@@ -32,7 +33,7 @@ const W = VIEW_WORDS[LANGUAGE];
 const EVERY_MS = 10_000;
 
 export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Element {
-  const speech = useSpeech();
+  const sensors = useSensors();
   const names = namesOf(shown);
   const path = names === '' ? 'api/alarms' : `api/alarms?sites=${names}`;
   // Refetch when a count changes.
@@ -49,7 +50,7 @@ export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Eleme
   const listOf = (alarms: readonly SiteAlarm[]): JSX.Element => (
     <ul className="fleet-alarm-list">
       {alarms.map((alarm) => (
-        <Row key={`${alarm.site} ${alarm.id}`} alarm={alarm} speech={speech} />
+        <Row key={`${alarm.site} ${alarm.id}`} alarm={alarm} sensors={sensors} />
       ))}
     </ul>
   );
@@ -73,11 +74,11 @@ export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Eleme
   );
 }
 
-function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Element {
+function Row({ alarm, sensors }: { alarm: SiteAlarm; sensors: Catalogue }): JSX.Element {
   const raised = secondsOf(alarm.raised_at);
   const state = alarm.is_live && alarm.now ? alarm.now : null;
   const trend = state && trendOf(state, alarm.hour_ago);
-  const values = valuesOf(alarm, speech, state && { kind: 'known', trend, ...state });
+  const values = valuesOf(alarm, sensors, state && { kind: 'known', trend, ...state });
   const { verdict } = alarm.now ?? alarm.reason;
   return (
     <li data-live={alarm.is_live} data-shelved={Boolean(alarm.shelved_by)}>
@@ -90,10 +91,9 @@ function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Eleme
           {values.now}{' '}
           {trend !== null && (
             <Trend
-              of={alarm.reason.sensor}
+              sensor={sensors.named(alarm.reason.sensor)}
               by={trend}
               hour={hourText(alarm.hour_s ?? 3_600)}
-              speech={speech}
             />
           )}
           {values.worst !== null && (

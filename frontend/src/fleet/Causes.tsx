@@ -5,20 +5,20 @@ import { causeWords } from '../alarms/arrange';
 import { inOnePiece, whereText } from '../alarms/words';
 import { S } from '../strings';
 import type { Cause } from './sites';
-import { useSpeech } from './useAnswer';
+import { useSensors } from './useAnswer';
 
 export type CauseText = (cause: Cause) => string;
 
 /** Renders nothing; hands out the words once the names of sensors are known, and when they change. */
 export default function Causes({ onWords }: { onWords: (text: CauseText) => void }): null {
-  const speech = useSpeech();
+  const sensors = useSensors();
   useEffect(() => {
     onWords(({ count, ...worst }) => {
       const where = count > 1 ? S.shownOf(count, count) : whereText(worst);
       return worst.tag_id === ''
-        ? causeWords(worst, speech)
-        : `${causeWords(worst, speech)} · ${inOnePiece(where)}`;
+        ? causeWords(worst, sensors)
+        : `${causeWords(worst, sensors)} · ${inOnePiece(where)}`;
     });
-  }, [speech, onWords]);
+  }, [sensors, onWords]);
   return null;
 }

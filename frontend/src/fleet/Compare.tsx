@@ -4,7 +4,6 @@ import '../styles/charts.css';
 
 import { type JSX, useMemo, useRef, useState } from 'react';
 
-import type { Speech } from '../alarms/words';
 import { lookOf } from '../charts/layers';
 import type { Line, PlotModel } from '../charts/model';
 import { usePlot } from '../charts/plot';
@@ -18,7 +17,7 @@ import { VIEW_WORDS } from '../words/fleetViews';
 import type { WireTime } from '../contract/types';
 import { Choice } from './Choice';
 import { type Site, siteLink, words } from './sites';
-import { useAnswer, useSpeech } from './useAnswer';
+import { useAnswer, useSensors } from './useAnswer';
 
 const W = VIEW_WORDS[LANGUAGE];
 
@@ -31,8 +30,7 @@ const HEIGHT = 320;
 const DRAWN = 3;
 
 export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Element {
-  const speech = useSpeech();
-  const { sensors, unit } = speech;
+  const sensors = useSensors();
   const [name, setName] = useState('temperature');
   const [period, setPeriod] = useState<Period>('day');
   const [picked, setPicked] = useState<readonly string[] | null>(null);
@@ -51,12 +49,12 @@ export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Elem
   const model = useMemo(
     () =>
       found && {
-        ...{ sensor: sensors.named(found.sensor_type), unit, span: spanOf(found), moment: null },
+        ...{ sensor: sensors.named(found.sensor_type), span: spanOf(found), moment: null },
         isMixed: false,
         bands: [{ ...spanOf(found), ranges: sensors.named(found.sensor_type) }],
         lines: linesOf(found, drawn, W.median),
       },
-    [found, drawn, sensors, unit],
+    [found, drawn, sensors],
   );
   const isSilent = (name: string): boolean =>
     compared.some(({ site, is_live: isLive }) => site === name && !isLive);
@@ -125,8 +123,8 @@ export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Elem
                     <a href={`${siteLink(site)}#sensor=${encodeURIComponent(name)}`}>{site.name}</a>
                     {isSilent(site.site) && ` (${W.wasLive})`}
                   </th>
-                  <td>{readingOrNone(model.sensor, valueAt(found, site, at), speech)}</td>
-                  <td>{deviationText(model.sensor, site, speech)}</td>
+                  <td>{readingOrNone(model.sensor, valueAt(found, site, at))}</td>
+                  <td>{deviationText(model.sensor, site)}</td>
                 </tr>
               ))}
             </tbody>
@@ -152,12 +150,12 @@ function Look({ place }: { place: number }): JSX.Element | null {
   );
 }
 
-const readingOrNone = (sensor: Sensor, value: number | null, { unit }: Speech): string =>
-  value === null ? S.noValue : readingText(sensor, value, unit);
+const readingOrNone = (sensor: Sensor, value: number | null): string =>
+  value === null ? S.noValue : readingText(sensor, value);
 
-function deviationText(sensor: Sensor, { deviation }: ComparedSite, { unit }: Speech): string {
+function deviationText(sensor: Sensor, { deviation }: ComparedSite): string {
   if (deviation === null) return S.noValue;
-  return withUnit(sensor, differenceNumber(sensor, deviation, unit), unit);
+  return withUnit(sensor, differenceNumber(sensor, deviation));
 }
 
 function onSystemTheme(listener: () => void): () => void {

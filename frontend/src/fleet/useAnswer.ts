@@ -1,11 +1,10 @@
 /** A server's answer, kept up to date while the page is visible. */
 import { useMemo } from 'react';
 
-import type { Speech } from '../alarms/words';
 import { pause } from '../clock';
 import { answer } from '../contract/api';
 import type { SensorsFile } from '../contract/types';
-import { cataloguesOf, NO_CATALOGUES } from '../domain/sensors';
+import { type Catalogue, cataloguesOf, NO_CATALOGUES } from '../domain/sensors';
 import { type Fetched, useFetched } from '../store/fetcher';
 import { openStorage, readSettings } from '../store/settings';
 import { useTicking } from '../widgets/useNow';
@@ -35,14 +34,11 @@ export function useAnswer<T>(path: string, everyMs: number, news = ''): Fetched<
 
 const EVERY_MS = 600_000;
 
-/** Names and formats of readings: the sensors in force, and the reader's unit. */
-export function useSpeech(): Speech {
+/** Names and formats of readings: the sensors in force, in the reader's unit. */
+export function useSensors(): Catalogue {
   const file = useAnswer<SensorsFile>('api/sensors', EVERY_MS).value;
   return useMemo(
-    () => ({
-      sensors: (file ? cataloguesOf(file) : NO_CATALOGUES).day,
-      unit: readSettings(openStorage()).unit,
-    }),
+    () => (file ? cataloguesOf(file, readSettings(openStorage()).unit) : NO_CATALOGUES).day,
     [file],
   );
 }

@@ -1,6 +1,5 @@
 import { beforeEach, describe, expect, test } from 'vitest';
 
-import { cataloguesOf } from '../domain/sensors';
 import type { Box } from '../geometry/coordinates';
 import { act, prefer, receive, store } from '../store/app';
 import { withField } from '../store/twin';
@@ -172,7 +171,7 @@ describe('painter', () => {
   });
 
   test('areas are drawn where the table is grouped by them', () => {
-    const value = cataloguesOf({ ...FILE, areas: { 'Bay 1': ['1'], 'Bay 2': ['2'] } });
+    const value = { ...FILE, areas: { 'Bay 1': ['1'], 'Bay 2': ['2'] } };
     receive({ sensors: { value, state: 'ready', message: '' } });
     show();
     painter.paintStill(store.get(), view, 0, true);

@@ -268,7 +268,6 @@ export class Painter {
         ageing: selectShown(state).ageing,
         health: selectHealth(state),
         sensor: selectSensor(state),
-        unit: state.settings.unit,
         listed: selectListed(state),
         now: Math.floor(now / FADE_TICK_MS) * FADE_TICK_MS,
       }),

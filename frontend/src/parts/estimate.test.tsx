@@ -12,7 +12,7 @@ import { selectTag } from '../store/moment';
 import { bodies, estimated, type Expected, expectedReading, grade } from '../testing/field';
 import { judgement, reason } from '../testing/health';
 import { goLive, nextStamp, showField, showTags } from '../testing/page';
-import { CATALOGUES } from '../testing/sensors';
+import { sensorNamed } from '../testing/sensors';
 import { readings, stateFrame, wireTag } from '../testing/tags';
 import { Legend } from '../ui/Legend';
 import { Readout } from '../ui/MapPanel';
@@ -292,8 +292,6 @@ test('counts the tags within reach that read the sensor and are not left out', (
   });
 });
 
-const sensor = (name: string): ReturnType<typeof CATALOGUES.day.named> =>
-  CATALOGUES.day.named(name);
 const plain = (text: string): string => text.replaceAll('\u00a0', ' ');
 
 test.each([
@@ -304,9 +302,9 @@ test.each([
   ['co2', 536.2, 22, '536 ± 36 ppm'],
   ['co2', 536.2, 0.2, '536 ± 0.33 ppm'],
 ] as const)('%s %d, error %d: %s', (name, mean, sd, text) => {
-  expect(plain(estimateText(sensor(name), mean, sd, 'C'))).toBe(text);
+  expect(plain(estimateText(sensorNamed(name), mean, sd))).toBe(text);
 });
 
 test('an error is a difference: no 32 in it', () => {
-  expect(plain(errorText(sensor('temperature'), 1, 'F'))).toBe('3.0 °F');
+  expect(plain(errorText(sensorNamed('temperature', 'F'), 1))).toBe('3.0 °F');
 });

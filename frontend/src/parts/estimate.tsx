@@ -20,7 +20,6 @@ import {
   numberText,
   percentText,
   shortAgeText,
-  type TemperatureUnit,
   valueText,
   withUnit,
 } from '../domain/format';
@@ -42,7 +41,6 @@ import { estimateWordsOf } from '../words/estimate';
 /** The shown estimate's uncertainty and prediction record; or why there is no estimate. */
 export function EstimateFacts(): JSX.Element {
   const sensor = useApp(selectSensor);
-  const unit = useApp((state) => state.settings.unit);
   const field = useApp((state) => selectShown(state).field.value);
   const isNow = useApp((state) => selectShown(state).moment === null);
   const isError = useApp((state) => state.view.heat === 'error');
@@ -65,7 +63,7 @@ export function EstimateFacts(): JSX.Element {
     <>
       {!isError && (
         <span data-testid="estimate-key">
-          {E.unsure(errorText(sensor, ofSensor.sureness.sdKnown, unit))}
+          {E.unsure(errorText(sensor, ofSensor.sureness.sdKnown))}
         </span>
       )}
       {grade && <Prediction grade={grade} isNow={isNow} />}
@@ -129,7 +127,6 @@ export function EstimateReadout({
   isError: boolean;
 }): JSX.Element {
   const sensor = useApp(selectSensor);
-  const unit = useApp((state) => state.settings.unit);
   const tags = useApp(selectTags);
   const health = useApp(selectHealth);
   const ageing = useApp((state) => selectShown(state).ageing);
@@ -143,8 +140,8 @@ export function EstimateReadout({
     value === null
       ? S.notKnown
       : isError
-        ? `±\u00a0${errorText(sensor, sd, unit)}`
-        : estimateText(sensor, value, sd, unit);
+        ? `±\u00a0${errorText(sensor, sd)}`
+        : estimateText(sensor, value, sd);
   return (
     <>
       <strong>{text}</strong>
@@ -188,7 +185,6 @@ export function nearTo(
 
 export function ErrorScale(): JSX.Element {
   const sensor = useApp(selectSensor);
-  const unit = useApp((state) => state.settings.unit);
   const most = useApp((state) => selectHeat(state)?.range.high ?? 0);
   return (
     <div data-testid="error-scale">
@@ -202,7 +198,7 @@ export function ErrorScale(): JSX.Element {
         <strong>{E.error}</strong>
         <span data-testid="error-high">
           ±{'\u00a0'}
-          {errorText(sensor, most / NINE_OF_TEN, unit)}
+          {errorText(sensor, most / NINE_OF_TEN)}
         </span>
       </div>
     </div>
@@ -219,7 +215,6 @@ export function CardEstimate({
 }): JSX.Element | null {
   const sensor = useApp(selectSensor);
   const catalogue = useApp(selectCatalogue);
-  const unit = useApp((state) => state.settings.unit);
   // Expected values exist for now only.
   const isNow = useApp((state) => selectShown(state).moment === null);
   const expected = useEstimateQuery<ExpectedTags>('tags').value?.tags ?? {};
@@ -235,8 +230,8 @@ export function CardEstimate({
         <p>
           {shown(sensor.label, 32)}:{' '}
           {E.expected(
-            valueText(sensor, own.measured, unit),
-            estimateText(sensor, own.expected, own.expected_sd, unit),
+            valueText(sensor, own.measured),
+            estimateText(sensor, own.expected, own.expected_sd),
           )}
         </p>
       )}
@@ -304,27 +299,18 @@ const Note = ({ text }: { text: string }): JSX.Element => (
 );
 
 /** Rounded like a value, unless that would round it to zero. */
-function errorNumber(sensor: Sensor, sd: number, unit: TemperatureUnit): string {
-  const text = differenceNumber(sensor, plusMinus(sd), unit);
-  return /[1-9]/.test(text) ? text : numberText(differenceToShown(sensor, plusMinus(sd), unit));
+function errorNumber(sensor: Sensor, sd: number): string {
+  const text = differenceNumber(sensor, plusMinus(sd));
+  return /[1-9]/.test(text) ? text : numberText(differenceToShown(sensor, plusMinus(sd)));
 }
 
 /** Half the width of the 90 % interval: "1.3 °C". */
-export const errorText = (sensor: Sensor, sd: number, unit: TemperatureUnit): string =>
-  withUnit(sensor, errorNumber(sensor, sd, unit), unit);
+export const errorText = (sensor: Sensor, sd: number): string =>
+  withUnit(sensor, errorNumber(sensor, sd));
 
 /** "22.4 ± 1.3 °C". */
-export const estimateText = (
-  sensor: Sensor,
-  mean: number,
-  sd: number,
-  unit: TemperatureUnit,
-): string =>
-  withUnit(
-    sensor,
-    `${valueText(sensor, mean, unit)}\u00a0±\u00a0${errorNumber(sensor, sd, unit)}`,
-    unit,
-  );
+export const estimateText = (sensor: Sensor, mean: number, sd: number): string =>
+  withUnit(sensor, `${valueText(sensor, mean)}\u00a0±\u00a0${errorNumber(sensor, sd)}`);
 
 /** Polling interval: the twin's answers about its estimate change slowly. */
 const EVERY_MS = 10_000;

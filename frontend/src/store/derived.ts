@@ -14,6 +14,7 @@ import {
   zonesOf,
 } from '../domain/ideal';
 import {
+  cataloguesOf,
   isMeasured,
   NO_CATALOGUES,
   rangesFor,
@@ -51,8 +52,11 @@ export function selectLatestHealth(state: AppState): HouseHealth | null {
   return snapshot && healthNow(snapshot.tags, health, isReceivingNow(state));
 }
 
-export const selectCatalogues = (state: AppState): Catalogues =>
-  state.twin.sensors.value ?? NO_CATALOGUES;
+const cataloguesIn = memoLast(cataloguesOf);
+
+/** The sensors as shown: in the page's language and the operator's unit. */
+export const selectCatalogues = ({ twin, settings }: AppState): Catalogues =>
+  twin.sensors.value ? cataloguesIn(twin.sensors.value, settings.unit) : NO_CATALOGUES;
 
 /** The sensors with the ranges of the shown moment: by day or by night. */
 export function selectCatalogue(state: AppState): Catalogue {

@@ -2,7 +2,6 @@
 import { now } from '../clock';
 import { answer, fetchQuality, get } from '../contract/api';
 import type { Field, FieldQuality, OccupancyGrid, SensorsFile } from '../contract/types';
-import { cataloguesOf } from '../domain/sensors';
 import { type MapPicture, mapPlacement, opaqueBox, pixelBoxCorners } from '../geometry/image';
 import { act, type AppState, keepFetched, onChange, receive, store } from './app';
 import { withField, withLatest } from './twin';
@@ -126,13 +125,12 @@ export function startSensors(): () => void {
         // Mostly the bridge answers 304 and the file is unchanged.
         if (text === known) return;
         known = text;
-        const value = cataloguesOf(file);
-        receive({ sensors: ready(value) });
+        receive({ sensors: ready(file) });
         // If the file lacks the default sensor, its first one is shown.
-        const [first] = value.day.all;
+        const [first] = Object.keys(file.sensors);
         const { sensor } = store.get().view;
         const isChosen = sensor !== DEFAULT_VIEW.sensor || sensor in file.sensors;
-        if (first && !isChosen) act({ sensor: first.name });
+        if (first !== undefined && !isChosen) act({ sensor: first });
       },
       onError: (message) => {
         // The previous file stays in force: an unreachable bridge has no other ranges.

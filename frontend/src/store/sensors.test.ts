@@ -1,12 +1,12 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 
-import { CATALOGUES, FILE } from '../testing/sensors';
+import { CATALOGUES, FILE, sensorNamed } from '../testing/sensors';
 import { goLive, goLost, showTags } from '../testing/page';
 import { judgement } from '../testing/health';
 import { wireTag } from '../testing/tags';
 import { act, receive, store } from './app';
 import { withConnection } from './twin';
-import { selectCatalogue, selectHeat, selectSensor, selectSensors } from './derived';
+import { selectHeat, selectSensor, selectSensors } from './derived';
 import { startSensors } from './loaders';
 import { NOTHING } from './fetcher';
 
@@ -86,8 +86,8 @@ test('a file without the sensor that the page opens with shows its first, unless
 });
 
 test('ranges are of the day or of the night, as the judge says', () => {
-  receive({ sensors: { value: CATALOGUES, state: 'ready', message: '' } });
-  expect(selectCatalogue(store.get())).toBe(CATALOGUES.day);
+  receive({ sensors: { value: FILE, state: 'ready', message: '' } });
+  expect(selectSensor(store.get()).ideal).toEqual(sensorNamed('temperature').ideal);
   showTags([wireTag()], judgement({}, { is_day: false, source: 'clock' }));
-  expect(selectCatalogue(store.get())).toBe(CATALOGUES.night);
+  expect(selectSensor(store.get()).ideal).toEqual(CATALOGUES.night.named('temperature').ideal);
 });

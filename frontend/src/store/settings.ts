@@ -1,5 +1,5 @@
 /** The operator's settings on this device, in the browser's local storage. */
-import type { TemperatureUnit } from '../domain/format';
+import type { TemperatureUnit } from '../domain/sensors';
 
 export interface Settings {
   readonly theme: 'system' | 'light' | 'dark';

@@ -5,11 +5,11 @@ import type {
   FieldQuality,
   Judgement,
   Latest,
+  SensorsFile,
   StatusFrame,
 } from '../contract/types';
 import { INITIAL, phaseOf, type Connection, type Phase } from '../connection/machine';
 import { sharedJudgement } from '../domain/health';
-import type { Catalogues } from '../domain/sensors';
 import { heldRange, type Range } from '../domain/ramp';
 import type { Timeline } from '../domain/timeline';
 import { snapshotOf, type Snapshot } from '../domain/twin';
@@ -79,7 +79,7 @@ export interface TwinState {
   /** The timeline of the period in view. */
   readonly remembered: Fetched<Timeline>;
   readonly difference: Fetched<Difference>;
-  readonly sensors: Fetched<Catalogues>;
+  readonly sensors: Fetched<SensorsFile>;
 }
 
 export const NO_TWIN: TwinState = {

@@ -7,7 +7,7 @@ import { withConnection, withField, withLatest, withState } from '../store/twin'
 import { NOTHING } from '../store/fetcher';
 import { DEFAULT_VIEW } from '../store/view';
 import { NOBODY } from './health';
-import { CATALOGUES } from './sensors';
+import { FILE } from './sensors';
 import { stateFrame } from './tags';
 
 export const status = (over: Partial<StatusFrame> = {}): StatusFrame => ({
@@ -34,7 +34,7 @@ let stamp = 100;
 export function showTags(tags: readonly TwinTagState[], health: Judgement = NOBODY): void {
   act(DEFAULT_VIEW);
   prefer(DEFAULT_SETTINGS);
-  receive({ sensors: { value: CATALOGUES, state: 'ready', message: '' }, remembered: NOTHING });
+  receive({ sensors: { value: FILE, state: 'ready', message: '' }, remembered: NOTHING });
   receive({ unread: null, alarms: null, past: null, pastFault: null });
   receive(withLatest({ field: NOTHING, map: NOTHING, quality: null }));
   stamp += 1;

@@ -1,7 +1,6 @@
 import { useRef, type CSSProperties, type JSX } from 'react';
 
 import { byCause, tagsText } from '../alarms/arrange';
-import { selectSpeech } from '../alarms/speech';
 import { timeOfDay } from '../clock';
 import { minuteText, shortAgeText } from '../domain/format';
 import { isBad, severity, todoText, type HouseHealth } from '../domain/health';
@@ -9,7 +8,7 @@ import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
 import { addressOfPage, CYCLE_LIMITS, nextSensor, type CycleSetting } from '../store/cycle';
-import { selectHealth, selectSensor } from '../store/derived';
+import { selectCatalogue, selectHealth, selectSensor } from '../store/derived';
 import { selectHasSnapshot } from '../store/moment';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
@@ -57,13 +56,13 @@ export function AttentionList(): JSX.Element {
 
 /** One line per task of a tag, or per cause that more than a few share, as in the alarm list. */
 function useLines(urgent: readonly Urgent[]): readonly Line[] {
-  const speech = useApp(selectSpeech);
+  const sensors = useApp(selectCatalogue);
   const wrong = urgent.map((own) => {
     const [reason] = own.reasons;
     const id = `${own.tagId} ${todoText(reason)}`;
     return { own, alarm: { id, tag_id: own.tagId, reason } };
   });
-  return byCause(wrong, speech).flatMap(({ key, cause, items }): Line[] =>
+  return byCause(wrong, sensors).flatMap(({ key, cause, items }): Line[] =>
     cause === null
       ? items.map(({ own, alarm }) => ({ key: alarm.id, cause, tags: [own] }))
       : [{ key, cause, tags: items.map(({ own }) => own) }],

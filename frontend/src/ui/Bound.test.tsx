@@ -11,8 +11,7 @@ beforeEach(() => {
   render(
     <Bound
       label="Lowest"
-      sensor={sensorNamed('temperature')}
-      unit="F"
+      sensor={sensorNamed('temperature', 'F')}
       value={10}
       refusal={(value) => (value < 30 ? null : 'too high')}
       onChange={onChange}

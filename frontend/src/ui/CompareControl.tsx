@@ -2,7 +2,6 @@ import { useState, type JSX } from 'react';
 
 import { now } from '../clock';
 import { differenceText, divergingColours, signedText, type Compare } from '../domain/difference';
-import { unitOf } from '../domain/format';
 import { shown } from '../domain/text';
 import { hasDate, rosText } from '../domain/time';
 import { act, store, useApp } from '../store/app';
@@ -88,7 +87,6 @@ function OwnMoment({ at }: { at: number }): JSX.Element {
 export function DifferenceLegend({ kiosk }: { kiosk: boolean }): JSX.Element | null {
   const compare = useApp((state) => state.view.compare);
   const sensor = useApp(selectSensor);
-  const unit = useApp((state) => state.settings.unit);
   const heat = useApp(selectHeat);
   const { value, state: fetched, message } = useApp((state) => state.twin.difference);
   if (!compare) return null;
@@ -96,7 +94,7 @@ export function DifferenceLegend({ kiosk }: { kiosk: boolean }): JSX.Element | n
   return (
     <div className="legend-difference" data-testid="difference-legend">
       <div className="legend-title">
-        <strong>{S.difference(shown(sensor.label, 32))}</strong> <span>{unitOf(sensor, unit)}</span>
+        <strong>{S.difference(shown(sensor.label, 32))}</strong> <span>{sensor.unit}</span>
         {!kiosk && (
           <button
             type="button"
@@ -121,9 +119,9 @@ export function DifferenceLegend({ kiosk }: { kiosk: boolean }): JSX.Element | n
             }}
           />
           <div className="difference-ends">
-            <span>{signedText(sensor, range.low, unit)}</span>
+            <span>{signedText(sensor, range.low)}</span>
             <span>{S.differenceNone}</span>
-            <span>{differenceText(sensor, range.high, unit)}</span>
+            <span>{differenceText(sensor, range.high)}</span>
           </div>
         </>
       ) : (

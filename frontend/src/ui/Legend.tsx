@@ -1,15 +1,7 @@
 import type { CSSProperties, JSX } from 'react';
 
 import type { FieldQuality } from '../contract/types';
-import {
-  differenceNumber,
-  rangeText,
-  readingText,
-  unitOf,
-  valueText,
-  withUnit,
-  type TemperatureUnit,
-} from '../domain/format';
+import { differenceNumber, rangeText, readingText, valueText, withUnit } from '../domain/format';
 import { IDEAL_ALPHA, idealParts, idealsText } from '../domain/ideal';
 import { fraction, rgbText, sensorColour, type Range } from '../domain/ramp';
 import type { Sensor, Span } from '../domain/sensors';
@@ -33,7 +25,6 @@ import { SensorLabel } from './SensorPicker';
 export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   const sensor = useApp(selectSensor);
   const { name } = sensor;
-  const unit = useApp((state) => state.settings.unit);
   const range = useApp(selectRange);
   const field = useApp((state) => selectShown(state).field.value);
   const quality = useApp((state) => selectShown(state).quality);
@@ -50,7 +41,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   const isIdeal = useApp((state) => selectColouring(state) === 'ideal');
   const isEstimate = useApp((state) => state.view.heat !== 'nearest');
   const isError = useApp((state) => selectHeat(state)?.isError ?? false);
-  const ideals = useApp((state) => idealsText(sensor, selectTags(state), unit));
+  const ideals = useApp((state) => idealsText(sensor, selectTags(state)));
   const isOld = useApp((state) => Boolean(selectHeat(state)?.old));
   const fetched = useApp((state) => state.twin.sensors);
   if (!fetched.value) {
@@ -72,7 +63,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
             <strong>
               <SensorLabel sensor={sensor} most={20} />
             </strong>{' '}
-            <span>{unitOf(sensor, unit)}</span>
+            <span>{sensor.unit}</span>
           </div>
           <div className="legend-scale">
             {isError ? (
@@ -80,7 +71,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
             ) : isIdeal ? (
               <IdealLegend sensor={sensor} />
             ) : (
-              <Ramp sensor={sensor} range={range} unit={unit} />
+              <Ramp sensor={sensor} range={range} />
             )}
           </div>
         </>
@@ -118,7 +109,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
             {samples > 0 ? S.legendTags(samples) : isFetching ? S.legendFetching : S.legendNoTags}
           </span>
           {!isEstimate && quality?.sensor_type === name && (
-            <Quality quality={quality} sensor={sensor} unit={unit} />
+            <Quality quality={quality} sensor={sensor} />
           )}
           {isIdeal && !isError && ideals !== '' && (
             <span data-testid="ideal-species">{ideals}</span>
@@ -150,16 +141,14 @@ function HatchedSign({ isFaint = false }: { isFaint?: boolean }): JSX.Element {
 function Quality({
   quality,
   sensor,
-  unit,
 }: {
   quality: FieldQuality;
   sensor: Sensor;
-  unit: TemperatureUnit;
 }): JSX.Element | null {
   const { rmse, worst } = quality;
   if (rmse === null) return null;
   const error = (value: number): string =>
-    withUnit(sensor, differenceNumber(sensor, Math.abs(value), unit), unit);
+    withUnit(sensor, differenceNumber(sensor, Math.abs(value)));
   const atWorst = worst
     ? ` ${S.legendErrorWorst(shown(worst.tag_id, 24), error(worst.error))}`
     : '';
@@ -175,31 +164,22 @@ function idealNote(
   sensor: Sensor,
   ideal: Span,
   ends: readonly [low: string, high: string],
-  unit: TemperatureUnit,
 ): string {
   const part = S.idealParts[sensor.part ?? 'any'];
-  const [low, high] = [valueText(sensor, ideal[0], unit), valueText(sensor, ideal[1], unit)];
-  const isHigh = ends[1] === readingText(sensor, ideal[1], unit);
+  const [low, high] = [valueText(sensor, ideal[0]), valueText(sensor, ideal[1])];
+  const isHigh = ends[1] === readingText(sensor, ideal[1]);
   if (ends[0] === low) return isHigh ? part : `${part} ${S.legendBelow(high)}`;
   return isHigh ? `${part} ${S.legendAbove(low)}` : `${part} ${S.valueRange(low, high)}`;
 }
 
 /** The heat map's colours, from the lowest to the highest value. */
-function Ramp({
-  sensor,
-  range,
-  unit,
-}: {
-  sensor: Sensor;
-  range: Range | null;
-  unit: TemperatureUnit;
-}): JSX.Element {
+function Ramp({ sensor, range }: { sensor: Sensor; range: Range | null }): JSX.Element {
   const colour = sensorColour(sensor);
   const ideal = range && sensor.ideal;
   const from = ideal && fraction(range, ideal[0]);
   const to = ideal && fraction(range, ideal[1]);
-  const low = range ? valueText(sensor, range.low, unit) : '–';
-  const high = range ? readingText(sensor, range.high, unit) : '–';
+  const low = range ? valueText(sensor, range.low) : '–';
+  const high = range ? readingText(sensor, range.high) : '–';
   const style = {
     '--ramp-field': rgbText(colour, sensor.maxAlpha),
     '--ideal': ((from ?? 0) + (to ?? 1)) / 2,
@@ -219,7 +199,7 @@ function Ramp({
         <span data-testid="range-low">{low}</span>
         <span className="ramp-before" />
         {sensor.ideal && (
-          <span className="ramp-note">{idealNote(sensor, sensor.ideal, [low, high], unit)}</span>
+          <span className="ramp-note">{idealNote(sensor, sensor.ideal, [low, high])}</span>
         )}
         <span data-testid="range-high">{high}</span>
       </div>
@@ -229,14 +209,13 @@ function Ramp({
 
 /** Legend of the colours that compare values with their ideal range. */
 function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
-  const unit = useApp((state) => state.settings.unit);
   const { ideal } = sensor;
   const colours = idealParts(IDEAL_ALPHA);
   const part = S.idealParts[sensor.part ?? 'any'];
-  const species = useApp((state) => idealsText(sensor, selectTags(state), unit));
+  const species = useApp((state) => idealsText(sensor, selectTags(state)));
   // Limits are shown for a single range only: with several species, each plant uses its own.
-  const low = species === '' && ideal && valueText(sensor, ideal[0], unit);
-  const high = species === '' && ideal && readingText(sensor, ideal[1], unit);
+  const low = species === '' && ideal && valueText(sensor, ideal[0]);
+  const high = species === '' && ideal && readingText(sensor, ideal[1]);
   const step = (
     name: keyof typeof colours,
     word: string,
@@ -257,7 +236,7 @@ function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
       {step(
         'right',
         species === '' ? part : S.legendEach(part),
-        species === '' && ideal && rangeText(sensor, ideal, unit),
+        species === '' && ideal && rangeText(sensor, ideal),
       )}
       {step('high', S.tooHigh(null), high ? S.legendAbove(high) : S.above)}
     </div>

@@ -113,7 +113,6 @@ export function Readout(): JSX.Element | null {
   const heat = useApp(selectHeat);
   const compare = useApp((state) => state.view.compare);
   const sensor = useApp(selectSensor);
-  const unit = useApp((state) => state.settings.unit);
   const difference = heat?.difference;
   const value = point && heat ? valueAt(heat.field, point) : null;
   const isOld = Boolean(point && heat?.old?.[cellAt(heat.field, point) ?? -1]);
@@ -123,7 +122,7 @@ export function Readout(): JSX.Element | null {
     return cell === null ? null : (rangesAt(selectZones(state, heat.field), cell) ?? null);
   });
   if (!point) return null;
-  const how = value !== null && !isOld && ranges && idealText(sensor, ranges, value, unit);
+  const how = value !== null && !isOld && ranges && idealText(sensor, ranges, value);
   const text = difference ? differenceText : readingText;
   return (
     <output className="readout" data-testid="readout">
@@ -131,7 +130,7 @@ export function Readout(): JSX.Element | null {
         <EstimateReadout point={point} field={heat.field} value={value} isError={heat.isError} />
       ) : (
         <strong>
-          {value === null ? S.notKnown : text(sensor, value, unit)}
+          {value === null ? S.notKnown : text(sensor, value)}
           {difference && value !== null && (
             <span> {sinceText(rosText(difference.against), compare)}</span>
           )}

@@ -1,6 +1,6 @@
 import { useId, useState, type JSX } from 'react';
 
-import { fromShown, readingText, toShown, unitOf, type TemperatureUnit } from '../domain/format';
+import { fromShown, readingText, toShown } from '../domain/format';
 import { rounded, type Range } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
 import { act, useApp } from '../store/app';
@@ -17,7 +17,6 @@ export function RangeControl({
   range: Range | null;
 }): JSX.Element {
   const fixed = useApp((state) => fixedRange(state.view));
-  const unit = useApp((state) => state.settings.unit);
   const { ideal } = sensor;
   return (
     <div className="range" data-fixed={fixed !== null}>
@@ -37,10 +36,10 @@ export function RangeControl({
           <Bound
             label={S.rangeLow}
             sensor={sensor}
-            unit={unit}
+
             value={fixed.low}
             refusal={(low) =>
-              low < fixed.high ? null : S.rangeNotBelow(readingText(sensor, fixed.high, unit))
+              low < fixed.high ? null : S.rangeNotBelow(readingText(sensor, fixed.high))
             }
             onChange={(low) => {
               act(withRange({ ...fixed, low }));
@@ -49,10 +48,10 @@ export function RangeControl({
           <Bound
             label={S.rangeHigh}
             sensor={sensor}
-            unit={unit}
+
             value={fixed.high}
             refusal={(high) =>
-              high > fixed.low ? null : S.rangeNotAbove(readingText(sensor, fixed.low, unit))
+              high > fixed.low ? null : S.rangeNotAbove(readingText(sensor, fixed.low))
             }
             onChange={(high) => {
               act(withRange({ ...fixed, high }));
@@ -90,14 +89,12 @@ export function startingRange({ ideal }: Sensor, range: Range | null): Range {
 export function Bound({
   label,
   sensor,
-  unit,
   value,
   refusal,
   onChange,
 }: {
   label: string;
   sensor: Sensor;
-  unit: TemperatureUnit;
   /** The applied value; like all values here, in the sensor's unit. */
   value: number;
   /** Why a value is invalid; null: it is valid. */
@@ -105,11 +102,11 @@ export function Bound({
   onChange: (value: number) => void;
 }): JSX.Element {
   const id = useId();
-  const text = String(Number(toShown(sensor, value, unit).toFixed(2)));
+  const text = String(Number(toShown(sensor, value).toFixed(2)));
   // null: nothing typed since the last applied value.
   const [typed, setTyped] = useState<string | null>(null);
   const wanted = typed === null || typed.trim() === '' ? NaN : Number(typed);
-  const next = fromShown(sensor, wanted, unit);
+  const next = fromShown(sensor, wanted);
   const why = typed === null ? null : Number.isFinite(next) ? refusal(next) : S.rangeNoNumber;
 
   const apply = (): void => {
@@ -119,7 +116,7 @@ export function Bound({
     <span className="bound">
       <label htmlFor={id}>
         {label}
-        <span className="unseen"> {unitOf(sensor, unit)}</span>
+        <span className="unseen"> {sensor.unit}</span>
       </label>
       <input
         id={id}

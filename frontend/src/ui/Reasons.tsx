@@ -26,7 +26,6 @@ export function useReasonText(
   const tag = useApp((state) => selectTag(state, tagId));
   const health = useApp((state) => selectHealth(state).byTag.get(tagId));
   const isReceiving = useApp(selectIsReceiving);
-  const unit = useApp((state) => state.settings.unit);
   const catalogue = useApp(selectCatalogue);
   return useTicking((now) => {
     if (!reason) return '';
@@ -36,7 +35,7 @@ export function useReasonText(
         : reason.since && snapshot
           ? whenOf(reason.since, snapshot)
           : 'unknown';
-    return reasonText(catalogue, reason, unit, ageSeconds(when, now, ageing), isMarked);
+    return reasonText(catalogue, reason, ageSeconds(when, now, ageing), isMarked);
   });
 }
 

@@ -1,7 +1,7 @@
 import type { JSX } from 'react';
 
 import type { TagHistory } from '../contract/types';
-import { readingText, type TemperatureUnit } from '../domain/format';
+import { readingText } from '../domain/format';
 import { rangeOf, rgbText, sensorColour } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
 import { S } from '../strings';
@@ -48,19 +48,17 @@ export function sparkLines(values: Values): SparkPoint[][] {
 export function Sparkline({
   sensor,
   values,
-  unit,
 }: {
   sensor: Sensor;
   values: Values;
-  unit: TemperatureUnit;
 }): JSX.Element | null {
   const count = values.filter(({ value }) => value !== null).length;
   const range = rangeOf(values.map(({ value }) => value));
   if (!range || count < 2) return null;
   const label = S.cardHistory(
     count,
-    readingText(sensor, range.low, unit),
-    readingText(sensor, range.high, unit),
+    readingText(sensor, range.low),
+    readingText(sensor, range.high),
   );
   const pieces = sparkLines(values);
   const last = pieces.at(-1)?.at(-1);

@@ -9,7 +9,6 @@ import {
   percentText,
   rangeText,
   readingText,
-  type TemperatureUnit,
 } from '../domain/format';
 import { isBack, isBad, rangeReason, sideOf, attemptOutcome } from '../domain/health';
 import { speciesText } from '../domain/marks';
@@ -47,7 +46,6 @@ const CardChart = lazyPart(async () => (await import('../charts/CardChart')).def
 export function TagCard({ tagId }: { tagId: string }): JSX.Element {
   const tag = useApp((state) => selectTag(state, tagId));
   const health = useApp((state) => selectHealth(state).byTag.get(tagId));
-  const unit = useApp((state) => state.settings.unit);
   const moment = useApp((state) => selectShown(state).moment);
   const hasSnapshot = useApp(selectHasSnapshot);
   // The latest observation decides whether to fetch again, whatever moment is shown.
@@ -82,7 +80,7 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
         />
       </header>
       {tag ? (
-        <CardBody tag={tag} health={health} unit={unit} history={history} />
+        <CardBody tag={tag} health={health} history={history} />
       ) : (
         hasSnapshot && <p>{moment === null ? S.cardGone : S.cardGoneThen}</p>
       )}
@@ -93,12 +91,10 @@ export function TagCard({ tagId }: { tagId: string }): JSX.Element {
 function CardBody({
   tag,
   health,
-  unit,
   history,
 }: {
   tag: Tag;
   health: TagHealth | undefined;
-  unit: TemperatureUnit;
   history: TagHistory | null;
 }): JSX.Element {
   const { at } = tag;
@@ -124,7 +120,7 @@ function CardBody({
             species={tag.sureSpecies}
             health={health}
             when={tag.readAt.get(name) ?? 'never'}
-            unit={unit}
+
             values={history?.sensors.find((each) => each.name === name)?.values ?? []}
           />
         ))}
@@ -202,7 +198,6 @@ function CardReading({
   species,
   health,
   when,
-  unit,
   values,
 }: {
   name: string;
@@ -210,7 +205,6 @@ function CardReading({
   species: string;
   health: TagHealth | undefined;
   when: When;
-  unit: TemperatureUnit;
   values: TagHistory['sensors'][number]['values'];
 }): JSX.Element {
   const sensor = useApp((state) => selectCatalogue(state).named(name));
@@ -226,19 +220,19 @@ function CardReading({
         {value === null
           ? S.sensorFailed
           : out
-            ? beyondLimitText(sensor, value, out.limit, unit)
-            : readingText(sensor, value, unit)}
+            ? beyondLimitText(sensor, value, out.limit)
+            : readingText(sensor, value)}
       </strong>
       <span className="card-age faint">
         <Age when={when} />
       </span>
       <span className="card-spark">
-        <Sparkline sensor={sensor} values={values} unit={unit} />
+        <Sparkline sensor={sensor} values={values} />
       </span>
       {ideal && (
         <span className="card-ideal" data-side={side || undefined} data-health={out?.verdict}>
           {side && `${S.side[side]}, `}
-          {`${S.idealParts[sensor.part ?? 'any']} ${rangeText(sensor, ideal, unit)}`}
+          {`${S.idealParts[sensor.part ?? 'any']} ${rangeText(sensor, ideal)}`}
         </span>
       )}
     </li>

@@ -1,13 +1,7 @@
 import { Fragment, memo, type JSX, type ReactNode } from 'react';
 
 import { differenceShown, trendOf } from '../domain/difference';
-import {
-  farOffText,
-  percentText,
-  shortAgeText,
-  valueText,
-  type TemperatureUnit,
-} from '../domain/format';
+import { farOffText, percentText, shortAgeText, valueText } from '../domain/format';
 import {
   beyondText,
   isBack,
@@ -35,7 +29,6 @@ export interface RowLook {
   /** Sensors that have a column. */
   readonly sensors: readonly Sensor[];
   readonly chosen: string;
-  readonly unit: TemperatureUnit;
   /** Hidden columns. */
   readonly hidden: readonly string[];
   /** State an hour ago; null: unknown. */
@@ -54,14 +47,14 @@ interface Props extends Row {
 
 export const TagRow = memo(function TagRow(props: Props): JSX.Element {
   const { index, tag, health, look, area, selected, hovered } = props;
-  const { catalogue, sensors, chosen, unit, hidden } = look;
+  const { catalogue, sensors, chosen, hidden } = look;
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
-  const all = reasonsText(catalogue, health.reasons, unit);
+  const all = reasonsText(catalogue, health.reasons);
   // Mention a failed scan once, with its age.
   const others = health.reasons.filter(({ kind }) => !tag.failedAttempt || kind !== 'scan_failed');
   const texts = others.map((reason, place): ReactNode =>
     // The row's mark already gives the worst reason's verdict.
-    reasonText(catalogue, reason, unit, null, place === 0),
+    reasonText(catalogue, reason, null, place === 0),
   );
   if (tag.failedAttempt) {
     const attempt = (
@@ -213,7 +206,7 @@ function Reading({ sensor, row: { tag, health }, look }: CellProps): JSX.Element
     );
   }
   const reason = rangeReason(health, sensor.name);
-  const beyond = reason && !isBack(reason) ? beyondText(look.catalogue, reason, look.unit) : null;
+  const beyond = reason && !isBack(reason) ? beyondText(look.catalogue, reason) : null;
   return (
     <>
       {reason && beyond !== null && (
@@ -222,13 +215,13 @@ function Reading({ sensor, row: { tag, health }, look }: CellProps): JSX.Element
           <span className="unseen">{beyond}: </span>
         </span>
       )}
-      {valueText(sensor, value, look.unit)}
+      {valueText(sensor, value)}
     </>
   );
 }
 
 /** A reading's change over an hour: an arrow and the difference, or why there is none. */
-function TrendLine({ sensor, row, look: { then, unit } }: CellProps): JSX.Element | null {
+function TrendLine({ sensor, row, look: { then } }: CellProps): JSX.Element | null {
   const { tag } = row;
   const value = tag.readings.get(sensor.name);
   const trend = trendOf(sensor.name, row, thenOf(then, tag));
@@ -244,7 +237,7 @@ function TrendLine({ sensor, row, look: { then, unit } }: CellProps): JSX.Elemen
     // For screen readers only: with a short history, every row would show it.
     return <span className="unseen">{then ? S.trendNone : S.trendUnknown}</span>;
   }
-  const { way, text, rate } = differenceShown(sensor, trend.by, unit);
+  const { way, text, rate } = differenceShown(sensor, trend.by);
   return (
     <span className="trend" data-trend={way} title={`${title}: ${text}`}>
       <span aria-hidden="true">{ARROWS[way]}</span> <span className="unseen">{title}: </span>

@@ -11,7 +11,6 @@ import {
 
 import { rgbText, sensorColour } from '../domain/ramp';
 import type { Sensor } from '../domain/sensors';
-import { unitOf } from '../domain/format';
 import type { AreaHead } from '../domain/table';
 import { shown } from '../domain/text';
 import { act, store, useApp } from '../store/app';
@@ -35,7 +34,6 @@ export function TagTable(): JSX.Element {
   const chosen = useApp((state) => state.view.sensor);
   const selected = useApp((state) => state.view.selected);
   const hovered = useApp((state) => state.view.hovered);
-  const unit = useApp((state) => state.settings.unit);
   const { lines, ...hold } = useHeldRows();
   const hasTags = useApp((state) => selectTags(state).length > 0);
   const longestId = useApp((state) =>
@@ -47,8 +45,8 @@ export function TagTable(): JSX.Element {
   const then = useApp((state) => selectHourAgo(state, last));
   // One object for all rows, or each state would render them anew.
   const look = useMemo(
-    () => ({ catalogue, sensors, chosen, unit, hidden, then }),
-    [catalogue, sensors, chosen, unit, hidden, then],
+    () => ({ catalogue, sensors, chosen, hidden, then }),
+    [catalogue, sensors, chosen, hidden, then],
   );
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
   const body = useRef<HTMLTableSectionElement>(null);
@@ -111,12 +109,7 @@ export function TagTable(): JSX.Element {
             </ColumnHead>
           )}
           {sensors.map((sensor) => (
-            <SensorHead
-              key={sensor.name}
-              sensor={sensor}
-              unit={unitOf(sensor, unit)}
-              chosen={sensor.name === chosen}
-            />
+            <SensorHead key={sensor.name} sensor={sensor} chosen={sensor.name === chosen} />
           ))}
           {has('species') && <ColumnHead id="species">{S.columns.species}</ColumnHead>}
           {has('flowers') && (
@@ -231,11 +224,9 @@ const longestWord = (label: string): number =>
 
 const SensorHead = memo(function SensorHead({
   sensor,
-  unit,
   chosen,
 }: {
   sensor: Sensor;
-  unit: string;
   chosen: boolean;
 }): JSX.Element {
   return (
@@ -244,7 +235,7 @@ const SensorHead = memo(function SensorHead({
       className={chosen ? 'number sensor chosen' : 'number sensor other'}
       style={{ '--sensor': rgbText(sensorColour(sensor)) } as CSSProperties}
     >
-      <SensorLabel sensor={sensor} /> <span className="head-unit">{unit}</span>
+      <SensorLabel sensor={sensor} /> <span className="head-unit">{sensor.unit}</span>
     </ColumnHead>
   );
 });

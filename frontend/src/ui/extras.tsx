@@ -76,7 +76,6 @@ export function HoverCard(): JSX.Element | null {
 function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
   const root = useRef<HTMLDivElement>(null);
   const health = useApp((state) => selectHealth(state).byTag.get(tag.id));
-  const unit = useApp((state) => state.settings.unit);
   const catalogue = useApp(selectCatalogue);
   const chosen = useApp((state) => state.view.sensor);
   // Placed by its size, which is known after layout and before paint.
@@ -111,14 +110,12 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
           const sensor = catalogue.named(name);
           const value = tag.readings.get(name);
           const how =
-            value == null
-              ? null
-              : idealText(sensor, rangesFor(sensor, tag.sureSpecies), value, unit);
+            value == null ? null : idealText(sensor, rangesFor(sensor, tag.sureSpecies), value);
           return (
             <div key={name} data-sensor={name} data-chosen={name === chosen}>
               <dt>{shown(sensor.label, 24)}</dt>
               <dd>
-                {value == null ? S.sensorFailed : readingText(sensor, value, unit)}{' '}
+                {value == null ? S.sensorFailed : readingText(sensor, value)}{' '}
                 {how !== null && <span>{how}</span>}{' '}
                 <span className="faint">
                   <Age when={tag.readAt.get(name) ?? 'never'} format={shortAgeText} />

@@ -142,7 +142,7 @@ describe.each(['en', 'de'] as const)('%s', (language) => {
     ...(await import('./HealthSummary')),
     ...(await import('./TagTable')),
     ...(await import('../alarms/watch')),
-    ...(await import('../alarms/speech')),
+    ...(await import('../alarms/latest')),
     ...(await import('../store/app')),
   });
   let page: Awaited<ReturnType<typeof load>>;

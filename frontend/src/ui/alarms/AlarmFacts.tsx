@@ -9,13 +9,14 @@ import {
   type Now,
   type Values,
 } from '../../alarms/words';
-import { selectNow, selectSpeech } from '../../alarms/speech';
+import { selectNow } from '../../alarms/latest';
 import type { Alarm, Verdict } from '../../contract/types';
 import { ageSeconds } from '../../domain/time';
 import { C } from '../../notes/NoteMarks';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { hourAgo, shortHourText } from '../../store/hourAgo';
+import { selectCatalogue } from '../../store/derived';
 import { rosNow, selectClockFault, selectHasTime } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
@@ -29,11 +30,11 @@ interface ValuesNow extends Values {
 /** An alarm's values in the latest state. */
 export function useValues(alarm: Alarm): ValuesNow {
   const last = useSelected(hourAgo);
-  const speech = useApp(selectSpeech);
+  const sensors = useApp(selectCatalogue);
   // As text: a new state with the same values for this tag does not re-render.
   const key = useApp((state) => JSON.stringify(selectNow(state, alarm, last)));
   const state = JSON.parse(key) as Now | null;
-  const values = valuesOf(alarm, speech, state);
+  const values = valuesOf(alarm, sensors, state);
   // As in the banner.
   const fault = useApp(selectClockFault);
   const todo = fault && alarm.reason.kind === 'silent' ? S.clockTodo[fault] : values.todo;
@@ -84,17 +85,16 @@ export function AlarmFacts({
   item: Item;
   values: ValuesNow;
 }): JSX.Element {
-  const speech = useApp(selectSpeech);
+  const sensors = useApp(selectCatalogue);
   return (
     <>
       {state?.kind === 'known' && current !== null && (
         <Fact name="now" verdict={state.verdict} text={current}>
           {state.value !== null && state.trend !== null && (
             <Trend
-              of={alarm.reason.sensor}
+              sensor={sensors.named(alarm.reason.sensor)}
               by={state.trend}
               hour={shortHourText()}
-              speech={speech}
             />
           )}
         </Fact>
@@ -133,10 +133,10 @@ function NotKnown({
   alarm: Alarm;
   state: Extract<Now, { kind: 'unknown' }>;
 }): JSX.Element {
-  const speech = useApp(selectSpeech);
+  const sensors = useApp(selectCatalogue);
   const hasTime = useApp(selectHasTime);
   const text = useTicking((at) =>
-    unknownText(alarm, speech, state, hasTime ? ageSeconds(state.lastAt, at) : null),
+    unknownText(alarm, sensors, state, hasTime ? ageSeconds(state.lastAt, at) : null),
   );
   return (
     <span data-fact="now" data-status="unknown" title={text}>

@@ -3,7 +3,7 @@ import { useId, useMemo, type JSX, type ReactNode } from 'react';
 import { alarmOf, isAwaited } from '../../alarms/list';
 import { notifyState, soundState, setNotify, setSound } from '../../alarms/notify';
 import { lastAction, own, undo } from '../../alarms/own';
-import { textNow } from '../../alarms/speech';
+import { textNow } from '../../alarms/latest';
 import { alarmList, meanwhile } from '../../alarms/watch';
 import { shown } from '../../domain/text';
 import { rosText, secondsOf } from '../../domain/time';

@@ -21,7 +21,7 @@ import {
   type Item,
 } from '../../alarms/list';
 import { acknowledgeAlarms } from '../../alarms/own';
-import { selectNow, selectSpeech, todoNow, worstNow, worstNowFirst } from '../../alarms/speech';
+import { selectNow, todoNow, worstNow, worstNowFirst } from '../../alarms/latest';
 import { alarmList } from '../../alarms/watch';
 import { timeOfDay } from '../../clock';
 import type { Alarm } from '../../contract/types';
@@ -29,6 +29,7 @@ import { secondsOf } from '../../domain/time';
 import { saveCsv } from '../../export/save';
 import { store, useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
+import { selectCatalogue } from '../../store/derived';
 import { selectLatestTag } from '../../store/moment';
 import { LONGEST_FILTER } from '../../store/view';
 import { S } from '../../strings';
@@ -60,13 +61,13 @@ export function AlarmPanel(): JSX.Element {
     const items = new Map(listed.active.map((item) => [item.alarm.id, item]));
     return { ...listed, active: ids.split('\n').flatMap((id) => items.get(id) ?? []) };
   }, [listed, ids]);
-  const speech = useApp(selectSpeech);
+  const sensors = useApp(selectCatalogue);
   const [filter, setFilter] = useState('');
   const [order, setOrder] = useState<Order>('cause');
   const { shown, added, showNew, ...hold } = useHeldOrder(all);
-  const seen = filtered(shown, filter, speech, isTag);
+  const seen = filtered(shown, filter, sensors, isTag);
   // Counts follow the live list, like all others on the page, even while the order is held.
-  const counted = filtered(all, filter, speech, isTag);
+  const counted = filtered(all, filter, sensors, isTag);
   const waiting = calling(seen);
   const who = useSelected(person);
   const isRefused = useIsRefused();
@@ -116,8 +117,8 @@ export function AlarmPanel(): JSX.Element {
           className="text-button"
           title={S.alarmSaveCsv}
           onClick={() => {
-            const found = filtered(alarmList.get(), filter, speech, isTag);
-            const text = alarmsCsv(found, speech, (alarm) => selectNow(store.get(), alarm));
+            const found = filtered(alarmList.get(), filter, sensors, isTag);
+            const text = alarmsCsv(found, sensors, (alarm) => selectNow(store.get(), alarm));
             saveCsv('alarms', text, timeOfDay());
           }}
         >
@@ -170,7 +171,7 @@ export function AlarmPanel(): JSX.Element {
                     ? String(all[name].length)
                     : `${counted[name].length}/${all[name].length}`
                 }
-                blocks={arranged(seen[name], order, speech)}
+                blocks={arranged(seen[name], order, sensors)}
               />
             )}
             {/* Below the rows, so that they do not move as it comes and goes. */}
@@ -284,12 +285,12 @@ function CauseHeading({
   isOpen: boolean;
   onToggle: () => void;
 }): JSX.Element | null {
-  const speech = useApp(selectSpeech);
+  const sensors = useApp(selectCatalogue);
   // While the order is held, alarms that left the group are still listed.
   const own = items.filter((item) => groupOf(item) === group);
   // As text: states that do not change it do not re-render.
   const facts = useApp((state) =>
-    causeFacts(own, speech, (alarm) => selectNow(state, alarm)).join('\n'),
+    causeFacts(own, sensors, (alarm) => selectNow(state, alarm)).join('\n'),
   );
   const [counts, current, worst] = facts.split('\n');
   const shown = own.length > 0 ? own : items;

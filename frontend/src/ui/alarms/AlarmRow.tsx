@@ -11,13 +11,13 @@ import {
   unacknowledgeAlarm,
   unshelveAlarm,
 } from '../../alarms/own';
-import { selectSpeech } from '../../alarms/speech';
 import { lastKnown, nameText, whereText } from '../../alarms/words';
 import { durationText, minuteText } from '../../domain/format';
 import { C } from '../../notes/NoteMarks';
 import { CommentField, CommentList } from '../../notes/Comments';
 import { useApp } from '../../store/app';
 import { mayAct, mayWithdraw, person, useSelected } from '../../store/create';
+import { selectCatalogue } from '../../store/derived';
 import { S } from '../../strings';
 import { Disclosure, Icon, useClose } from '../../widgets/controls';
 import { AlarmFacts, AlarmTimes, useValues } from './AlarmFacts';
@@ -37,7 +37,7 @@ export const AlarmRow = memo(function AlarmRow({
   const values = useValues(alarm);
   const known = lastKnown(values.state)?.verdict ?? verdict;
   const isBack = known === 'healthy';
-  const name = useApp((state) => nameText(alarm, selectSpeech(state)));
+  const name = useApp((state) => nameText(alarm, selectCatalogue(state)));
   const status = useStatus(item, group);
   return (
     <li

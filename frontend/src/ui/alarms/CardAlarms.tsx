@@ -2,12 +2,13 @@ import type { JSX } from 'react';
 
 import { oldestOf, unacknowledged, type Item } from '../../alarms/list';
 import { acknowledgeAlarms, unshelveAlarm } from '../../alarms/own';
-import { selectSpeech, todoNow, worstNow } from '../../alarms/speech';
+import { todoNow, worstNow } from '../../alarms/latest';
 import { spanText, whatText } from '../../alarms/words';
 import { alarmList } from '../../alarms/watch';
 import { minuteText } from '../../domain/format';
 import { store, useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
+import { selectCatalogue } from '../../store/derived';
 import { rosNow } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
@@ -69,7 +70,7 @@ function Acknowledged({ items }: { items: readonly Item[] }): JSX.Element {
 /** Shelved alarms: until when, why, and a button to unshelve. */
 function Shelved({ tagId }: { tagId: string }): JSX.Element {
   const shelved = useSelected(alarmList, (list) => list.shelved);
-  const speech = useApp(selectSpeech);
+  const sensors = useApp(selectCatalogue);
   const isAble = useSelected(person, mayAct);
   const isRefused = useIsRefused();
   return (
@@ -81,7 +82,7 @@ function Shelved({ tagId }: { tagId: string }): JSX.Element {
             <div key={alarm.id} className="card-alarms" data-testid="card-shelved">
               <span>
                 {S.alarmWhat(
-                  whatText(alarm, speech),
+                  whatText(alarm, sensors),
                   S.alarmShelved(minuteText(shelf.until), shelf.reason, alarm.shelved_by ?? ''),
                 )}
               </span>

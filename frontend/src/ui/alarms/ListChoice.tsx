@@ -1,7 +1,7 @@
 import type { JSX } from 'react';
 
 import { calling } from '../../alarms/list';
-import { worstNow } from '../../alarms/speech';
+import { worstNow } from '../../alarms/latest';
 import { alarmList } from '../../alarms/watch';
 import { act, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';

@@ -7,7 +7,7 @@ import { showTags } from '../testing/page';
 import { readings, wireTag } from '../testing/tags';
 import { NO_LOCAL_ALARMS } from './own';
 import { listOf } from './list';
-import { todoNow } from './speech';
+import { todoNow } from './latest';
 
 const IDS = ['1', '2'];
 const { active } = listOf(

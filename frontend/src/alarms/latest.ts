@@ -1,21 +1,12 @@
-/** Connects the alarms' words to the app state: sensor catalogue, unit, and the latest values. */
+/** Alarms with the latest values, whatever moment is shown. */
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import type { AppState } from '../store/app';
 import { selectCatalogue, selectLatestHealth } from '../store/derived';
 import { hourAgo, selectHourAgoNow, thenOf, type HourAgo } from '../store/hourAgo';
 import { isBack, todoText, VERDICTS } from '../domain/health';
-import { memoLast } from '../domain/memo';
 import { isReceivingNow, selectLatestTag } from '../store/moment';
 import { causesFirst, type Item } from './list';
-import { alarmText, nowOf, reasonNow, type Now, type Speech } from './words';
-
-const speech = memoLast((sensors: Speech['sensors'], unit: Speech['unit']): Speech => ({
-  sensors,
-  unit,
-}));
-
-export const selectSpeech = (state: AppState): Speech =>
-  speech(selectCatalogue(state), state.settings.unit);
+import { alarmText, nowOf, reasonNow, type Now } from './words';
 
 /** An alarm's value now, whatever moment is shown; null: it has no value. */
 export function selectNow(
@@ -50,9 +41,13 @@ export function todoNow(state: AppState, items: readonly Item[]): string {
 /** Sorted by current verdict, the worst first; alarms that share a cause stay together. */
 export function worstNowFirst(state: AppState, items: readonly Item[]): readonly Item[] {
   const reasons = new Map(items.map((item) => [item, reasonIn(state, item.alarm)]));
-  return causesFirst(items, (item) => reasons.get(item) ?? item.alarm.reason, selectSpeech(state));
+  return causesFirst(
+    items,
+    (item) => reasons.get(item) ?? item.alarm.reason,
+    selectCatalogue(state),
+  );
 }
 
 /** An alarm in one line, with its current value. */
 export const textNow = (state: AppState, alarm: Alarm): string =>
-  alarmText(alarm, selectSpeech(state), selectNow(state, alarm));
+  alarmText(alarm, selectCatalogue(state), selectNow(state, alarm));

@@ -118,8 +118,9 @@ function Row({ alarm, sensors }: { alarm: SiteAlarm; sensors: Catalogue }): JSX.
 }
 
 function trendOf(now: Reported, then?: Reported | null): number | null {
-  if (now.value === null || !then || then.value === null) return null;
-  const change = changeOf({ ...now, value: now.value }, { ...then, value: then.value });
+  const before = then?.value ?? null;
+  if (now.value === null || !then || before === null) return null;
+  const change = changeOf({ ...now, value: now.value }, { ...then, value: before });
   return change.kind === 'by' ? change.by : null;
 }
 

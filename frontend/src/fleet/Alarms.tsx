@@ -118,8 +118,12 @@ function Row({ alarm, speech }: { alarm: SiteAlarm; speech: Speech }): JSX.Eleme
 }
 
 function trendOf(now: Reported, then?: Reported | null): number | null {
-  if (now.value === null || !then || then.value === null) return null;
-  const change = changeOf({ ...now, value: now.value }, { ...then, value: then.value });
+  const [value, before] = [now.value, then?.value ?? null];
+  if (value === null || before === null) return null;
+  const change = changeOf(
+    { value, observed_at: now.observed_at },
+    { value: before, observed_at: then?.observed_at ?? null },
+  );
   return change.kind === 'by' ? change.by : null;
 }
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import blake2b
-from typing import Any, Final, Protocol
+from typing import Any, ClassVar, Final, Protocol
 
 import orjson
 
@@ -57,11 +57,10 @@ from lupin_twin.journal.fold import STATE_S_PER_TAG
 from lupin_twin.journal.queries import SERIES_S, SERIES_S_PER_TAG
 from lupin_twin.runtime.workers import ShouldStop
 
-# Costs, s of one core, at worst: to plan an answer and to write it, for each tag or scan; to judge
-# a tag with its scans of three days; to write a reading or a bucket.
+# Costs, s of one core, at worst: to plan the answer of a tag; to write a scan, or a reading or
+# bucket.
 PLAN_TAG_S: Final = 10e-6
-_WRITE_TAG_S: Final = 20e-6
-_HEALTH_TAG_S: Final = 1e-3
+_WRITE_SCAN_S: Final = 20e-6
 _WRITE_ENTRY_S: Final = 5e-6
 
 
@@ -118,6 +117,8 @@ class StateQuery:
     """A query of the state as of a moment, ns of ROS time; None: of the newest."""
 
     at_ns: int | None
+    # Cost of judging and writing a tag, s of one core.
+    tag_s: ClassVar[float] = 20e-6
 
     def cost_s(self, tags: int) -> float:
         """See `Query`."""
@@ -125,7 +126,7 @@ class StateQuery:
 
     def write_s(self, tags: int) -> float:
         """The cost of writing the answer with this many tags, s of one core."""
-        return tags * _WRITE_TAG_S
+        return tags * self.tag_s
 
     def look(self, find: Find) -> Plan:
         """See `Query`."""
@@ -149,10 +150,6 @@ class OneTag(StateQuery):
 
     tag_id: str
 
-    def write_s(self, tags: int) -> float:  # noqa: ARG002
-        """See `StateQuery`."""
-        return _WRITE_TAG_S
-
     def look(self, find: Find) -> Plan:
         """See `Query`, and `tag_of`."""
         snapshot: Snapshot = find(self.at_ns or 0)
@@ -169,10 +166,7 @@ class Health(StateQuery):
     """
 
     criteria: Criteria = field(compare=False)
-
-    def write_s(self, tags: int) -> float:
-        """See `StateQuery`."""
-        return tags * _HEALTH_TAG_S
+    tag_s = 1e-3
 
     def look(self, find: Find) -> Plan:
         """See `Query`."""
@@ -281,7 +275,7 @@ class LatestOfTag:
 
     def cost_s(self, tags: int) -> float:  # noqa: ARG002
         """See `Query`."""
-        return SERIES_S + self.count * _WRITE_TAG_S
+        return SERIES_S + self.count * _WRITE_SCAN_S
 
     def look(self, find: Find) -> Plan:
         """See `Query`."""

@@ -240,10 +240,7 @@ class Alarms(Contract):
 
 
 class AlarmsFrame(Alarms):
-    """WebSocket frame: the active alarms and those cleared within 24 h, on any change.
-
-    At most 1,000: the worst active ones come before others.
-    """
+    """WebSocket frame, on any change: alarms active or cleared in 24 h, at most the worst 1,000."""
 
     type: Literal["alarms"]
     notes: int = Field(description="grows with every note: fetch `/api/notes` again")

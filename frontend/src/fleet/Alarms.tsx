@@ -118,9 +118,12 @@ function Row({ alarm, sensors }: { alarm: SiteAlarm; sensors: Catalogue }): JSX.
 }
 
 function trendOf(now: Reported, then?: Reported | null): number | null {
-  const before = then?.value ?? null;
-  if (now.value === null || !then || before === null) return null;
-  const change = changeOf({ ...now, value: now.value }, { ...then, value: before });
+  const [value, before] = [now.value, then?.value ?? null];
+  if (value === null || before === null) return null;
+  const change = changeOf(
+    { value, observed_at: now.observed_at },
+    { value: before, observed_at: then?.observed_at ?? null },
+  );
   return change.kind === 'by' ? change.by : null;
 }
 

@@ -310,6 +310,7 @@ def test_check_ends_by_itself_with_an_exit_code(domain: int, config: Path) -> No
     ("change", "complaint"),
     [
         (("/temperature,", "'/1 bad',"), "topic '/1 bad'"),
+        (("/temperature,", "'/{bad}',"), "topic '/{bad}'"),
         (("sensor_msgs/msg/Temperature", "radar_msgs/msg/X"), "the package radar_msgs is"),
         (("sensor_msgs/msg/Temperature", "sensor_msgs/msg/Warmth"), "has no message Warmth"),
     ],

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_twin.estimate.kernel import Hyper, Readings, Scale
-from lupin_twin.estimate.model import FitFailed, Model, fit
+from lupin_twin.estimate.model import Model, fit
 from lupin_twin.estimate.posterior import INFLATION
 from tests.support import textbook_gp
 from tests.support.estimates import DAY_S, a_day, hypers, readings_of, some_readings, spots_of
@@ -74,7 +74,7 @@ def test_extreme_numbers_give_an_estimate_or_an_error(value: float, metres: floa
     readings = readings_of(rows, [(metres, -metres), (-metres, metres)])
     try:
         mean, sd = fit(readings).posterior(readings, DAY_S / 2).points(np.array(PLACES))
-    except FitFailed:
+    except np.linalg.LinAlgError:
         return
     assert np.isfinite(mean).all()
     assert np.isfinite(sd).all()

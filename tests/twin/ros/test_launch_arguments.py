@@ -9,7 +9,7 @@ from typing import Any
 import ament_index_python.packages
 import pytest
 
-from lupin_twin.core.parameters import ARGUMENTS, LaunchError
+from lupin_twin.core.parameters import ARGUMENTS, ParameterError
 
 SHARE = Path("ros_node/lupin_twin")
 NOT_GIVEN = {argument.name: argument.default for argument in ARGUMENTS}
@@ -82,5 +82,5 @@ def test_the_launch_file_starts_the_twin_with_the_given_arguments(
             "ros_arguments": ["--log-level", "rcl:=debug"],
         }
     ]
-    with pytest.raises(LaunchError, match=r"params_file is '/no\.yaml'"):
+    with pytest.raises(ParameterError, match=r"params_file is '/no\.yaml'"):
         twin(NOT_GIVEN | {"params_file": "/no.yaml"})

@@ -150,7 +150,7 @@ class AdaptNode(Node):  # type: ignore[misc]  # rclpy is not typed
             source.name = self.create_subscription(
                 kind, topic, self.utilities.guarded(topic, read), qos, raw=True
             ).topic_name
-        except InvalidTopicNameException as error:
+        except (InvalidTopicNameException, ValueError) as error:  # the latter for `{unknown}`
             raise ConfigError(f"topic {topic!r}: {str(error).partition(chr(10))[0]}") from None
 
     def _drop(self, reason: Reason, topic: str, why: str, case: str = "") -> None:

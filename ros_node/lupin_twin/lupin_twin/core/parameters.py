@@ -34,7 +34,7 @@ class World:
 
 
 class ParameterError(ValueError):
-    """A parameter out of its range; the message names it, its value and the limit."""
+    """A parameter or launch argument is invalid; the message names it, its value and the limit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,10 +218,6 @@ def changed(now: TwinParameters, wanted: Mapping[str, object]) -> TwinParameters
 # --- the launch file ------------------------------------------------------------------------------
 
 
-class LaunchError(ValueError):
-    """A launch argument is invalid; the message names it, its value and what was expected."""
-
-
 @dataclass(frozen=True, slots=True)
 class Argument:
     """A launch argument; empty means: not given. `choices` None: any text."""
@@ -274,10 +270,10 @@ def params_file(given: Mapping[str, str], default: str, is_file: Callable[[str],
     """Return the path of the parameter file; `default` is the package's own.
 
     Raises:
-        LaunchError: there is no such file; launch alone would only warn, and start with defaults.
+        ParameterError: there is no such file; launch alone would warn, and start with defaults.
 
     """
     path = given["params_file"] or default
     if not is_file(path):
-        raise LaunchError(f"params_file is {path!r}, expected an existing file")
+        raise ParameterError(f"params_file is {path!r}, expected an existing file")
     return path

@@ -19,7 +19,7 @@ import numpy as np
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.estimate.engine import TagPast, all_readings, within
 from lupin_twin.estimate.kernel import Pairs, Readings
-from lupin_twin.estimate.model import FitFailed, Model, fit, of_neighbours
+from lupin_twin.estimate.model import Model, fit, of_neighbours
 from lupin_twin.estimate.posterior import INFLATION
 from lupin_twin.estimate.solution import gap_of
 from lupin_twin.field.idw import Abandoned, never
@@ -144,7 +144,7 @@ def _graded(
             (at_s, off <= HALF_WIDTH_SDS * sd)
             for at_s, off, sd in predicted(model, both, -day_length_s)
         )
-    except (FitFailed, np.linalg.LinAlgError):
+    except np.linalg.LinAlgError:
         return ()
 
 

@@ -39,10 +39,6 @@ _LOG_SD: Final = np.array(PRIOR_LOG_SD)
 Objective = Callable[[FloatArray], tuple[float, FloatArray]]
 
 
-class FitFailed(RuntimeError):
-    """No parameters were found; the message says why."""
-
-
 def hyper_of(coordinates: FloatArray) -> Hyper:
     """The kernel's parameters at these coordinates."""
     return Hyper(*np.exp(_LOG_MEDIAN + _LOG_SD * coordinates).tolist())
@@ -82,13 +78,15 @@ def minimise(objective: Objective, start: FloatArray) -> FloatArray:
     """BFGS (Nocedal and Wright, "Numerical Optimization", 2006, 6.1) with halved steps.
 
     Raises:
-        FitFailed: the density is 0 even at the start.
+        numpy.linalg.LinAlgError: the density is 0 even at the start.
 
     """
     place = start
     value, slope = objective(place)
     if not np.isfinite(value):
-        raise FitFailed("the readings' covariance is singular at the prior's own median")
+        raise np.linalg.LinAlgError(
+            "the readings' covariance is singular at the prior's own median"
+        )
     curvature = np.eye(len(place))  # approximates the inverse Hessian
     for _ in range(_MAX_STEPS):
         step = -curvature @ slope
@@ -164,7 +162,7 @@ def fit(
     takes `day_length_s` of ROS time.
 
     Raises:
-        FitFailed: the readings cannot be fitted.
+        numpy.linalg.LinAlgError: the readings cannot be fitted.
         lupin_twin.field.idw.Abandoned: `should_stop`, called at each step, was true.
 
     """

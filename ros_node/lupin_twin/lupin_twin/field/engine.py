@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final, NamedTuple, Self
 
 import numpy as np
@@ -55,8 +55,11 @@ class FieldRequest:
     """Request for a sensor's field over a box (m, map frame) in cells of `resolution` (m).
 
     The numbers are rounded to float32, GetField's wire type. So the same request over HTTP and over
-    ROS compares equal, and has the same field. `past_float32` names the first number that float32
-    cannot hold, as it was sent; `check_request` refuses it.
+    ROS compares equal, and has the same field.
+
+    Raises:
+        FieldRefused: float32 cannot hold a number.
+
     """
 
     sensor_type: str
@@ -65,7 +68,6 @@ class FieldRequest:
     bbox_min_y: float
     bbox_max_x: float
     bbox_max_y: float
-    past_float32: str = field(default="", init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         with np.errstate(over="ignore", under="ignore"):
@@ -74,8 +76,10 @@ class FieldRequest:
                 rounded = float(np.float32(sent))
                 object.__setattr__(self, name, rounded)
                 is_lost = name == "resolution" and sent != 0.0 and rounded == 0.0
-                if (is_lost or math.isinf(rounded) > math.isinf(sent)) and not self.past_float32:
-                    object.__setattr__(self, "past_float32", f"{name} is {sent}")
+                if is_lost or math.isinf(rounded) > math.isinf(sent):
+                    raise FieldRefused(
+                        f"{name} is {sent} m, must fit into float32 (1.4e-45 to 3.4e38)"
+                    )
 
     @property
     def cells(self) -> dict[str, float]:
@@ -183,8 +187,6 @@ def check_request(request: FieldRequest, max_grid_cells: int) -> tuple[int, int]
 
     """
     check_sensor_type(request.sensor_type)
-    if request.past_float32:
-        raise FieldRefused(f"{request.past_float32} m, must fit into float32 (1.4e-45 to 3.4e38)")
     try:
         width, height = grid_dimensions(**request.cells)
     except ValueError as error:

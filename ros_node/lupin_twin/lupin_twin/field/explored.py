@@ -30,7 +30,7 @@ _KNOWN_MAX: Final = 100
 # side. A point that is below an edge by this share of a cell counts as on it.
 _EDGE_NOISE_CELLS: Final = 1e-4
 
-# Field cells that are looked up at once in a rotated map; bounds the memory.
+# Field cells that are looked up at once; bounds the memory.
 _CELLS_AT_ONCE: Final = 16_384
 
 # The fields that locate a map.
@@ -126,20 +126,14 @@ def explored_mask(
     explored = np.zeros((height, width), dtype=np.bool_)
     if occupancy.cells.size == 0:
         return explored
-    if occupancy.origin_yaw == 0.0:
-        columns, on_columns = _indices(x, occupancy.resolution, occupancy.width)
-        rows, on_rows = _indices(y, occupancy.resolution, occupancy.height)
-        # Only the part of the field that lies on the map is looked up.
-        inside = np.ix_(np.flatnonzero(on_rows), np.flatnonzero(on_columns))
-        explored[inside] = _known(occupancy.cells[np.ix_(rows[on_rows], columns[on_columns])])
-        return explored
     cos, sin = math.cos(occupancy.origin_yaw), math.sin(occupancy.origin_yaw)
     rows_at_once = max(1, _CELLS_AT_ONCE // width)
     for top in range(0, height, rows_at_once):
         band = y[top : top + rows_at_once, None]
         columns, on_columns = _indices(cos * x + sin * band, occupancy.resolution, occupancy.width)
         rows, on_rows = _indices(cos * band - sin * x, occupancy.resolution, occupancy.height)
-        known = _known(occupancy.cells[rows, columns])
+        percent = occupancy.cells[rows, columns]
+        known = (percent >= _KNOWN_MIN) & (percent <= _KNOWN_MAX)
         explored[top : top + rows_at_once] = known & on_columns & on_rows
     return explored
 
@@ -151,10 +145,6 @@ def _indices(
     position = np.floor(offset / resolution + _EDGE_NOISE_CELLS)
     inside = (position >= 0) & (position < count)
     return np.where(inside, position, 0).astype(np.intp), inside
-
-
-def _known(occupancy: npt.NDArray[np.int8]) -> BoolArray:
-    return (occupancy >= _KNOWN_MIN) & (occupancy <= _KNOWN_MAX)
 
 
 # A tag that is closer than this to another measures nothing new.

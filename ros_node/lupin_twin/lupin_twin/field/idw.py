@@ -181,13 +181,8 @@ def sample_columns(
 
 
 def _finite_range(values: npt.NDArray[np.float32]) -> tuple[float, float]:
-    low, high = np.fmin.reduce(values, axis=None), np.fmax.reduce(values, axis=None)
-    if np.isinf(low) or np.isinf(high):
-        finite = values[np.isfinite(values)]
-        low, high = finite.min(initial=np.inf), finite.max(initial=-np.inf)
-    if not np.isfinite(low):
-        return 0.0, 0.0
-    return float(low), float(high)
+    finite = values[np.isfinite(values)]
+    return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
 
 
 class PairwiseIdw:

@@ -31,7 +31,7 @@ from lupin_twin.estimate.grading import (
     record_of,
 )
 from lupin_twin.estimate.kernel import MAX_PER_TAG
-from lupin_twin.estimate.model import FitFailed, fit
+from lupin_twin.estimate.model import fit
 from lupin_twin.estimate.posterior import Posterior
 from lupin_twin.estimate.solution import Change, Place
 from lupin_twin.field.engine import FieldRefused, check_sensor_type
@@ -109,7 +109,6 @@ def load(
 
     Raises:
         lupin_twin.field.idw.Abandoned: `should_stop`, called every few milliseconds, was true.
-        lupin_twin.estimate.model.FitFailed: no model can be fitted.
         lupin_twin.field.engine.FieldRefused: see `readings_of`.
         numpy.linalg.LinAlgError: the readings cannot be computed with.
 
@@ -168,7 +167,7 @@ def estimate_at(
     try:
         posterior, _ = load(pasts, request.at_ns, day_length_s, should_stop)
         grid = posterior.grid(**request.box.cells)
-    except (FitFailed, np.linalg.LinAlgError) as error:
+    except np.linalg.LinAlgError as error:
         raise FieldRefused(f"these readings cannot be computed with: {error}") from error
     readings = posterior.readings
     return Estimate(grid, len(np.unique(readings.tag)), len(readings))
@@ -246,7 +245,7 @@ def report_of(
         return Report(at_ns, record=record_of(pasts, at_ns, day_length_s, should_stop))
     try:
         posterior, checks = load(today, at_ns, day_length_s, should_stop)
-    except (FitFailed, FieldRefused, np.linalg.LinAlgError) as error:
+    except (FieldRefused, np.linalg.LinAlgError) as error:
         record = record_of(pasts, at_ns, day_length_s, should_stop)
         return Report(at_ns, fit_problem=str(error) or repr(error), record=record)
     record = record_of(unchanged(pasts, changed_of(checks)), at_ns, day_length_s, should_stop)

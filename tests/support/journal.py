@@ -6,7 +6,9 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from lupin_twin.core.diagnostics import Condition, JournalState
+from lupin_twin.core.history import kind_of
 from lupin_twin.core.parameters import World
+from lupin_twin.core.past import PastWrite
 from lupin_twin.core.state import Bloom, Flower, Inspection, Pin, Pose, Reading, Scan, Write
 from lupin_twin.journal.file import JournalFile
 from lupin_twin.journal.fold import Restored
@@ -55,6 +57,18 @@ def inspection(tag_id: str = "7", at_ns: int = NOW, *, anomaly: bool = False) ->
 def pin(tag_id: str = "7", at_ns: int = NOW, x: float = 1.5) -> Pin:
     """A position."""
     return Pin(tag_id, Pose(x, 2.5, 0.0, 0.0, 0.0, 0.0, 1.0), at_ns, at_ns + 1000)
+
+
+def past_write(number: int, run: int, row: Scan | Inspection) -> PastWrite:
+    """A row as queries of the log return it: an uncertain species is left out."""
+    if isinstance(row, Inspection) and row.flower is not None:
+        flower = row.flower
+        species = flower.species if flower.confidence >= 0.5 else ""
+        seen = (True, species, flower.anomaly, flower.bug_count)
+        return PastWrite(number, run, row.tag_id, row.stamp_ns, 1, 0, (), (), *seen)
+    pairs = [(it.name, it.value) for it in getattr(row, "readings", ())]
+    names, values = zip(*pairs, strict=True) if pairs else ((), ())
+    return PastWrite(number, run, row.tag_id, row.stamp_ns, kind_of(row), row.status, names, values)
 
 
 @contextmanager

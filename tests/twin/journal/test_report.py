@@ -19,15 +19,14 @@ from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.report import Report
 from lupin_twin.core.diagnostics import Condition, JournalState
-from lupin_twin.core.history import kind_of
 from lupin_twin.core.notes import SHELVE, Note
 from lupin_twin.core.past import PastWrite, RunSpan
-from lupin_twin.core.state import Inspection, Pin, Reading
+from lupin_twin.core.state import Pin, Reading
 from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import SiteLog
 from lupin_twin.journal.writes import put_note
 from tests.support.alarms_reference import Plain, alarms
-from tests.support.journal import scan
+from tests.support.journal import past_write, scan
 from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, steps
 from tests.support.past import answered_by
 from tests.twin.journal.conftest import Engines, Living
@@ -125,7 +124,7 @@ def check(found: dict[str, Any], life: Life, start_ns: int, end_ns: int) -> None
     known = [(n, row) for n, row in life.holds() if row.stamp_ns < end_ns]
     reported = sorted(
         (
-            write(number, life.rows[number][0], row)
+            past_write(number, life.rows[number][0], row)
             for number, row in known
             if not isinstance(row, Pin)
         ),
@@ -211,18 +210,6 @@ def check_silences(
     if not reported:
         right = set()
     assert {(it["tag_id"], ns(it["from"]), ns(it["to"])) for it in found} == right
-
-
-def write(number: int, run: int, row: Any) -> PastWrite:
-    if isinstance(row, Inspection) and row.flower is not None:
-        flower = row.flower
-        species = flower.species if flower.confidence >= 0.5 else ""
-        seen = (True, species, flower.anomaly, flower.bug_count)
-        return PastWrite(number, run, row.tag_id, row.stamp_ns, 1, 0, (), (), *seen)
-    readings = getattr(row, "readings", ())
-    names = tuple(reading.name for reading in readings)
-    values = tuple(reading.value for reading in readings)
-    return PastWrite(number, run, row.tag_id, row.stamp_ns, kind_of(row), row.status, names, values)
 
 
 def plain(alarm: dict[str, Any]) -> Plain:

@@ -8,6 +8,7 @@ file stays beside the new one; one of version 4, as `NAME.v4`.
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import sqlite3
@@ -84,6 +85,11 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
 
     """
     version, new = old_version(path), path.with_name(path.name + ".upgrade")
+    # Refused at once: an upgrade that fills the disk would begin again and again.
+    needed, free = path.stat().st_size * 5 // 4 - size_of(new), shutil.disk_usage(path.parent).free
+    if free < needed:
+        room = f"its upgrade needs {needed / 1e6:,.1f} MB of disk, {free / 1e6:,.1f} MB are free"
+        raise OSError(errno.ENOSPC, room)
     try:
         with closing(sqlite3.connect(path, isolation_level=None, timeout=5.0)) as connection:
             # First move the WAL into the file: otherwise it would be taken for the new file's WAL.

@@ -293,16 +293,23 @@ def test_it_waits_for_readers_of_the_file(tmp_path: Path) -> None:
     ("name", "damage"),
     [
         ("day", "DROP TABLE run"),
-        (VERSION4, "UPDATE hour SET n = '[1'"),
+        (VERSION4, "UPDATE hour SET n = '[1' WHERE hour = (SELECT max(hour) FROM hour)"),
     ],
 )
 def test_a_file_that_cannot_be_upgraded_is_quarantined(
     name: str, damage: str, tmp_path: Path
 ) -> None:
     path = old(name, tmp_path)
+    # Of deleted scans, the hours are all that is left.
+    hours = "SELECT DISTINCT hour FROM hour WHERE hour < 489948 ORDER BY hour"
+    left = []
     with closing(sqlite3.connect(path)) as connection, connection:
+        if name == VERSION4:
+            left = connection.execute(hours).fetchall()
         connection.execute(damage)
     with started(path) as journal:
         wait_for(lambda: journal.condition.state is JournalState.RECORDING, "recording", 30.0)
         assert "j.sqlite.damaged-" in journal.condition.quarantined
     assert old_version(path) is None
+    with closing(open_reader(path)) as connection:
+        assert connection.execute(hours).fetchall() == left

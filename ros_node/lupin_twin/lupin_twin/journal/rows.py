@@ -46,14 +46,13 @@ def last_rows(connection: sqlite3.Connection, run: Run, most: int) -> list[Scan 
     return [row for _, row in sorted(found, key=lambda entry: entry[0])[-most:]]
 
 
-def outermost(log: SiteLog, way: str, upto: int = FOREVER_NS) -> list[tuple[int, int, int]]:
-    """Number, stamp and arrival of the first (ASC) or last (DESC) scan and inspection.
-
-    Only those numbered up to `upto` count.
-    """
+def outermost(
+    log: SiteLog, way: str, upto: int = FOREVER_NS, tables: Sequence[str] = WRITTEN
+) -> list[tuple[int, int, int]]:
+    """Number, stamp and arrival of each table's first (ASC) or last (DESC) row up to a number."""
     return [
         row
-        for table in WRITTEN
+        for table in tables
         for row in log.execute(
             f"SELECT seq, stamp_ns, arrival_ns FROM {table} WHERE site = :site AND seq <= :upto"
             f" ORDER BY seq {way} LIMIT 1",
@@ -63,8 +62,8 @@ def outermost(log: SiteLog, way: str, upto: int = FOREVER_NS) -> list[tuple[int,
 
 
 def last_row(log: SiteLog, upto: int = FOREVER_NS) -> tuple[int, int, int]:
-    """Number, stamp and arrival of the last row up to a number; all 0 if there is none."""
-    return max(outermost(log, "DESC", upto), default=(0, 0, 0))
+    """Number, stamp and arrival of the last write up to a number; all 0 if there is none."""
+    return max(outermost(log, "DESC", upto, (*WRITTEN, "place")), default=(0, 0, 0))
 
 
 def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan | Inspection]:

@@ -254,7 +254,8 @@ _FROM_VERSION1: Final = ";".join(
         "ALTER TABLE hour RENAME TO lists",
         "ALTER INDEX hour_pkey RENAME TO lists_pkey",
         POSTGRESQL_HOUR.strip().rstrip(";"),
-        HOURS_OF_LISTS.format(
+        "INSERT INTO hour "
+        + HOURS_OF_LISTS.format(
             lists="lists", each="generate_series(0, json_array_length(n) - 1) AS each(key)"
         ),
         "DROP TABLE lists",

@@ -1,4 +1,3 @@
-# ruff: noqa: S608  # SQL is put together of constants
 """Forwards a journal to the archive, again and again until it is stopped.
 
 A problem is reported once, in one line, and retried later; it does not affect the twin.
@@ -44,6 +43,7 @@ from lupin_twin.core.notes import KINDS, MAX_NOTES, SHELF_S, Note, NotesRequest,
 from lupin_twin.core.past import DAY_NS, NotRemembered
 from lupin_twin.core.state import NANOSECONDS_PER_SECOND
 from lupin_twin.journal.retention import RECORD
+from lupin_twin.journal.rows import last_row
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
     WRITTEN,
@@ -63,14 +63,6 @@ _CHANGING: Final = {
 _EPOCH: Final = (
     "SELECT journal_id, epoch, seq_offset, run_offset, forwarded_seq FROM epoch"
     " WHERE site = :site ORDER BY epoch DESC LIMIT 1"
-)
-# Each table's own limit has PostgreSQL read one row of it, instead of all rows of the site.
-_NEWEST: Final = "SELECT seq, arrival_ns FROM ({}) AS row ORDER BY seq DESC LIMIT 1".format(
-    " UNION ALL ".join(
-        f"(SELECT seq, arrival_ns FROM {table} WHERE site = :site"
-        " AND seq > :begun AND seq <= :upto ORDER BY seq DESC LIMIT 1)"
-        for table in (*WRITTEN, "place")
-    )
 )
 _RUNS: Final = "SELECT coalesce(max(run), 0) FROM run WHERE site = :site"
 _NEW_EPOCH: Final = (
@@ -161,12 +153,12 @@ class Sink:
     def _goes_on(self, source: Source, last: Epoch) -> bool:
         if source.last_seq() < last.forwarded_seq:
             return False
-        within = {"begun": last.seq_offset, "upto": last.seq_offset + last.forwarded_seq}
-        newest = self._log.execute(_NEWEST, within).fetchone()
-        if newest is None:
-            return True
+        seq, _, arrival_ns = last_row(self._log, last.seq_offset + last.forwarded_seq)
+        # A row of an earlier journal has no such number here.
+        seq = max(0, seq - last.seq_offset)
+        here, _, here_ns = source.last_row(seq)
         # A row that is not in the journal was deleted there.
-        return source.arrival_of(newest[0] - last.seq_offset) in {None, newest[1]}
+        return not seq or here != seq or here_ns == arrival_ns
 
     def put(self, batch: Batch, epoch: Epoch) -> Epoch:
         """Append a batch, all or nothing; returns the epoch as it is now."""

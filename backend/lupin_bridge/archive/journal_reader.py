@@ -22,11 +22,11 @@ from lupin_twin.journal.appending import PURGED_SEQ, Appender
 from lupin_twin.journal.follow import rows_behind
 from lupin_twin.journal.paths import files_of, forwarded_seq, note_forwarded
 from lupin_twin.journal.retention import RECORD
+from lupin_twin.journal.rows import last_row
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
     MAP,
     ORIGIN,
-    WRITTEN,
     Row,
     SiteLog,
     columns,
@@ -41,10 +41,6 @@ _SMALL: Final = ("run", "meta")
 # Columns with numbers of the journal, in whatever table.
 _SEQS: Final = ("seq", "series", "begun_seq")
 _RUNS: Final = ("run", "joins")
-_ARRIVAL: Final = " UNION ALL ".join(
-    f"SELECT arrival_ns FROM {table} WHERE site = :site AND seq = :seq"
-    for table in (*WRITTEN, "place")
-)
 # For each run, since when new rows may have changed its events. The last silence that began before
 # them may now end later.
 _EVENTS_SINCE: Final = (
@@ -155,10 +151,9 @@ class Source:
             note_id for (note_id,) in self._log.execute("SELECT id FROM note WHERE site = :site")
         }
 
-    def arrival_of(self, seq: int) -> int | None:
-        """When the row of a number was received; None: it is not there."""
-        found = self._log.execute(_ARRIVAL, {"seq": seq}).fetchone()
-        return None if found is None else int(found[0])
+    def last_row(self, upto: int) -> tuple[int, int, int]:
+        """Number, stamp and arrival of its last row up to a number."""
+        return last_row(self._log, upto)
 
     def batch(self, epoch: Epoch) -> Batch:
         """The next batch, as of one moment, and synced to the disk.

@@ -33,6 +33,7 @@ from lupin_twin.field.explored import OccupancyMap, map_of
 from lupin_twin.journal.appending import simulated
 from lupin_twin.journal.fold import state_at
 from lupin_twin.journal.retention import Stretches, kept
+from lupin_twin.journal.rows import last_row
 from lupin_twin.journal.runs import runs, span_at, world_of
 from lupin_twin.journal.schema import MAP, DamagedFile, SiteLog
 from lupin_twin.journal.writes import put_note
@@ -40,12 +41,6 @@ from lupin_twin.runtime.journal_queries import Recall
 from lupin_twin.runtime.workers import ShouldStop
 
 AnswerT = TypeVar("AnswerT")
-
-_ARRIVED: Final = (
-    "SELECT max(stamp_ns), max(arrival_ns) FROM (SELECT stamp_ns, arrival_ns FROM scan"
-    " WHERE site = :site ORDER BY seq DESC LIMIT 1) AS last"
-)
-
 
 # A map is identified by a hash of its text, which is the same in all replicas.
 _NEWER_MAP: Final = (
@@ -136,13 +131,13 @@ def _latest(log: SiteLog, request: Latest, frame_id: str) -> Reported:
     (now_ns,) = log.execute(
         "SELECT CAST(extract(epoch FROM now()) * 1000000000 AS BIGINT)"
     ).fetchone()
-    stamp_ns, arrival_ns = log.execute(_ARRIVED).fetchone()
+    _, stamp_ns, arrival_ns = last_row(log)
     if not is_wall_clock:
-        now_ns = (stamp_ns or 0) + max(0, now_ns - (arrival_ns or now_ns))
+        now_ns = stamp_ns + max(0, now_ns - (arrival_ns or now_ns))
     # Includes stamps of a robot's clock that is a little ahead of this one: they were received.
     known = state_at(journal, FOREVER_NS, frame_id)
     return Reported(
-        Snapshot(max(now_ns, stamp_ns or 0), frame_id, known.tags),
+        Snapshot(max(now_ns, stamp_ns), frame_id, known.tags),
         is_wall_clock,
         world_of(log),
         kept(journal),

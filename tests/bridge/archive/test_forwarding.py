@@ -152,12 +152,9 @@ def test_another_journal_overwrites_nothing(archive: Archive, journal: Path) -> 
     forward(archive, journal, [pin(), *scans(0, 50)])
     before = archive.rows()
     journal.unlink()
-    forward(
-        archive,
-        journal,
-        [pin(), inspection(), *scans(200, 20)],
-        Clock(NOW + DAY, NOW + DAY, is_simulated=False),
-    )
+    # It stays the same one if nothing is in it yet.
+    for rows in ([], [], [pin(), inspection(), *scans(200, 20)]):
+        forward(archive, journal, rows, Clock(NOW + DAY, NOW + DAY, is_simulated=False))
     after = archive.rows()
     for table in TABLES:
         assert [row for row in before[table] if row not in after[table]] == [], table

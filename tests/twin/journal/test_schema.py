@@ -29,18 +29,6 @@ def path(tmp_path: Path) -> Path:
     return made
 
 
-def test_an_index_missing_in_earlier_releases_is_created(path: Path) -> None:
-    indexes = "SELECT name FROM sqlite_schema WHERE type = 'index' AND sql != '' ORDER BY name"
-    with closing(open_writer(path)) as connection:
-        whole = connection.execute(indexes).fetchall()
-        connection.execute("DROP INDEX scan_bare")
-    assert find_damage(path) is None
-    with closing(open_reader(path)) as connection:
-        assert connection.execute("SELECT count(*) FROM scan").fetchone() == (0,)
-    with closing(open_writer(path)) as connection:
-        assert connection.execute(indexes).fetchall() == whole
-
-
 def test_a_foreign_database_is_reported_and_left_alone(tmp_path: Path) -> None:
     foreign = tmp_path / "theirs.sqlite"
     connection = sqlite3.connect(foreign)

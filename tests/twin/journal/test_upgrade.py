@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -21,7 +22,7 @@ from lupin_twin.journal.rebuild import old_version, upgrade
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import TABLES, get_meta, open_reader
 from lupin_twin.journal.writer import Journal
-from tests.support.journal import LIMITS
+from tests.support.journal import LIMITS, wait_state
 from tests.support.journal_answers import NAMES, answer, answers, old, same
 from tests.support.waiting import wait_for
 from tests.twin.journal.conftest import fail_on_a_full_disk
@@ -228,6 +229,22 @@ def test_a_disk_that_fills_leaves_the_old_file_unchanged(name: str, tmp_path: Pa
     assert names_in(tmp_path) == {"j.sqlite"}
 
 
+def test_without_room_for_the_new_file_the_upgrade_is_refused_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = old("day", tmp_path)
+    with monkeypatch.context() as full:
+        full.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=20_000))
+        with started(path) as journal:
+            needs = "its upgrade needs 0.1 MB of disk, 0.0 MB are free"
+            condition = wait_state(journal, JournalState.FAILING, needs)
+            assert condition.file_bytes == 0
+            assert names_in(tmp_path) == {"j.sqlite", "j.sqlite.lock"}
+            full.undo()
+            wait_state(journal, JournalState.RECORDING)
+    check_states(path, "day")
+
+
 def test_without_links_and_room_for_a_copy_nothing_is_left_behind(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -276,16 +293,23 @@ def test_it_waits_for_readers_of_the_file(tmp_path: Path) -> None:
     ("name", "damage"),
     [
         ("day", "DROP TABLE run"),
-        (VERSION4, "UPDATE hour SET n = '[1'"),
+        (VERSION4, "UPDATE hour SET n = '[1' WHERE hour = (SELECT max(hour) FROM hour)"),
     ],
 )
 def test_a_file_that_cannot_be_upgraded_is_quarantined(
     name: str, damage: str, tmp_path: Path
 ) -> None:
     path = old(name, tmp_path)
+    # Of deleted scans, the hours are all that is left.
+    hours = "SELECT DISTINCT hour FROM hour WHERE hour < 489948 ORDER BY hour"
+    left = []
     with closing(sqlite3.connect(path)) as connection, connection:
+        if name == VERSION4:
+            left = connection.execute(hours).fetchall()
         connection.execute(damage)
     with started(path) as journal:
         wait_for(lambda: journal.condition.state is JournalState.RECORDING, "recording", 30.0)
         assert "j.sqlite.damaged-" in journal.condition.quarantined
     assert old_version(path) is None
+    with closing(open_reader(path)) as connection:
+        assert connection.execute(hours).fetchall() == left

@@ -13,6 +13,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Final
 
+from lupin_twin.journal.counts import extent
 from lupin_twin.journal.rows import sensor_names
 from lupin_twin.journal.runs import Run, runs
 from lupin_twin.journal.schema import (
@@ -20,6 +21,7 @@ from lupin_twin.journal.schema import (
     LOCAL_SITE,
     Empty,
     Foreign,
+    SiteLog,
     is_damage_error,
     open_reader,
 )
@@ -141,7 +143,7 @@ def delete_wrong(connection: sqlite3.Connection, table: str, after: int, until: 
 
 _COUNTED: Final = ("scan", "look", "place", "hour")
 
-# A run, and its first and last stamp in ns of ROS time; None if nothing is left of it.
+# A run, and the stamps of its first and last attempts, deleted ones included; None: it has none.
 RunExtent = tuple[Run, int | None, int | None]
 
 
@@ -179,25 +181,11 @@ def sensors_of(connection: sqlite3.Connection) -> list[str]:
     return sorted(names)
 
 
-# One step in the index for each series; an extent over all rows would read all of them.
-_EXTENTS: Final = (
-    "SELECT run, min(least), max(most) FROM ("
-    "SELECT run, (SELECT min(stamp_ns) FROM scan WHERE site = s.site AND series = s.series"
-    " AND is_copy = 0) AS least, (SELECT max(stamp_ns) FROM scan WHERE site = s.site"
-    " AND series = s.series AND is_copy = 0) AS most FROM series AS s UNION ALL"
-    " SELECT run, min(stamp_ns), max(stamp_ns) FROM look WHERE is_copy = 0 GROUP BY run"
-    ") GROUP BY run"
-)
-
-
 def extents(connection: sqlite3.Connection) -> list[RunExtent]:
-    """The runs of the clock with their first and last stamps, in the order in which they began."""
-    found = {run: ends for run, *ends in connection.execute(_EXTENTS)}
-    return [
-        (run, *found.get(run.id, (None, None)))
-        for run in runs(connection.execute)
-        if run.joins is None
-    ]
+    """The runs of the clock in order, with their first and last attempts."""
+    log = SiteLog(connection)
+    every = [run for run in runs(log.execute) if run.joins is None]
+    return [(run, *(extent(log, run.id) or (None, None))) for run in every]
 
 
 def size_of(path: Path) -> int:

@@ -30,12 +30,11 @@ from lupin_twin.journal.retention import (
     shrink_step,
     unmet_limit,
 )
-from lupin_twin.journal.rows import last_rows
+from lupin_twin.journal.rows import LATCHED, last_rows
 from lupin_twin.journal.runs import CORRECTION_NS, Clock, Run, put_run, runs, simulation_goes_on
 from lupin_twin.journal.salvage import SALVAGE, begun_quarantine, quarantine, salvage
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
-    LOCAL_SITE,
     MAP,
     ORIGIN,
     SiteLog,
@@ -54,14 +53,6 @@ _PURGE_EVERY_S: Final = 60.0
 _POLL_EVERY_S: Final = 1.0
 # Least time between two maps that are written: a robot that explores sends one every second.
 _MAP_REST_S: Final = 10.0
-
-_LAST_SCANS: Final = (
-    "SELECT stamp_ns, arrival_ns FROM scan JOIN series ON series.site = scan.site"
-    " AND series.series = scan.series WHERE scan.site = ? AND run = ? ORDER BY seq DESC LIMIT 100"
-)
-_LAST_INSPECTIONS: Final = (
-    "SELECT stamp_ns, arrival_ns FROM look WHERE site = ? AND run = ? ORDER BY seq DESC LIMIT 100"
-)
 
 # Errors that are caused by a single row, which is then refused.
 _ROW_ERRORS: Final = (
@@ -193,7 +184,7 @@ class JournalFile:
     def _restored(self, run: Run) -> Restored:
         known = fold(self._connection, run.root, FOREVER_NS, run.begun_seq)
         begun = next(r for r in self._runs() if r.id == run.root)
-        rows = last_rows(self._connection, begun)
+        rows = last_rows(self._connection, begun, LATCHED)
         return Restored(run, known, tuple(rows), self._appender.last_seq)
 
     def begin(
@@ -258,10 +249,10 @@ class JournalFile:
         """The clock at the last write of a run."""
         last = run.begun
         # The latest stamp is among the last rows, because only latched ones are out of order.
-        for text in (_LAST_SCANS, _LAST_INSPECTIONS):
-            for stamp_ns, arrival_ns in self._connection.execute(text, (LOCAL_SITE, run.id)):
-                if stamp_ns > last.stamp_ns:
-                    last = Clock(stamp_ns, max(arrival_ns, last.arrival_ns), last.is_simulated)
+        for row in reversed(last_rows(self._connection, run, most=100)):
+            if row.stamp_ns > last.stamp_ns:
+                arrival_ns = max(row.arrival_ns, last.arrival_ns)
+                last = Clock(row.stamp_ns, arrival_ns, last.is_simulated)
         return last
 
     def _go_on_with(self, run: int) -> None:

@@ -31,9 +31,9 @@ from lupin_twin.journal.retention import (
     delete_recorded,
     delete_up_to,
     kept,
-    outermost,
     records,
 )
+from lupin_twin.journal.rows import last_row
 from lupin_twin.journal.runs import world_of
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
@@ -158,7 +158,7 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
     found += [("meta", row) for row in _all(log, "meta") if row[1].startswith(_FACTS)]
     found.append(("meta", ("", _UP_TO, _up_to(connection, after))))
     if after == 0:
-        begun = max(_newest(connection)[0], _gone_seq(connection))
+        begun = max(last_row(log)[0], _gone_seq(connection))
         found.append(("meta", ("", _BEGUN, str(begun))))
     texts = (
         json.dumps([table, *row[1:]], separators=(",", ":"), ensure_ascii=False)
@@ -238,7 +238,7 @@ def write(path: Path, lot: Lot, complete_ns: int | None, behind: int = 0) -> Fol
                 raise DamagedFile("rows that it does not have yet were deleted in the journal")
             set_meta(connection, _FOLLOWED, max(lot.last, last))
             if not lot.is_all or complete_ns is None:
-                complete_ns = _newest(connection)[1]
+                complete_ns = last_row(SiteLog(connection))[1]
             if complete_ns:
                 set_meta(connection, _COMPLETE, complete_ns)
         connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
@@ -266,7 +266,7 @@ def _followed(connection: sqlite3.Connection) -> Followed:
         log.journal_id,
         _last(connection),
         world_of(log),
-        int(log.meta(_COMPLETE) or 0) or _newest(connection)[1],
+        int(log.meta(_COMPLETE) or 0) or last_row(log)[1],
         kept(connection),
         simulated(connection),
     )
@@ -274,11 +274,6 @@ def _followed(connection: sqlite3.Connection) -> Followed:
 
 def _last(connection: sqlite3.Connection) -> int:
     return int(get_meta(connection, _FOLLOWED) or 0)
-
-
-def _newest(connection: sqlite3.Connection, upto: int = FOREVER_NS) -> tuple[int, int, int]:
-    """Number, stamp and arrival of the last row up to a number; all 0 if there is none."""
-    return max(outermost(connection, "DESC", upto), default=(0, 0, 0))
 
 
 # --- reading a journal ----------------------------------------------------------------------------
@@ -301,7 +296,7 @@ def _behind(log: SiteLog, table: str, after: int, most: int) -> list[Row]:
 
 def _up_to(connection: sqlite3.Connection, after: int) -> str:
     """A number, and what identifies the last row up to it: its own number, and its arrival."""
-    seq, _, arrival_ns = _newest(connection, after)
+    seq, _, arrival_ns = last_row(SiteLog(connection), after)
     return f"{after} {seq} {arrival_ns}"
 
 

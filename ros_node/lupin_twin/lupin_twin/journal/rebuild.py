@@ -8,6 +8,7 @@ file stays beside the new one; one of version 4, as `NAME.v4`.
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import sqlite3
@@ -25,7 +26,7 @@ from lupin_twin.journal.fold import copies
 from lupin_twin.journal.paths import writing_alone
 from lupin_twin.journal.retention import RETENTION_BYTES, RETENTION_NS
 from lupin_twin.journal.runs import Run, put_run, runs
-from lupin_twin.journal.salvage import numbered
+from lupin_twin.journal.salvage import delete, numbered
 from lupin_twin.journal.schema import (
     APPLICATION_ID,
     FILE_ERRORS,
@@ -84,6 +85,11 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
 
     """
     version, new = old_version(path), path.with_name(path.name + ".upgrade")
+    # Refused at once: an upgrade that fills the disk would begin again and again.
+    needed, free = path.stat().st_size * 5 // 4 - size_of(new), shutil.disk_usage(path.parent).free
+    if free < needed:
+        room = f"its upgrade needs {needed / 1e6:,.1f} MB of disk, {free / 1e6:,.1f} MB are free"
+        raise OSError(errno.ENOSPC, room)
     try:
         with closing(sqlite3.connect(path, isolation_level=None, timeout=5.0)) as connection:
             # First move the WAL into the file: otherwise it would be taken for the new file's WAL.
@@ -103,13 +109,12 @@ def upgrade(path: Path, report: Callable[[float], None]) -> str:
         sync(new)
         kept = _keep(path, version)
     except BaseException as error:
-        _remove(new)
+        delete(new)
         if isinstance(error, sqlite3.OperationalError) and str(error).startswith("no such"):
             raise DamagedFile(f"the tables of {path} are not those of a journal") from error
         raise
     # Empty by now, but they belong to the old file. A process that still reads it has them open.
-    for end in ("-wal", "-shm"):
-        path.with_name(path.name + end).unlink(missing_ok=True)
+    delete(path, "-wal", "-shm")
     new.chmod(path.stat().st_mode & 0o777)
     new.replace(path)
     sync(path.parent)
@@ -132,7 +137,7 @@ def _begun(path: Path, new: Path) -> sqlite3.Connection:
         if get_meta(target, _MADE_FROM) == made_from:
             return target
         target.close()
-    _remove(new)
+    delete(new)
     target = open_writer(new)
     set_meta(target, _MADE_FROM, made_from)
     return target
@@ -141,11 +146,6 @@ def _begun(path: Path, new: Path) -> sqlite3.Connection:
 def _copied(target: sqlite3.Connection) -> tuple[int, int]:
     after, _, damaged = (get_meta(target, _COPIED) or "0 0").partition(" ")
     return int(after), int(damaged)
-
-
-def _remove(new: Path) -> None:
-    for end in ("", "-wal", "-shm", "-journal"):
-        new.with_name(new.name + end).unlink(missing_ok=True)
 
 
 def _keep(path: Path, version: int | None) -> Path:
@@ -182,14 +182,14 @@ def _copy_version4(old: Path, new: Path, target: sqlite3.Connection) -> Iterator
         names = [name for name in columns(table, of_key=True) if name != "sensor"]
         key, marks = ", ".join(names), ", ".join("?" * len(names))
         lot = f"(SELECT * FROM old.{table} WHERE ({key}) > ({marks}) ORDER BY {key} LIMIT {ROWS})"
-        insert = f"INSERT INTO {table} SELECT * FROM {lot}"
+        select = f"SELECT * FROM {lot}"
         if table == "hour":
-            insert = HOURS_OF_LISTS.format(lists=lot, each="json_each(n) AS each")
+            select = HOURS_OF_LISTS.format(lists=lot, each="json_each(n) AS each")
         last = f"SELECT {key} FROM {{}} ORDER BY {' DESC, '.join(names)} DESC LIMIT 1"
         after = target.execute(last.format(table)).fetchone() or [""] * len(names)
         while until := target.execute(last.format(lot), after).fetchone():
             with transaction(target):
-                target.execute(insert, after)
+                target.execute(f"INSERT INTO {table} {select}", after)
             after = until
             yield size_of(new) / size_of(old)
 

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from lupin_twin.core.past import DAY_NS, FOREVER_NS, HOUR_NS
+from lupin_twin.core.past import DAY_NS, HOUR_NS
 from lupin_twin.journal.appending import LAST_SEQ, PURGED_SEQ, Appender
 from lupin_twin.journal.counts import DELETED, FORGOTTEN, deleted_ns, extent
 from lupin_twin.journal.paths import writing_alone
+from lupin_twin.journal.rows import outermost
 from lupin_twin.journal.runs import runs, spans
 from lupin_twin.journal.schema import (
     LOCAL_SITE,
@@ -100,8 +101,9 @@ def horizon_ns(connection: sqlite3.Connection, limits: Limits, now_ns: int) -> i
     The wall clock may be ahead. So the last arrival limits it, and one round, each minute, deletes
     an hour of data at most. A wrong clock that is soon corrected costs little.
     """
-    first = min((row[2] for row in outermost(connection, "ASC")), default=now_ns)
-    last = max((row[2] for row in outermost(connection, "DESC")), default=now_ns)
+    log = SiteLog(connection)
+    first = min((row[2] for row in outermost(log, "ASC")), default=now_ns)
+    last = max((row[2] for row in outermost(log, "DESC")), default=now_ns)
     return min(min(now_ns, last) - int(limits.days * DAY_NS), first + HOUR_NS)
 
 
@@ -150,27 +152,9 @@ def unmet_limit(connection: sqlite3.Connection, limits: Limits, before_ns: int) 
     """Which limit is exceeded although nothing more can be deleted, in words; empty if none."""
     if used_bytes(connection) > limits.max_bytes:
         return "no scans are kept: the hours, which are never deleted, exceed journal_max_mb"
-    if any(row[2] < before_ns for row in outermost(connection, "ASC")):
+    if any(row[2] < before_ns for row in outermost(SiteLog(connection), "ASC")):
         return "what is older than journal_days is kept until it is forwarded"
     return ""
-
-
-def outermost(
-    connection: sqlite3.Connection, way: str, upto: int = FOREVER_NS
-) -> list[tuple[int, int, int]]:
-    """Number, stamp and arrival of the first (ASC) or last (DESC) scan and inspection.
-
-    Only those numbered up to `upto` count.
-    """
-    return [
-        row
-        for table in WRITTEN
-        for row in connection.execute(
-            f"SELECT seq, stamp_ns, arrival_ns FROM {table} WHERE site = ? AND seq <= ?"  # noqa: S608
-            f" ORDER BY seq {way} LIMIT 1",
-            (LOCAL_SITE, upto),
-        )
-    ]
 
 
 def _write_horizons(connection: sqlite3.Connection, last: int) -> None:

@@ -1,3 +1,4 @@
+# ruff: noqa: S608  # SQL is put together of constants
 """Reads scans and inspections from the journal's tables, and parses the JSON in them."""
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from lupin_twin.core.history import KIND_FLOWER, LatestRequest
 from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import STATUS_OK, Bloom, Flower, Inspection, Reading, Scan, Write
 from lupin_twin.journal.runs import Run, runs, span_at
-from lupin_twin.journal.schema import LOCAL_SITE, DamagedFile
+from lupin_twin.journal.schema import LOCAL_SITE, WRITTEN, DamagedFile, SiteLog
 
 
 def weight(write: Write) -> int:
@@ -28,12 +29,12 @@ def weight(write: Write) -> int:
 
 _OF_RUN: Final = "r.site = :site AND r.run = :run"
 # More than all publishers of a robot latch.
-_LAST: Final = 1_000
+LATCHED: Final = 1_000
 
 
-def last_rows(connection: sqlite3.Connection, run: Run) -> list[Scan | Inspection]:
+def last_rows(connection: sqlite3.Connection, run: Run, most: int) -> list[Scan | Inspection]:
     """The last scans and inspections that were received in a run, in that order."""
-    query = {"site": LOCAL_SITE, "run": run.id, "since": run.begun_seq, "most": _LAST}
+    query = {"site": LOCAL_SITE, "run": run.id, "since": run.begun_seq, "most": most}
     last = " AND r.seq >= :since ORDER BY r.seq DESC LIMIT :most"
     found = _rows(
         connection,
@@ -42,7 +43,27 @@ def last_rows(connection: sqlite3.Connection, run: Run) -> list[Scan | Inspectio
         f"look AS r WHERE {_OF_RUN}{last}",
         query,
     )
-    return [row for _, row in sorted(found, key=lambda entry: entry[0])[-_LAST:]]
+    return [row for _, row in sorted(found, key=lambda entry: entry[0])[-most:]]
+
+
+def outermost(
+    log: SiteLog, way: str, upto: int = FOREVER_NS, tables: Sequence[str] = WRITTEN
+) -> list[tuple[int, int, int]]:
+    """Number, stamp and arrival of each table's first (ASC) or last (DESC) row up to a number."""
+    return [
+        row
+        for table in tables
+        for row in log.execute(
+            f"SELECT seq, stamp_ns, arrival_ns FROM {table} WHERE site = :site AND seq <= :upto"
+            f" ORDER BY seq {way} LIMIT 1",
+            {"upto": upto},
+        ).fetchall()
+    ]
+
+
+def last_row(log: SiteLog, upto: int = FOREVER_NS) -> tuple[int, int, int]:
+    """Number, stamp and arrival of the last write up to a number; all 0 if there is none."""
+    return max(outermost(log, "DESC", upto, (*WRITTEN, "place")), default=(0, 0, 0))
 
 
 def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan | Inspection]:
@@ -60,7 +81,7 @@ def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan 
     found = _inspections(
         connection, f"look AS r WHERE {_OF_RUN} AND r.tag = :tag{newest}", parameters
     )
-    of_tag = f"SELECT series FROM series AS s WHERE {of_tag}"  # noqa: S608
+    of_tag = f"SELECT series FROM series AS s WHERE {of_tag}"
     for (number,) in connection.execute(of_tag, parameters).fetchall():
         found += _scans(
             connection,
@@ -102,7 +123,7 @@ def _scans(
 ) -> list[tuple[int, Scan | Inspection]]:
     found: list[tuple[int, Scan | Inspection]] = []
     rows = connection.execute(
-        "SELECT seq, tag, kind, sensors, readings, stamp_ns, own_stamp_ns, arrival_ns, status,"  # noqa: S608
+        "SELECT seq, tag, kind, sensors, readings, stamp_ns, own_stamp_ns, arrival_ns, status,"
         f" source, mission, detail FROM {joined}",
         query,
     ).fetchall()
@@ -125,7 +146,7 @@ def _inspections(
 ) -> list[tuple[int, Scan | Inspection]]:
     found: list[tuple[int, Scan | Inspection]] = []
     for seq, tag, stamp_ns, own_ns, arrival_ns, source, mission, *flower in connection.execute(
-        "SELECT seq, r.tag, stamp_ns, own_stamp_ns, arrival_ns, source, mission, species,"  # noqa: S608
+        "SELECT seq, r.tag, stamp_ns, own_stamp_ns, arrival_ns, source, mission, species,"
         f" confidence, anomaly, flower_count, bug_count, blooms, box FROM {joined}",
         query,
     ).fetchall():

@@ -25,6 +25,7 @@ from lupin_twin.journal.checking import delete_wrong
 from lupin_twin.journal.counts import DELETED, count_rows
 from lupin_twin.journal.schema import (
     FILE_ERRORS,
+    HOURS_OF_LISTS,
     LOCAL_SITE,
     PAGE_SIZE,
     TABLES,
@@ -73,6 +74,7 @@ _COUNTED: Final = {
     "tally": ("run", f"hour <= :at / {HOUR_NS}"),
     "event": ("run", "stamp_ns <= :at"),
 }
+_HAS_SENSOR: Final = "SELECT 1 FROM pragma_table_info('hour') WHERE name = 'sensor'"
 _NOT_DELETED: Final = (
     (
         "DELETE FROM hour WHERE series IN (SELECT series FROM series WHERE run = :run)"
@@ -99,7 +101,7 @@ def quarantine(path: Path) -> Path:
     """
     new, name = _new_of(path), begun_quarantine(path)
     if not name:
-        _delete(new)
+        delete(new)
         # Wall time, for the person who looks for the file.
         when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
         free = (file for file in numbered(path, f".damaged-{when}") if not file.exists())
@@ -114,7 +116,7 @@ def quarantine(path: Path) -> Path:
             old.rename(its)
     # SQLite rebuilds the WAL's index from the WAL; one left behind would be of another file. So
     # would be an empty WAL, which a reader makes if it finds none.
-    _delete(path, "-wal", "-shm")
+    delete(path, "-wal", "-shm")
     new.rename(path)
     return quarantined
 
@@ -134,7 +136,8 @@ def _new_of(path: Path) -> Path:
     return path.with_name(path.name + ".new")
 
 
-def _delete(path: Path, *ends: str) -> None:
+def delete(path: Path, *ends: str) -> None:
+    """Delete a file and those of SQLite beside it, or only those with these endings."""
     for end in ends or ("", "-journal", "-wal", "-shm"):
         path.with_name(path.name + end).unlink(missing_ok=True)
 
@@ -219,8 +222,8 @@ def salvage(quarantined: Path, connection: sqlite3.Connection) -> None:
             with closing(_opened(mended)) as old:
                 _copy(old, connection, quarantined.stat().st_size)
     finally:
-        _delete(quarantined, "-shm")
-        _delete(mended)
+        delete(quarantined, "-shm")
+        delete(mended)
 
 
 def _is_unreadable(error: Exception) -> bool:
@@ -270,10 +273,7 @@ def _copy(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> None:
             _put(new, table, _both_ends(old, _ALL.format(table), by))
         _put(new, "series", _both_ends(old, _SERIES_OF, "run"))
         if purged:
-            for table, (by, which) in _COUNTED.items():
-                within = {"at": max(purged.values())}
-                select = f"{_ALL.format(table)} AND {which}"
-                _put(new, table, _both_ends(old, select, by, within))
+            _copy_counts(old, new, max(purged.values()))
         for table, is_meaningless in _MEANINGLESS.items():
             new.execute(f"DELETE FROM {table} WHERE {is_meaningless}")
         for (run,) in new.execute("SELECT run FROM run").fetchall():
@@ -291,6 +291,16 @@ def _copy(old: sqlite3.Connection, new: sqlite3.Connection, size: int) -> None:
             behind = last
             # Move each lot into the file, so that the WAL does not grow.
             new.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
+
+
+def _copy_counts(old: sqlite3.Connection, new: sqlite3.Connection, at_ns: int) -> None:
+    """Copy the counts up to a stamp."""
+    for table, (by, which) in _COUNTED.items():
+        select = _ALL.format(table)
+        if table == "hour" and not old.execute(_HAS_SENSOR).fetchone():  # of version 4
+            of_lists = HOURS_OF_LISTS.format(lists=table, each="json_each(n) AS each")
+            select = f"{of_lists} AND site = 'local'"
+        _put(new, table, _both_ends(old, f"{select} AND {which}", by, {"at": at_ns}))
 
 
 def _both_ends(

@@ -129,7 +129,7 @@ POSTGRESQL_HOUR: Final = _HOUR.format(key="")
 # Up to version 4, an hour had a JSON list in each column, with an element for each sensor. {lists}
 # is that table, {each} has the `key` of each element.
 HOURS_OF_LISTS: Final = (
-    "INSERT INTO hour SELECT site, series, hour, each.key, CAST(n ->> each.key AS BIGINT),"
+    "SELECT site, series, hour, each.key, CAST(n ->> each.key AS BIGINT),"
     " CAST(total ->> each.key AS DOUBLE PRECISION), CAST(low ->> each.key AS DOUBLE PRECISION),"
     " CAST(high ->> each.key AS DOUBLE PRECISION) FROM {lists}, {each}"
     " WHERE CAST(n ->> each.key AS BIGINT) > 0"
@@ -190,8 +190,7 @@ def open_writer(path: Path) -> sqlite3.Connection:
         connection.execute("PRAGMA mmap_size = 0")
         if is_new:
             _create(connection, path)
-        for index in _check_identity(connection, path):
-            connection.execute(index.decode())
+        _check_identity(connection, path)
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = NORMAL")
         connection.execute("PRAGMA wal_autocheckpoint = 0")
@@ -315,8 +314,7 @@ def _starts_as_something_else(path: Path) -> bool:
         return file.read(len(_MAGIC)) not in {b"", _MAGIC}
 
 
-def _check_identity(connection: sqlite3.Connection, path: Path) -> frozenset[bytes]:
-    """Check that a file is a journal; returns the SQL of indexes that an earlier release lacks."""
+def _check_identity(connection: sqlite3.Connection, path: Path) -> None:
     # Checked first: a new file gets all of its content at once.
     if connection.execute("PRAGMA page_count").fetchone() == (0,):
         raise Empty(f"{path} is empty: a journal that is just being created, or none")
@@ -333,11 +331,8 @@ def _check_identity(connection: sqlite3.Connection, path: Path) -> frozenset[byt
         raise Foreign(
             f"{path} is a journal of version {version}, this is version {VERSION}: {what}"
         )
-    found = {sql for (sql,) in connection.execute(_SCHEMA)}
-    lacking = _own_tables() - found
-    if found - _own_tables() or any(sql.startswith(b"CREATE TABLE") for sql in lacking):
+    if {sql for (sql,) in connection.execute(_SCHEMA)} != _own_tables():
         raise DamagedFile(f"the tables of {path} are not those of a journal")
-    return lacking
 
 
 # Tables and indexes, word for word: no other check sees a flipped letter in them.

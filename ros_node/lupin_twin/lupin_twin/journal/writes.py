@@ -37,14 +37,13 @@ from lupin_twin.core.past import (
 from lupin_twin.core.state import STATUS_OK, sure_species
 from lupin_twin.journal.counts import deleted_ns
 from lupin_twin.journal.queries import FROM_SCAN
-from lupin_twin.journal.rows import named_numbers, sensor_names
+from lupin_twin.journal.rows import last_row, named_numbers, sensor_names
 from lupin_twin.journal.runs import Run, Span, cut, runs, span_at, spans
-from lupin_twin.journal.schema import WRITTEN, SiteLog, one_view
+from lupin_twin.journal.schema import SiteLog, one_view
 
 # Approximate cost of a full answer of writes, s.
 WRITES_S: Final = 0.05
 
-_NEWEST: Final = "SELECT max(seq) FROM {} WHERE site = :site"
 _ARRIVAL: Final = (
     "SELECT seq, arrival_ns FROM scan WHERE site = :site AND seq > :after ORDER BY seq LIMIT 1"
 )
@@ -137,8 +136,8 @@ def scans(connection: Any, request: ScansRequest) -> tuple[PastWrite, ...]:
 def writes(connection: Any, request: WritesRequest) -> PastWrites:
     """Return the next writes, without copies."""
     log = SiteLog(connection)
-    newest = max(log.execute(_NEWEST.format(table)).fetchone()[0] or 0 for table in WRITTEN)
-    after = request.after or _beginning(log, request, newest)
+    newest_seq = last_row(log)[0]
+    after = request.after or _beginning(log, request, newest_seq)
     query = {"after": after, "count": request.max_count}
     scans = log.execute(_SCANS, query).fetchall()
     inspections = log.execute(_INSPECTIONS, query).fetchall()
@@ -147,7 +146,7 @@ def writes(connection: Any, request: WritesRequest) -> PastWrites:
     )
     is_all = len(found) < request.max_count
     found = found[: request.max_count]
-    last = max(newest, after) if is_all else found[-1].number
+    last = max(newest_seq, after) if is_all else found[-1].number
     axis = _axis(spans(runs(log.execute)))
     return PastWrites(log.journal_id, axis, tuple(found), last, is_all)
 
@@ -156,11 +155,9 @@ def _axis(found: Iterable[Span]) -> tuple[RunSpan, ...]:
     return tuple(RunSpan(span.run.id, span.start_ns, span.end_ns) for span in found)
 
 
-def _beginning(log: SiteLog, request: WritesRequest, newest: int) -> int:
+def _beginning(log: SiteLog, request: WritesRequest, high: int) -> int:
     """The number before the first requested write; bisects, as arrivals ascend with numbers."""
-    low, high = 0, newest
-    if request.reach_count:
-        low = max(0, newest - request.reach_count)
+    low = max(0, high - request.reach_count) if request.reach_count else 0
     if not request.reach_s:
         return low
     since_ns = time.time_ns() - int(request.reach_s * 1e9)

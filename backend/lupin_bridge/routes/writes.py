@@ -43,7 +43,7 @@ from lupin_bridge.routes.answers import (
     taking,
 )
 from lupin_bridge.routes.pages import language_of
-from lupin_bridge.serving.admission import AdmissionError, Answer, ClientLimitError, RateLimit
+from lupin_bridge.serving.admission import AdmissionError, Answer
 from lupin_bridge.stream import routes_schema
 from lupin_bridge.stream.state_json import note_json, stamp
 from lupin_twin.core.notes import COMMENT, SHELF_S, SHELVE, WITHDRAW, WITHDRAWN, Note, withdrawals
@@ -231,20 +231,8 @@ def _until(draft: routes_schema.NoteDraft, now_ns: int, *, is_critical: bool) ->
     return min(until_ns, now_ns + longest_s * NANOSECONDS_PER_SECOND)
 
 
-def _paced(pace: RateLimit, name: str, most: str) -> None:
-    """Refuse what comes too fast from one name.
-
-    Raises:
-        ClientLimitError: it has written too much.
-
-    """
-    wait_s = pace.take(name, time.monotonic())
-    if wait_s > 0.0:
-        raise ClientLimitError(f"{name} has {most}", wait_s)
-
-
 async def _write(request: Request, bridge: Bridge, note: Note) -> Note:
-    _paced(bridge.notes.pace, note.by, _TOO_MANY_NOTES)
+    bridge.notes.pace.charge(note.by, time.monotonic(), _TOO_MANY_NOTES)
     access: Access = request.app.state.access
     written = await bridge.source.write_note(note)
     # It is in the log: no failure from here on may report that it is not.
@@ -319,7 +307,7 @@ async def post_observation(request: Request) -> Response:
         )
     limits = bridge.limits
     most = f"{limits.observation_burst} observations and {limits.observations_per_s:g} a second"
-    _paced(bridge.observations_pace, person.name, f"posted more than {most}")
+    bridge.observations_pace.charge(person.name, time.monotonic(), f"posted more than {most}")
     draft = await read_body(request, routes_schema.ObservationDraft)
     now_ns = bridge.ros_time_ns
     if now_ns is None or not bridge.status.is_live:
@@ -394,7 +382,7 @@ async def subscribe(request: Request) -> Response:
         raise Refused("this bridge has no Web Push: start it with --push-contact", 404)
     if person is None or not _has_account(request, person):
         raise Refused("notifications require an account: sign in by name", 403)
-    _paced(bridge_of(request).notes.pace, person.name, _TOO_MANY_NOTES)
+    bridge_of(request).notes.pace.charge(person.name, time.monotonic(), _TOO_MANY_NOTES)
     given = await read_body(request, routes_schema.PushSubscription)
     if given.keys is None:
         await access.people.write(lambda it, _: it.remove_device(given.endpoint, person.name))

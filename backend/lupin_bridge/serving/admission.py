@@ -59,6 +59,16 @@ class RateLimit:
                 self._full_at_s.popitem(last=False)
         return wait
 
+    def charge(self, name: str, now_s: float, most: str) -> None:
+        """Take a turn of a name.
+
+        Raises:
+            ClientLimitError: there is none; the name has `most`.
+
+        """
+        if (wait_s := self.take(name, now_s)) > 0.0:
+            raise ClientLimitError(f"{name} has {most}", wait_s)
+
 
 # --- what clients may cost ------------------------------------------------------------------------
 

@@ -39,9 +39,6 @@ class RateLimit:
         self._max_keys = max_keys
         self._full_at_s: OrderedDict[Hashable, float] = OrderedDict()
 
-    def __len__(self) -> int:
-        return len(self._full_at_s)
-
     def wait_s(self, key: Hashable, now_s: float, count: int = 1) -> float:
         """How long until the key may take `count` turns, s; 0: now."""
         full_at = max(self._full_at_s.get(key, now_s), now_s) + (count - 1) * self._interval_s
@@ -60,12 +57,7 @@ class RateLimit:
         return wait
 
     def charge(self, name: str, now_s: float, most: str) -> None:
-        """Take a turn of a name.
-
-        Raises:
-            ClientLimitError: there is none; the name has `most`.
-
-        """
+        """Take a turn; raises `ClientLimitError` if there is none: the name has `most`."""
         if (wait_s := self.take(name, now_s)) > 0.0:
             raise ClientLimitError(f"{name} has {most}", wait_s)
 

@@ -171,7 +171,8 @@ def test_signing_in_for_ever_does_not_push_others_out_of_the_audit_trail(
     with httpx.Client(base_url=live.url, timeout=PATIENCE_S) as browser:
         assert {sign_in(browser, "eve").status_code for _ in range(10)} == {204}
         refused = sign_in(browser, "eve")
-        assert (refused.status_code, "eve has signed in more than 10 times" in refused.text) == (429, True)
+        assert refused.status_code == 429
+        assert "eve has signed in more than 10 times" in refused.text
         assert sign_in(browser, "bob").status_code == 204, "from the same address"
 
 

@@ -78,7 +78,7 @@ def test_the_page_hides_no_route(static: Path) -> None:
         "//etc/passwd",
         "/%2fetc%2fpasswd",
         "/assets/a.js%00.txt",
-        "/" + "x/" * 2_000,
+        "/" + "x/" * 60,
     ],
 )
 def test_nothing_outside_the_folder_is_served(static: Path, path: str) -> None:

@@ -40,9 +40,11 @@ ResultT = TypeVar("ResultT")
 MAX_WAITING: Final = 8
 
 
-# Failed sign-ins of an address at once, and per minute after that.
+# Failed sign-ins of an address at once, and per minute after that; and successful ones of a name:
+# each is in the audit trail, which would soon hold nothing else.
 ATTEMPT_BURST: Final = 10
 ATTEMPTS_PER_MINUTE: Final = 10
+_MOST: Final = f"more than {ATTEMPT_BURST} times and {ATTEMPTS_PER_MINUTE} a minute"
 
 
 class People:
@@ -64,6 +66,7 @@ class People:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="accounts")
         self._waiting = 0
         self._attempts = RateLimit(ATTEMPTS_PER_MINUTE / 60.0, ATTEMPT_BURST)
+        self._sign_ins = RateLimit(ATTEMPTS_PER_MINUTE / 60.0, ATTEMPT_BURST)
 
     @property
     def is_on(self) -> bool:
@@ -161,8 +164,7 @@ class People:
         wait_s = self._attempts.wait_s(address, time.monotonic())
         if wait_s > 0.0:
             raise ClientLimitError(
-                f"{address} has failed to sign in more than {ATTEMPT_BURST} times and "
-                f"{ATTEMPTS_PER_MINUTE} a minute: try again in {math.ceil(wait_s)} s",
+                f"{address} has failed to sign in {_MOST}: try again in {math.ceil(wait_s)} s",
                 wait_s,
             )
         try:
@@ -191,11 +193,13 @@ class People:
         None: the account was removed while its password was checked, or has another one now.
 
         Raises:
-            ClientLimitError, AccountError: see `write`.
+            ClientLimitError: the name signs in too often, or see `write`.
+            AccountError: see `write`.
 
         """
         if self.shared is not None and person.by == "shared token":
             return self.shared.cookie_name, self.shared.cookie(time.time()), SHARED_SESSION_S
+        self._sign_ins.charge(person.name, time.monotonic(), f"signed in {_MOST}")
         cookie = await self.write(
             lambda it, now_s: it.begin_session(person, address, now_s, ends_others=ends_others)
         )

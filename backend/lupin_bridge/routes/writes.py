@@ -10,7 +10,6 @@ import logging
 import math
 import time
 from contextlib import suppress
-from functools import partial
 from itertools import islice
 from typing import Final
 
@@ -43,7 +42,7 @@ from lupin_bridge.routes.answers import (
     taking,
 )
 from lupin_bridge.routes.pages import language_of
-from lupin_bridge.serving.admission import AdmissionError, Answer, ClientLimitError, RateLimit
+from lupin_bridge.serving.admission import AdmissionError, Answer
 from lupin_bridge.stream import routes_schema
 from lupin_bridge.stream.state_json import note_json, stamp
 from lupin_twin.core.notes import COMMENT, SHELF_S, SHELVE, WITHDRAW, WITHDRAWN, Note, withdrawals
@@ -55,9 +54,6 @@ log = logging.getLogger(__name__)
 router = APIRouter(default_response_class=Response)
 
 MAX_LISTED: Final = 2_000
-# Worst-case time to list the notes, s.
-_LIST_S: Final = 0.02
-MAX_AUDITED: Final = 2_000
 _TOO_MANY_NOTES: Final = f"written more than {NOTE_BURST} notes and {NOTES_PER_MINUTE} a minute"
 # Longest time for which a critical alarm may be shelved; any other one: `SHELF_S`.
 CRITICAL_SHELF_S: Final = 3_600
@@ -104,8 +100,8 @@ async def notes_route(request: Request) -> Response:
         return orjson.dumps({"notes": list(islice(found, MAX_LISTED))})
 
     async def compute() -> Answer:
-        write = partial(body, await _known(bridge))
-        return await computed(request, key, write, "application/json", cost_s=_LIST_S)
+        notes = await _known(bridge)
+        return await computed(request, key, lambda: body(notes), "application/json")
 
     return await respond(request, key, compute)
 
@@ -231,20 +227,8 @@ def _until(draft: routes_schema.NoteDraft, now_ns: int, *, is_critical: bool) ->
     return min(until_ns, now_ns + longest_s * NANOSECONDS_PER_SECOND)
 
 
-def _paced(pace: RateLimit, name: str, most: str) -> None:
-    """Refuse what comes too fast from one name.
-
-    Raises:
-        ClientLimitError: it has written too much.
-
-    """
-    wait_s = pace.take(name, time.monotonic())
-    if wait_s > 0.0:
-        raise ClientLimitError(f"{name} has {most}", wait_s)
-
-
 async def _write(request: Request, bridge: Bridge, note: Note) -> Note:
-    _paced(bridge.notes.pace, note.by, _TOO_MANY_NOTES)
+    bridge.notes.pace.charge(note.by, time.monotonic(), _TOO_MANY_NOTES)
     access: Access = request.app.state.access
     written = await bridge.source.write_note(note)
     # It is in the log: no failure from here on may report that it is not.
@@ -273,7 +257,7 @@ async def audit_route(request: Request) -> Response:
     access, person = request.app.state.access, person_of(request)
     if person is None or not person.may("admin") or access.people is None:
         raise Refused("the audit trail is for the role admin", 403)
-    found = await access.people.write(lambda it, _: it.audited(MAX_AUDITED))
+    found = await access.people.write(lambda it, _: it.audited(MAX_LISTED))
     return json_response(orjson.dumps({"audit": [row._asdict() for row in found]}))
 
 
@@ -319,7 +303,7 @@ async def post_observation(request: Request) -> Response:
         )
     limits = bridge.limits
     most = f"{limits.observation_burst} observations and {limits.observations_per_s:g} a second"
-    _paced(bridge.observations_pace, person.name, f"posted more than {most}")
+    bridge.observations_pace.charge(person.name, time.monotonic(), f"posted more than {most}")
     draft = await read_body(request, routes_schema.ObservationDraft)
     now_ns = bridge.ros_time_ns
     if now_ns is None or not bridge.status.is_live:
@@ -363,8 +347,9 @@ def _stamp_ns(observed_at: str | float | None, now_ns: int) -> int:
 async def key_route(request: Request) -> Response:
     """Only people with an account get a key, and only if the bridge has `--push-contact`."""
     push, person = bridge_of(request).outward.push, person_of(request)
+    people = request.app.state.access.people
     key = None
-    if push is not None and person is not None and _has_account(request, person):
+    if push is not None and person is not None and people.has_account(person):
         key = await push.public_key()
     return json_response(orjson.dumps({"public_key": key}))
 
@@ -392,9 +377,10 @@ async def subscribe(request: Request) -> Response:
     access: Access = request.app.state.access
     if push is None or access.people is None:
         raise Refused("this bridge has no Web Push: start it with --push-contact", 404)
-    if person is None or not _has_account(request, person):
+    # The devices of a token could not be removed with an account.
+    if person is None or not access.people.has_account(person):
         raise Refused("notifications require an account: sign in by name", 403)
-    _paced(bridge_of(request).notes.pace, person.name, _TOO_MANY_NOTES)
+    bridge_of(request).notes.pace.charge(person.name, time.monotonic(), _TOO_MANY_NOTES)
     given = await read_body(request, routes_schema.PushSubscription)
     if given.keys is None:
         await access.people.write(lambda it, _: it.remove_device(given.endpoint, person.name))
@@ -408,9 +394,3 @@ async def subscribe(request: Request) -> Response:
     address = client_of(request)
     await access.people.write(lambda it, now_s: it.add_device(person.name, device, address, now_s))
     return Response(status_code=204, headers=NEVER_STORE)
-
-
-def _has_account(request: Request, person: Person) -> bool:
-    """Whether it is an account: the devices of a token could not be removed with an account."""
-    people = request.app.state.access.people
-    return people is not None and people.has_account(person)

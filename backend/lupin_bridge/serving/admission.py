@@ -39,9 +39,6 @@ class RateLimit:
         self._max_keys = max_keys
         self._full_at_s: OrderedDict[Hashable, float] = OrderedDict()
 
-    def __len__(self) -> int:
-        return len(self._full_at_s)
-
     def wait_s(self, key: Hashable, now_s: float, count: int = 1) -> float:
         """How long until the key may take `count` turns, s; 0: now."""
         full_at = max(self._full_at_s.get(key, now_s), now_s) + (count - 1) * self._interval_s
@@ -58,6 +55,11 @@ class RateLimit:
             if len(self._full_at_s) > self._max_keys:
                 self._full_at_s.popitem(last=False)
         return wait
+
+    def charge(self, name: str, now_s: float, most: str) -> None:
+        """Take a turn; raises `ClientLimitError` if there is none: the name has `most`."""
+        if (wait_s := self.take(name, now_s)) > 0.0:
+            raise ClientLimitError(f"{name} has {most}", wait_s)
 
 
 # --- what clients may cost ------------------------------------------------------------------------

@@ -163,6 +163,18 @@ def test_a_disconnect_or_a_shutdown_during_a_body_is_no_error(accounts: Path) ->
         assert "ERROR" not in running.process.output
 
 
+def test_signing_in_for_ever_does_not_push_others_out_of_the_audit_trail(
+    live: Bridge, accounts: Path
+) -> None:
+    add(accounts, eve="viewer", bob="viewer")
+    with httpx.Client(base_url=live.url, timeout=PATIENCE_S) as browser:
+        assert {sign_in(browser, "eve").status_code for _ in range(10)} == {204}
+        refused = sign_in(browser, "eve")
+        assert refused.status_code == 429
+        assert "eve has signed in more than 10 times" in refused.text
+        assert sign_in(browser, "bob").status_code == 204, "from the same address"
+
+
 def test_who_is_removed_or_replaced_amid_a_sign_in_gets_no_session(
     live: Bridge, accounts: Path
 ) -> None:

@@ -97,7 +97,7 @@ async def test_a_twins_topics_are_relayed_byte_for_byte(
         def count(node: Any) -> int:
             return len(list(node.subscriptions))
 
-        thread: Any = relay._thread()
+        thread = source.thread
         before = await thread.call(count)
         for each in listening:
             each()

@@ -1,8 +1,10 @@
+import gc
 import math
 import random
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from types import FunctionType
 from unittest.mock import patch
 
 from hypothesis import given, settings
@@ -176,22 +178,51 @@ def test_writes_older_than_the_window_are_counted_and_not_used() -> None:
     assert fold.missed == 2
 
 
+def held(by: object) -> int:
+    """How many objects something holds."""
+    found, waiting = dict[int, object](), [by]
+    while waiting:
+        one = waiting.pop()
+        if id(one) not in found and not isinstance(one, type | FunctionType):
+            found[id(one)] = one
+            waiting += gc.get_referents(one)
+    return len(found)
+
+
 def test_memory_does_not_grow_with_the_days() -> None:
     """One round a day, and a lamp that switches: gaps, pauses and turns without end."""
-    fold = AlarmFold(BY, SPANS[0])
-    for day in range(60):
+    fold, sizes = AlarmFold(BY, SPANS[0]), []
+    for day in range(240):
         for at in (0, 1):
             light, number = (900.0, 0.0)[at], 2 * day + at
             stamp_ns = START + day * DAY_NS + at * MINUTE
             fold.take([PastWrite(number, 1, "a", stamp_ns, SCAN, 0, ("light",), (light,))])
         fold.found(stamp_ns, max(0, stamp_ns - 7 * DAY_NS))
-    (run,) = fold._runs.values()
-    trail = run.tags["a"].trail
-    assert (len(trail.gaps), len(trail.turns)) == (7, 15)
-    assert len([*run.stretches.pauses()]) == 7
-    assert len(run.limits) == 7
-    assert len(run.tags["a"]._log) <= 16
-    assert [run.days.is_day(stamp_ns - at) for at in (0, MINUTE)] == [False, True]
+        if day % 40 == 39:
+            sizes.append(held(fold))
+    assert max(sizes) - min(sizes) < 60, "less than one object for each day"
+
+
+def test_ordered_writes_are_judged_once_and_late_ones_from_a_checkpoint_on() -> None:
+    judged: list[int] = []
+
+    class Counting(Criteria):
+        def day(self, light: bool | None, stamp_ns: int) -> Day:
+            judged.append(stamp_ns)
+            return Day(True, "light")
+
+    fold = AlarmFold(Counting(SENSORS, None, ClockDay(None)), SPANS[0])
+
+    def count(number: int, at_ns: int) -> int:
+        judged.clear()
+        fold.take([PastWrite(number, 1, "a", at_ns, SCAN, 0, ("co2",), (400.0,))])
+        fold.found(at_ns)
+        return len(judged)
+
+    ordered = 5 * tag_log.MARK
+    assert {count(number, START + number * MINUTE) for number in range(ordered)} == {1}
+    assert count(9_999, START + (ordered - 2) * MINUTE + 1) <= tag_log.MARK + 1
+    assert count(9_998, START + 1) == ordered + 2
 
 
 def scans(values: Sequence[float], sensor: str = "temperature", tag: str = "a") -> list[PastWrite]:

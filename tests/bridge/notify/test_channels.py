@@ -1,7 +1,7 @@
 """All channels together: started, notified and stopped with a bridge."""
 
 import asyncio
-from concurrent.futures import ThreadPoolExecutor
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from lupin_twin.core.diagnostics import Origin
 from tests.support.mosquitto import Broker
 from tests.support.receiver import receiver, status
 from tests.support.seen import NOW_NS, SENSORS, Alarms, alarm, seen, tag
-from tests.support.waiting import until
+from tests.support.waiting import PATIENCE_S, until
 
 
 class Greenhouse:
@@ -57,8 +57,8 @@ async def test_a_failing_channel_is_reported_and_the_other_goes_on(tmp_path: Pat
         channels = Channels(Targets.of(settings, Secrets(webhook_secret="s" * 16)))
         channels.start(Greenhouse(), SENSORS)
         # A slow name lookup does not delay the shutdown.
-        pool = asyncio.get_running_loop()._default_executor  # type: ignore[attr-defined]
-        assert type(pool) is not ThreadPoolExecutor
+        loop, name_server = asyncio.get_running_loop(), threading.Event()
+        looking = loop.run_in_executor(None, name_server.wait, PATIENCE_S)
         await until(lambda: channels.status()["mqtt"], "the broker's absence")
         await until(lambda: dict(channels.counts())["lupin_outward_sent"]["webhook"], "a post")
         assert channels.status() == {
@@ -70,4 +70,8 @@ async def test_a_failing_channel_is_reported_and_the_other_goes_on(tmp_path: Pat
         assert counts["lupin_outward_failed"]["mqtt"] >= 1
         assert counts["lupin_outward_waiting"]["mqtt"] == 1
         await channels.stop()
+        await loop.shutdown_default_executor()
+        assert not looking.done()
+        name_server.set()
+        await looking
     assert server.posted[0].json["origin"] == Greenhouse.origin

@@ -1,3 +1,4 @@
+import math
 from datetime import UTC, datetime, time, timedelta, timezone
 
 import pytest
@@ -16,22 +17,14 @@ def light_of(*readings_lx: float) -> bool | None:
     return light.is_day
 
 
-def test_light_readings_take_precedence_over_the_clock() -> None:
+def test_the_majority_of_the_working_light_sensors_takes_precedence_over_the_clock() -> None:
     assert judge_day(light_of(900.0, 800.0), CLOCK, MIDNIGHT_S) == Day(True, "light")
     assert judge_day(light_of(0.0, 0.0), CLOCK, NOON_S) == Day(False, "light")
-
-
-def test_the_majority_of_the_sensors_decides() -> None:
     assert judge_day(light_of(0.0, 900.0, 900.0), None, None).is_day
     assert not judge_day(light_of(0.0, 0.0, 900.0), None, None).is_day
-
-
-def test_a_broken_sensor_does_not_decide() -> None:
-    assert judge_day(light_of(float("nan"), float("inf"), 900.0), None, None) == Day(True, "light")
-    assert judge_day(light_of(float("nan")), CLOCK, MIDNIGHT_S) == Day(False, "clock")
-
-
-def test_exactly_the_limit_is_day() -> None:
+    assert judge_day(light_of(math.nan, math.inf, 900.0), None, None) == Day(True, "light")
+    assert judge_day(light_of(math.nan), CLOCK, MIDNIGHT_S) == Day(False, "clock")
+    # Exactly the limit is day.
     assert judge_day(light_of(DAY_FROM_LX), None, None).is_day
     assert not judge_day(light_of(DAY_FROM_LX - 0.1), None, None).is_day
 

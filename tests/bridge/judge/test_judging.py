@@ -45,15 +45,18 @@ GOOD = tag("a", START, temperature=22.0)
 COLD = tag("b", START, temperature=6.0)
 
 
-def test_unchanged_state_is_not_reported_again() -> None:
+def test_unchanged_state_is_not_reported_again_and_a_tag_that_is_gone_is_forgotten() -> None:
     judge = Judge(BY_LIGHT)
     first = judge.see(snapshot(START, GOOD, COLD))
     assert first.tags.keys() == {"a", "b"}
     assert first.house.verdict is Verdict.CRITICAL
     assert judge.see(snapshot(START + S, GOOD, COLD)) is first
+    gone = judge.see(snapshot(START + 2 * S, GOOD))
+    assert gone.tags.keys() == {"a"}
+    assert gone.house.verdict is Verdict.HEALTHY
 
 
-def test_time_alone_makes_readings_old() -> None:
+def test_time_alone_makes_readings_old_by_the_scan_interval_or_by_a_configured_limit() -> None:
     judge = Judge(BY_LIGHT)
     judge.learn([scan("a", START - MINUTE, temperature=22.0)])
     judge.see(snapshot(START - MINUTE, tag("a", START - MINUTE, temperature=22.0)))
@@ -63,6 +66,9 @@ def test_time_alone_makes_readings_old() -> None:
     old = judge.see(snapshot(START + 10 * MINUTE + 1, GOOD))
     assert others(still, old) == {"a"}
     assert old.tags["a"].verdict is old.house.verdict is Verdict.UNKNOWN
+    judge = Judge(replace(BY_LIGHT, recent_s=30.0))
+    assert judge.see(snapshot(START + 30 * S, GOOD)).tags["a"].verdict == "healthy"
+    assert judge.see(snapshot(START + 31 * S, GOOD)).tags["a"].verdict == "unknown"
 
 
 def test_for_alarms_a_tag_scanned_once_has_a_day() -> None:
@@ -131,12 +137,6 @@ def test_a_sensor_missing_from_scans_does_not_change_the_interval() -> None:
     late.learn(scan("a", at_ns, temperature=22.0) for at_ns in scans[-9:])
     late.see(snapshot(scans[-1], now))
     assert late.holds_ns()["a"] == 30 * MINUTE
-
-
-def test_a_configured_limit_takes_precedence_over_the_scan_interval() -> None:
-    judge = Judge(replace(BY_LIGHT, recent_s=30.0))
-    assert judge.see(snapshot(START + 30 * S, GOOD)).tags["a"].verdict == "healthy"
-    assert judge.see(snapshot(START + 31 * S, GOOD)).tags["a"].verdict == "unknown"
 
 
 def test_a_reading_is_judged_by_the_daylight_and_the_plants_of_its_own_time() -> None:
@@ -340,11 +340,3 @@ def writes_of(*tags: TagState) -> list[PastWrite]:
         scan(one.tag_id, one.last_observed_ns or 0, **{it.name: it.value for it in one.readings})
         for one in tags
     ]
-
-
-def test_a_tag_that_is_gone_is_forgotten() -> None:
-    judge = Judge(BY_LIGHT)
-    judge.see(snapshot(START, GOOD, COLD))
-    gone = judge.see(snapshot(START + S, GOOD))
-    assert gone.tags.keys() == {"a"}
-    assert gone.house.verdict is Verdict.HEALTHY

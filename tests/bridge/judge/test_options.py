@@ -1,4 +1,5 @@
 import re
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -49,16 +50,24 @@ def test_the_hours_of_the_day_are_those_of_the_greenhouse() -> None:
     assert clock.is_day(winter + 60)
 
 
-@pytest.mark.parametrize("zone", ["Mars/Olympus", "../../etc/passwd", "Europe"])
-def test_an_unknown_time_zone_is_refused(zone: str) -> None:
-    with pytest.raises(SettingError, match=f"--time-zone is '{re.escape(zone)}', which this mach"):
-        criteria(time_zone=zone)
-
-
-@pytest.mark.parametrize("hours", ["", "6-20", "06:00-24:00", "06:60-20:00", "06:00–20:00", "day"])
-def test_invalid_hours_are_refused(hours: str) -> None:
-    with pytest.raises(SettingError, match=f"--day-hours is '{hours}', expected HH:MM-HH:MM"):
-        criteria(day_hours=hours)
+@pytest.mark.parametrize(
+    ("name", "values", "says"),
+    [
+        ("time_zone", ("Mars/Olympus", "../../etc/passwd", "Europe"), "which this machine"),
+        (
+            "day_hours",
+            ("", "6-20", "06:00-24:00", "06:60-20:00", "06:00–20:00", "day"),
+            "expected HH:MM-HH:MM",
+        ),
+    ],
+)
+def test_an_unknown_time_zone_and_invalid_hours_are_refused(
+    name: str, values: Sequence[str], says: str
+) -> None:
+    for value in values:
+        text = re.escape(f"--{name.replace('_', '-')} is '{value}', {says}")
+        with pytest.raises(SettingError, match=text):
+            criteria(**{name: value})
 
 
 def test_simulated_time_has_no_hours_of_a_wall_clock() -> None:

@@ -96,22 +96,16 @@ def test_every_sensor_has_a_hue_of_its_own() -> None:
     assert all(20 <= abs(a - b) <= 340 for a, b in itertools.combinations(hues, 2))
 
 
-def test_day_night_and_species_have_their_own_ranges() -> None:
-    temperature = parse(json.dumps(GOOD)).named("temperature")
+def test_day_night_and_species_have_their_own_ranges_and_an_undeclared_sensor_none() -> None:
+    temperature = parse(PLAIN).named("temperature")
     assert temperature.ranges(is_day=True) == Ranges(Span(18, 26), Span(10, 35))
     assert temperature.ranges(is_day=False) == Ranges(Span(15, 24))
     assert temperature.ranges(is_day=True, species="rose") == temperature.ranges(is_day=True)
     assert temperature.ranges(is_day=True, species="orchid") == Ranges(Span(20, 28))
     assert temperature.ranges(is_day=False, species="ORCHID") == Ranges()
-
-
-def test_a_night_without_ranges_uses_those_of_the_day() -> None:
-    temperature = parse(text_with("sensors/temperature/night", ...)).named("temperature")
-    assert temperature.night == temperature.day
-
-
-def test_an_undeclared_sensor_is_never_judged() -> None:
-    ph = parse(json.dumps(GOOD)).named("ph")
+    without_night = parse(text_with("sensors/temperature/night", ...)).named("temperature")
+    assert without_night.night == without_night.day
+    ph = parse(PLAIN).named("ph")
     assert (ph.name, ph.label, ph.unit, ph.hue) == ("ph", "ph", "", 265)
     assert ph.ranges(is_day=True) == Ranges()
 

@@ -1,6 +1,7 @@
 """The hub's rules, with connections whose buffers the test controls."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -232,12 +233,22 @@ def test_a_rate_holds_on_average_and_a_status_does_not_wait_for_it(stage: Stage)
     assert socket.got[-1] == 55, "the latest, when its time has come"
 
 
-def test_a_late_frame_does_not_delay_those_after_it(stage: Stage) -> None:
+@pytest.mark.parametrize(
+    ("times_s", "got"),
+    [
+        # A late frame does not delay those after it.
+        ((0.0, 1.05, 2.0, 2.05, 3.0, 3.05), [1, 2, 3, 5]),
+        # After a pause there is no burst: one as soon as something changes, the next an interval
+        # later, with a tenth of tolerance.
+        ((0.0, 100.0, 100.1, 100.85, 100.95, 101.85, 101.95), [1, 2, 5, 7]),
+    ],
+)
+def test_a_rate_is_a_mean(stage: Stage, times_s: Sequence[float], got: list[int]) -> None:
     on_average = Socket()
     stage.join(on_average, min_interval_s=1.0, wants_status=False)
-    for now_s in (0.0, 1.05, 2.0, 2.05, 3.0, 3.05):
+    for now_s in times_s:
         stage.publish(now_s)
-    assert on_average.got == [1, 2, 3, 5]
+    assert on_average.got == got
 
 
 # --- alarms -------------------------------------------------------------------------------------
@@ -288,13 +299,3 @@ def test_the_robot_comes_after_a_state_once_and_no_more_often_than_states(stage:
     stage.hub.serve_all(10.0)
     assert seldom.wires[-1] == b"robot 3"
     assert none.robot_due
-
-
-def test_a_pause_is_not_followed_by_a_burst(stage: Stage) -> None:
-    socket = Socket()
-    stage.join(socket, min_interval_s=1.0, wants_status=False)
-    stage.publish(0.0)
-    for now_s in (100.0, 100.1, 100.85, 100.95, 101.85, 101.95):
-        stage.publish(now_s)
-    # One as soon as something changes, the next an interval later, with a tenth of tolerance.
-    assert socket.got == [1, 2, 5, 7]

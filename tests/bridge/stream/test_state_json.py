@@ -148,17 +148,14 @@ def plainly(snapshot: Snapshot, has_times: bool = True) -> dict[str, Any]:
 
 @given(SNAPSHOTS)
 @settings(max_examples=100)
-def test_any_snapshot_is_written_as_in_the_contract(snapshot: Snapshot) -> None:
+def test_any_snapshot_is_written_as_in_the_contract_and_without_times_as_in_the_message(
+    snapshot: Snapshot,
+) -> None:
     text = StateJson().state(snapshot, snapshot.now_ns)
     written = json.loads(text, parse_constant=pytest.fail)
     written["tags"] = [filled(tag) for tag in written["tags"]]
     assert written == plainly(snapshot)
     schema.TwinState.model_validate_json(text, strict=True)
-
-
-@given(SNAPSHOTS)
-@settings(max_examples=50)
-def test_without_times_the_json_is_exactly_the_message(snapshot: Snapshot) -> None:
     text = StateJson(has_times=False).state(snapshot, snapshot.now_ns)
     assert json.loads(text, parse_constant=pytest.fail) == plainly(snapshot, has_times=False)
 

@@ -28,19 +28,14 @@ def received(at_s: float, clock: ClockState = "running", **says: Any) -> Livenes
     return Liveness(update=update(clock, **says), updated_s=at_s)
 
 
-def test_a_twin_is_live_until_it_was_silent_for_the_limit() -> None:
+def test_a_twin_is_live_until_it_was_silent_for_the_documented_time() -> None:
+    assert Liveness().status(5.0) == Status("never_seen", None)
     liveness = received(100.0)
+    assert liveness.status(99.0).state_age_s == 0.0, "an age is never negative"
     assert liveness.status(100.0 + STALE_AFTER_S - 0.001).reason == "live"
     assert liveness.status(100.0 + STALE_AFTER_S).reason == "stale"
-
-
-def test_a_silence_is_reported_within_the_documented_time() -> None:
     # Three missed publications are no accident, and a client knows by 3.5 s.
     assert 3.0 <= STALE_AFTER_S < STALE_AFTER_S + WATCH_PERIOD_S <= 3.5
-
-
-def test_a_twin_that_was_never_received_has_no_age() -> None:
-    assert Liveness().status(5.0) == Status("never_seen", None)
 
 
 def test_the_log_has_observations_before_the_twin_is_received() -> None:
@@ -49,10 +44,6 @@ def test_the_log_has_observations_before_the_twin_is_received() -> None:
         *("never_seen", "simulated"),
         1_440.0,
     )
-
-
-def test_an_age_is_never_negative() -> None:
-    assert received(10.0).status(9.0).state_age_s == 0.0
 
 
 def test_the_most_specific_reason_comes_first() -> None:

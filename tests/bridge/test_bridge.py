@@ -339,28 +339,21 @@ async def test_while_the_twin_is_silent_its_status_is_repeated() -> None:
         assert ages_s == sorted(set(ages_s)), "each as of then"
 
 
-async def test_a_twin_without_a_clock_has_not_been_silent_since_the_year_1970() -> None:
+async def test_a_twin_whose_clock_stops_is_silent_since_its_last_time_and_not_since_1970() -> None:
     async with Stage() as stage:
         stage.bridge.liveness.stale_after_s = 0.3
         clockless = replace(state(0).snapshot, clock="none")
         stage.script.tell(replace(state(0), snapshot=clockless))
         await until(lambda: "no_clock" in stage.ear.reasons, "that to be told")
         stage.script.tell(state(7))
-        await until(lambda: stage.ear.reasons[-1] == "stale", "the silence to be noticed")
-        await until(lambda: stage.bridge.alarms.now.alarms, "its alarm")
-    (silent,) = stage.bridge.alarms.now.alarms
-    assert (silent.reason.kind, silent.raised_at_ns) == ("silent", 7)
-
-
-async def test_a_twin_whose_clock_stops_is_silent_since_its_last_time() -> None:
-    async with Stage() as stage:
-        stage.script.tell(state(7))
         for clock in ("stopped", "doubted"):
             without = replace(state(8).snapshot, clock=clock)
             stage.script.tell(replace(state(8), snapshot=without))
+        await until(lambda: stage.ear.reasons[-1] == "stale", "the silence to be noticed")
         await until(lambda: stage.bridge.alarms.now.active, "its alarm")
         (silent,) = stage.bridge.alarms.now.active
         assert (silent.reason.kind, silent.raised_at_ns) == ("silent", 7)
+        stage.bridge.liveness.stale_after_s = math.inf
         stage.script.tell(state(9))
         await until(lambda: not stage.bridge.alarms.now.active, "its end")
 

@@ -94,23 +94,12 @@ def test_a_flipped_byte_is_reported_where_it_is(tmp_path: Path) -> None:
             list(messages)
 
 
-@pytest.mark.parametrize(
-    ("messages", "why"),
-    [
-        ([], "has no messages"),
-        ([Sent("/map", 1, occupancy_grid([[0]]))], "has nothing that a twin subscribes to"),
-    ],
-)
-def test_a_message_of_no_use_is_refused(tmp_path: Path, messages: list[Sent], why: str) -> None:
-    path = write_bag(tmp_path / "a.mcap", messages)
-    with pytest.raises(RecordingError, match=why), Recording([path]) as recording:
-        _ = recording.inputs
-
-
-def test_a_file_that_is_no_recording_is_refused(tmp_path: Path) -> None:
+def test_what_is_no_recording_or_of_no_use_is_refused(tmp_path: Path) -> None:
     one = write_bag(tmp_path / "b.mcap", sent(1))
     json = write_bag(tmp_path / "a.mcap", sent(1), encoding="json")
     tags = write_bag(tmp_path / "c.mcap", [Sent(OBSERVATIONS, 1, discovered({"a": pose(1, 2)}))])
+    empty = write_bag(tmp_path / "d.mcap", [])
+    mapped = write_bag(tmp_path / "e.mcap", [Sent("/map", 1, occupancy_grid([[0]]))])
     folder, fifo = tmp_path / "folder", tmp_path / "fifo"
     folder.mkdir()
     os.mkfifo(fifo)
@@ -120,9 +109,11 @@ def test_a_file_that_is_no_recording_is_refused(tmp_path: Path) -> None:
         ([tmp_path / "none.mcap"], "No such file"),
         ([folder], "is a folder without a .mcap file"),
         ([fifo], "is not a file"),
+        ([empty], "has no messages"),
+        ([mapped], "has nothing that a twin subscribes to"),
     ):
-        with pytest.raises(RecordingError, match=why):
-            Recording(paths)
+        with pytest.raises(RecordingError, match=why), Recording(paths) as recording:
+            _ = recording.inputs
 
 
 def test_a_start_after_the_end_is_refused(tmp_path: Path) -> None:

@@ -109,18 +109,23 @@ def test_a_mistake_is_one_clear_line(words: list[str], named: str) -> None:
 @pytest.mark.parametrize(
     ("words", "domain", "named"),
     [
-        ("--journal off", "0", "--journal is 'off', expected a file"),
-        ("", "232", "domain-232.sqlite"),
-        ("", "233", "ROS_DOMAIN_ID is '233', must be a whole number from 0 to 232"),
-        ("", "x", "ROS_DOMAIN_ID is 'x', must be a whole number from 0 to 232"),
+        ("info --journal off", "0", "--journal is 'off', expected a file"),
+        ("info", "232", "domain-232.sqlite"),
+        ("info", "233", "ROS_DOMAIN_ID is '233', must be a whole number from 0 to 232"),
+        ("info", "x", "ROS_DOMAIN_ID is 'x', must be a whole number from 0 to 232"),
+        ("export --from yesterday", "", "--from is 'yesterday', expected ROS seconds as a dec"),
+        ("export --to 2026-11-21T00:00:00", "", "--to is '2026-11-21T00:00:00', expected ROS"),
+        ("export --from 2 --to 1", "", "--to is 1.000000000, before --from, 2.000000000"),
     ],
 )
-def test_an_invalid_domain_or_journal_is_one_clear_line(
-    words: str, domain: str, named: str, monkeypatch: pytest.MonkeyPatch
+def test_an_invalid_domain_journal_or_period_is_one_clear_line(
+    words: str, domain: str, named: str, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Without a domain: of a journal that is there."""
     monkeypatch.setenv("ROS_DOMAIN_ID", domain)
-    done = journal("info", *words.split())
+    done = journal(*words.split(), *([] if domain else ["--journal", path]))
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert done.stderr.startswith("lupin-twin: ")
     assert named in done.stderr
 
 
@@ -253,21 +258,6 @@ def test_export_uses_the_units_of_the_operators_file(
     monkeypatch.setenv("LUPIN_SENSORS", str(tmp_path / "none"))
     done = journal("export", "--journal", path)
     assert (done.returncode, "LUPIN_SENSORS" in done.stderr) == (1, True)
-
-
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [
-        (["--from", "yesterday"], "--from is 'yesterday', expected ROS seconds as a decimal"),
-        (["--to", "2026-11-21T00:00:00"], "--to is '2026-11-21T00:00:00', expected ROS seconds"),
-        (["--from", "2", "--to", "1"], "--to is 1.000000000, before --from, 2.000000000"),
-    ],
-)
-def test_an_export_that_fails_is_one_clear_line(words: list[str], named: str, path: Path) -> None:
-    done = journal("export", "--journal", path, *words)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith(f"lupin-twin: {named}")
-    assert done.stderr.count("\n") == 1
 
 
 def test_vacuum_prints_the_size_before_and_after(path: Path) -> None:

@@ -3,8 +3,6 @@
 import os
 import signal
 import socket
-import subprocess
-import sys
 import time
 from collections import deque
 from collections.abc import Iterator
@@ -412,9 +410,3 @@ def test_a_slow_and_failing_archive_is_reported_once() -> None:
             process.wait_for_output("server closed the connection")
             database.accept()[0].close()
             assert process.output.count("server closed the connection") == 1
-
-
-def test_the_fleet_page_needs_no_ros() -> None:
-    code = "import sys, lupin_bridge.cli.roles; print('rclpy' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "False\n"

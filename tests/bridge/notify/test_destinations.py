@@ -79,23 +79,19 @@ def test_an_invalid_address_is_refused(url: str, named: str) -> None:
     assert "hunter2" not in message
 
 
-@pytest.mark.parametrize("prefix", ["", "/a", "a/", "a/+/b", "a#", "$SYS/a", "a\nb", "a" * 129])
-def test_a_prefix_that_no_topic_may_have_is_refused(prefix: str) -> None:
-    assert "--mqtt-prefix is " in refusal(mqtt_url="mqtt://a", mqtt_prefix=prefix)
-    if prefix:
-        message = refusal(mqtt_url="mqtt://a", mqtt_discovery_prefix=prefix)
-        assert "--mqtt-discovery-prefix is " in message
-
-
-@pytest.mark.parametrize("prefix", ["ferme/été 1", "a" * MAX_PREFIX])
-def test_other_prefixes_are_accepted_and_both_must_differ(prefix: str) -> None:
-    settings = Settings(mqtt_url="mqtt://a", mqtt_prefix=prefix, mqtt_discovery_prefix="")
-    target = Targets.of(settings, Secrets()).mqtt
-    assert target is not None
-    assert (target.topics.prefix, target.topics.discovery) == (prefix, "")
-    assert "both 'x', must differ" in refusal(
-        mqtt_url="mqtt://a", mqtt_prefix="x", mqtt_discovery_prefix="x"
-    )
+def test_a_prefix_that_no_topic_may_have_is_refused_and_both_must_differ() -> None:
+    for prefix in ("", "/a", "a/", "a/+/b", "a#", "$SYS/a", "a\nb", "a" * (MAX_PREFIX + 1)):
+        assert "--mqtt-prefix is " in refusal(mqtt_url="mqtt://a", mqtt_prefix=prefix)
+        if prefix:
+            message = refusal(mqtt_url="mqtt://a", mqtt_discovery_prefix=prefix)
+            assert "--mqtt-discovery-prefix is " in message
+    for prefix in ("ferme/été 1", "a" * MAX_PREFIX):
+        settings = Settings(mqtt_url="mqtt://a", mqtt_prefix=prefix, mqtt_discovery_prefix="")
+        target = Targets.of(settings, Secrets()).mqtt
+        assert target is not None
+        assert (target.topics.prefix, target.topics.discovery) == (prefix, "")
+    same = refusal(mqtt_url="mqtt://a", mqtt_prefix="x", mqtt_discovery_prefix="x")
+    assert "both 'x', must differ" in same
 
 
 def test_a_password_needs_a_user_and_a_warning_is_given_without_tls(
@@ -113,33 +109,22 @@ def test_a_password_needs_a_user_and_a_warning_is_given_without_tls(
     assert "hunter2" not in repr(target)
 
 
-def test_a_webhook_needs_a_valid_secret() -> None:
-    assert "--webhook-secret-file" in refusal(Secrets(), webhook_url="http://a")
-    message = refusal(Secrets(webhook_secret=SECRET[1:]), webhook_url="http://a")
-    assert f"has {MIN_SECRET_LENGTH - 1} characters" in message
-
-
-@pytest.mark.parametrize(
-    ("name", "url"),
-    [
+def test_an_unused_setting_is_reported_and_named_as_the_operator_wrote_it() -> None:
+    for name, url in (
         ("mqtt_user", "mqtt_url"),
         ("mqtt_password_file", "mqtt_url"),
         ("mqtt_ca", "mqtt_url"),
         ("webhook_secret_file", "webhook_url"),
         ("webhook_ca", "webhook_url"),
-    ],
-)
-def test_an_unused_setting_is_reported(name: str, url: str) -> None:
-    given: dict[str, Any] = {name: "x"}
-    message = refusal(**given)
-    assert message.startswith(
-        f"--{name.replace('_', '-')} is given without --{url.replace('_', '-')}"
-    )
-
-
-def test_a_mistake_is_named_as_the_operator_wrote_it() -> None:
+    ):
+        given: dict[str, Any] = {name: "x"}
+        option, needed = (f"--{it.replace('_', '-')}" for it in (name, url))
+        assert refusal(**given).startswith(f"{option} is given without {needed}")
     message = refusal(mqtt_url="x", given_as={"mqtt_url": "LUPIN_MQTT_URL"})
     assert message.startswith("LUPIN_MQTT_URL must begin with")
+    assert "--webhook-secret-file" in refusal(Secrets(), webhook_url="http://a")
+    message = refusal(Secrets(webhook_secret=SECRET[1:]), webhook_url="http://a")
+    assert f"has {MIN_SECRET_LENGTH - 1} characters" in message
 
 
 def test_a_private_authority_is_trusted_and_an_invalid_file_of_one_is_named(tmp_path: Path) -> None:

@@ -51,26 +51,9 @@ def history(past: SeriesPast, requested: SeriesRequest = REQUESTED) -> dict[str,
 # --- the body -------------------------------------------------------------------------------------
 
 
-def test_buckets_are_sent_with_their_length() -> None:
-    past = SeriesPast(
-        0, 9 * NS, 5 * NS // 2, (0, 5 * NS), (3, 1), (2.0, 5.0), (1.0, 5.0), (4.0, 5.0)
-    )
-    found = history(past)
-    assert (found["is_bucketed"], found["bucket_s"], found["readings"]) == (True, 2.5, [])
-    assert found["buckets"] == [
-        {"start": {"sec": 0, "nanosec": 0}, "n": 3, "mean": 2.0, "min": 1.0, "max": 4.0},
-        {"start": {"sec": 5, "nanosec": 0}, "n": 1, "mean": 5.0, "min": 5.0, "max": 5.0},
-    ]
-
-
-@pytest.mark.parametrize(
-    ("sensor_type", "unit"), [("co2", "ppm"), ("x", ""), ("~silences", "s"), ("~looks", "")]
-)
-def test_each_value_has_its_unit(sensor_type: str, unit: str) -> None:
-    assert history(readings(), SeriesRequest("7", sensor_type))["unit"] == unit
-
-
-def test_events_have_no_gaps() -> None:
+def test_each_value_has_its_unit_and_events_have_no_gaps() -> None:
+    for sensor_type, unit in (("co2", "ppm"), ("x", ""), ("~silences", "s"), ("~looks", "")):
+        assert history(readings(), SeriesRequest("7", sensor_type))["unit"] == unit
     past = readings(1, 2, 3, 90)
     assert history(past, SeriesRequest("7", "~failures"))["gaps"] == []
     assert len(history(past)["gaps"]) == 2
@@ -79,23 +62,23 @@ def test_events_have_no_gaps() -> None:
 # --- gaps -----------------------------------------------------------------------------------------
 
 
-def test_an_empty_period_has_no_gap() -> None:
-    assert gaps(SeriesPast(5, 5), None) == []
-
-
-def test_many_readings_in_each_bucket_make_every_absent_one_a_gap() -> None:
-    assert gaps(buckets(10, dict.fromkeys((0, 1, 2, 4, 5, 6, 7), 5)), None) == [(30, 40), (80, 100)]
-
-
-def test_with_at_most_one_reading_per_bucket_absent_ones_are_usual() -> None:
-    assert gaps(buckets(10, dict.fromkeys((0, 2, 4, 6, 8), 1)), None) == []
-    assert gaps(buckets(10, dict.fromkeys((0, 1, 2, 6, 7, 8, 9), 1)), None) == []
-    assert gaps(buckets(10, dict.fromkeys((0, 1, 2, 7, 8, 9), 1)), None) == [(30, 70)]
-
-
-def test_a_single_bucket_shows_the_usual_spacing_by_its_count() -> None:
-    assert gaps(buckets(10, {3: 1}), None) == []
-    assert gaps(buckets(10, {3: 10}), None) == [(0, 30), (40, 100)]
+@pytest.mark.parametrize(
+    ("counts", "expected"),
+    [
+        # Many readings in each bucket make every absent one a gap.
+        (dict.fromkeys((0, 1, 2, 4, 5, 6, 7), 5), [(30, 40), (80, 100)]),
+        # With at most one in each, absent ones are usual.
+        (dict.fromkeys((0, 2, 4, 6, 8), 1), []),
+        (dict.fromkeys((0, 1, 2, 6, 7, 8, 9), 1), []),
+        (dict.fromkeys((0, 1, 2, 7, 8, 9), 1), [(30, 70)]),
+        # A single bucket shows the usual spacing by its count.
+        ({3: 1}, []),
+        ({3: 10}, [(0, 30), (40, 100)]),
+    ],
+)
+def test_gaps_between_buckets(counts: dict[int, int], expected: list[tuple[int, int]]) -> None:
+    assert gaps(buckets(10, counts), None) == expected
+    assert gaps(SeriesPast(5, 5), None) == [], "an empty period has none"
 
 
 def plain_gaps(stamps: list[int], end: int) -> list[tuple[int, int]]:

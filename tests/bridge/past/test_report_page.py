@@ -147,14 +147,11 @@ def test_a_note_has_its_kind_and_its_text_and_headings_do_not_contradict_their_c
     assert "Tags not scanned None." in page
 
 
-def test_missing_earlier_data_are_reported_only_where_the_log_begins_within_the_period() -> None:
+def test_the_report_names_its_greenhouse_and_says_from_when_to_when_it_is_complete() -> None:
     whole, late = (page_of(kept_from=at(seconds)) for seconds in (0, HOUR_S))
     assert "No data before" not in whole
     assert "Complete up to 27 Nov 2026, 14:00." in whole
     assert "No data before 27 Nov 2026, 07:00. Complete up to 27 Nov 2026, 14:00." in late
-
-
-def test_the_report_names_its_greenhouse_and_says_when_nothing_was_recorded() -> None:
     end_ns = (BEGUN_S + HOUR_S) * 10**9
     page = ReportPage(BEGUN_S * 10**9, end_ns, GREENHOUSE, UNKNOWN_JOURNAL, "de")
     assert "Simuliert" not in text_of(page, 1)
@@ -162,18 +159,14 @@ def test_the_report_names_its_greenhouse_and_says_when_nothing_was_recorded() ->
     assert "Schichtbericht: gh<1> Simuliert. Kein echter Roboter: Gewächshaus" in reported
 
 
-def test_a_column_of_acknowledgements_and_shelves_appears_when_one_is_needed() -> None:
-    acknowledged = alarm(acknowledged_by="Anna", acknowledged_at=at(120))
-    assert "Acknowledged, shelved" not in page_of(alarms=[alarm()])
-    page = page_of(alarms=[alarm(), acknowledged])
-    assert "Acknowledged, shelved" in page
-    assert page.count("acknowledged by Anna, 06:02") == 1
-
-
-def test_an_alarm_row_names_its_tag_or_the_greenhouse() -> None:
+def test_an_alarm_row_names_its_tag_or_the_greenhouse_and_who_acknowledged_it() -> None:
     page = page_of(alarms=[alarm(), alarm(tag_id="")])
     assert "Pest seen (critical) 7 06:01" in page
     assert "Pest seen (critical) Greenhouse 06:01" in page
+    assert "Acknowledged, shelved" not in page, "a column that is not needed"
+    page = page_of(alarms=[alarm(), alarm(acknowledged_by="Anna", acknowledged_at=at(120))])
+    assert "Acknowledged, shelved" in page
+    assert page.count("acknowledged by Anna, 06:02") == 1
 
 
 def test_open_alarms_come_first_with_value_and_both_limits() -> None:

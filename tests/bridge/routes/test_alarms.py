@@ -12,15 +12,13 @@ import pytest
 from PIL import Image
 
 from lupin_bridge.alarms.board import Change, board_of
-from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import own_sensors
-from lupin_bridge.judge.verdict import Kind, Reason, Verdict
-from lupin_bridge.routes.status import MAX_ALARMS, _is_in
+from lupin_bridge.routes.status import MAX_ALARMS
 from lupin_bridge.stream import schema
 from tests.support.inprocess import running
 from tests.support.messages import inspection, scan
 from tests.support.rosbridge import ros_at
-from tests.support.seen import alarm
+from tests.support.seen import S, alarm
 from tests.support.waiting import wait_for
 from tests.support.web import Bridge, bridge
 
@@ -87,21 +85,23 @@ def test_an_impossible_query_is_refused(live: Bridge, query: dict[str, Any], say
     assert (answer.status_code, says in answer.json()["detail"]) == (400, True)
 
 
-def test_a_period_has_the_alarms_that_were_active_at_any_time_of_it() -> None:
-    reason = Reason(Kind.PEST, Verdict.CRITICAL)
-    over, still = Alarm("1", reason, "a", 20, 30), Alarm("2", reason, "a", 40)
-
-    def found(start: int, end: int, active: str | None = None) -> list[str]:
-        return [alarm.id for alarm in (over, still) if _is_in(alarm, start, end, active)]
-
-    assert found(0, 0) == found(30, 41) == ["1", "2"]
-    assert found(31, 41) == found(31, 0) == found(0, 0, active="1") == ["2"]
-    assert found(21, 40) == found(0, 21) == found(0, 0, active="0") == ["1"]
-    assert found(0, 20) == found(31, 40) == []
-
-
-async def test_the_number_of_alarms_is_limited(domain: int) -> None:
+async def test_a_period_has_the_alarms_that_were_active_in_it_and_their_number_is_limited(
+    domain: int,
+) -> None:
+    over, still = alarm("1", raised_ns=20 * S, cleared_ns=30 * S), alarm("2", raised_ns=40 * S)
     async with running() as it:
+
+        async def found(query: str = "") -> str:
+            answer = await it.http.get(f"/api/alarms?{query}")
+            return "".join(sorted(alarm["tag_id"] for alarm in answer.json()["alarms"]))
+
+        it.bridge.alarms.put(board_of([over, still]), Change((over, still)), "journal", 0)
+        assert await found() == await found("from=30&to=41") == "12"
+        assert await found("from=31&to=41") == await found("from=31") == await found("active=1")
+        assert await found("active=1") == "2"
+        assert await found("from=21&to=40") == await found("to=21") == await found("active=0")
+        assert await found("active=0") == "1"
+        assert await found("to=20") == await found("from=31&to=40") == ""
         many = [alarm(str(number)) for number in range(MAX_ALARMS + 1)]
         it.bridge.alarms.put(board_of(many), Change(tuple(many)), "journal", 0)
         assert len((await it.http.get("/api/alarms")).json()["alarms"]) == MAX_ALARMS

@@ -12,14 +12,13 @@ from tests.support.web import ROUTES
 DOCUMENT: dict[str, Any] = json.loads(document())
 
 
-def test_it_lists_every_route_of_the_contract_and_no_others() -> None:
+def test_it_lists_every_route_of_the_contract_and_only_writing_ones_have_more_than_get() -> (
+    None
+):
     described = {route for route, documented in ROUTES.items() if documented}
     # Only for people, and only for programs: see test_people and test_observations.
     described |= {"/api/notes/{note_id}", "/api/audit", "/api/observations", "/api/push"}
     assert set(DOCUMENT["paths"]) == described
-
-
-def test_only_the_writing_routes_have_more_than_get() -> None:
     written = {
         "/api/notes": ["get", "post"],
         "/api/notes/{note_id}": ["delete"],
@@ -31,9 +30,6 @@ def test_only_the_writing_routes_have_more_than_get() -> None:
         for operation in operations.values():
             assert operation["summary"], path
             assert all(answer["description"] for answer in operation["responses"].values()), path
-
-
-def test_every_parameter_is_described_and_frames_are_among_the_types() -> None:
     field = DOCUMENT["paths"]["/api/field"]["get"]["parameters"]
     names = "sensor_type resolution bbox_min_x bbox_min_y bbox_max_x bbox_max_y scale at"
     assert [parameter["name"] for parameter in field] == names.split()

@@ -213,20 +213,17 @@ def test_the_default_is_all_that_is_stored() -> None:
     assert query(TIMELINE).tag_id is query(EXPORT).tag_id is query(EXPORT).sensor_type is None
 
 
-@pytest.mark.parametrize(("to", "what"), [(None, "missing"), ("100", r"100\.000000000 s")])
-def test_without_a_known_time_a_report_needs_an_end(to: str | None, what: str) -> None:
-    with pytest.raises(PastRefused, match=f"^to is {what}, and what time it is now is not known"):
-        query_string.report(query_string.OfReport(to=to), None)
-
-
-def test_a_report_of_the_first_hours_begins_at_0() -> None:
+def test_a_report_of_the_first_hours_begins_at_0_and_without_a_known_time_it_needs_an_end() -> None:
     assert query_string.report(query_string.OfReport(), NOW_NS) == (0, NOW_NS)
+    for to, what in ((None, "missing"), ("100", r"100\.000000000 s")):
+        with pytest.raises(PastRefused, match=f"^to is {what}, and what time it is now is not kno"):
+            query_string.report(query_string.OfReport(to=to), None)
 
 
 # --- moments and periods --------------------------------------------------------------------------
 
 
-def test_now_is_valid_and_the_future_is_refused() -> None:
+def test_now_is_valid_and_the_future_is_refused_unless_now_is_unknown() -> None:
     assert query_string.at([("at", "1000")], NOW_NS) == NOW_NS
     assert span(HISTORY, from_="1000") == (NOW_NS, 0)
     later = "1000.000000001"
@@ -235,9 +232,6 @@ def test_now_is_valid_and_the_future_is_refused() -> None:
     assert str(refused.value) == f"at is {later} s, later than now, 1000.000000000 s"
     with pytest.raises(PastRefused, match=r"^from is 1000\.000000001 s, later than now"):
         span(HISTORY, from_=later)
-
-
-def test_while_now_is_unknown_nothing_is_in_the_future() -> None:
     assert query_string.at([("at", "2000000000")], None) == 2 * 10**9 * NS
 
 
@@ -249,21 +243,19 @@ def test_a_period_may_end_after_now_and_be_empty_but_not_be_inverted() -> None:
 
 
 @pytest.mark.parametrize("kind", [HISTORY, TIMELINE, EXPORT])
-def test_an_end_at_0_is_not_read_as_now(kind: type[query_string.OfPeriod]) -> None:
+def test_an_end_at_0_and_an_empty_or_impossible_name_are_refused(
+    kind: type[query_string.OfPeriod],
+) -> None:
     with pytest.raises(PastRefused, match=r"^to is 0 s"):
         span(kind, to="0")
-
-
-# --- the rest -------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", [HISTORY, TIMELINE, EXPORT])
-def test_an_empty_or_impossible_name_is_refused(kind: type[query_string.OfPeriod]) -> None:
     with pytest.raises(PastRefused, match=r"^tag_id is '': string should have at least 1 char"):
         query(kind, tag_id="")
     assert query(kind, tag_id="x" * MAX_TEXT_LENGTH).tag_id == "x" * MAX_TEXT_LENGTH
     with pytest.raises(PastRefused, match=f"at most {MAX_TEXT_LENGTH} characters"):
         query(kind, tag_id="x" * (MAX_TEXT_LENGTH + 1))
+
+
+# --- the rest -------------------------------------------------------------------------------------
 
 
 # --- fields ---------------------------------------------------------------------------------------
@@ -281,19 +273,14 @@ def parse(pairs: Sequence[tuple[str, str]]) -> FieldQuery:
 # --- parsing ------------------------------------------------------------------------------------
 
 
-def test_omitted_values_have_defaults_and_the_server_chooses_the_box() -> None:
-    query = parse([("sensor_type", "co2")])
+def test_omitted_values_have_defaults_and_cells_of_a_default_box_get_wide_enough() -> None:
+    query, whole = parse([("sensor_type", "co2")]), (0.0, 1.0, 2.0, 3.0)
     assert query == FieldQuery("co2")
     assert query.box is None
-    assert query.request((0.0, 1.0, 2.0, 3.0), 400) == FieldRequest("co2", 0.1, 0.0, 1.0, 2.0, 3.0)
-
-
-def test_cells_of_a_default_box_get_wide_enough_unless_the_query_sets_their_size() -> None:
-    whole = (0.0, 1.0, 2.0, 3.0)
-    coarser = parse([("sensor_type", "co2")]).request(whole, 399)
-    assert coarser == FieldRequest("co2", 0.2, *whole)
+    assert query.request(whole, 400) == FieldRequest("co2", 0.1, *whole)
+    assert query.request(whole, 399) == FieldRequest("co2", 0.2, *whole)
     fixed = parse([("sensor_type", "co2"), ("resolution", "0.1")]).request(whole, 399)
-    assert fixed == FieldRequest("co2", 0.1, *whole)
+    assert fixed == FieldRequest("co2", 0.1, *whole), "unless the query sets their size"
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "1001", "1.5", "", "²", "٣", "1e2", "9" * 5_000, "x"])

@@ -24,30 +24,30 @@ from tests.support.seen import Alarms, alarm
 A, B = alarm("a"), alarm("b", raised_ns=2)
 
 
-def test_a_change_is_reported_after_the_board_has_it() -> None:
+def test_a_change_is_reported_after_the_board_has_it_and_so_is_another_source() -> None:
     board, reported = Alarms(), list[tuple[Change, int]]()
     board.show([A], is_past=True)
     board.on_change = lambda change: reported.append((change, board.now.number))
     cleared = replace(A, cleared_at_ns=A.raised_at_ns + 1)
     board.show([cleared, B])
-    assert reported == [(Change((B, cleared)), board.now.number)]
+    number = board.now.number
+    assert reported == [(Change((B, cleared)), number)]
     assert (board.now.alarms, board.now.active) == ((cleared, B), (B,))
+    board.show([cleared, B])
+    assert (len(reported), board.now.number) == (1, number), "the same alarms are no change"
+    board.show([cleared, B], "starting")
+    assert reported[1:] == [(Change(()), number + 1)]
 
 
-def test_the_same_alarms_are_no_change_but_another_source_is_one() -> None:
-    board, received = Alarms(), list[Change]()
-    board.show([A])
-    board.on_change, number = received.append, board.now.number
-    board.show([A])
-    assert (received, board.now.number) == ([], number)
-    board.show([A], "starting")
-    assert (received, board.now.number) == ([Change(())], number + 1)
-
-
-def test_active_alarms_come_before_worse_ones_that_are_over() -> None:
+def test_the_worst_come_first_and_active_ones_before_worse_ones_that_are_over() -> None:
     over, still = alarm(cleared_ns=9), alarm("b", Verdict.STRESSED)
     worst = alarm("c")
     assert sorted([over, still, worst], key=active_first) == [worst, still, over]
+    many = [
+        replace(alarm(str(number), raised_ns=number), id=str(number))
+        for number in range(MAX_WORST + 1)
+    ]
+    assert board_of(many).worst == tuple(reversed(many))[:MAX_WORST]
 
 
 # --- a page of alarms -----------------------------------------------------------------------------
@@ -115,14 +115,6 @@ def test_an_alarm_suppressed_for_its_tags_many_alarms_is_reported_unchanged() ->
     before, now = board_of(many[:-1]), board_of(many[1:])
     assert change_between(before, now) == Change((many[-1],))
     assert change_between(board_of(many[:2]), board_of(many[1:2])) == Change((), (many[0],))
-
-
-def test_the_worst_come_first() -> None:
-    many = [
-        replace(alarm(str(number), raised_ns=number), id=str(number))
-        for number in range(MAX_WORST + 1)
-    ]
-    assert board_of(many).worst == tuple(reversed(many))[:MAX_WORST]
 
 
 # --- notes on alarms ------------------------------------------------------------------------------

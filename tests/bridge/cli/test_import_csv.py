@@ -252,14 +252,10 @@ def test_a_file_that_cannot_be_imported_is_refused_in_one_line(
     assert importing.rows() == []
 
 
-def test_a_journal_in_use_by_a_twin_is_refused(importing: Import) -> None:
+def test_a_journal_in_use_by_a_twin_and_one_of_a_simulation_are_refused(importing: Import) -> None:
     with closing(Lock(importing.journal, "/lupin_twin")):
         done = importing.given(WIDE, ROWS).run("--write")
-    assert done.returncode == 1
-    assert "is in use by /lupin_twin" in done.stderr
-
-
-def test_a_journal_of_a_simulation_is_refused(importing: Import) -> None:
+    assert (done.returncode, "is in use by /lupin_twin" in done.stderr) == (1, True)
     append(importing.journal, [scan("A", 5 * SECOND)], Clock(5 * SECOND, NOW, is_simulated=True))
     done = importing.given(WIDE, ROWS).run("--write")
     assert done.returncode == 1

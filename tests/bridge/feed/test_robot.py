@@ -80,7 +80,12 @@ def test_a_clock_that_goes_back_removes_the_future(back_s: float, is_known: bool
     assert log.now.position == (position(2.0, 20.0) if not is_known else log.now.position)
 
 
-def test_a_plan_is_done_at_its_end_and_not_where_a_round_begins() -> None:
+def test_a_plan_is_done_at_its_end_also_one_replaced_on_the_way_and_not_where_it_begins() -> None:
+    other = RobotLog()
+    for at in range(6):
+        there = Plan(((float(at), 0.0), (5.0, 0.0)), (100 + at) * S)
+        other.take(Robot(position=position(float(at), 100.5 + at), plan=there), (101 + at) * S)
+        assert (other.now.plan is None) is (at == 5)
     log = RobotLog()
     round_trip = Plan(((0.0, 0.0), (5.0, 0.0), (0.0, 0.1)), 99 * S)
     log.take(Robot(position=position(0.0, 100.0), plan=round_trip), 100 * S)
@@ -89,14 +94,6 @@ def test_a_plan_is_done_at_its_end_and_not_where_a_round_begins() -> None:
     assert log.now.plan == round_trip
     drive(log, position(0.3, 120.0))
     assert log.now.plan is None
-
-
-def test_a_plan_that_is_replaced_on_the_way_is_done_too() -> None:
-    log = RobotLog()
-    for at in range(6):
-        there = Plan(((float(at), 0.0), (5.0, 0.0)), (100 + at) * S)
-        log.take(Robot(position=position(float(at), 100.5 + at), plan=there), (101 + at) * S)
-        assert (log.now.plan is None) is (at == 5)
 
 
 def test_an_empty_plan_and_one_from_ten_minutes_ago_are_ignored() -> None:

@@ -146,12 +146,9 @@ def test_a_picture_is_transparent_where_nothing_is_known(
     # Its top row has the greatest y.
     assert alpha[0, 2] == alpha[1, 0] == 0
     assert alpha[1, 1] < alpha[1, 2] < alpha[0, 0] < alpha[0, 1]
-
-
-def test_a_picture_with_nothing_known_is_transparent() -> None:
-    field = formats.estimate_picture(an_estimate(2, 2, sd_known=0.0), "mean")
-    assert (field.value_min, field.value_max) == (0.0, 0.0)
-    assert np.isnan(field.values).all()
+    nothing = formats.estimate_picture(an_estimate(2, 2, sd_known=0.0), layer)
+    assert (nothing.value_min, nothing.value_max) == (0.0, 0.0)
+    assert np.isnan(nothing.values).all()
 
 
 def test_an_estimate_is_known_where_it_is_certain_to_a_part_of_the_narrowest_ideal_range() -> None:

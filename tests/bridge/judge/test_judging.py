@@ -1,3 +1,4 @@
+import itertools
 from dataclasses import replace
 from importlib.resources import files
 
@@ -82,19 +83,23 @@ def test_for_alarms_a_tag_scanned_once_has_a_day() -> None:
     assert judge.see(snapshot(START + day + 1, GOOD)).tags["a"].verdict is Verdict.UNKNOWN
 
 
+def judged_one_by_one(*values: float) -> list[Health]:
+    """Tag a, with this temperature at each scan, one a minute."""
+    judge = Judge(BY_LIGHT)
+    return [
+        judge.see(snapshot(at_ns, tag("a", at_ns, temperature=value))).tags["a"]
+        for at_ns, value in zip(itertools.count(START, MINUTE), values, strict=False)
+    ]
+
+
 def test_a_value_that_wobbles_at_a_limit_does_not_change_its_status_at_every_scan() -> None:
     """From 18 to 26 the deadband is 0.4: a value out of range stays so until it is further within.
 
     The limit stays the configured one; `clears_at` stands beside it.
     """
-    judge = Judge(BY_LIGHT)
-    found = []
-    for number, value in enumerate((25.9, 26.1, 25.9, 26.1, 25.61, 25.6, 25.9, 35.1, 34.9, 34.5)):
-        at_ns = START + number * MINUTE
-        health = judge.see(snapshot(at_ns, tag("a", at_ns, temperature=value))).tags["a"]
-        found.append((health.verdict, *((it.limit, it.release) for it in health.reasons)))
+    found = judged_one_by_one(25.9, 26.1, 25.9, 26.1, 25.61, 25.6, 25.9, 35.1, 34.9, 34.5)
     stressed, critical = Verdict.STRESSED, Verdict.CRITICAL
-    assert found == [
+    assert [(it.verdict, *((r.limit, r.release) for r in it.reasons)) for it in found] == [
         (Verdict.HEALTHY,),
         (stressed, (26.0, None)),
         (stressed, (26.0, 25.6)),
@@ -106,15 +111,8 @@ def test_a_value_that_wobbles_at_a_limit_does_not_change_its_status_at_every_sca
         (critical, (35.0, 34.6)),
         (stressed, (26.0, None)),
     ]
-
-
-def test_a_value_that_was_out_of_range_nine_scans_ago_is_forgotten() -> None:
-    judge, found = Judge(BY_LIGHT), []
-    for number in range(10):
-        at_ns, value = START + number * MINUTE, 25.9 if number else 26.1
-        health = judge.see(snapshot(at_ns, tag("a", at_ns, temperature=value))).tags["a"]
-        found.append(health.verdict)
-    assert found == [Verdict.STRESSED] * 9 + [Verdict.HEALTHY]
+    forgotten = judged_one_by_one(26.1, *[25.9] * 9)
+    assert [it.verdict for it in forgotten] == [stressed] * 9 + [Verdict.HEALTHY]
 
 
 def scan(tag_id: str, at_ns: int, **values: float) -> PastWrite:
@@ -169,20 +167,15 @@ def reported(health: Health) -> list[tuple[str, float | None, float | None]]:
     return [(it.verdict, it.value, it.limit) for it in health.reasons]
 
 
-def test_a_lasting_reason_keeps_its_start_time() -> None:
+def test_a_lasting_reason_keeps_its_start_time_and_without_a_clock_nothing_is_known() -> None:
     judge = Judge(BY_LIGHT)
-    judge.see(snapshot(START, COLD))
+    judge.see(snapshot(START, GOOD, COLD))
     still = tag("b", START + MINUTE, temperature=6.5)
-    (reason,) = judge.see(snapshot(START + MINUTE, still)).tags["b"].reasons
+    (reason,) = judge.see(snapshot(START + MINUTE, GOOD, still)).tags["b"].reasons
     assert (reason.value, reason.since_ns) == (6.5, START)
-
-
-def test_without_a_clock_nothing_is_known() -> None:
-    judge = Judge(BY_LIGHT)
-    judge.see(snapshot(START, GOOD))
-    stopped = judge.see(replace(snapshot(START, GOOD), clock="stopped"))
+    stopped = judge.see(replace(snapshot(START + MINUTE, GOOD, still), clock="stopped"))
     assert (stopped.house.verdict, stopped.tags["a"].verdict) == ("unknown", "unknown")
-    back = judge.see(snapshot(START + S, GOOD))
+    back = judge.see(snapshot(START + 2 * MINUTE, GOOD))
     assert (back.house.verdict, back.tags["a"].verdict) == ("healthy", "healthy")
 
 

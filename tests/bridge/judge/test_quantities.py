@@ -42,21 +42,15 @@ def test_air_at_its_dew_point_is_saturated(temperature_c: float, humidity: float
     assert saturation_kpa(dew_c) == pytest.approx(saturation_kpa(temperature_c) * humidity / 100)
 
 
-@pytest.mark.parametrize(
-    ("temperature_c", "humidity"),
-    [(20.0, -0.1), (20.0, 105.1), (-40.1, 50.0), (80.1, 50.0), (math.nan, 50.0), (20.0, math.nan)],
-)
-def test_impossible_readings_derive_nothing(temperature_c: float, humidity: float) -> None:
-    for derived in DERIVED.values():
-        assert math.isnan(derived.formula(temperature_c, humidity))
-
-
-@pytest.mark.parametrize("humidity", [0.0, 5e-324, 2e-322])
-def test_dry_air_has_no_dew_point(humidity: float) -> None:
-    assert math.isnan(dew_point_c(20.0, humidity))
-
-
-def test_a_sensor_that_reads_slightly_high_in_saturated_air_counts_as_saturated() -> None:
+def test_impossible_readings_derive_nothing_and_slightly_high_ones_count_as_saturated() -> None:
+    for temperature_c, humidity in (
+        *((20.0, -0.1), (20.0, 105.1), (-40.1, 50.0)),
+        *((80.1, 50.0), (math.nan, 50.0), (20.0, math.nan)),
+    ):
+        for derived in DERIVED.values():
+            assert math.isnan(derived.formula(temperature_c, humidity))
+    for humidity in (0.0, 5e-324, 2e-322):
+        assert math.isnan(dew_point_c(20.0, humidity)), "dry air has none"
     assert vapour_pressure_deficit_kpa(20.0, 100.4) == 0.0
     assert dew_point_c(20.0, 105.0) == pytest.approx(20.0)
 
@@ -115,14 +109,10 @@ def test_too_little_of_a_day_has_no_value(name: str) -> None:
     far = 2.0 * MAX_GAP_NS / HOUR
     assert math.isnan(value(name, lambda _: 20.0, step=far))
     assert math.isnan(DAILY[name].at(AT, [], is_day))
-
-
-def test_a_day_without_its_noon_has_no_value() -> None:
-    """Its light would be half of the real one."""
+    # Without its noon, a day's light would be half of the real one.
     noon = range(11, 15)
     readings = [(AT + (h - 24) * HOUR, 20_000.0) for h in range(25) if h not in noon]
-    for daily in DAILY.values():
-        assert math.isnan(daily.at(AT, readings, is_day))
+    assert math.isnan(DAILY[name].at(AT, readings, is_day))
 
 
 def test_readings_from_before_the_day_or_after_it_do_not_count() -> None:

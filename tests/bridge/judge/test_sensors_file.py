@@ -49,26 +49,29 @@ def text_with(path: str, value: Any) -> str:
     return json.dumps(table, indent=1)
 
 
-def test_the_shipped_file_is_valid() -> None:
+def test_the_shipped_file_is_valid_with_a_hue_for_each_sensor_and_texts_in_all_languages() -> None:
     sensors = parse(OURS)
     assert (sensors.text, sensors.max_alpha) == (OURS, 0.6)
     assert sensors.named("temperature").unit == "°C"
     assert sensors.named("light").night == Ranges(None, None)
     assert {"vpd", "dew_point"} <= sensors.by_name.keys()
+    hues = [sensor.hue for sensor in sensors.by_name.values()]
+    # 20 degrees apart, around the circle: colours that people can distinguish.
+    assert all(20 <= abs(a - b) <= 340 for a, b in itertools.combinations(hues, 2))
+    labels = {name: it.get("labels", {}).keys() for name, it in json.loads(OURS)["sensors"].items()}
+    silent = {name for name, given in labels.items() if given != set(get_args(Language))}
+    assert silent == {"co2"}  # a formula
 
 
 def test_every_judged_sensor_of_it_has_a_source_and_every_measured_one_a_plausible_range() -> None:
     for name, entry in json.loads(OURS)["sensors"].items():
         assert re.search(r"(19|20)\d\d", entry["source"]), name
         assert ("plausible" in entry) is not ("derived" in entry), name
-    temperature = parse(OURS).named("temperature")
-    assert [temperature.is_plausible(value) for value in (-300.0, -40.0, 80.0, 80.1)] == (
-        [False, True, True, False]
-    )
-    nobody = parse(OURS).named("ph")
-    assert [nobody.is_plausible(value) for value in (1e9, float("nan"), float("-inf"))] == (
-        [True, False, False]
-    )
+    temperature, nobody = (parse(OURS).named(name) for name in ("temperature", "ph"))
+    found = [temperature.is_plausible(value) for value in (-300.0, -40.0, 80.0, 80.1)]
+    assert found == [False, True, True, False]
+    found = [nobody.is_plausible(value) for value in (1e9, float("nan"), float("-inf"))]
+    assert found == [True, False, False]
 
 
 def test_the_file_says_which_sensors_are_derived() -> None:
@@ -88,12 +91,6 @@ def test_the_file_says_which_sensors_are_derived() -> None:
         parse(text_with("sensors/temperature/derived", ["light"]))
     with pytest.raises(SensorsError, match=r"derived: Input should be a valid array, not True"):
         parse(text_with("sensors/vpd", vpd | {"derived": True}))
-
-
-def test_every_sensor_has_a_hue_of_its_own() -> None:
-    hues = [sensor.hue for sensor in parse(OURS).by_name.values()]
-    # 20 degrees apart, around the circle: colours that people can distinguish.
-    assert all(20 <= abs(a - b) <= 340 for a, b in itertools.combinations(hues, 2))
 
 
 def test_day_night_and_species_have_their_own_ranges_and_an_undeclared_sensor_none() -> None:
@@ -171,16 +168,6 @@ def test_the_widest_and_the_narrowest_ranges_are_accepted(ideal: list[float]) ->
     assert {alarm.worst for alarm in episodes.alarms()} == {-1e300, 1e308}
 
 
-def test_the_shipped_file_has_texts_in_all_languages() -> None:
-    sensors = json.loads(OURS)["sensors"]
-    silent = {
-        name
-        for name, reported in sensors.items()
-        if reported.get("labels", {}).keys() != set(get_args(Language))
-    }
-    assert silent == {"co2"}  # a formula
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -200,12 +187,9 @@ def test_text_that_is_no_json_is_refused_with_its_line(text: str, says: str) -> 
         parse(text)
 
 
-def test_a_mistake_is_one_line_whatever_characters_a_name_has() -> None:
+def test_areas_are_lists_of_tags_and_a_mistake_is_one_line_whatever_a_name_has() -> None:
+    assert parse(text_with("areas", {"North bay": ["1", "A*"]})).by_name
+    assert parse(text_with("sensors/temperature/labels", {"de": "x" * MAX_TEXT})).by_name
     with pytest.raises(SensorsError) as refused:
         parse(text_with("sensors/a\n\x1b[2Jb", {}))
     assert str(refused.value) == "sensors.a\\n\\x1b[2Jb.ideal: Field required"
-
-
-def test_areas_are_lists_of_tags_and_labels_may_be_in_other_languages() -> None:
-    assert parse(text_with("areas", {"North bay": ["1", "A*"]})).by_name
-    assert parse(text_with("sensors/temperature/labels", {"de": "x" * MAX_TEXT})).by_name

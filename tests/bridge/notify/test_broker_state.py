@@ -53,15 +53,22 @@ def test_everything_is_sent_once_and_then_only_changes() -> None:
     assert news["lt/tags/b/health"]["verdict"] == "critical"
 
 
-def test_an_expired_reading_is_sent_as_unknown() -> None:
-    one = mirror()
+def test_an_expired_reading_is_sent_as_unknown_also_that_of_a_silent_twin() -> None:
     state = tag("a", temperature=21.0)
-    reported(one, seen(state))
+    now, reading = seen(state), "lt/tags/a/readings/temperature"
+    one, silent = mirror(), mirror()
+    for each in (one, silent):
+        reported(each, now)
     assert reported(one, seen(state, now_ns=NOW_NS + HOLDS_NS)) == {}
     news = reported(one, seen(state, now_ns=NOW_NS + HOLDS_NS + 1))
-    assert news["lt/tags/a/readings/temperature"]["value"] is None
-    assert news["lt/tags/a/readings/temperature"]["stamp"]["sec"] == NOW_NS // S
+    assert (news[reading]["value"], news[reading]["stamp"]["sec"]) == (None, NOW_NS // S)
     assert news["lt/tags/a/health"]["verdict"] == "unknown"
+    stale = replace(now.status, reason="stale")
+    news = reported(silent, replace(now, status=stale, now_ns=NOW_NS + HOLDS_NS + 1))
+    assert (news["lt/house/twin"]["state"], news[reading]["value"]) == ("OFF", None)
+    # Nor is anything known while the clock does not run.
+    assert reported(one, now)[reading]["value"] == 21.0
+    assert reported(one, seen(state, now_ns=None))[reading]["value"] is None
 
 
 def test_only_the_verdict_that_changes_by_itself_is_sent() -> None:
@@ -72,26 +79,6 @@ def test_only_the_verdict_that_changes_by_itself_is_sent() -> None:
     news = reported(one, replace(day, judged=replace(day.judged, tags=tags)))
     assert set(news) == {"lt/tags/a/health"}
     assert news["lt/tags/a/health"]["verdict"] == "healthy"
-
-
-def test_readings_of_a_silent_twin_still_expire() -> None:
-    one = mirror()
-    now = seen(tag("a", temperature=21.0))
-    reported(one, now)
-    silent = replace(now, status=replace(now.status, reason="stale"), now_ns=NOW_NS + HOLDS_NS + 1)
-    news = reported(one, silent)
-    assert news["lt/house/twin"]["state"] == "OFF"
-    assert news["lt/tags/a/readings/temperature"]["value"] is None
-
-
-def test_while_the_clock_does_not_run_nothing_is_known() -> None:
-    one = mirror()
-    state = tag("a", temperature=21.0)
-    reported(one, seen(state))
-    assert (
-        reported(one, seen(state, now_ns=None))["lt/tags/a/readings/temperature"]["value"] is None
-    )
-    assert reported(one, seen(state))["lt/tags/a/readings/temperature"]["value"] == 21.0
 
 
 def test_each_message_names_its_source_and_a_new_source_sends_all_again() -> None:
@@ -125,9 +112,10 @@ def test_alarms_are_sent_for_the_tag_and_for_the_greenhouse() -> None:
     assert (news["lt/tags/a/alarms"]["state"], news["lt/house/alarms"]["state"]) == ("OFF", "OFF")
 
 
-def test_an_announcement_that_changes_is_sent_again() -> None:
+def test_an_announcement_that_changes_is_sent_again_and_without_a_prefix_there_is_none() -> None:
     one = mirror()
     state = tag("a", temperature=21.0)
+    assert announcements(reported(mirror(""), seen(state))) == set()
     reported(one, seen(state))
     slower = tag("a", NOW_NS + 1, temperature=21.0)
     assert announcements(reported(one, seen(slower, now_ns=NOW_NS + 1))) == set()
@@ -137,10 +125,6 @@ def test_an_announcement_that_changes_is_sent_again() -> None:
     assert news[config]["expire_after"] == 900
     more = reported(one, seen(tag("a", NOW_NS + 2, temperature=21.0, co2=500.0), holds_ns=holds))
     assert announcements(more) == {"homeassistant/sensor/lt/tag_a_-_reading_co2/config"}
-
-
-def test_without_a_discovery_prefix_nothing_is_announced() -> None:
-    assert announcements(reported(mirror(""), seen(tag("a", temperature=21.0)))) == set()
 
 
 def test_a_change_during_a_send_is_sent_in_its_latest_form() -> None:

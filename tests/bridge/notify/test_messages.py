@@ -4,7 +4,6 @@ import re
 from dataclasses import replace
 from typing import Any
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -43,7 +42,7 @@ def test_long_unusual_names_are_cut_between_characters(name: str) -> None:
     assert re.fullmatch(r"(?:[A-Za-z0-9-]|_[0-9A-F]{2})*(?:__[0-9a-f]{32})?", safe(name))
 
 
-def test_topics_start_with_the_prefix() -> None:
+def test_topics_start_with_the_prefix_and_a_tag_called_house_is_not_the_greenhouse() -> None:
     topics = Topics("farm/gh1", "homeassistant")
     assert topics.status == "farm/gh1/status"
     assert topics.birth == "homeassistant/status"
@@ -53,10 +52,6 @@ def test_topics_start_with_the_prefix() -> None:
     assert topics.config("sensor", "12", "verdict") == (
         "homeassistant/sensor/farm_2Fgh1/tag_12_-_verdict/config"
     )
-
-
-def test_a_tag_called_house_is_not_the_greenhouse() -> None:
-    topics = Topics("p", "d")
     assert topics.device("house") != topics.device(None)
     assert topics.of("house", "health") != topics.of(None, "health")
     assert topics.config("sensor", "house", "x") != topics.config("sensor", None, "x")
@@ -99,25 +94,20 @@ def test_a_sensor_has_the_fields_that_home_assistant_needs() -> None:
     }
 
 
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("humidity", "humidity"),
-        ("soil_moisture", "moisture"),
-        ("co2", "carbon_dioxide"),
-        ("light", "illuminance"),
-        ("vpd", "pressure"),
-        ("dew_point", "temperature"),
-        ("ph", None),
-    ],
-)
-def test_each_of_our_sensors_has_its_class(name: str, expected: str | None) -> None:
-    config = next(iter(announced("12", name).values()))
-    assert config.get("device_class") == expected
-    assert ("unit_of_measurement" in config) is (expected is not None)
-
-
-def test_a_unit_that_does_not_fit_the_class_removes_it() -> None:
+def test_each_of_our_sensors_has_its_class_unless_its_unit_does_not_fit() -> None:
+    classes = {
+        "humidity": "humidity",
+        "soil_moisture": "moisture",
+        "co2": "carbon_dioxide",
+        "light": "illuminance",
+        "vpd": "pressure",
+        "dew_point": "temperature",
+        "ph": None,
+    }
+    for name, expected in classes.items():
+        config = next(iter(announced("12", name).values()))
+        assert config.get("device_class") == expected
+        assert ("unit_of_measurement" in config) is (expected is not None)
     odd = replace(SENSORS.named("temperature"), unit="mK")
     config = next(iter(dict(tag_configs(TOPICS, "12", [odd], HOLDS_NS)).values()))
     assert "device_class" not in config

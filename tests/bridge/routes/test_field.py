@@ -105,8 +105,17 @@ def test_accept_chooses_the_format_and_the_answer_varies_by_it(
     assert "vary" not in by_suffix.headers
 
 
-def test_an_unknown_format_is_406(live: Bridge) -> None:
-    answer = live.get("/api/field", {"Accept": "text/html"}, **QUERY)
+def test_all_lines_of_a_header_count_and_an_unknown_format_is_406(live: Bridge) -> None:
+    def request(*lines: tuple[str, str]) -> httpx.Response:
+        url = f"{live.url}/api/field"
+        return httpx.get(url, params=QUERY, headers=lines, timeout=PATIENCE_S, trust_env=False)
+
+    two_types = request(("Accept", "text/html;q=0.1"), ("Accept", "application/x-npy"))
+    assert two_types.headers["content-type"] == "application/x-npy"
+    tag = etag(live, "/api/field.json")
+    two_tags = request(("If-None-Match", '"other"'), ("If-None-Match", tag), ("Accept", "*/*"))
+    assert two_tags.status_code == 304
+    answer = request(("Accept", "text/html"))
     assert (answer.status_code, answer.headers["vary"]) == (406, "Accept")
     message = schema.ErrorMessage.model_validate_json(answer.content)
     assert "application/json, image/png, application/x-npy" in message.detail
@@ -206,18 +215,6 @@ def test_an_unchanged_field_is_not_sent_again(live: Bridge, path: str) -> None:
     assert work_done(live) == before, "neither computed nor looked up"
     for other in ('"other"', tag[:-2] + '"', tag.strip('"'), tag[:-1]):
         assert live.get(path, {"If-None-Match": other}, **QUERY).status_code == 200
-
-
-def test_all_lines_of_a_header_count(live: Bridge) -> None:
-    def request(*lines: tuple[str, str]) -> httpx.Response:
-        url = f"{live.url}/api/field"
-        return httpx.get(url, params=QUERY, headers=lines, timeout=PATIENCE_S, trust_env=False)
-
-    two_types = request(("Accept", "text/html;q=0.1"), ("Accept", "application/x-npy"))
-    assert two_types.headers["content-type"] == "application/x-npy"
-    tag = etag(live, "/api/field.json")
-    two_tags = request(("If-None-Match", '"other"'), ("If-None-Match", tag), ("Accept", "*/*"))
-    assert two_tags.status_code == 304
 
 
 def test_an_etag_holds_until_the_field_could_have_changed(changing: Bridge) -> None:

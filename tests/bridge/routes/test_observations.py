@@ -272,13 +272,12 @@ def test_without_the_setting_or_without_accounts_nothing_can_be_written(
         assert (answer.status_code, why in answer.json()["detail"]) == (403, True)
 
 
-def test_a_fleet_accepts_none(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_fleet_accepts_none_and_only_a_token_is_a_writer(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit):
         main(["fleet", "--archive-url", "postgresql://x@127.0.0.1:1/x", *ON])
     assert "--http-observations is for a twin, not for lupin-twin fleet" in capsys.readouterr().err
-
-
-def test_only_a_token_is_a_writer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = ("--accounts", str(tmp_path / "accounts.sqlite"))
     assert main(["token", "add", "esp", "--role", "writer", *file]) == 0
     assert len(capsys.readouterr().out.strip()) == 43

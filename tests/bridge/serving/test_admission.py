@@ -226,7 +226,7 @@ def taken(limit: RateLimit, client: str, now_s: float, attempts: int) -> int:
     return sum(limit.take(client, now_s) == 0.0 for _ in range(attempts))
 
 
-def test_a_burst_passes_at_once_and_the_next_turn_waits_an_interval() -> None:
+def test_a_burst_passes_at_once_the_next_turn_waits_and_several_are_taken_together() -> None:
     limit = RateLimit(rate_hz=20.0, burst=40.0)
     assert taken(limit, "a", 100.0, 60) == 40
     assert limit.take("a", 100.0) == pytest.approx(0.05)
@@ -234,11 +234,8 @@ def test_a_burst_passes_at_once_and_the_next_turn_waits_an_interval() -> None:
     assert taken(limit, "a", 100.05, 2) == 1
     assert taken(limit, "a", 3_600.0, 60) == 40
     assert taken(limit, "a", 3_600.0, 60) == 0, "a long rest saves up one burst and no more"
-
-
-def test_several_turns_are_taken_together_or_not_at_all() -> None:
     limit = RateLimit(rate_hz=10.0, burst=5.0)
-    assert limit.take("a", 0.0, 6) == pytest.approx(0.1)
+    assert limit.take("a", 0.0, 6) == pytest.approx(0.1), "or not at all"
     assert limit.take("a", 0.0, 5) == 0.0
     assert limit.take("a", 0.0) == pytest.approx(0.1)
 

@@ -10,6 +10,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import ExitStack, asynccontextmanager
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from websockets.frames import CloseCode, Frame, Opcode
@@ -243,7 +244,9 @@ async def connection(
     if ours is not None:
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         context.load_cert_chain(ours.cert, ours.key)
-    server = await asyncio.get_running_loop().create_server(Ours, "127.0.0.1", 0, ssl=context)
+    soon: dict[str, Any] = {} if context is None else {"ssl_shutdown_timeout": 0.5}
+    loop = asyncio.get_running_loop()
+    server = await loop.create_server(Ours, "127.0.0.1", 0, ssl=context, **soon)
     with ExitStack() as stack:
         theirs = socket.create_connection(server.sockets[0].getsockname())
         if ours is not None:

@@ -254,8 +254,8 @@ def test_a_rate_is_a_mean(stage: Stage, times_s: Sequence[float], got: list[int]
 # --- alarms -------------------------------------------------------------------------------------
 
 
-def test_every_change_of_alarms_goes_to_everyone_and_whole(stage: Stage) -> None:
-    sockets = [Socket(), Socket()]
+def test_every_change_of_alarms_goes_to_everyone_whole_and_after_the_first_state() -> None:
+    stage, sockets = Stage(), [Socket(), Socket()]
     stage.publish()
     for socket in sockets:
         stage.join(socket, delta=True, wants_status=False)
@@ -266,10 +266,7 @@ def test_every_change_of_alarms_goes_to_everyone_and_whole(stage: Stage) -> None
     for socket in sockets:
         assert socket.got == [1, {"a"}, (1, 2), {"a", "b"}, set()]
     assert sockets[0].wires[1] is sockets[1].wires[1], "one serialisation serves all"
-
-
-def test_a_new_client_gets_the_alarms_after_the_first_state_and_not_before(stage: Stage) -> None:
-    early, late = Socket(), Socket()
+    stage, early, late = Stage(), Socket(), Socket()
     stage.announce("live")
     stage.alarms("a")
     stage.join(early)

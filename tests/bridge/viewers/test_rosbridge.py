@@ -67,15 +67,17 @@ def frame(*tag_ids: str) -> StateFrame:
 # --- subscriptions ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("message_id", "topic"), [("b", TOPIC), ("a", "/cmd_vel")])
-def test_ending_an_unknown_subscription_is_worth_a_warning(
-    session: Session, message_id: str, topic: str
+def test_the_type_may_be_given_in_both_forms_and_ending_an_unknown_one_is_worth_a_warning(
+    session: Session,
 ) -> None:
-    subscribe(session, "a")
-    (status,) = replies(unsubscribe(session, message_id, topic))
-    assert (status["level"], status["id"]) == ("warning", message_id)
-    assert status["msg"] == f"there is no such subscription to topic {topic!r}"
-    assert session.is_subscribed
+    for type_ in ("lupin_msgs/msg/TwinState", "lupin_msgs/TwinState", "", None):
+        reaction = subscribe(session, "a", type=type_)
+        assert reaction == Reaction(state_is_due=True, subscribed=TOPIC)
+    for message_id, topic in (("b", TOPIC), ("a", "/cmd_vel")):
+        (status,) = replies(unsubscribe(session, message_id, topic))
+        assert (status["level"], status["id"]) == ("warning", message_id)
+        assert status["msg"] == f"there is no such subscription to topic {topic!r}"
+        assert session.is_subscribed
 
 
 @pytest.mark.parametrize(
@@ -104,11 +106,6 @@ def test_a_refused_subscription_changes_nothing(
     assert replies(reaction) == [{"op": "status", "level": "error", "msg": text, "id": "a"}]
     assert not reaction.state_is_due
     assert not session.is_subscribed
-
-
-@pytest.mark.parametrize("type_", ["lupin_msgs/msg/TwinState", "lupin_msgs/TwinState", "", None])
-def test_the_type_may_be_given_in_both_forms(session: Session, type_: object) -> None:
-    assert subscribe(session, type=type_) == Reaction(state_is_due=True, subscribed=TOPIC)
 
 
 def test_subscriptions_are_limited(session: Session) -> None:

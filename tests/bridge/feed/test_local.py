@@ -1,4 +1,4 @@
-"""The twin of this process, in its ROS thread."""
+"""The twin of this process, in its ROS thread; and work that is shared or repeated."""
 
 import asyncio
 import threading
@@ -12,6 +12,7 @@ from rclpy.parameter import Parameter
 from lupin_bridge.feed.local import LocalTwin
 from lupin_bridge.feed.query import as_found
 from lupin_bridge.feed.source import TwinTimeoutError
+from lupin_bridge.feed.tasks import Periodic, Shared
 from lupin_twin.core.diagnostics import JournalState
 from lupin_twin.core.notes import COMMENT, Note
 from lupin_twin.core.past import NotRemembered
@@ -102,3 +103,60 @@ async def test_a_query_that_takes_too_long_ends_and_delays_no_observation(domain
             await twin.ask(Endless(), 0.0)
         waiting.cancel()
         await until(lambda: twin.past.pending == {}, "the end of both")
+
+
+# --- work that is shared or repeated --------------------------------------------------------------
+
+
+async def test_a_request_that_arrives_as_the_last_one_is_cancelled_starts_new_work() -> None:
+    shared, begun, may_end = Shared[int](), list[None](), asyncio.Event()
+
+    async def work() -> int:
+        begun.append(None)
+        number = len(begun)
+        await may_end.wait()
+        return number
+
+    leaving = asyncio.create_task(shared.get("a", work))
+    await until(lambda: begun, "the work")
+    leaving.cancel()
+    await asyncio.sleep(0)  # it has left; the work has not been cancelled yet
+    coming = asyncio.create_task(shared.get("a", work))
+    await asyncio.wait([leaving])
+    may_end.set()
+    assert await coming == 2
+    assert len(shared) == 0
+
+
+async def test_an_error_reaches_all_waiters_and_is_not_cached() -> None:
+    shared, begun = Shared[int](), list[None]()
+
+    async def work() -> int:
+        begun.append(None)
+        if len(begun) == 1:
+            raise MemoryError("too much")
+        return len(begun)
+
+    found = await asyncio.gather(*(shared.get("a", work) for _ in "ab"), return_exceptions=True)
+    assert [type(error) for error in found] == [MemoryError] * 2
+    assert await shared.get("a", work) == 2
+
+
+async def test_an_error_that_stays_ends_no_repetition_and_is_logged_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    errors, done = [ValueError("a"), ValueError("a"), ValueError("b"), None, ValueError("b")], 0
+
+    async def work() -> None:
+        nonlocal done
+        error = errors[min(done, 4)]
+        done += 1
+        if error is not None:
+            raise error
+
+    periodic = Periodic(work, 0.0, "the work")
+    periodic.start()
+    await until(lambda: done > len(errors), "all of them")
+    await periodic.stop()
+    logged = [record.getMessage() for record in caplog.records]
+    assert logged == [f"the work had an error and continues: {name}" for name in "abb"]

@@ -5,11 +5,10 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -37,18 +36,6 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return found
 
 
-Run = Callable[[Callable[[PastProcess], Coroutine[Any, Any, None]]], None]
-
-
-@pytest.fixture(scope="module")
-def run() -> Iterator[Run]:
-    """Run a test with the process that the tests of reading share."""
-    past = PastProcess()
-    with asyncio.Runner() as runner:
-        yield lambda test: runner.run(test(past))
-        runner.run(past.stop())
-
-
 @asynccontextmanager
 async def looking_back() -> AsyncIterator[PastProcess]:
     past = PastProcess()
@@ -62,8 +49,8 @@ def now(path: Path) -> Now:
     return Now(NOW_NS, "map", Condition(JournalState.RECORDING, path=str(path)))
 
 
-def test_it_runs_at_a_lower_priority_and_returns_bodies_of_any_size(path: Path, run: Run) -> None:
-    async def test(past: PastProcess) -> None:
+async def test_it_runs_at_a_lower_priority_and_returns_bodies_of_any_size(path: Path) -> None:
+    async with looking_back() as past:
         assert await past.ask(Count(NOW_NS), now(path), 0.0) == 1
         nice = os.getpriority(os.PRIO_PROCESS, 0) + NICENESS
         assert await past.ask(Running(), now(path), 0.0) == (0, nice)
@@ -73,11 +60,9 @@ def test_it_runs_at_a_lower_priority_and_returns_bodies_of_any_size(path: Path, 
             assert answered.answer.body == b"7" * count
         assert past.starts == 1
 
-    run(test)
 
-
-def test_its_errors_are_raised_here(path: Path, run: Run) -> None:
-    async def test(past: PastProcess) -> None:
+async def test_its_errors_are_raised_here(path: Path) -> None:
+    async with looking_back() as past:
         with pytest.raises(PastRefused, match="x is 7, the limit is 6"):
             await past.ask(Failing("refused"), now(path), 0.0)
         with pytest.raises(PastRefused, match="later than now"):
@@ -91,11 +76,9 @@ def test_its_errors_are_raised_here(path: Path, run: Run) -> None:
             await past.ask(Count(1), now(path.with_name("none")), 0.0)
         assert past.starts == 1
 
-    run(test)
 
-
-def test_a_query_that_is_no_longer_awaited_ends_in_the_process(path: Path, run: Run) -> None:
-    async def test(past: PastProcess) -> None:
+async def test_a_query_that_is_no_longer_awaited_ends_in_the_process(path: Path) -> None:
+    async with looking_back() as past:
         asking = [
             asyncio.create_task(past.ask(Endless(), now(path), 1.0)) for _ in range(MAX_PENDING)
         ]
@@ -111,8 +94,6 @@ def test_a_query_that_is_no_longer_awaited_ends_in_the_process(path: Path, run: 
         while (await past.ask(Running(), now(path), 0.0))[0]:
             pass
         assert past.pending == {}
-
-    run(test)
 
 
 async def test_an_export_goes_on_in_a_restarted_process(

@@ -37,7 +37,7 @@ from lupin_twin.core.state import (
     TagState,
     TwinStore,
 )
-from tests.bridge.alarms.test_feed import Journal, changed
+from tests.bridge.alarms.test_board import Journal, changed
 
 CASES = json.loads(Path(__file__).with_name("verdicts.json").read_text(encoding="utf-8"))
 SENSORS = own_sensors()

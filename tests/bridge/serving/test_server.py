@@ -1,6 +1,8 @@
-"""The server with connected clients: its socket, its limits, and its shutdown."""
+"""The server with connected clients: its sockets, its limits, how fast it sends, its shutdown."""
 
+import contextlib
 import faulthandler
+import re
 import resource
 import select
 import signal
@@ -14,6 +16,7 @@ import httpx
 import pytest
 from fastapi import FastAPI
 from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import unix_connect
 
 from lupin_bridge.cli.roles import FEEDER_STOP_S
 from lupin_bridge.feed.ros_thread import STOP_TIMEOUT_S
@@ -27,8 +30,12 @@ from lupin_bridge.serving.server import (
 )
 from lupin_bridge.settings import Settings
 from lupin_twin.runtime.process import END_S, IDLE_WORKERS_END_S
+from tests.support import raw_http
+from tests.support.access import Served, refused_start, served
+from tests.support.domains import own_domain
 from tests.support.messages import scan
-from tests.support.processes import Process, faults, lupin_twin, url_of
+from tests.support.people import add
+from tests.support.processes import Process, faults, limits, lupin_twin, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Listener, bridge, deaf_client, listener, overfill
@@ -209,3 +216,110 @@ def test_after_a_signal_it_stops_whatever_hangs() -> None:
 def test_the_shutdown_times_add_up_to_the_documented_one() -> None:
     assert CLOSE_AFTER_S < GRACEFUL_SHUTDOWN_S
     assert GRACEFUL_SHUTDOWN_S + max(STOP_TIMEOUT_S, FEEDER_STOP_S) + IDLE_WORKERS_END_S <= 2.0
+
+
+# --- answers are sent as fast as they are read ----------------------------------------------------
+
+
+# 1,000,000 cells, 5 MB of JSON: more than two sockets buffer.
+LARGE_FIELD = (
+    "/api/field.json?sensor_type=co2&resolution=0.01"
+    "&bbox_min_x=0&bbox_min_y=0&bbox_max_x=10&bbox_max_y=10"
+)
+SMALL_FIELD = LARGE_FIELD.replace("0.01", "10")
+CONCURRENCY = 3
+TIMEOUT_S = 3
+
+
+@pytest.fixture(scope="module")
+def live() -> Iterator[Served]:
+    options = limits(client_timeout_s=TIMEOUT_S, concurrency=CONCURRENCY)
+    with served(*options) as running:
+        yield running
+
+
+def test_a_large_field_arrives_whole(live: Served) -> None:
+    with live.client() as client:  # on one connection: each answer has an end
+        response, head = client.get(LARGE_FIELD), client.head(LARGE_FIELD)
+    assert len(response.content) == int(response.headers["content-length"]) > 4_000_000
+    assert len(response.json()["values"]) == 1_000_000
+    assert (head.content, head.headers["content-length"]) == (
+        b"",
+        response.headers["content-length"],
+    )
+    assert "ERROR" not in live.process.output
+
+
+def test_stuck_readers_hold_only_their_own_places_and_are_cut_off(live: Served) -> None:
+    refused = f"has {CONCURRENCY} requests for computed answers in flight, the limit"
+    with contextlib.ExitStack() as readers:
+        # For one cached field, the number of readers is not limited, and all may be stuck.
+        large = [LARGE_FIELD.replace("co2", f"co2_{number}") for number in range(CONCURRENCY)]
+        deaf = [readers.enter_context(deaf_client(live.url, field)) for field in large]
+        wait_for(lambda: refused in live.get(SMALL_FIELD).text, "the deaf readers' places")
+        with live.client("127.0.4.1") as other:
+            assert other.get(SMALL_FIELD).status_code == 200, "it is another client"
+        line = f"disconnected a reader that accepted nothing for {TIMEOUT_S} s"
+        wait_for(lambda: live.process.output.count(line) == CONCURRENCY, "their end")
+        assert all(len(raw_http.received(client)) < 4_000_000 for client in deaf)
+    wait_for(lambda: live.get(SMALL_FIELD).status_code == 200, "their places to be free")
+    assert "ERROR" not in live.process.output
+
+
+# --- behind a proxy on the same machine, by a Unix socket -----------------------------------------
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "http.sock"
+
+
+@contextmanager
+def asking(path: Path, *options: str) -> Iterator[httpx.Client]:
+    """Query a bridge that serves there, as its proxy does."""
+    options = ("--host", f"unix:{path}", *options)
+    with (
+        own_domain() as domain,
+        lupin_twin(domain, "serve", *options, "--ros-args", "-p", "journal:=off") as process,
+    ):
+        process.wait_for_output(f"lupin-twin: unix:{path}")
+        transport = httpx.HTTPTransport(uds=str(path))
+        with httpx.Client(
+            base_url="http://localhost", transport=transport, timeout=PATIENCE_S
+        ) as client:
+            yield client
+        assert not {"warning", "error"} & set(re.findall(r"\w+", process.output.lower()))
+
+
+def test_owner_and_group_may_connect_and_a_state_arrives(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as left:
+        left.bind(str(path))  # and its process has ended
+    with asking(path) as client:
+        assert path.stat().st_mode & 0o777 == 0o660
+        with socket.socket(socket.AF_UNIX) as named:
+            named.bind(f"\0{path}")  # in Linux's abstract namespace: its name is bytes
+            named.connect(str(path))
+            named.sendall(b"GET /healthz HTTP/1.0\r\nHost: localhost\r\n\r\n")
+            assert named.recv(15) == b"HTTP/1.1 200 OK"
+        assert client.get("/api/state").status_code in (200, 503)
+        with unix_connect(str(path), "ws://localhost/ws/state") as connection:
+            assert '"status"' in str(connection.recv(timeout=PATIENCE_S))
+        in_use = f"lupin-twin: cannot listen on unix:{path}: Address already in use"
+        assert refused_start("--host", f"unix:{path}") == in_use
+
+
+def test_its_client_is_the_proxy_and_names_the_person(path: Path, tmp_path: Path) -> None:
+    add(tmp_path / "accounts.sqlite", anna="operator")
+    accounts = ("--accounts", str(tmp_path / "accounts.sqlite"))
+    with asking(path, *accounts, "--proxy-user-header", "Remote-User") as client:
+        assert client.get("/api/session").status_code == 401
+        assert client.get("/api/session", headers={"Remote-User": "anna"}).json()["name"] == "anna"
+
+
+@pytest.mark.parametrize("name", ["file", "no-such-folder/http.sock", "long" * 40])
+def test_a_path_that_is_no_socket_is_reported_and_no_file_lost(name: str, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("somebody's")
+    line = refused_start("--host", f"unix:{tmp_path / name}")
+    assert line.startswith(f"lupin-twin: cannot listen on unix:{tmp_path / name}: ")
+    assert "None" not in line
+    assert (tmp_path / "file").read_text() == "somebody's"

@@ -183,9 +183,12 @@ def test_a_page_may_have_its_own_styles_and_no_script(built: Path, path: str) ->
     assert answer.headers["x-content-type-options"] == "nosniff"
 
 
-def test_only_the_guide_may_have_its_own_styles(built: Path) -> None:
+def test_only_the_guide_may_have_its_own_styles_and_it_can_only_be_read(built: Path) -> None:
     for path in ("/docs", "/", "/docs/nowhere"):
-        assert "unsafe-inline" not in query_guide(built, path).headers["content-security-policy"]
+        policy = query_guide(built, path).headers["content-security-policy"]
+        assert "unsafe-inline" not in policy
+    assert query_guide(built, "/docs/guide/", "POST").status_code == 405
+    assert query_guide(built, "/docs/guide/", "HEAD").text == ""
 
 
 @pytest.mark.parametrize("prefix", ["", "/gh1"])
@@ -203,11 +206,6 @@ def test_nothing_else_is_served_and_the_answer_says_where_to_look(
     answer = query_guide(built, f"{prefix}{path}", prefix=prefix)
     assert answer.status_code == 404
     assert answer.json()["detail"].endswith(f"; see {prefix}/docs")
-
-
-def test_it_can_only_be_read(built: Path) -> None:
-    assert query_guide(built, "/docs/guide/", "POST").status_code == 405
-    assert query_guide(built, "/docs/guide/", "HEAD").text == ""
 
 
 @pytest.mark.parametrize("path", ["/docs/guide/", "/docs/guide/how-to/server.html"])

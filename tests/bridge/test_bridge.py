@@ -183,7 +183,9 @@ def test_the_mean_rate_holds_whatever_the_producer_does(
     asyncio.run(test())
 
 
-async def test_a_frame_carries_the_latest_of_all_changes_since_the_last() -> None:
+async def test_a_frame_carries_the_latest_of_all_changes_and_heartbeats_beside_it_are_omitted() -> (
+    None
+):
     async with Stage(frames_per_s=50.0) as stage:
         for number in range(1, 101):
             stage.script.tell(state(number))
@@ -191,14 +193,9 @@ async def test_a_frame_carries_the_latest_of_all_changes_since_the_last() -> Non
         assert stage.ear.states[0]["revision"] == "r1"
         assert len(stage.ear.states) <= 4
         assert stage.bridge.latest == state(100)
-
-
-async def test_a_heartbeat_right_after_a_frame_is_omitted() -> None:
     async with Stage(frames_per_s=100.0) as stage:
-        stage.script.tell(state(1))
-        for _ in range(3):
-            stage.script.tell(TwinUpdate(state(1).snapshot, "r1"))
-        stage.script.tell(state(2))
+        for number in (1, 1, 1, 1, 2):
+            stage.script.tell(state(number))
         await until(lambda: len(stage.ear.states) == 2, "the change")
         assert stage.ear.states[-1]["revision"] == "r2"
 

@@ -104,6 +104,7 @@ def test_the_bridges_own_pages_pass_and_those_of_an_allowed_origin_are_marked(
         "https://127.0.0.1:8000",  # another scheme
         "http://panel.example:3000.evil.example",
         "http://robot.example",
+        "http://twin.example",  # its host is allowed, and not its pages
         "null",
         "",
         "http://panel.example:3000 http://evil.example",

@@ -6,6 +6,7 @@ import math
 import os
 import re
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -173,25 +174,27 @@ async def test_the_last_state_of_a_lost_twin_is_no_news_to_a_new_node(domain: in
 async def test_a_node_is_replaced_after_ever_longer_silences_of_five_minutes_at_most(
     domain: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    second, plain = itertools.count(), asyncio.sleep
+    second: Iterator[int]
+    plain = asyncio.sleep
     monkeypatch.setattr(asyncio, "sleep", lambda for_s: plain(min(for_s, 0.001)))
 
     def now_s() -> float:
         """Each look for the twin is a second after the one before."""
         assert twin.update is not None
-        return twin.update.made_s + next(second)
+        return twin.update.made_s + next(second, 1_000)
 
     def rejoined() -> list[str]:
         return re.findall(r"nothing was received on /twin/state for (\d+) s: joining", caplog.text)
 
     with Peer(domain) as peer:
         async with started(WebTwin) as (twin, reported):
-            monkeypatch.setattr(web, "time", SimpleNamespace(monotonic=now_s))
-            twin.rejoin_after_s = Limits().rejoin_after_s
             for lost in (1, 2):
+                second = itertools.repeat(0)
+                monkeypatch.setattr(web, "time", SimpleNamespace(monotonic=now_s))
+                twin.rejoin_after_s = Limits().rejoin_after_s
                 peer.publish("/twin/state", state_of(float(lost)), depth=1)
                 await until(lambda: len(reported) == lost, "a sign of life")  # noqa: B023
-                second = itertools.count()
+                second = iter(range(1_000))
                 await until(lambda: len(rejoined()) == 6 * lost, "its silence")  # noqa: B023
     assert rejoined() == ["30", "60", "120", "240", "480", "780"] * 2
 
@@ -241,15 +244,14 @@ def left_after_start(folder: Path) -> tuple[str | None, list[Path]]:
     return asyncio.run(test()), sorted(folder.glob("*.sqlite"))
 
 
-def test_an_old_copy_is_deleted_at_the_start(tmp_path: Path) -> None:
-    latest, recent, _ = paths = copies(tmp_path, 60.0, RETAINED_S - 60.0, RETAINED_S + 60.0)
-    assert left_after_start(tmp_path) == (str(latest), paths[:2])
-    assert recent.exists()
-
-
-def test_the_latest_copy_stays_whatever_its_age(tmp_path: Path) -> None:
-    latest, _ = copies(tmp_path, RETAINED_S + 60.0, RETAINED_S + 120.0)
+def test_an_old_copy_is_deleted_at_the_start_unless_it_is_the_latest(tmp_path: Path) -> None:
+    latest, recent, old = copies(tmp_path, 60.0, RETAINED_S - 60.0, RETAINED_S + 60.0)
+    assert left_after_start(tmp_path) == (str(latest), [latest, recent])
+    for path in (latest, recent):
+        path.unlink()
+    latest, old = copies(tmp_path, RETAINED_S + 60.0, RETAINED_S + 120.0)
     assert left_after_start(tmp_path) == (str(latest), [latest])
+    assert not old.exists()
 
 
 @pytest.mark.parametrize("is_old", [False, True])

@@ -347,11 +347,8 @@ def add_stamps(*stamps_s: float) -> Patrol:
     return found.patrol(0)
 
 
-def test_a_way_back_or_a_pause_does_not_change_the_interval() -> None:
+def test_only_the_last_intervals_count_and_no_way_back_or_pause_among_them() -> None:
     assert add_stamps(0, 40, 80, 120, 700, 740).interval_ns == 40 * S
-
-
-def test_only_the_last_intervals_count() -> None:
     slow = [i * 600 for i in range(2 * LAP_INTERVALS)]
     fast = [slow[-1] + 5 * (i + 1) for i in range(LAP_INTERVALS)]
     assert add_stamps(*slow, *fast).interval_ns == 5 * S

@@ -112,11 +112,7 @@ def test_day_night_and_species_have_their_own_ranges_and_an_undeclared_sensor_no
     [
         ("ramp", ..., "ramp: Field required"),
         ("ramp/max_alpha", 1.1, "ramp.max_alpha: Input should be less than or equal to 1, not 1.1"),
-        (
-            "sensors/temperature/hue",
-            361,
-            "temperature.hue: Input should be less than or equal to 360",
-        ),
+        ("sensors/temperature/hue", 361, "hue: Input should be less than or equal to 360"),
         ("sensors/temperature/hue", True, "hue: Input should be a valid number, not True"),
         ("sensors/temperature/label", ..., "temperature.label: Field required"),
         ("sensors/temperature/label", "x" * (MAX_TEXT + 1), "should have at most 64 characters"),
@@ -127,11 +123,7 @@ def test_day_night_and_species_have_their_own_ranges_and_an_undeclared_sensor_no
         ("sensors/temperature/ideal", None, "critical is given, but no ideal range"),
         ("sensors/temperature/night", [1, 2], "night: Input should be an object, not [1, 2]"),
         ("sensors/temperature/night", {}, "night.ideal: Field required"),
-        (
-            "sensors/temperature/ideals",
-            [1, 2],
-            "temperature.ideals: Extra inputs are not permitted",
-        ),
+        ("sensors/temperature/ideals", [1, 2], "ideals: Extra inputs are not permitted"),
         ("sensors/temperature/species/Orchid/ideal", [3, 1], "Orchid: ideal is [3.0, 1.0]"),
         ("sensors/temperature/species/orchid", {"ideal": None}, "species is given more than once"),
         ("sensors/temperature/ideal", [-1e9, 1.1e9], "less than or equal to 1000000000, not 11000"),
@@ -142,11 +134,7 @@ def test_day_night_and_species_have_their_own_ranges_and_an_undeclared_sensor_no
         ("sensors/temperature/plausible", [80, -40], "low must be less than high"),
         ("sensors/temperature/source", 5, "source: Input should be a valid string"),
         ("areas", {"North bay": "1"}, "areas.North bay"),
-        (
-            "sensors/temperature/unit",
-            "\ud83c",
-            "Invalid JSON: unexpected end of hex escape at line",
-        ),
+        ("sensors/temperature/unit", "\ud83c", "unexpected end of hex escape at line"),
         ("sensors/\ud83c", GOOD["sensors"]["temperature"], "end of hex escape at line"),
     ],
 )

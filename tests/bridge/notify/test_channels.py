@@ -13,7 +13,6 @@ from zoneinfo import ZoneInfo
 import orjson
 import pytest
 
-from lupin_bridge.alarms.board import AlarmBoard, NoteBoard
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify import channels, mqtt, webhook
 from lupin_bridge.notify.channels import MOST_DAYS, Channels, DailyReport, DailyTarget
@@ -24,7 +23,7 @@ from lupin_bridge.notify.webhook import MAX_REFUSALS, Webhook
 from lupin_bridge.past.plans import Answered
 from lupin_bridge.serving.admission import Answer
 from lupin_bridge.settings import Secrets, SettingError, Settings
-from lupin_twin.core.diagnostics import Condition, JournalState, Origin
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.past import NotRemembered, PastRefused
 from tests.support.mosquitto import Broker, Subscriber
 from tests.support.processes import free_port
@@ -34,28 +33,17 @@ from tests.support.seen import NOW_NS, SENSORS, Alarms, alarm, seen, tag
 from tests.support.waiting import PATIENCE_S, until
 
 
-class Quiet:
-    """A bridge as the channels need it."""
-
-    ros_time_ns = NOW_NS
-    origin: Origin = "simulated"
-    criteria = Criteria.of(Settings())
-    source: Any = None  # no past is queried
-
-    def __init__(self) -> None:
-        board = Alarms()
-        board.show([alarm("a")])
-        self.alarms: AlarmBoard = board
-        self.notes = NoteBoard(self.source, lambda: None)
-
-    def seen(self) -> GreenhouseState:
-        return seen(tag("a", temperature=20.0))
+def with_an_alarm() -> Any:
+    """A simulated greenhouse with an alarm, and no past that is queried."""
+    found = Greenhouse(NOW_NS, origin="simulated")
+    found.alarms.show([alarm("a")])
+    return found
 
 
 async def test_without_a_configured_channel_nothing_is_started() -> None:
     channels = Channels()
     before = len(asyncio.all_tasks())
-    channels.start(Quiet(), SENSORS)
+    channels.start(with_an_alarm(), SENSORS)
     assert len(asyncio.all_tasks()) == before
     assert channels.status() == {}
     assert {name: dict(counts) for name, counts in channels.counts()} == {
@@ -71,7 +59,7 @@ async def test_a_failing_channel_is_reported_and_the_other_goes_on(tmp_path: Pat
         hook = f"http://127.0.0.1:{server.port}/hook"
         settings = Settings(mqtt_url=broker.url, webhook_url=hook)
         channels = Channels(Targets.of(settings, Secrets(webhook_secret="s" * 16)))
-        channels.start(Quiet(), SENSORS)
+        channels.start(with_an_alarm(), SENSORS)
         # A slow name lookup does not delay the shutdown.
         loop, name_server = asyncio.get_running_loop(), threading.Event()
         looking = loop.run_in_executor(None, name_server.wait, PATIENCE_S)
@@ -90,7 +78,7 @@ async def test_a_failing_channel_is_reported_and_the_other_goes_on(tmp_path: Pat
         assert not looking.done()
         name_server.set()
         await looking
-    assert server.posted[0].json["origin"] == Quiet.origin
+    assert server.posted[0].json["origin"] == "simulated"
 
 
 # --- the daily report -----------------------------------------------------------------------------
@@ -116,6 +104,7 @@ class Greenhouse:
     checks: int = 0
     origin: str = "robot"
     alarms: Alarms = field(default_factory=Alarms)
+    notes: Any = None
 
     @property
     def source(self) -> Any:

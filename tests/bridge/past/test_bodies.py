@@ -341,12 +341,9 @@ def read(*rows: PastRow) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text, newline=""), strict=True))
 
 
-def test_rows_of_one_scan_and_of_the_next_have_their_own_times() -> None:
+def test_rows_have_their_own_times_and_end_as_in_rfc_4180() -> None:
     rows = read(ROW, ROW, FAILED, ROW)
     assert [row["stamp"][9:12] for row in rows] == ["0.0", "0.0", "1.0", "0.0"]
-
-
-def test_a_line_ends_as_in_rfc_4180() -> None:
     text = bodies.CSV_HEADER + bodies.csv_lines([ROW, FAILED], SENSORS)
     assert text.count(b"\r\n") == text.count(b"\n") == 3
     assert text.endswith(b"\r\n")

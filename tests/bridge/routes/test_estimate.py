@@ -259,11 +259,7 @@ def test_where_another_tag_would_help_is_reported_with_its_gain(graded: Bridge) 
 @pytest.mark.parametrize(
     ("path", "query", "complaint"),
     [
-        (
-            "advice",
-            {**SENSOR, "places": 21},
-            "places is '21': input should be less than or equal to 20",
-        ),
+        ("advice", {**SENSOR, "places": 21}, "places is '21': input should be less than or equ"),
         ("advice", {**SENSOR, "places": "x"}, "places is 'x': input should be a valid integer"),
         ("advice", {}, "sensor_type: field required"),
         ("tags", {}, "sensor_type: field required"),

@@ -157,12 +157,8 @@ def test_every_field_route_has_the_limit(slow: Served, route: str) -> None:
         assert client.get(route + query).content == first.content, "a cached answer costs nothing"
         second = client.get(route + QUERY.replace("co2", f"other {route}"))
         refusal = schema.GetFieldResponse.model_validate_json(second.content)
-        assert (refusal.ok, refusal.values, refusal.width, refusal.sample_count) == (
-            False,
-            [],
-            0,
-            0,
-        )
+        assert (refusal.ok, refusal.values, refusal.width) == (False, [], 0)
+        assert refusal.sample_count == 0
         assert_slowed(second, refusal.error_message)
         with slow.client() as other:
             assert other.get(route + query).status_code == 200, "another client"

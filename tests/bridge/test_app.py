@@ -126,9 +126,6 @@ def test_a_long_path_is_shortened_in_the_answer(tmp_path: Path) -> None:
     assert len(query(tmp_path, "GET", "/" + "x" * 4_000).text) < 300
 
 
-# --- without its page -----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("method", ["GET", "HEAD"])
 def test_the_root_says_how_to_build_the_page(tmp_path: Path, method: str) -> None:
     for folder in (tmp_path / "nowhere", tmp_path):  # an empty one is no page either
@@ -147,9 +144,6 @@ def test_the_font_is_that_of_the_page(tmp_path: Path, monkeypatch: pytest.Monkey
     assert (answer.status_code, answer.content) == (200, b"wOF2")
     assert answer.headers["content-type"] == "font/woff2"
     assert answer.headers["cache-control"] == "max-age=604800"
-
-
-# --- the guide ------------------------------------------------------------------------------------
 
 
 GUIDE = "<!doctype html><title>Guide</title><style>b {}</style>"
@@ -213,9 +207,6 @@ def test_a_guide_that_is_not_built_says_how_to_build_it(tmp_path: Path, path: st
     answer = query_guide(tmp_path, path)
     assert answer.status_code == 404
     assert "make docs" in ErrorMessage.model_validate_json(answer.content).detail
-
-
-# --- the language of a page -----------------------------------------------------------------------
 
 
 SPOKEN = ("en", "de", "nl", "es")

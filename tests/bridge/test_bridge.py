@@ -110,9 +110,6 @@ class Stage:
         await self.bridge.stop()
 
 
-# --- pace ---------------------------------------------------------------------------------------
-
-
 class Beat:
     """A bridge whose clock and frame timer belong to the test."""
 
@@ -200,9 +197,6 @@ async def test_a_frame_carries_the_latest_of_all_changes_and_heartbeats_beside_i
         assert stage.ear.states[-1]["revision"] == "r2"
 
 
-# --- status -------------------------------------------------------------------------------------
-
-
 async def test_a_status_is_sent_when_it_changes_and_only_then() -> None:
     now_s = 100.0
     async with Stage(lambda: now_s) as stage:
@@ -251,9 +245,6 @@ async def test_a_busy_memory_at_the_start_is_queried_again(monkeypatch: pytest.M
         await until(is_learnt, "the rhythm")
 
 
-# --- the watch ----------------------------------------------------------------------------------
-
-
 async def test_a_client_with_a_low_rate_gets_the_latest_although_nothing_more_happens() -> None:
     now_s = 100.0
     async with Stage(clock=lambda: now_s, frames_per_s=100.0) as stage:
@@ -268,9 +259,6 @@ async def test_a_client_with_a_low_rate_gets_the_latest_although_nothing_more_ha
         now_s += 0.3
         await until(lambda: rare.states[-1]["revision"] == "r5", "the newest in its time")
         assert [frame["revision"] for frame in rare.states] == ["r1", "r5"]
-
-
-# --- alarms -------------------------------------------------------------------------------------
 
 
 async def test_alarms_are_sent_at_once_and_those_right_after_once_a_second() -> None:
@@ -313,8 +301,6 @@ async def test_a_channel_that_fails_on_an_alarm_costs_the_page_no_alarms(
         await until(lambda: any(it.get("alarms") for it in stage.ear.frames), "the alarm")
     assert "webhook had an error with changed alarms" in caplog.text
 
-
-# --- a silent twin ------------------------------------------------------------------------------
 
 SECOND = 1_000_000_000
 
@@ -371,9 +357,6 @@ async def test_a_clock_that_goes_back_withdraws_the_silences_of_its_future() -> 
                 stage.script.tell(state(back))
                 await until(lambda: not board.now.active, "its end")
         assert raised_ns() == [3 * SECOND]
-
-
-# --- with a real twin ---------------------------------------------------------------------------
 
 
 def test_no_thread_and_no_descriptor_is_left_behind(domain: int) -> None:

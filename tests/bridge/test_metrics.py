@@ -82,9 +82,6 @@ def test_wrong_estimates_are_counted_by_sensor() -> None:
         assert f'\nlupin_estimate_{name}{{sensor="{sensor}"}} {value}\n' in text
 
 
-# --- answers --------------------------------------------------------------------------------------
-
-
 def test_each_path_belongs_to_one_of_a_few_kinds() -> None:
     kinds = {
         "/api/state": "state",

@@ -66,9 +66,6 @@ def test_the_copy_for_the_browsers_types_is_up_to_date() -> None:
     )
 
 
-# --- the page: nothing external, nothing unescaped ------------------------------------------------
-
-
 PAGE = render(DOCUMENT, "http://twin:8000")
 
 
@@ -143,9 +140,6 @@ def test_text_that_looks_like_markup_stays_text(kind: str) -> None:
     page = Page(render(hostile, address))
     assert "script" not in {tag for tag, _ in page.tags}
     assert markup in page.text
-
-
-# --- types with the names of the ROS messages -----------------------------------------------------
 
 
 def names(message_type: Any) -> list[str]:

@@ -73,18 +73,12 @@ def test_any_query_string_is_parsed_or_refused(pairs: list[tuple[str, str]]) -> 
         read(Some, pairs)
 
 
-# --- options of a WebSocket client ----------------------------------------------------------------
-
-
 def test_the_lowest_rate_is_one_and_anything_lower_is_refused() -> None:
     requested = read(ListenQuery, [("delta", "1"), ("max_rate_hz", "0.01")])
     assert (requested.delta, requested.min_interval_s) == (True, 100.0)
     for value in ("0.0099", "0", "-1", "nan", "fast", ""):
         with pytest.raises(ValueError, match=f"max_rate_hz is '{value}': input should be"):
             read(ListenQuery, [("max_rate_hz", value)])
-
-
-# --- moments --------------------------------------------------------------------------------------
 
 
 NS = 10**9
@@ -187,9 +181,6 @@ def test_any_text_is_a_moment_or_refused(text: str) -> None:
         assert 0 <= moment("at", text) <= LAST_NS
 
 
-# --- periods of the past --------------------------------------------------------------------------
-
-
 NOW_NS = 1_000 * NS
 HISTORY, TIMELINE, EXPORT = query_string.OfHistory, query_string.OfTimeline, query_string.OfExport
 NEEDED: dict[Any, dict[str, str]] = {HISTORY: {"tag_id": "7", "sensor_type": "co2"}}
@@ -218,9 +209,6 @@ def test_a_report_of_the_first_hours_begins_at_0_and_without_a_known_time_it_nee
     for to, what in ((None, "missing"), ("100", r"100\.000000000 s")):
         with pytest.raises(PastRefused, match=f"^to is {what}, and what time it is now is not kno"):
             query_string.report(query_string.OfReport(to=to), None)
-
-
-# --- moments and periods --------------------------------------------------------------------------
 
 
 def test_now_is_valid_and_the_future_is_refused_unless_now_is_unknown() -> None:
@@ -255,12 +243,6 @@ def test_an_end_at_0_and_an_empty_or_impossible_name_are_refused(
         query(kind, tag_id="x" * (MAX_TEXT_LENGTH + 1))
 
 
-# --- the rest -------------------------------------------------------------------------------------
-
-
-# --- fields ---------------------------------------------------------------------------------------
-
-
 BOX = {"bbox_min_x": "-1", "bbox_min_y": "0.5", "bbox_max_x": "2e1", "bbox_max_y": "3"}
 
 
@@ -268,9 +250,6 @@ def parse(pairs: Sequence[tuple[str, str]]) -> FieldQuery:
     names = [name for name, _ in pairs]
     own = [] if "sensor_type" in names else [("sensor_type", "co2")]
     return read(FieldQuery, [*own, *pairs])
-
-
-# --- parsing ------------------------------------------------------------------------------------
 
 
 def test_omitted_values_have_defaults_and_cells_of_a_default_box_get_wide_enough() -> None:
@@ -287,9 +266,6 @@ def test_omitted_values_have_defaults_and_cells_of_a_default_box_get_wide_enough
 def test_a_scale_out_of_range_is_refused(text: str) -> None:
     with pytest.raises(PastRefused, match=f"^scale is '{text[:64]}': "):
         parse([("scale", text)])
-
-
-# --- Accept (RFC 9110, section 12.5.1) ----------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -317,9 +293,6 @@ def test_accept_chooses_the_format(accept: str | None, expected: FieldFormat | N
 @given(st.text(st.characters(codec="latin-1"), max_size=60))
 def test_any_accept_header_chooses_a_format_or_none(accept: str) -> None:
     assert field_query.negotiate(accept) in (None, *FORMATS)
-
-
-# --- headers ------------------------------------------------------------------------------------
 
 
 @example("  a b ")

@@ -31,9 +31,6 @@ def headers(*given: tuple[str, str]) -> Headers:
     return Headers(raw=[(name.encode(), value.encode("latin-1")) for name, value in given])
 
 
-# --- Host ---------------------------------------------------------------------------------------
-
-
 OWN = (
     *("127.0.0.1", "192.168.7.20:8000", "[::1]:8000", "[fd00::7]", "LocalHost:8000"),
     *("twin.localhost:8000", "GREENHOUSE.lan.", "robot.example:8443", "twin.example:8443"),
@@ -70,9 +67,6 @@ def test_an_allowed_host_has_to_be_a_valid_name(name: str) -> None:
     with pytest.raises(ValueError, match="expected it without scheme and port") as refused:
         AccessPolicy("127.0.0.1", allowed_hosts=["twin.example", name])
     assert repr(name) in str(refused.value)
-
-
-# --- Origin -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -146,9 +140,6 @@ def test_any_text_is_a_valid_origin_or_refused(text: str) -> None:
     assert host_of(origin.partition("://")[2]) is not None
 
 
-# --- Sec-Fetch ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("site", "mode", "dest", "passes"),
     [
@@ -177,9 +168,6 @@ def test_an_allowed_origin_may_send_cross_site_requests() -> None:
     assert judge(*requested, sec_fetch_site="cross-site", sec_fetch_mode="cors").refusal is None
 
 
-# --- Referer ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("referer", "passes"),
     [
@@ -200,9 +188,6 @@ def test_without_sec_fetch_the_referer_identifies_the_page(referer: str, passes:
     assert judge(referer=referer, sec_fetch_site="same-origin").refusal is None
     hidden = judge(referer=referer, sec_fetch_site="cross-site", wants_page=True)
     assert hidden.refusal is not None, "it tells more than a Referer does"
-
-
-# --- warnings at the start ----------------------------------------------------------------------
 
 
 def test_only_listening_beyond_loopback_warns_about_missing_protection() -> None:

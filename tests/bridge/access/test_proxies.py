@@ -29,9 +29,6 @@ def seen(proxies: Proxies, path: str = "/", kind: str = "http", **scope: Any) ->
     return scopes[0]
 
 
-# --- which headers are trusted --------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("peer", "forwarded", "client"),
     [
@@ -92,9 +89,6 @@ def test_a_proxy_is_an_address_or_a_network(proxy: str) -> None:
     assert repr(proxy) in str(it.value)
 
 
-# --- the prefix -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("path", "whole"),
     [
@@ -123,8 +117,6 @@ def test_a_prefix_is_a_path() -> None:
             Proxies.of(Settings(path_prefix=prefix))
         assert repr(prefix) in str(it.value)
 
-
-# --- the bridge -----------------------------------------------------------------------------------
 
 PROXY, STRANGER = "127.0.0.3", "127.0.0.4"
 
@@ -177,9 +169,6 @@ def test_redirects_and_links_stay_below_the_prefix(live: Served) -> None:
     for path, location in (("/", "signin"), ("/gh1/a/b", "../signin")):
         assert live.get(path, page).headers["location"] == location
     assert live.get("/gh1", BEARER).headers["location"].endswith("/gh1/")
-
-
-# --- names from a proxy ---------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

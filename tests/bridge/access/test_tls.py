@@ -46,9 +46,6 @@ def refusal(cert: Path, key: Path) -> str:
     return message
 
 
-# --- the files ----------------------------------------------------------------------------------
-
-
 def test_a_pair_of_files_that_cannot_be_served_is_named(ours: Certificate, tmp_path: Path) -> None:
     nowhere, odd = tmp_path / "nowhere.pem", tmp_path / "odd.pem"
     assert refusal(nowhere, ours.key) == f"--tls-cert {nowhere}: No such file or directory"
@@ -72,9 +69,6 @@ def test_a_pair_of_files_that_cannot_be_served_is_named(ours: Certificate, tmp_p
 def test_a_bad_file_ends_the_start_with_one_line(ours: Certificate) -> None:
     line = refused_start("--tls-cert", "/nowhere", "--tls-key", str(ours.key))
     assert line == "lupin-twin: --tls-cert /nowhere: No such file or directory"
-
-
-# --- served -------------------------------------------------------------------------------------
 
 
 def test_https_and_wss_are_served_and_announced(secure: Served, ours: Certificate) -> None:
@@ -135,9 +129,6 @@ def test_old_versions_of_tls_are_refused(secure: Served, ours: Certificate) -> N
         old.maximum_version = ssl.TLSVersion.TLSv1_1
     with pytest.raises(httpx.ConnectError), Served(secure.process, secure.url, old).client() as it:
         it.get("/healthz")
-
-
-# --- renewed ------------------------------------------------------------------------------------
 
 
 def renew(ours: Certificate, folder: Path) -> Certificate:

@@ -67,8 +67,6 @@ def test_the_worst_come_first_and_active_ones_before_worse_ones_that_are_over() 
     assert board_of(many).worst == tuple(reversed(many))[:MAX_WORST]
 
 
-# --- a page of alarms -----------------------------------------------------------------------------
-
 VERDICTS = [Verdict.CRITICAL, Verdict.STRESSED, Verdict.UNKNOWN]
 
 
@@ -134,8 +132,6 @@ def test_an_alarm_suppressed_for_its_tags_many_alarms_is_reported_unchanged() ->
     assert change_between(board_of(many[:2]), board_of(many[1:2])) == Change((), (many[0],))
 
 
-# --- notes on alarms ------------------------------------------------------------------------------
-
 NOTED = 10**18
 HOUR = 3_600 * 10**9
 COLD = Alarm("a", Reason(Kind.RANGE, Verdict.STRESSED, "temperature", 9.0, 12.0), "7", NOTED - 1)
@@ -171,9 +167,6 @@ def test_an_alarm_that_comes_back_stays_shelved_unless_it_is_worse_or_of_another
     elsewhere = replace(again, tag_id="8")
     for other, is_shelved in ((again, True), (worse, False), (warm, False), (elsewhere, False)):
         assert ("b" in notes_of_alarms([COLD, other], [SHELF], NOTED)) is is_shelved, other
-
-
-# --- the feed -------------------------------------------------------------------------------------
 
 
 NOW = 10**15
@@ -390,9 +383,6 @@ async def test_a_state_from_before_a_silence_does_not_withdraw_it() -> None:
         await changed(board)
         over = next(alarm for alarm in board.now.alarms if not alarm.tag_id)
         assert (over.reason.kind, over.cleared_at_ns) == ("silent", NOW)
-
-
-# --- without a journal ----------------------------------------------------------------------------
 
 
 def after(store: TwinStore, *writes: Scan | Inspection) -> Snapshot:

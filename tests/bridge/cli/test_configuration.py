@@ -46,9 +46,6 @@ def refusal(
     return str(refused.value)
 
 
-# --- precedence -----------------------------------------------------------------------------------
-
-
 def test_the_command_line_overrides_the_environment_and_that_the_file(config: Any) -> None:
     path = config("port = 1\nmax_clients = 1\nreading_validity_s = 1\n")
     environment = {"LUPIN_PORT": "2", "LUPIN_MAX_CLIENTS": "2"}
@@ -78,9 +75,6 @@ def test_an_environment_variable_may_name_the_file_and_is_named(
     assert refusal({}, {"LUPIN_CONFIG": "/no"}) == "LUPIN_CONFIG /no: No such file or directory"
     for name, says in (("PORT", "input should be a valid integer"), ("HOST", "string should have")):
         assert refusal({}, {f"LUPIN_{name}": ""}).startswith(f"LUPIN_{name} is '': {says}")
-
-
-# --- mistakes -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -145,9 +139,6 @@ def test_an_unknown_variable_of_ours_is_warned_about_and_others_are_ignored() ->
     )
 
 
-# --- secrets --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["token", "mqtt_password", "webhook_secret"])
 def test_a_secret_comes_from_a_variable_which_is_then_removed_or_from_a_file(
     name: str, tmp_path: Path
@@ -177,9 +168,6 @@ def test_a_world_readable_file_causes_a_warning(
         take_secrets(Settings(token_file=str(file)), {})
         assert bool(caplog.messages) == warned
     assert "mode 644: anyone on this machine can read the token" in caplog.text
-
-
-# --- the process ----------------------------------------------------------------------------------
 
 
 def test_the_process_reads_all_three_sources(config: Any, tmp_path: Path) -> None:
@@ -212,9 +200,6 @@ def test_any_mistake_ends_the_start_with_one_line(config: Any, tmp_path: Path) -
     assert refused_start("--token-file", str(short)).startswith(
         "lupin-twin: --token-file has 5 characters, must have at least 16"
     )
-
-
-# --- the table ------------------------------------------------------------------------------------
 
 
 RANGES = {

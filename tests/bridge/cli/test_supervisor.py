@@ -74,9 +74,6 @@ def test_without_a_manager_nothing_is_sent(
     assert len(caplog.messages) == has_socket, "said once"
 
 
-# --- the process ----------------------------------------------------------------------------------
-
-
 @pytest.fixture
 def listening(tmp_path: Path) -> Iterator[Manager]:
     manager = Manager(str(tmp_path / "notify"))

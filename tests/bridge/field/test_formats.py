@@ -66,9 +66,6 @@ def test_a_colour_is_the_one_that_a_browser_shows(
     assert rgb(hue, saturation, lightness) == red_green_blue
 
 
-# --- JSON ---------------------------------------------------------------------------------------
-
-
 def test_json_has_null_for_what_is_not_finite_and_short_decimals() -> None:
     text = formats.write_json(GRID)
     body = json.loads(text, parse_constant=pytest.fail)
@@ -86,9 +83,6 @@ def test_a_large_field_is_written_in_parts_that_form_one_list(
     assert formats.write_json(GRID) == whole
     parts = list(formats.numbers(GRID.values))
     assert parts == [b"10.0,null,20.0,12.5", b",", b"15.0,30.0"]
-
-
-# --- PNG ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("scale", [1, 3])
@@ -122,8 +116,6 @@ def test_every_pixel_of_a_png_is_the_ramps(rows: list[list[float]], scale: int) 
             # 255 steps over 153 levels: at most half a step and half a level off.
             assert abs(alpha - exact) <= 0.81
 
-
-# --- estimates ------------------------------------------------------------------------------------
 
 # The first five of six are known: standard deviations 0, 0.5, .. below 2.25.
 ESTIMATE = an_estimate(width=3, height=2)

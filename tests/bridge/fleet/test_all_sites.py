@@ -191,9 +191,6 @@ def test_an_alarm_comes_with_its_notes_and_a_shelved_one_is_not_counted(every: A
     assert page.http.get("/api/alarms?sites=noted").headers["etag"] != etag
 
 
-# --- comparing ------------------------------------------------------------------------------------
-
-
 def compared(page: Page, **query: str) -> dict[str, Any]:
     answer = page.http.get("/api/compare", params={"sensor_type": "temperature", **query})
     assert answer.status_code == 200, answer.text
@@ -273,9 +270,6 @@ def test_the_configured_sensors_are_those_of_a_bridge(every: All) -> None:
     assert sensors.content == every.page.http.get("/sites/gh1/api/sensors").content
     font = every.page.http.get("/font.woff2")
     assert font.status_code == 200 or "the page was not built" in font.text
-
-
-# --- shift reports and exports --------------------------------------------------------------------
 
 
 def rows_of(begun_s: int) -> list[Write]:
@@ -372,9 +366,6 @@ def test_the_latest_notes_of_all_sites_and_who_withdrew_one(
             " 'site', '', NULL FROM generate_series(1, 50000) AS n"
         )
         assert len(page.http.get(f"/api/report?from={at_s - HOUR_S}").json()["notes"]) == 200
-
-
-# --- rows -----------------------------------------------------------------------------------------
 
 
 def test_sites_are_exported_together_or_by_name(archive: Archive, tmp_path: Path) -> None:

@@ -66,8 +66,6 @@ def ws(page: Page, path: str) -> str:
     return page.url.replace("http", "ws", 1) + path
 
 
-# --- names and paths ------------------------------------------------------------------------------
-
 STRANGE = {
     b"/sites/%2e%2e/": 404,
     b"/sites/gh1/../../api/sites": 404,
@@ -97,9 +95,6 @@ def test_no_process_is_started_for_unknown_sites(page: Page) -> None:
     for number in range(100):
         assert page.http.get(f"/sites/none{number}/api/state").status_code == 404
     assert page.metric("lupin_fleet_sites_open") == before
-
-
-# --- readers --------------------------------------------------------------------------------------
 
 
 def test_a_client_that_reads_many_sites_loses_one_to_another_client(page: Page) -> None:
@@ -178,9 +173,6 @@ def test_an_overview_client_that_never_reads_is_disconnected(
             next(received)
 
 
-# --- processes ------------------------------------------------------------------------------------
-
-
 def test_a_stopped_and_a_killed_process_are_replaced_and_counted(page: Page) -> None:
     assert page.http.get(f"/sites/gh1/{HISTORY}").status_code == 200
 
@@ -229,9 +221,6 @@ def test_an_archive_that_hangs_is_reported_and_recovers(tmp_path: Path) -> None:
                 "the past to be back",
             )
             assert "Traceback" not in running.process.output
-
-
-# --- what is in the archive -----------------------------------------------------------------------
 
 
 def test_unreadable_rows_are_reported_on_the_page_of_their_site(
@@ -352,9 +341,6 @@ def test_a_sites_clock_may_be_wrong_by_a_year(archive: Archive, tmp_path: Path) 
             # A moment in the past of the site can be queried.
             assert [it["tag_id"] for it in past.json()["tags"]] == ["7"]
             assert len(running.http.get(f"{below}/export.csv").text.splitlines()) == 6
-
-
-# --- fatal and passing errors ---------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -190,8 +190,6 @@ async def test_an_unexpected_error_is_logged_once_and_ends_neither_overview_nor_
     await watching.stop()
 
 
-# --- source of the data ---------------------------------------------------------------------------
-
 # Site, what its twin reports, its clock, and what is shown.
 SITES: tuple[tuple[str, Origin, bool, str], ...] = (
     ("robot", "robot", False, "robot"),
@@ -225,9 +223,6 @@ def test_the_source_is_read_from_the_log(archive: Archive, tmp_path: Path) -> No
         # A journal with another use is shown as such.
         record(archive.of_site("simulated"), tmp_path / "simulated", "robot")
         page.site("simulated", origin="robot")
-
-
-# --- small maps -----------------------------------------------------------------------------------
 
 
 def drawn(*tags: tuple[float, float, Verdict]) -> str:

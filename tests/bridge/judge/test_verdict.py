@@ -129,9 +129,6 @@ def test_a_greenhouse_has_its_worst_tags_verdict_or_is_unknown_where_most_tags_a
     assert judge_site(Counter(map(Verdict, tags)), is_silent=False).verdict == greenhouse
 
 
-# --- greenhouses ----------------------------------------------------------------------------------
-
-
 TABLE = json.loads(Path(__file__).with_name("states.json").read_text(encoding="utf-8"))
 STATES = TABLE["states"]
 S = 1_000_000_000

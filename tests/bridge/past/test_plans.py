@@ -155,9 +155,6 @@ def test_readings_hold_as_long_as_the_earlier_scans_imply() -> None:
     assert verdict_of(judged_at(602, old, before_s=[240.0]))[0] == "healthy"
 
 
-# --- refusals -------------------------------------------------------------------------------------
-
-
 def test_too_large_a_past_field_is_refused() -> None:
     limit = replace(RULES, max_grid_cells=40 * 30)
     field_of(SITE, requested(limit), JSON)
@@ -168,9 +165,6 @@ def test_too_large_a_past_field_is_refused() -> None:
     field_of(SITE, requested(replace(RULES, max_grid_cells=4_800), scale=2), PNG)
     with pytest.raises(FieldRefused, match="4800 pixels, the limit is 4799"):
         field_of(SITE, requested(replace(RULES, max_grid_cells=4_799), scale=2), PNG)
-
-
-# --- ETags ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -187,9 +181,6 @@ def test_another_field_has_another_etag(other: Field) -> None:
         return {field_of(SITE, field, it).etag for it in (None, *FORMATS)}
 
     assert not etags(other) & etags(requested())
-
-
-# --- costs, and what is not in the log yet --------------------------------------------------------
 
 
 QUERIES: tuple[Query, ...] = (

@@ -107,9 +107,6 @@ def send(it: Running, *paths: str) -> list[asyncio.Task[httpx.Response]]:
     return [asyncio.create_task(it.http.get(path)) for path in paths]
 
 
-# --- small requests are never queued behind large ones --------------------------------------------
-
-
 async def test_a_flood_of_the_most_expensive_fields_delays_no_tiny_one_nor_that_of_another_client(
     domain: int, held: Held
 ) -> None:
@@ -137,9 +134,6 @@ async def test_a_flood_of_the_most_expensive_fields_delays_no_tiny_one_nor_that_
             assert (await theirs).status_code == 200
         assert sorted([(await task).status_code for task in flood]) == [200] * 12 + [503] * 28
         assert held.begun.index("co2 51") < len(held.begun) - 2, "it passed the flood"
-
-
-# --- only while a client waits --------------------------------------------------------------------
 
 
 async def test_a_client_that_disconnects_cancels_its_work(domain: int, held: Held) -> None:
@@ -179,9 +173,6 @@ async def test_a_time_out_cancels_the_work_too(
         monkeypatch.setattr(type(it.bridge.notes), "notes", None)
         monkeypatch.setattr(it.bridge.notes, "look", lambda: asyncio.sleep(PATIENCE_S))
         assert (await it.http.get("/api/notes")).status_code == 504
-
-
-# --- shared work ----------------------------------------------------------------------------------
 
 
 async def test_identical_requests_take_one_place_and_one_computation(

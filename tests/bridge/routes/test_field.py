@@ -53,9 +53,6 @@ def npy(running: Bridge, **query: Any) -> npt.NDArray[np.float32]:
     return np.load(io.BytesIO(answer.content), allow_pickle=False)  # type: ignore[no-any-return]
 
 
-# --- the same numbers everywhere ----------------------------------------------------------------
-
-
 def test_the_service_and_both_formats_give_the_numbers_of_the_definition(live: Bridge) -> None:
     service = live.peer.get_field(**QUERY)
     body = live.json("/api/field.json", **QUERY)
@@ -82,9 +79,6 @@ def test_the_service_and_both_formats_give_the_numbers_of_the_definition(live: B
     for name, value in body.items():
         as_sent = np.float32(value) if isinstance(value, float) else value
         assert as_sent == getattr(service, name), name
-
-
-# --- formats ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -142,9 +136,6 @@ def test_the_headers_of_every_format_describe_its_content(live: Bridge, suffix: 
     assert headers["cache-control"] == "no-cache"
 
 
-# --- refusals -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("change", "named"),
     [
@@ -186,9 +177,6 @@ def test_an_oversized_grid_is_refused_over_http_as_over_ros(
     assert (service.ok, answer.status_code) == (False, 400)
     assert answer.json()["error_message"] == service.error_message
     assert "the limit is 1000000" in service.error_message
-
-
-# --- ETag ---------------------------------------------------------------------------------------
 
 
 def etag(running: Bridge, path: str = "/api/field.json", **query: Any) -> str:
@@ -271,9 +259,6 @@ def test_only_with_clip_to_explored_a_live_field_ends_where_the_map_does(
     at = observed["sec"] + 1
     wait_for(lambda: changing.get("/api/state", at=at).status_code == 200, "that moment")
     assert changing.json("/api/field", **QUERY, at=at)["values"] == whole
-
-
-# --- quality ------------------------------------------------------------------------------------
 
 
 def test_quality_describes_the_requested_field(live: Bridge) -> None:

@@ -57,9 +57,6 @@ def client(greenhouse: Bridge) -> Iterator[Viewer]:
         yield opened
 
 
-# --- Foxglove's own client ----------------------------------------------------------------------
-
-
 def test_foxgloves_client_finds_and_decodes_the_channels(greenhouse: Bridge) -> None:
     reported = play(greenhouse.url, "look", STATE, INPUT, "/map", DIAGNOSTICS, *LAYERS)
     assert reported["chosen"] == [WEBSOCKET, SDK]
@@ -122,9 +119,6 @@ def test_every_change_by_foxgloves_client_is_refused(greenhouse: Bridge) -> None
     assert greenhouse.peer.node.count_publishers("/cmd_vel") == 0
 
 
-# --- raw frames ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("offered", [(), ("foxglove.sdk.v2",), ("cbor", "ros")])
 def test_without_a_known_subprotocol_it_is_refused(
     greenhouse: Bridge, offered: tuple[str, ...]
@@ -159,9 +153,6 @@ def test_invalid_messages_are_answered_and_the_connection_stays(client: Viewer) 
         assert client.status().startswith(wording)
     client.subscribe(STATE)
     assert client.data(1)
-
-
-# --- in the test's own process --------------------------------------------------------------------
 
 
 SIM = ("--ros-args", "-p", "use_sim_time:=true")

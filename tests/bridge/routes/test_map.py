@@ -87,9 +87,6 @@ def test_a_restarted_bridge_has_no_map_at_first_and_matches_no_earlier_etag(doma
         assert again[path].status_code == 200, "under another tag"
 
 
-# --- its JSON and picture, cell by cell -----------------------------------------------------------
-
-
 FREE, OCCUPIED = 236, 70
 
 

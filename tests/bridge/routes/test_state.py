@@ -44,9 +44,6 @@ def twin() -> Iterator[Bridge]:
         yield running
 
 
-# --- WebSocket ----------------------------------------------------------------------------------
-
-
 def test_a_change_is_pushed_before_the_twins_next_publication(twin: Bridge) -> None:
     with twin.listen() as listener, twin.listen(max_rate_hz=0.01) as rare:
         listener.until("state")
@@ -72,9 +69,6 @@ def test_an_invalid_request_is_refused_with_the_reason(twin: Bridge) -> None:
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 1008
             assert closed.value.rcvd.reason == reason
-
-
-# --- one tag ------------------------------------------------------------------------------------
 
 
 def test_a_live_bridge_is_healthy_and_ready(twin: Bridge) -> None:
@@ -115,9 +109,6 @@ def test_a_hostile_tag_id_is_a_plain_404(twin: Bridge, tag_id: str) -> None:
         assert len(schema.ErrorMessage.model_validate_json(answer.content).detail) < 400
         assert "set-cookie" not in answer.headers
         assert answer.headers["content-type"] == "application/json"
-
-
-# --- history ------------------------------------------------------------------------------------
 
 
 def history(twin: Bridge, tag_id: str) -> dict[str, list[Any]]:
@@ -162,9 +153,6 @@ def test_attempts_and_their_times_are_reported(twin: Bridge) -> None:
         (3610, 0, 1), (7210, 0, 0), (7300, 2, 0),
     ]  # fmt: skip
     assert past["tries"][-1]["status_detail"] == "not decoded"
-
-
-# --- a bridge whose ROS thread has ended ----------------------------------------------------------
 
 
 def reads(served: Running, tag_id: str, sensor_type: str) -> bool:
@@ -214,9 +202,6 @@ async def test_when_the_ros_thread_ends_health_reports_it_and_every_client_is_no
         assert (answer.status_code, "co2" in answer.text) == (200, True)
         async with connect(ws_url(served.url), proxy=None, open_timeout=PATIENCE_S) as late:
             assert json.loads(await late.recv())["reason"] == "thread_dead"
-
-
-# --- alarms ---------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -301,9 +286,6 @@ async def test_a_period_has_the_alarms_that_were_active_in_it_and_their_number_i
         many = [alarm(str(number)) for number in range(MAX_ALARMS + 1)]
         it.bridge.alarms.put(board_of(many), Change(tuple(many)), "journal", 0)
         assert len((await it.http.get("/api/alarms")).json()["alarms"]) == MAX_ALARMS
-
-
-# --- verdicts -------------------------------------------------------------------------------------
 
 
 def verdicts(live: Bridge) -> dict[str, str]:

@@ -52,9 +52,6 @@ def open_files() -> set[str]:
     return {entry.name for entry in Path("/proc/self/fd").iterdir()}
 
 
-# --- the socket ---------------------------------------------------------------------------------
-
-
 def test_hundreds_of_simultaneous_connections_need_no_second_attempt() -> None:
     with listen("127.0.0.1", 0) as listener, ExitStack() as stack:
         clients = [stack.enter_context(socket.socket()) for _ in range(400)]
@@ -145,9 +142,6 @@ def last_words(listener: Listener) -> tuple[str, int]:
         return reason, 0 if closed.rcvd is None else closed.rcvd.code
 
 
-# --- shutdown -----------------------------------------------------------------------------------
-
-
 def test_a_signal_ends_it_and_all_clients_are_notified_whether_they_read_or_not() -> None:
     with (
         bridge() as running_bridge,
@@ -218,9 +212,6 @@ def test_the_shutdown_times_add_up_to_the_documented_one() -> None:
     assert GRACEFUL_SHUTDOWN_S + max(STOP_TIMEOUT_S, FEEDER_STOP_S) + IDLE_WORKERS_END_S <= 2.0
 
 
-# --- answers are sent as fast as they are read ----------------------------------------------------
-
-
 # 1,000,000 cells, 5 MB of JSON: more than two sockets buffer.
 LARGE_FIELD = (
     "/api/field.json?sensor_type=co2&resolution=0.01"
@@ -264,9 +255,6 @@ def test_stuck_readers_hold_only_their_own_places_and_are_cut_off(live: Served) 
         assert all(len(raw_http.received(client)) < 4_000_000 for client in deaf)
     wait_for(lambda: live.get(SMALL_FIELD).status_code == 200, "their places to be free")
     assert "ERROR" not in live.process.output
-
-
-# --- behind a proxy on the same machine, by a Unix socket -----------------------------------------
 
 
 @pytest.fixture

@@ -123,9 +123,6 @@ async def test_a_refused_client_can_read_the_reason(
         await asyncio.to_thread(send_and_receive, served.url)
 
 
-# --- JSON messages of a client, at the limits and past them ---------------------------------------
-
-
 def refusal(message: str | bytes) -> str:
     with pytest.raises(ValueError, match=r".") as caught:
         members_of(message)
@@ -154,9 +151,6 @@ def test_deep_nesting_is_refused(opening: str, closing: str) -> None:
     for end in ("", f"0{closing * levels}}}"):
         text = refusal(f'{{"x":{opening * levels}{end}')
         assert text.startswith("the message is not JSON: ")
-
-
-# --- large messages in pieces, parsed by another library ------------------------------------------
 
 
 def read(wire: bytes) -> list[Frame]:
@@ -214,9 +208,6 @@ def test_nothing_is_copied() -> None:
     message = bytes(300_000)
     views = [payload for _, payload in pieces(frame_head(BINARY, len(message)), message)]
     assert all(it.obj is message for it in views if isinstance(it, memoryview))
-
-
-# --- sockets to a reader that does not read -------------------------------------------------------
 
 
 # More than any socket buffers.

@@ -53,9 +53,6 @@ def snapshot(*tags: TagState, stamp_ns: int = 10**10) -> Snapshot:
     return Snapshot(stamp_ns, "map", tags)
 
 
-# --- made once, dropped when no longer needed ---------------------------------------------------
-
-
 def test_no_more_than_two_frames_are_cached() -> None:
     writer = FrameWriter()
     frames: list[StateFrame] = []
@@ -65,8 +62,6 @@ def test_no_more_than_two_frames_are_cached() -> None:
     assert frames[3].base is frames[2]
     assert frames[2].base is None, "or every frame ever made would stay in memory"
 
-
-# --- deltas -------------------------------------------------------------------------------------
 
 STEPS = st.lists(
     st.dictionaries(st.sampled_from("abcdef"), st.integers(0, 2), max_size=6),
@@ -112,8 +107,6 @@ def test_applying_the_deltas_gives_the_state(steps: list[dict[str, int]]) -> Non
         assert ageless(mine) == ageless(whole)
 
 
-# --- size ---------------------------------------------------------------------------------------
-
 # What every browser gets ten times a second, for thirty tags with five sensors each.
 MAX_GREENHOUSE_BYTES = 16_000
 
@@ -145,9 +138,6 @@ def test_a_frame_of_a_greenhouse_is_within_its_budget_of_bytes() -> None:
     assert verdicts == {"healthy": 27, "critical": 3}
     frame = FrameWriter().state(scanned, "0123456789abcdef-1234-5", judged)
     assert len(frame.full()) <= MAX_GREENHOUSE_BYTES
-
-
-# --- a snapshot as JSON ---------------------------------------------------------------------------
 
 
 ANY_NUMBER = st.floats(width=64)

@@ -89,9 +89,6 @@ def stage() -> Stage:
     return Stage()
 
 
-# --- everyone -----------------------------------------------------------------------------------
-
-
 def test_the_age_in_a_status_is_that_at_the_time_of_sending(stage: Stage) -> None:
     stage.announce("stale", 3.0)
     sockets = [Socket(), Socket(), Socket(room=0)]
@@ -144,9 +141,6 @@ def test_eviction_needs_an_address_with_two_fewer(mine: int, gets_a_place: bool)
     assert len(stage.hub) == mine + 3 - gets_a_place
 
 
-# --- slow clients -------------------------------------------------------------------------------
-
-
 def test_a_slow_client_is_never_queued_for_and_gets_the_latest_frame(stage: Stage) -> None:
     slow, quick = Socket(room=1), Socket()
     client = stage.join(slow, wants_status=False)
@@ -194,9 +188,6 @@ def test_a_client_that_takes_nothing_for_too_long_is_closed_and_removed(stage: S
     assert (quick.dismissed, len(stage.hub)) == (None, 1)
     assert stage.hub.dismiss_stuck(1_000.0) == 0
     assert stage.hub.clients_dismissed == 1
-
-
-# --- options of a client ------------------------------------------------------------------------
 
 
 def test_deltas_go_to_clients_that_chose_them_and_have_the_frame_before(stage: Stage) -> None:
@@ -249,9 +240,6 @@ def test_a_rate_is_a_mean(stage: Stage, times_s: Sequence[float], got: list[int]
     for now_s in times_s:
         stage.publish(now_s)
     assert on_average.got == got
-
-
-# --- alarms -------------------------------------------------------------------------------------
 
 
 def test_every_change_of_alarms_goes_to_everyone_whole_and_after_the_first_state() -> None:

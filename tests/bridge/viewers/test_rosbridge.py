@@ -64,9 +64,6 @@ def frame(*tag_ids: str) -> StateFrame:
     return FrameWriter().state(Snapshot(0, "map", tuple(TagState(t) for t in tag_ids)), "r")
 
 
-# --- subscriptions ----------------------------------------------------------------------------
-
-
 def test_the_type_may_be_given_in_both_forms_and_ending_an_unknown_one_is_worth_a_warning(
     session: Session,
 ) -> None:
@@ -132,9 +129,6 @@ def test_a_topic_is_fed_by_the_options_of_its_last_subscription(session: Session
     assert session.feeds == {}
 
 
-# --- the state on the wire --------------------------------------------------------------------
-
-
 def test_a_topic_has_the_name_that_the_client_used(session: Session) -> None:
     subscribe(session, topic="twin/state")
     subscribe(session, "a", topic="twin/state")
@@ -144,9 +138,6 @@ def test_a_topic_has_the_name_that_the_client_used(session: Session) -> None:
     assert spellings == ["twin/state", "/twin/state"]
     unsubscribe(session, topic="twin/state")
     assert [text["topic"] for text in texts_of(session.wire(frame()))] == ["/twin/state"]
-
-
-# --- calls, levels and everything else --------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -174,9 +165,6 @@ def test_an_id_of_a_wrong_type_is_refused_and_not_repeated(
     [reply] = replies(send(session, op="unsubscribe", topic=TOPIC, id=message_id))
     assert reply["msg"].startswith("id is ")
     assert "id" not in reply
-
-
-# --- messages in JSON, compared with the output of rosbridge_suite --------------------------------
 
 
 class Stamp:
@@ -241,9 +229,6 @@ def test_a_text_that_is_not_unicode_is_refused(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setitem(Everything.FIELDS, "text", ("string", "\udcff"))
     with pytest.raises(ValueError, match="UTF-8"):
         json_of(Everything())
-
-
-# --- feeds over a scripted relay ------------------------------------------------------------------
 
 
 INPUT = Topic("a/msg/B", "", "/in", depth=3)

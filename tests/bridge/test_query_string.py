@@ -196,12 +196,16 @@ def span(kind: type[query_string.OfPeriod], **given: str) -> tuple[int, int]:
     return start_ns, end_ns
 
 
-def test_the_default_is_all_that_is_stored() -> None:
+def test_the_default_period_is_all_that_is_stored_and_none_may_be_inverted() -> None:
     assert query_string.at([], NOW_NS) is None
     for kind in (HISTORY, TIMELINE, EXPORT):
         assert span(kind) == (0, 0)
     assert query(HISTORY).points == query(TIMELINE).points == DEFAULT_POINTS
     assert query(TIMELINE).tag_id is query(EXPORT).tag_id is query(EXPORT).sensor_type is None
+    assert span(EXPORT, from_="2000", to="2001") == (2_000 * NS, 2_001 * NS)
+    assert span(EXPORT, from_="5", to="5") == (5 * NS, 5 * NS)
+    with pytest.raises(PastRefused, match=r"^to is 4\.999999999 s, before from, 5\.000000000 s"):
+        span(EXPORT, from_="5", to="4.999999999")
 
 
 def test_a_report_of_the_first_hours_begins_at_0_and_without_a_known_time_it_needs_an_end() -> None:
@@ -221,13 +225,6 @@ def test_now_is_valid_and_the_future_is_refused_unless_now_is_unknown() -> None:
     with pytest.raises(PastRefused, match=r"^from is 1000\.000000001 s, later than now"):
         span(HISTORY, from_=later)
     assert query_string.at([("at", "2000000000")], None) == 2 * 10**9 * NS
-
-
-def test_a_period_may_end_after_now_and_be_empty_but_not_be_inverted() -> None:
-    assert span(EXPORT, from_="2000", to="2001") == (2_000 * NS, 2_001 * NS)
-    assert span(EXPORT, from_="5", to="5") == (5 * NS, 5 * NS)
-    with pytest.raises(PastRefused, match=r"^to is 4\.999999999 s, before from, 5\.000000000 s"):
-        span(EXPORT, from_="5", to="4.999999999")
 
 
 @pytest.mark.parametrize("kind", [HISTORY, TIMELINE, EXPORT])

@@ -149,12 +149,17 @@ def test_only_its_owner_can_read_the_file_and_it_holds_no_secret(path: Path) -> 
     assert b"$argon2id$" in raw
 
 
-def test_a_session_ends_when_it_expires_and_with_its_account(path: Path) -> None:
+def test_sessions_per_name_are_limited_and_end_when_they_expire_and_with_their_account(
+    path: Path,
+) -> None:
     add(path, anna="operator")
     with changing(path) as accounts:
+        names = [digest(begin_session(accounts, NOW + n)) for n in range(25)]
+        found = [accounts.of_session(name, NOW) for name in names]
+        assert [it is not None for it in found] == [False] * 5 + [True] * 20
         name, anna = digest(begin_session(accounts)), accounts.of_name("anna")
-        found = accounts.of_session(name, NOW + SESSION_S - 1)
-        assert found == Person("anna", "operator", session=name, ends_at_s=NOW + SESSION_S)
+        whose = accounts.of_session(name, NOW + SESSION_S - 1)
+        assert whose == Person("anna", "operator", session=name, ends_at_s=NOW + SESSION_S)
         assert accounts.of_session(name, NOW + SESSION_S) is None
         accounts.remove("anna", "account", by="a test", now_s=NOW)
         assert accounts.of_session(name, NOW) is None
@@ -164,14 +169,6 @@ def test_a_session_ends_when_it_expires_and_with_its_account(path: Path) -> None
     add(path, anna="admin")
     with closing(Accounts(path)) as accounts:
         assert accounts.of_session(name, NOW) is None, "of another anna"
-
-
-def test_sessions_per_name_are_limited(path: Path) -> None:
-    add(path, anna="operator")
-    with changing(path) as accounts:
-        names = [digest(begin_session(accounts, NOW + n)) for n in range(25)]
-        found = [accounts.of_session(name, NOW) for name in names]
-        assert [it is not None for it in found] == [False] * 5 + [True] * 20
 
 
 def test_a_name_belongs_to_one_person_or_one_token(path: Path) -> None:

@@ -71,13 +71,21 @@ def test_a_bad_file_ends_the_start_with_one_line(ours: Certificate) -> None:
     assert line == "lupin-twin: --tls-cert /nowhere: No such file or directory"
 
 
-def test_https_and_wss_are_served_and_announced(secure: Served, ours: Certificate) -> None:
+def test_https_and_wss_are_served_the_own_origin_is_https_and_the_cookie_is_secure(
+    secure: Served, ours: Certificate
+) -> None:
     assert secure.url.startswith("https://127.0.0.1:")
     assert secure.get("/api/state", BEARER).json()["tags"] == []
     with wss(ws_url(secure.url), ours.trust, BEARER) as connection:
         first = connection.next_state()["seq"]
         for number in range(1, 4):
             assert connection.next_state()["seq"] == first + number
+    for origin, status in ((secure.url, 200), (secure.url.replace("https", "http"), 403)):
+        assert secure.get("/api/state", {**BEARER, "Origin": origin}).status_code == status
+    cookie = secure.post("/api/signin", BEARER).headers["set-cookie"]
+    assert "secure" in [part.strip().lower() for part in cookie.split(";")]
+    # No HSTS: a self-signed certificate must not be pinned in a browser.
+    assert "strict-transport-security" not in secure.get("/signin").headers
 
 
 def test_a_request_in_the_same_packet_as_the_end_of_the_handshake_is_answered(
@@ -111,15 +119,6 @@ def test_a_request_in_the_same_packet_as_the_end_of_the_handshake_is_answered(
                 except ssl.SSLWantReadError:
                     take()
         assert "cut off" not in live.process.output
-
-
-def test_the_bridges_own_origin_is_https_and_its_cookie_is_secure(secure: Served) -> None:
-    for origin, status in ((secure.url, 200), (secure.url.replace("https", "http"), 403)):
-        assert secure.get("/api/state", {**BEARER, "Origin": origin}).status_code == status
-    cookie = secure.post("/api/signin", BEARER).headers["set-cookie"]
-    assert "secure" in [part.strip().lower() for part in cookie.split(";")]
-    # No HSTS: a self-signed certificate must not be pinned in a browser.
-    assert "strict-transport-security" not in secure.get("/signin").headers
 
 
 def test_old_versions_of_tls_are_refused(secure: Served, ours: Certificate) -> None:

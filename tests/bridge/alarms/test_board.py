@@ -112,7 +112,7 @@ def test_a_page_has_all_in_their_order_and_a_change_is_what_differs(seed: int) -
         before = page
 
 
-def test_changes_are_reported_in_the_order_in_which_they_happened_without_the_unchanged() -> None:
+def test_changes_are_reported_in_the_order_of_their_time_and_suppressed_ones_unchanged() -> None:
     first, second = alarm("a", raised_ns=3), alarm("b", raised_ns=5)
     before = board_of([second, first])
     assert change_between(before, board_of([first, second])) == Change(())
@@ -120,9 +120,6 @@ def test_changes_are_reported_in_the_order_in_which_they_happened_without_the_un
     page = board_of([cleared, first, third])
     assert change_between(before, page) == Change((third, cleared))
     assert page.alarms == (third, cleared, first)
-
-
-def test_an_alarm_suppressed_for_its_tags_many_alarms_is_reported_unchanged() -> None:
     many = [
         replace(alarm("a", raised_ns=number), id=str(number), cleared_at_ns=number + 1)
         for number in range(MAX_EPISODES + 1)
@@ -139,7 +136,7 @@ SHELF = Note("1", NOTED, "anna", SHELVE, "alarm:a", "heater", NOTED + HOUR)
 FOUND = Note("0", NOTED, "bert", ACKNOWLEDGE, "alarm:a")
 
 
-def test_a_shelf_ends_at_its_time_or_by_a_later_note_or_by_withdrawal() -> None:
+def test_a_shelf_ends_at_its_time_and_holds_for_an_alarm_that_comes_back_no_worse() -> None:
     assert "a" in notes_of_alarms([COLD], [SHELF], NOTED + HOUR - 1)
     assert notes_of_alarms([COLD], [SHELF], None) == {}
     assert notes_of_alarms([COLD], [SHELF], NOTED + HOUR) == {}
@@ -148,6 +145,12 @@ def test_a_shelf_ends_at_its_time_or_by_a_later_note_or_by_withdrawal() -> None:
     assert (
         notes_of_alarms([COLD], [SHELF, Note("2", NOTED, "anna", WITHDRAW, "note:1")], NOTED) == {}
     )
+    again = replace(COLD, id="b")
+    worse = replace(again, reason=replace(COLD.reason, verdict=Verdict.CRITICAL))
+    warm = replace(again, reason=replace(COLD.reason, value=40.0, limit=30.0))
+    elsewhere = replace(again, tag_id="8")
+    for other, is_shelved in ((again, True), (worse, False), (warm, False), (elsewhere, False)):
+        assert ("b" in notes_of_alarms([COLD, other], [SHELF], NOTED)) is is_shelved, other
 
 
 @pytest.mark.parametrize("message", [SHELF, FOUND], ids=["shelved", "acknowledged"])
@@ -158,15 +161,6 @@ def test_notes_end_when_their_alarm_gets_worse_and_later_ones_hold(message: Note
     assert notes_of_alarms([worse], [message], NOTED + 1) == {}
     again = replace(message, id="2", made_at_ns=NOTED + 1)
     assert "a" in notes_of_alarms([worse], [message, again], NOTED + 2)
-
-
-def test_an_alarm_that_comes_back_stays_shelved_unless_it_is_worse_or_of_another_kind() -> None:
-    again = replace(COLD, id="b")
-    worse = replace(again, reason=replace(COLD.reason, verdict=Verdict.CRITICAL))
-    warm = replace(again, reason=replace(COLD.reason, value=40.0, limit=30.0))
-    elsewhere = replace(again, tag_id="8")
-    for other, is_shelved in ((again, True), (worse, False), (warm, False), (elsewhere, False)):
-        assert ("b" in notes_of_alarms([COLD, other], [SHELF], NOTED)) is is_shelved, other
 
 
 NOW = 10**15

@@ -88,15 +88,12 @@ def command(action: str, url: str, **env: str) -> CompletedProcess[str]:
     return run("archive", action, "--archive-url", url, **env)
 
 
-def test_info_has_a_line_a_site(two_sites: Archive) -> None:
+def test_info_has_a_line_a_site_and_check_tells_rows_that_fit_no_other(two_sites: Archive) -> None:
     two_sites.do("INSERT INTO site VALUES ('gh3', 'Named before it is forwarded')")
     told = command("info", two_sites.owner).stdout.splitlines()
     assert told.pop().endswith("the last received never; never forwarded; 0 journals")
     found = [line.partition(", 0 looks, 0 places; ")[0] for line in told]
     assert found == ["gh1: 1 scans", "gh2: 1 scans"]
-
-
-def test_check_tells_rows_that_fit_no_other(two_sites: Archive) -> None:
     assert "is whole" in command("check", two_sites.owner).stdout
     two_sites.do("DELETE FROM series WHERE site = 'gh1'")
     done = command("check", two_sites.owner)
@@ -263,11 +260,17 @@ def retain(archive: Archive, days: int, *more: str) -> str:
     return done.stdout
 
 
-def test_rows_lie_by_the_month_of_their_stamp_and_the_next_month_is_there(sites: Archive) -> None:
+def test_rows_lie_by_the_month_and_one_in_which_another_site_has_rows_stays(sites: Archive) -> None:
     assert parts(sites) == sorted({month(at) for at in stamps(*AGES)})
     for at in stamps(*AGES):
         after = datetime.fromtimestamp(at / SECOND, UTC).replace(day=1).timestamp() + 32 * 86_400
         assert exists(sites, month(int(after) * SECOND))
+    sites.copy_site("gh3")
+    retain(sites, 60, "--site", "gh1")
+    assert sorted(row[2] for row in sites.rows()["scan"]) == stamps(*AGES)[2:]
+    for table, stamp in (("scan", 2), ("look", 3)):
+        assert sorted(row[stamp] for row in sites.rows("gh3")[table]) == stamps(*AGES)
+    assert exists(sites, month(stamps(*AGES)[0]))
 
 
 def test_a_simulated_clock_has_a_part_of_its_own(archive: Archive, tmp_path: Path) -> None:
@@ -339,12 +342,3 @@ def test_of_one_site_alone(sites: Archive) -> None:
     ):
         done = run("archive", "retain", "--archive-url", sites.owner, *given)
         assert (done.returncode, done.stderr) == (code, f"lupin-twin: {said}\n")
-
-
-def test_a_month_in_which_another_site_has_rows_stays(sites: Archive) -> None:
-    sites.copy_site("gh3")
-    retain(sites, 60, "--site", "gh1")
-    assert sorted(row[2] for row in sites.rows()["scan"]) == stamps(*AGES)[2:]
-    for table, stamp in (("scan", 2), ("look", 3)):
-        assert sorted(row[stamp] for row in sites.rows("gh3")[table]) == stamps(*AGES)
-    assert exists(sites, month(stamps(*AGES)[0]))

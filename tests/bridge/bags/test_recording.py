@@ -45,12 +45,11 @@ def test_files_and_folders_are_played_as_one_recording_in_the_order_of_time(
         assert [it.log_ns // 10**9 for it in part] == [3, 4]
 
 
-def test_a_file_without_chunks_or_without_messages_is_read(tmp_path: Path) -> None:
+def test_a_file_without_chunks_or_messages_is_read_and_of_several_grids_only_maps(
+    tmp_path: Path,
+) -> None:
     plain = write_bag(tmp_path / "plain.mcap", sent(1, 2), is_chunked=False)
     assert times(plain, write_bag(tmp_path / "empty.mcap", [])) == [1, 2]
-
-
-def test_of_several_grids_only_maps_are_played(tmp_path: Path) -> None:
     grid = occupancy_grid([[0]])
     names = ["/costmap", "/gh1/map", "/local_costmap"]
     path = write_bag(tmp_path / "a.mcap", [*sent(1), *(Sent(name, 1, grid) for name in names)])

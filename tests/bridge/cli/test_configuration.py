@@ -46,7 +46,9 @@ def refusal(
     return str(refused.value)
 
 
-def test_the_command_line_overrides_the_environment_and_that_the_file(config: Any) -> None:
+def test_the_command_line_overrides_the_environment_and_that_the_file_also_for_lists(
+    config: Any,
+) -> None:
     path = config("port = 1\nmax_clients = 1\nreading_validity_s = 1\n")
     environment = {"LUPIN_PORT": "2", "LUPIN_MAX_CLIENTS": "2"}
     settings = settings_from({"port": "3"}, environment, path)
@@ -54,9 +56,6 @@ def test_the_command_line_overrides_the_environment_and_that_the_file(config: An
     assert settings.called("port") == "--port"
     assert settings.called("max_clients") == "LUPIN_MAX_CLIENTS"
     assert settings.called("reading_validity_s") == f"{path} line 3: reading_validity_s"
-
-
-def test_a_list_is_taken_whole_from_the_first_place_that_sets_it(config: Any) -> None:
     path = config('allow_host = ["of.the.file"]\n')
     environment = {"LUPIN_ALLOW_HOST": "one.example, two.example ,"}
     assert settings_from({}, {}, path).allow_host == ("of.the.file",)

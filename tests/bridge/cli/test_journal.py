@@ -81,7 +81,9 @@ def test_the_default_file_is_found_by_the_rule_of_the_node(
 ACTIONS = ("info", "check", "export", "vacuum")
 
 
-def test_a_missing_file_is_named_and_not_created(tmp_path: Path, path: Path) -> None:
+def test_a_missing_or_inaccessible_file_is_named_and_not_created(
+    tmp_path: Path, path: Path, home: Path
+) -> None:
     before = sorted(tmp_path.iterdir())
     for action in ACTIONS:
         done = journal(action, "--journal", tmp_path / "none.sqlite")
@@ -89,6 +91,12 @@ def test_a_missing_file_is_named_and_not_created(tmp_path: Path, path: Path) -> 
         line = f"lupin-twin: there is no journal {tmp_path}/none.sqlite; in its folder there are j."
         assert done.stderr.startswith(line)
     assert sorted(tmp_path.iterdir()) == before
+    home.mkdir(parents=True)
+    for action, option in product(ACTIONS, ("--journal", "--namespace")):
+        done = journal(action, option, "x" * 300)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert done.stderr.startswith("lupin-twin: cannot look for the journal /")
+        assert done.stderr.endswith(": File name too long\n")
 
 
 @pytest.mark.parametrize(
@@ -127,15 +135,6 @@ def test_an_invalid_domain_journal_or_period_is_one_clear_line(
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
     assert done.stderr.startswith("lupin-twin: ")
     assert named in done.stderr
-
-
-def test_an_inaccessible_path_is_named(home: Path) -> None:
-    home.mkdir(parents=True)
-    for action, option in product(ACTIONS, ("--journal", "--namespace")):
-        done = journal(action, option, "x" * 300)
-        assert (done.returncode, done.stdout) == (1, "")
-        assert done.stderr.startswith("lupin-twin: cannot look for the journal /")
-        assert done.stderr.endswith(": File name too long\n")
 
 
 def test_a_file_of_another_application_is_left_alone_and_named(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ def places(log: RobotLog) -> list[float]:
     return [it.x for it in log.trail]
 
 
-def test_the_latest_of_each_is_stored_and_only_changes_are_reported() -> None:
+def test_the_latest_of_each_is_stored_with_or_without_a_clock_and_only_changes_reported() -> None:
     log = RobotLog()
     here, full = position(1.0, 100.0), Battery(64.0, 90 * S)
     assert log.take(Robot(position=here), 100 * S)
@@ -30,6 +30,11 @@ def test_the_latest_of_each_is_stored_and_only_changes_are_reported() -> None:
     assert not log.take(Robot(position=here), 103 * S)
     assert not log.take(Robot(position=position(9.0, 99.0)), 104 * S), "an older one"
     assert log.now.position == here
+    log = RobotLog()
+    # With a clock that stands still, the last one is the latest.
+    for x in (1.0, 2.0):
+        log.take(Robot(position=position(x, 50.0)), None)
+        assert log.now == Robot(position(x, 50.0))
 
 
 def test_points_of_a_trail_are_apart_in_distance_and_in_time() -> None:
@@ -45,7 +50,7 @@ def test_points_of_a_trail_are_apart_in_distance_and_in_time() -> None:
     assert places(log) == [0.0, 0.1, 0.3]
 
 
-def test_a_trail_ends_after_an_hour_also_while_the_robot_is_silent() -> None:
+def test_a_trail_ends_after_an_hour_also_of_a_silent_robot_and_a_bounded_one_covers_it() -> None:
     log = RobotLog()
     drive(log, position(0.0, 100.0), position(1.0, 200.0))
     log.take(Robot(), 3_700 * S)
@@ -55,9 +60,6 @@ def test_a_trail_ends_after_an_hour_also_while_the_robot_is_silent() -> None:
     log.take(Robot(), 9_999 * S)
     assert places(log) == []
     assert log.now.position is not None, "where it was last is still known"
-
-
-def test_a_bounded_trail_still_covers_an_hour() -> None:
     log = RobotLog()
     drive(log, *(position(float(second), 100.0 + second) for second in range(3_600)))
     trail = places(log)
@@ -111,11 +113,3 @@ def test_an_empty_plan_and_one_from_ten_minutes_ago_are_ignored() -> None:
         log.take(Robot(plan=received), now_ns)
         plans.append(log.now.plan)
     assert plans == [there, there, None, again, None]
-
-
-def test_without_a_clock_stamps_are_taken_as_they_are() -> None:
-    log = RobotLog()
-    # With a clock that stands still, the last one is the latest.
-    for x in (1.0, 2.0):
-        log.take(Robot(position=position(x, 50.0)), None)
-        assert log.now == Robot(position(x, 50.0))

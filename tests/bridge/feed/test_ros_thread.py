@@ -141,7 +141,9 @@ def test_events_after_the_loop_has_closed_do_no_harm(domain: int) -> None:
         asyncio.run(end())
 
 
-async def test_an_error_of_a_ros_future_is_raised(domain: int) -> None:
+async def test_an_error_of_a_ros_future_is_raised_and_a_cancelled_one_released_in_its_thread(
+    domain: int,
+) -> None:
     def start(node: Probe) -> Future:
         future = Future(executor=node.executor)
         future.set_exception(OSError("no"))
@@ -150,9 +152,6 @@ async def test_an_error_of_a_ros_future_is_raised(domain: int) -> None:
     async with Stage() as stage:
         with pytest.raises(OSError, match="no"):
             await stage.ros.ask(start, lambda *_: None)
-
-
-async def test_a_cancelled_future_is_released_in_the_thread_of_the_nodes(domain: int) -> None:
     async with Stage() as stage:
         requested, given_up = Future(), list[tuple[Future, threading.Thread]]()
         waiting = asyncio.create_task(

@@ -66,18 +66,15 @@ def test_a_colour_is_the_one_that_a_browser_shows(
     assert rgb(hue, saturation, lightness) == red_green_blue
 
 
-def test_json_has_null_for_what_is_not_finite_and_short_decimals() -> None:
+def test_json_has_null_for_what_is_not_finite_and_a_large_field_is_written_in_parts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     text = formats.write_json(GRID)
     body = json.loads(text, parse_constant=pytest.fail)
     assert body["values"] == [10.0, None, 20.0, 12.5, 15.0, 30.0]
     assert (body["origin_x"], body["origin_y"]) == (-1.25, 2.5)
     assert b'"resolution_used":0.1,' in text
     assert (body["value_min"], body["value_max"], body["sample_count"]) == (10.0, 30.0, 5)
-
-
-def test_a_large_field_is_written_in_parts_that_form_one_list(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
     whole = formats.write_json(GRID)
     monkeypatch.setattr(formats, "_AT_ONCE", 4)
     assert formats.write_json(GRID) == whole

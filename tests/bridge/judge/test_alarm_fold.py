@@ -237,7 +237,7 @@ def reported(received: Sequence[PastWrite], later_ns: int = 0) -> list[Alarm]:
     return list(follow([received], SPANS[0], received[-1].stamp_ns + later_ns))
 
 
-def test_two_scans_raise_an_alarm_and_two_clear_it() -> None:
+def test_two_scans_raise_an_alarm_and_two_clear_it_and_a_worse_one_is_the_same_alarm() -> None:
     assert reported(scans([22, 17, 22, 17, 22])) == []
     (alarm,) = reported(scans([22, 17, 16, 22, 16.5, 22, 22, 17]))
     at = [(at_ns - START) // MINUTE for at_ns in (alarm.raised_at_ns, alarm.cleared_at_ns or 0)]
@@ -247,9 +247,6 @@ def test_two_scans_raise_an_alarm_and_two_clear_it() -> None:
     assert (reason.value, reason.limit, reason.verdict) == (16, 18, "stressed")
     assert reason.since_ns == START + MINUTE
     assert alarm.worst == 16
-
-
-def test_an_alarm_that_gets_worse_is_the_same_alarm_with_a_worse_verdict() -> None:
     (stressed,) = reported(scans([17, 17]))
     (critical,) = reported(scans([17, 17, 6, 12]))
     assert critical.id == stressed.id

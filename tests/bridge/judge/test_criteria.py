@@ -82,14 +82,13 @@ def criteria(**settings: Any) -> Criteria:
     return Criteria.of(Settings(**settings))
 
 
-def test_the_default_is_our_own_file_and_the_scan_interval() -> None:
+def test_the_default_is_our_own_file_and_a_mistake_in_another_is_reported_with_its_line(
+    tmp_path: Path,
+) -> None:
     chosen = criteria()
     assert chosen.sensors == own_sensors()
     assert chosen.recent_s is None
     assert criteria(reading_validity_s=900.0).recent_s == 900.0
-
-
-def test_a_mistake_in_the_file_is_reported_with_its_line(tmp_path: Path) -> None:
     file = tmp_path / "mine.json"
     file.write_text(own_sensors().text.replace('"ideal": [18, 26]', '"ideal": [26, 18]'), "utf-8")
     says = f"--sensors {file}: sensors.temperature: ideal is [26.0, 18.0], and low must be"
@@ -108,7 +107,7 @@ def test_a_file_is_not_read_past_its_limit(tmp_path: Path) -> None:
         criteria(sensors=str(file))
 
 
-def test_the_hours_of_the_day_are_those_of_the_greenhouse() -> None:
+def test_the_hours_of_the_day_are_those_of_the_greenhouse_and_simulated_time_has_none() -> None:
     clock = criteria(time_zone="Europe/Amsterdam", day_hours="07:30-19:00").clock
     summer = datetime(2026, 7, 1, 5, 29, tzinfo=UTC).timestamp()
     assert not clock.is_day(summer)
@@ -116,6 +115,8 @@ def test_the_hours_of_the_day_are_those_of_the_greenhouse() -> None:
     winter = datetime(2026, 1, 1, 6, 29, tzinfo=UTC).timestamp()
     assert not clock.is_day(winter)
     assert clock.is_day(winter + 60)
+    assert unix_s(3_600 * 10**9) is None
+    assert unix_s(1_790_000_000 * 10**9) == 1_790_000_000
 
 
 @pytest.mark.parametrize(
@@ -136,8 +137,3 @@ def test_an_unknown_time_zone_and_invalid_hours_are_refused(
         text = re.escape(f"--{name.replace('_', '-')} is '{value}', {says}")
         with pytest.raises(SettingError, match=text):
             criteria(**{name: value})
-
-
-def test_simulated_time_has_no_hours_of_a_wall_clock() -> None:
-    assert unix_s(3_600 * 10**9) is None
-    assert unix_s(1_790_000_000 * 10**9) == 1_790_000_000

@@ -131,7 +131,7 @@ def test_a_late_scan_corrects_its_day() -> None:
     assert [one.raised_at_ns for one in found(received)] == [dawn(1)]
 
 
-def test_a_range_of_light_belongs_to_a_crop() -> None:
+def test_a_range_of_light_belongs_to_a_crop_and_without_a_clock_a_day_is_24_hours() -> None:
     received = scans({"light": [4_000.0, 4_000.0]})
     assert found(received) == []
     inspection = PastWrite(10_000, 1, "a", HOUR, 1, 0, has_seen=True, species="Lettuce")
@@ -139,9 +139,6 @@ def test_a_range_of_light_belongs_to_a_crop() -> None:
     assert dim.reason.sensor == "daily_light_integral"
     assert dim.reason.value == pytest.approx(24 * 3600 * 4_000.0 / 54.0 / 1e6)
     assert dim.reason.limit == 12.0
-
-
-def test_without_a_clock_a_day_is_24_hours_of_ros_time() -> None:
     fold = AlarmFold(Criteria(own_sensors(), None, ClockDay(None)), SPANS)
     fold.take(scans({"temperature": [14.0] * 3}, first_h=DAWN + 5))
     [cold] = [one for one in fold.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]

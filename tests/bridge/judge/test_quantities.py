@@ -76,13 +76,15 @@ def value(name: str, of: Callable[[float], float], hours: float = 24.0, step: fl
     return DAILY[name].at(AT, readings, is_day)
 
 
-def test_a_daily_light_integral_is_the_sum_of_the_photons() -> None:
+def test_a_daily_light_integral_and_a_dose_of_co2_are_sums() -> None:
     # 10 h of 54,000 lx are 10 h of 1000 umol/m2/s.
     lit = value("daily_light_integral", lambda hour: 54_000.0 * (7.0 <= hour <= 17.0), step=0.01)
     assert lit == pytest.approx(36.0, rel=2e-3)
     # Half a sine of 12 h: its mean is 2 / pi of its maximum.
     sun = value("daily_light_integral", lambda hour: max(0.0, math.sin((hour - 6) * math.pi / 12)))
     assert sun == pytest.approx(12 * 3600 * 2 / math.pi / LX_PER_UMOL / 1e6, rel=5e-3)
+    dose = value("co2_dose", lambda hour: 800.0 if 6.0 <= hour <= 18.0 else 5000.0, step=0.01)
+    assert dose == pytest.approx(12 * 800.0, rel=5e-3)
 
 
 def test_temperature_over_a_day() -> None:
@@ -94,11 +96,6 @@ def test_temperature_over_a_day() -> None:
     assert value("temperature_night_minimum", lambda hour: 5.0 if hour == 12.0 else hour) == 0.0
     assert value("growing_degree_days", course) == (24.0 + 16.0) / 2 - BASE_C
     assert value("growing_degree_days", lambda _: 4.0) == 0.0
-
-
-def test_a_dose_of_co2_covers_the_hours_of_daylight() -> None:
-    dose = value("co2_dose", lambda hour: 800.0 if 6.0 <= hour <= 18.0 else 5000.0, step=0.01)
-    assert dose == pytest.approx(12 * 800.0, rel=5e-3)
 
 
 @pytest.mark.parametrize("name", DAILY)
@@ -115,13 +112,12 @@ def test_too_little_of_a_day_has_no_value(name: str) -> None:
     assert math.isnan(DAILY[name].at(AT, readings, is_day))
 
 
-def test_readings_from_before_the_day_or_after_it_do_not_count() -> None:
+def test_other_days_do_not_count_and_without_a_night_there_is_no_difference_and_no_minimum() -> (
+    None
+):
     daily = DAILY["temperature_24h_mean"]
     readings = [(AT + hour * HOUR, 20.0 if -24 <= hour <= 0 else 99.0) for hour in range(-30, 4)]
     assert daily.at(AT, readings, is_day) == 20.0
-
-
-def test_without_a_night_there_is_no_difference_and_no_minimum() -> None:
     readings = [(AT + hour * HOUR, 20.0) for hour in range(-24, 1)]
     for name in ("day_night_difference", "temperature_night_minimum"):
         assert math.isnan(DAILY[name].at(AT, readings, lambda _: True))

@@ -89,12 +89,33 @@ def test_a_tag_is_judged_as_an_expert_would(case: dict[str, Any]) -> None:
     ]
 
 
-def test_the_table_has_every_kind_of_reason_that_a_tag_can_have() -> None:
+def test_the_tables_have_every_sensor_every_kind_and_every_verdict() -> None:
     reported = {kind for case in CASES for kind, *_ in case["reasons"]}
     assert reported == set(Kind) - {Kind.SILENT, Kind.STOPPED, Kind.CHANGED}
+    reasons = [
+        reason for state in STATES for tag in tags_of(state).values() for reason in tag["reasons"]
+    ]
+    of_greenhouse = {kind for state in STATES for kind in state["house"]["reasons"]}
+    alarmed = {kind for state in STATES for _, kind, _, _ in state["alarms"]}
+    assert {kind for kind, *_ in reasons} | of_greenhouse | {"stopped"} == set(Kind) - {
+        Kind.CHANGED
+    }
+    assert alarmed == set(Kind) - {Kind.CHANGED}
+    measured = ("temperature", "humidity", "co2", "light", "soil_moisture")
+    for sensor in measured:
+        of_sensor = [reason for reason in reasons if reason[2] == sensor]
+        sides = {value < limit for kind, _, _, value, limit in of_sensor if kind == "range"}
+        assert sides == {True, False}, f"{sensor} low and high"
+        assert {kind for kind, *_ in of_sensor} >= {"range", "reading_failed", "old"}
+    assert {state["house"]["verdict"] for state in STATES} == {
+        "critical",
+        "stressed",
+        "unknown",
+        "healthy",
+    }
 
 
-def test_a_reason_names_the_observation_that_it_comes_from() -> None:
+def test_a_reason_names_its_observation_and_a_reading_from_the_future_counts_as_read_now() -> None:
     by_name = {case["name"]: case for case in CASES}
     (cold,) = judge(by_name["a lethal cold"]).reasons
     assert cold.since_ns == ago(60)
@@ -104,9 +125,6 @@ def test_a_reason_names_the_observation_that_it_comes_from() -> None:
     assert failed.since_ns == ago(30)
     (never,) = judge(by_name["never scanned"]).reasons
     assert never.since_ns is None
-
-
-def test_a_reading_from_the_future_counts_as_read_now() -> None:
     assert judge(CASES[0], NOW_NS - 10**12).verdict is Verdict.HEALTHY
 
 
@@ -274,27 +292,3 @@ def test_a_greenhouse_is_judged_as_an_expert_would(
     for tag_id, tag in of_tags.items():
         assert reported(message.tags[tag_id]) == expected(tag["reasons"])
     assert asyncio.run(alarms(state)) == state["alarms"]
-
-
-def test_the_table_has_every_sensor_every_kind_and_every_verdict() -> None:
-    reasons = [
-        reason for state in STATES for tag in tags_of(state).values() for reason in tag["reasons"]
-    ]
-    of_greenhouse = {kind for state in STATES for kind in state["house"]["reasons"]}
-    alarmed = {kind for state in STATES for _, kind, _, _ in state["alarms"]}
-    assert {kind for kind, *_ in reasons} | of_greenhouse | {"stopped"} == set(Kind) - {
-        Kind.CHANGED
-    }
-    assert alarmed == set(Kind) - {Kind.CHANGED}
-    measured = ("temperature", "humidity", "co2", "light", "soil_moisture")
-    for sensor in measured:
-        of_sensor = [reason for reason in reasons if reason[2] == sensor]
-        sides = {value < limit for kind, _, _, value, limit in of_sensor if kind == "range"}
-        assert sides == {True, False}, f"{sensor} low and high"
-        assert {kind for kind, *_ in of_sensor} >= {"range", "reading_failed", "old"}
-    assert {state["house"]["verdict"] for state in STATES} == {
-        "critical",
-        "stressed",
-        "unknown",
-        "healthy",
-    }

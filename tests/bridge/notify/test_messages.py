@@ -114,15 +114,12 @@ def test_each_of_our_sensors_has_its_class_unless_its_unit_does_not_fit() -> Non
     assert config["unit_of_measurement"] == "mK"
 
 
-def test_a_tag_and_the_greenhouse_have_a_verdict_and_an_alarm() -> None:
+def test_a_tag_and_the_greenhouse_have_a_verdict_and_an_alarm_and_silence_takes_the_tags() -> None:
     for found in (announced("12"), dict(greenhouse_configs(TOPICS))):
         by_name = {config["name"]: config for config in found.values()}
         assert by_name["Verdict"]["options"] == ["critical", "stressed", "healthy"]
         assert by_name["Alarm"]["device_class"] == "problem"
         assert by_name["Alarm"]["json_attributes_topic"] == by_name["Alarm"]["state_topic"]
-
-
-def test_a_silent_twin_makes_only_the_verdicts_of_tags_unavailable() -> None:
     tags = {it["name"]: it for it in announced("12", "co2").values()}
     greenhouse = {it["name"]: it for it in dict(greenhouse_configs(TOPICS)).values()}
     for name in ("Verdict", "Alarm"):

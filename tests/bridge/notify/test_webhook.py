@@ -216,20 +216,21 @@ def test_an_alarm_that_turns_critical_is_sent_once_and_a_worse_value_alone_is_no
     ]
 
 
-def test_an_alarm_that_continues_after_all_is_raised_again_with_another_id() -> None:
+def test_an_alarm_that_continues_is_raised_again_and_one_that_never_was_is_withdrawn() -> None:
     news = AlarmNews()
     put(news, alarm("a"))
     put(news, alarm("a", cleared_ns=NOW_NS + S))
     ((change, name),) = put(news, alarm("a"))
     assert change == "raised"
     assert name != f"{alarm('a').id}.raised"
-
-
-def test_a_sent_alarm_that_turns_out_never_to_have_been_is_withdrawn_and_no_other() -> None:
     news = AlarmNews()
     put(news, alarm("a"))
     found = news.of(Change((), (alarm("a"), alarm("b"))), NOW_NS)
     assert [(it.change, it.alarm.tag_id) for it in found] == [("withdrawn", "a")]
+    news = AlarmNews()
+    old, new = alarm("old", raised_ns=1, cleared_ns=2), alarm("new", raised_ns=NOW_NS)
+    found = news.of(Change((old, new), is_past=True), None)
+    assert [it.alarm.tag_id for it in found] == ["new"]
 
 
 def test_active_alarms_and_those_of_the_last_day_are_sent_again_with_the_same_ids() -> None:
@@ -243,13 +244,6 @@ def test_active_alarms_and_those_of_the_last_day_are_sent_again_with_the_same_id
     assert ids == [("raised", f"{active.id}.raised")]
     after = put(AlarmNews(), old, active, just, missed, is_past=True)
     assert after == [*ids, ("cleared", f"{just.id}.cleared.{edge}")]
-
-
-def test_without_a_known_time_the_latest_alarm_sets_the_day() -> None:
-    news = AlarmNews()
-    old, new = alarm("old", raised_ns=1, cleared_ns=2), alarm("new", raised_ns=NOW_NS)
-    found = news.of(Change((old, new), is_past=True), None)
-    assert [it.alarm.tag_id for it in found] == ["new"]
 
 
 # --- one POST -------------------------------------------------------------------------------------
@@ -281,7 +275,7 @@ def message(port: int) -> tuple[int, int]:
     return refused.value.status, refused.value.retry_after_s
 
 
-def test_a_post_has_its_headers_and_body() -> None:
+def test_a_post_has_its_headers_and_body_and_an_interim_response_is_skipped() -> None:
     with receiver(status(204)) as server:
         sent(f"http://127.0.0.1:{server.port}/hook?a=b")
     (posted,) = server.posted
@@ -289,6 +283,9 @@ def test_a_post_has_its_headers_and_body() -> None:
     assert posted.headers["content-type"] == "application/json"
     assert posted.headers["host"] == f"127.0.0.1:{server.port}"
     assert posted.headers["webhook-id"] == "1"
+    first = b"HTTP/1.1 103 Early Hints\r\n\r\nHTTP/1.1 202 OK\r\n\r\n"
+    with receiver(lambda _: iter([first])) as server:
+        sent(f"http://127.0.0.1:{server.port}/")
 
 
 @pytest.mark.parametrize(
@@ -345,12 +342,6 @@ def test_a_body_is_not_read_however_much_arrives() -> None:
     with receiver(flood) as server:
         sent(f"http://127.0.0.1:{server.port}/")
     assert sum(given) < 20_000_000  # more than the sockets hold
-
-
-def test_an_interim_response_is_skipped() -> None:
-    first = b"HTTP/1.1 103 Early Hints\r\n\r\nHTTP/1.1 202 OK\r\n\r\n"
-    with receiver(lambda _: iter([first])) as server:
-        sent(f"http://127.0.0.1:{server.port}/")
 
 
 def test_https_trusts_its_authority_alone(tmp_path: Path) -> None:

@@ -176,13 +176,10 @@ def at(seconds: int) -> dict[str, int]:
     return {"sec": seconds, "nanosec": 0}
 
 
-def test_an_empty_past_is_a_valid_answer() -> None:
+def test_an_empty_past_is_a_valid_answer_and_silences_are_intervals() -> None:
     found = timeline(parts(5 * NS, 5 * NS))
     assert (found["from"], found["to"], found["reach"]) == (at(5), at(5), None)
     assert (found["buckets"], found["silences"], found["runs"]) == ([], [], [])
-
-
-def test_silences_are_intervals_and_of_too_many_the_longest_of_each_bucket_is_sent() -> None:
     silences = SeriesPast(0, 100 * NS, None, (NS,), (1,), (2.5,), (2.5,), (2.5,))
     assert timeline(parts(silences=silences))["silences"] == [
         {"from": at(1), "to": {"sec": 3, "nanosec": 500_000_000}}
@@ -307,18 +304,12 @@ def test_for_a_period_both_lie_within_it(
     assert bodies.of_period(JOURNAL, start_ns, end_ns) == (until_ns, since_ns)
 
 
-def test_unknown_limits_are_omitted() -> None:
+def test_unknown_limits_are_omitted_and_the_reasons_for_missing_data_are_explained() -> None:
     assert bodies.moment_headers(UNKNOWN_JOURNAL, NS) == {}
     assert bodies.period_headers(UNKNOWN_JOURNAL, 0, NS) == {}
     assert bodies.period_fields(UNKNOWN_JOURNAL, 0, NS) == {"complete_to": None, "kept_from": None}
     assert bodies.why_not(UNKNOWN_JOURNAL, NS) == ""
-
-
-def test_a_journal_without_a_guarantee_guarantees_completeness_from_now_on() -> None:
     assert bodies.kept_from(replace(JOURNAL, kept_ns=()), 5 * NS) == 100 * NS
-
-
-def test_the_reasons_for_missing_data_are_explained_in_words() -> None:
     assert bodies.why_not(JOURNAL, 50 * NS) == (
         "; what was received before 60.000000000 s is not kept"
     )

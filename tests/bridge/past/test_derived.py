@@ -61,16 +61,13 @@ def answer(request: SeriesRequest, known: Known) -> tuple[SeriesPast, list[Serie
     return derived.derived_series(request, own_sensors(), is_day, find), requested
 
 
-def test_only_possible_readings_of_one_scan_are_paired() -> None:
+def test_only_possible_readings_of_one_scan_are_paired_and_a_real_sensor_takes_precedence() -> None:
     past, requested = answer(REQUESTED, SITE)
     assert past.stamps_ns == (10 * S,)
     assert past.means == past.minima == past.maxima == (vpd(20.0, 50.0),)
     assert (past.counts, past.is_bucketed, past.start_ns) == ((1,), False, 10 * S)
     assert [it.sensor_type for it in requested] == ["vpd", "temperature", "humidity"]
     assert {it.end_ns for it in requested[1:]} == {past.end_ns}, "one now for all"
-
-
-def test_a_real_sensor_of_that_name_takes_precedence_and_is_read_alone() -> None:
     for name in ("vpd", "co2"):
         past, requested = answer(replace(REQUESTED, sensor_type=name), {**SITE, name: {5 * S: 1.0}})
         assert (past.means, len(requested)) == ((1.0,), 1)

@@ -89,7 +89,7 @@ def test_a_cancelled_export_does_not_free_the_place_of_the_next() -> None:
         assert admission.exporting == EXPORTS
 
 
-def test_a_client_has_a_rate_and_is_told_when_to_retry() -> None:
+def test_a_client_has_a_rate_and_a_request_refused_for_its_number_uses_no_turn() -> None:
     admission = Admission(Limits(answers_per_s=0.5, concurrency=9, total_concurrency=9))
     with admission.request("a", 0.0):
         pass
@@ -100,9 +100,6 @@ def test_a_client_has_a_rate_and_is_told_when_to_retry() -> None:
     assert refused.value.headers == {"Retry-After": "2"}
     with admission.request("b", 0.25), admission.request("a", 2.0):
         pass
-
-
-def test_a_request_refused_for_its_number_uses_no_turn() -> None:
     admission = Admission(Limits(answers_per_s=1.0, concurrency=1, total_concurrency=9))
     with admission.request("a", 0.0):
         for _ in range(100):

@@ -129,16 +129,13 @@ def refusal(message: str | bytes) -> str:
     return str(caught.value)
 
 
-def test_only_an_object_is_accepted() -> None:
+def test_only_an_object_is_accepted_and_a_too_long_message_is_not_parsed() -> None:
     assert members_of('{"a": [1]}') == {"a": [1]}
     assert refusal(b"{}") == "a binary frame is refused, expected JSON text"
     assert refusal("[]") == "the message is an array, expected an object"
     assert refusal("3") == "the message is 3, expected an object"
     assert refusal("{").startswith("the message is not JSON: ")
     assert refusal('{"a": NaN}').startswith("the message is not JSON: ")
-
-
-def test_a_too_long_message_is_not_parsed() -> None:
     longest = '{"x":"' + "x" * (MAX_MESSAGE_LENGTH - 8) + '"}'
     assert len(members_of(longest)["x"]) == MAX_MESSAGE_LENGTH - 8
     assert refusal(longest + " ") == "the message has 16385 characters, the limit is 16384"
@@ -193,7 +190,7 @@ def test_a_message_stays_the_same_and_no_piece_exceeds_the_limit(length: int) ->
         assert [frame.fin for frame in frames] == [*[False] * (len(frames) - 1), True]
 
 
-def test_a_ping_fits_between_two_pieces() -> None:
+def test_a_ping_fits_between_two_pieces_and_nothing_is_copied() -> None:
     row = pieces(frame_head(BINARY, 200_000) + bytes(200_000))
     first, *others = (head + bytes(payload) for head, payload in row)
     ping = Frame(Opcode.PING, b"?").serialize(mask=False)
@@ -202,9 +199,6 @@ def test_a_ping_fits_between_two_pieces() -> None:
         Opcode.PING,
         Opcode.CONT,
     ]
-
-
-def test_nothing_is_copied() -> None:
     message = bytes(300_000)
     views = [payload for _, payload in pieces(frame_head(BINARY, len(message)), message)]
     assert all(it.obj is message for it in views if isinstance(it, memoryview))

@@ -80,14 +80,11 @@ def test_every_status_has_a_frame_of_the_contract(reason: Reason, age_s: float |
     assert frame.state_age_seconds == (None if age_s is None else 1.235)
 
 
-def test_more_than_one_twin_is_reported_while_they_live() -> None:
+def test_which_changes_are_news_for_clients_and_which_for_people() -> None:
     liveness = received(0.0, twin_count=2)
     assert liveness.status(0.0).is_live
     assert liveness.status(0.0).message.startswith("2 twins publish on the same topic")
     assert "silent" in liveness.status(10.0).message
-
-
-def test_which_changes_are_news_for_clients_and_which_for_people() -> None:
     now = live()
     assert now.is_news_after(None)
     assert not live(0.9).is_news_after(now), "an age alone is none"
@@ -181,10 +178,12 @@ def test_a_change_of_the_journals_state_is_news() -> None:
 # --- alarms, verdicts, accuracy -------------------------------------------------------------------
 
 
-def test_an_answer_without_alarms_has_its_limit_of_knowledge() -> None:
+def test_an_answer_without_alarms_or_verdicts_says_so() -> None:
     body = alarms_body([], "starting", None)
     assert body == {"alarms": [], "source": "starting", "since": None}
     schema.Alarms.model_validate(body)
+    judged = schema.Judgement.model_validate_json(judgement(NOTHING_JUDGED), strict=True)
+    assert (judged.house.verdict, judged.tags) == ("unknown", {})
 
 
 def test_the_alarms_of_a_frame_are_limited_with_the_active_ones_first() -> None:
@@ -204,11 +203,6 @@ def test_a_value_held_only_by_the_deadband_has_its_limit_and_what_clears_it() ->
     body = schema.Judgement.model_validate_json(judgement(judged), strict=True)
     (reason,) = body.tags["a"].reasons
     assert (reason.limit, reason.release) == (18.0, 18.4)
-
-
-def test_a_greenhouse_not_judged_yet_is_reported_too() -> None:
-    body = schema.Judgement.model_validate_json(judgement(NOTHING_JUDGED), strict=True)
-    assert (body.house.verdict, body.tags) == ("unknown", {})
 
 
 def test_the_hit_rate_of_estimates() -> None:
@@ -251,16 +245,13 @@ def snapshot(**latest: int) -> Snapshot:
     return Snapshot(100, "map", tuple(tags))
 
 
-def test_estimates_use_finite_readings_of_tags_with_a_position() -> None:
+def test_estimates_use_finite_readings_of_pinned_tags_and_changed_ones_are_listed() -> None:
     tags = (
         TagState("a", pose=HERE, readings=(Reading("co2", 1.0, 5), Reading("light", math.nan, 9))),
         TagState("b", pose=HERE, readings=(Reading("co2", 1.0, 7),)),
         TagState("c", readings=(Reading("co2", 1.0, 8),)),
     )
     assert sensors_of(Snapshot(100, "map", tags)) == ["co2"]
-
-
-def test_changed_tags_are_listed_by_tag_and_sensor() -> None:
     known = {"co2": report(9, {"a": None, "b": 3}), "light": report(9, {"b": 4, "c": 5})}
     assert changed_of(known) == {"b": {"co2": 3, "light": 4}, "c": {"light": 5}}
 

@@ -246,7 +246,9 @@ def test_subscriptions_are_limited(stage: Stage) -> None:
     assert stage.subscribe((199, 199)).begun
 
 
-def test_the_latest_message_of_each_subscription_waits_and_they_take_turns(stage: Stage) -> None:
+def test_of_each_subscription_the_latest_message_waits_in_turn_behind_the_latest_time(
+    stage: Stage,
+) -> None:
     stage.subscribe((1, 10), (2, 20))
     for key, payload in ((1, b"a"), (2, b"b"), (1, b"c"), (9, b"nobody")):
         stage.session.put(key, Sample(payload, 5))
@@ -255,9 +257,6 @@ def test_the_latest_message_of_each_subscription_waits_and_they_take_turns(stage
     stage.session.put(1, Sample(b"d", 5))
     stage.unsubscribe(1)
     assert stage.written() == [], "who has unsubscribed hears nothing more"
-
-
-def test_time_goes_before_messages_and_only_the_latest(stage: Stage) -> None:
     stage.subscribe((1, 10))
     stage.session.put(1, Sample(b"a", 5))
     stage.session.time_ns = 7

@@ -1,25 +1,23 @@
-"""From a source to connections: pace, status, watch; and nothing is left behind."""
+"""From a source to connections: pace, status, watch, judging; and nothing is left behind."""
 
 import asyncio
 import itertools
 import json
 import math
-import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Self, cast
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from websockets.asyncio.client import connect
 
 from lupin_bridge.alarms.board import Change, board_of
 from lupin_bridge.bridge import ALARMS_REST_S, Bridge
 from lupin_bridge.feed.relay import Relay
 from lupin_bridge.feed.source import ThreadState, TwinUnavailableError, TwinUpdate
+from lupin_bridge.judge.verdict import Health, judge_site
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.webhook import Webhook
@@ -29,13 +27,11 @@ from lupin_bridge.stream.hub import Client
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastWrite
-from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.state import Reading, Snapshot, TagState
 from lupin_twin.runtime.workers import Workers
 from tests.bridge.stream.test_frames import received
-from tests.support.inprocess import run, running
 from tests.support.seen import alarm
-from tests.support.waiting import PATIENCE_S, until, wait_for
-from tests.support.web import ws_url
+from tests.support.waiting import until
 
 
 class Script:
@@ -359,28 +355,74 @@ async def test_a_clock_that_goes_back_withdraws_the_silences_of_its_future() -> 
         assert raised_ns() == [3 * SECOND]
 
 
-def test_no_thread_and_no_descriptor_is_left_behind(domain: int) -> None:
-    def left() -> tuple[set[str], int]:
-        threads = {thread.name for thread in threading.enumerate()}
-        return threads, len(list(Path("/proc/self/fd").iterdir()))
+def judged_state(number: int) -> TwinUpdate:
+    """The state after that many scans of two tags."""
+    stamp_ns = number * 10**9
+    readings = (Reading("temperature", 24.0, stamp_ns),)
+    tags = tuple(
+        TagState(tag_id, readings=readings, last_observed_ns=stamp_ns) for tag_id in ("bad", "good")
+    )
+    return TwinUpdate(Snapshot(stamp_ns, "map", tags), f"r{number}")
 
-    async def once() -> None:
-        async with (
-            running() as served,
-            connect(
-                ws_url(served.url), proxy=None, max_size=None, open_timeout=PATIENCE_S
-            ) as listener,
-        ):
-            await listener.recv()
-            assert (await served.http.get("/api/field.png?sensor_type=co2")).status_code == 200
 
-    run(domain, once())  # what is made once per process stays
-    threads, files = left()  # some of which may be about to end
-    for _ in range(3):
-        run(domain, once())
+@pytest.mark.parametrize("error", [None, TwinUnavailableError("not yet")])
+async def test_a_robot_is_not_reported_as_stopped_before_the_log_was_read(
+    error: Exception | None,
+) -> None:
+    requested, may_answer = asyncio.Event(), asyncio.Event()
 
-    def are_gone() -> bool:
-        threads_now, files_now = left()
-        return threads_now <= threads and files_now <= files
+    async def query(*_: object) -> tuple[PastWrite, ...]:
+        requested.set()
+        await may_answer.wait()
+        if error is not None:
+            raise error
+        return ()
 
-    wait_for(are_gone, "no more threads and descriptors than before")
+    stage = Stage(frames_per_s=1000.0)
+    stage.script.ask = query  # type: ignore[method-assign]
+    tags = judged_state(1).snapshot.tags
+    async with stage:
+        for number in (1, 2):
+            later = TwinUpdate(Snapshot((2_000 + number) * 10**9, "map", tags), f"r{number}")
+            stage.script.tell(later)
+            await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
+            greenhouse = stage.ear.states[-1]["health"]["house"]
+            if number == 1:
+                assert greenhouse["verdict"] == "healthy"
+                await requested.wait()
+                may_answer.set()
+                await until(lambda: stage.bridge.judge.knows_recent, "the log's word")
+        assert [reason["kind"] for reason in greenhouse["reasons"]] == ["stopped"]
+
+
+async def test_a_state_that_cannot_be_judged_is_sent_with_everything_unknown(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    is_broken = False
+
+    def judge(*args: Any, **more: Any) -> Health:
+        if is_broken:
+            raise ZeroDivisionError("a defect")
+        return judge_site(*args, **more)
+
+    monkeypatch.setattr("lupin_bridge.judge.judging.judge_site", judge)
+
+    def verdicts(frame: dict[str, Any]) -> list[str]:
+        health = frame["health"]
+        return [health["house"]["verdict"], *(tag["verdict"] for tag in health["tags"].values())]
+
+    delta = Ear()
+    async with Stage(frames_per_s=1000.0) as stage:
+        stage.bridge.join(Client(delta, delta=True))
+        for number, is_broken in enumerate((False, True, True, False), start=1):
+            stage.script.tell(judged_state(number))
+            await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
+            wanted = "unknown" if is_broken else "healthy"
+            assert verdicts(stage.ear.states[-1]) == [wanted] * 3
+        assert [verdicts(frame) for frame in delta.frames if frame["type"] == "delta"] == [
+            ["unknown"] * 3,
+            ["unknown"],
+            ["healthy"] * 3,
+        ]
+        assert caplog.text.count("ZeroDivisionError: a defect") == 1
+        assert b"lupin_judge_errors_total 2.0" in stage.bridge.metrics.text()

@@ -7,6 +7,7 @@ import resource
 import select
 import signal
 import socket
+import threading
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
@@ -15,6 +16,7 @@ from pathlib import Path
 import httpx
 import pytest
 from fastapi import FastAPI
+from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import unix_connect
 
@@ -33,12 +35,13 @@ from lupin_twin.runtime.process import END_S, IDLE_WORKERS_END_S
 from tests.support import raw_http
 from tests.support.access import Served, refused_start, served
 from tests.support.domains import own_domain
+from tests.support.inprocess import run, running
 from tests.support.messages import scan
 from tests.support.people import add
 from tests.support.processes import Process, faults, limits, lupin_twin, url_of
 from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
-from tests.support.web import Listener, bridge, deaf_client, listener, overfill
+from tests.support.web import Listener, bridge, deaf_client, listener, overfill, ws_url
 
 # Too much for the event loop: a worker computes and writes it.
 MILLION_CELLS = (
@@ -305,3 +308,30 @@ def test_a_path_that_is_no_socket_is_reported_and_no_file_lost(name: str, tmp_pa
     assert line.startswith(f"lupin-twin: cannot listen on unix:{tmp_path / name}: ")
     assert "None" not in line
     assert (tmp_path / "file").read_text() == "somebody's"
+
+
+def test_no_thread_and_no_descriptor_is_left_behind(domain: int) -> None:
+    def left() -> tuple[set[str], int]:
+        threads = {thread.name for thread in threading.enumerate()}
+        return threads, len(list(Path("/proc/self/fd").iterdir()))
+
+    async def once() -> None:
+        async with (
+            running() as served,
+            connect(
+                ws_url(served.url), proxy=None, max_size=None, open_timeout=PATIENCE_S
+            ) as listener,
+        ):
+            await listener.recv()
+            assert (await served.http.get("/api/field.png?sensor_type=co2")).status_code == 200
+
+    run(domain, once())  # what is made once per process stays
+    threads, files = left()  # some of which may be about to end
+    for _ in range(3):
+        run(domain, once())
+
+    def are_gone() -> bool:
+        threads_now, files_now = left()
+        return threads_now <= threads and files_now <= files
+
+    wait_for(are_gone, "no more threads and descriptors than before")

@@ -100,7 +100,9 @@ def importing(tmp_path: Path) -> Import:
     return Import(tmp_path)
 
 
-def test_a_dry_run_reports_what_would_be_written_and_writes_nothing(importing: Import) -> None:
+def test_a_dry_run_writes_nothing_and_importing_twice_writes_each_row_once(
+    importing: Import,
+) -> None:
     done = importing.given(WIDE, ROWS).run()
     assert done.returncode == 0
     assert done.stdout.splitlines() == [
@@ -111,9 +113,6 @@ def test_a_dry_run_reports_what_would_be_written_and_writes_nothing(importing: I
     ]
     assert "nothing was written; add --write" in done.stderr
     assert not importing.journal.exists()
-
-
-def test_importing_twice_writes_each_row_once(importing: Import) -> None:
     importing.given(WIDE | {"places": {"A": [1.5, 2]}}, ROWS)
     assert "3 scans are new" in importing.written()
     then_ns = int(datetime(2024, 5, 1, 10, tzinfo=UTC).timestamp()) * SECOND

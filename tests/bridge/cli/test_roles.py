@@ -268,9 +268,9 @@ class Manager:
 
 
 @pytest.fixture
-def manager(tmp_path: Path) -> Iterator[Manager]:
-    """In Linux's abstract namespace."""
-    manager = Manager(f"@lupin-{tmp_path}")
+def manager(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Manager]:
+    """By default in Linux's abstract namespace."""
+    manager = Manager(getattr(request, "param", "@lupin-") + f"{tmp_path}/notify")
     yield manager
     manager.socket.close()
 
@@ -298,13 +298,6 @@ def test_without_a_manager_nothing_is_sent(
     assert len(caplog.messages) == has_socket, "said once"
 
 
-@pytest.fixture
-def listening(tmp_path: Path) -> Iterator[Manager]:
-    manager = Manager(str(tmp_path / "notify"))
-    yield manager
-    manager.socket.close()
-
-
 def test_the_bridge_reports_when_it_is_ready_and_when_it_stops(
     domain: int, manager: Manager
 ) -> None:
@@ -329,11 +322,12 @@ def test_the_bridge_reports_when_it_is_ready_and_when_it_stops(
         assert process.wait() == 0
 
 
+@pytest.mark.parametrize("manager", [""], indirect=True)
 def test_a_hanging_callback_fails_health_checks_and_stops_the_watchdog_messages(
-    domain: int, listening: Manager
+    domain: int, manager: Manager
 ) -> None:
     hangs = faults("--hang", "lupin_twin.core.state:TwinStore.record:hang me")
-    env: Any = {"NOTIFY_SOCKET": listening.address, "WATCHDOG_USEC": "1500000"}
+    env: Any = {"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": "1500000"}
     soon = constants(**{"lupin_bridge.feed.source:STUCK_AFTER_S": 2.0})
     with lupin_twin(domain, "serve", *hangs, *soon, **env) as process, Peer(domain) as peer:
         url = url_of(process)
@@ -350,6 +344,6 @@ def test_a_hanging_callback_fails_health_checks_and_stops_the_watchdog_messages(
         message = health().json()["message"]
         text = r"The ROS thread has been stuck in a callback for \d+ s\. Restart\."
         assert re.fullmatch(text, message)
-        wait_for(lambda: any("stuck" in word.get("STATUS", "") for word in listening.rest()), "it")
-        assert not any("WATCHDOG" in word for word in listening.rest())
+        wait_for(lambda: any("stuck" in word.get("STATUS", "") for word in manager.rest()), "it")
+        assert not any("WATCHDOG" in word for word in manager.rest())
         assert process.stop() == 0

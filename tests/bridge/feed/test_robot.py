@@ -37,7 +37,7 @@ def test_the_latest_of_each_is_stored_with_or_without_a_clock_and_only_changes_r
         assert log.now == Robot(position(x, 50.0))
 
 
-def test_points_of_a_trail_are_apart_in_distance_and_in_time() -> None:
+def test_points_of_a_trail_are_apart_and_it_covers_an_hour_also_of_a_silent_robot() -> None:
     log = RobotLog()
     drive(
         log,
@@ -48,9 +48,6 @@ def test_points_of_a_trail_are_apart_in_distance_and_in_time() -> None:
         position(0.3, 104.0),
     )
     assert places(log) == [0.0, 0.1, 0.3]
-
-
-def test_a_trail_ends_after_an_hour_also_of_a_silent_robot_and_a_bounded_one_covers_it() -> None:
     log = RobotLog()
     drive(log, position(0.0, 100.0), position(1.0, 200.0))
     log.take(Robot(), 3_700 * S)
@@ -82,23 +79,12 @@ def test_a_clock_that_goes_back_removes_the_future(back_s: float, is_known: bool
     assert log.now.position == (position(2.0, 20.0) if not is_known else log.now.position)
 
 
-def test_a_plan_is_done_at_its_end_also_one_replaced_on_the_way_and_not_where_it_begins() -> None:
+def test_a_plan_is_done_at_its_end_and_an_empty_or_old_one_is_ignored() -> None:
     other = RobotLog()
     for at in range(6):
         there = Plan(((float(at), 0.0), (5.0, 0.0)), (100 + at) * S)
         other.take(Robot(position=position(float(at), 100.5 + at), plan=there), (101 + at) * S)
         assert (other.now.plan is None) is (at == 5)
-    log = RobotLog()
-    round_trip = Plan(((0.0, 0.0), (5.0, 0.0), (0.0, 0.1)), 99 * S)
-    log.take(Robot(position=position(0.0, 100.0), plan=round_trip), 100 * S)
-    assert log.now.plan == round_trip
-    drive(log, position(5.0, 110.0))
-    assert log.now.plan == round_trip
-    drive(log, position(0.3, 120.0))
-    assert log.now.plan is None
-
-
-def test_an_empty_plan_and_one_from_ten_minutes_ago_are_ignored() -> None:
     log = RobotLog()
     there = Plan(((9.0, 0.0),), 100 * S)
     again = Plan(((9.0, 0.0),), 800 * S)
@@ -113,3 +99,11 @@ def test_an_empty_plan_and_one_from_ten_minutes_ago_are_ignored() -> None:
         log.take(Robot(plan=received), now_ns)
         plans.append(log.now.plan)
     assert plans == [there, there, None, again, None]
+    log = RobotLog()
+    round_trip = Plan(((0.0, 0.0), (5.0, 0.0), (0.0, 0.1)), 99 * S)
+    log.take(Robot(position=position(0.0, 100.0), plan=round_trip), 100 * S)
+    assert log.now.plan == round_trip
+    drive(log, position(5.0, 110.0))
+    assert log.now.plan == round_trip
+    drive(log, position(0.3, 120.0))
+    assert log.now.plan is None

@@ -81,16 +81,15 @@ STRANGE = {
 }
 
 
-def test_a_malformed_path_is_refused_as_a_request_and_as_a_websocket(page: Page) -> None:
+def test_a_malformed_path_is_refused_and_no_process_is_started_for_unknown_sites(
+    page: Page,
+) -> None:
     for path, expected in STRANGE.items():
         line = b"GET " + path + b" HTTP/1.1\r\n"
         plain = raw_http.answer(page.url, line + b"Host: 127.0.0.1\r\nConnection: close\r\n\r\n")
         assert status(plain) == expected, path
         assert b"x-evil" not in plain.lower().partition(b"\r\n\r\n")[0], path
         assert 400 <= status(raw_http.answer(page.url, line + UPGRADE + b"\r\n")) < 500, path
-
-
-def test_no_process_is_started_for_unknown_sites(page: Page) -> None:
     before = page.metric("lupin_fleet_sites_open")
     for number in range(100):
         assert page.http.get(f"/sites/none{number}/api/state").status_code == 404

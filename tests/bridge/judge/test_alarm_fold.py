@@ -258,18 +258,7 @@ def test_two_scans_raise_an_alarm_and_two_clear_it_and_a_worse_one_is_the_same_a
     assert (bad.raised_as, bad.is_worse, bad.worse_at_ns) == ("critical", False, None)
 
 
-def test_the_fold_reports_when_it_will_change_without_news() -> None:
-    fold = AlarmFold(BY, SPANS[0])
-    received = scans([22, 22])
-    fold.take(received)
-    last_ns = received[-1].stamp_ns
-    due_ns = fold.found(last_ns).due_ns
-    assert fold.found(due_ns - 1).alarms == ()
-    assert [one.reason.kind for one in fold.found(due_ns).alarms] == ["stopped"]
-    assert fold.found(due_ns).due_ns == FOREVER
-
-
-def test_unchanged_alarms_are_the_same_objects() -> None:
+def test_unchanged_alarms_are_the_same_objects_and_the_next_change_is_reported() -> None:
     fold = AlarmFold(BY, SPANS[0])
     received = scans([17, 17, 16, 22, 22])
     fold.take(received[:2])
@@ -285,6 +274,14 @@ def test_unchanged_alarms_are_the_same_objects() -> None:
     ]
     fold.take(late)
     assert first[0].id not in {one.id for one in fold.found(now_ns).alarms}
+    fold = AlarmFold(BY, SPANS[0])
+    received = scans([22, 22])
+    fold.take(received)
+    last_ns = received[-1].stamp_ns
+    due_ns = fold.found(last_ns).due_ns
+    assert fold.found(due_ns - 1).alarms == ()
+    assert [one.reason.kind for one in fold.found(due_ns).alarms] == ["stopped"]
+    assert fold.found(due_ns).due_ns == FOREVER
 
 
 def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false() -> None:

@@ -68,7 +68,7 @@ def dawn(day: int) -> int:
     return day * DAY_NS + DAWN * HOUR
 
 
-def test_a_days_mean_raises_at_the_next_dawn_and_one_good_day_clears() -> None:
+def test_a_days_mean_raises_at_the_next_dawn_and_has_no_deadband() -> None:
     [cold] = found(scans({"temperature": [20.0, 14.0, 13.0, 20.0, 20.0]}))
     assert (cold.tag_id, cold.reason.sensor, cold.reason.verdict) == ("a", MEAN, Verdict.STRESSED)
     # The last hour of that day already moved towards the next one's temperature.
@@ -77,6 +77,14 @@ def test_a_days_mean_raises_at_the_next_dawn_and_one_good_day_clears() -> None:
     assert cold.reason.limit == 17.0
     assert (cold.raised_at_ns, cold.reason.since_ns) == (dawn(2), dawn(2))
     assert cold.cleared_at_ns == dawn(4)
+    wobbling = found(scans({"temperature": [16.8, 17.2, 16.8, 17.4, 20.0]}))
+    reported = [(one.raised_at_ns, one.cleared_at_ns) for one in wobbling]
+    assert reported == [(dawn(1), dawn(2)), (dawn(3), dawn(4))]
+    own = [
+        replace(one, sensors=("temperature", MEAN), values=(14.0, 20.0))
+        for one in scans({"temperature": [14.0] * 3})
+    ]
+    assert found(own) == []
 
 
 def test_the_value_equals_that_of_the_history_at_that_moment() -> None:
@@ -92,17 +100,6 @@ def test_the_value_equals_that_of_the_history_at_that_moment() -> None:
         at_dawn = DAILY[alarm.reason.sensor].at(dawn(1), readings, is_day)
         assert alarm.raised_at_ns == dawn(1)
         assert alarm.reason.value == pytest.approx(at_dawn)
-
-
-def test_a_daily_quantity_has_no_deadband_and_a_sensor_that_reads_it_takes_precedence() -> None:
-    wobbling = found(scans({"temperature": [16.8, 17.2, 16.8, 17.4, 20.0]}))
-    reported = [(one.raised_at_ns, one.cleared_at_ns) for one in wobbling]
-    assert reported == [(dawn(1), dawn(2)), (dawn(3), dawn(4))]
-    own = [
-        replace(one, sensors=("temperature", MEAN), values=(14.0, 20.0))
-        for one in scans({"temperature": [14.0] * 3})
-    ]
-    assert found(own) == []
 
 
 def test_too_little_of_a_day_gives_no_value_and_a_day_without_scans_not_that_before() -> None:

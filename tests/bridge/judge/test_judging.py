@@ -75,7 +75,7 @@ def test_time_alone_makes_readings_old_by_the_scan_interval_or_by_a_configured_l
     assert judge.see(snapshot(START + 31 * S, GOOD)).tags["a"].verdict == "unknown"
 
 
-def test_for_alarms_a_tag_scanned_once_has_a_day() -> None:
+def test_for_alarms_a_tag_scanned_once_has_a_day_and_a_missing_sensor_changes_no_interval() -> None:
     judge, day = Judge(BY_LIGHT), 24 * 60 * MINUTE
     judge.see(snapshot(START, GOOD, COLD))
     judge.learn([scan("b", START - day, temperature=6.0)])  # and no interval extends it
@@ -84,6 +84,20 @@ def test_for_alarms_a_tag_scanned_once_has_a_day() -> None:
     judge.see(snapshot(START, GOOD))
     assert judge.see(snapshot(START + day, GOOD)).tags["a"].verdict is Verdict.HEALTHY
     assert judge.see(snapshot(START + day + 1, GOOD)).tags["a"].verdict is Verdict.UNKNOWN
+    dead = Reading("light", 900.0, START)
+    scans = [START + round_ * 10 * MINUTE for round_ in range(40)]
+    judge, late = Judge(BY_LIGHT), Judge(BY_LIGHT)
+    held = set()
+    for at_ns in scans:
+        now = replace(GOOD, readings=(dead, Reading("temperature", 22.0, at_ns)))
+        judge.see(snapshot(at_ns, now))
+        held.add(judge.holds_ns()["a"])
+    assert held == {24 * 60 * MINUTE, 30 * MINUTE}
+    # The same where the past gives the interval.
+    late.see(snapshot(scans[-1], now))
+    late.learn(scan("a", at_ns, temperature=22.0) for at_ns in scans[-9:])
+    late.see(snapshot(scans[-1], now))
+    assert late.holds_ns()["a"] == 30 * MINUTE
 
 
 def judged_one_by_one(*values: float) -> list[Health]:
@@ -121,23 +135,6 @@ def test_a_value_that_wobbles_at_a_limit_does_not_change_its_status_at_every_sca
 def scan(tag_id: str, at_ns: int, **values: float) -> PastWrite:
     names, numbers = tuple(values), tuple(values.values())
     return PastWrite(at_ns, 1, tag_id, at_ns, 0, 0, names, numbers)
-
-
-def test_a_sensor_missing_from_scans_does_not_change_the_interval() -> None:
-    dead = Reading("light", 900.0, START)
-    scans = [START + round_ * 10 * MINUTE for round_ in range(40)]
-    judge, late = Judge(BY_LIGHT), Judge(BY_LIGHT)
-    held = set()
-    for at_ns in scans:
-        now = replace(GOOD, readings=(dead, Reading("temperature", 22.0, at_ns)))
-        judge.see(snapshot(at_ns, now))
-        held.add(judge.holds_ns()["a"])
-    assert held == {24 * 60 * MINUTE, 30 * MINUTE}
-    # The same where the past gives the interval.
-    late.see(snapshot(scans[-1], now))
-    late.learn(scan("a", at_ns, temperature=22.0) for at_ns in scans[-9:])
-    late.see(snapshot(scans[-1], now))
-    assert late.holds_ns()["a"] == 30 * MINUTE
 
 
 def test_a_reading_is_judged_by_the_daylight_and_the_plants_of_its_own_time() -> None:

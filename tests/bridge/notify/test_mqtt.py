@@ -306,17 +306,7 @@ def test_an_expired_reading_is_sent_as_unknown_also_that_of_a_silent_twin() -> N
     assert reported(one, seen(state, now_ns=None))[reading]["value"] is None
 
 
-def test_only_the_verdict_that_changes_by_itself_is_sent() -> None:
-    one = mirror()
-    day = seen(tag("a", temperature=16.0), tag("b", temperature=20.0))
-    reported(one, day)
-    tags = {**day.judged.tags, "a": Health(Verdict.HEALTHY)}
-    news = reported(one, replace(day, judged=replace(day.judged, tags=tags)))
-    assert set(news) == {"lt/tags/a/health"}
-    assert news["lt/tags/a/health"]["verdict"] == "healthy"
-
-
-def test_each_message_names_its_source_and_a_new_source_sends_all_again() -> None:
+def test_each_message_names_its_source_and_only_a_verdict_that_changes_is_sent() -> None:
     one = mirror()
     state = tag("a", temperature=6.0)
     then = seen(state, alarms=(alarm("a"),))
@@ -325,6 +315,13 @@ def test_each_message_names_its_source_and_a_new_source_sends_all_again() -> Non
     assert {first[topic]["origin"] for topic in message} == {"robot"}
     news = reported(one, seen(state, alarms=(alarm("a"),), origin="recorded"))
     assert {topic: it["origin"] for topic, it in news.items()} == dict.fromkeys(message, "recorded")
+    one = mirror()
+    day = seen(tag("a", temperature=16.0), tag("b", temperature=20.0))
+    reported(one, day)
+    tags = {**day.judged.tags, "a": Health(Verdict.HEALTHY)}
+    news = reported(one, replace(day, judged=replace(day.judged, tags=tags)))
+    assert set(news) == {"lt/tags/a/health"}
+    assert news["lt/tags/a/health"]["verdict"] == "healthy"
 
 
 def test_alarms_are_sent_for_the_tag_and_for_the_greenhouse() -> None:

@@ -188,7 +188,7 @@ def test_an_empty_past_is_a_valid_answer_and_silences_are_intervals() -> None:
     assert timeline(parts(silences=silences))["silences"] == [{"from": at(20), "to": at(24)}]
 
 
-def test_runs_that_overlap_the_period_are_sent_with_the_extent_of_all() -> None:
+def test_runs_that_overlap_the_period_are_sent_with_the_extent_of_all_and_end_with_it() -> None:
     runs = SeriesPast(
         2 * NS,
         500 * NS,
@@ -207,9 +207,6 @@ def test_runs_that_overlap_the_period_are_sent_with_the_extent_of_all() -> None:
         # Until now, which is after the period.
         {"from": at(90), "to": at(100), "is_simulated": False},
     ]
-
-
-def test_a_run_of_years_ends_with_the_period_however_its_length_is_rounded() -> None:
     start_ns, now_ns = 1_700_000_000 * NS, 1_795_920_785_417_813_153
     length_s = (now_ns - start_ns) / NS
     assert start_ns + round(length_s * NS) < now_ns

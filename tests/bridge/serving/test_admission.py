@@ -59,15 +59,15 @@ def test_dragging_through_the_past_is_admitted_and_a_flood_is_not() -> None:
     assert admitted(1_000.0, seconds) == pytest.approx(allowed, abs=1)
 
 
-def test_the_oldest_export_is_ended_for_another_client_once_it_is_old() -> None:
+def test_the_oldest_export_is_ended_for_another_client_and_frees_one_place() -> None:
     admission, ended = Admission(Limits()), list[str]()
     with ExitStack() as taken:
 
         def begin(client: str, now_s: float) -> None:
             taken.enter_context(admission.export(client, now_s, lambda: ended.append(client)))
 
-        for now_s, client in enumerate("abcd"):
-            begin(client, now_s)
+        for at_s, client in enumerate("abcd"):
+            begin(client, at_s)
         with pytest.raises(BusyError):
             begin("e", LONG_EXPORT_S - 1)
         with pytest.raises(ClientLimitError):
@@ -77,9 +77,6 @@ def test_the_oldest_export_is_ended_for_another_client_once_it_is_old() -> None:
         assert admission.refused == {"client_exports": 1, "total_exports": 1}
         assert admission.exporting == EXPORTS
     assert admission.exporting == 0
-
-
-def test_a_cancelled_export_does_not_free_the_place_of_the_next() -> None:
     admission = Admission(Limits())
     with ExitStack() as taken, ExitStack() as broken_off:
         for client, stack in zip("abcdea", (broken_off, *[taken] * 5), strict=True):
@@ -289,7 +286,7 @@ def holds(stored: AnswerCache, key: object, expected: Answer) -> bool:
     return lent is not None and lent[0] is expected
 
 
-def test_an_answer_being_sent_stays_and_counts_until_it_is_released() -> None:
+def test_an_answer_being_sent_stays_and_counts_and_a_replacement_takes_its_place() -> None:
     stored = cached(10, 10)
     stored.put("a", answer(10))
     lent = [stored.lend("a"), stored.lend("a")]
@@ -303,9 +300,6 @@ def test_an_answer_being_sent_stays_and_counts_until_it_is_released() -> None:
         one[1]()
     stored.put("d", answer(20 + ENTRY_BYTES))
     assert [has(stored, key) for key in "abcd"] == [False, False, False, True]
-
-
-def test_a_replacement_takes_the_place_of_the_old_answer() -> None:
     stored = cached(10, 10, 10)
     stored.put("field", answer(10))
     for number in range(100):

@@ -296,7 +296,7 @@ def test_an_unchanged_tag_still_ages() -> None:
     assert ages == [0.0, 2.5, 0.0]
 
 
-def test_a_reading_has_its_time_where_it_differs_from_the_one_before() -> None:
+def test_times_and_attempts_are_written_where_they_differ() -> None:
     times_s = (7210, 10, 10, None, None, 7210)
     readings = tuple(Reading(str(i), 1.0, s and s * S) for i, s in enumerate(times_s))
     tag = TagState("7", POSE, readings, last_observed_ns=7210 * S, looked_at_ns=3610 * S)
@@ -310,9 +310,6 @@ def test_a_reading_has_its_time_where_it_differs_from_the_one_before() -> None:
         {"sec": 7210, "nanosec": 0},
     ]
     assert written["looked_at"] == {"sec": 3610, "nanosec": 0}
-
-
-def test_the_last_attempt_is_written_unless_it_was_the_last_observation() -> None:
     tag = TagState("7", POSE, last_observed_ns=5 * S, last_try=Attempt(5 * S))
     assert (
         not {"last_try", "last_try_status", "last_try_detail"}

@@ -101,17 +101,9 @@ async def test_the_topics_of_a_twin_and_the_published_layers_are_offered() -> No
     assert offer.channels[1].schema == "# lupin_msgs/msg/TwinState"
 
 
-async def test_a_topic_without_a_definition_is_left_out_and_warned_about_once(
+async def test_layers_are_bounded_and_a_topic_without_a_definition_is_left_out_and_warned_about(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    offer = offer_of(Source({"/n/twin/tags": MARKERS, "/n/twin/planters": MARKERS}))
-    for _ in range(3):
-        await offer.look()
-    assert topics(offer) == OWN
-    assert caplog.text.count("is not offered to viewers") == 1
-
-
-async def test_layers_are_bounded_and_without_ros_there_are_none() -> None:
     source = Source({f"/n/twin/field/s{n:03}": POINTS for n in range(MAX_LAYERS + 1)})
     offer = offer_of(source)
     await offer.look()
@@ -119,6 +111,11 @@ async def test_layers_are_bounded_and_without_ros_there_are_none() -> None:
     source.has_ended = True
     await offer.look()
     assert topics(offer) == OWN
+    offer = offer_of(Source({"/n/twin/tags": MARKERS, "/n/twin/planters": MARKERS}))
+    for _ in range(3):
+        await offer.look()
+    assert topics(offer) == OWN
+    assert caplog.text.count("is not offered to viewers") == 1
 
 
 async def test_followers_get_only_changes_and_an_id_is_never_reused(

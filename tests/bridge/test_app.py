@@ -1,4 +1,4 @@
-"""The application: its routes, and the page."""
+"""The application: its routes, its page, the guide, and what is said where a part is not built."""
 
 import asyncio
 from pathlib import Path
@@ -6,10 +6,13 @@ from typing import Any
 
 import httpx
 import pytest
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
 
 from lupin_bridge.app import create_app
+from lupin_bridge.routes import pages
+from lupin_bridge.routes.pages import HOW_TO_BUILD, language_of
 from lupin_bridge.stream import schema
+from lupin_bridge.stream.schema import ErrorMessage
 
 PAGE = '<!doctype html><title>HMI</title><script type="module" src="/assets/a.js"></script>'
 
@@ -41,13 +44,12 @@ def query(static_folder: Path, method: str, path: str) -> httpx.Response:
     return request(create_app(None, static_folder), method, path)
 
 
-def test_it_describes_itself_without_a_twin_and_the_frameworks_own_pages_are_off(
-    tmp_path: Path,
-) -> None:
-    for path in ("/docs", "/openapi.json"):
-        assert query(tmp_path, "GET", path).status_code == 200
-    for path in ("/redoc", "/docs/oauth2-redirect"):
-        assert query(tmp_path, "GET", path).status_code == 404
+def test_it_describes_itself_without_a_twin_and_the_page_hides_no_route(static: Path) -> None:
+    (static / "docs").write_text("a file of that name")
+    assert "API" in query(static, "GET", "/docs").text
+    assert query(static, "GET", "/openapi.json").status_code == 200
+    for path in ("/redoc", "/docs/oauth2-redirect"):  # the framework's own
+        assert query(static, "GET", path).status_code == 404
 
 
 def test_the_page_and_its_files_are_served_from_the_same_origin(static: Path) -> None:
@@ -59,11 +61,6 @@ def test_the_page_and_its_files_are_served_from_the_same_origin(static: Path) ->
     assert script.headers["content-type"].startswith("text/javascript")
     assert script.headers["x-content-type-options"] == "nosniff"
     assert query(static, "HEAD", "/").text == ""
-
-
-def test_the_page_hides_no_route(static: Path) -> None:
-    (static / "docs").write_text("a file of that name")
-    assert "API" in query(static, "GET", "/docs").text
 
 
 @pytest.mark.parametrize(
@@ -127,3 +124,116 @@ def test_a_missing_websocket_is_refused_in_json(static: Path, built: bool) -> No
 
 def test_a_long_path_is_shortened_in_the_answer(tmp_path: Path) -> None:
     assert len(query(tmp_path, "GET", "/" + "x" * 4_000).text) < 300
+
+
+@pytest.mark.parametrize("method", ["GET", "HEAD"])
+def test_the_root_says_how_to_build_the_page(tmp_path: Path, method: str) -> None:
+    for folder in (tmp_path / "nowhere", tmp_path):  # an empty one is no page either
+        answer = query(folder, method, "/")
+        assert answer.status_code == 503
+        assert answer.headers["cache-control"] == "no-store"
+        assert "default-src 'self'" in answer.headers["content-security-policy"]
+        assert (HOW_TO_BUILD in answer.text) == (method == "GET")
+
+
+def test_the_font_is_that_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pages, "_ASSETS", tmp_path)
+    assert query(tmp_path, "GET", "/font.woff2").status_code == 404
+    (tmp_path / "inter-1.woff2").write_bytes(b"wOF2")
+    answer = query(tmp_path, "GET", "/font.woff2")
+    assert (answer.status_code, answer.content) == (200, b"wOF2")
+    assert answer.headers["content-type"] == "font/woff2"
+    assert answer.headers["cache-control"] == "max-age=604800"
+
+
+GUIDE = "<!doctype html><title>Guide</title><style>b {}</style>"
+
+
+@pytest.fixture
+def built(tmp_path: Path) -> Path:
+    folder = tmp_path / "guide"
+    (folder / "how-to").mkdir(parents=True)
+    (folder / "index.html").write_text(GUIDE)
+    (folder / "how-to" / "server.html").write_text(GUIDE)
+    (tmp_path / "secret.txt").write_text("secret")
+    return folder
+
+
+def query_guide(
+    guide_folder: Path, path: str, method: str = "GET", prefix: str = ""
+) -> httpx.Response:
+    return request(create_app(None, guide_folder=guide_folder), method, path, prefix)
+
+
+@pytest.mark.parametrize("path", ["/docs/guide/", "/docs/guide/how-to/server.html"])
+def test_a_page_may_have_its_own_styles_and_no_script(built: Path, path: str) -> None:
+    answer = query_guide(built, path)
+    assert (answer.status_code, answer.text) == (200, GUIDE)
+    policy = answer.headers["content-security-policy"].split("; ")
+    rules = dict(rule.split(" ", 1) for rule in policy)
+    assert rules["style-src"] == "'self' 'unsafe-inline'"
+    assert rules["default-src"] == "'self'"
+    assert "script-src" not in rules
+    assert answer.headers["x-content-type-options"] == "nosniff"
+
+
+def test_only_the_guide_may_have_its_own_styles_and_it_can_only_be_read(built: Path) -> None:
+    for path in ("/docs", "/", "/docs/nowhere"):
+        policy = query_guide(built, path).headers["content-security-policy"]
+        assert "unsafe-inline" not in policy
+    assert query_guide(built, "/docs/guide/", "POST").status_code == 405
+    assert query_guide(built, "/docs/guide/", "HEAD").text == ""
+
+
+@pytest.mark.parametrize("prefix", ["", "/gh1"])
+def test_without_its_slash_it_redirects(built: Path, prefix: str) -> None:
+    answer = query_guide(built, f"{prefix}/docs/guide", prefix=prefix)
+    assert answer.is_redirect
+    assert answer.headers["location"] == f"{prefix}/docs/guide/"
+
+
+@pytest.mark.parametrize("prefix", ["", "/gh1"])
+@pytest.mark.parametrize("path", ["/docs/guide/nowhere.html", "/docs/guide/..%2fsecret.txt"])
+def test_nothing_else_is_served_and_the_answer_says_where_to_look(
+    built: Path, path: str, prefix: str
+) -> None:
+    answer = query_guide(built, f"{prefix}{path}", prefix=prefix)
+    assert answer.status_code == 404
+    assert answer.json()["detail"].endswith(f"; see {prefix}/docs")
+
+
+@pytest.mark.parametrize("path", ["/docs/guide/", "/docs/guide/how-to/server.html"])
+def test_a_guide_that_is_not_built_says_how_to_build_it(tmp_path: Path, path: str) -> None:
+    answer = query_guide(tmp_path, path)
+    assert answer.status_code == 404
+    assert "make docs" in ErrorMessage.model_validate_json(answer.content).detail
+
+
+SPOKEN = ("en", "de", "nl", "es")
+
+
+@pytest.mark.parametrize(
+    ("requested", "accepted", "language"),
+    [
+        ("", "", "en"),
+        ("", "de-AT,de;q=0.9,en;q=0.8", "de"),
+        ("", "fr-FR, nl;q=0.7, en;q=0.6", "nl"),
+        ("", "en;q=0.5,es;q=0.501", "es"),
+        ("", "es , de", "es"),
+        ("", "de;q=0", "en"),
+        ("", "*", "en"),
+        ("", "fr,pl;q=0.9", "en"),
+        ("", ";q=1,,de;q=0.1", "de"),
+        ("lang=nl", "de", "nl"),
+        ("lang=DE-ch", "", "de"),
+        # No variant of the browser's language either.
+        ("lang=xx", "de", "en"),
+        ("lang=", "de", "en"),
+    ],
+)
+def test_the_language_is_chosen_from_accept_language(
+    requested: str, accepted: str, language: str
+) -> None:
+    headers = [(b"accept-language", accepted.encode())]
+    requested_by = Request({"type": "http", "query_string": requested.encode(), "headers": headers})
+    assert language_of(requested_by, SPOKEN) == language

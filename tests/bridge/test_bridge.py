@@ -1,25 +1,23 @@
-"""From a source to connections: pace, status, watch; and nothing is left behind."""
+"""From a source to connections: pace, status, watch, judging; and nothing is left behind."""
 
 import asyncio
 import itertools
 import json
 import math
-import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Self, cast
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from websockets.asyncio.client import connect
 
 from lupin_bridge.alarms.board import Change, board_of
 from lupin_bridge.bridge import ALARMS_REST_S, Bridge
 from lupin_bridge.feed.relay import Relay
 from lupin_bridge.feed.source import ThreadState, TwinUnavailableError, TwinUpdate
+from lupin_bridge.judge.verdict import Health, judge_site
 from lupin_bridge.notify.channels import Channels
 from lupin_bridge.notify.destinations import Targets
 from lupin_bridge.notify.webhook import Webhook
@@ -29,13 +27,11 @@ from lupin_bridge.stream.hub import Client
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered, PastWrite
-from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.state import Reading, Snapshot, TagState
 from lupin_twin.runtime.workers import Workers
 from tests.bridge.stream.test_frames import received
-from tests.support.inprocess import run, running
 from tests.support.seen import alarm
-from tests.support.waiting import PATIENCE_S, until, wait_for
-from tests.support.web import ws_url
+from tests.support.waiting import until
 
 
 class Script:
@@ -110,9 +106,6 @@ class Stage:
         await self.bridge.stop()
 
 
-# --- pace ---------------------------------------------------------------------------------------
-
-
 class Beat:
     """A bridge whose clock and frame timer belong to the test."""
 
@@ -183,7 +176,9 @@ def test_the_mean_rate_holds_whatever_the_producer_does(
     asyncio.run(test())
 
 
-async def test_a_frame_carries_the_latest_of_all_changes_since_the_last() -> None:
+async def test_a_frame_carries_the_latest_of_all_changes_and_heartbeats_beside_it_are_omitted() -> (
+    None
+):
     async with Stage(frames_per_s=50.0) as stage:
         for number in range(1, 101):
             stage.script.tell(state(number))
@@ -191,19 +186,11 @@ async def test_a_frame_carries_the_latest_of_all_changes_since_the_last() -> Non
         assert stage.ear.states[0]["revision"] == "r1"
         assert len(stage.ear.states) <= 4
         assert stage.bridge.latest == state(100)
-
-
-async def test_a_heartbeat_right_after_a_frame_is_omitted() -> None:
     async with Stage(frames_per_s=100.0) as stage:
-        stage.script.tell(state(1))
-        for _ in range(3):
-            stage.script.tell(TwinUpdate(state(1).snapshot, "r1"))
-        stage.script.tell(state(2))
+        for number in (1, 1, 1, 1, 2):
+            stage.script.tell(state(number))
         await until(lambda: len(stage.ear.states) == 2, "the change")
         assert stage.ear.states[-1]["revision"] == "r2"
-
-
-# --- status -------------------------------------------------------------------------------------
 
 
 async def test_a_status_is_sent_when_it_changes_and_only_then() -> None:
@@ -254,9 +241,6 @@ async def test_a_busy_memory_at_the_start_is_queried_again(monkeypatch: pytest.M
         await until(is_learnt, "the rhythm")
 
 
-# --- the watch ----------------------------------------------------------------------------------
-
-
 async def test_a_client_with_a_low_rate_gets_the_latest_although_nothing_more_happens() -> None:
     now_s = 100.0
     async with Stage(clock=lambda: now_s, frames_per_s=100.0) as stage:
@@ -271,9 +255,6 @@ async def test_a_client_with_a_low_rate_gets_the_latest_although_nothing_more_ha
         now_s += 0.3
         await until(lambda: rare.states[-1]["revision"] == "r5", "the newest in its time")
         assert [frame["revision"] for frame in rare.states] == ["r1", "r5"]
-
-
-# --- alarms -------------------------------------------------------------------------------------
 
 
 async def test_alarms_are_sent_at_once_and_those_right_after_once_a_second() -> None:
@@ -317,8 +298,6 @@ async def test_a_channel_that_fails_on_an_alarm_costs_the_page_no_alarms(
     assert "webhook had an error with changed alarms" in caplog.text
 
 
-# --- a silent twin ------------------------------------------------------------------------------
-
 SECOND = 1_000_000_000
 
 
@@ -339,28 +318,21 @@ async def test_while_the_twin_is_silent_its_status_is_repeated() -> None:
         assert ages_s == sorted(set(ages_s)), "each as of then"
 
 
-async def test_a_twin_without_a_clock_has_not_been_silent_since_the_year_1970() -> None:
+async def test_a_twin_whose_clock_stops_is_silent_since_its_last_time_and_not_since_1970() -> None:
     async with Stage() as stage:
         stage.bridge.liveness.stale_after_s = 0.3
         clockless = replace(state(0).snapshot, clock="none")
         stage.script.tell(replace(state(0), snapshot=clockless))
         await until(lambda: "no_clock" in stage.ear.reasons, "that to be told")
         stage.script.tell(state(7))
-        await until(lambda: stage.ear.reasons[-1] == "stale", "the silence to be noticed")
-        await until(lambda: stage.bridge.alarms.now.alarms, "its alarm")
-    (silent,) = stage.bridge.alarms.now.alarms
-    assert (silent.reason.kind, silent.raised_at_ns) == ("silent", 7)
-
-
-async def test_a_twin_whose_clock_stops_is_silent_since_its_last_time() -> None:
-    async with Stage() as stage:
-        stage.script.tell(state(7))
         for clock in ("stopped", "doubted"):
             without = replace(state(8).snapshot, clock=clock)
             stage.script.tell(replace(state(8), snapshot=without))
+        await until(lambda: stage.ear.reasons[-1] == "stale", "the silence to be noticed")
         await until(lambda: stage.bridge.alarms.now.active, "its alarm")
         (silent,) = stage.bridge.alarms.now.active
         assert (silent.reason.kind, silent.raised_at_ns) == ("silent", 7)
+        stage.bridge.liveness.stale_after_s = math.inf
         stage.script.tell(state(9))
         await until(lambda: not stage.bridge.alarms.now.active, "its end")
 
@@ -383,31 +355,74 @@ async def test_a_clock_that_goes_back_withdraws_the_silences_of_its_future() -> 
         assert raised_ns() == [3 * SECOND]
 
 
-# --- with a real twin ---------------------------------------------------------------------------
+def judged_state(number: int) -> TwinUpdate:
+    """The state after that many scans of two tags."""
+    stamp_ns = number * 10**9
+    readings = (Reading("temperature", 24.0, stamp_ns),)
+    tags = tuple(
+        TagState(tag_id, readings=readings, last_observed_ns=stamp_ns) for tag_id in ("bad", "good")
+    )
+    return TwinUpdate(Snapshot(stamp_ns, "map", tags), f"r{number}")
 
 
-def test_no_thread_and_no_descriptor_is_left_behind(domain: int) -> None:
-    def left() -> tuple[set[str], int]:
-        threads = {thread.name for thread in threading.enumerate()}
-        return threads, len(list(Path("/proc/self/fd").iterdir()))
+@pytest.mark.parametrize("error", [None, TwinUnavailableError("not yet")])
+async def test_a_robot_is_not_reported_as_stopped_before_the_log_was_read(
+    error: Exception | None,
+) -> None:
+    requested, may_answer = asyncio.Event(), asyncio.Event()
 
-    async def once() -> None:
-        async with (
-            running() as served,
-            connect(
-                ws_url(served.url), proxy=None, max_size=None, open_timeout=PATIENCE_S
-            ) as listener,
-        ):
-            await listener.recv()
-            assert (await served.http.get("/api/field.png?sensor_type=co2")).status_code == 200
+    async def query(*_: object) -> tuple[PastWrite, ...]:
+        requested.set()
+        await may_answer.wait()
+        if error is not None:
+            raise error
+        return ()
 
-    run(domain, once())  # what is made once per process stays
-    threads, files = left()  # some of which may be about to end
-    for _ in range(3):
-        run(domain, once())
+    stage = Stage(frames_per_s=1000.0)
+    stage.script.ask = query  # type: ignore[method-assign]
+    tags = judged_state(1).snapshot.tags
+    async with stage:
+        for number in (1, 2):
+            later = TwinUpdate(Snapshot((2_000 + number) * 10**9, "map", tags), f"r{number}")
+            stage.script.tell(later)
+            await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
+            greenhouse = stage.ear.states[-1]["health"]["house"]
+            if number == 1:
+                assert greenhouse["verdict"] == "healthy"
+                await requested.wait()
+                may_answer.set()
+                await until(lambda: stage.bridge.judge.knows_recent, "the log's word")
+        assert [reason["kind"] for reason in greenhouse["reasons"]] == ["stopped"]
 
-    def are_gone() -> bool:
-        threads_now, files_now = left()
-        return threads_now <= threads and files_now <= files
 
-    wait_for(are_gone, "no more threads and descriptors than before")
+async def test_a_state_that_cannot_be_judged_is_sent_with_everything_unknown(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    is_broken = False
+
+    def judge(*args: Any, **more: Any) -> Health:
+        if is_broken:
+            raise ZeroDivisionError("a defect")
+        return judge_site(*args, **more)
+
+    monkeypatch.setattr("lupin_bridge.judge.judging.judge_site", judge)
+
+    def verdicts(frame: dict[str, Any]) -> list[str]:
+        health = frame["health"]
+        return [health["house"]["verdict"], *(tag["verdict"] for tag in health["tags"].values())]
+
+    delta = Ear()
+    async with Stage(frames_per_s=1000.0) as stage:
+        stage.bridge.join(Client(delta, delta=True))
+        for number, is_broken in enumerate((False, True, True, False), start=1):
+            stage.script.tell(judged_state(number))
+            await until(lambda: len(stage.ear.states) == number, "the frame")  # noqa: B023
+            wanted = "unknown" if is_broken else "healthy"
+            assert verdicts(stage.ear.states[-1]) == [wanted] * 3
+        assert [verdicts(frame) for frame in delta.frames if frame["type"] == "delta"] == [
+            ["unknown"] * 3,
+            ["unknown"],
+            ["healthy"] * 3,
+        ]
+        assert caplog.text.count("ZeroDivisionError: a defect") == 1
+        assert b"lupin_judge_errors_total 2.0" in stage.bridge.metrics.text()

@@ -1,12 +1,25 @@
-"""The OpenAPI document: complete, and available without ROS."""
+"""The OpenAPI document and its page: complete, and available without ROS."""
 
 import json
 import subprocess
 import sys
+from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+import pytest
+from geometry_msgs.msg import Point, Polygon, Pose, Quaternion
+from lupin_msgs.msg import FlowerPoint, SensorReading, TagTimes, TwinState, TwinTagState
+from lupin_msgs.srv import GetEstimate, GetField
+from nav_msgs.msg import MapMetaData, OccupancyGrid
+from pydantic import BaseModel
+from std_msgs.msg import Header
+
 from lupin_bridge.app import document
+from lupin_bridge.routes.pages import render
+from lupin_bridge.stream import schema
+from lupin_bridge.stream.pollers import GetEstimateResponse
+from tests.support.web import ROUTES
 
 DOCUMENT: dict[str, Any] = json.loads(document())
 
@@ -23,9 +36,6 @@ def test_only_the_writing_routes_have_more_than_get() -> None:
         for operation in operations.values():
             assert operation["summary"], path
             assert all(answer["description"] for answer in operation["responses"].values()), path
-
-
-def test_every_parameter_is_described_and_frames_are_among_the_types() -> None:
     field = DOCUMENT["paths"]["/api/field"]["get"]["parameters"]
     names = "sensor_type resolution bbox_min_x bbox_min_y bbox_max_x bbox_max_y scale at"
     assert [parameter["name"] for parameter in field] == names.split()
@@ -33,20 +43,16 @@ def test_every_parameter_is_described_and_frames_are_among_the_types() -> None:
     assert {"StateFrame", "StatusFrame"} <= set(DOCUMENT["components"]["schemas"])
 
 
-def references(part: Any) -> list[str]:
-    if isinstance(part, dict):
-        own = [part["$ref"]] if isinstance(part.get("$ref"), str) else []
-        return own + [ref for value in part.values() for ref in references(value)]
-    if isinstance(part, list):
-        return [ref for value in part for ref in references(value)]
-    return []
-
-
-def test_every_reference_leads_to_a_type() -> None:
-    known = {f"#/components/schemas/{name}" for name in DOCUMENT["components"]["schemas"]}
-    found = set(references(DOCUMENT))
-    assert found
-    assert found <= known
+def test_the_command_and_a_fleet_need_no_ros() -> None:
+    script = (
+        "import runpy, sys; runpy.run_module('lupin_bridge.app', run_name='__main__');"
+        "import lupin_bridge.cli.roles;"
+        "ros = [m for m in sys.modules if m.split('.')[0] in ('rclpy', 'lupin_msgs')];"
+        "assert not ros, ros"
+    )
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
+    assert json.loads(result.stdout) == DOCUMENT
+    assert result.stdout.endswith(b"}\n")
 
 
 def test_the_copy_for_the_browsers_types_is_up_to_date() -> None:
@@ -56,12 +62,122 @@ def test_the_copy_for_the_browsers_types_is_up_to_date() -> None:
     )
 
 
-def test_the_command_needs_no_ros() -> None:
-    script = (
-        "import runpy, sys; runpy.run_module('lupin_bridge.app', run_name='__main__');"
-        "ros = [m for m in sys.modules if m.split('.')[0] in ('rclpy', 'lupin_msgs')];"
-        "assert not ros, ros"
-    )
-    result = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
-    assert json.loads(result.stdout) == DOCUMENT
-    assert result.stdout.endswith(b"}\n")
+PAGE = render(DOCUMENT, "http://twin:8000")
+
+
+class Page(HTMLParser):
+    """A page's text, ids and links; refuses tags that are not closed in order."""
+
+    VOID = ("meta", "link", "br", "img", "input")
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.text = ""
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self._open: list[str] = []
+        self.feed(html)
+        self.close()
+        assert self._open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in self.VOID:
+            self._open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+    def attributes(self, name: str) -> list[str]:
+        return [attrs[name] or "" for _, attrs in self.tags if name in attrs]
+
+
+def test_every_route_field_and_parameter_is_listed_with_a_line_for_curl() -> None:
+    text = Page(PAGE).text
+    for path, described in ROUTES.items():
+        assert (f"GET {path}" in text) == described
+        assert (f"curl 'http://twin:8000{path}" in text) == described
+    assert "curl 'http://twin:8000/api/field.png?sensor_type=…'" in text
+    for described_type in DOCUMENT["components"]["schemas"].values():
+        assert all(field in text for field in described_type["properties"])
+    for parameter in DOCUMENT["paths"]["/api/field"]["get"]["parameters"]:
+        assert parameter["description"] in text
+
+
+def test_every_type_is_listed_every_link_leads_to_one_and_nothing_is_loaded() -> None:
+    page = Page(PAGE)
+    assert set(page.attributes("id")) == set(DOCUMENT["components"]["schemas"])
+    links = page.attributes("href")
+    assert len(links) > len(ROUTES)
+    elsewhere = {"openapi.json", "docs/guide/"}
+    assert set(links) - elsewhere <= {f"#{name}" for name in page.attributes("id")}
+    page = Page(PAGE)
+    assert not {tag for tag, _ in page.tags} & {"script", "style", "link", "img", "iframe"}
+    assert page.attributes("style") == []
+
+
+@pytest.mark.parametrize("kind", ["route", "parameter", "type", "address"])
+def test_text_that_looks_like_markup_stays_text(kind: str) -> None:
+    markup, address = "<script>alert('x')</script>", "http://twin"
+    hostile = json.loads(document())
+    if kind == "route":
+        hostile["paths"][f"/{markup}"] = hostile["paths"]["/api/state"]
+    elif kind == "parameter":
+        hostile["paths"]["/api/field"]["get"]["parameters"][0]["description"] = markup
+    elif kind == "type":
+        hostile["components"]["schemas"]["Time"]["description"] = markup
+    else:
+        address = f"http://{markup}"
+    page = Page(render(hostile, address))
+    assert "script" not in {tag for tag, _ in page.tags}
+    assert markup in page.text
+
+
+def names(message_type: Any) -> list[str]:
+    """The fields of a ROS message, in their order."""
+    return list(message_type.get_fields_and_field_types())
+
+
+# What a type has after the fields of its message.
+TIMES: dict[Any, list[str]] = {
+    schema.TwinTagState: ["looked_at", "last_try", "last_try_status", "last_try_detail"],
+    schema.SensorReading: ["observed_at"],
+}
+
+
+@pytest.mark.parametrize(
+    ("model", "message_type"),
+    [
+        (schema.TwinState, TwinState),
+        (schema.TwinTagState, TwinTagState),
+        (schema.SensorReading, SensorReading),
+        (schema.FlowerPoint, FlowerPoint),
+        (schema.GetFieldResponse, GetField.Response),
+        (schema.MapMetaData, MapMetaData),
+        (schema.Header, Header),
+        (schema.Pose, Pose),
+        (schema.Point, Point),
+        (schema.Quaternion, Quaternion),
+        (schema.Polygon, Polygon),
+        (schema.OccupancyGrid, OccupancyGrid),
+        (GetEstimateResponse, GetEstimate.Response),
+    ],
+)
+def test_a_type_has_the_fields_of_its_message_in_their_order_and_then_the_times(
+    model: type[BaseModel], message_type: Any
+) -> None:
+    # The cells of a map are a picture.
+    expected = [
+        name for name in names(message_type) if (model, name) != (schema.OccupancyGrid, "data")
+    ]
+    times = TIMES.get(model, [])
+    assert list(model.model_fields) == expected + times
+    assert set(times) <= set(names(TagTimes)) - {"tag_id", "sensors"}
+
+
+def test_every_type_forbids_unknown_fields() -> None:
+    models = [m for m in vars(schema).values() if isinstance(m, type) and issubclass(m, BaseModel)]
+    assert len(models) > 15
+    assert all(model.model_config.get("extra") == "forbid" for model in models[1:])

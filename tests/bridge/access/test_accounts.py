@@ -1,20 +1,137 @@
-"""The accounts file: roles, session lifetimes, and what is stored of a secret."""
+"""The shared token and its sessions; the accounts file, its roles, and its commands."""
 
 import asyncio
+import csv
+import re
 import sqlite3
 import stat
+import time
 from contextlib import closing
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import pytest
 from argon2 import PasswordHasher
 
+from lupin_bridge.access import credentials
 from lupin_bridge.access import people as people_module
 from lupin_bridge.access.accounts import SESSION_S, Accounts, Audited, Device
-from lupin_bridge.access.credentials import AccountError, Person, check_password, digest
-from lupin_bridge.access.people import ATTEMPT_BURST, MAX_WAITING, People
+from lupin_bridge.access.credentials import (
+    MAX_COOKIE_BYTES,
+    MIN_TOKEN_LENGTH,
+    SHARED_SESSION_S,
+    AccountError,
+    CookieTooLong,
+    Credentials,
+    Person,
+    check_password,
+    cookies_of,
+    digest,
+)
+from lupin_bridge.access.people import ATTEMPT_BURST, MAX_WAITING, People, verify
 from lupin_bridge.serving.admission import ClientLimitError
-from tests.support.people import PASSWORD, TOKEN, add, begin_session, changing, remove
+from lupin_bridge.settings import SettingError
+from tests.support.people import PASSWORD, add, begin_session, changing, remove
+from tests.support.people import TOKEN as SCADA
+from tests.support.processes import run_here
+
+TOKEN = "correct-horse~battery.staple/42+x="
+OURS = Credentials(TOKEN)
+NOW_S = 1_700_000_000.0
+
+
+def test_a_token_that_is_short_or_that_no_header_can_carry_is_refused_and_never_shown() -> None:
+    for token in ("", "short", "x" * (MIN_TOKEN_LENGTH - 1)):
+        length = f"LUPIN_TOKEN has {len(token)} characters, must have at least {MIN_TOKEN_LENGTH}"
+        with pytest.raises(SettingError, match=length) as refused:
+            Credentials(token)
+        assert not token or token not in str(refused.value)
+    for odd in (" ", "\n", "ä", '"', ";", ",", "\x00", "=x"):
+        with pytest.raises(SettingError, match="RFC 6750") as refused:
+            Credentials(f"0123456789abcdef{odd}0123456789")
+        assert "0123456789" not in str(refused.value)
+
+
+def test_a_session_holds_at_every_replica_of_the_token_until_it_ends() -> None:
+    cookie, replica = OURS.cookie(NOW_S), Credentials(TOKEN)
+    session = replica.session_of(cookie, NOW_S + SHARED_SESSION_S - 1)
+    assert session is not None
+    assert (session.name, session.role) == ("", "viewer")
+    assert session.ends_at_s == NOW_S + SHARED_SESSION_S
+    assert replica.cookie_name == OURS.cookie_name
+    assert not OURS.session_of(cookie, NOW_S + SHARED_SESSION_S)
+    another = Credentials(TOKEN + "=")
+    assert not another.session_of(cookie, NOW_S)
+    assert another.cookie_name != OURS.cookie_name
+    assert TOKEN not in cookie + repr(OURS) + str(vars(OURS))
+
+
+@pytest.mark.parametrize("made_up", ["", ".", "\u0660", "x" * 8_000])
+def test_a_changed_cookie_is_refused(made_up: str) -> None:
+    ends, name, mac = OURS.cookie(NOW_S).split(".")
+    for cookie in (
+        made_up,
+        f"{int(ends) + 1}.{name}.{mac}",
+        f"{ends}0.{name}.{mac}",
+        f"{ends}.{name[::-1]}.{mac}",
+        f"{ends}.{name}.{mac[::-1]}",
+        f"{ends}.{name}.{made_up}",
+        f"{ends}.{mac}",
+    ):
+        assert not OURS.session_of(cookie, NOW_S)
+
+
+def test_signed_out_sessions_are_remembered_up_to_a_limit_the_longest_lasting_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(credentials, "MAX_SIGNED_OUT", 2)
+    ours = Credentials(TOKEN)
+    cookies = [ours.cookie(NOW_S + later_s) for later_s in range(4)]
+    for cookie in cookies[:3]:
+        session = ours.session_of(cookie, NOW_S)
+        assert session is not None
+        ours.sign_out(session)
+        assert not ours.still(session, NOW_S)
+    assert [ours.session_of(cookie, NOW_S) is not None for cookie in cookies] == [
+        *(True, False, False, True)
+    ]
+
+
+# --- cookies --------------------------------------------------------------------------------------
+
+NAME = "lupin_session_0011aabb"
+
+
+def test_every_value_of_the_name_is_found_in_all_header_lines_and_nothing_else() -> None:
+    for header, values in (
+        ("", []),
+        (f"theme=dark; {NAME}=a.b; other=1", ["a.b"]),
+        (f"theme=dark;{NAME}=a.b\t;", ["a.b"]),
+        (f"x{NAME}=a", []),
+        (f"{NAME}x=a", []),
+        (f"{NAME}=a; {NAME}=b", ["a", "b"]),
+        (f'{NAME}="a\\"b"', ['"a\\"b"']),
+    ):
+        assert cookies_of(NAME, [(b"host", b"x"), (b"cookie", header.encode())]) == values
+    # Bytes that are no text do no harm.
+    lines = [(b"cookie", f"{NAME}=a".encode()), (b"cookie", f"{NAME}=\xff".encode("latin-1"))]
+    assert cookies_of(NAME, lines) == ["a", "\xff"]
+    assert cookies_of(NAME, [(b"set-cookie", f"{NAME}=a".encode())]) == []
+
+
+@pytest.mark.parametrize("lines", [1, 2])
+def test_a_cookie_header_is_read_up_to_its_limit(lines: int) -> None:
+    own = f"{NAME}=a".encode()
+    fill = (MAX_COOKIE_BYTES - lines * len(own)) // lines
+    headers = [(b"cookie", own + b";" * fill) for _ in range(lines)]
+    assert sum(len(value) for _, value in headers) == MAX_COOKIE_BYTES
+    assert cookies_of(NAME, headers) == ["a"] * lines
+    with pytest.raises(CookieTooLong, match=f"Cookie has {MAX_COOKIE_BYTES + 1} bytes, the limit"):
+        cookies_of(NAME, [*headers, (b"cookie", b";")])
+
+
+# --- the accounts file ----------------------------------------------------------------------------
+
 
 NOW = 1_800_000_000
 
@@ -32,17 +149,22 @@ def test_only_its_owner_can_read_the_file_and_it_holds_no_secret(path: Path) -> 
         assert [stat.S_IMODE(file.stat().st_mode) for file in path.parent.iterdir()] == [0o600] * 3
         raw = b"".join(file.read_bytes() for file in path.parent.iterdir())
     assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
-    for secret in (PASSWORD, TOKEN, cookie):
+    for secret in (PASSWORD, SCADA, cookie):
         assert secret.encode() not in raw
     assert b"$argon2id$" in raw
 
 
-def test_a_session_ends_when_it_expires_and_with_its_account(path: Path) -> None:
+def test_sessions_per_name_are_limited_and_end_when_they_expire_and_with_their_account(
+    path: Path,
+) -> None:
     add(path, anna="operator")
     with changing(path) as accounts:
+        names = [digest(begin_session(accounts, NOW + n)) for n in range(25)]
+        found = [accounts.of_session(name, NOW) for name in names]
+        assert [it is not None for it in found] == [False] * 5 + [True] * 20
         name, anna = digest(begin_session(accounts)), accounts.of_name("anna")
-        found = accounts.of_session(name, NOW + SESSION_S - 1)
-        assert found == Person("anna", "operator", session=name, ends_at_s=NOW + SESSION_S)
+        whose = accounts.of_session(name, NOW + SESSION_S - 1)
+        assert whose == Person("anna", "operator", session=name, ends_at_s=NOW + SESSION_S)
         assert accounts.of_session(name, NOW + SESSION_S) is None
         accounts.remove("anna", "account", by="a test", now_s=NOW)
         assert accounts.of_session(name, NOW) is None
@@ -52,14 +174,6 @@ def test_a_session_ends_when_it_expires_and_with_its_account(path: Path) -> None
     add(path, anna="admin")
     with closing(Accounts(path)) as accounts:
         assert accounts.of_session(name, NOW) is None, "of another anna"
-
-
-def test_sessions_per_name_are_limited(path: Path) -> None:
-    add(path, anna="operator")
-    with changing(path) as accounts:
-        names = [digest(begin_session(accounts, NOW + n)) for n in range(25)]
-        found = [accounts.of_session(name, NOW) for name in names]
-        assert [it is not None for it in found] == [False] * 5 + [True] * 20
 
 
 def test_a_name_belongs_to_one_person_or_one_token(path: Path) -> None:
@@ -173,13 +287,13 @@ def test_a_deleted_or_unreadable_accounts_file_opens_nothing(path: Path) -> None
     before = people.is_on
     add(path, "token", scada="viewer")
     assert (before, people.is_on) == (False, True)
-    assert people.by_token(TOKEN) == Person("scada", "viewer", by="token")
+    assert people.by_token(SCADA) == Person("scada", "viewer", by="token")
     path.unlink()
     assert people.is_on
     with pytest.raises(AccountError):
-        people.by_token(TOKEN)
+        people.by_token(SCADA)
     add(path, "token", digest("another"), scada="viewer")  # another file in its place
-    assert people.by_token(TOKEN) is None
+    assert people.by_token(SCADA) is None
     path.unlink()
     path.symlink_to(path)  # it cannot be read
     assert People(path).is_on
@@ -201,3 +315,121 @@ def test_only_devices_of_people_who_may_read_the_site_are_notified(path: Path) -
         accounts.add_device("anna", Device("https://push.example/x", "", "", "en"), "::1", NOW)
         found = [len(accounts.devices(site)) for site in ("north", "south", "")]
     assert found == [1, 0, 0]
+
+
+# --- `lupin-twin user`, `token` and `audit` -------------------------------------------------------
+
+
+STAMP = r"20\d\d-\d\d-\d\dT\d\d:\d\d:\d\dZ"
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "accounts.sqlite"
+
+
+def ended(file: Path, words: str) -> CompletedProcess[str]:
+    """The command on this file."""
+    return run_here(*words.split(), "--accounts", file)
+
+
+def printed(file: Path, words: str) -> str:
+    """What it prints; it must succeed."""
+    done = ended(file, words)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_user_is_added_listed_and_removed(file: Path) -> None:
+    secret = file.with_name("password")
+    secret.write_text("short\n")
+    words = "user add anna --role operator --for-site gh1 --for-site gh2 --password-file"
+    refused = ended(file, f"{words} {secret}")
+    assert (refused.returncode, file.exists()) == (1, False)
+    assert "has 5 characters, must have 10 to 512" in refused.stderr
+    secret.write_text(f"{PASSWORD}\n")
+    added = ended(file, f"{words} {secret}")
+    assert (added.returncode, added.stdout) == (
+        0,
+        "account anna is added, with the role operator\n",
+    )
+    assert f"{file} is created: from now on, bridges" in added.stderr
+    assert printed(file, "user add bert --role viewer --no-password") == (
+        "account bert is added, with the role viewer\n"
+    )
+    assert re.fullmatch(
+        rf"anna  operator  {STAMP}  gh1 gh2\nbert  viewer  {STAMP}\n", printed(file, "user list")
+    )
+    with closing(Accounts(file, is_writer=True)) as accounts:
+        found = accounts.of_name("anna")
+        assert found is not None
+        assert found == Person("anna", "operator", sites=("gh1", "gh2"))
+        assert verify(found.secret, PASSWORD)
+        session = digest(begin_session(accounts, int(time.time())))
+    assert printed(file, "user remove anna") == "account anna is removed\n"
+    assert printed(file, "user list").startswith("bert ")
+    with closing(Accounts(file)) as accounts:
+        assert accounts.of_name("anna") is None
+        assert accounts.of_session(session, int(time.time())) is None
+    last = ended(file, "user remove bert")
+    assert (last.returncode, printed(file, "user list")) == (0, "")
+    assert "nobody can sign in any more" in last.stderr
+
+
+def test_a_token_is_printed_once_listed_and_revoked(file: Path) -> None:
+    token = printed(file, "token add scada --role viewer --for-site gh1").strip()
+    listed = printed(file, "token list")
+    assert re.fullmatch(rf"scada  viewer  {STAMP}  gh1\n", listed)
+    assert printed(file, "user list") == ""
+    with closing(Accounts(file)) as accounts:
+        found = accounts.of_token(digest(token))
+        assert found is not None
+        assert (found.name, found.role, found.sites) == ("scada", "viewer", ("gh1",))
+    assert printed(file, "token revoke scada") == "token scada is removed\n"
+    assert printed(file, "token list") == ""
+    with closing(Accounts(file)) as accounts:
+        assert accounts.of_token(digest(token)) is None
+
+
+def test_the_audit_trail_is_csv_with_the_latest_row_first(file: Path) -> None:
+    printed(file, "user add anna --role admin --no-password")
+    token = printed(file, "token add scada --role viewer").strip()
+    with closing(Accounts(file, is_writer=True)) as accounts:
+        begin_session(accounts, int(time.time()))
+    printed(file, "token revoke scada")
+    text = printed(file, "audit")
+    header, *rows = csv.reader(text.splitlines())
+    assert header == ["time", "who", "what", "subject", "address"]
+    assert all(re.fullmatch(STAMP, row[0]) for row in rows)
+    by = rows[0][1]
+    assert by.endswith(" on this machine")
+    assert [row[1:] for row in rows] == [
+        [by, "remove token", "scada", ""],
+        ["anna", "sign in", "", "192.0.2.7"],
+        [by, "add token", "scada viewer", ""],
+        [by, "add account", "anna admin", ""],
+    ]
+    assert token not in text
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ("user add no/name --role viewer --no-password", "the name is 'no/name'"),
+        ("user add anna --role viewer --no-password", "there is account 'anna' already"),
+        ("user add bert --role viewer", "there is no terminal to enter the password in"),
+        ("user add bert --role viewer --password-file /nowhere", "--password-file /nowhere: No "),
+        ("user remove bert", "there is no account 'bert'"),
+        ("token revoke anna", "there is no token 'anna'"),
+    ],
+)
+def test_a_failed_command_is_one_line_and_changes_nothing(
+    file: Path, words: str, reason: str
+) -> None:
+    printed(file, "user add anna --role viewer --no-password")
+    before = printed(file, "user list"), printed(file, "audit")
+    done = ended(file, words)
+    assert (done.returncode, done.stdout) == (1, "")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"lupin-twin: {reason}")
+    assert (printed(file, "user list"), printed(file, "audit")) == before

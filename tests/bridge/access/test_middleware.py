@@ -1,4 +1,4 @@
-"""The access checks of a live bridge: foreign hosts and pages, tokens, and no secret in the log."""
+"""The access checks of a live bridge, what holds for every answer, and no secret in the log."""
 
 from collections.abc import Iterator
 
@@ -10,9 +10,10 @@ from lupin_bridge.access.middleware import GUESS_BURST, MAX_TARGET_BYTES, OPEN_P
 from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES
 from lupin_bridge.stream import schema
 from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
+from tests.support.messages import occupancy_grid, scan
 from tests.support.proc_stat import cpu_s
 from tests.support.waiting import wait_for
-from tests.support.web import ROUTES
+from tests.support.web import ROUTES, Bridge, bridge
 
 PANEL = "http://panel.example:3000"
 UPGRADE = {
@@ -57,14 +58,6 @@ def refusal_of(answer: httpx.Response) -> str:
 # --- Host ---------------------------------------------------------------------------------------
 
 
-def test_an_allowed_host_is_a_name_and_not_an_origin(open_bridge: Served) -> None:
-    assert open_bridge.get("/api/state", {"Host": "twin.example:8000"}).status_code == 200
-    assert open_bridge.get("/api/state", {"Host": "sub.twin.example"}).status_code == 403
-    foreign = open_bridge.get("/api/state", {"Origin": "http://twin.example"})
-    assert foreign.status_code == 403
-    assert "access-control-allow-origin" not in foreign.headers
-
-
 def test_a_rebound_name_gets_nothing(open_bridge: Served) -> None:
     rebound = {"Host": "evil.example:8000", "Origin": "http://evil.example:8000"}
     requested = [(path, rebound) for path in ("/api/state", "/healthz", "/", "/signin", "/nowhere")]
@@ -89,7 +82,9 @@ def test_a_foreign_page_gets_no_answer_and_no_permission_to_read_one(open_bridge
         assert open_bridge.handshake(path, evil) == 403, path
 
 
-def test_the_pages_of_an_allowed_origin_may_read(open_bridge: Served) -> None:
+def test_an_allowed_page_may_read_and_cannot_write_and_a_cache_keeps_the_origins_apart(
+    open_bridge: Served,
+) -> None:
     answer = open_bridge.get("/api/field?sensor_type=co2", {"Origin": PANEL})
     assert answer.status_code == 200
     assert answer.headers["access-control-allow-origin"] == PANEL
@@ -97,13 +92,14 @@ def test_the_pages_of_an_allowed_origin_may_read(open_bridge: Served) -> None:
     exposed = answer.headers["access-control-expose-headers"].lower().split(", ")
     assert {"etag", "retry-after", "x-field-sample-count"} <= set(exposed)
     assert open_bridge.handshake(headers={"Origin": PANEL}) == 101
-
-
-def test_a_cache_keeps_the_origins_apart(open_bridge: Served) -> None:
     for headers in ({}, {"Origin": PANEL}, {"Origin": "http://evil.example"}):
         assert "Origin" in open_bridge.get("/api/state", headers).headers["vary"]
     both = open_bridge.get("/api/field?sensor_type=co2", {"Origin": PANEL}).headers["vary"]
     assert {part.strip() for part in both.split(",")} == {"Accept", "Origin"}
+    for path in ("/api/state", "/api/notes", "/api/signin"):
+        answer = open_bridge.post(path, {"Origin": PANEL})
+        assert answer.status_code == 403
+        assert "may only read here" in refusal_of(answer)
 
 
 def test_an_allowed_page_may_send_a_preflight_with_a_token(open_bridge: Served) -> None:
@@ -118,20 +114,6 @@ def test_an_allowed_page_may_send_a_preflight_with_a_token(open_bridge: Served) 
         other = open_bridge.get("/api/state", {"Origin": origin, **requests}, method="OPTIONS")
         assert other.status_code == status
         assert "access-control-allow-origin" not in other.headers
-
-
-def test_an_allowed_page_cannot_write(open_bridge: Served) -> None:
-    for path in ("/api/state", "/api/notes", "/api/signin"):
-        answer = open_bridge.post(path, {"Origin": PANEL})
-        assert answer.status_code == 403
-        assert "may only read here" in refusal_of(answer)
-
-
-def test_a_picture_in_a_foreign_page_is_not_computed(open_bridge: Served) -> None:
-    hidden = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}
-    answer = open_bridge.get("/api/field.png?sensor_type=co2", hidden)
-    assert answer.status_code == 403
-    assert "without naming itself" in refusal_of(answer)
 
 
 @pytest.mark.parametrize("path", ["/", "/docs", "/signin", "/api/report.html"])
@@ -198,11 +180,6 @@ def test_a_browser_is_sent_to_the_sign_in_page(closed: Served, path: str, locati
     assert answer.headers["cache-control"] == "no-store"
 
 
-def test_a_writing_method_is_refused_before_its_path_is_checked(closed: Served) -> None:
-    assert closed.get("/api/state", method="POST").status_code == 401
-    assert closed.get("/api/state", BEARER, method="POST").status_code == 405
-
-
 @pytest.mark.parametrize("path", ["/ws/state", "/rosbridge", "/foxglove"])
 def test_a_websocket_needs_the_token(closed: Served, path: str) -> None:
     assert closed.handshake(path) == 401
@@ -246,11 +223,15 @@ def test_a_hostile_cookie_delays_no_other_client(closed: Served, inside: str) ->
         assert cpu_s(closed.process.pid) - before_s < 5.0
 
 
-def test_a_token_anywhere_else_opens_nothing(closed: Served) -> None:
+def test_a_token_elsewhere_opens_nothing_and_a_writing_method_is_refused_before_its_path(
+    closed: Served,
+) -> None:
     assert closed.get("/api/state", {"Authorization": f"Basic {TOKEN}"}).status_code == 401
     for query in (f"?token={TOKEN}", f"?access_token={TOKEN}", f"?LUPIN_TOKEN={TOKEN}"):
         assert closed.get("/api/state" + query).status_code == 401
         assert closed.handshake("/ws/state" + query) == 401
+    assert closed.get("/api/state", method="POST").status_code == 401
+    assert closed.get("/api/state", BEARER, method="POST").status_code == 405
 
 
 def test_guessing_slows_down_only_the_guesser(closed: Served) -> None:
@@ -307,3 +288,98 @@ def test_listening_beyond_loopback_is_logged_as_a_warning() -> None:
         assert "without LUPIN_TOKEN" in warnings[0]
         assert "without --tls-cert" in warnings[1]
         assert live.get("/api/state").status_code == 200, "it goes by its addresses"
+
+
+# --- what holds for every answer ------------------------------------------------------------------
+
+
+ELSEWHERE = ["/", "/nowhere", "/ws/state"]
+QUERY = {"sensor_type": "co2", "resolution": "0.5"}
+IN_CELLS = {path for path in PATHS if "field" in path or "estimate" in path}
+SENSOR = {"sensor_type": "co2"}
+OF_SENSOR = {f"/api/estimate/{name}" for name in ("advice", "quality", "tags")}
+POSTED = ("/api/signin", "/api/signout")
+SERIES = {"tag_id": "7", "sensor_type": "co2"}
+# Without an end, a period ends now, and its file name contains that second.
+PERIOD = {"from": "1", "to": "5"}
+PAST = {"/api/history": SERIES, "/api/timeline": {}, "/api/export.csv": {}}
+
+
+@pytest.fixture(scope="module")
+def twin() -> Iterator[Bridge]:
+    with bridge() as running:
+        running.peer.observe(scan("7", {"co2": 400.0}, at=(1, 1)))
+        running.peer.publish_map(occupancy_grid([[0]]))
+        running.tag("7")
+        running.peer.until(lambda: running.get("/api/map").status_code == 200, "the map")
+        yield running
+
+
+def send(twin: Bridge, method: str, path: str) -> httpx.Response:
+    query = PAST[path] | PERIOD if path in PAST else QUERY if path in IN_CELLS else None
+    return twin.http.request(method, path, params=query if path not in OF_SENSOR else SENSOR)
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_head_is_get_without_the_body(twin: Bridge, path: str) -> None:
+    got, head = (send(twin, method, path) for method in ("GET", "HEAD"))
+    assert (got.status_code, head.status_code, head.content) == (200, 200, b"")
+    assert got.content
+    # The other headers depend on the time: lengths, ETags, file names.
+    for name in ("content-type", "cache-control", "vary"):
+        assert head.headers.get(name) == got.headers.get(name), name
+
+
+@pytest.mark.parametrize("path", [*(path for path in PATHS if path != "/api/notes"), *ELSEWHERE])
+@pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE", "BREW"])
+def test_any_method_but_a_read_is_refused(twin: Bridge, path: str, method: str) -> None:
+    answer = send(twin, method, path)
+    assert answer.status_code == 405
+    assert answer.headers["allow"] == "GET, HEAD"
+    message = schema.ErrorMessage.model_validate_json(answer.content)
+    assert message.detail == f"method {method} is not allowed here, use GET or HEAD"
+
+
+@pytest.mark.parametrize("path", POSTED)
+def test_signing_in_and_out_needs_post_with_a_header_that_no_form_can_send(
+    twin: Bridge, path: str
+) -> None:
+    for method in ("GET", "HEAD", "PUT", "DELETE", "OPTIONS"):
+        answer = twin.http.request(method, path, headers=OWN)
+        assert (answer.status_code, answer.headers["allow"]) == (405, "POST"), method
+    answer = twin.http.post(path)
+    assert answer.status_code == 403
+    assert answer.json() == {"detail": "POST without the header X-Lupin-Twin, expected any value"}
+    assert twin.http.post(path, headers=OWN).status_code == 404, "this bridge needs no token"
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "status"),
+    [
+        ("GET", "/api/state", 200),
+        ("GET", "/docs", 200),
+        ("GET", "/api/field.png?sensor_type=co2", 200),
+        ("GET", "/api/field", 400),
+        ("GET", "/nowhere", 404),
+        ("POST", "/api/state", 405),
+    ],
+)
+def test_every_answer_has_the_security_headers(
+    twin: Bridge, method: str, path: str, status: int
+) -> None:
+    answer = twin.http.request(method, path)
+    assert answer.status_code == status
+    policy = dict(
+        part.strip().split(" ", 1) for part in answer.headers["content-security-policy"].split(";")
+    )
+    assert policy["default-src"] == policy["connect-src"] == "'self'"
+    assert policy["img-src"] == "'self' blob: data:"
+    assert policy["object-src"] == policy["base-uri"] == policy["frame-ancestors"] == "'none'"
+    assert "script-src" not in policy, "the default allows no inline script"
+    assert "unsafe" not in answer.headers["content-security-policy"]
+    assert answer.headers["x-content-type-options"] == "nosniff"
+    assert answer.headers["x-frame-options"] == "DENY"
+    assert answer.headers["referrer-policy"] == "no-referrer"
+    assert answer.headers["cross-origin-opener-policy"] == "same-origin"
+    assert answer.headers["cross-origin-resource-policy"] == "same-origin"
+    assert "server" not in answer.headers

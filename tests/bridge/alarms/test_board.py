@@ -1,14 +1,21 @@
-"""The board of alarms, the alarms of a page, and the notes that people added."""
+"""The board of alarms, the notes of people on them, and the feed.
+
+`test_live_notes` covers the feed in `serve` and in `web`.
+"""
 
 import random
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lupin_bridge.alarms import feed as feed_module
 from lupin_bridge.alarms.board import (
     MAX_WORST,
+    AlarmBoard,
     Board,
     Change,
     active_first,
@@ -16,41 +23,49 @@ from lupin_bridge.alarms.board import (
     change_between,
     notes_of_alarms,
 )
+from lupin_bridge.alarms.feed import AlarmFeed, writes_between
+from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
+from lupin_bridge.judge import alarm_fold
 from lupin_bridge.judge.episodes import MAX_EPISODES, Alarm
+from lupin_bridge.judge.judging import Criteria, Judge
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
+from lupin_bridge.settings import Settings
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.notes import ACKNOWLEDGE, SHELVE, WITHDRAW, Note
+from lupin_twin.core.past import PastWrite, PastWrites, RunSpan, WritesRequest
+from lupin_twin.core.state import Flower, Inspection, Reading, Scan, Snapshot, TwinStore
+from lupin_twin.runtime.workers import Workers
 from tests.support.seen import Alarms, alarm
+from tests.support.waiting import until
 
 A, B = alarm("a"), alarm("b", raised_ns=2)
 
 
-def test_a_change_is_reported_after_the_board_has_it() -> None:
+def test_a_change_is_reported_after_the_board_has_it_and_so_is_another_source() -> None:
     board, reported = Alarms(), list[tuple[Change, int]]()
     board.show([A], is_past=True)
     board.on_change = lambda change: reported.append((change, board.now.number))
     cleared = replace(A, cleared_at_ns=A.raised_at_ns + 1)
     board.show([cleared, B])
-    assert reported == [(Change((B, cleared)), board.now.number)]
+    number = board.now.number
+    assert reported == [(Change((B, cleared)), number)]
     assert (board.now.alarms, board.now.active) == ((cleared, B), (B,))
+    board.show([cleared, B])
+    assert (len(reported), board.now.number) == (1, number), "the same alarms are no change"
+    board.show([cleared, B], "starting")
+    assert reported[1:] == [(Change(()), number + 1)]
 
 
-def test_the_same_alarms_are_no_change_but_another_source_is_one() -> None:
-    board, received = Alarms(), list[Change]()
-    board.show([A])
-    board.on_change, number = received.append, board.now.number
-    board.show([A])
-    assert (received, board.now.number) == ([], number)
-    board.show([A], "starting")
-    assert (received, board.now.number) == ([Change(())], number + 1)
-
-
-def test_active_alarms_come_before_worse_ones_that_are_over() -> None:
+def test_the_worst_come_first_and_active_ones_before_worse_ones_that_are_over() -> None:
     over, still = alarm(cleared_ns=9), alarm("b", Verdict.STRESSED)
     worst = alarm("c")
     assert sorted([over, still, worst], key=active_first) == [worst, still, over]
+    many = [
+        replace(alarm(str(number), raised_ns=number), id=str(number))
+        for number in range(MAX_WORST + 1)
+    ]
+    assert board_of(many).worst == tuple(reversed(many))[:MAX_WORST]
 
-
-# --- a page of alarms -----------------------------------------------------------------------------
 
 VERDICTS = [Verdict.CRITICAL, Verdict.STRESSED, Verdict.UNKNOWN]
 
@@ -97,7 +112,7 @@ def test_a_page_has_all_in_their_order_and_a_change_is_what_differs(seed: int) -
         before = page
 
 
-def test_changes_are_reported_in_the_order_in_which_they_happened_without_the_unchanged() -> None:
+def test_changes_are_reported_in_the_order_of_their_time_and_suppressed_ones_unchanged() -> None:
     first, second = alarm("a", raised_ns=3), alarm("b", raised_ns=5)
     before = board_of([second, first])
     assert change_between(before, board_of([first, second])) == Change(())
@@ -105,9 +120,6 @@ def test_changes_are_reported_in_the_order_in_which_they_happened_without_the_un
     page = board_of([cleared, first, third])
     assert change_between(before, page) == Change((third, cleared))
     assert page.alarms == (third, cleared, first)
-
-
-def test_an_alarm_suppressed_for_its_tags_many_alarms_is_reported_unchanged() -> None:
     many = [
         replace(alarm("a", raised_ns=number), id=str(number), cleared_at_ns=number + 1)
         for number in range(MAX_EPISODES + 1)
@@ -117,57 +129,313 @@ def test_an_alarm_suppressed_for_its_tags_many_alarms_is_reported_unchanged() ->
     assert change_between(board_of(many[:2]), board_of(many[1:2])) == Change((), (many[0],))
 
 
-def test_the_worst_come_first() -> None:
-    many = [
-        replace(alarm(str(number), raised_ns=number), id=str(number))
-        for number in range(MAX_WORST + 1)
-    ]
-    assert board_of(many).worst == tuple(reversed(many))[:MAX_WORST]
-
-
-# --- notes on alarms ------------------------------------------------------------------------------
-
-NOW = 10**18
+NOTED = 10**18
 HOUR = 3_600 * 10**9
-COLD = Alarm("a", Reason(Kind.RANGE, Verdict.STRESSED, "temperature", 9.0, 12.0), "7", NOW - 1)
-SHELF = Note("1", NOW, "anna", SHELVE, "alarm:a", "heater", NOW + HOUR)
-FOUND = Note("0", NOW, "bert", ACKNOWLEDGE, "alarm:a")
+COLD = Alarm("a", Reason(Kind.RANGE, Verdict.STRESSED, "temperature", 9.0, 12.0), "7", NOTED - 1)
+SHELF = Note("1", NOTED, "anna", SHELVE, "alarm:a", "heater", NOTED + HOUR)
+FOUND = Note("0", NOTED, "bert", ACKNOWLEDGE, "alarm:a")
 
 
-def test_a_shelf_ends_at_its_time_or_by_a_later_note_or_by_withdrawal() -> None:
-    assert "a" in notes_of_alarms([COLD], [SHELF], NOW + HOUR - 1)
+def test_a_shelf_ends_at_its_time_and_holds_for_an_alarm_that_comes_back_no_worse() -> None:
+    assert "a" in notes_of_alarms([COLD], [SHELF], NOTED + HOUR - 1)
     assert notes_of_alarms([COLD], [SHELF], None) == {}
-    assert notes_of_alarms([COLD], [SHELF], NOW + HOUR) == {}
-    ended = Note("2", NOW, "bert", SHELVE, "alarm:a")
-    assert notes_of_alarms([COLD], [SHELF, ended], NOW) == {}
-    assert notes_of_alarms([COLD], [SHELF, Note("2", NOW, "anna", WITHDRAW, "note:1")], NOW) == {}
-
-
-@pytest.mark.parametrize("message", [SHELF, FOUND], ids=["shelved", "acknowledged"])
-def test_notes_end_when_their_alarm_gets_worse_and_later_ones_hold(message: Note) -> None:
-    bad = replace(COLD.reason, verdict=Verdict.CRITICAL)
-    worse = replace(COLD, reason=bad, raised_as=Verdict.STRESSED, worse_at_ns=NOW + 1)
-    assert "a" in notes_of_alarms([COLD], [message], NOW + 1)
-    assert notes_of_alarms([worse], [message], NOW + 1) == {}
-    again = replace(message, id="2", made_at_ns=NOW + 1)
-    assert "a" in notes_of_alarms([worse], [message, again], NOW + 2)
-
-
-def test_an_alarm_that_comes_back_stays_shelved_unless_it_is_worse_or_of_another_kind() -> None:
+    assert notes_of_alarms([COLD], [SHELF], NOTED + HOUR) == {}
+    ended = Note("2", NOTED, "bert", SHELVE, "alarm:a")
+    assert notes_of_alarms([COLD], [SHELF, ended], NOTED) == {}
+    assert (
+        notes_of_alarms([COLD], [SHELF, Note("2", NOTED, "anna", WITHDRAW, "note:1")], NOTED) == {}
+    )
     again = replace(COLD, id="b")
     worse = replace(again, reason=replace(COLD.reason, verdict=Verdict.CRITICAL))
     warm = replace(again, reason=replace(COLD.reason, value=40.0, limit=30.0))
     elsewhere = replace(again, tag_id="8")
     for other, is_shelved in ((again, True), (worse, False), (warm, False), (elsewhere, False)):
-        assert ("b" in notes_of_alarms([COLD, other], [SHELF], NOW)) is is_shelved, other
+        assert ("b" in notes_of_alarms([COLD, other], [SHELF], NOTED)) is is_shelved, other
 
 
-@pytest.mark.parametrize("until_ns", [None, NOW + HOUR // 2])
+@pytest.mark.parametrize("message", [SHELF, FOUND], ids=["shelved", "acknowledged"])
+def test_notes_end_when_their_alarm_gets_worse_and_later_ones_hold(message: Note) -> None:
+    bad = replace(COLD.reason, verdict=Verdict.CRITICAL)
+    worse = replace(COLD, reason=bad, raised_as=Verdict.STRESSED, worse_at_ns=NOTED + 1)
+    assert "a" in notes_of_alarms([COLD], [message], NOTED + 1)
+    assert notes_of_alarms([worse], [message], NOTED + 1) == {}
+    again = replace(message, id="2", made_at_ns=NOTED + 1)
+    assert "a" in notes_of_alarms([worse], [message, again], NOTED + 2)
+
+
+@pytest.mark.parametrize("until_ns", [None, NOTED + HOUR // 2])
 def test_the_last_note_on_an_alarm_that_came_back_ends_the_shelf_from_before(
     until_ns: int | None,
 ) -> None:
     again = replace(COLD, id="b")
-    ended = Note("2", NOW + 1, "bert", SHELVE, "alarm:b", "", until_ns)
+    ended = Note("2", NOTED + 1, "bert", SHELVE, "alarm:b", "", until_ns)
     for notes in ([SHELF, ended], [ended, SHELF]):
         for alarms in ([COLD, again], [again, COLD]):
-            assert notes_of_alarms(alarms, notes, NOW + HOUR // 2) == {}
+            assert notes_of_alarms(alarms, notes, NOTED + HOUR // 2) == {}
+
+
+NOW = 10**15
+
+
+@pytest.fixture(autouse=True)
+def without_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("JOURNAL_S", "REST_S"):
+        monkeypatch.setattr(feed_module, name, 0.01)
+
+
+class Journal:
+    """The part of a source that the feed uses: writes that a test makes up."""
+
+    def __init__(self) -> None:
+        self.workers = Workers("test")
+        self.writes_now: list[PastWrite] = []
+        self.name, self.requested = "a", 0
+        self.is_removed = False
+        self.fault: Exception | None = None
+        self.written = 0
+
+    def journal(self) -> Condition:
+        """The number of writes in the log. `reported`, the reported number, may be lower."""
+        return Condition(JournalState.RECORDING, written=self.written)
+
+    async def writes(self, request: WritesRequest) -> PastWrites:
+        """The next write of the log."""
+        self.requested += 1
+        if self.fault is not None:
+            raise self.fault
+        if self.is_removed:
+            raise TwinUnavailableError("no twin offers /twin/get_writes")
+        found = [write for write in self.writes_now if write.number > request.after]
+        part = tuple(found[: request.max_count])
+        last = part[-1].number if part else request.after
+        span = RunSpan(1, 0, 2**63 - 1)
+        return PastWrites(self.name, (span,), part, last, len(part) == len(found))
+
+
+def pest(number: int, bugs: int) -> PastWrite:
+    seen = (True, "", bugs > 0, bugs)
+    return PastWrite(number, 1, "a", NOW - 100 + number, 1, 0, (), (), *seen)
+
+
+def reported(number: int, **over: object) -> TwinUpdate:
+    store = TwinStore()
+    store.record_inspection(
+        Inspection("a", NOW - 100 + number, Flower(bug_count=number, anomaly=True))
+    )
+    snapshot: Snapshot = store.snapshot(NOW + number, "map")
+    return TwinUpdate(snapshot, str(number), **over)  # type: ignore[arg-type]
+
+
+@asynccontextmanager
+async def following(*writes: PastWrite) -> AsyncIterator[tuple[AlarmFeed, AlarmBoard, Journal]]:
+    """With writes: once the board has what the log has."""
+    source, board = Journal(), AlarmBoard()
+    source.writes_now = list(writes)
+    criteria = Criteria.of(Settings())
+    feed = AlarmFeed(source, Judge(criteria), board, lambda: NOW, 7.0)  # type: ignore[arg-type]
+    feed.start()
+    try:
+        if writes:
+            feed.on_state(reported(1))
+            await changed(board)
+        yield feed, board, source
+    finally:
+        await feed.stop()
+        source.workers.close()
+
+
+async def changed(board: AlarmBoard) -> None:
+    """Wait for the next change of the board."""
+    number = board.now.number
+    await until(lambda: board.now.number > number, "the next change")
+
+
+async def test_a_late_scan_which_no_state_shows_counts_for_the_status() -> None:
+    """The tag's readings are then valid for three times ten minutes, not for a day."""
+    async with following(pest(1, 1)) as (feed, _, source):
+        store, judge = TwinStore(), feed.judge
+        store.record(Scan("a", NOW, (Reading("temperature", 22.0),)))
+        judge.see(store.snapshot(NOW, "map"))
+        assert judge.holds_ns() == {"a": 86_400 * 10**9}
+        late = PastWrite(2, 1, "a", NOW - 600 * 10**9, 0, 0, ("temperature",), (22.0,))
+        source.writes_now += [late, replace(late, number=3, run=0, stamp_ns=NOW - 10**9)]
+        source.written = 2
+        feed.on_state(reported(1))
+
+        def holds_ns() -> dict[str, int]:
+            judge.see(store.snapshot(NOW, "map"))
+            return judge.holds_ns()
+
+        await until(lambda: holds_ns() == {"a": 1_800 * 10**9}, "the scan")
+
+
+async def test_it_reads_the_past_once_then_new_writes_and_a_new_journal_whole() -> None:
+    async with following() as (feed, board, source):
+        source.writes_now = [pest(number, number % 2) for number in range(1, 1_200)]
+        received: list[Change] = []
+        board.on_change = received.append
+        feed.on_state(reported(1))
+        await changed(board)
+        assert (board.now.source, board.now.since_ns, received[0].is_past) == (
+            "journal",
+            NOW - 99,
+            True,
+        )
+        assert len(board.now.active) == 1
+        source.writes_now += [pest(1_200, 0), pest(1_201, 0)]
+        feed.on_state(reported(2))
+        await changed(board)
+        assert [alarm.is_active for alarm in board.now.alarms[:1]] == [False]
+        assert not received[-1].is_past
+        requested = source.requested
+        for _ in range(5):
+            feed.on_state(reported(2))
+        assert source.requested == requested
+        source.name, source.writes_now = "b", [pest(1, 4)]
+        feed.on_state(reported(3))
+        await changed(board)
+        assert [alarm.worst for alarm in board.now.alarms] == [4.0]
+
+
+async def test_errors_that_stay_are_logged_once_and_do_not_end_the_alarms(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async with following() as (feed, board, source):
+
+        def fail(_: Change) -> None:
+            raise ZeroDivisionError("over a silence")
+
+        board.on_change, source.fault = fail, RuntimeError("in the journal")
+        for number in range(1, 4):
+            feed.on_silence(is_silent=number % 2 > 0, last_ns=NOW - number)
+            await until(lambda n=number: board.now.number == n, "the silence")  # type: ignore[misc]
+        logged = [record.getMessage() for record in caplog.records]
+        assert [text.partition(": ")[2] for text in logged] == ["in the journal", "over a silence"]
+        board.on_change, source.fault = lambda _: None, None
+        source.writes_now = [pest(1, 4)]
+        feed.on_state(reported(1))
+        await changed(board)
+        assert len(board.now.active) == 2
+
+
+async def test_writes_are_read_also_when_the_state_does_not_change(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # For a slow disk the feed reads once more by itself. Here it has to be woken.
+    monkeypatch.setattr("lupin_bridge.alarms.feed.AGAIN_S", 1_000_000.0)
+    async with following() as (feed, board, source):
+        source.writes_now, source.written = [pest(1, 2)], 1
+        feed.on_state(reported(1))
+        await changed(board)
+        source.writes_now += [pest(2, 0), pest(3, 0)]
+        source.written = 3
+        feed.on_state(reported(1))
+        await changed(board)
+        assert board.now.active == ()
+
+
+async def test_writes_older_than_the_window_are_counted_and_reported(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    defaults = alarm_fold.AlarmFold.__init__.__kwdefaults__
+    assert defaults is not None
+    monkeypatch.setitem(defaults, "kept", 8)
+
+    early = [replace(pest(number, 1), stamp_ns=NOW - 1_000 + number) for number in range(1, 70)]
+    async with following(*early) as (feed, board, source):
+        source.writes_now.append(replace(pest(99, 1), stamp_ns=NOW - 1_000))
+        feed.on_state(reported(2))
+        await until(lambda: feed.missed == 1, "that it was missed")
+        assert len(board.now.active) == 1
+    assert "too late for its alarms" in caplog.text
+
+
+async def test_a_missing_twin_adds_its_alarm_to_those_of_before() -> None:
+    async with following(pest(1, 2)) as (feed, board, source):
+        source.is_removed = True
+        feed.on_silence(is_silent=True, last_ns=NOW - 5)
+        await changed(board)
+        assert [alarm.reason.kind for alarm in board.now.active] == ["silent", "pest"]
+        assert board.now.source == "journal"
+        source.is_removed = False
+        feed.on_silence(is_silent=False, last_ns=NOW)
+        await changed(board)
+        assert [alarm.reason.kind for alarm in board.now.active] == ["pest"]
+
+
+async def test_alarms_that_the_journal_has_long_not_confirmed_are_reported_as_incomplete(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lupin_bridge.alarms.feed.UNANSWERED_S", 0.0)
+
+    async with following(pest(1, 2)) as (feed, board, source):
+        source.is_removed = True
+        feed.on_state(reported(2))
+        await changed(board)
+        assert [alarm.reason.kind for alarm in board.now.active] == ["pest"]
+        assert (board.now.source, len(board.now.alarms)) == ("starting", 1)
+        source.is_removed = False
+        feed.on_state(reported(3))
+        await changed(board)
+        assert (board.now.source, len(board.now.alarms)) == ("journal", 1)
+
+
+async def test_without_a_journal_states_raise_alarms_and_a_silent_twin_is_one() -> None:
+    async with following() as (feed, board, source):
+        feed.on_state(reported(3, journal=Condition(JournalState.FAILING)))
+        await changed(board)
+        assert (board.now.source, source.requested) == ("heard", 0)
+        assert [alarm.worst for alarm in board.now.active] == [3.0]
+        feed.on_silence(is_silent=True, last_ns=NOW - 5)
+        await changed(board)
+        silent = next(alarm for alarm in board.now.active if not alarm.tag_id)
+        assert (silent.reason.kind, silent.raised_at_ns) == ("silent", NOW - 5)
+        feed.on_silence(is_silent=True, last_ns=NOW - 5)
+        feed.on_silence(is_silent=False, last_ns=NOW)
+        await changed(board)
+        over = next(alarm for alarm in board.now.alarms if not alarm.tag_id)
+        assert (over.id, over.cleared_at_ns) == (silent.id, NOW)
+
+
+async def test_a_state_from_before_a_silence_does_not_withdraw_it() -> None:
+    async with following(pest(1, 2)) as (feed, board, _):
+        feed.on_silence(is_silent=True, last_ns=NOW - 5)
+        await changed(board)
+        received = replace(reported(1).snapshot, stamp_ns=NOW - 10)
+        feed.on_state(replace(reported(1), snapshot=received))
+        feed.on_silence(is_silent=False, last_ns=NOW)
+        await changed(board)
+        over = next(alarm for alarm in board.now.alarms if not alarm.tag_id)
+        assert (over.reason.kind, over.cleared_at_ns) == ("silent", NOW)
+
+
+def after(store: TwinStore, *writes: Scan | Inspection) -> Snapshot:
+    for write in writes:
+        if isinstance(write, Scan):
+            store.record(write)
+        else:
+            store.record_inspection(write)
+    return store.snapshot(NOW, "map")
+
+
+def test_new_alarms_are_reported_once_in_the_order_of_time_and_numbered() -> None:
+    store = TwinStore()
+    pest = Flower(species="tulip", confidence=0.9, anomaly=True, bug_count=3)
+    first = after(
+        store,
+        Scan("a", 5, (Reading("co2", 400.0), Reading("light", 1.0))),
+        Inspection("a", 4, pest),
+        Scan("b", 6, (), status=2),
+    )
+    reported = writes_between(None, first, 7)
+    assert [(w.number, w.tag_id, w.stamp_ns, w.kind, w.status) for w in reported] == [
+        (7, "a", 4, 1, 0),
+        (8, "a", 5, 0, 0),
+        (9, "b", 6, 0, 2),
+    ]
+    assert (reported[0].species, reported[0].anomaly, reported[0].bug_count) == ("tulip", True, 3)
+    assert (reported[1].sensors, reported[1].values) == (("co2", "light"), (400.0, 1.0))
+    second = after(store, Scan("a", 9, (Reading("co2", 410.0),)))
+    (new,) = writes_between(first, second, 10)
+    assert (new.stamp_ns, new.sensors, new.values) == (9, ("co2",), (410.0,))
+    assert writes_between(second, replace(second, stamp_ns=NOW + 1), 11) == []

@@ -1,15 +1,18 @@
-"""The archive's tables, and who may do what with them."""
+"""The archive's tables, who may do what with them, and what is given up by age."""
 
 import random
+import time
+from datetime import UTC, datetime
 from pathlib import Path
 from subprocess import CompletedProcess
 
 import psycopg
 import pytest
 
-from tests.support.archive import Archive, forward_once, run
+from lupin_twin.journal.runs import Clock
+from tests.support.archive import Archive, forward_once, forwarder, rows_of, run, wait_until_equal
 from tests.support.fleet import recent_scans, write
-from tests.support.journal import append, scan
+from tests.support.journal import SECOND, append, inspection, scan
 from tests.support.postgres import Postgres, server
 from tests.support.tls import certificate
 
@@ -85,15 +88,12 @@ def command(action: str, url: str, **env: str) -> CompletedProcess[str]:
     return run("archive", action, "--archive-url", url, **env)
 
 
-def test_info_has_a_line_a_site(two_sites: Archive) -> None:
+def test_info_has_a_line_a_site_and_check_tells_rows_that_fit_no_other(two_sites: Archive) -> None:
     two_sites.do("INSERT INTO site VALUES ('gh3', 'Named before it is forwarded')")
     told = command("info", two_sites.owner).stdout.splitlines()
     assert told.pop().endswith("the last received never; never forwarded; 0 journals")
     found = [line.partition(", 0 looks, 0 places; ")[0] for line in told]
     assert found == ["gh1: 1 scans", "gh2: 1 scans"]
-
-
-def test_check_tells_rows_that_fit_no_other(two_sites: Archive) -> None:
     assert "is whole" in command("check", two_sites.owner).stdout
     two_sites.do("DELETE FROM series WHERE site = 'gh1'")
     done = command("check", two_sites.owner)
@@ -207,3 +207,138 @@ def test_the_servers_certificate_is_checked(tmp_path: Path) -> None:
         done = forwarded(trusted)
         assert done.returncode == 0, done.stderr
         assert len(archive.rows()["scan"]) == len(recent_scans()) - 5
+
+
+# --- parts by month -------------------------------------------------------------------------------
+
+
+DAY = 86_400 * SECOND
+TODAY = time.time_ns()
+AGES = (200, 100, 40, 10, 1)
+
+
+def stamps(*ages: int) -> list[int]:
+    return [TODAY - days * DAY for days in ages]
+
+
+def month(stamp_ns: int) -> str:
+    return f"{datetime.fromtimestamp(stamp_ns / SECOND, UTC):scan_%Y_%m}"
+
+
+@pytest.fixture
+def sites(archive: Archive, tmp_path: Path) -> Archive:
+    """Two sites with a scan and an inspection at each age; gh2 has the last only."""
+    for site, ages in (("gh1", AGES), ("gh2", AGES[-1:])):
+        archive.site = site
+        archive.add_user(site)
+        begun = Clock(stamps(*ages)[0], stamps(*ages)[0], is_simulated=False)
+        rows = [write for at in stamps(*ages) for write in (scan("7", at), inspection("7", at))]
+        append(tmp_path / site, rows, begun)
+        forward_once(archive, tmp_path / site)
+    archive.site = "gh1"
+    return archive
+
+
+def parts(archive: Archive, where: str = "true") -> list[str]:
+    sql = f"SELECT DISTINCT tableoid::regclass::text FROM scan WHERE {where} ORDER BY 1"
+    return [name for (name,) in archive.select(sql)]
+
+
+def parts_made(archive: Archive) -> list[str]:
+    sql = "SELECT inhrelid::regclass::text FROM pg_inherits WHERE inhparent = 'scan'::regclass"
+    return [name for (name,) in archive.select(sql)]
+
+
+def exists(archive: Archive, table: str) -> bool:
+    return archive.select(f"SELECT to_regclass('{table}') IS NOT NULL") == [(True,)]
+
+
+def retain(archive: Archive, days: int, *more: str) -> str:
+    words = ("archive", "retain", "--archive-url", archive.owner, "--days", str(days))
+    done = run(*words, *more)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_rows_lie_by_the_month_and_one_in_which_another_site_has_rows_stays(sites: Archive) -> None:
+    assert parts(sites) == sorted({month(at) for at in stamps(*AGES)})
+    for at in stamps(*AGES):
+        after = datetime.fromtimestamp(at / SECOND, UTC).replace(day=1).timestamp() + 32 * 86_400
+        assert exists(sites, month(int(after) * SECOND))
+    sites.copy_site("gh3")
+    retain(sites, 60, "--site", "gh1")
+    assert sorted(row[2] for row in sites.rows()["scan"]) == stamps(*AGES)[2:]
+    for table, stamp in (("scan", 2), ("look", 3)):
+        assert sorted(row[stamp] for row in sites.rows("gh3")[table]) == stamps(*AGES)
+    assert exists(sites, month(stamps(*AGES)[0]))
+
+
+def test_a_simulated_clock_has_a_part_of_its_own(archive: Archive, tmp_path: Path) -> None:
+    journal, begun = tmp_path / "journal", Clock(SECOND, TODAY, is_simulated=True)
+    append(journal, [scan("7", 2 * SECOND), inspection("7", 3 * SECOND)], begun)
+    forward_once(archive, journal)
+    assert archive.rows() == rows_of(journal)
+    assert parts(archive) == ["scan_before"]
+    # It is as old as its arrival.
+    assert retain(archive, 1) == "deleted nothing\n"
+
+
+def test_a_month_that_cannot_be_made_holds_up_its_own_rows_alone(
+    archive: Archive, tmp_path: Path
+) -> None:
+    journal = tmp_path / "journal"
+    append(journal, [scan("7", TODAY)])
+    with forwarder(archive, journal) as process:
+        with psycopg.connect(archive.owner) as reader:
+            reader.execute("SELECT count(*) FROM scan")
+            process.wait_for_output("is not forwarded: the archive cannot be reached or written")
+        wait_until_equal(archive, journal)
+    (after,) = {*parts_made(archive)} - {"scan_before", month(TODAY)}
+    archive.do(f"DROP TABLE {after}")
+    append(journal, [scan("7", TODAY + SECOND)])
+    with psycopg.connect(archive.owner) as reader:
+        reader.execute("SELECT count(*) FROM scan")
+        forward_once(archive, journal)
+    assert archive.rows() == rows_of(journal)
+
+
+def test_a_months_end_takes_nothing_from_a_forwarder(archive: Archive) -> None:
+    with psycopg.connect(archive.url(), autocommit=True) as forwarder:
+        for sql in ("SELECT * FROM {}", "DELETE FROM {}", "DROP TABLE {}"):
+            forwarder.execute("SELECT make_months(%s)", (TODAY // SECOND,))
+            with pytest.raises(psycopg.errors.InsufficientPrivilege):
+                forwarder.execute(sql.format(month(TODAY)))
+
+
+def test_what_is_older_goes_for_good_with_its_months_and_what_was_counted_stays(
+    sites: Archive, tmp_path: Path
+) -> None:
+    before = sites.rows()
+    told = retain(sites, 60)
+    after = sites.rows()
+    assert sorted(row[2] for row in after["scan"]) == stamps(*AGES)[2:]
+    assert sorted(row[3] for row in after["look"]) == stamps(*AGES)[2:]
+    assert {table: after[table] for table in ("hour", "tally", "event", "series")} == {
+        table: before[table] for table in ("hour", "tally", "event", "series")
+    }
+    upto = sites.select("SELECT site, value FROM meta WHERE key LIKE 'purged_ns:%'")
+    assert upto == [("gh1", str(stamps(*AGES)[1]))]
+    assert not exists(sites, month(stamps(*AGES)[0]))
+    assert f"deleted {month(stamps(*AGES)[0])[5:].replace('_', '-')}: the whole month" in told
+    assert run("archive", "check", "--archive-url", sites.owner).returncode == 0
+    assert retain(sites, 60) == "deleted nothing\n"
+    append(tmp_path / "gh1", [scan("7", TODAY)])
+    forward_once(sites, tmp_path / "gh1")
+    assert len(sites.rows()["scan"]) == len(after["scan"]) + 1
+
+
+def test_of_one_site_alone(sites: Archive) -> None:
+    assert "gh1: " in retain(sites, 1, "--site", "gh1")
+    assert sites.rows()["scan"] == []
+    assert len(sites.rows("gh2")["scan"]) == 1
+    for given, code, said in (
+        (("--days", "1", "--site", "gh9"), 1, "the archive has no site 'gh9'"),
+        (("--days", "1e9"), 2, "--days is 1e+09, expected more than 0, 36500 at most"),
+    ):
+        done = run("archive", "retain", "--archive-url", sites.owner, *given)
+        assert (done.returncode, done.stderr) == (code, f"lupin-twin: {said}\n")

@@ -24,9 +24,6 @@ def signals() -> Iterator[None]:
     signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-# --- arguments ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("given_", "own", "ros"),
     [
@@ -46,9 +43,6 @@ def test_arguments_after_ros_args_belong_to_ros_up_to_a_double_dash(
     assert split_ros_args(given_) == (own, ros)
 
 
-# --- mistakes ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
@@ -66,9 +60,6 @@ def test_a_mistake_in_the_command_line_is_named(
     done = run_here(*arguments)
     assert done.returncode == 2
     assert named in done.stderr.splitlines()[-1]
-
-
-# --- the process ----------------------------------------------------------------------------------
 
 
 def test_without_a_home_directory_it_still_serves(tmp_path: Path) -> None:
@@ -92,8 +83,6 @@ def blocked_signals(pid: int) -> int:
     (mask,) = [line.split()[1] for line in status.splitlines() if line.startswith("SigBlk")]
     return int(mask, 16)
 
-
-# --- the log --------------------------------------------------------------------------------------
 
 LEVELS = ["debug", "info", "warning", "error"]
 

@@ -1,18 +1,23 @@
-"""Settings from the command line, the environment and a file: precedence and error messages."""
+"""Settings: one table with their ranges; command line, environment and file; error messages."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin
 
 import pytest
+from annotated_types import Interval
 
 from lupin_bridge.settings import (
     MAX_FILE_BYTES,
     Secrets,
     SettingError,
     Settings,
+    limits_of,
+    option,
     settings_from,
     strange_variables,
+    table,
     take_secrets,
+    types,
     variable,
 )
 from tests.support.access import TOKEN, refused_start, served
@@ -41,10 +46,9 @@ def refusal(
     return str(refused.value)
 
 
-# --- precedence -----------------------------------------------------------------------------------
-
-
-def test_the_command_line_overrides_the_environment_and_that_the_file(config: Any) -> None:
+def test_the_command_line_overrides_the_environment_and_that_the_file_also_for_lists(
+    config: Any,
+) -> None:
     path = config("port = 1\nmax_clients = 1\nreading_validity_s = 1\n")
     environment = {"LUPIN_PORT": "2", "LUPIN_MAX_CLIENTS": "2"}
     settings = settings_from({"port": "3"}, environment, path)
@@ -52,9 +56,6 @@ def test_the_command_line_overrides_the_environment_and_that_the_file(config: An
     assert settings.called("port") == "--port"
     assert settings.called("max_clients") == "LUPIN_MAX_CLIENTS"
     assert settings.called("reading_validity_s") == f"{path} line 3: reading_validity_s"
-
-
-def test_a_list_is_taken_whole_from_the_first_place_that_sets_it(config: Any) -> None:
     path = config('allow_host = ["of.the.file"]\n')
     environment = {"LUPIN_ALLOW_HOST": "one.example, two.example ,"}
     assert settings_from({}, {}, path).allow_host == ("of.the.file",)
@@ -62,27 +63,17 @@ def test_a_list_is_taken_whole_from_the_first_place_that_sets_it(config: Any) ->
     assert settings_from({"allow_host": ["mine"]}, environment, path).allow_host == ("mine",)
 
 
-def test_an_environment_variable_may_name_the_file(config: Any, tmp_path: Path) -> None:
+def test_an_environment_variable_may_name_the_file_and_is_named(
+    config: Any, tmp_path: Path
+) -> None:
     environment = {"LUPIN_CONFIG": config("port = 1\n")}
     assert settings_from({}, environment).port == 1
     assert refusal({}, environment, str(tmp_path / "no")) == (
         f"--config {tmp_path}/no: No such file or directory"
     )
     assert refusal({}, {"LUPIN_CONFIG": "/no"}) == "LUPIN_CONFIG /no: No such file or directory"
-
-
-# --- mistakes -------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "named"),
-    [
-        ("LUPIN_PORT", "", "LUPIN_PORT is '': input should be a valid integer"),
-        ("LUPIN_HOST", "", "LUPIN_HOST is '': string should have at least 1 char"),
-    ],
-)
-def test_a_mistake_in_a_variable_names_the_variable(name: str, value: str, named: str) -> None:
-    assert refusal({}, {name: value}).startswith(named)
+    for name, says in (("PORT", "input should be a valid integer"), ("HOST", "string should have")):
+        assert refusal({}, {f"LUPIN_{name}": ""}).startswith(f"LUPIN_{name} is '': {says}")
 
 
 @pytest.mark.parametrize(
@@ -147,9 +138,6 @@ def test_an_unknown_variable_of_ours_is_warned_about_and_others_are_ignored() ->
     )
 
 
-# --- secrets --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["token", "mqtt_password", "webhook_secret"])
 def test_a_secret_comes_from_a_variable_which_is_then_removed_or_from_a_file(
     name: str, tmp_path: Path
@@ -179,9 +167,6 @@ def test_a_world_readable_file_causes_a_warning(
         take_secrets(Settings(token_file=str(file)), {})
         assert bool(caplog.messages) == warned
     assert "mode 644: anyone on this machine can read the token" in caplog.text
-
-
-# --- the process ----------------------------------------------------------------------------------
 
 
 def test_the_process_reads_all_three_sources(config: Any, tmp_path: Path) -> None:
@@ -214,3 +199,56 @@ def test_any_mistake_ends_the_start_with_one_line(config: Any, tmp_path: Path) -
     assert refused_start("--token-file", str(short)).startswith(
         "lupin-twin: --token-file has 5 characters, must have at least 16"
     )
+
+
+RANGES = {
+    name: limit
+    for name, hint in types().items()
+    for limit in getattr(hint, "__metadata__", ())
+    if isinstance(limit, Interval)
+}
+
+
+def test_every_setting_has_a_valid_default_a_help_text_and_an_option_of_its_name() -> None:
+    for spec in table():
+        value = list(spec.default) if spec.default == () else str(spec.default)
+        pair = {"tls_cert": "tls_key", "tls_key": "tls_cert"}.get(spec.name, spec.name)
+        assert settings_from({spec.name: value, pair: value}, {}) == Settings()
+        assert spec.metadata["help"]
+        assert spec.metadata["group"]
+    assert Settings().host == "127.0.0.1", "this machine alone"
+    assert option("mqtt_url") == "--mqtt-url"
+    assert variable("mqtt_url") == "LUPIN_MQTT_URL"
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_both_ends_of_a_range_are_included_and_a_value_beyond_is_named(name: str) -> None:
+    low: Any = RANGES[name].ge
+    high: Any = RANGES[name].le
+    for end in (low, high):
+        assert getattr(settings_from({name: str(end)}, {}), name) == end
+    for value, limit in ((low - 1, low), (high + 1, high), ("nan", "")):
+        with pytest.raises(SettingError) as refused:
+            settings_from({name: str(value)}, {})
+        assert str(refused.value).startswith(f"{option(name)} is '{value}': input should be ")
+        assert f"{limit:.15g}" in str(refused.value) if limit != "" else True
+    assert limits_of(name) == f"from {low:.15g} to {high:.15g}"
+
+
+@pytest.mark.parametrize("name", [name for name in types() if limits_of(name).count(" or ")])
+def test_an_invalid_choice_is_named_with_the_valid_ones(name: str) -> None:
+    choices = get_args(types()[name])
+    assert get_origin(types()[name]) is not None
+    for choice in choices:
+        assert getattr(settings_from({name: choice}, {}), name) == choice
+    with pytest.raises(SettingError, match=f"{option(name)} is 'loud': input should be") as refused:
+        settings_from({name: "loud"}, {})
+    assert all(choice in str(refused.value) for choice in choices)
+
+
+def test_tls_needs_both_files() -> None:
+    assert settings_from({"tls_cert": "c.pem", "tls_key": "k.pem"}, {}).tls_key == "k.pem"
+    with pytest.raises(SettingError, match="--tls-cert is given without --tls-key"):
+        settings_from({"tls_cert": "c.pem"}, {})
+    with pytest.raises(SettingError, match=r"^LUPIN_TLS_KEY is given without --tls-cert"):
+        settings_from({}, {"LUPIN_TLS_KEY": "k.pem"})

@@ -100,7 +100,9 @@ def importing(tmp_path: Path) -> Import:
     return Import(tmp_path)
 
 
-def test_a_dry_run_reports_what_would_be_written_and_writes_nothing(importing: Import) -> None:
+def test_a_dry_run_writes_nothing_and_importing_twice_writes_each_row_once(
+    importing: Import,
+) -> None:
     done = importing.given(WIDE, ROWS).run()
     assert done.returncode == 0
     assert done.stdout.splitlines() == [
@@ -111,9 +113,6 @@ def test_a_dry_run_reports_what_would_be_written_and_writes_nothing(importing: I
     ]
     assert "nothing was written; add --write" in done.stderr
     assert not importing.journal.exists()
-
-
-def test_importing_twice_writes_each_row_once(importing: Import) -> None:
     importing.given(WIDE | {"places": {"A": [1.5, 2]}}, ROWS)
     assert "3 scans are new" in importing.written()
     then_ns = int(datetime(2024, 5, 1, 10, tzinfo=UTC).timestamp()) * SECOND
@@ -252,14 +251,10 @@ def test_a_file_that_cannot_be_imported_is_refused_in_one_line(
     assert importing.rows() == []
 
 
-def test_a_journal_in_use_by_a_twin_is_refused(importing: Import) -> None:
+def test_a_journal_in_use_by_a_twin_and_one_of_a_simulation_are_refused(importing: Import) -> None:
     with closing(Lock(importing.journal, "/lupin_twin")):
         done = importing.given(WIDE, ROWS).run("--write")
-    assert done.returncode == 1
-    assert "is in use by /lupin_twin" in done.stderr
-
-
-def test_a_journal_of_a_simulation_is_refused(importing: Import) -> None:
+    assert (done.returncode, "is in use by /lupin_twin" in done.stderr) == (1, True)
     append(importing.journal, [scan("A", 5 * SECOND)], Clock(5 * SECOND, NOW, is_simulated=True))
     done = importing.given(WIDE, ROWS).run("--write")
     assert done.returncode == 1

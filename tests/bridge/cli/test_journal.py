@@ -1,5 +1,6 @@
-"""`lupin-twin journal`: which file it reads, what it prints, and its exit codes."""
+"""`lupin-twin journal`: which file it reads, what it prints, its exit codes, and backups."""
 
+import sqlite3
 import subprocess
 import sys
 from contextlib import closing
@@ -9,13 +10,19 @@ from itertools import product
 from pathlib import Path
 from subprocess import CompletedProcess
 
+import httpx
 import pytest
 
+from lupin_bridge.cli.command import main
+from lupin_bridge.console import backup
 from lupin_twin.journal.paths import demo_journal_path, journal_path
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.schema import open_writer
+from tests.support.bags import no_file_above
 from tests.support.journal import NOW, SECOND, append, inspection, is_whole, pin, recording, scan
-from tests.support.processes import run_here
+from tests.support.messages import scan as observed
+from tests.support.processes import lupin_twin, run_here, url_of
+from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 
 # Of a twin that starts after all of it was written.
@@ -74,7 +81,9 @@ def test_the_default_file_is_found_by_the_rule_of_the_node(
 ACTIONS = ("info", "check", "export", "vacuum")
 
 
-def test_a_missing_file_is_named_and_not_created(tmp_path: Path, path: Path) -> None:
+def test_a_missing_or_inaccessible_file_is_named_and_not_created(
+    tmp_path: Path, path: Path, home: Path
+) -> None:
     before = sorted(tmp_path.iterdir())
     for action in ACTIONS:
         done = journal(action, "--journal", tmp_path / "none.sqlite")
@@ -82,6 +91,12 @@ def test_a_missing_file_is_named_and_not_created(tmp_path: Path, path: Path) -> 
         line = f"lupin-twin: there is no journal {tmp_path}/none.sqlite; in its folder there are j."
         assert done.stderr.startswith(line)
     assert sorted(tmp_path.iterdir()) == before
+    home.mkdir(parents=True)
+    for action, option in product(ACTIONS, ("--journal", "--namespace")):
+        done = journal(action, option, "x" * 300)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert done.stderr.startswith("lupin-twin: cannot look for the journal /")
+        assert done.stderr.endswith(": File name too long\n")
 
 
 @pytest.mark.parametrize(
@@ -102,28 +117,24 @@ def test_a_mistake_is_one_clear_line(words: list[str], named: str) -> None:
 @pytest.mark.parametrize(
     ("words", "domain", "named"),
     [
-        ("--journal off", "0", "--journal is 'off', expected a file"),
-        ("", "232", "domain-232.sqlite"),
-        ("", "233", "ROS_DOMAIN_ID is '233', must be a whole number from 0 to 232"),
-        ("", "x", "ROS_DOMAIN_ID is 'x', must be a whole number from 0 to 232"),
+        ("info --journal off", "0", "--journal is 'off', expected a file"),
+        ("info", "232", "domain-232.sqlite"),
+        ("info", "233", "ROS_DOMAIN_ID is '233', must be a whole number from 0 to 232"),
+        ("info", "x", "ROS_DOMAIN_ID is 'x', must be a whole number from 0 to 232"),
+        ("export --from yesterday", "", "--from is 'yesterday', expected ROS seconds as a dec"),
+        ("export --to 2026-11-21T00:00:00", "", "--to is '2026-11-21T00:00:00', expected ROS"),
+        ("export --from 2 --to 1", "", "--to is 1.000000000, before --from, 2.000000000"),
     ],
 )
-def test_an_invalid_domain_or_journal_is_one_clear_line(
-    words: str, domain: str, named: str, monkeypatch: pytest.MonkeyPatch
+def test_an_invalid_domain_journal_or_period_is_one_clear_line(
+    words: str, domain: str, named: str, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Without a domain: of a journal that is there."""
     monkeypatch.setenv("ROS_DOMAIN_ID", domain)
-    done = journal("info", *words.split())
+    done = journal(*words.split(), *([] if domain else ["--journal", path]))
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert done.stderr.startswith("lupin-twin: ")
     assert named in done.stderr
-
-
-def test_an_inaccessible_path_is_named(home: Path) -> None:
-    home.mkdir(parents=True)
-    for action, option in product(ACTIONS, ("--journal", "--namespace")):
-        done = journal(action, option, "x" * 300)
-        assert (done.returncode, done.stdout) == (1, "")
-        assert done.stderr.startswith("lupin-twin: cannot look for the journal /")
-        assert done.stderr.endswith(": File name too long\n")
 
 
 def test_a_file_of_another_application_is_left_alone_and_named(tmp_path: Path) -> None:
@@ -248,21 +259,6 @@ def test_export_uses_the_units_of_the_operators_file(
     assert (done.returncode, "LUPIN_SENSORS" in done.stderr) == (1, True)
 
 
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [
-        (["--from", "yesterday"], "--from is 'yesterday', expected ROS seconds as a decimal"),
-        (["--to", "2026-11-21T00:00:00"], "--to is '2026-11-21T00:00:00', expected ROS seconds"),
-        (["--from", "2", "--to", "1"], "--to is 1.000000000, before --from, 2.000000000"),
-    ],
-)
-def test_an_export_that_fails_is_one_clear_line(words: list[str], named: str, path: Path) -> None:
-    done = journal("export", "--journal", path, *words)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith(f"lupin-twin: {named}")
-    assert done.stderr.count("\n") == 1
-
-
 def test_vacuum_prints_the_size_before_and_after(path: Path) -> None:
     with closing(open_writer(path)) as connection:
         connection.execute("DELETE FROM scan")
@@ -308,3 +304,96 @@ def test_a_name_that_is_not_valid_text_is_printed_escaped(path: Path) -> None:
     path.rename(strange)
     done = journal("check", "--journal", strange)
     assert (done.returncode, done.stdout) == (0, f"{strange} is whole\n")
+
+
+# --- backups --------------------------------------------------------------------------------------
+
+
+def test_another_twin_starts_from_a_backup_of_a_running_one(domain: int, tmp_path: Path) -> None:
+    source, copy = tmp_path / "twin.sqlite", tmp_path / "copy.sqlite"
+
+    def tags(url: str) -> set[str]:
+        answer = httpx.get(f"{url}/api/state", trust_env=False, timeout=PATIENCE_S)
+        return {tag["tag_id"] for tag in answer.json()["tags"]}
+
+    def rows() -> str:
+        return run_here("journal", "export", "--journal", source).stdout
+
+    with (
+        Peer(domain) as robot,
+        lupin_twin(domain, "serve", "--ros-args", "-p", f"journal:={source}") as twin,
+    ):
+        url = url_of(twin)
+        robot.observe(observed("before", {"co2": 1.0}))
+        wait_for(lambda: "before" in tags(url), "the first tag")
+        wait_for(
+            lambda: "before" in run_here("journal", "export", "--journal", source).stdout, "its row"
+        )
+        assert run_here("journal", "backup", copy, "--journal", source).returncode == 0
+        # It is complete by itself: no file lies beside it.
+        assert list(tmp_path.glob("copy.sqlite*")) == [copy]
+        robot.observe(observed("after", {"co2": 3.0}))
+        wait_for(lambda: "after" in tags(url), "the last tag")
+        wait_for(
+            lambda: "after" in run_here("journal", "export", "--journal", source).stdout, "its row"
+        )
+        twin.stop()
+    # As the docs say.
+    for beside in ("-wal", "-shm"):
+        source.with_name(source.name + beside).unlink(missing_ok=True)
+    source.write_bytes(copy.read_bytes())
+    assert run_here("journal", "check", "--journal", source).returncode == 0
+    # The robot has gone: it would repeat what it published after the copy.
+    with lupin_twin(domain, "serve", "--ros-args", "-p", f"journal:={source}") as twin:
+        assert tags(url_of(twin)) == {"before"}
+
+
+def test_writes_during_the_backup_do_not_get_in_and_do_not_restart_it(tmp_path: Path) -> None:
+    source, copy = tmp_path / "large.sqlite", tmp_path / "copy.sqlite"
+    shares: list[float] = []
+    with closing(sqlite3.connect(source, isolation_level=None)) as writer:
+        writer.execute("PRAGMA journal_mode = WAL")
+        writer.execute("CREATE TABLE large AS SELECT zeroblob(20000000) AS bytes")
+
+        def report(share: float) -> None:
+            shares.append(share)
+            assert len(shares) < 100, "begun anew, again and again"
+            writer.execute(f"CREATE TABLE meanwhile_{len(shares)} (number)")
+
+        with closing(sqlite3.connect(source, isolation_level=None)) as reader:
+            assert backup(reader, copy, report) == copy.stat().st_size > 20_000_000
+    assert len(shares) > 2
+    assert shares == sorted(set(shares))
+    with closing(sqlite3.connect(copy)) as found:
+        assert found.execute("SELECT name FROM sqlite_schema").fetchall() == [("large",)]
+
+
+def test_nothing_is_overwritten_and_a_failed_backup_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "twin.sqlite"
+    append(source, [scan(at_ns=NOW + n, a=n / 3) for n in range(2000)])
+    taken = tmp_path / "taken"
+    taken.write_text("mine", encoding="ascii")
+    for target, why in (
+        (taken, "already exists, and nothing is overwritten"),
+        (source, "already exists, and nothing is overwritten"),
+        (tmp_path / "none" / "copy", "No such file or directory"),
+    ):
+        assert main(["journal", "backup", str(target), "--journal", str(source)]) == 1
+        message = capsys.readouterr().err
+        assert message.startswith("lupin-twin: ")
+        assert str(target) in message
+        assert message.endswith(f"{why}\n")
+    assert taken.read_text(encoding="ascii") == "mine"
+
+
+def test_a_failed_backup_leaves_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source, copy = tmp_path / "twin.sqlite", tmp_path / "copy.sqlite"
+    append(source, [scan(at_ns=NOW + n, a=n / 3) for n in range(2000)])
+    assert source.stat().st_size > 40_960
+    # Enough for SQLite's 32 kB beside the journal, not for the copy.
+    with no_file_above(40_960):
+        assert main(["journal", "backup", str(copy), "--journal", str(source)]) == 1
+    assert f"\nlupin-twin: cannot copy to {copy}: " in capsys.readouterr().err
+    assert list(tmp_path.glob("copy*")) == []

@@ -1,23 +1,38 @@
 """The roles as processes: what refuses their start, what they serve, and how they end."""
 
+import asyncio
 import os
 import re
 import signal
+import socket
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
 
 from lupin_bridge.cli.roles import DAY_S, Feed, patrolled, since_morning_s, with_past
-from lupin_bridge.serving.server import listen
+from lupin_bridge.serving.server import Supervisor, listen
 from lupin_patrol.cli import parser as patrol_parser
 from lupin_patrol.perception import SECONDS_PER_DAY
+from tests.support.access import BEARER, TOKEN
 from tests.support.journal import CLOCK, append, is_whole, select
 from tests.support.journal import scan as row
 from tests.support.messages import scan
-from tests.support.processes import Process, children_of, is_running, lupin_twin, patrols_of, url_of
+from tests.support.processes import (
+    Process,
+    children_of,
+    constants,
+    faults,
+    is_running,
+    lupin_twin,
+    patrols_of,
+    url_of,
+)
 from tests.support.recordings import OBSERVATIONS, Sent, write_bag
+from tests.support.ros import Peer
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import listener, tag_ids
 
@@ -49,20 +64,18 @@ def test_a_port_in_use_is_named(domain: int, role: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "named"),
+    ("role", "arguments", "named"),
     [
-        (["-p", "idw_power:=-1.0"], "parameter idw_power is -1.0, expected 0.01 to 100.0"),
-        (["-p", "nonsense"], "parse parameter override rule: '-p nonsense'"),
+        ("serve", ("--ros-args", "-p", "idw_power:=-1.0"), "idw_power is -1.0, expected 0.01 to 1"),
+        ("serve", ("--ros-args", "-p", "nonsense"), "parse parameter override rule: '-p nonsense'"),
+        ("web", ("--journal", "postgresql://db/lupin"), "'postgresql://db/lupin', expected a file"),
     ],
 )
-def test_a_bad_ros_argument_is_named(domain: int, arguments: list[str], named: str) -> None:
-    with lupin_twin(domain, "serve", "--ros-args", *arguments) as process:
+def test_a_bad_argument_is_named(
+    domain: int, role: str, arguments: tuple[str, ...], named: str
+) -> None:
+    with lupin_twin(domain, role, *arguments) as process:
         assert named in refused(process)
-
-
-def test_the_web_role_refuses_an_archive_as_its_journal(domain: int) -> None:
-    with lupin_twin(domain, "web", "--journal", "postgresql://db/lupin") as process:
-        assert "'postgresql://db/lupin', expected a file" in refused(process)
 
 
 # --- roles --------------------------------------------------------------------------------------
@@ -155,16 +168,13 @@ def test_a_demo_has_one_journal_per_seed() -> None:
         assert feed.journal == Path(path)
 
 
-@pytest.mark.parametrize("patrol_args", [[], ["--speed=1"], ["--speed=50"], ["--speed=0.5"]])
-def test_a_demos_twin_gets_the_length_of_its_patrols_day(patrol_args: list[str]) -> None:
-    patrol = patrol_parser().parse_args(patrol_args)
-    day_s = SECONDS_PER_DAY / patrol.day_speed / patrol.speed
-    assert f"day_length_s:={day_s}" in patrolled(ENV, patrol_args, []).twin_args
-
-
-@pytest.mark.parametrize("speed", ["0", "nan", "inf", "-1"])
-def test_an_invalid_speed_is_refused_by_the_patrol(speed: str) -> None:
-    assert "day_length_s:=1440.0" in patrolled(ENV, [f"--speed={speed}"], []).twin_args
+def test_a_demos_twin_gets_the_length_of_its_patrols_day() -> None:
+    for patrol_args in ([], ["--speed=1"], ["--speed=50"], ["--speed=0.5"]):
+        patrol = patrol_parser().parse_args(patrol_args)
+        day_s = SECONDS_PER_DAY / patrol.day_speed / patrol.speed
+        assert f"day_length_s:={day_s}" in patrolled(ENV, patrol_args, []).twin_args
+    for speed in ("0", "nan", "inf", "-1"):  # the patrol refuses it
+        assert "day_length_s:=1440.0" in patrolled(ENV, [f"--speed={speed}"], []).twin_args
 
 
 @pytest.mark.parametrize(
@@ -228,3 +238,112 @@ def test_a_failure_to_fill_in_the_past_is_reported_and_the_demo_goes_on(
     expected = ("argument --speed: ", r"\[Errno 17\] File exists", ".*not a database")
     for text, why in zip(reported, expected, strict=True):
         assert re.match(f"the demo starts without history: {why}", text)
+
+
+# --- what is reported to systemd ------------------------------------------------------------------
+
+
+class Manager:
+    """The service manager's side: a datagram socket, and the messages that arrived."""
+
+    def __init__(self, address: str) -> None:
+        self.address = address
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.socket.bind(address.replace("@", "\0"))
+        self.socket.settimeout(PATIENCE_S)
+
+    def next(self, timeout_s: float = PATIENCE_S) -> dict[str, str]:
+        self.socket.settimeout(timeout_s)
+        lines = self.socket.recv(4096).decode().splitlines()
+        return dict(line.split("=", 1) for line in lines)
+
+    def rest(self) -> list[dict[str, str]]:
+        """What has arrived and was not read."""
+        found = []
+        try:
+            while True:
+                found.append(self.next(timeout_s=0.0))
+        except BlockingIOError:
+            return found
+
+
+@pytest.fixture
+def manager(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Manager]:
+    """By default in Linux's abstract namespace."""
+    manager = Manager(getattr(request, "param", "@lupin-") + f"{tmp_path}/notify")
+    yield manager
+    manager.socket.close()
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {},
+        {"WATCHDOG_USEC": "1000", "WATCHDOG_PID": "1"},  # the watchdog of another process
+        {"WATCHDOG_USEC": "soon"},
+        {"NOTIFY_SOCKET": "vsock:1:2"},
+        {"NOTIFY_SOCKET": "/nowhere/at/all"},
+    ],
+)
+@pytest.mark.filterwarnings("ignore:unclosed <socket:ResourceWarning")  # it ends with the process
+def test_without_a_manager_nothing_is_sent(
+    environment: dict[str, str], caplog: pytest.LogCaptureFixture
+) -> None:
+    has_socket = "NOTIFY_SOCKET" in environment
+    supervisor = Supervisor(environment)
+    assert supervisor.watchdog_s == 0.0
+    supervisor.ready("x")
+    supervisor.stopping()
+    asyncio.run(supervisor.send_watchdog(lambda: None))
+    assert len(caplog.messages) == has_socket, "said once"
+
+
+def test_the_bridge_reports_when_it_is_ready_and_when_it_stops(
+    domain: int, manager: Manager
+) -> None:
+    env = {"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": "1000000", "LUPIN_TOKEN": TOKEN}
+    with lupin_twin(domain, "demo", afresh=False, **env) as process:
+        text = manager.next()
+        assert text["READY"] == "1"
+        url = text["STATUS"].removeprefix("serving ")
+        answer = httpx.get(f"{url}/readyz", headers=BEARER, trust_env=False, timeout=PATIENCE_S)
+        assert answer.json()["reason"] == "live", "ROS is up by then"
+        for _ in range(3):
+            assert manager.next() == {"WATCHDOG": "1"}
+        (patrol,) = wait_for(lambda: patrols_of(process.pid), "the patrol")
+        environment = Path(f"/proc/{patrol}/environ")  # empty while it starts
+        wait_for(lambda: b"ROS_DOMAIN_ID" in environment.read_bytes(), "what it inherits")
+        inherited = environment.read_bytes()
+        assert b"NOTIFY_SOCKET" not in inherited
+        assert TOKEN.encode() not in inherited
+        manager.rest()  # unread, the socket holds no more than ten messages
+        process.send(signal.SIGTERM)
+        wait_for(lambda: {"STOPPING": "1"} in manager.rest(), "the word that it stops")
+        assert process.wait() == 0
+
+
+@pytest.mark.parametrize("manager", [""], indirect=True)
+def test_a_hanging_callback_fails_health_checks_and_stops_the_watchdog_messages(
+    domain: int, manager: Manager
+) -> None:
+    hangs = faults("--hang", "lupin_twin.core.state:TwinStore.record:hang me")
+    env: Any = {"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": "1500000"}
+    soon = constants(**{"lupin_bridge.feed.source:STUCK_AFTER_S": 2.0})
+    with lupin_twin(domain, "serve", *hangs, *soon, **env) as process, Peer(domain) as peer:
+        url = url_of(process)
+
+        def health() -> httpx.Response:
+            return httpx.get(f"{url}/healthz", trust_env=False, timeout=PATIENCE_S)
+
+        assert health().json() == {
+            "ok": True, "message": "The ROS thread runs.", "callback_errors": 0,
+        }  # fmt: skip
+        peer.observe(scan("hang me", {"co2": 1.0}))
+        process.wait_for_output("hangs")
+        wait_for(lambda: health().status_code == 503, "health to tell")
+        message = health().json()["message"]
+        text = r"The ROS thread has been stuck in a callback for \d+ s\. Restart\."
+        assert re.fullmatch(text, message)
+        wait_for(lambda: any("stuck" in word.get("STATUS", "") for word in manager.rest()), "it")
+        assert not any("WATCHDOG" in word for word in manager.rest())
+        assert process.stop() == 0

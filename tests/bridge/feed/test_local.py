@@ -1,25 +1,44 @@
-"""The twin of this process, in its ROS thread."""
+"""The twin of this process, in its ROS thread; the past process; and shared or repeated work."""
 
 import asyncio
+import logging
+import os
+import signal
+import sys
 import threading
 import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from functools import partial
 from pathlib import Path
 
 import pytest
 from rclpy.parameter import Parameter
 
+from lupin_bridge.feed import past_process
 from lupin_bridge.feed.local import LocalTwin
-from lupin_bridge.feed.query import as_found
+from lupin_bridge.feed.past_process import MAX_PENDING, PastProcess
+from lupin_bridge.feed.query import NICENESS, Now, as_found, export_step
 from lupin_bridge.feed.source import TwinTimeoutError
-from lupin_twin.core.diagnostics import JournalState
+from lupin_bridge.feed.tasks import Periodic, Shared
+from lupin_bridge.past.plans import Answered
+from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.notes import COMMENT, Note
-from lupin_twin.core.past import NotRemembered
+from lupin_twin.core.past import NotRemembered, PastRefused
 from lupin_twin.journal.runs import Clock
+from lupin_twin.journal.writes import Export
 from lupin_twin.ros.node import TwinNode
 from tests.support.inprocess import started
-from tests.support.journal import SECOND, append, scan
-from tests.support.past_queries import endless
+from tests.support.journal import NOW, SECOND, append, scan
+from tests.support.past_queries import (
+    at_work,
+    endless,
+    faulty,
+    refused,
+    sevens,
+    tags_at,
+    unpicklable,
+)
 from tests.support.waiting import PATIENCE_S, until
 
 NOTE = Note("", time.time_ns(), "anna", COMMENT, "site", "a comment")
@@ -102,3 +121,204 @@ async def test_a_query_that_takes_too_long_ends_and_delays_no_observation(domain
             await twin.ask(endless, 0.0)
         waiting.cancel()
         await until(lambda: twin.past.pending == {}, "the end of both")
+
+
+# --- work that is shared or repeated --------------------------------------------------------------
+
+
+async def test_a_request_that_arrives_as_the_last_one_is_cancelled_starts_new_work() -> None:
+    shared, begun, may_end = Shared[int](), list[None](), asyncio.Event()
+
+    async def work() -> int:
+        begun.append(None)
+        number = len(begun)
+        await may_end.wait()
+        return number
+
+    leaving = asyncio.create_task(shared.get("a", work))
+    await until(lambda: begun, "the work")
+    leaving.cancel()
+    await asyncio.sleep(0)  # it has left; the work has not been cancelled yet
+    coming = asyncio.create_task(shared.get("a", work))
+    await asyncio.wait([leaving])
+    may_end.set()
+    assert await coming == 2
+    assert len(shared) == 0
+
+
+async def test_an_error_reaches_all_waiters_and_is_not_cached() -> None:
+    shared, begun = Shared[int](), list[None]()
+
+    async def work() -> int:
+        begun.append(None)
+        if len(begun) == 1:
+            raise MemoryError("too much")
+        return len(begun)
+
+    found = await asyncio.gather(*(shared.get("a", work) for _ in "ab"), return_exceptions=True)
+    assert [type(error) for error in found] == [MemoryError] * 2
+    assert await shared.get("a", work) == 2
+
+
+async def test_an_error_that_stays_ends_no_repetition_and_is_logged_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    errors, done = [ValueError("a"), ValueError("a"), ValueError("b"), None, ValueError("b")], 0
+
+    async def work() -> None:
+        nonlocal done
+        error = errors[min(done, 4)]
+        done += 1
+        if error is not None:
+            raise error
+
+    periodic = Periodic(work, 0.0, "the work")
+    periodic.start()
+    await until(lambda: done > len(errors), "all of them")
+    await periodic.stop()
+    logged = [record.getMessage() for record in caplog.records]
+    assert logged == [f"the work had an error and continues: {name}" for name in "abb"]
+
+
+# --- the past process -----------------------------------------------------------------------------
+
+
+pytestmark = pytest.mark.usefixtures("children_know_the_tests")
+
+NOW_NS = NOW + SECOND
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A journal of 2,500 scans of one tag."""
+    found = tmp_path_factory.mktemp("past") / "j.sqlite"
+    append(found, [scan(at_ns=NOW + number) for number in range(2_500)])
+    return found
+
+
+@asynccontextmanager
+async def looking_back() -> AsyncIterator[PastProcess]:
+    past = PastProcess()
+    try:
+        yield past
+    finally:
+        await past.stop()
+
+
+def now(path: Path) -> Now:
+    return Now(NOW_NS, "map", Condition(JournalState.RECORDING, path=str(path)))
+
+
+async def test_it_runs_at_a_lower_priority_and_returns_bodies_of_any_size(path: Path) -> None:
+    async with looking_back() as past:
+        assert await past.ask(partial(tags_at, NOW_NS), now(path), 0.0) == 1
+        nice = os.getpriority(os.PRIO_PROCESS, 0) + NICENESS
+        assert await past.ask(at_work, now(path), 0.0) == (0, nice)
+        for count in (0, 3_000_000):
+            answered: Answered = await past.ask(partial(sevens, count), now(path), 0.0)
+            assert answered.answer is not None
+            assert answered.answer.body == b"7" * count
+        assert past.starts == 1
+
+
+async def test_its_errors_are_raised_here(path: Path) -> None:
+    async with looking_back() as past:
+        with pytest.raises(PastRefused, match="x is 7, the limit is 6"):
+            await past.ask(refused, now(path), 0.0)
+        with pytest.raises(PastRefused, match="later than now"):
+            await past.ask(partial(tags_at, NOW_NS + 1), now(path), 0.0)
+        with pytest.raises(ZeroDivisionError) as caught:
+            await past.ask(faulty, now(path), 0.0)
+        assert "in faulty" in caught.value.__notes__[0], "where it was"
+        with pytest.raises(RuntimeError, match=r"LocalError.*nobody's knowledge"):
+            await past.ask(unpicklable, now(path), 0.0)
+        with pytest.raises(NotRemembered, match="is not there"):
+            await past.ask(partial(tags_at, 1), now(path.with_name("none")), 0.0)
+        assert past.starts == 1
+
+
+async def test_a_query_that_is_no_longer_awaited_ends_in_the_process(path: Path) -> None:
+    async with looking_back() as past:
+        asking = [
+            asyncio.create_task(past.ask(endless, now(path), 1.0)) for _ in range(MAX_PENDING)
+        ]
+        await until(lambda: len(past.pending) == MAX_PENDING, "all of them")
+        with pytest.raises(NotRemembered, match=f"{MAX_PENDING} requests .* the limit"):
+            await past.ask(at_work, now(path), 0.0)
+        asking.pop().cancel()
+        await until(lambda: len(past.pending) < MAX_PENDING, "one to go")
+        running, _ = await past.ask(at_work, now(path), 0.0)
+        assert running <= 3, "those that no thread has taken wait"
+        for pending in asking:
+            pending.cancel()
+        while (await past.ask(at_work, now(path), 0.0))[0]:
+            pass
+        assert past.pending == {}
+
+
+async def test_an_export_goes_on_in_a_restarted_process(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(past_process, "REST_S", 0.0)
+    async with looking_back() as past:
+        export: Export | None = Export(0, NOW_NS, None, None)
+        found: list[int] = []
+        while export is not None:
+            export, lots = await past.ask(partial(export_step, export, len), now(path), 0.0)
+            found += lots
+            if past.starts == 1:
+                assert past.pid is not None
+                os.kill(past.pid, signal.SIGKILL)
+                await until(lambda: past.pid is None and not past.why_down, "its end")
+        assert (found, past.starts) == ([1_000, 1_000, 500], 2)
+
+
+async def test_a_process_that_does_not_react_is_replaced_and_one_that_is_busy_is_not(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(past_process, "REST_S", 0.0)
+    async with looking_back() as past:
+
+        async def cancel_a_query() -> None:
+            with pytest.raises(TimeoutError):
+                async with asyncio.timeout(0.01):
+                    await past.ask(endless, now(path), 0.0)
+
+        assert await past.ask(partial(tags_at, NOW_NS), now(path), 0.0) == 1
+        monkeypatch.setattr(past_process, "STUCK_S", 1.5)
+        await cancel_a_query()
+        with pytest.raises(TimeoutError):
+            async with asyncio.timeout(2.0):  # longer than it may take to react
+                await past.ask(endless, now(path), 0.0)
+        assert await past.ask(partial(tags_at, NOW_NS), now(path), 0.0) == 1
+        assert past.starts == 1
+        os.kill(past.pid or 0, signal.SIGSTOP)
+        await cancel_a_query()
+        with pytest.raises(NotRemembered, match="did not react"):
+            await past.ask(partial(tags_at, NOW_NS), now(path), 0.0)
+        await until(lambda: not past.why_down, "the rest")
+        assert await past.ask(partial(tags_at, NOW_NS), now(path), 0.0) == 1
+
+
+async def test_a_process_that_dies_or_cannot_start_is_reported_and_replaced(
+    path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(past_process, "REST_S", 0.2)
+    async with looking_back() as past:
+        with monkeypatch.context() as nowhere:
+            nowhere.setattr(sys, "executable", "/nowhere/python")
+            with pytest.raises(NotRemembered, match="cannot be started"):
+                await past.ask(partial(tags_at, NOW_NS), now(path), 0.0)
+        with pytest.raises(NotRemembered, match="is being restarted"):
+            await past.ask(partial(tags_at, NOW_NS), now(path), 0.0)
+        await until(lambda: not past.why_down, "the rest")
+        waiting = asyncio.create_task(past.ask(endless, now(path), 0.0))
+        await until(lambda: past.pid is not None, "a process")
+        os.kill(past.pid or 0, signal.SIGKILL)
+        with pytest.raises(NotRemembered, match="was killed by SIGKILL"):
+            await waiting
+        await until(lambda: not past.why_down, "the next one")
+        assert past.pid is None, "no query"
+        assert await past.ask(partial(tags_at, NOW_NS), now(path), 0.0) == 1
+        reported = [r.getMessage() for r in caplog.records if r.levelno == logging.ERROR]
+        assert reported[-1] == "the process that reads the past was killed by SIGKILL"

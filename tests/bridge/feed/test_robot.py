@@ -20,7 +20,7 @@ def places(log: RobotLog) -> list[float]:
     return [it.x for it in log.trail]
 
 
-def test_the_latest_of_each_is_stored_and_only_changes_are_reported() -> None:
+def test_the_latest_of_each_is_stored_with_or_without_a_clock_and_only_changes_reported() -> None:
     log = RobotLog()
     here, full = position(1.0, 100.0), Battery(64.0, 90 * S)
     assert log.take(Robot(position=here), 100 * S)
@@ -30,9 +30,14 @@ def test_the_latest_of_each_is_stored_and_only_changes_are_reported() -> None:
     assert not log.take(Robot(position=here), 103 * S)
     assert not log.take(Robot(position=position(9.0, 99.0)), 104 * S), "an older one"
     assert log.now.position == here
+    log = RobotLog()
+    # With a clock that stands still, the last one is the latest.
+    for x in (1.0, 2.0):
+        log.take(Robot(position=position(x, 50.0)), None)
+        assert log.now == Robot(position(x, 50.0))
 
 
-def test_points_of_a_trail_are_apart_in_distance_and_in_time() -> None:
+def test_points_of_a_trail_are_apart_and_it_covers_an_hour_also_of_a_silent_robot() -> None:
     log = RobotLog()
     drive(
         log,
@@ -43,9 +48,6 @@ def test_points_of_a_trail_are_apart_in_distance_and_in_time() -> None:
         position(0.3, 104.0),
     )
     assert places(log) == [0.0, 0.1, 0.3]
-
-
-def test_a_trail_ends_after_an_hour_also_while_the_robot_is_silent() -> None:
     log = RobotLog()
     drive(log, position(0.0, 100.0), position(1.0, 200.0))
     log.take(Robot(), 3_700 * S)
@@ -55,9 +57,6 @@ def test_a_trail_ends_after_an_hour_also_while_the_robot_is_silent() -> None:
     log.take(Robot(), 9_999 * S)
     assert places(log) == []
     assert log.now.position is not None, "where it was last is still known"
-
-
-def test_a_bounded_trail_still_covers_an_hour() -> None:
     log = RobotLog()
     drive(log, *(position(float(second), 100.0 + second) for second in range(3_600)))
     trail = places(log)
@@ -80,26 +79,12 @@ def test_a_clock_that_goes_back_removes_the_future(back_s: float, is_known: bool
     assert log.now.position == (position(2.0, 20.0) if not is_known else log.now.position)
 
 
-def test_a_plan_is_done_at_its_end_and_not_where_a_round_begins() -> None:
-    log = RobotLog()
-    round_trip = Plan(((0.0, 0.0), (5.0, 0.0), (0.0, 0.1)), 99 * S)
-    log.take(Robot(position=position(0.0, 100.0), plan=round_trip), 100 * S)
-    assert log.now.plan == round_trip
-    drive(log, position(5.0, 110.0))
-    assert log.now.plan == round_trip
-    drive(log, position(0.3, 120.0))
-    assert log.now.plan is None
-
-
-def test_a_plan_that_is_replaced_on_the_way_is_done_too() -> None:
-    log = RobotLog()
+def test_a_plan_is_done_at_its_end_and_an_empty_or_old_one_is_ignored() -> None:
+    other = RobotLog()
     for at in range(6):
         there = Plan(((float(at), 0.0), (5.0, 0.0)), (100 + at) * S)
-        log.take(Robot(position=position(float(at), 100.5 + at), plan=there), (101 + at) * S)
-        assert (log.now.plan is None) is (at == 5)
-
-
-def test_an_empty_plan_and_one_from_ten_minutes_ago_are_ignored() -> None:
+        other.take(Robot(position=position(float(at), 100.5 + at), plan=there), (101 + at) * S)
+        assert (other.now.plan is None) is (at == 5)
     log = RobotLog()
     there = Plan(((9.0, 0.0),), 100 * S)
     again = Plan(((9.0, 0.0),), 800 * S)
@@ -114,11 +99,11 @@ def test_an_empty_plan_and_one_from_ten_minutes_ago_are_ignored() -> None:
         log.take(Robot(plan=received), now_ns)
         plans.append(log.now.plan)
     assert plans == [there, there, None, again, None]
-
-
-def test_without_a_clock_stamps_are_taken_as_they_are() -> None:
     log = RobotLog()
-    # With a clock that stands still, the last one is the latest.
-    for x in (1.0, 2.0):
-        log.take(Robot(position=position(x, 50.0)), None)
-        assert log.now == Robot(position(x, 50.0))
+    round_trip = Plan(((0.0, 0.0), (5.0, 0.0), (0.0, 0.1)), 99 * S)
+    log.take(Robot(position=position(0.0, 100.0), plan=round_trip), 100 * S)
+    assert log.now.plan == round_trip
+    drive(log, position(5.0, 110.0))
+    assert log.now.plan == round_trip
+    drive(log, position(0.3, 120.0))
+    assert log.now.plan is None

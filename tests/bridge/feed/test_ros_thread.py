@@ -67,9 +67,6 @@ class Stage:
         await self.ros.stop()
 
 
-# --- towards ROS --------------------------------------------------------------------------------
-
-
 async def test_a_call_runs_in_the_thread_of_the_nodes_and_returns_its_result(domain: int) -> None:
     stage = Stage()
     with pytest.raises(TwinUnavailableError, match="not running"):
@@ -113,9 +110,6 @@ async def test_a_heartbeat_reports_a_hanging_callback_and_its_recovery(domain: i
         await until(lambda: stage.ros.stuck_s == 0.0, "it to come back")
 
 
-# --- towards the loop ---------------------------------------------------------------------------
-
-
 async def test_the_loop_receives_the_latest_event_and_skips_those_before_it(domain: int) -> None:
     async with Stage() as stage:
 
@@ -147,10 +141,9 @@ def test_events_after_the_loop_has_closed_do_no_harm(domain: int) -> None:
         asyncio.run(end())
 
 
-# --- futures of ROS -----------------------------------------------------------------------------
-
-
-async def test_an_error_of_a_ros_future_is_raised(domain: int) -> None:
+async def test_an_error_of_a_ros_future_is_raised_and_a_cancelled_one_released_in_its_thread(
+    domain: int,
+) -> None:
     def start(node: Probe) -> Future:
         future = Future(executor=node.executor)
         future.set_exception(OSError("no"))
@@ -159,9 +152,6 @@ async def test_an_error_of_a_ros_future_is_raised(domain: int) -> None:
     async with Stage() as stage:
         with pytest.raises(OSError, match="no"):
             await stage.ros.ask(start, lambda *_: None)
-
-
-async def test_a_cancelled_future_is_released_in_the_thread_of_the_nodes(domain: int) -> None:
     async with Stage() as stage:
         requested, given_up = Future(), list[tuple[Future, threading.Thread]]()
         waiting = asyncio.create_task(
@@ -204,9 +194,6 @@ async def test_a_caller_cancelled_while_its_call_starts_leaves_nothing_behind(do
         assert stage.ros.callback_errors == 0
 
 
-# --- the end ------------------------------------------------------------------------------------
-
-
 async def test_the_end_of_the_thread_is_reported_once_and_logged(
     domain: int, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -245,8 +232,6 @@ def test_a_thread_that_needs_a_restart_is_reported() -> None:
         ended = ThreadState(is_alive=False, stuck_s=stuck_s)
         assert ailment(ended) == "The ROS thread has ended. Restart."
 
-
-# --- what nodes log -------------------------------------------------------------------------------
 
 BROKEN = faults("--raise", "lupin_twin.core.state:TwinStore.record:boom")
 

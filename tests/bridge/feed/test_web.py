@@ -1,13 +1,15 @@
 """The source of the role `web`, and a peer in place of its twin."""
 
 import asyncio
+import itertools
 import math
 import os
+import re
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
-from unittest.mock import AsyncMock
 
 import pytest
 from geometry_msgs.msg import Point, Pose, PoseStamped
@@ -16,15 +18,16 @@ from lupin_msgs.srv import GetWrites
 from rclpy.parameter import Parameter
 
 from lupin_bridge.feed import web
-from lupin_bridge.feed.relay import Sample, TwinNames, topics_of
+from lupin_bridge.feed.relay import Sample, topics_of
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
 from lupin_bridge.feed.web import RETAINED_S, FollowedLog, WebTwin
 from lupin_bridge.serving.admission import Limits
-from lupin_twin.core.diagnostics import Condition, JournalState
+from lupin_twin.core.diagnostics import STATE_TOPIC, Condition, Finding, JournalState
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import NotRemembered
 from lupin_twin.core.state import Reading, Scan
 from lupin_twin.journal.follow import Lot, followed, write
+from lupin_twin.ros.convert import diagnostics
 from lupin_twin.runtime.workers import Workers
 from tests.support.inprocess import started
 from tests.support.journal import NOW, recording, scan
@@ -46,36 +49,45 @@ def state_of(value: float) -> TwinState:
 async def test_a_new_map_is_a_new_revision_and_no_sign_of_life(domain: int) -> None:
     with Peer(domain) as peer:
         async with started(WebTwin) as (twin, reported):
-            states = peer.publish("/twin/state", state_of(1.0), depth=1)
+            peer.publish("/twin/state", state_of(1.0), depth=1)
             await until(lambda: reported and twin.revision() == reported[-1].revision, "a state")
             before = len(reported)
             peer.publish_map(occupancy_grid([[0, 100]]))
             await until(lambda: twin.occupancy_map() is not None, "the map")
             assert twin.revision() != reported[-1].revision
             assert len(reported) == before
-            # Nor does a new node drop the state for it.
-            peer.node.destroy_publisher(states)
-            await twin.thread.stop()
-            await twin._join()
-            revision = twin.revision()
-            peer.publish_map(occupancy_grid([[100, 0]]))
-            await until(lambda: twin.revision() != revision, "another map")
-            assert len(reported) == before
-            assert twin.update is not None
-            assert twin.update.snapshot is reported[-1].snapshot
 
 
-async def test_without_a_twin_the_missing_service_is_named(domain: int) -> None:
-    async with started(WebTwin) as (twin, _):
-        with pytest.raises(TwinUnavailableError, match=f"no twin offers {NAME}: is it running"):
-            await twin._rows_behind(0)
+async def test_without_a_twin_the_missing_service_is_named(
+    domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    with Peer(domain) as peer:
+        async with started(WebTwin) as (twin, _):
+            await knows_a_journal(twin, peer)
+            await until(lambda: f"no twin offers {NAME}: the twin's state" in caplog.text, "why")
+            peer.node.destroy_publisher(peer.publisher("/twin/state", TwinState))
+            await until(lambda: f"no twin offers {NAME}: is it running" in caplog.text, "why")
     assert all(task.get_name() != LOOK for task in asyncio.all_tasks()), "it goes on searching"
 
 
-async def test_after_a_silence_a_new_node_recovers_everything(domain: int) -> None:
+async def knows_a_journal(twin: WebTwin, peer: Peer) -> None:
+    """Until it was told of a journal that it cannot read here, and so has to request its rows."""
+    values = {STATE_TOPIC: "/twin/state", "state": "recording", "id": "j", "file": "/nowhere"}
+    report = diagnostics([Finding("journal", 0, "", values)], "/lupin_twin", 0)
+
+    def is_told() -> bool:
+        peer.publish("/diagnostics", report)
+        peer.publish("/twin/state", state_of(1.0), depth=1)
+        return twin.journal().journal_id == "j"
+
+    await until(is_told, "its journal")
+
+
+async def test_after_a_silence_a_new_node_recovers_everything(
+    domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
     scans, samples = list[Observation](), list[Sample]()
     with Peer(domain) as peer:
-        peer.node.create_service(GetWrites, NAME, lambda _, response: response)
         peer.node.create_subscription(
             Observation, "/floranova/observations", scans.append, latched(50)
         )
@@ -120,9 +132,7 @@ async def test_after_a_silence_a_new_node_recovers_everything(domain: int) -> No
             await until(twin.occupancy_map, "the map")
             peer.node.destroy_publisher(maps)
             twin.rejoin_after_s = 0.1
-            # The peer does not spin: it never answers.
-            with pytest.raises(TwinUnavailableError, match="not running"):
-                await twin._rows_behind(0)
+            await until(lambda: "joining ROS again" in caplog.text, "its replacement")
             twin.rejoin_after_s = math.inf
             await until_answered(is_joined, "the new node")
             await goes_both_ways(2.0)
@@ -152,6 +162,8 @@ async def test_the_last_state_of_a_lost_twin_is_no_news_to_a_new_node(domain: in
             state, _, _ = revision.rpartition("-0-")
             assert state in twin.revision(), "the state is the same"
             assert twin.rules.idw_power == 3.0
+            assert twin.update is not None
+            assert twin.update.snapshot is reported[-1].snapshot
             peer.publish("/twin/state", state_of(2.0), depth=1)
             await until(
                 lambda: reported[-1].snapshot.tags[0].readings[0].value == 2.0, "the next one"
@@ -160,28 +172,36 @@ async def test_the_last_state_of_a_lost_twin_is_no_news_to_a_new_node(domain: in
 
 
 async def test_a_node_is_replaced_after_ever_longer_silences_of_five_minutes_at_most(
-    monkeypatch: pytest.MonkeyPatch,
+    domain: int, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    twin = WebTwin(ros_args=(), timeout_s=1.0, rejoin_after_s=Limits().rejoin_after_s)
-    now_s, joined = 0.0, list[float]()
+    second: Iterator[int]
+    plain = asyncio.sleep
+    monkeypatch.setattr(asyncio, "sleep", lambda for_s: plain(min(for_s, 0.001)))
 
-    async def join() -> None:
-        joined.append(now_s)
+    def now_s() -> float:
+        """Each look for the twin is a second after the one before."""
+        assert twin.update is not None
+        return twin.update.made_s + next(second, 1_000)
 
-    monkeypatch.setattr(web, "time", SimpleNamespace(monotonic=lambda: now_s))
-    twin.thread = SimpleNamespace(stop=AsyncMock())  # type: ignore[assignment]
-    twin._join, twin.names = join, TwinNames("/twin/state", NAME)
-    for made_s in (None, 1_000.0, 3_000.0):
-        if made_s is not None:
-            twin.update = SimpleNamespace(made_s=made_s)  # type: ignore[assignment]
-        for second in range(1_000):
-            now_s = (made_s or 0.0) + second
-            await twin._rejoin_if_lost()
-    after = [30.0, 60.0, 120.0, 240.0, 480.0, 780.0]
-    assert joined == [begun + each for begun in (1_000.0, 3_000.0) for each in after]
+    def rejoined() -> list[str]:
+        return re.findall(r"nothing was received on /twin/state for (\d+) s: joining", caplog.text)
+
+    with Peer(domain) as peer:
+        async with started(WebTwin) as (twin, reported):
+            for lost in (1, 2):
+                second = itertools.repeat(0)
+                monkeypatch.setattr(web, "time", SimpleNamespace(monotonic=now_s))
+                twin.rejoin_after_s = Limits().rejoin_after_s
+                peer.publish("/twin/state", state_of(float(lost)), depth=1)
+                await until(lambda: len(reported) == lost, "a sign of life")  # noqa: B023
+                second = iter(range(1_000))
+                await until(lambda: len(rejoined()) == 6 * lost, "its silence")  # noqa: B023
+    assert rejoined() == ["30", "60", "120", "240", "480", "780"] * 2
 
 
-async def test_refusals_are_the_services_and_no_wait_is_endless(domain: int) -> None:
+async def test_refusals_are_the_services_and_no_wait_is_endless(
+    domain: int, caplog: pytest.LogCaptureFixture
+) -> None:
     def answer(_: Any, response: Any) -> Any:
         response.error_message = SAYS
         return response
@@ -189,23 +209,11 @@ async def test_refusals_are_the_services_and_no_wait_is_endless(domain: int) -> 
     with Peer(domain) as peer:
         peer.node.create_service(GetWrites, NAME, answer)
         async with started(WebTwin, timeout_s=0.5) as (twin, _):
-
-            async def is_given_up() -> bool:
-                try:
-                    await twin._rows_behind(0)
-                except TwinTimeoutError as error:
-                    return "within 0.5 s" in str(error)
-                except TwinUnavailableError:  # not found yet
-                    return False
-                return False
-
-            await until_answered(is_given_up, "the peer, which does not spin", bool)
+            await knows_a_journal(twin, peer)
+            await until(lambda: "within 0.5 s" in caplog.text, "the peer, which does not spin")
             twin.timeout_s = 20.0
-            requested = asyncio.create_task(twin._rows_behind(0))
-            while not requested.done():
+            while SAYS not in caplog.text:
                 await asyncio.to_thread(peer.spin_briefly)
-            with pytest.raises(NotRemembered, match=SAYS):
-                await requested
 
 
 # --- copies of journals ---------------------------------------------------------------------------
@@ -236,15 +244,14 @@ def left_after_start(folder: Path) -> tuple[str | None, list[Path]]:
     return asyncio.run(test()), sorted(folder.glob("*.sqlite"))
 
 
-def test_an_old_copy_is_deleted_at_the_start(tmp_path: Path) -> None:
-    latest, recent, _ = paths = copies(tmp_path, 60.0, RETAINED_S - 60.0, RETAINED_S + 60.0)
-    assert left_after_start(tmp_path) == (str(latest), paths[:2])
-    assert recent.exists()
-
-
-def test_the_latest_copy_stays_whatever_its_age(tmp_path: Path) -> None:
-    latest, _ = copies(tmp_path, RETAINED_S + 60.0, RETAINED_S + 120.0)
+def test_an_old_copy_is_deleted_at_the_start_unless_it_is_the_latest(tmp_path: Path) -> None:
+    latest, recent, old = copies(tmp_path, 60.0, RETAINED_S - 60.0, RETAINED_S + 60.0)
+    assert left_after_start(tmp_path) == (str(latest), [latest, recent])
+    for path in (latest, recent):
+        path.unlink()
+    latest, old = copies(tmp_path, RETAINED_S + 60.0, RETAINED_S + 120.0)
     assert left_after_start(tmp_path) == (str(latest), [latest])
+    assert not old.exists()
 
 
 @pytest.mark.parametrize("is_old", [False, True])

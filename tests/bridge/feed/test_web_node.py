@@ -96,9 +96,6 @@ def tag(
     return TagState(tag_id, pose, readings, at_s * S, last_try=Attempt(at_s * S), **more)
 
 
-# --- states -------------------------------------------------------------------------------------
-
-
 def test_the_revision_changes_with_poses_and_readings_and_with_nothing_else(
     stage: Stage, peer: Peer
 ) -> None:
@@ -153,9 +150,6 @@ def spare(_: float) -> None:
     """The condition of an earlier wait holds with the next state."""
 
 
-# --- times --------------------------------------------------------------------------------------
-
-
 def test_a_state_waits_for_its_own_times_but_not_past_the_next_one(
     stage: Stage, peer: Peer
 ) -> None:
@@ -173,9 +167,6 @@ def test_a_state_waits_for_its_own_times_but_not_past_the_next_one(
     peer.publish("/twin/times", convert.StateMessages().times(late[-1]), depth=1)
     stage.until(lambda: has_times(stage.reported[-1]), "the last one, with its times")
     assert stage.reported[-1].tags[0].readings[0].observed_at_ns == 80 * S
-
-
-# --- maps ---------------------------------------------------------------------------------------
 
 
 def test_a_repeated_map_changes_nothing_and_all_replicas_have_the_same_one(
@@ -202,9 +193,6 @@ def test_a_repeated_map_changes_nothing_and_all_replicas_have_the_same_one(
     peer.publish_map(occupancy_grid([[100, 0]], stamp_s=6))
     stage.until(lambda: stage.node.occupancy_map is not first, "another map")
     assert stage.node.revision != revision
-
-
-# --- the rest -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,6 @@
 import os
 import signal
 import socket
-import subprocess
-import sys
 import time
 from collections import deque
 from collections.abc import Iterator
@@ -68,8 +66,6 @@ def ws(page: Page, path: str) -> str:
     return page.url.replace("http", "ws", 1) + path
 
 
-# --- names and paths ------------------------------------------------------------------------------
-
 STRANGE = {
     b"/sites/%2e%2e/": 404,
     b"/sites/gh1/../../api/sites": 404,
@@ -86,23 +82,19 @@ STRANGE = {
 }
 
 
-def test_a_malformed_path_is_refused_as_a_request_and_as_a_websocket(page: Page) -> None:
+def test_a_malformed_path_is_refused_and_no_process_is_started_for_unknown_sites(
+    page: Page,
+) -> None:
     for path, expected in STRANGE.items():
         line = b"GET " + path + b" HTTP/1.1\r\n"
         plain = raw_http.answer(page.url, line + b"Host: 127.0.0.1\r\nConnection: close\r\n\r\n")
         assert status(plain) == expected, path
         assert b"x-evil" not in plain.lower().partition(b"\r\n\r\n")[0], path
         assert 400 <= status(raw_http.answer(page.url, line + UPGRADE + b"\r\n")) < 500, path
-
-
-def test_no_process_is_started_for_unknown_sites(page: Page) -> None:
     before = page.metric("lupin_fleet_sites_open")
     for number in range(100):
         assert page.http.get(f"/sites/none{number}/api/state").status_code == 404
     assert page.metric("lupin_fleet_sites_open") == before
-
-
-# --- readers --------------------------------------------------------------------------------------
 
 
 def test_a_client_that_reads_many_sites_loses_one_to_another_client(page: Page) -> None:
@@ -181,9 +173,6 @@ def test_an_overview_client_that_never_reads_is_disconnected(
             next(received)
 
 
-# --- processes ------------------------------------------------------------------------------------
-
-
 def test_a_stopped_and_a_killed_process_are_replaced_and_counted(page: Page) -> None:
     assert page.http.get(f"/sites/gh1/{HISTORY}").status_code == 200
 
@@ -232,9 +221,6 @@ def test_an_archive_that_hangs_is_reported_and_recovers(tmp_path: Path) -> None:
                 "the past to be back",
             )
             assert "Traceback" not in running.process.output
-
-
-# --- what is in the archive -----------------------------------------------------------------------
 
 
 def test_unreadable_rows_are_reported_on_the_page_of_their_site(
@@ -357,9 +343,6 @@ def test_a_sites_clock_may_be_wrong_by_a_year(archive: Archive, tmp_path: Path) 
             assert len(running.http.get(f"{below}/export.csv").text.splitlines()) == 6
 
 
-# --- fatal and passing errors ---------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("args", "message"),
     [
@@ -413,9 +396,3 @@ def test_a_slow_and_failing_archive_is_reported_once() -> None:
             process.wait_for_output("server closed the connection")
             database.accept()[0].close()
             assert process.output.count("server closed the connection") == 1
-
-
-def test_the_fleet_page_needs_no_ros() -> None:
-    code = "import sys, lupin_bridge.cli.roles; print('rclpy' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "False\n"

@@ -165,8 +165,6 @@ def test_an_archive_that_cannot_be_written_is_reported(here: Here) -> None:
         assert archive.select("SELECT 1 FROM note WHERE text = 'who waits'") == []
 
 
-# --- people with some sites -----------------------------------------------------------------------
-
 OURS = {"Authorization": f"Bearer {TOKEN}"}
 ALL = {"Authorization": f"Bearer all-{TOKEN}"}
 

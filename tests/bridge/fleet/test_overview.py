@@ -190,8 +190,6 @@ async def test_an_unexpected_error_is_logged_once_and_ends_neither_overview_nor_
     await watching.stop()
 
 
-# --- source of the data ---------------------------------------------------------------------------
-
 # Site, what its twin reports, its clock, and what is shown.
 SITES: tuple[tuple[str, Origin, bool, str], ...] = (
     ("robot", "robot", False, "robot"),
@@ -227,9 +225,6 @@ def test_the_source_is_read_from_the_log(archive: Archive, tmp_path: Path) -> No
         page.site("simulated", origin="robot")
 
 
-# --- small maps -----------------------------------------------------------------------------------
-
-
 def drawn(*tags: tuple[float, float, Verdict]) -> str:
     states = [
         TagState(str(n), pose=Pose(x, y, 0.0, 0.0, 0.0, 0.0, 1.0))
@@ -241,23 +236,25 @@ def drawn(*tags: tuple[float, float, Verdict]) -> str:
 WELL, BAD = Verdict.HEALTHY, Verdict.CRITICAL
 
 
-def test_y_grows_upwards_and_the_worst_is_drawn_last() -> None:
+def test_a_map_is_centred_and_square_with_y_upwards_and_the_worst_drawn_last() -> None:
     assert drawn((0.0, 0.0, BAD), (4.0, 2.0, WELL)) == (
         '<path class="healthy" d="M40 0h0"/><path class="critical" d="M0 20h0"/>'
     )
-
-
-def test_the_map_is_centred_and_square() -> None:
     assert drawn((0.0, 0.0, WELL), (0.0, 5.0, WELL)) == (
         '<path class="healthy" d="M20 0h0M20 20h0"/>'
     )
     assert drawn((7.0, 3.0, WELL)) == '<path class="healthy" d="M20 10h0"/>'
+    at_one_place = drawn((0.0, 0.0, WELL), (0.001, 0.0, BAD), (10.0, 0.0, WELL))
+    assert at_one_place.count("M") == 2
+    assert 'class="critical" d="M0 10h0"' in at_one_place
 
 
-def test_of_tags_at_one_position_the_worst_is_drawn() -> None:
-    one = drawn((0.0, 0.0, WELL), (0.001, 0.0, BAD), (10.0, 0.0, WELL))
-    assert one.count("M") == 2
-    assert 'class="critical" d="M0 10h0"' in one
+def test_a_tag_far_off_moves_no_other_and_one_without_a_position_is_not_drawn() -> None:
+    near = [(float(n % 6), float(n // 6), WELL) for n in range(30)]
+    assert drawn(*near, (5e5, 0.0, BAD)) == drawn(*near)
+    assert dots([TagState("a")], {"a": Health(WELL)}) == ""
+    assert map_version("") is None, "an empty map has none"
+    assert map_version(drawn((0.0, 0.0, WELL))) != map_version(drawn((0.0, 0.0, BAD)))
 
 
 def test_ten_thousand_tags_take_at_most_seven_kb() -> None:
@@ -267,17 +264,6 @@ def test_ten_thousand_tags_take_at_most_seven_kb() -> None:
         for _ in range(10_000)
     ]
     assert len(map_svg(drawn(*many))) < 7_500
-
-
-def test_a_tag_far_off_does_not_move_the_others() -> None:
-    near = [(float(n % 6), float(n // 6), WELL) for n in range(30)]
-    assert drawn(*near, (5e5, 0.0, BAD)) == drawn(*near)
-
-
-def test_a_tag_without_a_position_is_not_drawn_and_an_empty_map_has_no_version() -> None:
-    assert dots([TagState("a")], {"a": Health(WELL)}) == ""
-    assert map_version("") is None
-    assert map_version(drawn((0.0, 0.0, WELL))) != map_version(drawn((0.0, 0.0, BAD)))
 
 
 async def test_a_process_is_checked_as_long_as_it_does_not_answer(

@@ -105,12 +105,6 @@ def test_the_floor_plan_is_the_same_as_the_twins(archive: Archive, tmp_path: Pat
         assert get("map").status_code == 404
 
 
-def known(field: httpx.Response) -> int:
-    return sum(value is not None for value in field.json()["values"])
-
-
-# --- three replicas behind a real nginx as the guide configures it --------------------------------
-
 SHOWN = ("--trusted-proxy", "127.0.0.1", "--allow-host", "fleet.example")
 BROWSERS = 4
 

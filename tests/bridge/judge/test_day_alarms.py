@@ -68,7 +68,7 @@ def dawn(day: int) -> int:
     return day * DAY_NS + DAWN * HOUR
 
 
-def test_a_days_mean_raises_at_the_next_dawn_and_one_good_day_clears() -> None:
+def test_a_days_mean_raises_at_the_next_dawn_and_has_no_deadband() -> None:
     [cold] = found(scans({"temperature": [20.0, 14.0, 13.0, 20.0, 20.0]}))
     assert (cold.tag_id, cold.reason.sensor, cold.reason.verdict) == ("a", MEAN, Verdict.STRESSED)
     # The last hour of that day already moved towards the next one's temperature.
@@ -77,6 +77,14 @@ def test_a_days_mean_raises_at_the_next_dawn_and_one_good_day_clears() -> None:
     assert cold.reason.limit == 17.0
     assert (cold.raised_at_ns, cold.reason.since_ns) == (dawn(2), dawn(2))
     assert cold.cleared_at_ns == dawn(4)
+    wobbling = found(scans({"temperature": [16.8, 17.2, 16.8, 17.4, 20.0]}))
+    reported = [(one.raised_at_ns, one.cleared_at_ns) for one in wobbling]
+    assert reported == [(dawn(1), dawn(2)), (dawn(3), dawn(4))]
+    own = [
+        replace(one, sensors=("temperature", MEAN), values=(14.0, 20.0))
+        for one in scans({"temperature": [14.0] * 3})
+    ]
+    assert found(own) == []
 
 
 def test_the_value_equals_that_of_the_history_at_that_moment() -> None:
@@ -94,19 +102,16 @@ def test_the_value_equals_that_of_the_history_at_that_moment() -> None:
         assert alarm.reason.value == pytest.approx(at_dawn)
 
 
-def test_a_daily_quantity_has_no_deadband() -> None:
-    wobbling = found(scans({"temperature": [16.8, 17.2, 16.8, 17.4, 20.0]}))
-    reported = [(one.raised_at_ns, one.cleared_at_ns) for one in wobbling]
-    assert reported == [(dawn(1), dawn(2)), (dawn(3), dawn(4))]
-
-
-def test_too_little_of_a_day_gives_no_value() -> None:
+def test_too_little_of_a_day_gives_no_value_and_a_day_without_scans_not_that_before() -> None:
     assert found(scans({"temperature": [14.0, 14.0]}, first_h=DAWN + 5)) == []
     assert found(scans({"temperature": [14.0] * 4}, every_h=4.0)) == []
     assert found(scans({"temperature": [14.0]})) == []  # its dawn is still to come
-    gone = [one for one in scans({"temperature": [14.0] * 4}) if one.stamp_ns < dawn(1) + HOUR]
+    received = scans({"temperature": [14.0] * 4})
+    gone = [one for one in received if one.stamp_ns < dawn(1) + HOUR]
     [alarm] = found(gone)
     assert alarm.is_active
+    late = [one for one in received if not dawn(1) <= one.stamp_ns < dawn(2)]
+    assert [one.raised_at_ns for one in found(late)] == [dawn(3)]
 
 
 def test_a_late_scan_corrects_its_day() -> None:
@@ -123,7 +128,7 @@ def test_a_late_scan_corrects_its_day() -> None:
     assert [one.raised_at_ns for one in found(received)] == [dawn(1)]
 
 
-def test_a_range_of_light_belongs_to_a_crop() -> None:
+def test_a_range_of_light_belongs_to_a_crop_and_without_a_clock_a_day_is_24_hours() -> None:
     received = scans({"light": [4_000.0, 4_000.0]})
     assert found(received) == []
     inspection = PastWrite(10_000, 1, "a", HOUR, 1, 0, has_seen=True, species="Lettuce")
@@ -131,17 +136,6 @@ def test_a_range_of_light_belongs_to_a_crop() -> None:
     assert dim.reason.sensor == "daily_light_integral"
     assert dim.reason.value == pytest.approx(24 * 3600 * 4_000.0 / 54.0 / 1e6)
     assert dim.reason.limit == 12.0
-
-
-def test_a_sensor_that_reads_the_quantity_itself_takes_precedence() -> None:
-    own = [
-        replace(one, sensors=("temperature", MEAN), values=(14.0, 20.0))
-        for one in scans({"temperature": [14.0] * 3})
-    ]
-    assert found(own) == []
-
-
-def test_without_a_clock_a_day_is_24_hours_of_ros_time() -> None:
     fold = AlarmFold(Criteria(own_sensors(), None, ClockDay(None)), SPANS)
     fold.take(scans({"temperature": [14.0] * 3}, first_h=DAWN + 5))
     [cold] = [one for one in fold.found(40 * DAY_NS).alarms if one.reason.sensor in DAILY]
@@ -189,9 +183,3 @@ def test_the_last_whole_days_value_holds_until_the_next_scan_after_a_dawn() -> N
     assert mean(dawn(1) - 1) is None
     assert mean(dawn(1)) == mean(dawn(2) - 1) == pytest.approx(14.0, abs=0.2)
     assert mean(dawn(2)) == pytest.approx(20.0, abs=0.2)
-
-
-def test_a_day_without_scans_is_not_judged_by_the_day_before() -> None:
-    received = scans({"temperature": [14.0, 14.0, 14.0, 14.0]})
-    late = [one for one in received if not dawn(1) <= one.stamp_ns < dawn(2)]
-    assert [one.raised_at_ns for one in found(late)] == [dawn(3)]

@@ -1,3 +1,6 @@
+"""The judge: verdicts that follow the scans, and the pace of the patrol."""
+
+import itertools
 from dataclasses import replace
 from importlib.resources import files
 
@@ -5,9 +8,17 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from lupin_bridge.judge import scans
 from lupin_bridge.judge.day import Day
 from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, Judged, judge_once
-from lupin_bridge.judge.scans import Patrol, light_turns
+from lupin_bridge.judge.scans import (
+    LAP_INTERVALS,
+    SHORTEST_NS,
+    Patrol,
+    RecentScans,
+    Stretches,
+    light_turns,
+)
 from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict
 from lupin_twin.core.past import PastWrite, recent_of
@@ -45,15 +56,18 @@ GOOD = tag("a", START, temperature=22.0)
 COLD = tag("b", START, temperature=6.0)
 
 
-def test_unchanged_state_is_not_reported_again() -> None:
+def test_unchanged_state_is_not_reported_again_and_a_tag_that_is_gone_is_forgotten() -> None:
     judge = Judge(BY_LIGHT)
     first = judge.see(snapshot(START, GOOD, COLD))
     assert first.tags.keys() == {"a", "b"}
     assert first.house.verdict is Verdict.CRITICAL
     assert judge.see(snapshot(START + S, GOOD, COLD)) is first
+    gone = judge.see(snapshot(START + 2 * S, GOOD))
+    assert gone.tags.keys() == {"a"}
+    assert gone.house.verdict is Verdict.HEALTHY
 
 
-def test_time_alone_makes_readings_old() -> None:
+def test_time_alone_makes_readings_old_by_the_scan_interval_or_by_a_configured_limit() -> None:
     judge = Judge(BY_LIGHT)
     judge.learn([scan("a", START - MINUTE, temperature=22.0)])
     judge.see(snapshot(START - MINUTE, tag("a", START - MINUTE, temperature=22.0)))
@@ -63,9 +77,12 @@ def test_time_alone_makes_readings_old() -> None:
     old = judge.see(snapshot(START + 10 * MINUTE + 1, GOOD))
     assert others(still, old) == {"a"}
     assert old.tags["a"].verdict is old.house.verdict is Verdict.UNKNOWN
+    judge = Judge(replace(BY_LIGHT, recent_s=30.0))
+    assert judge.see(snapshot(START + 30 * S, GOOD)).tags["a"].verdict == "healthy"
+    assert judge.see(snapshot(START + 31 * S, GOOD)).tags["a"].verdict == "unknown"
 
 
-def test_for_alarms_a_tag_scanned_once_has_a_day() -> None:
+def test_for_alarms_a_tag_scanned_once_has_a_day_and_a_missing_sensor_changes_no_interval() -> None:
     judge, day = Judge(BY_LIGHT), 24 * 60 * MINUTE
     judge.see(snapshot(START, GOOD, COLD))
     judge.learn([scan("b", START - day, temperature=6.0)])  # and no interval extends it
@@ -74,49 +91,6 @@ def test_for_alarms_a_tag_scanned_once_has_a_day() -> None:
     judge.see(snapshot(START, GOOD))
     assert judge.see(snapshot(START + day, GOOD)).tags["a"].verdict is Verdict.HEALTHY
     assert judge.see(snapshot(START + day + 1, GOOD)).tags["a"].verdict is Verdict.UNKNOWN
-
-
-def test_a_value_that_wobbles_at_a_limit_does_not_change_its_status_at_every_scan() -> None:
-    """From 18 to 26 the deadband is 0.4: a value out of range stays so until it is further within.
-
-    The limit stays the configured one; `clears_at` stands beside it.
-    """
-    judge = Judge(BY_LIGHT)
-    found = []
-    for number, value in enumerate((25.9, 26.1, 25.9, 26.1, 25.61, 25.6, 25.9, 35.1, 34.9, 34.5)):
-        at_ns = START + number * MINUTE
-        health = judge.see(snapshot(at_ns, tag("a", at_ns, temperature=value))).tags["a"]
-        found.append((health.verdict, *((it.limit, it.release) for it in health.reasons)))
-    stressed, critical = Verdict.STRESSED, Verdict.CRITICAL
-    assert found == [
-        (Verdict.HEALTHY,),
-        (stressed, (26.0, None)),
-        (stressed, (26.0, 25.6)),
-        (stressed, (26.0, None)),
-        (stressed, (26.0, 25.6)),
-        (Verdict.HEALTHY,),
-        (Verdict.HEALTHY,),
-        (critical, (35.0, None)),
-        (critical, (35.0, 34.6)),
-        (stressed, (26.0, None)),
-    ]
-
-
-def test_a_value_that_was_out_of_range_nine_scans_ago_is_forgotten() -> None:
-    judge, found = Judge(BY_LIGHT), []
-    for number in range(10):
-        at_ns, value = START + number * MINUTE, 25.9 if number else 26.1
-        health = judge.see(snapshot(at_ns, tag("a", at_ns, temperature=value))).tags["a"]
-        found.append(health.verdict)
-    assert found == [Verdict.STRESSED] * 9 + [Verdict.HEALTHY]
-
-
-def scan(tag_id: str, at_ns: int, **values: float) -> PastWrite:
-    names, numbers = tuple(values), tuple(values.values())
-    return PastWrite(at_ns, 1, tag_id, at_ns, 0, 0, names, numbers)
-
-
-def test_a_sensor_missing_from_scans_does_not_change_the_interval() -> None:
     dead = Reading("light", 900.0, START)
     scans = [START + round_ * 10 * MINUTE for round_ in range(40)]
     judge, late = Judge(BY_LIGHT), Judge(BY_LIGHT)
@@ -133,10 +107,41 @@ def test_a_sensor_missing_from_scans_does_not_change_the_interval() -> None:
     assert late.holds_ns()["a"] == 30 * MINUTE
 
 
-def test_a_configured_limit_takes_precedence_over_the_scan_interval() -> None:
-    judge = Judge(replace(BY_LIGHT, recent_s=30.0))
-    assert judge.see(snapshot(START + 30 * S, GOOD)).tags["a"].verdict == "healthy"
-    assert judge.see(snapshot(START + 31 * S, GOOD)).tags["a"].verdict == "unknown"
+def judged_one_by_one(*values: float) -> list[Health]:
+    """Tag a, with this temperature at each scan, one a minute."""
+    judge = Judge(BY_LIGHT)
+    return [
+        judge.see(snapshot(at_ns, tag("a", at_ns, temperature=value))).tags["a"]
+        for at_ns, value in zip(itertools.count(START, MINUTE), values, strict=False)
+    ]
+
+
+def test_a_value_that_wobbles_at_a_limit_does_not_change_its_status_at_every_scan() -> None:
+    """From 18 to 26 the deadband is 0.4: a value out of range stays so until it is further within.
+
+    The limit stays the configured one; `clears_at` stands beside it.
+    """
+    found = judged_one_by_one(25.9, 26.1, 25.9, 26.1, 25.61, 25.6, 25.9, 35.1, 34.9, 34.5)
+    stressed, critical = Verdict.STRESSED, Verdict.CRITICAL
+    assert [(it.verdict, *((r.limit, r.release) for r in it.reasons)) for it in found] == [
+        (Verdict.HEALTHY,),
+        (stressed, (26.0, None)),
+        (stressed, (26.0, 25.6)),
+        (stressed, (26.0, None)),
+        (stressed, (26.0, 25.6)),
+        (Verdict.HEALTHY,),
+        (Verdict.HEALTHY,),
+        (critical, (35.0, None)),
+        (critical, (35.0, 34.6)),
+        (stressed, (26.0, None)),
+    ]
+    forgotten = judged_one_by_one(26.1, *[25.9] * 9)
+    assert [it.verdict for it in forgotten] == [stressed] * 9 + [Verdict.HEALTHY]
+
+
+def scan(tag_id: str, at_ns: int, **values: float) -> PastWrite:
+    names, numbers = tuple(values), tuple(values.values())
+    return PastWrite(at_ns, 1, tag_id, at_ns, 0, 0, names, numbers)
 
 
 def test_a_reading_is_judged_by_the_daylight_and_the_plants_of_its_own_time() -> None:
@@ -169,20 +174,15 @@ def reported(health: Health) -> list[tuple[str, float | None, float | None]]:
     return [(it.verdict, it.value, it.limit) for it in health.reasons]
 
 
-def test_a_lasting_reason_keeps_its_start_time() -> None:
+def test_a_lasting_reason_keeps_its_start_time_and_without_a_clock_nothing_is_known() -> None:
     judge = Judge(BY_LIGHT)
-    judge.see(snapshot(START, COLD))
+    judge.see(snapshot(START, GOOD, COLD))
     still = tag("b", START + MINUTE, temperature=6.5)
-    (reason,) = judge.see(snapshot(START + MINUTE, still)).tags["b"].reasons
+    (reason,) = judge.see(snapshot(START + MINUTE, GOOD, still)).tags["b"].reasons
     assert (reason.value, reason.since_ns) == (6.5, START)
-
-
-def test_without_a_clock_nothing_is_known() -> None:
-    judge = Judge(BY_LIGHT)
-    judge.see(snapshot(START, GOOD))
-    stopped = judge.see(replace(snapshot(START, GOOD), clock="stopped"))
+    stopped = judge.see(replace(snapshot(START + MINUTE, GOOD, still), clock="stopped"))
     assert (stopped.house.verdict, stopped.tags["a"].verdict) == ("unknown", "unknown")
-    back = judge.see(snapshot(START + S, GOOD))
+    back = judge.see(snapshot(START + 2 * MINUTE, GOOD))
     assert (back.house.verdict, back.tags["a"].verdict) == ("healthy", "healthy")
 
 
@@ -360,9 +360,52 @@ def writes_of(*tags: TagState) -> list[PastWrite]:
     ]
 
 
-def test_a_tag_that_is_gone_is_forgotten() -> None:
-    judge = Judge(BY_LIGHT)
-    judge.see(snapshot(START, GOOD, COLD))
-    gone = judge.see(snapshot(START + S, GOOD))
-    assert gone.tags.keys() == {"a"}
-    assert gone.house.verdict is Verdict.HEALTHY
+# --- the pace of the patrol -----------------------------------------------------------------------
+
+
+def scanned(*stamps_s: float, tags: int = 10) -> RecentScans:
+    """As many tags, scanned in turn."""
+    scans = RecentScans(BY_LIGHT.day)
+    for number, stamp_s in enumerate(stamps_s):
+        name = str(number % tags)
+        write = PastWrite(0, 0, name, int(stamp_s * S), 0, 0, ("temperature",), (22.0,))
+        scans.take([write], {name: TagState(name)})
+    return scans
+
+
+def interval_ns(*stamps_s: float) -> int | None:
+    return scanned(*stamps_s).patrol(None, 0).interval_ns
+
+
+def test_a_way_back_or_a_pause_does_not_change_the_interval() -> None:
+    assert interval_ns(0, 40, 80, 120, 700, 740) == 40 * S
+
+
+def test_only_the_last_intervals_count() -> None:
+    slow = [i * 600 for i in range(2 * LAP_INTERVALS)]
+    fast = [slow[-1] + 5 * (i + 1) for i in range(LAP_INTERVALS)]
+    assert interval_ns(*slow, *fast) == 5 * S
+
+
+def test_scans_at_one_moment_count_once_and_those_still_to_come_do_not_count() -> None:
+    scans = scanned(100, 140, 120, 140, 151)
+    assert scans.patrol(150 * S, 0) == Patrol(20 * S, 140 * S, 0)
+    assert scans.patrol(151 * S, 0).last_scan_ns == 151 * S
+
+
+def test_old_pauses_are_dropped_and_the_number_stored_is_bounded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stretches = Stretches()
+    for number in range(8):
+        stretches.add(2 * number * SHORTEST_NS)
+    assert not stretches.add(0), "it is no news"
+    # A pause that ends exactly at the limit stays.
+    assert stretches.forget(4 * SHORTEST_NS) == 4 * SHORTEST_NS
+    assert next(stretches.pauses()) == (2 * SHORTEST_NS, 4 * SHORTEST_NS)
+    assert stretches.forget(4 * SHORTEST_NS + 1) == 4 * SHORTEST_NS + 1
+    assert next(stretches.pauses()) == (4 * SHORTEST_NS, 6 * SHORTEST_NS)
+    for most, complete_ns in ((5, 0), (4, 6 * SHORTEST_NS)):
+        monkeypatch.setattr(scans, "MAX_PAUSES", most)
+        assert stretches.forget(0) == complete_ns
+    assert len([*stretches.pauses()]) == 4

@@ -1,24 +1,37 @@
-"""The webhook and a real receiver: refusing, slow, failing, and then accepting everything."""
+"""The webhook and a real receiver: changes of alarms, one POST, refusals, and recovery."""
 
 import asyncio
+import ssl
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from lupin_bridge.alarms.board import Change
 from lupin_bridge.judge.episodes import Alarm
+from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify import webhook
-from lupin_bridge.notify.destinations import Targets
-from lupin_bridge.notify.webhook import MAX_WAITING, ORIGIN_S, Webhook
+from lupin_bridge.notify.destinations import Targets, WebhookTarget
+from lupin_bridge.notify.webhook import (
+    MAX_WAITING,
+    ORIGIN_S,
+    RESENT_NS,
+    AlarmNews,
+    PostError,
+    Webhook,
+    post,
+)
 from lupin_bridge.settings import Secrets, Settings
 from lupin_twin.core.diagnostics import Origin
 from tests.support.docs import block_named
 from tests.support.processes import free_port
 from tests.support.receiver import Answer, Posted, receiver, silence, status
 from tests.support.seen import NOW_NS, Alarms, S, alarm
+from tests.support.tls import certificate
 from tests.support.waiting import PATIENCE_S, until
 
 SECRET = "a secret of 20 chars"
@@ -174,3 +187,171 @@ async def test_it_stops_at_once_while_a_receiver_hangs() -> None:
             await until(lambda: len(server.posted) == 1, "the post")
             async with asyncio.timeout(5.0):  # its time-out may be 10 s
                 await hook.stop()
+
+
+# --- changes of alarms ----------------------------------------------------------------------------
+
+
+def put(news: AlarmNews, *alarms: Alarm, is_past: bool = False) -> list[tuple[str, str]]:
+    found = news.of(Change(alarms, is_past=is_past), NOW_NS)
+    return [(it.change, it.id) for it in found]
+
+
+def test_an_alarm_that_turns_critical_is_sent_once_and_a_worse_value_alone_is_not() -> None:
+    news = AlarmNews()
+    mild = replace(alarm("a", Verdict.STRESSED), raised_as=Verdict.STRESSED)
+    bad = replace(mild, reason=replace(mild.reason, verdict=Verdict.CRITICAL))
+    raised, worse = f"{mild.id}.raised", f"{mild.id}.worse.critical"
+    assert put(news, mild) == [("raised", raised)]
+    assert put(news, *(replace(mild, worst=float(value)) for value in range(99))) == []
+    assert put(news, bad) == [("worse", worse)]
+    assert put(news, *(replace(bad, worst=float(value)) for value in range(99))) == []
+    # After a restart both are sent once more; a receiver of the first only learns of the second.
+    again = AlarmNews()
+    assert put(again, bad, is_past=True) == [("raised", raised), ("worse", worse)]
+    assert [it for it, _ in put(again, replace(bad, cleared_at_ns=NOW_NS + S))] == ["cleared"]
+    # One that was raised as critical never gets worse.
+    assert [it for it, _ in put(AlarmNews(), replace(bad, raised_as=Verdict.CRITICAL))] == [
+        "raised"
+    ]
+
+
+def test_an_alarm_that_continues_is_raised_again_and_one_that_never_was_is_withdrawn() -> None:
+    news = AlarmNews()
+    put(news, alarm("a"))
+    put(news, alarm("a", cleared_ns=NOW_NS + S))
+    ((change, name),) = put(news, alarm("a"))
+    assert change == "raised"
+    assert name != f"{alarm('a').id}.raised"
+    news = AlarmNews()
+    put(news, alarm("a"))
+    found = news.of(Change((), (alarm("a"), alarm("b"))), NOW_NS)
+    assert [(it.change, it.alarm.tag_id) for it in found] == [("withdrawn", "a")]
+    news = AlarmNews()
+    old, new = alarm("old", raised_ns=1, cleared_ns=2), alarm("new", raised_ns=NOW_NS)
+    found = news.of(Change((old, new), is_past=True), None)
+    assert [it.alarm.tag_id for it in found] == ["new"]
+
+
+def test_active_alarms_and_those_of_the_last_day_are_sent_again_with_the_same_ids() -> None:
+    """So that a restart loses none, and a receiver recognises those it has."""
+    before = AlarmNews()
+    old, active = alarm("old", raised_ns=1, cleared_ns=2), alarm("a", raised_ns=1)
+    edge = NOW_NS - RESENT_NS
+    just = alarm("just", raised_ns=3, cleared_ns=edge)
+    missed = alarm("missed", raised_ns=4, cleared_ns=edge - 1)
+    ids = put(before, active)
+    assert ids == [("raised", f"{active.id}.raised")]
+    after = put(AlarmNews(), old, active, just, missed, is_past=True)
+    assert after == [*ids, ("cleared", f"{just.id}.cleared.{edge}")]
+
+
+# --- one POST -------------------------------------------------------------------------------------
+
+
+def target(url: str, ca: str = "") -> WebhookTarget:
+    settings = Settings(webhook_url=url, webhook_ca=ca)
+    found = Targets.of(settings, Secrets(webhook_secret="s" * 16)).webhook
+    assert found is not None
+    return found
+
+
+def sent(url: str, answer_s: float = 60.0, ca: str = "") -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(webhook, "ANSWER_S", answer_s)
+        asyncio.run(post(target(url, ca), {"webhook-id": "1"}, b'{"a":1}'))
+
+
+def refusal(url: str, answer_s: float = 60.0, ca: str = "") -> str:
+    with pytest.raises(PostError) as refused:
+        sent(url, answer_s, ca)
+    return str(refused.value)
+
+
+def message(port: int) -> tuple[int, int]:
+    """The status of a refusal, and its Retry-After."""
+    with pytest.raises(PostError) as refused:
+        sent(f"http://127.0.0.1:{port}/")
+    return refused.value.status, refused.value.retry_after_s
+
+
+def test_a_post_has_its_headers_and_body_and_an_interim_response_is_skipped() -> None:
+    with receiver(status(204)) as server:
+        sent(f"http://127.0.0.1:{server.port}/hook?a=b")
+    (posted,) = server.posted
+    assert (posted.path, posted.body) == ("/hook?a=b", b'{"a":1}')
+    assert posted.headers["content-type"] == "application/json"
+    assert posted.headers["host"] == f"127.0.0.1:{server.port}"
+    assert posted.headers["webhook-id"] == "1"
+    first = b"HTTP/1.1 103 Early Hints\r\n\r\nHTTP/1.1 202 OK\r\n\r\n"
+    with receiver(lambda _: iter([first])) as server:
+        sent(f"http://127.0.0.1:{server.port}/")
+
+
+@pytest.mark.parametrize(
+    ("code", "retry_after", "reported_s"),
+    [
+        (302, "7", 7),
+        (404, "7", 7),
+        (503, "Wed, 21 Oct 2026 07:28:00 GMT", 0),
+        (503, "9" * 5_000, 999_999_999),
+    ],
+)
+def test_any_other_status_fails_a_redirect_is_not_followed_and_retry_after_is_a_number(
+    code: int, retry_after: str, reported_s: int
+) -> None:
+    with receiver(status(200)) as elsewhere:
+        place = f"Location: http://127.0.0.1:{elsewhere.port}/"
+        with receiver(status(code, place, f"Retry-After: {retry_after}")) as server:
+            assert message(server.port) == (code, reported_s)
+    assert elsewhere.posted == []
+
+
+def test_a_missing_receiver_is_reported_in_the_systems_words() -> None:
+    assert refusal(f"http://127.0.0.1:{free_port()}/") == "Connection refused"
+    assert refusal("http://a..b/") == "its host name cannot be looked up"
+
+
+@pytest.mark.parametrize(
+    ("answer", "timeout_s", "why"),
+    [
+        ([b"", None], 0.05, "no answer within 0.05 s"),
+        ([b"HTTP/1.1 200 OK\r\nX: ", None], 0.05, "no answer within 0.05 s"),
+        ([b"HTTP/1.1 200 OK\r\nX: ", *[b"x" * 1000] * 1000], 5.0, "no HTTP answer: Receive buffer"),
+        ([b"SSH-2.0-OpenSSH\r\n\r\n"], 60.0, "no HTTP answer: "),
+        ([b""], 60.0, "the connection was closed before an answer"),
+        ([b"HTTP/1.1 200"], 60.0, "the connection was closed before an answer"),
+    ],
+)
+def test_an_answer_that_is_late_partial_endless_or_invalid_is_a_failure(
+    answer: list[bytes | None], timeout_s: float, why: str
+) -> None:
+    with receiver(lambda _: iter(answer)) as server:
+        assert refusal(f"http://127.0.0.1:{server.port}/", timeout_s).startswith(why)
+
+
+def test_a_body_is_not_read_however_much_arrives() -> None:
+    given: list[int] = []
+
+    def flood(_: Posted) -> Iterator[bytes | None]:
+        yield b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n"
+        while True:
+            given.append(65_536)
+            yield b"10000\r\n" + b"x" * 65_536 + b"\r\n"
+
+    with receiver(flood) as server:
+        sent(f"http://127.0.0.1:{server.port}/")
+    assert sum(given) < 20_000_000  # more than the sockets hold
+
+
+def test_https_trusts_its_authority_alone(tmp_path: Path) -> None:
+    made = certificate(tmp_path)
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(made.cert, made.key)
+    with receiver(status(200), tls=context) as server:
+        url = f"https://127.0.0.1:{server.port}/"
+        assert "certificate verify failed" in refusal(url)
+        ca = tmp_path / "ca.pem"
+        made.authority.cert_pem.write_to_path(str(ca))
+        sent(url, ca=str(ca))
+    assert len(server.posted) == 1

@@ -118,7 +118,7 @@ def test_dates_and_numbers_are_written_as_on_the_page(lang: str, texts: list[str
     assert [text for text in texts if text not in page] == []
 
 
-def test_times_are_those_of_the_greenhouse_or_of_the_readers_zone() -> None:
+def test_times_are_those_of_the_greenhouse_or_of_a_zone_that_this_machine_knows() -> None:
     assert "Times: Europe/Amsterdam (UTC+01:00)" in page_of()
     # From the second day on, rows have their dates.
     page = page_of(hours=20, zone=ZoneInfo("Asia/Kathmandu"))
@@ -129,15 +129,12 @@ def test_times_are_those_of_the_greenhouse_or_of_the_readers_zone() -> None:
     )
     assert "7 28 Nov, 01:00" in page
     assert "7 26 Nov, 22:00" in page
-
-
-def test_a_zone_that_this_machine_does_not_know_is_reported() -> None:
     period_ns = BEGUN_S * 10**9, (BEGUN_S + HOUR_S) * 10**9
-    page = ReportPage(*period_ns, GREENHOUSE, UNKNOWN_JOURNAL, "en", UTC, "Mars/<North>")
+    unknown = ReportPage(*period_ns, GREENHOUSE, UNKNOWN_JOURNAL, "en", UTC, "Mars/<North>")
     reported = (
         "Times: UTC (UTC+00:00) This server does not know the time zone Mars/<North>: times are in"
     )
-    assert reported in text_of(page, 1)
+    assert reported in text_of(unknown, 1)
 
 
 def test_a_note_has_its_kind_and_its_text_and_headings_do_not_contradict_their_content() -> None:
@@ -147,14 +144,11 @@ def test_a_note_has_its_kind_and_its_text_and_headings_do_not_contradict_their_c
     assert "Tags not scanned None." in page
 
 
-def test_missing_earlier_data_are_reported_only_where_the_log_begins_within_the_period() -> None:
+def test_the_report_names_its_greenhouse_and_says_from_when_to_when_it_is_complete() -> None:
     whole, late = (page_of(kept_from=at(seconds)) for seconds in (0, HOUR_S))
     assert "No data before" not in whole
     assert "Complete up to 27 Nov 2026, 14:00." in whole
     assert "No data before 27 Nov 2026, 07:00. Complete up to 27 Nov 2026, 14:00." in late
-
-
-def test_the_report_names_its_greenhouse_and_says_when_nothing_was_recorded() -> None:
     end_ns = (BEGUN_S + HOUR_S) * 10**9
     page = ReportPage(BEGUN_S * 10**9, end_ns, GREENHOUSE, UNKNOWN_JOURNAL, "de")
     assert "Simuliert" not in text_of(page, 1)
@@ -162,18 +156,14 @@ def test_the_report_names_its_greenhouse_and_says_when_nothing_was_recorded() ->
     assert "Schichtbericht: gh<1> Simuliert. Kein echter Roboter: Gewächshaus" in reported
 
 
-def test_a_column_of_acknowledgements_and_shelves_appears_when_one_is_needed() -> None:
-    acknowledged = alarm(acknowledged_by="Anna", acknowledged_at=at(120))
-    assert "Acknowledged, shelved" not in page_of(alarms=[alarm()])
-    page = page_of(alarms=[alarm(), acknowledged])
-    assert "Acknowledged, shelved" in page
-    assert page.count("acknowledged by Anna, 06:02") == 1
-
-
-def test_an_alarm_row_names_its_tag_or_the_greenhouse() -> None:
+def test_an_alarm_row_names_its_tag_or_the_greenhouse_and_who_acknowledged_it() -> None:
     page = page_of(alarms=[alarm(), alarm(tag_id="")])
     assert "Pest seen 7 06:01" in page
     assert "Pest seen Greenhouse 06:01" in page
+    assert "Acknowledged, shelved" not in page, "a column that is not needed"
+    page = page_of(alarms=[alarm(), alarm(acknowledged_by="Anna", acknowledged_at=at(120))])
+    assert "Acknowledged, shelved" in page
+    assert page.count("acknowledged by Anna, 06:02") == 1
 
 
 def test_open_alarms_come_first_with_value_and_both_limits() -> None:
@@ -220,7 +210,7 @@ def test_open_alarms_come_first_with_value_and_both_limits() -> None:
     assert "8 06:01 12.5 °C (06:10) 36.0 °C (critical) 10.0 to 35.0 °C" in active
     assert "7 06:01 0.83 kPa (06:10) 1.50 kPa (stressed) 0.20 to 1.30 kPa" in active
     assert "9 06:01 just below 10.0 °C (06:10) 8.0 °C (critical) 10.0 to 35.0 °C" in active
-    assert "6 06:01 9.1 °C 8.0 °C (critical) 10.0 to 35.0 °C" in active, "a reading of unknown time has none"
+    assert "6 06:01 9.1 °C 8.0 °C (critical) 10.0 to 35.0 °C" in active, "its time is not known"
     assert "7 06:01 07:19 1 h 18 min 1.60 kPa (stressed) 0.20 to 1.30 kPa" in resolved
     # The file of sensors has another range by now.
     assert "7 06:01 06:01 37 s 2.0 °C (critical) 3.5 °C" in resolved

@@ -108,9 +108,6 @@ def send(it: Running, *paths: str) -> list[asyncio.Task[httpx.Response]]:
     return [asyncio.create_task(it.http.get(path)) for path in paths]
 
 
-# --- small requests are never queued behind large ones --------------------------------------------
-
-
 async def test_a_flood_of_the_most_expensive_fields_delays_no_tiny_one_nor_that_of_another_client(
     domain: int, held: Held
 ) -> None:
@@ -138,9 +135,6 @@ async def test_a_flood_of_the_most_expensive_fields_delays_no_tiny_one_nor_that_
             assert (await theirs).status_code == 200
         assert sorted([(await task).status_code for task in flood]) == [200] * 12 + [503] * 28
         assert held.begun.index("co2 51") < len(held.begun) - 2, "it passed the flood"
-
-
-# --- only while a client waits --------------------------------------------------------------------
 
 
 async def test_a_client_that_disconnects_cancels_its_work(domain: int, held: Held) -> None:
@@ -199,9 +193,6 @@ async def test_a_long_list_of_notes_delays_no_other_answer(
         gate.set()
         assert (await listed).json() == {"notes": []}
     assert was_open == [True]
-
-
-# --- shared work ----------------------------------------------------------------------------------
 
 
 async def test_identical_requests_take_one_place_and_one_computation(

@@ -54,14 +54,19 @@ async def test_all_rows_come_under_one_header(domain: int) -> None:
         assert past.requested == [(NS, 9 * NS, "a/b", "co2")]
 
 
-async def test_head_reads_no_row(domain: int) -> None:
-    past = MadeUp(lots=[rows(1)])
+async def test_head_reads_no_row_and_without_rows_there_is_a_header_or_empty_parquet(
+    domain: int,
+) -> None:
+    past = MadeUp()
     async with remembering(past) as it:
         answer = await it.http.head(f"{PATH}?to=9")
         assert (answer.status_code, answer.content) == (200, b"")
         assert "19700101T000009Z" in answer.headers["content-disposition"]
         assert past.requested == []
         assert (await it.http.head(f"{PATH}?to=now")).status_code == 400
+        assert (await it.http.get(PATH)).content == bodies.CSV_HEADER
+        answer = await it.http.get("/api/export.parquet")
+        assert parquet.read_table(pyarrow.BufferReader(answer.content)).num_rows == 0
 
 
 async def test_parquet_has_the_same_rows_with_units_and_coordinates(domain: int) -> None:
@@ -94,13 +99,6 @@ async def test_parquet_has_the_same_rows_with_units_and_coordinates(domain: int)
         assert schema.field("x_m").metadata[b"units"] == b"m"
         assert schema.metadata[b"to"] == b"1970-01-01T00:00:09.000000000Z"
         assert json.loads(schema.metadata[b"units"])["co2"] == "ppm"
-
-
-async def test_without_rows_the_file_is_a_csv_header_or_empty_parquet(domain: int) -> None:
-    async with remembering(MadeUp()) as it:
-        assert (await it.http.get(PATH)).content == bodies.CSV_HEADER
-        answer = await it.http.get("/api/export.parquet")
-        assert parquet.read_table(pyarrow.BufferReader(answer.content)).num_rows == 0
 
 
 async def test_parquet_without_its_package_is_refused_with_how_to_install_it(

@@ -53,9 +53,6 @@ def npy(running: Bridge, **query: Any) -> npt.NDArray[np.float32]:
     return np.load(io.BytesIO(answer.content), allow_pickle=False)  # type: ignore[no-any-return]
 
 
-# --- the same numbers everywhere ----------------------------------------------------------------
-
-
 def test_the_service_and_both_formats_give_the_numbers_of_the_definition(live: Bridge) -> None:
     service = live.peer.get_field(**QUERY)
     body = live.json("/api/field.json", **QUERY)
@@ -84,9 +81,6 @@ def test_the_service_and_both_formats_give_the_numbers_of_the_definition(live: B
         assert as_sent == getattr(service, name), name
 
 
-# --- formats ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("accept", "media_type", "suffix"),
     [
@@ -105,8 +99,17 @@ def test_accept_chooses_the_format_and_the_answer_varies_by_it(
     assert "vary" not in by_suffix.headers
 
 
-def test_an_unknown_format_is_406(live: Bridge) -> None:
-    answer = live.get("/api/field", {"Accept": "text/html"}, **QUERY)
+def test_all_lines_of_a_header_count_and_an_unknown_format_is_406(live: Bridge) -> None:
+    def request(*lines: tuple[str, str]) -> httpx.Response:
+        url = f"{live.url}/api/field"
+        return httpx.get(url, params=QUERY, headers=lines, timeout=PATIENCE_S, trust_env=False)
+
+    two_types = request(("Accept", "text/html;q=0.1"), ("Accept", "application/x-npy"))
+    assert two_types.headers["content-type"] == "application/x-npy"
+    tag = etag(live, "/api/field.json")
+    two_tags = request(("If-None-Match", '"other"'), ("If-None-Match", tag), ("Accept", "*/*"))
+    assert two_tags.status_code == 304
+    answer = request(("Accept", "text/html"))
     assert (answer.status_code, answer.headers["vary"]) == (406, "Accept")
     message = schema.ErrorMessage.model_validate_json(answer.content)
     assert "application/json, image/png, application/x-npy" in message.detail
@@ -131,9 +134,6 @@ def test_the_headers_of_every_format_describe_its_content(live: Bridge, suffix: 
     }
     assert headers["content-disposition"] == f'inline; filename="temperature.{suffix}"'
     assert headers["cache-control"] == "no-cache"
-
-
-# --- refusals -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -179,9 +179,6 @@ def test_an_oversized_grid_is_refused_over_http_as_over_ros(
     assert "the limit is 1000000" in service.error_message
 
 
-# --- ETag ---------------------------------------------------------------------------------------
-
-
 def etag(running: Bridge, path: str = "/api/field.json", **query: Any) -> str:
     answer = running.get(path, **(query or QUERY))
     assert answer.status_code == 200, answer.text
@@ -206,18 +203,6 @@ def test_an_unchanged_field_is_not_sent_again(live: Bridge, path: str) -> None:
     assert work_done(live) == before, "neither computed nor looked up"
     for other in ('"other"', tag[:-2] + '"', tag.strip('"'), tag[:-1]):
         assert live.get(path, {"If-None-Match": other}, **QUERY).status_code == 200
-
-
-def test_all_lines_of_a_header_count(live: Bridge) -> None:
-    def request(*lines: tuple[str, str]) -> httpx.Response:
-        url = f"{live.url}/api/field"
-        return httpx.get(url, params=QUERY, headers=lines, timeout=PATIENCE_S, trust_env=False)
-
-    two_types = request(("Accept", "text/html;q=0.1"), ("Accept", "application/x-npy"))
-    assert two_types.headers["content-type"] == "application/x-npy"
-    tag = etag(live, "/api/field.json")
-    two_tags = request(("If-None-Match", '"other"'), ("If-None-Match", tag), ("Accept", "*/*"))
-    assert two_tags.status_code == 304
 
 
 def test_an_etag_holds_until_the_field_could_have_changed(changing: Bridge) -> None:
@@ -274,9 +259,6 @@ def test_only_with_clip_to_explored_a_live_field_ends_where_the_map_does(
     at = observed["sec"] + 1
     wait_for(lambda: changing.get("/api/state", at=at).status_code == 200, "that moment")
     assert changing.json("/api/field", **QUERY, at=at)["values"] == whole
-
-
-# --- quality ------------------------------------------------------------------------------------
 
 
 def test_quality_describes_the_requested_field(live: Bridge) -> None:

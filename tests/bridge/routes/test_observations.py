@@ -191,16 +191,20 @@ def test_a_writer_posts_and_does_nothing_else(live: Bridge) -> None:
     assert (answer.status_code, answer.headers["allow"]) == (405, "POST")
 
 
+def head(name: str, length: int, *more: str, token: str = "") -> bytes:
+    """The head of a raw request with a writer's token."""
+    lines = ("Host: 127.0.0.1", "Content-Type: application/json", f"Content-Length: {length}")
+    authorization = f"Authorization: Bearer {token or TOKENS[name]}"
+    first = "POST /api/observations HTTP/1.1"
+    return "\r\n".join((first, *lines, authorization, *more, "\r\n")).encode()
+
+
 def test_bodies_are_bounded_and_a_partial_one_times_out(live: Bridge, folder: Path) -> None:
     huge = {"tag_id": "huge", "readings": {f"sensor {n}": 1.0 for n in range(10_000)}}
     assert len(json.dumps(huge)) > MAX_BODY_BYTES
-    head = (
-        f"POST /api/observations HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
-        f"Authorization: Bearer {TOKENS['esp']}\r\nContent-Length: {{}}\r\n\r\n"
-    )
-    message = raw_http.answer(live.url, head.format(len(json.dumps(huge))).encode())
+    message = raw_http.answer(live.url, head("esp", len(json.dumps(huge))))
     assert raw_http.status(message) == 413
-    half = head.format(100).encode() + b'{"tag_id": "half", '
+    half = head("esp", 100) + b'{"tag_id": "half", '
     assert raw_http.status(raw_http.answer(live.url, half)) == 408
     assert rows(folder, "huge") == rows(folder, "half") == []
 
@@ -208,30 +212,23 @@ def test_bodies_are_bounded_and_a_partial_one_times_out(live: Bridge, folder: Pa
 def test_a_token_that_is_revoked_amid_a_body_posts_nothing(live: Bridge, folder: Path) -> None:
     token, accounts = f"gone-{TOKEN}", folder / "accounts.sqlite"
     add(accounts, "token", digest(token), gone="writer")
-    body = json.dumps({"tag_id": "gone", "readings": {"co2": 1.0}})
-    head = (
-        "POST /api/observations HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
-        f"Authorization: Bearer {token}\r\nContent-Length: {len(body)}\r\nConnection: close\r\n"
-        "Expect: 100-continue\r\n\r\n"
-    )
+    body = json.dumps({"tag_id": "gone", "readings": {"co2": 1.0}}).encode()
+    more = "Connection: close", "Expect: 100-continue"
     with raw_http.connect(live.url) as client:
-        client.sendall(head.encode())
+        client.sendall(head("gone", len(body), *more, token=token))
         assert client.recv(65536).startswith(b"HTTP/1.1 100"), "let in, and the body is waited for"
         remove(accounts, "gone", "token")
-        client.sendall(body.encode())
+        client.sendall(body)
         assert raw_http.status(raw_http.received(client)) == 401
 
 
 def test_a_flood_slows_only_its_own_client(live: Bridge) -> None:
     """All at once on one connection: a client that waits for answers is slow enough by itself."""
     number = Limits().observation_burst * 8
-    body = json.dumps({"tag_id": "flood", "readings": {"t": 1}})
-    request = (
-        "POST /api/observations HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
-        f"Authorization: Bearer {TOKENS['flood']}\r\nContent-Length: {len(body)}\r\n"
-    )
-    last = f"{request}Connection: close\r\n\r\n{body}"
-    message = raw_http.answer(live.url, (f"{request}\r\n{body}" * (number - 1) + last).encode())
+    body = json.dumps({"tag_id": "flood", "readings": {"t": 1}}).encode()
+    request = head("flood", len(body)) + body
+    last = head("flood", len(body), "Connection: close") + body
+    message = raw_http.answer(live.url, request * (number - 1) + last)
     taken, slowed = message.count(b"HTTP/1.1 202 "), message.count(b"HTTP/1.1 429 ")
     assert taken + slowed == number
     assert taken >= Limits().observation_burst
@@ -272,13 +269,12 @@ def test_without_the_setting_or_without_accounts_nothing_can_be_written(
         assert (answer.status_code, why in answer.json()["detail"]) == (403, True)
 
 
-def test_a_fleet_accepts_none(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_fleet_accepts_none_and_only_a_token_is_a_writer(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit):
         main(["fleet", "--archive-url", "postgresql://x@127.0.0.1:1/x", *ON])
     assert "--http-observations is for a twin, not for lupin-twin fleet" in capsys.readouterr().err
-
-
-def test_only_a_token_is_a_writer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = ("--accounts", str(tmp_path / "accounts.sqlite"))
     assert main(["token", "add", "esp", "--role", "writer", *file]) == 0
     assert len(capsys.readouterr().out.strip()) == 43

@@ -149,7 +149,7 @@ def test_repeated_attempts_slow_down_only_their_own_address(live: Bridge) -> Non
         assert sign_in(other, "anna").status_code == 204
 
 
-def test_only_an_admin_reads_the_audit_trail(live: Bridge) -> None:
+def test_only_an_admin_reads_the_audit_trail_and_a_reader_cannot_write(live: Bridge) -> None:
     with signed_in(live.url, "anna") as browser:
         assert browser.get("/api/audit").status_code == 403
     assert live.get("/api/audit", BEARER).status_code == 403
@@ -157,6 +157,14 @@ def test_only_an_admin_reads_the_audit_trail(live: Bridge) -> None:
         found = routes_schema.Audit.model_validate(browser.get("/api/audit").json()).audit
     assert (found[0].who, found[0].what, found[0].address) == ("boss", "sign in", "127.0.0.1")
     assert {(row.what, row.subject) for row in found} >= {("add account", "anna operator")}
+    note = {"kind": "comment", "subject": "site", "text": "x"}
+    assert live.http.post("/api/notes", json=note, headers={**OWN, **BEARER}).status_code == 403
+    assert live.http.post("/api/notes", json=note, headers=OWN).status_code == 401
+    with signed_in(live.url, "vera") as vera:
+        answer = write(vera, **note)
+        assert (answer.status_code, "vera is a viewer" in answer.text) == (403, True)
+        assert vera.delete("/api/notes/1").status_code == 403
+        assert not vera.get("/api/session").json()["can_write_notes"]
 
 
 # --- notes --------------------------------------------------------------------------------------
@@ -267,17 +275,6 @@ def test_a_comment_on_a_tag_or_the_greenhouse_is_found_by_subject_and_period(liv
 
 
 # --- attacks ------------------------------------------------------------------------------------
-
-
-def test_a_reader_cannot_write(live: Bridge) -> None:
-    note = {"kind": "comment", "subject": "site", "text": "x"}
-    assert live.http.post("/api/notes", json=note, headers={**OWN, **BEARER}).status_code == 403
-    assert live.http.post("/api/notes", json=note, headers=OWN).status_code == 401
-    with signed_in(live.url, "vera") as vera:
-        answer = write(vera, **note)
-        assert (answer.status_code, "vera is a viewer" in answer.text) == (403, True)
-        assert vera.delete("/api/notes/1").status_code == 403
-        assert not vera.get("/api/session").json()["can_write_notes"]
 
 
 @pytest.mark.parametrize(

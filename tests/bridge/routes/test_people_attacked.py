@@ -109,30 +109,6 @@ def test_a_revoked_token_opens_nothing_even_when_another_has_its_name(
     assert live.get("/api/session", ours).json()["name"] == "plc"
 
 
-def test_an_account_removed_during_a_write_writes_nothing(live: Bridge, accounts: Path) -> None:
-    add(accounts, gone="operator")
-    with signed_in(live.url, "gone") as browser:
-        cookie = "; ".join(f"{name}={value}" for name, value in browser.cookies.items())
-    body = json.dumps({**COMMENT_NOW, "text": "too late"})
-    head = (
-        "POST /api/notes HTTP/1.1\r\nHost: localhost\r\nX-Lupin-Twin: 1\r\nConnection: close\r\n"
-        "Expect: 100-continue\r\n"
-        f"Content-Type: application/json\r\nCookie: {cookie}\r\nContent-Length: {len(body)}\r\n\r\n"
-    )
-    host, port = live.url.removeprefix("http://").split(":")
-    with socket.create_connection((host, int(port)), timeout=PATIENCE_S) as client:
-        client.sendall(head.encode())
-        # They have been admitted, and their note is pending.
-        assert client.recv(65536).startswith(b"HTTP/1.1 100")
-        remove(accounts, "gone")
-        client.sendall(body.encode())
-        answer = b""
-        while part := client.recv(65536):
-            answer += part
-    assert answer.startswith(b"HTTP/1.1 401"), answer
-    assert all(note.text != "too late" for note in notes(live))
-
-
 @pytest.mark.parametrize(
     "body",
     [

@@ -1,21 +1,30 @@
-"""Limits of computed answers: number and rate, for each client and for all together."""
+"""Limits of computed answers, rate limits of clients, and the cache of serialised answers."""
 
 import asyncio
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
+from typing import Any
 
 import httpx
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from lupin_bridge.serving.admission import (
     BURST_S,
+    ENTRY_BYTES,
     EXPORTS,
     LONG_EXPORT_S,
+    MAX_NEWEST,
     Admission,
+    Answer,
+    AnswerCache,
     BusyError,
     ClientLimitError,
     Limits,
+    RateLimit,
+    client_key,
 )
 from lupin_bridge.stream import schema
 from tests.support.access import Served, served
@@ -50,15 +59,15 @@ def test_dragging_through_the_past_is_admitted_and_a_flood_is_not() -> None:
     assert admitted(1_000.0, seconds) == pytest.approx(allowed, abs=1)
 
 
-def test_the_oldest_export_is_ended_for_another_client_once_it_is_old() -> None:
+def test_the_oldest_export_is_ended_for_another_client_and_frees_one_place() -> None:
     admission, ended = Admission(Limits()), list[str]()
     with ExitStack() as taken:
 
         def begin(client: str, now_s: float) -> None:
             taken.enter_context(admission.export(client, now_s, lambda: ended.append(client)))
 
-        for now_s, client in enumerate("abcd"):
-            begin(client, now_s)
+        for at_s, client in enumerate("abcd"):
+            begin(client, at_s)
         with pytest.raises(BusyError):
             begin("e", LONG_EXPORT_S - 1)
         with pytest.raises(ClientLimitError):
@@ -68,9 +77,6 @@ def test_the_oldest_export_is_ended_for_another_client_once_it_is_old() -> None:
         assert admission.refused == {"client_exports": 1, "total_exports": 1}
         assert admission.exporting == EXPORTS
     assert admission.exporting == 0
-
-
-def test_a_cancelled_export_does_not_free_the_place_of_the_next() -> None:
     admission = Admission(Limits())
     with ExitStack() as taken, ExitStack() as broken_off:
         for client, stack in zip("abcdea", (broken_off, *[taken] * 5), strict=True):
@@ -80,7 +86,7 @@ def test_a_cancelled_export_does_not_free_the_place_of_the_next() -> None:
         assert admission.exporting == EXPORTS
 
 
-def test_a_client_has_a_rate_and_is_told_when_to_retry() -> None:
+def test_a_client_has_a_rate_and_a_request_refused_for_its_number_uses_no_turn() -> None:
     admission = Admission(Limits(answers_per_s=0.5, concurrency=9, total_concurrency=9))
     with admission.request("a", 0.0):
         pass
@@ -91,9 +97,6 @@ def test_a_client_has_a_rate_and_is_told_when_to_retry() -> None:
     assert refused.value.headers == {"Retry-After": "2"}
     with admission.request("b", 0.25), admission.request("a", 2.0):
         pass
-
-
-def test_a_request_refused_for_its_number_uses_no_turn() -> None:
     admission = Admission(Limits(answers_per_s=1.0, concurrency=1, total_concurrency=9))
     with admission.request("a", 0.0):
         for _ in range(100):
@@ -148,12 +151,8 @@ def test_every_field_route_has_the_limit(slow: Served, route: str) -> None:
         assert client.get(route + query).content == first.content, "a cached answer costs nothing"
         second = client.get(route + QUERY.replace("co2", f"other {route}"))
         refusal = schema.GetFieldResponse.model_validate_json(second.content)
-        assert (refusal.ok, refusal.values, refusal.width, refusal.sample_count) == (
-            False,
-            [],
-            0,
-            0,
-        )
+        assert (refusal.ok, refusal.values, refusal.width) == (False, [], 0)
+        assert refusal.sample_count == 0
         assert_slowed(second, refusal.error_message)
         with slow.client() as other:
             assert other.get(route + query).status_code == 200, "another client"
@@ -208,3 +207,142 @@ async def test_with_all_places_taken_the_answer_is_503_until_one_is_free(domain:
 def test_a_cached_answer_passes_the_limit(slow: Served, route: str) -> None:
     with slow.client(address=f"127.0.5.{len(route)}") as client:
         assert [client.get(route).status_code for _ in range(5)] == [200] * 5
+
+
+# --- rates ----------------------------------------------------------------------------------------
+
+
+def taken(limit: RateLimit, client: str, now_s: float, attempts: int) -> int:
+    return sum(limit.take(client, now_s) == 0.0 for _ in range(attempts))
+
+
+def test_a_burst_passes_at_once_the_next_turn_waits_and_several_are_taken_together() -> None:
+    limit = RateLimit(rate_hz=20.0, burst=40.0)
+    assert taken(limit, "a", 100.0, 60) == 40
+    assert limit.take("a", 100.0) == pytest.approx(0.05)
+    assert limit.wait_s("a", 100.04) == pytest.approx(0.01)
+    assert taken(limit, "a", 100.05, 2) == 1
+    assert taken(limit, "a", 3_600.0, 60) == 40
+    assert taken(limit, "a", 3_600.0, 60) == 0, "a long rest saves up one burst and no more"
+    limit = RateLimit(rate_hz=10.0, burst=5.0)
+    assert limit.take("a", 0.0, 6) == pytest.approx(0.1), "or not at all"
+    assert limit.take("a", 0.0, 5) == 0.0
+    assert limit.take("a", 0.0) == pytest.approx(0.1)
+
+
+def test_the_table_is_bounded_and_drops_the_least_recently_active() -> None:
+    limit = RateLimit(rate_hz=0.001, burst=1.0, max_keys=3)
+    for client in ("a", "b", "c", "d", "e"):
+        assert limit.take(client, 0.0) == 0.0
+    assert limit.take("a", 0.0) == 0.0, "it was forgotten"
+    assert limit.take("e", 0.0) > 0.0, "it was not"
+    limit = RateLimit(rate_hz=0.001, burst=2.0, max_keys=2)
+    for client in ("a", "b", "a", "c"):
+        limit.take(client, 0.0)
+    assert limit.take("a", 0.0) > 0.0, "of b less was heard"
+
+
+@pytest.mark.parametrize(
+    ("address", "client"),
+    [
+        ("192.168.7.20", "192.168.7.20"),
+        ("::ffff:192.168.7.20", "192.168.7.20"),
+        ("2001:db8:1:2:3:4:5:6", "2001:db8:1:2::/64"),
+        ("2001:db8:1:2::1", "2001:db8:1:2::/64"),
+        ("fe80::1%eth0", "fe80::/64"),
+        ("::1", "::/64"),
+        ("", ""),
+        ("a unix socket", "a unix socket"),
+    ],
+)
+def test_an_address_identifies_its_client(address: str, client: str) -> None:
+    assert client_key(address) == client
+
+
+# --- the cache ------------------------------------------------------------------------------------
+
+
+def answer(size: int) -> Answer:
+    return Answer(b"x" * size, "text/plain")
+
+
+def cached(*bodies: int) -> AnswerCache:
+    """Room for exactly these bodies."""
+    return AnswerCache(max_bytes=sum(bodies) + len(bodies) * ENTRY_BYTES)
+
+
+def has(stored: AnswerCache, key: object) -> bool:
+    lent = stored.lend(key)
+    if lent is not None:
+        lent[1]()
+    return lent is not None
+
+
+def holds(stored: AnswerCache, key: object, expected: Answer) -> bool:
+    lent = stored.lend(key)
+    if lent is not None:
+        lent[1]()
+    return lent is not None and lent[0] is expected
+
+
+def test_an_answer_being_sent_stays_and_counts_and_a_replacement_takes_its_place() -> None:
+    stored = cached(10, 10)
+    stored.put("a", answer(10))
+    lent = [stored.lend("a"), stored.lend("a")]
+    stored.put("b", answer(10))
+    stored.put("c", answer(10))
+    assert [has(stored, key) for key in "abc"] == [True, False, True]
+    stored.put("d", answer(20 + ENTRY_BYTES))
+    assert not has(stored, "d"), "there is no room while anybody reads"
+    for one in lent:
+        assert one is not None
+        one[1]()
+    stored.put("d", answer(20 + ENTRY_BYTES))
+    assert [has(stored, key) for key in "abcd"] == [False, False, False, True]
+    stored = cached(10, 10, 10)
+    stored.put("field", answer(10))
+    for number in range(100):
+        stored.put(("state", number), answer(10), instead_of=("state", number - 1))
+    assert has(stored, "field"), "the many states in between did not drive it out"
+    stored.put("huge", answer(1_000_000))
+    assert has(stored, "field"), "nor what there is no room for"
+    assert len(stored) == 2
+
+
+Step = tuple[str, int, int]
+STEPS = st.lists(
+    st.tuples(st.sampled_from(["put", "lend", "give back"]), st.integers(0, 5), st.integers(0, 40))
+)
+
+
+@given(STEPS)
+def test_the_bound_always_holds(steps: list[Step]) -> None:
+    stored = AnswerCache(max_bytes=60 + 3 * ENTRY_BYTES)
+    lent: list[Any] = []
+    for what, key, size in steps:
+        if what == "put":
+            stored.put(key, answer(size))
+        elif what == "lend" and (one := stored.lend(key)) is not None:
+            lent.append(one)
+        elif what == "give back" and lent:
+            lent.pop()[1]()
+        assert 0 <= stored.bytes <= 60 + 3 * ENTRY_BYTES
+        for one, _ in lent:
+            assert any(holds(stored, key, one) for key in range(6))
+    for _, give_back in lent:
+        give_back()
+    stored.put("all", answer(60 + 2 * ENTRY_BYTES))
+    assert (len(stored), stored.bytes) == (1, 60 + 3 * ENTRY_BYTES), (
+        "nobody holds anything any more"
+    )
+
+
+def test_the_newest_tags_are_reported() -> None:
+    stored = AnswerCache()
+    for number in range(MAX_NEWEST + 1):
+        stored.put(f'"{number}"', Answer(b"", "text/plain"))
+    assert stored.newest_tags() == [f'"{number}"' for number in range(MAX_NEWEST, 0, -1)]
+    stored.put(("no", "tag"), Answer(b"", "text/plain"))
+    lent = stored.lend('"1"')
+    assert lent is not None
+    assert stored.newest_tags()[:2] == ['"1"', f'"{MAX_NEWEST}"']

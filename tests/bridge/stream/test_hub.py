@@ -1,6 +1,7 @@
 """The hub's rules, with connections whose buffers the test controls."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -88,9 +89,6 @@ def stage() -> Stage:
     return Stage()
 
 
-# --- everyone -----------------------------------------------------------------------------------
-
-
 def test_the_age_in_a_status_is_that_at_the_time_of_sending(stage: Stage) -> None:
     stage.announce("stale", 3.0)
     sockets = [Socket(), Socket(), Socket(room=0)]
@@ -143,9 +141,6 @@ def test_eviction_needs_an_address_with_two_fewer(mine: int, gets_a_place: bool)
     assert len(stage.hub) == mine + 3 - gets_a_place
 
 
-# --- slow clients -------------------------------------------------------------------------------
-
-
 def test_a_slow_client_is_never_queued_for_and_gets_the_latest_frame(stage: Stage) -> None:
     slow, quick = Socket(room=1), Socket()
     client = stage.join(slow, wants_status=False)
@@ -195,9 +190,6 @@ def test_a_client_that_takes_nothing_for_too_long_is_closed_and_removed(stage: S
     assert stage.hub.clients_dismissed == 1
 
 
-# --- options of a client ------------------------------------------------------------------------
-
-
 def test_deltas_go_to_clients_that_chose_them_and_have_the_frame_before(stage: Stage) -> None:
     socket, whole = Socket(), Socket()
     stage.publish()
@@ -232,19 +224,26 @@ def test_a_rate_holds_on_average_and_a_status_does_not_wait_for_it(stage: Stage)
     assert socket.got[-1] == 55, "the latest, when its time has come"
 
 
-def test_a_late_frame_does_not_delay_those_after_it(stage: Stage) -> None:
+@pytest.mark.parametrize(
+    ("times_s", "got"),
+    [
+        # A late frame does not delay those after it.
+        ((0.0, 1.05, 2.0, 2.05, 3.0, 3.05), [1, 2, 3, 5]),
+        # After a pause there is no burst: one as soon as something changes, the next an interval
+        # later, with a tenth of tolerance.
+        ((0.0, 100.0, 100.1, 100.85, 100.95, 101.85, 101.95), [1, 2, 5, 7]),
+    ],
+)
+def test_a_rate_is_a_mean(stage: Stage, times_s: Sequence[float], got: list[int]) -> None:
     on_average = Socket()
     stage.join(on_average, min_interval_s=1.0, wants_status=False)
-    for now_s in (0.0, 1.05, 2.0, 2.05, 3.0, 3.05):
+    for now_s in times_s:
         stage.publish(now_s)
-    assert on_average.got == [1, 2, 3, 5]
+    assert on_average.got == got
 
 
-# --- alarms -------------------------------------------------------------------------------------
-
-
-def test_every_change_of_alarms_goes_to_everyone_and_whole(stage: Stage) -> None:
-    sockets = [Socket(), Socket()]
+def test_every_change_of_alarms_goes_to_everyone_whole_and_after_the_first_state() -> None:
+    stage, sockets = Stage(), [Socket(), Socket()]
     stage.publish()
     for socket in sockets:
         stage.join(socket, delta=True, wants_status=False)
@@ -255,10 +254,7 @@ def test_every_change_of_alarms_goes_to_everyone_and_whole(stage: Stage) -> None
     for socket in sockets:
         assert socket.got == [1, {"a"}, (1, 2), {"a", "b"}, set()]
     assert sockets[0].wires[1] is sockets[1].wires[1], "one serialisation serves all"
-
-
-def test_a_new_client_gets_the_alarms_after_the_first_state_and_not_before(stage: Stage) -> None:
-    early, late = Socket(), Socket()
+    stage, early, late = Stage(), Socket(), Socket()
     stage.announce("live")
     stage.alarms("a")
     stage.join(early)
@@ -288,13 +284,3 @@ def test_the_robot_comes_after_a_state_once_and_no_more_often_than_states(stage:
     stage.hub.serve_all(10.0)
     assert seldom.wires[-1] == b"robot 3"
     assert none.robot_due
-
-
-def test_a_pause_is_not_followed_by_a_burst(stage: Stage) -> None:
-    socket = Socket()
-    stage.join(socket, min_interval_s=1.0, wants_status=False)
-    stage.publish(0.0)
-    for now_s in (100.0, 100.1, 100.85, 100.95, 101.85, 101.95):
-        stage.publish(now_s)
-    # One as soon as something changes, the next an interval later, with a tenth of tolerance.
-    assert socket.got == [1, 2, 5, 7]

@@ -1,19 +1,47 @@
-"""Status: live, or offline for one of four reasons."""
+"""What is sent beside the states: status, alarms, verdicts, and the accuracy of estimates."""
 
+import asyncio
+import json
+import math
 from typing import Any, get_args
 
 import pytest
 
+from lupin_bridge.alarms.board import board_of
 from lupin_bridge.bridge import WATCH_PERIOD_S
-from lupin_bridge.feed.source import TwinUpdate
-from lupin_bridge.stream import schema
-from lupin_bridge.stream.frames import STALE_AFTER_S, Liveness, Reason, Status
+from lupin_bridge.feed.source import TwinUnavailableError, TwinUpdate
+from lupin_bridge.judge.judging import NOTHING_JUDGED, Judge
+from lupin_bridge.judge.verdict import Verdict
+from lupin_bridge.stream import pollers, schema
+from lupin_bridge.stream.frames import (
+    MAX_IN_FRAME,
+    STALE_AFTER_S,
+    Liveness,
+    Reason,
+    Status,
+    alarms_in_frame,
+)
+from lupin_bridge.stream.pollers import (
+    MAX_SENSORS,
+    Changed,
+    EstimatePoller,
+    EstimateQualities,
+    changed_of,
+    sensors_of,
+)
+from lupin_bridge.stream.state_json import alarms_body, judgement
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.drops import Counts, Recent
 from lupin_twin.core.parameters import World
-from lupin_twin.core.state import ClockState, Snapshot
+from lupin_twin.core.past import PastRefused
+from lupin_twin.core.state import ClockState, Pose, Reading, Snapshot, TagState
+from lupin_twin.estimate.grading import Record, Tally
+from lupin_twin.field.engine import FieldRefused
 from lupin_twin.ros.convert import map_of
+from lupin_twin.runtime.estimates import Report, TagCheck
 from tests.support.messages import occupancy_grid
+from tests.support.seen import BY_LIGHT, NOW_NS, S, alarm, tag
+from tests.support.waiting import until
 
 
 def update(clock: ClockState = "running", **says: Any) -> TwinUpdate:
@@ -28,39 +56,25 @@ def received(at_s: float, clock: ClockState = "running", **says: Any) -> Livenes
     return Liveness(update=update(clock, **says), updated_s=at_s)
 
 
-def test_a_twin_is_live_until_it_was_silent_for_the_limit() -> None:
+def test_a_twin_is_live_until_it_was_silent_for_the_documented_time() -> None:
+    assert Liveness().status(5.0) == Status("never_seen", None)
     liveness = received(100.0)
+    assert liveness.status(99.0).state_age_s == 0.0, "an age is never negative"
     assert liveness.status(100.0 + STALE_AFTER_S - 0.001).reason == "live"
     assert liveness.status(100.0 + STALE_AFTER_S).reason == "stale"
-
-
-def test_a_silence_is_reported_within_the_documented_time() -> None:
     # Three missed publications are no accident, and a client knows by 3.5 s.
     assert 3.0 <= STALE_AFTER_S < STALE_AFTER_S + WATCH_PERIOD_S <= 3.5
 
 
-def test_a_twin_that_was_never_received_has_no_age() -> None:
-    assert Liveness().status(5.0) == Status("never_seen", None)
-
-
-def test_the_log_has_observations_before_the_twin_is_received() -> None:
-    status = Liveness(lambda: World("simulated", 1_440.0)).status(5.0)
-    assert (status.reason, status.update.origin, status.day_length_s) == (
-        *("never_seen", "simulated"),
-        1_440.0,
-    )
-
-
-def test_an_age_is_never_negative() -> None:
-    assert received(10.0).status(9.0).state_age_s == 0.0
-
-
-def test_the_most_specific_reason_comes_first() -> None:
+def test_the_most_specific_reason_comes_first_and_the_log_is_known_before_the_twin() -> None:
     liveness = received(0.0)
     liveness.thread_dead = True
     assert liveness.status(0.0).reason == "thread_dead"
     liveness.shutting_down = True
     assert liveness.status(0.0).reason == "shutting_down"
+    status = Liveness(lambda: World("simulated", 1_440.0)).status(5.0)
+    found = (status.reason, status.update.origin, status.day_length_s)
+    assert found == ("never_seen", "simulated", 1_440.0)
 
 
 @pytest.mark.parametrize("reason", get_args(Reason))
@@ -74,14 +88,11 @@ def test_every_status_has_a_frame_of_the_contract(reason: Reason, age_s: float |
     assert frame.state_age_seconds == (None if age_s is None else 1.235)
 
 
-def test_more_than_one_twin_is_reported_while_they_live() -> None:
+def test_which_changes_are_news_for_clients_and_which_for_people() -> None:
     liveness = received(0.0, twin_count=2)
     assert liveness.status(0.0).is_live
     assert liveness.status(0.0).message.startswith("2 twins publish on the same topic")
     assert "silent" in liveness.status(10.0).message
-
-
-def test_which_changes_are_news_for_clients_and_which_for_people() -> None:
     now = live()
     assert now.is_news_after(None)
     assert not live(0.9).is_news_after(now), "an age alone is none"
@@ -170,3 +181,166 @@ def test_a_change_of_the_journals_state_is_news() -> None:
     stretch = schema.StatusFrame.model_validate(filled.frame()).journal.simulated
     assert stretch is not None
     assert (stretch.start.sec, stretch.start.nanosec, stretch.end.sec) == (1, 2, 3)
+
+
+# --- alarms, verdicts, accuracy -------------------------------------------------------------------
+
+
+def test_an_answer_without_alarms_or_verdicts_says_so() -> None:
+    body = alarms_body([], "starting", None)
+    assert body == {"alarms": [], "source": "starting", "since": None}
+    schema.Alarms.model_validate(body)
+    judged = schema.Judgement.model_validate_json(judgement(NOTHING_JUDGED), strict=True)
+    assert (judged.house.verdict, judged.tags) == ("unknown", {})
+
+
+def test_the_alarms_of_a_frame_are_limited_with_the_active_ones_first() -> None:
+    for active in (MAX_IN_FRAME - 1, MAX_IN_FRAME + 1):
+        alarms = [alarm(str(number)) for number in range(active)]
+        over = [alarm(f"over {number}", cleared_ns=NOW_NS) for number in range(2)]
+        found = alarms_in_frame(board_of([*over, *alarms]), NOW_NS)
+        assert len(found) == MAX_IN_FRAME
+        assert sum(one.is_active for one in found) == min(active, MAX_IN_FRAME)
+
+
+def test_the_worst_alarm_is_in_a_frame_however_many_came_later() -> None:
+    first = alarm("first", raised_ns=1)
+    later = [alarm(str(number), Verdict.STRESSED) for number in range(MAX_IN_FRAME)]
+    assert first in alarms_in_frame(board_of([first, *later]), NOW_NS)
+
+
+def test_a_value_held_only_by_the_deadband_has_its_limit_and_what_clears_it() -> None:
+    """From 18 to 26 °C the deadband is 0.4."""
+    judge = Judge(BY_LIGHT)
+    for at_ns, value in ((NOW_NS, 17.9), (NOW_NS + S, 18.1)):
+        judged = judge.see(Snapshot(at_ns, "map", (tag("a", at_ns, temperature=value),)))
+    body = schema.Judgement.model_validate_json(judgement(judged), strict=True)
+    (reason,) = body.tags["a"].reasons
+    assert (reason.limit, reason.release) == (18.0, 18.4)
+
+
+def test_the_hit_rate_of_estimates() -> None:
+    report = Report(5 * S, True, "why", Record(3 * S + 7, Tally(10, 9), Tally(70, 30)))
+    body = json.loads(pollers.quality({"co2": report, "ph": Report(S)}))
+    EstimateQualities.model_validate(body)
+    assert body["sensors"]["co2"] == {
+        "fitted_at": {"sec": 5, "nanosec": 0},
+        "fit_problem": "why",
+        "graded_since": {"sec": 3, "nanosec": 7},
+        "day": {"scans": 10, "inside": 9},
+        "week": {"scans": 70, "inside": 30},
+        "share_day": 0.9,
+        "share_week": 30 / 70,
+        "is_trusted": False,
+    }
+    bare = body["sensors"]["ph"]
+    assert (bare["fitted_at"], bare["graded_since"], bare["share_day"]) == (None, None, None)
+    assert bare["is_trusted"] is None
+
+
+# --- reports of every sensor ----------------------------------------------------------------------
+
+
+HERE = Pose(1.0, 2.0, 0.5, 0.0, 0.0, 0.0, 1.0)
+
+
+def report(at_ns: int, changed: dict[str, int | None]) -> Report:
+    tags = tuple(
+        TagCheck(tag_id, 1.0, 1, 1.0, 1.0, 0.0, 0.0, since) for tag_id, since in changed.items()
+    )
+    return Report(at_ns, is_fitted=True, tags=tags)
+
+
+def snapshot(**latest: int) -> Snapshot:
+    tags = [
+        TagState(name, pose=HERE, readings=(Reading(name, 1.0, at_ns),))
+        for name, at_ns in latest.items()
+    ]
+    return Snapshot(100, "map", tuple(tags))
+
+
+def test_estimates_use_finite_readings_of_pinned_tags_and_changed_ones_are_listed() -> None:
+    tags = (
+        TagState("a", pose=HERE, readings=(Reading("co2", 1.0, 5), Reading("light", math.nan, 9))),
+        TagState("b", pose=HERE, readings=(Reading("co2", 1.0, 7),)),
+        TagState("c", readings=(Reading("co2", 1.0, 8),)),
+    )
+    assert sensors_of(Snapshot(100, "map", tags)) == ["co2"]
+    known = {"co2": report(9, {"a": None, "b": 3}), "light": report(9, {"b": 4, "c": 5})}
+    assert changed_of(known) == {"b": {"co2": 3, "light": 4}, "c": {"light": 5}}
+
+
+class Stage:
+    """The queries of a poller, and its updates."""
+
+    def __init__(self) -> None:
+        self.requested: list[str] = []
+        self.reported: list[Changed] = []
+        self.snapshot: Snapshot | None = None
+        self.answers: dict[str, Report] = {}
+        self.error: Exception = TwinUnavailableError("nobody is there")
+        self.poller = EstimatePoller(self.report_on, lambda: self.snapshot, self.reported.append)
+
+    async def report_on(self, sensor: str, snapshot: Snapshot) -> Report:
+        assert snapshot is self.snapshot
+        self.requested.append(sensor)
+        if sensor not in self.answers:
+            raise self.error
+        return self.answers[sensor]
+
+
+async def test_changes_are_passed_on_in_their_current_form() -> None:
+    stage = Stage()
+    await stage.poller.update()
+    assert stage.requested == [], "there is no state yet"
+    stage.snapshot = snapshot(co2=5, light=6)
+    stage.answers = {"co2": report(9, {"co2": None}), "light": report(4, {})}
+    await stage.poller.update()
+    assert stage.requested == ["co2", "light"]
+    assert stage.reported == [{}]
+    stage.answers["co2"] = report(9, {"co2": 5})
+    for _ in range(2):
+        await stage.poller.update()
+        assert stage.reported[-1] == {"co2": {"co2": 5}}
+    stage.snapshot = snapshot(light=6)
+    await stage.poller.update()
+    assert stage.reported[-1] == {}, "no tag has that sensor any more"
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        TwinUnavailableError("nobody is there"),
+        # A clock that went back, and a name that is too long.
+        PastRefused("at is 9 s, later than now, 8 s"),
+        FieldRefused("sensor_type has 300 characters, the limit is 256"),
+    ],
+)
+async def test_where_a_report_fails_the_last_one_holds(error: Exception) -> None:
+    stage = Stage()
+    stage.snapshot, stage.error = snapshot(co2=5, light=6), error
+    stage.answers = {"co2": report(9, {"co2": 5}), "light": report(9, {})}
+    await stage.poller.update()
+    stage.answers = {"light": report(9, {"light": 6})}
+    await stage.poller.update()
+    assert stage.reported[-1] == {"co2": {"co2": 5}, "light": {"light": 6}}
+
+
+def test_the_number_of_queried_sensors_is_limited() -> None:
+    stage = Stage()
+    names = [f"s{number:02}" for number in range(MAX_SENSORS + 1)]
+    stage.snapshot = snapshot(**dict.fromkeys(names, 1))
+    stage.answers = dict.fromkeys(names, report(9, {}))
+    asyncio.run(stage.poller.update())
+    assert stage.requested == names[:-1]
+
+
+async def test_a_failed_query_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pollers, "PERIOD_S", 0.0)
+    stage = Stage()
+    stage.snapshot = snapshot(co2=1)
+    stage.poller.start()
+    await until(lambda: len(stage.requested) > 1, "another query")
+    stage.answers = {"co2": report(9, {"co2": 1})}
+    await until(lambda: stage.reported[-1], "the answer")
+    await stage.poller.stop()

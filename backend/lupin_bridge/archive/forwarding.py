@@ -141,13 +141,13 @@ class Sink:
         if (found := self._log.execute(_EPOCH).fetchone()) is not None:
             journal_id, *numbers = found
             last = Epoch(self._site, *numbers)
-            if journal_id == source.journal_id and self._goes_on(source, last):
+            if journal_id == source.log.journal_id and self._goes_on(source, last):
                 return last
             report(f"site {self._site} has a different journal than before: all of it is forwarded")
             (runs,) = self._log.execute(_RUNS).fetchone()
             seqs = last.seq_offset + last.forwarded_seq
             epoch = Epoch(self._site, last.number + 1, seqs, runs, 0)
-        self._log.execute(_NEW_EPOCH, {**asdict(epoch), "journal": source.journal_id})
+        self._log.execute(_NEW_EPOCH, {**asdict(epoch), "journal": source.log.journal_id})
         return epoch
 
     def _goes_on(self, source: Source, last: Epoch) -> bool:
@@ -156,7 +156,7 @@ class Sink:
         seq, _, arrival_ns = last_row(self._log, last.seq_offset + last.forwarded_seq)
         # A row of an earlier journal has no such number here.
         seq = max(0, seq - last.seq_offset)
-        here, _, here_ns = source.last_row(seq)
+        here, _, here_ns = last_row(source.log, seq)
         # A row that is not in the journal was deleted there.
         return not seq or here != seq or here_ns == arrival_ns
 

@@ -22,7 +22,6 @@ from lupin_twin.journal.appending import PURGED_SEQ, Appender
 from lupin_twin.journal.follow import rows_behind
 from lupin_twin.journal.paths import files_of, forwarded_seq, note_forwarded
 from lupin_twin.journal.retention import RECORD
-from lupin_twin.journal.rows import last_row
 from lupin_twin.journal.schema import (
     DAY_LENGTH,
     MAP,
@@ -104,7 +103,7 @@ class Batch:
 
 
 class Source:
-    """An open journal, in one thread; `path` has to be a journal.
+    """An open journal, in one thread; `path` has to be a journal, `log` runs queries on it.
 
     Raises:
         Empty, Foreign, DamagedFile, sqlite3.Error, OSError: as `open_named`.
@@ -116,7 +115,7 @@ class Source:
         self._connection = open_named(path)
         # Only now, because opening makes a WAL where there is none.
         self._files = files_of(path)
-        self._log = SiteLog(self._connection)
+        self.log = SiteLog(self._connection)
         self._version = -1
         self._sent: frozenset[tuple[str, Row]] = frozenset()
         # Whether the archive may lack events of rows that it has.
@@ -125,11 +124,6 @@ class Source:
     def close(self) -> None:
         """Close the journal."""
         self._connection.close()
-
-    @property
-    def journal_id(self) -> str:
-        """The journal's id."""
-        return self._log.journal_id
 
     def is_replaced(self) -> bool:
         """Whether its path, or its WAL's, is now that of another file, or of none."""
@@ -148,12 +142,8 @@ class Source:
     def note_ids(self) -> set[str]:
         """The ids of all its notes."""
         return {
-            note_id for (note_id,) in self._log.execute("SELECT id FROM note WHERE site = :site")
+            note_id for (note_id,) in self.log.execute("SELECT id FROM note WHERE site = :site")
         }
-
-    def last_row(self, upto: int) -> tuple[int, int, int]:
-        """Number, stamp and arrival of its last row up to a number."""
-        return last_row(self._log, upto)
 
     def batch(self, epoch: Epoch) -> Batch:
         """The next batch, as of one moment, and synced to the disk.
@@ -165,14 +155,14 @@ class Source:
         after = epoch.forwarded_seq
         with one_view(self._connection):
             self._refuse_salvaged()
-            found, upto, is_all = rows_behind(self._log, after, _ROWS, every=True)
+            found, upto, is_all = rows_behind(self.log, after, _ROWS, every=True)
             found += [("meta", row) for row in self._facts(epoch)]
             since: list[tuple[int, int]] = []
             if is_all:  # rows go first, because late ones change events
                 sql = _EVERY_EVENT if self._is_behind else _EVENTS_SINCE
-                since = self._log.execute(sql, {"after": after, "upto": upto}).fetchall()
+                since = self.log.execute(sql, {"after": after, "upto": upto}).fetchall()
             for run, since_ns in since:
-                of_run = self._log.execute(_EVENTS, {"run": run, "since": since_ns})
+                of_run = self.log.execute(_EVENTS, {"run": run, "since": since_ns})
                 found += [("event", row) for row in of_run]
         self._sync()
         self._is_behind = not is_all
@@ -194,17 +184,17 @@ class Source:
 
         """
         self._refuse_salvaged()
-        if not forwarded_seq(self._path, self.journal_id):
+        if not forwarded_seq(self._path, self.log.journal_id):
             self.note(0)
 
     def note(self, seq: int) -> None:
         """Note beside the journal that its rows up to a number are in the archive."""
-        if forwarded_seq(self._path, self.journal_id) != seq:
-            note_forwarded(self._path, self.journal_id, seq)
+        if forwarded_seq(self._path, self.log.journal_id) != seq:
+            note_forwarded(self._path, self.log.journal_id, seq)
 
     def _refuse_salvaged(self) -> None:
         # Then rows come in any order.
-        if self._log.meta("salvage"):
+        if self.log.meta("salvage"):
             raise ArchiveError(f"the journal {self._path} is being saved from damage")
 
     def _facts(self, epoch: Epoch) -> Iterator[Row]:
@@ -212,9 +202,9 @@ class Source:
 
         Rows that were deleted here stay there, except those that were never forwarded.
         """
-        purged = int(self._log.meta(PURGED_SEQ) or 0)
+        purged = int(self.log.meta(PURGED_SEQ) or 0)
         of_runs = ("lost_ns", "purged_ns") if purged > epoch.forwarded_seq else ("lost_ns",)
-        for site, key, value in self._log.execute("SELECT * FROM meta WHERE site = :site"):
+        for site, key, value in self.log.execute("SELECT * FROM meta WHERE site = :site"):
             name, _, number = key.partition(":")
             if name in of_runs:
                 yield site, f"{name}:{int(number) + epoch.run_offset}", value

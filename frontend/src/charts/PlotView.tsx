@@ -229,7 +229,10 @@ export function SensorChoice({
       aria-label={S.sensors}
       value={value}
       options={choices}
-      text={(name) => shown(catalogue.named(name).label, 32)}
+      text={(name) => {
+        const { label, unit } = catalogue.named(name);
+        return [shown(label, 32), unit].filter(Boolean).join(', ');
+      }}
       onChange={onChange}
     />
   );

@@ -65,8 +65,7 @@ export function PlotView({
     >
       <header>
         <h3>
-          <span className="plot-name">{shown(model.sensor.label, 32)}</span>{' '}
-          <span className="faint">{model.sensor.unit}</span>
+          {shown(model.sensor.label, 32)} <span className="faint">{model.sensor.unit}</span>
         </h3>
         {only && <LineValue line={only} model={model} />}
         {model.isMixed && <span className="faint">{S.chartIdealsDiffer}</span>}

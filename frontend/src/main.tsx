@@ -7,6 +7,7 @@ import './styles/layout.css';
 import './styles/map.css';
 import './styles/legend.css';
 import './styles/health.css';
+import './styles/strip.css';
 import './styles/table.css';
 import './styles/table-sizes.css';
 import './styles/ages.css';

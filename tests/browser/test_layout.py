@@ -362,6 +362,9 @@ def test_every_language_has_room_on_a_phone(greenhouse: Bridge, open_page: OpenP
         expect(hmi.test_id("sample-count")).to_contain_text(contribute)
         expect(hmi.page.locator("html")).to_have_attribute("lang", language)
         assert hmi.page.evaluate(_TOO_LONG) == []
+        # "Since" shares the last line of what to do first, or has no room.
+        todo, since = places(hmi, ".health-strip .do-what strong", ".health-strip small")
+        assert since.top < todo.bottom, language
         hmi.expect_parts()
         hmi.page.locator(".menu > button").click()
         expect(hmi.test_id("language")).to_have_value(language)

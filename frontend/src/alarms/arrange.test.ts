@@ -4,7 +4,7 @@ import type { Alarm } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { cataloguesOf } from '../domain/sensors';
 import { CATALOGUE, IN_FAHRENHEIT, FILE } from '../testing/sensors';
-import { alarmsCsv, arranged, causeFacts, filtered, tagsText } from './arrange';
+import { alarmsCsv, arranged, countsText, filtered, tagsText } from './arrange';
 import { acknowledge, NO_LOCAL_ALARMS, shelve, type LocalAlarms } from './own';
 import { causesFirst, listOf } from './list';
 import type { Now } from './words';
@@ -70,39 +70,15 @@ test('of one cause, each area stands by itself, and is found by its name', () =>
   expect(filtered(list, 'south', sensors, isTag).active).toHaveLength(6);
 });
 
-test('of a cause how many are how bad, and the value farthest beyond', () => {
-  const items = listOf(
-    [
-      { ...cold(1), worst: 4.2 },
-      { ...cold(2), worst: 5.5 },
-      { ...cold(3), cleared_at: { sec: 120, nanosec: 0 }, worst: 3.1 },
-      // The lowest value, whatever its plants' limit.
-      alarm('4', { tag_id: '4', reason: { limit: 4, value: 3 }, worst: 2.9, cleared: 130 }),
-    ],
-    NO_LOCAL_ALARMS,
-    null,
-    AT,
-  );
-  const now = ({ id }: Alarm): Now | null =>
-    id === 'cold2'
-      ? { kind: 'known', value: 10.4, verdict: 'stressed', reason: null, trend: null }
-      : id === 'cold1'
-        ? { kind: 'known', value: 10.9, verdict: 'healthy', reason: null, trend: null }
-        : null;
-  expect(causeFacts([...items.active, ...items.resolved], CATALOGUE, now)).toEqual([
-    ...[
-      '1 stressed, 1 back to normal',
-      'now 10.4\u00a0°C (Tag\u00a02)',
-      'worst 2.9\u00a0°C (Tag\u00a04)',
-    ],
-  ]);
-  expect(causeFacts(items.resolved, CATALOGUE, now)).toEqual([
-    '',
-    '',
-    'worst 2.9\u00a0°C (Tag\u00a04)',
-  ]);
+test('of a cause how many are how bad', () => {
+  const items = listOf([cold(1), cold(2)], NO_LOCAL_ALARMS, null, AT);
+  const now = ({ id }: Alarm): Now => ({
+    ...{ kind: 'known', value: 10.4, reason: null, trend: null },
+    verdict: id === 'cold2' ? 'stressed' : 'healthy',
+  });
+  expect(countsText(items.active, now)).toBe('1 stressed, 1 back to normal');
   const unknown = (): Now => ({ kind: 'unknown', last: 9, lastAt: 'unknown' });
-  expect(causeFacts(items.active, CATALOGUE, unknown)[0], 'no word for all alike').toBe('');
+  expect(countsText(items.active, unknown), 'no word for all alike').toBe('');
 });
 
 test('the newest first, or by tag: in one row', () => {

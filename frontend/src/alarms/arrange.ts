@@ -9,16 +9,7 @@ import { compareIds } from '../domain/twin';
 import { toShown } from '../domain/format';
 import { S } from '../strings';
 import { causeOf, inEach, MOST_LOOSE, type AlarmList, type Item, type Wrong } from './list';
-import {
-  inOnePiece,
-  lastKnown,
-  nameText,
-  valuesOf,
-  whatText,
-  whereText,
-  worstOf,
-  type Now,
-} from './words';
+import { lastKnown, nameText, whatText, worstOf, type Now } from './words';
 
 export const ORDERS = ['cause', 'newest', 'tag'] as const;
 /** "cause" puts the worst first. */
@@ -106,52 +97,19 @@ export function tagsText(ids: readonly string[]): string {
   return S.alarmTags(named, ids.length - count);
 }
 
-/**
- * Facts about alarms that share a cause: the number per verdict now, and the most extreme value now and
- * at worst; empty: none. No counts if all have the same verdict, which the heading already shows.
- */
-export function causeFacts(
-  items: readonly Item[],
-  sensors: Catalogue,
-  nowOf: (alarm: Alarm) => Now | null,
-): readonly [counts: string, now: string, worst: string] {
-  const all = items.map(({ alarm, verdict }) => {
-    const now = nowOf(alarm);
-    const known = now?.kind === 'known' ? now : null;
-    // As in its row: an alarm without a value keeps its verdict.
-    const current = lastKnown(now)?.verdict ?? verdict;
-    return { alarm, now, verdict: current, value: known?.value ?? null };
-  });
-  const [one] = items;
-  // A cause lies on one side of the range.
-  const isBelow = one && isOfRange(one.alarm.reason) && sideOf(one.alarm.reason) === 'below';
-  const furthest = (valueOf: (each: (typeof all)[number]) => number | null) => {
-    const found = all
-      .map((each) => ({ each, value: valueOf(each) ?? NaN }))
-      .filter(({ value }) => !Number.isNaN(value))
-      .sort((a, b) => (isBelow ? a.value - b.value : b.value - a.value))[0]?.each;
-    return (
-      found && {
-        ...valuesOf(found.alarm, sensors, found.now),
-        where: inOnePiece(whereText(found.alarm)),
-      }
-    );
-  };
-  const current = furthest(({ value }) => value);
-  const worst = furthest(({ alarm, now }) => worstOf(alarm, now));
-  const active = all.filter(({ alarm }) => alarm.cleared_at === null);
+/** How many active alarms have each verdict now; empty if all have the same one. */
+export function countsText(items: readonly Item[], nowOf: (alarm: Alarm) => Now | null): string {
+  const active = items.filter(({ alarm }) => alarm.cleared_at === null);
+  // As in its row: an alarm without a value keeps its verdict.
+  const verdicts = active.map(({ alarm, verdict }) => lastKnown(nowOf(alarm))?.verdict ?? verdict);
   const counts = VERDICTS.flatMap((verdict) => {
-    const count = active.filter((each) => each.verdict === verdict).length;
+    const count = verdicts.filter((each) => each === verdict).length;
     if (count === 0) return [];
     const word =
       verdict === 'healthy' ? S.alarmBack : (count === 1 ? S.health : S.healthMany)[verdict];
     return [`${count} ${word.toLowerCase()}`];
   });
-  return [
-    counts.length > 1 ? counts.join(', ') : '',
-    current?.now ? `${current.now} (${current.where})` : '',
-    worst?.worst ? `${worst.worst} (${worst.where})` : '',
-  ];
+  return counts.length > 1 ? counts.join(', ') : '';
 }
 
 const iso = (at: WireTime | null): string | null =>

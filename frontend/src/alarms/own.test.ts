@@ -91,7 +91,7 @@ test('a critical alarm is shelved for an hour at most, whatever is stored', () =
   const shelf = { verdict: 'critical', until: AT + 3_600_000, reason: 'x' } as const;
   expect(isShelfHeld(shelf, 'critical', AT)).toBe(true);
   expect(isShelfHeld(shelf, 'critical', AT - 1)).toBe(false);
-  const text = JSON.stringify({ shelved: [['a', 'critical', AT + 28_800_000, 'x']] });
+  const text = JSON.stringify({ shelved: [['a', { ...shelf, until: AT + 28_800_000 }]] });
   expect(pruned(readStored({ getItem: () => text }), new Set(), AT).shelved.size).toBe(0);
 });
 

@@ -123,49 +123,36 @@ export const nextEnd = (local: LocalAlarms, at: number): number =>
   Math.min(...[...local.shelved.values()].map(({ until }) => until).filter((until) => until > at));
 
 const KEY = 'lupin-twin.alarms';
+
+/** Maps as their entries. */
+interface Stored extends Pick<LocalAlarms, 'sound' | 'notify'> {
+  readonly acknowledged: readonly (readonly [id: string, Acknowledgement])[];
+  readonly shelved: readonly (readonly [what: string, Shelf])[];
+}
+
 /** Reads the stored state; a damaged one counts as empty. */
 export function readStored(storage: Pick<Storage, 'getItem'>): LocalAlarms {
   try {
-    const {
-      acknowledged = [],
-      shelved = [],
-      sound = false,
-      notify = false,
-    } = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<StoredRows>;
+    const stored = JSON.parse(storage.getItem(KEY) ?? '{}') as Partial<Stored>;
     return {
-      acknowledged: new Map(acknowledged.map(([id, verdict, at]) => [id, { verdict, at }])),
-      shelved: new Map(
-        shelved.map(([what, verdict, until, reason = '']) => [what, { verdict, until, reason }]),
-      ),
-      ...{ sound, notify },
+      ...NO_LOCAL_ALARMS,
+      ...stored,
+      acknowledged: new Map(stored.acknowledged),
+      shelved: new Map(stored.shelved),
     };
   } catch {
     return NO_LOCAL_ALARMS;
   }
 }
 
-/** Stored form of `LocalAlarms`. */
-interface StoredRows {
-  readonly acknowledged: readonly (readonly [id: string, Verdict, at: number])[];
-  readonly shelved: readonly (readonly [what: string, Verdict, until: number, reason?: string])[];
-  readonly sound: boolean;
-  readonly notify: boolean;
-}
-
 export function writeStored(storage: Pick<Storage, 'setItem'>, local: LocalAlarms): void {
-  const { sound, notify } = local;
-  const rows: StoredRows = {
-    acknowledged: [...local.acknowledged].map(([id, { verdict, at }]) => [id, verdict, at]),
-    shelved: [...local.shelved].map(([what, { verdict, until, reason }]) => [
-      what,
-      verdict,
-      until,
-      reason,
-    ]),
-    ...{ sound, notify },
+  const stored: Stored = {
+    ...local,
+    acknowledged: [...local.acknowledged],
+    shelved: [...local.shelved],
   };
   try {
-    storage.setItem(KEY, JSON.stringify(rows));
+    storage.setItem(KEY, JSON.stringify(stored));
   } catch {
     // Storage is full or blocked: the state then lasts as long as the page.
   }

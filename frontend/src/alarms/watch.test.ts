@@ -166,7 +166,7 @@ test('what another tab of the browser has acknowledged is so here', () => {
   reportAlarms(alarm('a'));
   stored.set(
     'lupin-twin.alarms',
-    JSON.stringify({ acknowledged: [['a', 'critical', Date.now()]] }),
+    JSON.stringify({ acknowledged: [['a', { verdict: 'critical', at: Date.now() }]] }),
   );
   window.dispatchEvent(new StorageEvent('storage', { key: 'lupin-twin.alarms' }));
   expect(ids()).toEqual([]);

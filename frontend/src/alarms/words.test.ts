@@ -141,7 +141,7 @@ test('of a pest how many: now, at worst and at first', () => {
 test('since when and until when: of today the time alone, to the minute', () => {
   const since = alarm('a', { raised: NOON });
   expect(spanText(since, NOON + 1_500)).toBe('since 12:00 (25\u00a0min)');
-  expect(spanText(since, NOON + 86_400)).toBe('since 14 Nov, 12:00 (1\u00a0d\u00a00\u00a0h)');
+  expect(spanText(since, NOON + 86_400)).toBe('since 14 Nov, 12:00 (1\u00a0d)');
   expect(spanText(since, null)).toBe('since 14 Nov, 12:00');
   // The clock was set back since.
   expect(spanText(since, NOON - 60)).toBe('since 12:00');
@@ -156,7 +156,7 @@ test('since when and until when: of today the time alone, to the minute', () => 
 test('a row says since when, for how long only if it began today, and the end once it is resolved', () => {
   const since = alarm('a', { raised: NOON });
   const text = (nowS: number | null): string => timesOf(since, nowS, false).text;
-  expect(text(NOON + 7_500)).toBe('since 12:00 (2\u00a0h)');
+  expect(text(NOON + 7_500)).toBe('since 12:00 (2\u00a0h\u00a05\u00a0min)');
   expect(text(NOON + 86_400)).toBe('since 14 Nov, 12:00');
   expect(text(null)).toBe('since 14 Nov, 12:00');
   expect(text(NOON - 60)).toBe('since 12:00');

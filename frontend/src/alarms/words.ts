@@ -1,7 +1,7 @@
 /** An alarm in words: what, where, value now and at worst, since when, until when. Pure. */
 import type { Alarm, HealthReason, Verdict } from '../contract/types';
 import { isOldReading, trendOf, type TagThen } from '../domain/difference';
-import { ageText, beyondLimitText, minuteText, readingText, shortAgeText } from '../domain/format';
+import { ageText, beyondLimitText, minuteText, readingText } from '../domain/format';
 import { beyondText, isOfRange, reasonText, sideOf, todoText } from '../domain/health';
 import type { Catalogue } from '../domain/sensors';
 import { shown } from '../domain/text';
@@ -124,7 +124,7 @@ export function spanText({ raised_at, cleared_at }: Alarm, nowS: number | null):
   return S.alarmUntil(begin, end, lengthText(until - from));
 }
 
-/** Since when, and if that is today, for how long in short; with `isOver`, how long it was and when it ended. */
+/** Since when, and if that is today, for how long; with `isOver`, how long it was and when it ended. */
 export function timesOf(
   { raised_at, cleared_at }: Alarm,
   nowS: number | null,
@@ -137,7 +137,7 @@ export function timesOf(
     return { text: lengthText(length), note: `${S.alarmResolved} ${whenText(until, nowS)}` };
   }
   const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? from);
-  const short = length === null || !isOfToday ? null : shortAgeText(length);
+  const short = length === null || !isOfToday ? null : lengthText(length);
   return { text: S.alarmSince(whenText(from, nowS), short), note: '' };
 }
 

@@ -12,7 +12,7 @@ import { selectCatalogue, selectSensor } from '../store/derived';
 import { rosNow, selectTags } from '../store/moment';
 import { type Charted, MOST_CHARTED, withChart, withTag } from '../store/view';
 import { S } from '../strings';
-import { Icon, IconButton, Segmented, Select, useFocusBack } from '../widgets/controls';
+import { Icon, IconButton, Select, useFocusBack } from '../widgets/controls';
 import { useSize } from '../widgets/useSize';
 import { ChartTables } from './SeriesTable';
 import { ChartState, LineSign, LineValue, MarksKey, PlotView, SensorChoice } from './PlotView';
@@ -76,24 +76,13 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
       data-testid="chart-view"
     >
       <header>
-        {/* To the eye, the choice says it; on paper there is none. */}
+        {/* To the eye, the menu says it; on paper there is none. */}
         <h2 className="unseen">
           <bdi>{charted.by === 'tag' ? tagLabel(tagId) : S.charts}</bdi>
         </h2>
-        <Segmented
-          legend={S.chartsByLegend}
-          value={charted.by}
-          options={[
-            { value: 'tag', label: <bdi>{tagLabel(tagId)}</bdi> },
-            { value: 'sensor', label: S.chartsSeveral },
-          ]}
-          onChange={(by) => {
-            act(withChart({ by, tagIds: charted.tagIds }));
-          }}
-        />
         {charted.by === 'tag' && (
           <Select
-            aria-label={S.tags}
+            aria-label={S.columns.tag}
             value={tagId}
             options={tagIds}
             text={tagLabel}
@@ -102,6 +91,17 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
             }}
           />
         )}
+        <button
+          type="button"
+          className="text-button"
+          aria-pressed={charted.by === 'sensor'}
+          onClick={() => {
+            const by = charted.by === 'tag' ? 'sensor' : 'tag';
+            act(withChart({ by, tagIds: charted.tagIds }));
+          }}
+        >
+          {S.chartsSeveral}
+        </button>
         <div className="chart-tools">
           <IconButton
             icon="later"

@@ -21,7 +21,7 @@ test.each([
 });
 
 test('of a moment it counts what there was by then', () => {
-  expect(said('temperature_24h_mean', 4_680, 98_920)).toMatch(/; 1\u00a0h 0\u00a0min so far$/);
+  expect(said('temperature_24h_mean', 4_680, 98_920)).toMatch(/; 1\u00a0h so far$/);
 });
 
 test('with a value it says that', () => {
@@ -96,7 +96,7 @@ beforeEach(() => {
 test('a tag’s sensors can be chosen, and what is computed of them', () => {
   const onChange = vi.fn();
   render(<SensorChoice tagId="1" value="light" onChange={onChange} />);
-  expect(choices()).toEqual(['Light', 'ph', 'Daily light integral']);
+  expect(choices()).toEqual(['Light, lx', 'ph', 'Daily light integral, mol/m²/d']);
   fireEvent.change(screen.getByLabelText('Sensor'), { target: { value: 'daily_light_integral' } });
   expect(onChange).toHaveBeenCalledWith('daily_light_integral');
 });
@@ -104,9 +104,9 @@ test('a tag’s sensors can be chosen, and what is computed of them', () => {
 test('what takes two sensors needs both', () => {
   render(<SensorChoice tagId="2" value="temperature" onChange={vi.fn()} />);
   expect(choices()).toEqual([
-    ...['Temperature', 'Humidity', 'Vapour pressure deficit', 'Dew point', 'Dew margin'],
-    ...['24-h mean temperature', 'Night minimum', 'Day-night difference (DIF)'],
-    'Growing degree days',
+    ...['Temperature, °C', 'Humidity, %', 'Vapour pressure deficit, kPa', 'Dew point, °C'],
+    ...['Dew margin, K', '24-h mean temperature, °C', 'Night minimum, °C'],
+    ...['Day-night difference (DIF), K', 'Growing degree days, °C·d'],
   ]);
 });
 

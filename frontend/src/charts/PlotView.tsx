@@ -65,8 +65,7 @@ export function PlotView({
     >
       <header>
         <h3>
-          <span className="plot-name">{shown(model.sensor.label, 32)}</span>{' '}
-          <span className="faint">{model.sensor.unit}</span>
+          {shown(model.sensor.label, 32)} <span className="faint">{model.sensor.unit}</span>
         </h3>
         {only && <LineValue line={only} model={model} />}
         {model.isMixed && <span className="faint">{S.chartIdealsDiffer}</span>}
@@ -229,7 +228,10 @@ export function SensorChoice({
       aria-label={S.sensors}
       value={value}
       options={choices}
-      text={(name) => shown(catalogue.named(name).label, 32)}
+      text={(name) => {
+        const { label, unit } = catalogue.named(name);
+        return [shown(label, 32), unit].filter(Boolean).join(', ');
+      }}
       onChange={onChange}
     />
   );

@@ -214,9 +214,11 @@ describe('attempts', () => {
 
   test('a connection that sends what cannot be used is replaced', () => {
     const broken = step(live, { type: 'broken', now: 9_000 });
-    expect(broken.command).toBe('drop');
+    expect(broken.command).toBe('reopen');
     expect(phaseOf(broken.connection, 9_001)).toBe('reconnecting');
-    expect(nextDeadline(broken.connection, 9_000)).toBe(9_500);
+    const atOnce = step(live, { type: 'broken', now: 100 });
+    expect(atOnce.command).toBe('drop');
+    expect(nextDeadline(atOnce.connection, 100)).toBe(600);
   });
 
   test('each connection is an epoch of its own', () => {

@@ -45,7 +45,7 @@ export type ConnectionEvent =
 /**
  * - start: make a new connection in any state; after a lapse, the old one may deliver old frames
  * - received: a frame other than status and state, which only shows that the bridge is alive
- * - broken: an unusable frame; later deltas would build on it
+ * - broken: an unusable frame, or a delta that does not fit: later deltas would build on it
  * - wake: the tab became visible, or the operator wants to retry now
  * - online: the network is back; restart a running attempt, which began without it
  * - tick: a deadline of `nextDeadline` may have passed
@@ -98,9 +98,11 @@ export function step(
       if (socket.kind === 'closed') return stay(connection);
       return stay(fail(connection, now, event.code, random));
     case 'broken':
-      return socket.kind === 'open'
-        ? stay(fail(connection, now, null, random), 'drop')
-        : stay(connection);
+      if (socket.kind !== 'open') return stay(connection);
+      // A new connection begins with the whole state: at once, unless the last one broke as well.
+      return isProven(socket, now)
+        ? open(connection, now)
+        : stay(fail(connection, now, null, random), 'drop');
     case 'online':
       return socket.kind === 'opening'
         ? open(connection, now)
@@ -138,11 +140,13 @@ function fail(
   random: number,
 ): Connection {
   const { socket } = connection;
-  const proven = socket.kind === 'open' && now - socket.since >= PROVEN_MS;
-  const failures = proven ? 1 : connection.failures + 1;
+  const failures = isProven(socket, now) ? 1 : connection.failures + 1;
   const retryAt = now + backoffMs(failures, random, closeCode);
   return { ...connection, failures, socket: { kind: 'closed', retryAt } };
 }
+
+const isProven = (socket: Socket, now: number): boolean =>
+  socket.kind === 'open' && now - socket.since >= PROVEN_MS;
 
 const silence = (socket: Socket & { kind: 'open' }, now: number): number =>
   now - (socket.lastFrameAt ?? socket.since);

@@ -79,8 +79,9 @@ export function connect(url: string, handlers: ConnectionHandlers) {
       const parsed = parseFrame(data);
       if (parsed.kind === 'passed over') return;
       if (parsed.kind === 'bad') {
-        // A lost delta shows in the next one, which does not fit (`latestAfter`).
+        // It may have been a delta.
         handlers.onBad(parsed.why);
+        send({ type: 'broken', now: at });
         return;
       }
       const { frame } = parsed;

@@ -1,10 +1,11 @@
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
+import type { OccupancyGrid } from './types';
 import { npyEstimate, npy as npyGrid } from '../testing/field';
 import { answer, fetchEstimate, fetchHistory, npyOf, Refusal, route, stateSocketUrl } from './api';
 
 const { signal } = new AbortController();
-const fetchMap = (): Promise<object> => answer(signal, 'api/map');
+const fetchMap = (): Promise<object> => answer<OccupancyGrid>(signal, 'api/map', ['info']);
 
 beforeEach(() => {
   document.head.innerHTML = '';
@@ -15,6 +16,13 @@ describe('addresses', () => {
     document.head.innerHTML = '<base href="https://farm.example/house-3/#x">';
     expect(route('api/map').href).toBe('https://farm.example/house-3/api/map');
     expect(stateSocketUrl()).toBe('wss://farm.example/house-3/ws/state?delta=1');
+  });
+
+  test('an answer of another shape is refused by its address and what it lacks', async () => {
+    vi.stubGlobal('fetch', () => Promise.resolve(Response.json({ sensors: [] })));
+    await expect(fetchHistory('5', signal)).rejects.toThrow(
+      'api/tags/5/history: the answer has no "tries"',
+    );
   });
 
   test('a tag’s id is written so that it stays one part of the path', async () => {

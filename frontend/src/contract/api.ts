@@ -41,9 +41,21 @@ export const momentParameter = (at: number): string => Math.max(0, at).toFixed(3
 export const get = (path: string, signal: AbortSignal): Promise<Response> =>
   request(path, { signal, cache: 'no-cache' });
 
-/** An answer in JSON. The server's tests compare its answers with the schemas that its types here are from. */
-export const answer = async <T>(signal: AbortSignal, path: string, query?: Query): Promise<T> =>
-  bodyOf<T>(await get(query ? withQuery(path, query) : path, signal));
+/**
+ * An answer in JSON. The server's tests compare its answers with the schemas that its types here are from.
+ * One without a part that the page `needs`, from another server, fails here and not where it is shown.
+ */
+export async function answer<T extends object>(
+  signal: AbortSignal,
+  path: string,
+  needs: readonly (keyof T & string)[],
+  query?: Query,
+): Promise<T> {
+  const body = await bodyOf<T>(await get(query ? withQuery(path, query) : path, signal));
+  const lacking = needs.find((part) => body[part] === undefined);
+  if (lacking !== undefined) throw new Error(`${path}: the answer has no "${lacking}"`);
+  return body;
+}
 
 /** A refusal is thrown with its reason. */
 export async function request(path: string, init: RequestInit): Promise<Response> {
@@ -142,10 +154,10 @@ export const fetchQuality = (
   signal: AbortSignal,
   at?: number,
 ): Promise<FieldQuality> =>
-  answer(signal, 'api/field/quality', { sensor_type: sensor, at: at?.toFixed(3) });
+  answer(signal, 'api/field/quality', ['rmse'], { sensor_type: sensor, at: at?.toFixed(3) });
 
 export const fetchHistory = (tagId: string, signal: AbortSignal): Promise<TagHistory> =>
-  answer(signal, `api/tags/${encodeURIComponent(tagId)}/history`);
+  answer(signal, `api/tags/${encodeURIComponent(tagId)}/history`, ['sensors', 'tries']);
 
 /**
  * Numbers in the given dimensions, row-major, in the one NPY format that the bridge sends: version 1,

@@ -16,7 +16,7 @@ export async function fetchStateAt(at: number, signal: AbortSignal): Promise<Lat
       isWhole = holdsAll(it, at);
       return bodyOf<Schemas['TwinState']>(it);
     }),
-    answer<Schemas['Judgement']>(signal, 'api/health', query),
+    answer<Schemas['Judgement']>(signal, 'api/health', ['house', 'tags'], query),
   ]);
   const { sec, nanosec } = state.header.stamp;
   return {
@@ -48,7 +48,7 @@ export const fetchTimeline = (
   signal: AbortSignal,
   tagId?: string,
 ): Promise<Timeline> =>
-  answer(signal, 'api/timeline', {
+  answer(signal, 'api/timeline', ['buckets', 'silences', 'runs'], {
     points,
     from: span ? momentParameter(span.from) : undefined,
     to: span ? momentParameter(span.to) : undefined,
@@ -78,7 +78,7 @@ export const fetchSeries = (
   points: number,
   signal: AbortSignal,
 ): Promise<History> =>
-  answer(signal, 'api/history', {
+  answer(signal, 'api/history', ['readings', 'buckets', 'gaps'], {
     ...parameters(query),
     points: Math.min(MAX_POINTS, points),
   });

@@ -6,7 +6,7 @@ import type { Note, Notes, Session } from './types';
 const OWN = { 'X-Lupin-Twin': '1' };
 
 export const fetchSession = (signal: AbortSignal): Promise<Session> =>
-  answer(signal, 'api/session');
+  answer(signal, 'api/session', ['can_write_notes']);
 
 /** Ends the session and its open sockets. */
 export async function signOut(): Promise<void> {
@@ -34,14 +34,14 @@ export const postPush = (body: PushSubscriptionJSON): Promise<void> => post('api
 /** Withdraws the current note on a subject, if there is one. */
 export async function withdrawNote(kind: Draft['kind'], subject: string): Promise<void> {
   const { signal } = new AbortController();
-  const { notes } = await answer<Notes>(signal, 'api/notes', { subject });
+  const { notes } = await answer<Notes>(signal, 'api/notes', ['notes'], { subject });
   const note = notes.find((each) => each.kind === kind && each.withdrawn_by === null);
   if (note) await withdrawComment(note.id);
 }
 
 /** The latest first, including withdrawn ones. */
 export const fetchNotes = async (signal: AbortSignal): Promise<readonly Note[]> =>
-  (await answer<Notes>(signal, 'api/notes')).notes;
+  (await answer<Notes>(signal, 'api/notes', ['notes'])).notes;
 
 export async function withdrawComment(id: string): Promise<void> {
   await request(`api/notes/${encodeURIComponent(id)}`, { method: 'DELETE', headers: OWN });

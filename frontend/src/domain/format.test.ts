@@ -42,7 +42,8 @@ test.each([
   [59.9, '59\u00a0s'],
   [60, '1\u00a0min'],
   [3599, '59\u00a0min'],
-  [3600, '1\u00a0h 0\u00a0min'],
+  [3600, '1\u00a0h'],
+  [5_100, '1\u00a0h 25\u00a0min'],
   [90_061, '1\u00a0d 1\u00a0h'],
 ])('%d s is %s old', (seconds, text) => {
   expect(ageText(seconds)).toBe(text);

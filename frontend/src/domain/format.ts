@@ -65,15 +65,18 @@ export function rangeText(sensor: Sensor, range: Span | null): string {
   return S.valueRange(valueText(sensor, range[0]), readingText(sensor, range[1]));
 }
 
-/** An age in at most its two largest units. */
+/** A length of time in at most its two largest units; a second one of 0 is left out. */
 export function ageText(seconds: number): string {
   const s = Math.floor(seconds);
   if (s < 60) return `${s}\u00a0s`;
   const minutes = Math.floor(s / 60);
   if (minutes < 60) return `${minutes}\u00a0min`;
   const hours = Math.floor(minutes / 60);
-  if (hours < 24) return `${hours}\u00a0${S.hours} ${minutes % 60}\u00a0min`;
-  return `${Math.floor(hours / 24)}\u00a0d ${hours % 24}\u00a0${S.hours}`;
+  const [most, rest] =
+    hours < 24
+      ? [`${hours}\u00a0${S.hours}`, `${minutes % 60}\u00a0min`]
+      : [`${Math.floor(hours / 24)}\u00a0d`, `${hours % 24}\u00a0${S.hours}`];
+  return rest.startsWith('0') ? most : `${most} ${rest}`;
 }
 
 /** An interval between repeated events: exact if short. */
@@ -81,12 +84,8 @@ export function intervalText(seconds: number): string {
   if (seconds < 10) return `${written(seconds.toFixed(1))}\u00a0s`;
   const s = Math.round(seconds);
   if (s >= 60 && s < 600 && s % 60 > 0) return `${Math.floor(s / 60)}\u00a0min ${s % 60}\u00a0s`;
-  return durationText(s);
+  return ageText(s);
 }
-
-/** Like an age, but without a second unit of 0. */
-export const durationText = (seconds: number): string =>
-  ageText(seconds).replace(/\u00a0([hud]) 0\u00a0\w+$/, '\u00a0$1');
 
 /** An age in its largest unit alone, for a narrow column. */
 export function shortAgeText(seconds: number): string {

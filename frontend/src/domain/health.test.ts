@@ -189,7 +189,7 @@ describe('a reason in words', () => {
     [
       { ...old, limit: 86_400, sensor: 'soil_moisture' },
       90_000,
-      `Soil moisture: no reading for 1${NBSP}d (readings are valid for 1${NBSP}d)`,
+      `Soil moisture: no reading for 1${NBSP}d 1${NBSP}h (readings are valid for 1${NBSP}d)`,
     ],
     [{ ...old, limit: 600 }, null, `Not scanned recently (readings are valid for 10${NBSP}min)`],
     [

@@ -1,7 +1,7 @@
 /** Presents the bridge's verdicts. Nothing is judged here: no rule, no range. */
 import type { HealthReason, Judgement, TagHealth, Verdict } from '../contract/types';
 import { S } from '../strings';
-import { beyondLimitText, durationText, readingText, shortAgeText, valueText } from './format';
+import { ageText, beyondLimitText, readingText, valueText } from './format';
 import type { Shared } from './memo';
 import type { Catalogue } from './sensors';
 import { shown } from './text';
@@ -128,7 +128,7 @@ export function reasonText(
   const sensor = sensors.named(name);
   const label = name === '' ? '' : shown(sensor.label, LONGEST_NAME);
   const R = S.reasons;
-  const ago = age === null ? '' : ` (${S.agoSuffix(shortAgeText(age))})`;
+  const ago = age === null ? '' : ` (${S.agoSuffix(ageText(age))})`;
   if (isOfRange(reason)) {
     const edge = reason.release ?? reason.limit;
     const reading = beyondLimitText(sensor, reason.value, edge);
@@ -152,15 +152,15 @@ export function reasonText(
     case 'scan_failed':
       return R.scanFailed(
         S.attemptOutcomes[attemptOutcome(value ?? NaN)],
-        age === null ? null : shortAgeText(age),
+        age === null ? null : ageText(age),
       );
     case 'pest':
       return R.pest(value ?? 0);
     case 'old':
       return R.old(
         label,
-        age === null ? null : shortAgeText(age),
-        limit === null ? null : durationText(limit),
+        age === null ? null : ageText(age),
+        limit === null ? null : ageText(limit),
         reason.since !== null,
       );
     case 'silent':

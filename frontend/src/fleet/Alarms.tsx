@@ -38,7 +38,12 @@ export default function Alarms({ shown }: { shown: readonly Site[] }): JSX.Eleme
   const path = names === '' ? 'api/alarms' : `api/alarms?sites=${names}`;
   // Refetch when a count changes.
   const news = shown.map((site) => `${site.site} ${site.active_alarms ?? 0}`).join();
-  const { value, message } = useAnswer<{ alarms: readonly SiteAlarm[] }>(path, EVERY_MS, news);
+  const { value, message } = useAnswer<{ alarms: readonly SiteAlarm[] }>(
+    path,
+    ['alarms'],
+    EVERY_MS,
+    news,
+  );
   const rows = useMemo(() => {
     const sites = new Set(shown.map(({ site }) => site));
     return value?.alarms.filter(({ site }) => sites.has(site)) ?? [];

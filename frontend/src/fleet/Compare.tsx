@@ -41,7 +41,7 @@ export default function Compare({ shown }: { shown: readonly Site[] }): JSX.Elem
   const hour = Math.floor(timeOfDay() / 3_600_000) * 3600;
   const { from } = periodSpan({ kind: period }, hour, null);
   const path = `api/compare?sensor_type=${encodeURIComponent(name)}&from=${from}&sites=${sites.join(',')}`;
-  const { value: found, message } = useAnswer<Compared>(path, EVERY_MS);
+  const { value: found, message } = useAnswer<Compared>(path, ['sites', 'median'], EVERY_MS);
   const drawn = useMemo(
     () => picked ?? found?.sites.slice(0, DRAWN).map(({ site }) => site) ?? [],
     [picked, found],

@@ -39,7 +39,7 @@ export default function Report({ shown }: { shown: readonly Site[] }): JSX.Eleme
   const { value, message } = useAnswer<{
     sites: readonly SiteReport[];
     notes: readonly SiteNote[];
-  }>(path, EVERY_MS);
+  }>(path, ['sites', 'notes'], EVERY_MS);
   const found = new Map(value?.sites.map((each) => [each.site, each]));
   const sites = new Set(shown.map(({ site }) => site));
   const notes = value?.notes.filter(({ site }) => sites.has(site)) ?? [];

@@ -13,7 +13,12 @@ import { useTicking } from '../widgets/useNow';
 const SETTLE_MS = 300;
 
 /** Fetches at once, when `path` or `news` changes, and at an interval, ms; the last answer stays. */
-export function useAnswer<T>(path: string, everyMs: number, news = ''): Fetched<T> {
+export function useAnswer<T extends object>(
+  path: string,
+  needs: readonly (keyof T & string)[],
+  everyMs: number,
+  news = '',
+): Fetched<T> {
   const turn = useTicking((at) =>
     document.visibilityState === 'visible' ? String(Math.floor(at / everyMs)) : null,
   );
@@ -25,7 +30,7 @@ export function useAnswer<T>(path: string, everyMs: number, news = ''): Fetched<
           group: path,
           run: async (signal) => {
             await pause(SETTLE_MS);
-            return answer<T>(signal, path);
+            return answer<T>(signal, path, needs);
           },
         },
     SETTLE_MS,
@@ -36,7 +41,11 @@ const EVERY_MS = 600_000;
 
 /** Names and formats of readings: the sensors in force, in the reader's unit. */
 export function useSensors(): Catalogue {
-  const file = useAnswer<SensorsFile>('api/sensors', EVERY_MS).value;
+  const file = useAnswer<SensorsFile>(
+    'api/sensors',
+    ['ramp', 'fallback', 'sensors'],
+    EVERY_MS,
+  ).value;
   return useMemo(
     () => (file ? cataloguesOf(file, readSettings(openStorage()).unit) : NO_CATALOGUES).day,
     [file],

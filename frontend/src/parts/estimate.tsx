@@ -19,7 +19,7 @@ import {
   metresText,
   numberText,
   percentText,
-  shortAgeText,
+  ageText,
   valueText,
   withUnit,
 } from '../domain/format';
@@ -45,7 +45,8 @@ export function EstimateFacts(): JSX.Element {
   const isNow = useApp((state) => selectShown(state).moment === null);
   const isError = useApp((state) => state.view.heat === 'error');
   const hasTags = useApp((state) => selectTags(state).length > 0);
-  const graded = useEstimateQuery<Schemas['EstimateQualities']>('quality').value?.sensors ?? {};
+  const graded =
+    useEstimateQuery<Schemas['EstimateQualities']>('quality', 'sensors').value?.sensors ?? {};
   const grade = Object.hasOwn(graded, sensor.name) ? (graded[sensor.name] ?? null) : null;
   if (!isMeasured(sensor)) {
     return (
@@ -133,7 +134,7 @@ export function EstimateReadout({
   const { count, oldest } = nearTo(point, tags, sensor.name, health);
   const age = useTicking((now) => {
     const seconds = ageSeconds(oldest, now, ageing);
-    return seconds === null ? null : shortAgeText(seconds);
+    return seconds === null ? null : ageText(seconds);
   });
   const sd = field.sureness?.sd[cellAt(field, point) ?? -1] ?? NaN;
   const text =
@@ -217,7 +218,7 @@ export function CardEstimate({
   const catalogue = useApp(selectCatalogue);
   // Expected values exist for now only.
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const expected = useEstimateQuery<ExpectedTags>('tags').value?.tags ?? {};
+  const expected = useEstimateQuery<ExpectedTags>('tags', 'tags').value?.tags ?? {};
   const own = isNow && Object.hasOwn(expected, tag.id) ? expected[tag.id] : undefined;
   const changed = new Set(
     (health?.reasons ?? []).filter(({ kind }) => kind === 'changed').map((each) => each.sensor),
@@ -250,7 +251,7 @@ const PLACES = 5;
 /** Where another tag would help: numbers on the map, a list for screen readers. */
 export function AdviceMarks(): JSX.Element {
   const isNow = useApp((state) => selectShown(state).moment === null);
-  const { value, state, message } = useEstimateQuery<Advice>('advice', PLACES);
+  const { value, state, message } = useEstimateQuery<Advice>('advice', 'places', PLACES);
   if (!isNow) return <Note text={E.adviceNow} />;
   if (!value) {
     return <Note text={state === 'failed' ? E.adviceFailed(shown(message, 160)) : ''} />;
@@ -319,7 +320,11 @@ const EVERY_MS = 10_000;
  * The bridge's answer about the shown sensor, polled over HTTP while connected, one request at a time.
  * The answer about another sensor is dropped.
  */
-function useEstimateQuery<T>(what: string, places?: number): Fetched<T> {
+function useEstimateQuery<T extends object>(
+  what: string,
+  needs: keyof T & string,
+  places?: number,
+): Fetched<T> {
   const sensor = useApp((state) => state.view.sensor);
   const isOpen = useApp((state) => state.twin.connection.socket.kind === 'open');
   const turn = useTicking((at) => String(Math.floor(at / EVERY_MS)));
@@ -332,7 +337,7 @@ function useEstimateQuery<T>(what: string, places?: number): Fetched<T> {
             const query = { sensor_type: sensor, places };
             return {
               of: sensor,
-              result: await answer(signal, `api/estimate/${what}`, query),
+              result: await answer<T>(signal, `api/estimate/${what}`, [needs], query),
             };
           },
         }

@@ -194,7 +194,7 @@ function useTrail(): readonly TrailPoint[] {
       },
       ({ twin }) =>
         twin.connection.socket.kind === 'open'
-          ? { key: 'robot', run: (signal) => answer(signal, 'api/robot') }
+          ? { key: 'robot', run: (signal) => answer(signal, 'api/robot', ['trail']) }
           : null,
     );
     const unsubscribe = robotFrame.subscribe(() => {

@@ -126,9 +126,12 @@ test('a bad message is told of for a minute after the last one', () => {
     }
   };
   FakeSocket.last.onmessage?.({ data: 'null' });
+  vi.advanceTimersByTime(500);
+  FakeSocket.last.onopen?.();
   pass(50);
   expect(unread()).toBe(1);
   FakeSocket.last.onmessage?.({ data: 'null' });
+  FakeSocket.last.onopen?.();
   pass(59);
   expect(unread()).toBe(2);
   pass(1);

@@ -141,7 +141,7 @@ export function startSensors(): () => void {
       // The first connection opens during this fetch, and to the same bridge.
       key: String(Math.max(1, connection.epoch)),
       group: 'sensors',
-      run: (signal) => answer(signal, 'api/sensors'),
+      run: (signal) => answer(signal, 'api/sensors', ['ramp', 'fallback', 'sensors']),
     }),
   );
 }
@@ -152,7 +152,7 @@ export function startSensors(): () => void {
  */
 async function loadMap(signal: AbortSignal): Promise<MapPicture> {
   const [grid, blob] = await Promise.all([
-    answer<OccupancyGrid>(signal, 'api/map'),
+    answer<OccupancyGrid>(signal, 'api/map', ['info']),
     get('api/map.png', signal).then((response) => response.blob()),
   ]);
   const bitmap = await createImageBitmap(blob);

@@ -188,7 +188,7 @@ describe('card', () => {
     render(<TagCard tagId="7" />);
     const own = (sensor: string): HTMLElement | null =>
       screen.getByTestId('tag-card').querySelector(`[data-sensor=${sensor}]`);
-    expect(own('temperature')?.textContent).toContain('2\u00a0h 0\u00a0min');
+    expect(own('temperature')?.textContent).toContain('2\u00a0h');
     expect(own('temperature')?.dataset['age']).toBe('old');
     expect(own('co2')?.textContent).toContain('unknown');
     expect(screen.getByTestId('tag-card').textContent).toContain('Flowers inspected');

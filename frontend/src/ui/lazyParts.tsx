@@ -2,7 +2,7 @@
 import { createElement, lazy, Suspense, type ComponentType, type JSX } from 'react';
 
 import type * as EstimateParts from '../parts/estimate';
-import { S } from '../strings';
+import { ErrorBoundary, PartMissing } from './ErrorBoundary';
 
 /** A lazy component; if it cannot be loaded, it says so and the rest of the page keeps working. */
 export function lazyPart<Props extends object>(
@@ -12,19 +12,17 @@ export function lazyPart<Props extends object>(
     try {
       return { default: await load() };
     } catch {
-      return { default: Missing };
+      return { default: () => <PartMissing /> };
     }
   });
   return function LazyPart(props: Props): JSX.Element {
-    return <Suspense>{createElement(Part as ComponentType<Props>, props)}</Suspense>;
+    return (
+      <ErrorBoundary isPart>
+        <Suspense>{createElement(Part as ComponentType<Props>, props)}</Suspense>
+      </ErrorBoundary>
+    );
   };
 }
-
-const Missing = (): JSX.Element => (
-  <span className="part-missing" role="status">
-    {S.partMissing}
-  </span>
-);
 
 const parts = (): Promise<typeof EstimateParts> => import('../parts/estimate');
 

@@ -4,6 +4,7 @@ import type { JSX } from 'react';
 import { pause } from '../clock';
 import { createStore, useSelected } from '../store/create';
 import type * as everyPart from './deferred';
+import { ErrorBoundary } from './ErrorBoundary';
 
 export type Parts = typeof everyPart;
 
@@ -39,12 +40,12 @@ async function loadWithRetries(load: () => Promise<Parts>): Promise<Parts> {
   }
 }
 
-/** Renders children that need the later parts; nothing until those are loaded. */
+/** Renders children that need the later parts; nothing until those are loaded. One that fails, fails alone. */
 export function WithParts({
   children,
 }: {
   children: (parts: Parts) => JSX.Element | null;
 }): JSX.Element | null {
   const parts = useSelected(deferred, (it) => it.parts);
-  return parts && children(parts);
+  return parts && <ErrorBoundary isPart>{children(parts)}</ErrorBoundary>;
 }

@@ -3,7 +3,7 @@ import { Fragment, useMemo, useRef, useState, type FocusEvent, type JSX } from '
 import {
   alarmsCsv,
   arranged,
-  causeFacts,
+  countsText,
   filtered,
   ORDERS,
   tagsText,
@@ -42,7 +42,7 @@ import { Acknowledge, AlarmRow, ignoreDoubleClick } from './AlarmRow';
 import { ALARMS_ID, ListChoice } from './ListChoice';
 import { sharingText, useIsRefused, useWhoAcknowledged } from './people';
 
-/** Rows shown first for a shared cause; for others, and with each "more", `MOST_ROWS`. */
+/** Rows shown when a shared cause is opened; for others, and with each "more", `MOST_ROWS`. */
 const MOST_OF_CAUSE = 5;
 const MOST_ROWS = 100;
 
@@ -220,7 +220,7 @@ function Group({
   );
 }
 
-/** Alarm rows of a block; alarms with a shared cause start collapsed under its heading. */
+/** Alarm rows of a block; of a shared cause, its first row until its heading is clicked. */
 function Rows({
   block: { cause, items },
   group,
@@ -228,12 +228,11 @@ function Rows({
   block: Block;
   group: keyof AlarmList;
 }): JSX.Element {
-  const [requestedMost, setMost] = useState(cause === null ? MOST_ROWS : MOST_OF_CAUSE);
-  const [isOpen, setOpen] = useState(false);
+  const [most, setMost] = useState(cause === null ? MOST_ROWS : 1);
   // On paper everything is expanded.
   const isPaper = usePaper();
-  const most = isPaper ? items.length : requestedMost;
-  const rest = items.length - most;
+  const shown = isPaper ? items.length : most;
+  const rest = items.length - shown;
   return (
     <>
       {cause !== null && (
@@ -241,37 +240,33 @@ function Rows({
           cause={cause}
           items={items}
           group={group}
-          isOpen={isOpen}
+          isOpen={most > 1}
           onToggle={() => {
-            setOpen(!isOpen);
+            setMost(most > 1 ? 1 : MOST_OF_CAUSE);
           }}
         />
       )}
-      {(isOpen || isPaper || cause === null) && (
-        <>
-          <ul data-caused={cause !== null}>
-            {items.slice(0, most).map((item) => (
-              <AlarmRow key={item.alarm.id} item={item} group={group} />
-            ))}
-          </ul>
-          {rest > 0 && (
-            <button
-              type="button"
-              className="text-button alarm-more"
-              onClick={() => {
-                setMost(most + MOST_ROWS);
-              }}
-            >
-              {S.attentionMore(Math.min(rest, MOST_ROWS))}
-            </button>
-          )}
-        </>
+      <ul data-caused={cause !== null}>
+        {items.slice(0, shown).map((item) => (
+          <AlarmRow key={item.alarm.id} item={item} group={group} />
+        ))}
+      </ul>
+      {rest > 0 && most > 1 && (
+        <button
+          type="button"
+          className="text-button alarm-more"
+          onClick={() => {
+            setMost(most + MOST_ROWS);
+          }}
+        >
+          {S.attentionMore(Math.min(rest, MOST_ROWS))}
+        </button>
       )}
     </>
   );
 }
 
-/** Heading of a shared cause: what is wrong, how bad it is, and at which tags. */
+/** Heading of a shared cause: what is wrong, what to do, and at which tags; its first row has the values. */
 function CauseHeading({
   cause,
   items,
@@ -285,14 +280,9 @@ function CauseHeading({
   isOpen: boolean;
   onToggle: () => void;
 }): JSX.Element | null {
-  const sensors = useApp(selectCatalogue);
   // While the order is held, alarms that left the group are still listed.
   const own = items.filter((item) => groupOf(item) === group);
-  // As text: states that do not change it do not re-render.
-  const facts = useApp((state) =>
-    causeFacts(own, sensors, (alarm) => selectNow(state, alarm)).join('\n'),
-  );
-  const [counts, current, worst] = facts.split('\n');
+  const counts = useApp((state) => countsText(own, (alarm) => selectNow(state, alarm)));
   const shown = own.length > 0 ? own : items;
   const verdict = useApp((state) => worstNow(state, shown));
   const todo = useApp((state) => todoNow(state, shown));
@@ -324,8 +314,6 @@ function CauseHeading({
           {counts && <span className="alarm-facts">{counts}</span>}
           <span className="alarm-facts faint">{tagsText(tags)}</span>
         </span>
-        <span data-fact="now">{current}</span>
-        <span data-fact="worst">{worst}</span>
       </button>
       {/* Rendered even without a button, to align with the rows' columns. */}
       <div className="alarm-tools">

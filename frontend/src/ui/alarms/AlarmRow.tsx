@@ -12,7 +12,7 @@ import {
   unshelveAlarm,
 } from '../../alarms/own';
 import { lastKnown, nameText, whereText } from '../../alarms/words';
-import { durationText, minuteText } from '../../domain/format';
+import { ageText, minuteText } from '../../domain/format';
 import { C } from '../../notes/NoteMarks';
 import { CommentField, CommentList } from '../../notes/Comments';
 import { useApp } from '../../store/app';
@@ -220,7 +220,7 @@ function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
               shelveAlarm(item, minutes, given);
             })}
           >
-            {S.alarmShelveFor(durationText(minutes * 60))}
+            {S.alarmShelveFor(ageText(minutes * 60))}
           </button>
         ))}
       </div>

@@ -9,8 +9,7 @@ import { whenText } from '../../alarms/words';
 import { failureText } from '../../domain/format';
 import { secondsOf } from '../../domain/time';
 import { shown } from '../../domain/text';
-import { onChange, store, useApp } from '../../store/app';
-import { createFetcher } from '../../store/fetcher';
+import { keepFetched, onChange, store, useApp } from '../../store/app';
 import { rosNow, selectIsDisconnected } from '../../store/moment';
 import { person, useSelected } from '../../store/create';
 import { say } from '../toast';
@@ -138,30 +137,29 @@ async function share(before: LocalAlarms, next: LocalAlarms): Promise<void> {
 
 /** Fetches the signed-in user on each connection; returns a stop function. */
 export function startPeople(): () => void {
-  const session = createFetcher<Session>({
-    paceMs: PACE_MS,
-    onValue: (found) => {
-      person.set(found.name ? found : null);
-      acting.share = found.can_write_notes ? (before, next) => void share(before, next) : null;
-      take();
-    },
-    onError: () => {
-      // The fetcher retries; until then everything stays as it is.
-    },
-  });
-  const update = (): void => {
-    // The first connection opens during this fetch, to the same bridge: no need to fetch again.
-    const epoch = Math.max(1, store.get().twin.connection.epoch);
-    session.want({ key: String(epoch), group: 'session', run: fetchSession });
-  };
-  update();
   const stops = [
-    onChange(({ twin }) => [twin.connection.epoch], update),
+    // On failure, everything stays as it is until a retry succeeds.
+    keepFetched<Session>(
+      {
+        paceMs: PACE_MS,
+        parts: ({ twin }) => [twin.connection.epoch],
+        onValue: (found) => {
+          person.set(found.name ? found : null);
+          acting.share = found.can_write_notes ? (before, next) => void share(before, next) : null;
+          take();
+        },
+      },
+      ({ twin }) => ({
+        // The first connection opens during this fetch, to the same bridge: no need to fetch again.
+        key: String(Math.max(1, twin.connection.epoch)),
+        group: 'session',
+        run: fetchSession,
+      }),
+    ),
     onChange(({ twin }) => [twin.alarms], take),
   ];
   return () => {
     for (const stop of stops) stop();
-    session.want(null);
     acting.share = null;
     person.set(null);
   };

@@ -204,7 +204,6 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   charts: 'Verläufe',
   chartOf: (sensor) => `Verlauf: ${sensor}`,
   chartsSeveral: 'Mehrere',
-  chartsByLegend: 'Was gezeigt wird',
   chartSpan: (from, to) => `${from} bis ${to}`,
   chartSummary: (count, latest, at, low, high, gaps) =>
     `${counted(count, 'Messwert', 'Messwerte')}, der letzte ${latest} (${at}), ` +

@@ -204,7 +204,6 @@ export const CHARTS = {
   charts: 'Charts',
   chartOf: (sensor: string): string => `Chart of ${sensor}`,
   chartsSeveral: 'Several tags',
-  chartsByLegend: 'What is charted',
   chartSpan: (from: string, to: string): string => `${from} to ${to}`,
   chartSummary: (
     count: number,

@@ -202,7 +202,6 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   charts: 'Gráficas',
   chartOf: (sensor) => `Gráfica: ${sensor}`,
   chartsSeveral: 'Varios puntos',
-  chartsByLegend: 'Qué se muestra',
   chartSpan: (from, to) => `${from} a ${to}`,
   chartSummary: (count, latest, at, low, high, gaps) =>
     `${counted(count, 'lectura', 'lecturas')}, la última ${latest} (${at}), ` +

@@ -202,7 +202,6 @@ export const CHARTS: In<typeof EN.CHARTS> = {
   charts: 'Grafieken',
   chartOf: (sensor) => `Grafiek: ${sensor}`,
   chartsSeveral: 'Meerdere',
-  chartsByLegend: 'Wat er getoond wordt',
   chartSpan: (from, to) => `${from} tot ${to}`,
   chartSummary: (count, latest, at, low, high, gaps) =>
     `${counted(count, 'meetwaarde', 'meetwaarden')}, de laatste ${latest} (${at}), ` +

@@ -102,7 +102,7 @@ const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
     says: {
       range: /\d.*, (unter|über) \d/,
       reading_failed: /Der Sensor liefert keinen Wert$/,
-      scan_failed: /^Letzte Messung fehlgeschlagen: (nicht erreichbar|nicht erkannt|nicht lesbar)/,
+      scan_failed: /^Fehlversuch: (nicht erreichbar|nicht erkannt|nicht lesbar)/,
       pest: /^\d+ Schädlinge? festgestellt$/,
       old: /gemessen|kein Messwert|[Kk]eine Messung/,
       changed: /verändert/,

@@ -220,7 +220,9 @@ def test_open_alarms_come_first_with_value_and_both_limits() -> None:
     assert "8 06:01 12.5 °C (06:10) 36.0 °C (critical) 10.0 to 35.0 °C" in active
     assert "7 06:01 0.83 kPa (06:10) 1.50 kPa (stressed) 0.20 to 1.30 kPa" in active
     assert "9 06:01 just below 10.0 °C (06:10) 8.0 °C (critical) 10.0 to 35.0 °C" in active
-    assert "6 06:01 9.1 °C 8.0 °C (critical) 10.0 to 35.0 °C" in active, "a reading of unknown time has none"
+    assert "6 06:01 9.1 °C 8.0 °C (critical) 10.0 to 35.0 °C" in active, (
+        "a reading of unknown time has none"
+    )
     assert "7 06:01 07:19 1 h 18 min 1.60 kPa (stressed) 0.20 to 1.30 kPa" in resolved
     # The file of sensors has another range by now.
     assert "7 06:01 06:01 37 s 2.0 °C (critical) 3.5 °C" in resolved

@@ -136,8 +136,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     },
     readingFailed: (sensor) => `${sensor}: Der Sensor liefert keinen Wert`,
     implausible: (reading) => `${reading}: kein plausibler Wert`,
-    scanFailed: (outcome, age) =>
-      `Letzte Messung fehlgeschlagen: ${outcome}${age === null ? '' : `, vor ${age}`}`,
+    scanFailed: (outcome, age) => `Fehlversuch: ${outcome}${age === null ? '' : `, vor ${age}`}`,
     pest: (count) =>
       count > 0
         ? `${counted(count, 'Schädling', 'Schädlinge')} festgestellt`
@@ -209,6 +208,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthNotCurrent: 'Nicht aktuell',
   healthNoTime: 'Nicht beurteilt, solange die Zeit unbekannt ist',
   healthNothing: 'Noch kein Messwert zu beurteilen',
+  healthNoRange: 'Kein Messwert mit Idealbereich',
   healthFilter: ', nur diese Messpunkte anzeigen',
   scanInterval: (interval) => `alle ${interval} eine Messung`,
   houseLast: (age) => `letzte Messung vor ${age}`,

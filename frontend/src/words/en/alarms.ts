@@ -215,6 +215,8 @@ export const HEALTH = {
   healthNotCurrent: 'Not current',
   healthNoTime: 'Not assessed while the time is unknown',
   healthNothing: 'No reading to assess yet',
+  /** Of a tag that is unknown although it has recent readings. */
+  healthNoRange: 'No reading with an ideal range',
   healthFilter: ', show only these tags',
   scanInterval: (interval: string): string => `a scan every ${interval}`,
   houseLast: (age: string): string => `last scan ${age} ago`,

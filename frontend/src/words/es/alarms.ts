@@ -211,6 +211,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthNotCurrent: 'Desactualizado',
   healthNoTime: 'Sin evaluar mientras se desconozca la hora',
   healthNothing: 'Aún no hay lecturas que evaluar',
+  healthNoRange: 'Ninguna lectura con rango ideal',
   healthFilter: ', mostrar solo estos puntos',
   scanInterval: (interval) => `una medición cada ${interval}`,
   houseLast: (age) => `última medición hace ${age}`,

@@ -198,6 +198,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthNotCurrent: 'Niet actueel',
   healthNoTime: 'Niet beoordeeld zolang de tijd onbekend is',
   healthNothing: 'Nog geen meetwaarde om te beoordelen',
+  healthNoRange: 'Geen meetwaarde met een ideaal bereik',
   healthFilter: ', alleen deze meetpunten tonen',
   scanInterval: (interval) => `elke ${interval} een meting`,
   houseLast: (age) => `laatste meting ${age} geleden`,

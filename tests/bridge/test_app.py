@@ -63,7 +63,9 @@ def test_the_page_and_its_files_are_served_from_the_same_origin(static: Path) ->
 
 def test_the_page_hides_no_route(static: Path) -> None:
     (static / "docs").write_text("a file of that name")
-    assert "API" in query(static, "GET", "/docs").text
+    page = query(static, "GET", "/docs").text
+    assert "Only <code>POST /api/observations</code> writes to ROS" in page
+    assert "`" not in page
 
 
 @pytest.mark.parametrize(

@@ -128,8 +128,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'unter', above: 'über' },
     wasBeyond: (side, limit) => `war ${side} ${limit}`,
-    heldUntil: (status, side, until) =>
-      `${status} bis ${side === 'below' ? 'unter' : 'über'} ${until}`,
+    heldUntil: (status, isBelow, until) => `${status} bis ${isBelow ? 'unter' : 'über'} ${until}`,
     just: {
       below: (limit) => `knapp unter ${limit}`,
       above: (limit) => `knapp über ${limit}`,

@@ -132,8 +132,8 @@ export const HEALTH = {
     sides: { below: 'below', above: 'above' },
     wasBeyond: (side: string, limit: string): string => `was ${side} ${limit}`,
     /** A value that was out of range keeps its status until it is well within (hysteresis). */
-    heldUntil: (status: string, side: 'below' | 'above', until: string): string =>
-      `${status} until ${side} ${until}`,
+    heldUntil: (status: string, isBelow: boolean, until: string): string =>
+      `${status} until ${isBelow ? 'below' : 'above'} ${until}`,
     /** For a value beyond its limit that rounds to the limit. */
     just: {
       below: (limit: string): string => `just below ${limit}`,

@@ -120,8 +120,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'onder', above: 'boven' },
     wasBeyond: (side, limit) => `was ${side} ${limit}`,
-    heldUntil: (status, side, until) =>
-      `${status} tot ${side === 'below' ? 'onder' : 'boven'} ${until}`,
+    heldUntil: (status, isBelow, until) => `${status} tot ${isBelow ? 'onder' : 'boven'} ${until}`,
     just: {
       below: (limit) => `net onder ${limit}`,
       above: (limit) => `net boven ${limit}`,

@@ -46,7 +46,9 @@ def query(static_folder: Path, method: str, path: str) -> httpx.Response:
 
 def test_it_describes_itself_without_a_twin_and_the_page_hides_no_route(static: Path) -> None:
     (static / "docs").write_text("a file of that name")
-    assert "API" in query(static, "GET", "/docs").text
+    page = query(static, "GET", "/docs").text
+    assert "Only <code>POST /api/observations</code> writes to ROS" in page
+    assert "`" not in page
     assert query(static, "GET", "/openapi.json").status_code == 200
     for path in ("/redoc", "/docs/oauth2-redirect"):  # the framework's own
         assert query(static, "GET", path).status_code == 404

@@ -107,9 +107,10 @@ def test_axe_and_windows_of_any_size(open_greenhouse: OpenGreenhouse) -> None:
     expect(hmi.row("1")).to_be_in_viewport()
 
 
-def test_all_rows_have_the_same_height(open_greenhouse: OpenGreenhouse) -> None:
-    """Otherwise the table would jump as it scrolls."""
-    hmi = open_greenhouse(300)
+@pytest.mark.parametrize("tags", [30, 300])
+def test_all_rows_have_the_same_height(open_greenhouse: OpenGreenhouse, tags: int) -> None:
+    """Otherwise the table would jump as it scrolls, or when a tag is found."""
+    hmi = open_greenhouse(tags)
     hmi.page.evaluate("greenhouse.unpin(3)")
     expect(hmi.row("3")).to_have_attribute("data-pinned", "false")
     heights = hmi.page.locator("tr[data-tag-id]").evaluate_all(

@@ -141,4 +141,5 @@ def test_a_page_whose_session_has_ended_goes_to_the_sign_in_page(page: Page) -> 
         port = str(urlsplit(first.url).port)
     with served("--port", port, LUPIN_TOKEN=TOKEN) as second:
         assert second.url == first.url
-        expect(page).to_have_url(second.url + "/signin")
+        expect(page).to_have_url(second.url + "/signin#ended")
+        expect(page.get_by_role("alert")).to_have_text(re.compile("^Your session has ended"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Collection
 from functools import cache
@@ -107,12 +108,17 @@ def render(document: dict[str, Any], base_url: str) -> str:
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
         f"<title>{escape(info['title'])}: API</title></head><body><main>"
-        f"<h1>{escape(info['title'])}: API</h1><p>{escape(info['summary'])}</p>"
-        f"<p>{escape(info['description'])}</p>"
+        f"<h1>{escape(info['title'])}: API</h1><p>{_prose(info['summary'])}</p>"
+        f"<p>{_prose(info['description'])}</p>"
         '<p>As a document for tools: <a href="openapi.json">/openapi.json</a></p>'
         '<p>For people, with tutorials: <a href="docs/guide/">the guide</a></p>'
         f"<h2>Routes</h2>{routes}<h2>Types</h2>{schemas}</main></body></html>"
     )
+
+
+def _prose(text: str) -> str:
+    """Text as HTML; what is between backticks is code."""
+    return re.sub("`([^`]+)`", r"<code>\1</code>", escape(text))
 
 
 def _route(method: str, path: str, operation: dict[str, Any], base_url: str) -> str:
@@ -122,17 +128,17 @@ def _route(method: str, path: str, operation: dict[str, Any], base_url: str) -> 
     rows = "".join(
         f"<tr><td><code>{escape(p['name'])}</code></td><td>{escape(p['schema'].get('type', ''))}"
         f"{' (required)' if p.get('required') else ''}</td>"
-        f"<td>{escape(p.get('description', ''))}</td></tr>"
+        f"<td>{_prose(p.get('description', ''))}</td></tr>"
         for p in parameters
     )
     answers = "".join(
-        f"<li>{escape(code)}: {escape(answer['description'])} {_types(answer)}</li>"
+        f"<li>{escape(code)}: {_prose(answer['description'])} {_types(answer)}</li>"
         for code, answer in operation["responses"].items()
     )
     url = f"{base_url}{path}{'?' + query if query else ''}"
     return (
         f"<section><h3><code>{method} {escape(path)}</code></h3>"
-        f"<p>{escape(operation.get('summary', ''))}. {escape(operation.get('description', ''))}</p>"
+        f"<p>{_prose(operation.get('summary', ''))}. {_prose(operation.get('description', ''))}</p>"
         f"<pre>curl {'' if method == 'GET' else f'-X {method} '}'{escape(url)}'</pre>"
         + (f"<table border='1'>{rows}</table>" if rows else "")
         + f"<ul>{answers}</ul></section>"
@@ -151,12 +157,12 @@ def _types(answer: dict[str, Any]) -> str:
 def _schema(name: str, described: dict[str, Any]) -> str:
     rows = "".join(
         f"<tr><td><code>{escape(field)}</code></td><td>{_type_of(prop)}</td>"
-        f"<td>{escape(prop.get('description', ''))}</td></tr>"
+        f"<td>{_prose(prop.get('description', ''))}</td></tr>"
         for field, prop in described.get("properties", {}).items()
     )
     return (
         f'<section id="{escape(name)}"><h3>{escape(name)}</h3>'
-        f"<p>{escape(described.get('description', ''))}</p>"
+        f"<p>{_prose(described.get('description', ''))}</p>"
         f"<table border='1'>{rows}</table></section>"
     )
 

@@ -164,11 +164,11 @@ const answering = (status: number): void => {
   vi.stubGlobal('fetch', () => Promise.resolve(new Response(null, { status })));
 };
 
-test('a server that requires a token leads to its sign-in page', async () => {
+test('a server that requires a token leads to its sign-in page, which says why', async () => {
   const leave = vi.fn<(url: URL) => void>();
   answering(401);
   await signInIfRequired(leave);
-  expect(leave.mock.calls.map(([url]) => url.pathname)).toEqual(['/signin']);
+  expect(leave.mock.calls.map(([url]) => url.pathname + url.hash)).toEqual(['/signin#ended']);
 });
 
 test.each([200, 403, 503])('a server that answers %i keeps the page', async (status) => {

@@ -120,7 +120,7 @@ export function connect(url: string, handlers: ConnectionHandlers) {
  */
 export async function signInIfRequired(leave: (url: URL) => void = goTo): Promise<void> {
   const answer = await fetch(route('readyz'), { cache: 'no-store' }).catch(() => null);
-  if (answer?.status === 401) leave(route('signin'));
+  if (answer?.status === 401) leave(new URL('#ended', route('signin')));
 }
 
 function goTo(url: URL): void {

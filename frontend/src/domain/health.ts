@@ -183,8 +183,8 @@ export const isBack = ({ release, verdict }: HealthReason): boolean =>
 const heldText = (reason: OfRange, text: (value: number) => string): string | null => {
   const { release = null, verdict } = reason;
   if (release === null) return null;
-  const side = sideOf(reason) === 'below' ? 'above' : 'below';
-  return S.reasons.heldUntil(S.health[verdict].toLowerCase(), side, text(release));
+  const isBelow = sideOf(reason) === 'above';
+  return S.reasons.heldUntil(S.health[verdict].toLowerCase(), isBelow, text(release));
 };
 
 /** Names sensor, side and limit, without the value, which changes. */

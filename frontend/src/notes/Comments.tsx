@@ -125,9 +125,12 @@ const LONGEST = 500;
 export function CommentField({
   subject,
   moment,
+  name = moment === null ? C.now : C.then(rosText(moment)),
   onDone,
 }: {
   subject: string;
+  /** The field's label. */
+  name?: string;
   /** The time that the comment is about, ROS seconds; null: now. */
   moment: number | null;
   onDone: () => void;
@@ -154,7 +157,7 @@ export function CommentField({
   return (
     <form className="comment-field" onSubmit={send}>
       <label>
-        {moment === null ? C.now : C.then(rosText(moment))}
+        {name}
         <textarea
           ref={field}
           rows={2}
@@ -173,7 +176,7 @@ export function CommentField({
         />
       </label>
       {fault !== '' && <p role="alert">{fault}</p>}
-      <button type="submit" className="text-button" disabled={isSending || text.trim() === ''}>
+      <button type="submit" className="comment-button" disabled={isSending || text.trim() === ''}>
         {C.send}
       </button>
     </form>

@@ -3,7 +3,7 @@ import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { moveViewport } from '../store/app';
 import { robotBox, robotFrame } from '../store/create';
-import { goLive, goLost, nextStamp, showTags } from '../testing/page';
+import { goLive, goLost, nextStamp, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import {
   extended,
@@ -63,6 +63,14 @@ test('the robot is marked at its reported position, and labels keep clear of it'
 test.each([
   ['a robot that is old says how old', 12, goLive, '12 s ago'],
   ['cut off, the banner says how old one is that was live', 0, goLost, undefined],
+  [
+    'of a twin that is silent, the banner says it too',
+    0,
+    () => {
+      goLive(status({ twin: 'offline', reason: 'stale' }));
+    },
+    undefined,
+  ],
   ['cut off, one that was old by then says how old', 12, goLost, '12 s ago'],
 ])('%s', (_, age, then, said) => {
   document.body.innerHTML = '<div id="map-view"></div>';

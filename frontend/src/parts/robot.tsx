@@ -11,13 +11,7 @@ import { mapPoint, toCanvas } from '../geometry/coordinates';
 import { act, type AppState, keepFetched, store, useApp } from '../store/app';
 import { withLayer } from '../store/view';
 import { robotBox, robotFrame, useSelected } from '../store/create';
-import {
-  isReceivingNow,
-  rosNow,
-  selectIsDisconnected,
-  selectLatest,
-  selectShown,
-} from '../store/moment';
+import { isReceivingNow, rosNow, selectLatest, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { Check } from '../widgets/controls';
 import { useTicking } from '../widgets/useNow';
@@ -39,9 +33,9 @@ export function RobotLayer(): ReactPortal | null {
     return known === null ? null : ageText(known);
   });
   const cutAt = useApp((state) =>
-    selectIsDisconnected(state) ? selectLatest(state).snapshot?.takenAt : undefined,
+    isReceivingNow(state) ? undefined : selectLatest(state).snapshot?.takenAt,
   );
-  // Without a connection, the banner gives the age; the mark ages only if it was old before.
+  // While nothing arrives, the banner gives the age; the mark ages only if it was old before.
   const isLive = useTicking((now) => ((ageAt(cutAt ?? now) ?? LIVE_S) < LIVE_S ? 'live' : 'old'));
   const time = useTicking((now) => {
     const known = timeOf(store.get(), now);

@@ -234,6 +234,14 @@ test('counts the tags by verdict, and filters by one', () => {
   expect(healthy.getAttribute('aria-pressed')).toBe('true');
   fireEvent.click(healthy);
   expect(store.get().view.health).toBeNull();
+  const many = Array.from({ length: 1200 }, (_, id) => String(id));
+  act(() => {
+    showTags(
+      many.map((tag_id) => wireTag({ tag_id })),
+      judgement(Object.fromEntries(many.map((id) => [id, 'unknown']))),
+    );
+  });
+  expect(screen.getByRole('button', { name: /^1,200 Unknown/ })).toBeTruthy();
 });
 
 test('all is well, hardly anything is known, and nothing is', () => {

@@ -1,6 +1,6 @@
 import type { JSX } from 'react';
 
-import { ageText, intervalText } from '../domain/format';
+import { ageText, intervalText, numberText } from '../domain/format';
 import { isBad, isSilent, VERDICTS, type HouseHealth } from '../domain/health';
 import { ageSeconds } from '../domain/time';
 import { whenOf } from '../domain/twin';
@@ -55,7 +55,9 @@ export function HealthSummary({ kiosk }: { kiosk: boolean }): JSX.Element {
               }}
             >
               <HealthShape verdict={verdict} />
-              <strong>{hasSnapshot ? health.counts[verdict] : S.noValue}</strong>{' '}
+              <strong>
+                {hasSnapshot ? numberText(health.counts[verdict], 0) : S.noValue}
+              </strong>{' '}
               <span>{(health.counts[verdict] === 1 ? S.health : S.healthMany)[verdict]}</span>
               {!kiosk && <span className="unseen">{S.healthFilter}</span>}
             </button>

@@ -51,6 +51,11 @@ describe('legend', () => {
     prefer({ unit: 'F' });
     rerender(<Legend kiosk={false} />);
     expect(at('rmse')).toBe('Typical error 2.7\u00a0°F');
+    // It is the map's, not that of a difference.
+    act({ compare: { by: 'ago', seconds: 86_400 } });
+    rerender(<Legend kiosk={false} />);
+    expect(screen.queryByTestId('rmse')).toBeNull();
+    act({ compare: null });
   });
 
   test('says what is readings too old, by both colourings, and of no moment when nothing was', () => {

@@ -108,10 +108,10 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
           <span data-testid="sample-count">
             {samples > 0 ? S.legendTags(samples) : isFetching ? S.legendFetching : S.legendNoTags}
           </span>
-          {!isEstimate && quality?.sensor_type === name && (
+          {!isEstimate && !isCompared && quality?.sensor_type === name && (
             <Quality quality={quality} sensor={sensor} />
           )}
-          {isIdeal && !isError && ideals !== '' && (
+          {isIdeal && !isError && !isCompared && ideals !== '' && (
             <span data-testid="ideal-species">{ideals}</span>
           )}
           {!isEstimate && (

@@ -34,6 +34,7 @@ import { S } from '../strings';
 import { IconButton, useFocusBack } from '../widgets/controls';
 import { Age, AgeFact, Fact, useAgeStep } from './Age';
 import { CardAlarms } from './alarms/CardAlarms';
+import { selectIsCurrent } from './DoNow';
 import { HealthMark } from './HealthMark';
 import { Sparkline } from './Sparkline';
 import { CardEstimate, lazyPart } from './lazyParts';
@@ -104,10 +105,11 @@ function CardBody({
   const isCharted = useApp((state) => state.view.chart !== null);
   const area = useApp((state) => selectCatalogue(state).areaOf(tag.id));
   const isNow = useApp((state) => selectShown(state).moment === null);
+  const isCurrent = useApp(selectIsCurrent);
   return (
     <div className="card-body">
       {health && (
-        <Reasons health={health} tagId={tag.id} hasTodo={isBad(health.verdict) && isNow} />
+        <Reasons health={health} tagId={tag.id} hasTodo={isBad(health.verdict) && isCurrent} />
       )}
       {isNow && <CardAlarms tagId={tag.id} />}
       {tag.readings.size === 0 && <p className="faint">{S.cardNoReadings}</p>}

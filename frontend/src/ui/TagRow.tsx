@@ -33,6 +33,8 @@ export interface RowLook {
   readonly hidden: readonly string[];
   /** State an hour ago; null: unknown. */
   readonly then: HourAgo | null;
+  /** Whether the twin has a valid time; otherwise nothing is assessed. */
+  readonly isTimed: boolean;
 }
 
 interface Props extends Row {
@@ -66,7 +68,8 @@ export const TagRow = memo(function TagRow(props: Props): JSX.Element {
     if (worstReason(health)?.kind === 'scan_failed') texts.unshift(attempt);
     else texts.push(attempt);
   }
-  const [why, ...more] = texts;
+  const isUnranged = look.isTimed && health.verdict === 'unknown' && tag.readings.size > 0;
+  const [why = isUnranged ? S.healthNoRange : undefined, ...more] = texts;
   return (
     <tr
       aria-rowindex={index + 2}

@@ -56,6 +56,21 @@ describe('table', () => {
     expect(row('2').textContent).toContain('never');
   });
 
+  test('says why a tag with readings is unknown, unless nothing is assessed at all', () => {
+    const tags = ['9', '10'].map((tag_id) =>
+      wireTag({ tag_id, readings: tag_id === '9' ? readings({ ph: 6 }) : [] }),
+    );
+    showTags(tags, judgement({ 9: 'unknown', 10: 'unknown' }));
+    render(<TagTable />);
+    expect(row('9').querySelector('.why')?.textContent).toBe('No reading with an ideal range');
+    // Its age says "never".
+    expect(row('10').querySelector('.why')).toBeNull();
+    flush(() => {
+      goLive(status({ twin: 'offline', reason: 'no_clock' }));
+    });
+    expect(row('9').querySelector('.why')).toBeNull();
+  });
+
   test('says first what the verdict is about, then that an attempt has failed', () => {
     const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 2 });
     const hot = reason({ verdict: 'critical', value: 40, limit: 35 });
@@ -222,7 +237,7 @@ describe('table', () => {
   });
 
   test('a verdict has its first reason beside it, and how many more there are', () => {
-    showTags(tags, judgement({ a: [reason()] }));
+    showTags(tags, judgement({ a: [reason()], b: 'healthy' }));
     render(<TagTable />);
     expect(row('a').querySelector('.why')?.textContent).toBe('Temperature 6.6\u00a0°C, below 10.0');
     expect(row('a').querySelector('.why-count')).toBeNull();

@@ -18,7 +18,7 @@ import { withSort, withTag } from '../store/view';
 import { selectCatalogue, selectShownColumns } from '../store/derived';
 import { useSelected } from '../store/create';
 import { hourAgo, selectHourAgo } from '../store/hourAgo';
-import { selectTags } from '../store/moment';
+import { selectClockFault, selectTags } from '../store/moment';
 import { isColumnShown } from '../store/settings';
 import { S } from '../strings';
 import { Icon } from '../widgets/controls';
@@ -44,9 +44,10 @@ export function TagTable(): JSX.Element {
   const last = useSelected(hourAgo);
   const then = useApp((state) => selectHourAgo(state, last));
   // One object for all rows, or each state would render them anew.
+  const isTimed = useApp((state) => selectClockFault(state) === null);
   const look = useMemo(
-    () => ({ catalogue, sensors, chosen, hidden, then }),
-    [catalogue, sensors, chosen, hidden, then],
+    () => ({ catalogue, sensors, chosen, hidden, then, isTimed }),
+    [catalogue, sensors, chosen, hidden, then, isTimed],
   );
   const has = (id: string): boolean => isColumnShown({ hidden }, id);
   const body = useRef<HTMLTableSectionElement>(null);

@@ -113,7 +113,7 @@ test.each([
     'This twin is not recording: its file belongs to another program.',
     /Give the twin another file/,
   ],
-  ['off', 'Nothing is recorded.', /After a restart, all earlier data is lost/],
+  ['off', 'Recording is off.', /After a restart, all earlier data is lost/],
 ] as const)('a journal that is %s is reported, with why and what to do', (state, title, hint) => {
   render(<Troubles />);
   journal({ state, detail: 'database or disk is full' });

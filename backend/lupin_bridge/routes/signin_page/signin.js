@@ -42,6 +42,9 @@ const signIn = async () => {
   return response.status === 401 ? words.wrong : reasonOf(response);
 };
 
+// The page leads here when its session is over.
+if (location.hash === '#ended') message.textContent = words.ended;
+
 (person.hidden ? input : person).focus();
 
 form.addEventListener('submit', (event) => {

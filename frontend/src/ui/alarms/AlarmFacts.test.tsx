@@ -1,8 +1,9 @@
-import { act as flush, render } from '@testing-library/react';
+import { act as flush, fireEvent, render, screen } from '@testing-library/react';
 import { expect, test } from 'vitest';
 
 import { startAlarms } from '../../alarms/watch';
 import { receive } from '../../store/app';
+import { person } from '../../store/create';
 import { alarm, alarms, reportAlarms } from '../../testing/alarms';
 import { judgement } from '../../testing/health';
 import { goLive, goLost, showTags, status } from '../../testing/page';
@@ -38,6 +39,24 @@ test('back to normal is of now, not of a twin that is silent', () => {
   flush(goLost);
   expect(row()).toContain('Unknown');
   expect(row()).not.toContain('Back to normal');
+  stop();
+});
+
+test('the field for a comment names its alarm', () => {
+  showTags([wireTag()]);
+  person.set({
+    ...{ name: 'anna', role: 'operator', can_write_notes: true },
+    ...{ can_sign_out: true, seconds_left: null },
+  });
+  const stop = startAlarms();
+  render(<AlarmPanel />);
+  flush(() => {
+    reportAlarms(alarm('a'));
+  });
+  fireEvent.click(screen.getByRole('button', { name: /^Actions/ }));
+  fireEvent.click(screen.getByRole('button', { name: 'Comment' }));
+  expect(screen.getByLabelText(/^Comment: Tag 1: Temperature below/)).toBeTruthy();
+  person.set(null);
   stop();
 });
 

@@ -151,7 +151,12 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
     <div className="row-actions" ref={root}>
       {form === 'shelve' && <Shelving item={item} name={name} />}
       {form === 'comment' && (
-        <CommentField subject={`alarm:${alarm.id}`} moment={null} onDone={close} />
+        <CommentField
+          subject={`alarm:${alarm.id}`}
+          moment={null}
+          name={S.alarmWhat(C.comment, name)}
+          onDone={close}
+        />
       )}
       {form === null && (
         <ul className="menu-list">

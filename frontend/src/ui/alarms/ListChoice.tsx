@@ -3,6 +3,7 @@ import type { JSX } from 'react';
 import { calling } from '../../alarms/list';
 import { worstNow } from '../../alarms/latest';
 import { alarmList } from '../../alarms/watch';
+import { numberText } from '../../domain/format';
 import { act, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { selectIsDisconnected } from '../../store/moment';
@@ -60,7 +61,7 @@ export function AlarmsLabel(): JSX.Element {
         {length > 0 && (
           <span data-testid="alarm-count" aria-hidden="true">
             {' '}
-            ({isNow ? length : S.alarmsNow(length)})
+            ({isNow ? numberText(length, 0) : S.alarmsNow(length)})
           </span>
         )}
       </span>

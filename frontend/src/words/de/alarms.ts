@@ -128,16 +128,14 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'unter', above: 'über' },
     wasBeyond: (side, limit) => `war ${side} ${limit}`,
-    heldUntil: (status, side, until) =>
-      `${status} bis ${side === 'below' ? 'unter' : 'über'} ${until}`,
+    heldUntil: (status, isBelow, until) => `${status} bis ${isBelow ? 'unter' : 'über'} ${until}`,
     just: {
       below: (limit) => `knapp unter ${limit}`,
       above: (limit) => `knapp über ${limit}`,
     },
     readingFailed: (sensor) => `${sensor}: Der Sensor liefert keinen Wert`,
     implausible: (reading) => `${reading}: kein plausibler Wert`,
-    scanFailed: (outcome, age) =>
-      `Letzte Messung fehlgeschlagen: ${outcome}${age === null ? '' : `, vor ${age}`}`,
+    scanFailed: (outcome, age) => `Fehlversuch: ${outcome}${age === null ? '' : `, vor ${age}`}`,
     pest: (count) =>
       count > 0
         ? `${counted(count, 'Schädling', 'Schädlinge')} festgestellt`
@@ -209,6 +207,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthNotCurrent: 'Nicht aktuell',
   healthNoTime: 'Nicht beurteilt, solange die Zeit unbekannt ist',
   healthNothing: 'Noch kein Messwert zu beurteilen',
+  healthNoRange: 'Kein Messwert mit Idealbereich',
   healthFilter: ', nur diese Messpunkte anzeigen',
   scanInterval: (interval) => `alle ${interval} eine Messung`,
   houseLast: (age) => `letzte Messung vor ${age}`,

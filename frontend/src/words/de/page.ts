@@ -78,7 +78,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     `Der Zwilling hat in den letzten Minuten ${counted(count, 'Nachricht', 'Nachrichten')} verworfen.`,
   journal: {
     off: {
-      title: 'Es wird nichts aufgezeichnet.',
+      title: 'Die Aufzeichnung ist aus.',
       hint: 'Nach einem Neustart sind alle früheren Daten verloren.',
     },
     slow: {

@@ -132,8 +132,8 @@ export const HEALTH = {
     sides: { below: 'below', above: 'above' },
     wasBeyond: (side: string, limit: string): string => `was ${side} ${limit}`,
     /** A value that was out of range keeps its status until it is well within (hysteresis). */
-    heldUntil: (status: string, side: 'below' | 'above', until: string): string =>
-      `${status} until ${side} ${until}`,
+    heldUntil: (status: string, isBelow: boolean, until: string): string =>
+      `${status} until ${isBelow ? 'below' : 'above'} ${until}`,
     /** For a value beyond its limit that rounds to the limit. */
     just: {
       below: (limit: string): string => `just below ${limit}`,
@@ -215,6 +215,8 @@ export const HEALTH = {
   healthNotCurrent: 'Not current',
   healthNoTime: 'Not assessed while the time is unknown',
   healthNothing: 'No reading to assess yet',
+  /** Of a tag that is unknown although it has recent readings. */
+  healthNoRange: 'No reading with an ideal range',
   healthFilter: ', show only these tags',
   scanInterval: (interval: string): string => `a scan every ${interval}`,
   houseLast: (age: string): string => `last scan ${age} ago`,

@@ -80,7 +80,7 @@ export const PAGE = {
   /** For a journal that does not record: the problem, and what to do. */
   journal: {
     off: {
-      title: 'Nothing is recorded.',
+      title: 'Recording is off.',
       hint: 'After a restart, all earlier data is lost.',
     },
     slow: {

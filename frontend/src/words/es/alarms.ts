@@ -128,8 +128,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'inferior a', above: 'superior a' },
     wasBeyond: (side, limit) => `ha sido ${side} ${limit}`,
-    heldUntil: (status, side, until) =>
-      `${status} hasta ${side === 'below' ? 'bajar de' : 'superar'} ${until}`,
+    heldUntil: (status, isBelow, until) =>
+      `${status} hasta ${isBelow ? 'bajar de' : 'superar'} ${until}`,
     just: {
       below: (limit) => `justo por debajo de ${limit}`,
       above: (limit) => `justo por encima de ${limit}`,
@@ -211,6 +211,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthNotCurrent: 'Desactualizado',
   healthNoTime: 'Sin evaluar mientras se desconozca la hora',
   healthNothing: 'Aún no hay lecturas que evaluar',
+  healthNoRange: 'Ninguna lectura con rango ideal',
   healthFilter: ', mostrar solo estos puntos',
   scanInterval: (interval) => `una medición cada ${interval}`,
   houseLast: (age) => `última medición hace ${age}`,

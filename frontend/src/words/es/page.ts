@@ -75,7 +75,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     `El gemelo ha descartado ${counted(count, 'mensaje', 'mensajes')} en los últimos minutos.`,
   journal: {
     off: {
-      title: 'No se guarda ningún registro.',
+      title: 'El registro está desactivado.',
       hint: 'Tras un reinicio, se pierden todos los datos anteriores.',
     },
     slow: {

@@ -120,8 +120,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'onder', above: 'boven' },
     wasBeyond: (side, limit) => `was ${side} ${limit}`,
-    heldUntil: (status, side, until) =>
-      `${status} tot ${side === 'below' ? 'onder' : 'boven'} ${until}`,
+    heldUntil: (status, isBelow, until) => `${status} tot ${isBelow ? 'onder' : 'boven'} ${until}`,
     just: {
       below: (limit) => `net onder ${limit}`,
       above: (limit) => `net boven ${limit}`,
@@ -198,6 +197,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthNotCurrent: 'Niet actueel',
   healthNoTime: 'Niet beoordeeld zolang de tijd onbekend is',
   healthNothing: 'Nog geen meetwaarde om te beoordelen',
+  healthNoRange: 'Geen meetwaarde met een ideaal bereik',
   healthFilter: ', alleen deze meetpunten tonen',
   scanInterval: (interval) => `elke ${interval} een meting`,
   houseLast: (age) => `laatste meting ${age} geleden`,

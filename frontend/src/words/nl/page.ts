@@ -77,7 +77,7 @@ export const PAGE: In<typeof EN.PAGE> = {
     `De digital twin heeft de afgelopen minuten ${counted(count, 'bericht', 'berichten')} niet verwerkt.`,
   journal: {
     off: {
-      title: 'Er wordt niets vastgelegd.',
+      title: 'Het vastleggen staat uit.',
       hint: 'Na een herstart zijn alle eerdere gegevens weg.',
     },
     slow: {

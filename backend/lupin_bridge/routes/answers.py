@@ -143,6 +143,8 @@ async def read_body(request: Request, model: type[ModelT]) -> ModelT:
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False, include_context=False)[0]
         name, why = ".".join(map(str, first["loc"])) or "the body", first["msg"]
+        if first["type"] == "string_pattern_mismatch":  # the only patterns of `routes_schema`
+            why = "it contains a control character"
         raise Refused(f"{name[:64]}: {why[0].lower()}{why[1:]}") from None
 
 

@@ -136,7 +136,7 @@ GOOD = {"tag_id": "bad", "readings": {"t": 1.0}}
         ({**GOOD, "readings": {f"s{n}": 1 for n in range(65)}}, "readings: dictionary should hav"),
         ({**GOOD, "readings": {"t": "21"}}, "readings.t: input should be a valid number"),
         ({**GOOD, "tag_id": "x" * 257}, "tag_id: string should have at most 256 characters"),
-        ({**GOOD, "tag_id": "a\0b"}, "tag_id: string should match pattern"),
+        ({**GOOD, "tag_id": "a\0b"}, "tag_id: it contains a control character"),
         ({**GOOD, "place": [1]}, "place: list should have at least 2 items"),
         ({**GOOD, "place": [1, 2e6]}, "place.1: input should be less than or equal to 1000000"),
         ({**GOOD, "source": "robot"}, "source: extra inputs are not permitted"),

@@ -42,7 +42,7 @@ export const MAP: In<typeof EN.MAP> = {
   legend: 'Legende',
   legendWaiting: 'Namen, Einheiten und Bereiche werden geladen',
   legendFailed: (reason) =>
-    `Namen, Einheiten und Bereiche konnten nicht geladen werden; die Seite versucht es weiter. ${reason}`,
+    `Namen, Einheiten und Bereiche konnten nicht geladen werden (${reason}); die Seite versucht es weiter.`,
   legendTags: (count) => counted(count, 'Messpunkt trägt bei', 'Messpunkte tragen bei'),
   legendFetching: 'Die Heatmap wird geladen',
   legendNoTags: 'Kein Messpunkt trägt bei',
@@ -81,7 +81,7 @@ export const MAP: In<typeof EN.MAP> = {
   rangeNotAbove: (low) => `Muss über ${low} liegen: nicht übernommen`,
   rangeNoNumber: 'Keine Zahl: nicht übernommen',
   fieldFailed: (reason) =>
-    `Die Heatmap konnte nicht geladen werden; die Seite versucht es weiter. ${reason}`,
+    `Die Heatmap konnte nicht geladen werden (${reason}); die Seite versucht es weiter.`,
 
   compare: 'Vergleichen mit',
   compareWith: {
@@ -215,7 +215,7 @@ export const CHARTS: In<typeof EN.CHARTS> = {
       : `Braucht 24 h Messwerte; bisher ${known}`,
   chartLoading: 'Frühere Daten werden geladen',
   chartFailed: (reason) =>
-    `Frühere Daten konnten nicht geladen werden; die Seite versucht es weiter. ${reason}`,
+    `Frühere Daten konnten nicht geladen werden (${reason}); die Seite versucht es weiter.`,
   chartNoTime: 'Der Zwilling kennt noch keine Uhrzeit; es gibt noch keine früheren Daten.',
   chartIdealsDiffer: 'Idealbereiche je nach Art verschieden',
   chartNoSensors: 'Dieser Messpunkt hat keinen Sensor.',

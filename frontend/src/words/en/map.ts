@@ -37,7 +37,7 @@ export const MAP = {
   legend: 'Legend',
   legendWaiting: 'Loading names, units and ranges',
   legendFailed: (reason: string): string =>
-    `Names, units and ranges could not be loaded; the page keeps trying. ${reason}`,
+    `Names, units and ranges could not be loaded (${reason}); the page keeps trying.`,
   legendTags: (count: number): string => counted(count, 'tag contributes', 'tags contribute'),
   legendFetching: 'Loading the heat map',
   legendNoTags: 'No tag contributes',
@@ -78,7 +78,7 @@ export const MAP = {
   rangeNotAbove: (low: string): string => `Must be above ${low}: not applied`,
   rangeNoNumber: 'Not a number: not applied',
   fieldFailed: (reason: string): string =>
-    `The heat map could not be loaded; the page keeps trying. ${reason}`,
+    `The heat map could not be loaded (${reason}); the page keeps trying.`,
 
   compare: 'Compare with',
   compareWith: {
@@ -223,7 +223,7 @@ export const CHARTS = {
       : `Needs 24 h of readings; ${known} so far`,
   chartLoading: 'Loading history',
   chartFailed: (reason: string): string =>
-    `History could not be loaded; the page keeps trying. ${reason}`,
+    `History could not be loaded (${reason}); the page keeps trying.`,
   chartNoTime: 'The twin has no time yet, so there is no history.',
   chartIdealsDiffer: 'Ideal ranges differ by species',
   chartNoSensors: 'This tag has no sensor.',

@@ -40,7 +40,7 @@ export const MAP: In<typeof EN.MAP> = {
   legend: 'Leyenda',
   legendWaiting: 'Cargando nombres, unidades y rangos',
   legendFailed: (reason) =>
-    `No se pudieron cargar nombres, unidades y rangos; la página lo sigue intentando. ${reason}`,
+    `No se pudieron cargar nombres, unidades y rangos (${reason}); la página lo sigue intentando.`,
   legendTags: (count) => counted(count, 'punto aporta datos', 'puntos aportan datos'),
   legendFetching: 'Cargando el mapa de calor',
   legendNoTags: 'Ningún punto aporta datos',
@@ -79,7 +79,7 @@ export const MAP: In<typeof EN.MAP> = {
   rangeNotAbove: (low) => `Debe ser superior a ${low}: no se aplica`,
   rangeNoNumber: 'No es un número: no se aplica',
   fieldFailed: (reason) =>
-    `No se pudo cargar el mapa de calor; la página lo sigue intentando. ${reason}`,
+    `No se pudo cargar el mapa de calor (${reason}); la página lo sigue intentando.`,
 
   compare: 'Comparar con',
   compareWith: {
@@ -213,7 +213,7 @@ export const CHARTS: In<typeof EN.CHARTS> = {
       : `Requiere 24 h de lecturas; hasta ahora ${known}`,
   chartLoading: 'Cargando el histórico',
   chartFailed: (reason) =>
-    `No se pudo cargar el histórico; la página lo sigue intentando. ${reason}`,
+    `No se pudo cargar el histórico (${reason}); la página lo sigue intentando.`,
   chartNoTime: 'El gemelo aún no tiene hora: todavía no hay histórico.',
   chartIdealsDiffer: 'El rango ideal depende de la especie',
   chartNoSensors: 'Este punto no tiene sensores.',

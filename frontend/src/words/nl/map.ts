@@ -40,7 +40,7 @@ export const MAP: In<typeof EN.MAP> = {
   legend: 'Legenda',
   legendWaiting: 'Namen, eenheden en bereiken worden geladen',
   legendFailed: (reason) =>
-    `Namen, eenheden en bereiken konden niet worden geladen; de pagina blijft het proberen. ${reason}`,
+    `Namen, eenheden en bereiken konden niet worden geladen (${reason}); de pagina blijft het proberen.`,
   legendTags: (count) => counted(count, 'meetpunt telt mee', 'meetpunten tellen mee'),
   legendFetching: 'De heatmap wordt geladen',
   legendNoTags: 'Geen meetpunt telt mee',
@@ -79,7 +79,7 @@ export const MAP: In<typeof EN.MAP> = {
   rangeNotAbove: (low) => `Moet boven ${low} liggen: niet toegepast`,
   rangeNoNumber: 'Geen getal: niet toegepast',
   fieldFailed: (reason) =>
-    `De heatmap kon niet worden geladen; de pagina blijft het proberen. ${reason}`,
+    `De heatmap kon niet worden geladen (${reason}); de pagina blijft het proberen.`,
 
   compare: 'Vergelijken met',
   compareWith: {
@@ -213,7 +213,7 @@ export const CHARTS: In<typeof EN.CHARTS> = {
       : `Heeft 24 u aan meetwaarden nodig; tot nu toe ${known}`,
   chartLoading: 'De historie wordt geladen',
   chartFailed: (reason) =>
-    `De historie kon niet worden geladen; de pagina blijft het proberen. ${reason}`,
+    `De historie kon niet worden geladen (${reason}); de pagina blijft het proberen.`,
   chartNoTime: 'De digital twin heeft nog geen tijd; er is nog geen historie.',
   chartIdealsDiffer: 'Ideaal bereik verschilt per soort',
   chartNoSensors: 'Dit meetpunt heeft geen sensor.',

@@ -177,6 +177,6 @@ test('a moment that could not be loaded, and which one is shown instead', () => 
   receive({ pastFault: { at: 3_600, message: 'too busy', isLasting: false } });
   render(<Troubles />);
   expect(lines()).toEqual([
-    'sim 01:00:00 could not be loaded. Showing sim 01:23:45 while the page retries. too busy',
+    'sim 01:00:00 could not be loaded (too busy). Showing sim 01:23:45 while the page retries.',
   ]);
 });

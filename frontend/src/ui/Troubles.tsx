@@ -56,8 +56,8 @@ function troublesOf(
   if (pastFault && moment !== null && pastFault.at !== moment) {
     troubles.push({
       id: 'past',
-      title: S.pastFault(rosText(pastFault.at)),
-      detail: S.pastFaultShown(rosText(moment), shown(pastFault.message, 160)),
+      title: S.pastFault(rosText(pastFault.at), shown(pastFault.message, 160)),
+      detail: S.pastFaultShown(rosText(moment)),
     });
   }
   for (const problem of status?.input_problems ?? []) {

@@ -224,9 +224,8 @@ export const PAST = {
   pastNothing: (moment: string): string => `No data for ${moment}`,
   pastReach: (from: string): string => `Recorded data begins at ${from}.`,
   pastReachNothing: 'Nothing has been recorded yet.',
-  pastFault: (wanted: string): string => `${wanted} could not be loaded.`,
-  pastFaultShown: (shown: string, why: string): string =>
-    `Showing ${shown} while the page retries. ${why}`,
+  pastFault: (wanted: string, why: string): string => `${wanted} could not be loaded (${why}).`,
+  pastFaultShown: (shown: string): string => `Showing ${shown} while the page retries.`,
   backToLive: 'Back to live',
   backToRecording: 'Back to the recording',
   frozenBehindPast: (clock: string): string => `Live data has stopped. Last data at ${clock}`,

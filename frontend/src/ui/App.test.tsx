@@ -95,6 +95,9 @@ describe('page', () => {
     const tabs = screen.getByRole('navigation', { name: /Map/ });
     expect(tabs.querySelector('[data-health]')).toBeNull();
     expect(tabs.textContent).toMatch(/Alarms$/);
+    const at = store.get().view.moment ?? NaN;
+    flush(() => receive({ pastFault: { at, message: 'later than now', isLasting: true } }));
+    expect(screen.getByTestId('sample-count').textContent).toBe('No tag contributes');
   });
 
   test('choosing a sensor is choosing a radio button', () => {

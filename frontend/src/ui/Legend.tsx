@@ -31,7 +31,7 @@ export function Legend({ kiosk }: { kiosk: boolean }): JSX.Element {
   const samples = field?.sensor === name ? field.sampleCount : 0;
   const isFetching = useApp(
     (state) =>
-      !selectHasSnapshot(state) ||
+      (!selectHasSnapshot(state) && !state.twin.pastFault) ||
       (selectShown(state).field.value?.sensor !== name &&
         selectTags(state).some((tag) => tag.at && tag.readings.get(name) != null)),
   );

@@ -197,7 +197,15 @@ class Posterior:
         """
         cells = Cells.of(bbox_min_x, bbox_min_y, bbox_max_x, bbox_max_y, resolution)
         x, y = cells.lattice(self.hyper.l)
-        mean, sd = self.points(np.stack(np.meshgrid(x, y), axis=-1))
+        if self._is_exact:
+            solved, parts = self._whole, []
+            for rows in _split(np.arange(len(y)), len(x) * len(solved.xy)):
+                self._go_on()
+                parts.append(solved.moments(solved.near_grid(x, y[rows])))
+            mean, variance = (np.concatenate(one) for one in zip(*parts, strict=True))
+            mean, sd = self._in_unit(mean, variance)
+        else:
+            mean, sd = self.points(np.stack(np.meshgrid(x, y), axis=-1))
         self._go_on()
         mean, sd = (cells.spread(x, y, one.reshape(len(y), len(x))) for one in (mean, sd))
         return cells.filled(mean, sd, self.sd_known)

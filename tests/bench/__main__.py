@@ -11,12 +11,17 @@ BENCHES = (
     "bench_field",
     "bench_estimate",
     "bench_estimate_checks",
+    "bench_estimate_many",
+    "bench_estimate_speed",
     "bench_log",
     "bench_alarms",
     "bench_page",
     "bench_greenhouse",
     "bench_import",
+    "bench_forward",
     "bench_fleet",
+    "bench_overview",
+    "bench_replicas",
 )
 
 

@@ -7,19 +7,19 @@ error than IDW's.
 """
 
 from collections import defaultdict
-from itertools import product
+from collections.abc import Iterator
 from math import erf, exp, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from lupin_twin.core.parameters import TwinParameters
-from lupin_twin.estimate.engine import thinned
+from lupin_twin.estimate.engine import TagPast, readings_of
 from lupin_twin.estimate.kernel import Readings
-from lupin_twin.estimate.model import fit
+from lupin_twin.estimate.model import Model, fit
 from lupin_twin.field.engine import FieldRules
 from lupin_twin.field.idw import compute_idw_field
-from tests.bench.other_worlds import DAY_S, HOUR_S, JUDGING, SORTS, Floats, World, world_of
+from tests.bench.other_worlds import HOUR_S, JUDGING, SORTS, Floats, World, world_of
 
 CELL_M = 0.25
 INTERVAL_SDS = 1.645
@@ -39,11 +39,21 @@ class Field(NamedTuple):
 class Case(NamedTuple):
     """A greenhouse at a moment: the readings that count, the cells' positions, the truth there."""
 
+    world: World
     readings: Readings
     at_s: float
     places: Floats
     truth: Floats
     idw: Floats
+
+
+def cases() -> Iterator[tuple[str, str, Case]]:
+    """(sort, phase, case)."""
+    for sort in SORTS:
+        for seed in JUDGING:
+            world = world_of(sort, seed)
+            for phase in PHASES:
+                yield sort, phase, case_of(world, phase, seed)
 
 
 def case_of(world: World, phase: str, seed: int) -> Case:
@@ -54,25 +64,44 @@ def case_of(world: World, phase: str, seed: int) -> Case:
     width, height = (int(side / CELL_M) for side in world.size_m)
     x, y = (np.arange(width) + 0.5) * CELL_M, (np.arange(height) + 0.5) * CELL_M
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    latest = {int(tag): row for row, tag in enumerate(all_read.tag)}
-    idw = compute_idw_field(
-        [(*world.xy[tag].tolist(), float(all_read.value[row])) for tag, row in latest.items()],
+    idw = idw_of(all_read, width * CELL_M, height * CELL_M, CELL_M)
+    truth = world.truth(places, np.full(len(places), at_s))
+    return Case(world, as_received(all_read, at_s), 0.0, places, truth, idw)
+
+
+def idw_of(read: Readings, width_m: float, height_m: float, cell_m: float) -> Floats:
+    """The plain field of the latest readings over a floor, cell by cell."""
+    latest = {int(tag): row for row, tag in enumerate(read.tag)}
+    return compute_idw_field(
+        [(*read.xy[tag].tolist(), float(read.value[row])) for tag, row in latest.items()],
         bbox_min_x=0.0,
         bbox_min_y=0.0,
-        bbox_max_x=width * CELL_M,
-        bbox_max_y=height * CELL_M,
-        resolution=CELL_M,
+        bbox_max_x=width_m,
+        bbox_max_y=height_m,
+        resolution=cell_m,
         falloff_radius_m=RULES.falloff_radius_m,
         max_distance_m=RULES.max_distance_m,
         power=RULES.idw_power,
     ).values.astype(np.float64)
-    truth = world.truth(places, np.full(len(places), at_s))
-    return Case(thinned(all_read, at_s, DAY_S), at_s, places, truth, idw)
 
 
-def judged(case: Case) -> Field:
+def as_received(read: Readings, at_s: float) -> Readings:
+    """A twin's input of an estimate, by seconds from `at_s` on."""
+    tags = []
+    for tag, (x, y) in enumerate(read.xy):
+        rows = np.flatnonzero(read.tag == tag)
+        own = zip((read.time_s[rows] * 1e9).round(), read.value[rows], strict=True)
+        tags.append(TagPast(str(tag), x, y, tuple((int(ns), float(value)) for ns, value in own)))
+    return readings_of(tags, round(at_s * 1e9), 24.0 * HOUR_S)
+
+
+def judged(case: Case, model: Model | None = None) -> Field:
+    model = fit(case.readings) if model is None else model
+    return compared(case, *model.posterior(case.readings, case.at_s).points(case.places))
+
+
+def compared(case: Case, mean: Floats, sd: Floats) -> Field:
     """An estimate of the case's positions, compared with IDW's and the truth."""
-    mean, sd = fit(case.readings).posterior(case.readings, case.at_s).points(case.places)
     painted = np.isfinite(case.idw)
     of_idw = rmse(case.idw[painted] - case.truth[painted])
     off = case.truth - mean
@@ -109,12 +138,10 @@ def line(name: str, fields: list[Field]) -> str:
 
 def main() -> None:
     rows: dict[str, list[Field]] = defaultdict(list)
-    for sort, seed in product(SORTS, JUDGING):
-        world = world_of(sort, seed)
-        for phase in PHASES:
-            field = judged(case_of(world, phase, seed))
-            for name in (sort, phase, "all"):
-                rows[name].append(field)
+    for sort, phase, case in cases():
+        field = judged(case)
+        for name in (sort, phase, "all"):
+            rows[name].append(field)
     print(f"{'':<26}{'fields':>7}{'to IDW':>9}{'covers':>9}{'CRPS':>9}{'narrow':>8}{'worse':>8}")
     for name in (*SORTS, *PHASES, "all"):
         print(line(name, rows[name]))

@@ -108,9 +108,22 @@ class Filled:
 @cache
 def filled(greenhouse: Greenhouse) -> Filled:
     """The journal of a greenhouse, written once per process; it is deleted with the process."""
-    folder = tempfile.mkdtemp(prefix="lupin-twin-bench-")
+    return fill(
+        _folder() / f"{greenhouse.tags}-{greenhouse.days:g}-{greenhouse.every_s:g}.sqlite",
+        greenhouse,
+    )
+
+
+@cache
+def _folder() -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="lupin-twin-bench-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    path, readings = Path(folder) / "journal.sqlite", 0
+    return folder
+
+
+def fill(path: Path, greenhouse: Greenhouse) -> Filled:
+    """Write all observations of a greenhouse, as its twin would."""
+    readings = 0
     file = JournalFile(path, LIMITS, is_sound=True)
     with closing(file):
         run = file.start(Clock(BEGUN_NS, BEGUN_NS, is_simulated=False), is_believed=True).run

@@ -33,13 +33,16 @@ def _run(*command: str) -> None:
 class Postgres:
     """A server; `url` is its connection string, `folder` has its socket."""
 
-    def __init__(self, folder: Path, *, fsync: bool, primary: Postgres | None = None) -> None:
+    def __init__(
+        self, folder: Path, *, fsync: bool, connections: int = 100, primary: Postgres | None = None
+    ) -> None:
         found = Path(shutil.which("initdb") or _BIN / "initdb").resolve()
         self.folder = folder
         self.url = f"host={folder} user={_USER} dbname=postgres"
         self._pg_ctl = str(found.with_name("pg_ctl"))
         self._data = folder / "data"
         self._fsync = "on" if fsync else "off"
+        self._connections = connections
         self._listens = "-c listen_addresses=''"
         if os.geteuid() == 0:
             owner = pwd.getpwnam(_USER)
@@ -57,7 +60,10 @@ class Postgres:
 
     def start(self) -> None:
         """Start it; returns when it answers."""
-        options = f"-k {self.folder} {self._listens} -c fsync={self._fsync}"
+        options = (
+            f"-k {self.folder} {self._listens} -c fsync={self._fsync}"
+            f" -c max_connections={self._connections}"
+        )
         log = str(self.folder / "log")
         _run(self._pg_ctl, "-D", str(self._data), "-o", options, "-l", log, "-w", "start")
 
@@ -116,7 +122,9 @@ class Postgres:
 
 
 @contextmanager
-def server(*, fsync: bool = False, primary: Postgres | None = None) -> Iterator[Postgres]:
+def server(
+    *, fsync: bool = False, connections: int = 100, primary: Postgres | None = None
+) -> Iterator[Postgres]:
     """A running server; it is stopped and deleted with the block.
 
     `primary`: this one is its standby, and the primary now waits for it at each commit.
@@ -124,7 +132,7 @@ def server(*, fsync: bool = False, primary: Postgres | None = None) -> Iterator[
     # Short: the path of a socket has at most 107 bytes.
     folder = Path(tempfile.mkdtemp(prefix="pg", dir="/tmp"))
     try:
-        made = Postgres(folder, fsync=fsync, primary=primary)
+        made = Postgres(folder, fsync=fsync, connections=connections, primary=primary)
         made.start()
         try:
             if primary is not None:

@@ -122,7 +122,6 @@ function CardBody({
             species={tag.sureSpecies}
             health={health}
             when={tag.readAt.get(name) ?? 'never'}
-
             values={history?.sensors.find((each) => each.name === name)?.values ?? []}
           />
         ))}

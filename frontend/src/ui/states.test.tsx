@@ -103,7 +103,7 @@ const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
       range: /\d.*, (unter|über) \d/,
       reading_failed: /Der Sensor liefert keinen Wert$/,
       scan_failed: /^Fehlversuch: (nicht erreichbar|nicht erkannt|nicht lesbar)/,
-      pest: /^\d+ Schädlinge? festgestellt$/,
+      pest: /^\d+ Schädlinge? gefunden$/,
       old: /gemessen|kein Messwert|[Kk]eine Messung/,
       changed: /verändert/,
       silent: /Keine aktuellen Daten vom digitalen Zwilling/,
@@ -111,7 +111,7 @@ const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
     },
     alarms: {
       range: /(unter|über) \d/,
-      pest: /^Schädlinge festgestellt, jetzt \d+ Schädlinge? \(kritisch\)$/,
+      pest: /^Schädlinge gefunden, jetzt \d+ Schädlinge? \(kritisch\)$/,
     },
     tag: 'Messpunkt 1',
     house: 'Ganzes Gewächshaus',

@@ -322,7 +322,7 @@ def test_a_critical_alarm_reaches_exactly_the_browsers_that_may_have_it(open_to:
         wait_for(lambda: on.posted_to(annas) and on.posted_to(berts), "both messages")
         [to_anna], [to_bert] = on.posted_to(annas), on.posted_to(berts)
         assert annas.read(to_anna) == {"title": "Alarm", "body": "Tag 7: Pest seen (critical)"}
-        assert berts.read(to_bert)["body"] == "Messpunkt 7: Schädlinge festgestellt (kritisch)"
+        assert berts.read(to_bert)["body"] == "Messpunkt 7: Schädlinge gefunden (kritisch)"
         assert to_anna.headers["ttl"] == "3600"
         assert to_anna.headers["content-encoding"] == "aes128gcm"
         authorization = to_anna.headers["authorization"]

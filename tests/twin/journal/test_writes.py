@@ -88,7 +88,7 @@ def test_the_recent_window_has_the_last_nine_scans_and_inspections_of_each_tag(
         assert stamps == {
             ("7", 0): [9, 10, 11, 12, 13, 14, 15, 16, 17, 17],
             ("7", 1): [],
-            ("8", 0): [17 - 3 * DAY],
+            ("8", 0): [16 - 3 * DAY, 17 - 3 * DAY],
             ("8", 1): [9, 10, 11, 12, 13, 14, 15, 16, 17],
         }
         assert recent(copied(life.connection), then) == found

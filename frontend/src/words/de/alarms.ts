@@ -28,9 +28,9 @@ export const ALARMS: In<typeof EN.ALARMS> = {
       ? 'jetzt unbekannt'
       : `jetzt unbekannt, zuletzt ${last}${age === null ? '' : ` vor ${age}`}`,
   alarmPests: {
-    seen: 'festgestellt',
-    still: 'weiterhin festgestellt',
-    gone: 'nicht mehr festgestellt',
+    seen: 'gefunden',
+    still: 'weiterhin gefunden',
+    gone: 'nicht mehr gefunden',
   },
   alarmWorst: {
     below: (reading) => `Tiefstwert ${reading}`,
@@ -138,8 +138,8 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     scanFailed: (outcome, age) => `Fehlversuch: ${outcome}${age === null ? '' : `, vor ${age}`}`,
     pest: (count) =>
       count > 0
-        ? `${counted(count, 'Schädling', 'Schädlinge')} festgestellt`
-        : 'Schädlinge festgestellt',
+        ? `${counted(count, 'Schädling', 'Schädlinge')} gefunden`
+        : 'Schädlinge gefunden',
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''

@@ -70,7 +70,7 @@ export const MAP: In<typeof EN.MAP> = {
   legendOthers: 'andere',
   pinLacking: 'kein Sensor',
   pinFailed: 'Sensor ausgefallen',
-  pinPest: 'Schädlinge festgestellt',
+  pinPest: 'Schädlinge gefunden',
   range: 'Farbbereich',
   rangeAuto: 'Auto',
   rangeFixed: 'Fest',

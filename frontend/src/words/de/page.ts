@@ -255,7 +255,7 @@ export const PAST: In<typeof EN.PAST> = {
   timebarMark: {
     scans: 'Balken nach oben: Messungen',
     failures: 'Balken nach unten: fehlgeschlagene Versuche',
-    pest: 'gefülltes Dreieck: Schädlinge festgestellt',
+    pest: 'gefülltes Dreieck: Schädlinge gefunden',
     cleared: 'leerer Ring: Schädlinge weg',
     silence: 'schraffiert: kein Messversuch',
     before: 'gegenläufig schraffiert: nicht aufgezeichnet oder nicht mehr gespeichert',

@@ -137,9 +137,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     implausible: (reading) => `${reading}: kein plausibler Wert`,
     scanFailed: (outcome, age) => `Fehlversuch: ${outcome}${age === null ? '' : `, vor ${age}`}`,
     pest: (count) =>
-      count > 0
-        ? `${counted(count, 'Schädling', 'Schädlinge')} gefunden`
-        : 'Schädlinge gefunden',
+      count > 0 ? `${counted(count, 'Schädling', 'Schädlinge')} gefunden` : 'Schädlinge gefunden',
     old: (sensor, age, holds, isDated) => {
       const since = !isDated
         ? sensor === ''

@@ -96,7 +96,9 @@ describe('page', () => {
     expect(tabs.querySelector('[data-health]')).toBeNull();
     expect(tabs.textContent).toMatch(/Alarms$/);
     const at = store.get().view.moment ?? NaN;
-    flush(() => receive({ pastFault: { at, message: 'later than now', isLasting: true } }));
+    flush(() => {
+      receive({ pastFault: { at, message: 'later than now', isLasting: true } });
+    });
     expect(screen.getByTestId('sample-count').textContent).toBe('No tag contributes');
   });
 

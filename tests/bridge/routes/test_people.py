@@ -246,7 +246,7 @@ def test_a_critical_alarm_is_shelved_with_a_reason_for_at_most_an_hour_and_anyon
         ({"kind": "comment", "subject": "note:1", "text": "x"}, 400, "subject is 'note:1'"),
         ({"kind": "comment", "subject": "site", "text": "x", "until": "9e9"}, 400, "until is"),
         ({"kind": "comment", "subject": "site", "text": "x" * 501}, 400, "at most 500"),
-        ({"kind": "comment", "subject": "site", "text": "a\0b"}, 400, "text: string should match"),
+        ({"kind": "comment", "subject": "site", "text": "a\0b"}, 400, "text: it contains a"),
         ({"kind": "comment", "subject": "site", "text": ["x"]}, 400, "text"),
         ({"kind": "comment", "subject": "site", "text": "x", "by": "boss"}, 400, "by: extra"),
         ([1], 400, "the body"),

@@ -32,6 +32,7 @@ from tests.support.people import (
     signed_in,
     write,
 )
+from tests.support.proc_stat import cpu_s
 from tests.support.waiting import PATIENCE_S, wait_for
 from tests.support.web import Bridge, bridge
 from tests.support.ws_client import last_word, open_websocket
@@ -154,15 +155,16 @@ def test_signing_in_for_ever_does_not_push_others_out_of_the_audit_trail(
 def test_who_is_removed_or_replaced_amid_a_sign_in_gets_no_session(
     live: Bridge, accounts: Path
 ) -> None:
-    # The parameters in the hash decide: it takes seconds, and the others wait behind it. Sessions
-    # are checked more often, but a sign-in has none yet.
+    # The parameters in the hash decide: once begun, it takes seconds, and the others wait behind it.
+    # Sessions are checked more often, but a sign-in has none yet.
     add(accounts, secret=f"$argon2id$v=19$m=65536,t=60,p=1${'A' * 22}${'A' * 43}", slow="viewer")
     add(accounts, gone="operator", new="operator")
     with ExitStack() as open_, ThreadPoolExecutor() as clients:
-        answers = []
+        answers, began_s = [], cpu_s(live.process.pid)
         for name in ("slow", "gone", "new"):
             client = open_.enter_context(httpx.Client(base_url=live.url, timeout=PATIENCE_S))
             answers.append(clients.submit(sign_in, client, name))
+            wait_for(lambda: cpu_s(live.process.pid) > began_s + 0.2, "the slow one to begin")
             assert client.get("/healthz").status_code == 200  # and the sign-in before it is read
         for name in ("gone", "new"):
             remove(accounts, name)

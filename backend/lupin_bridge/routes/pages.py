@@ -45,19 +45,8 @@ _WRITE_S: Final = 0.02
 
 GUIDE_PATH: Final = "/docs/guide"
 _NO_GUIDE: Final = "the guide was not built: run `make docs` in the clone, or install a release"
-# The guide and `/docs` have inline styles; scripts are files, as everywhere.
-_STYLED_POLICY: Final = f"{CONTENT_POLICY}; style-src 'self' 'unsafe-inline'"
-_WRITTEN: Final = {**REVALIDATE, "Content-Security-Policy": _STYLED_POLICY}
-_STYLE: Final = """
-:root { color-scheme: light dark; font: 15px/1.5 system-ui, sans-serif; }
-main { max-width: 60rem; margin: 0 auto; padding: 0 1rem 3rem; }
-section { margin-block: 2rem; border-top: 1px solid #8886; }
-code, pre { font: 13px/1.5 ui-monospace, monospace; }
-h3 code { font-size: 1rem; font-weight: 700; }
-pre { overflow-x: auto; padding: 0.5rem 0.75rem; border-radius: 6px; background: #8882; }
-table { border-collapse: collapse; }
-td { padding: 0.25rem 0.75rem 0.25rem 0; border-top: 1px solid #8884; vertical-align: top; }
-"""
+# The guide's theme has inline styles; scripts are files, as everywhere.
+_GUIDE_POLICY: Final = f"{CONTENT_POLICY}; style-src 'self' 'unsafe-inline'"
 
 HOW_TO_BUILD: Final = (
     "build it with `npm ci && npm run build` in the project's folder, install the bridge again "
@@ -95,12 +84,12 @@ async def _written_once(
 ) -> Response:
     bridge: Bridge | None = request.app.state.bridge
     if bridge is None:
-        return Response(write(), headers=_WRITTEN, media_type=media_type)
+        return Response(write(), headers=REVALIDATE, media_type=media_type)
 
     return await respond(
         request,
         key,
-        lambda: computed(request, key, write, media_type, cost_s=_WRITE_S, headers=_WRITTEN),
+        lambda: computed(request, key, write, media_type, cost_s=_WRITE_S, headers=REVALIDATE),
     )
 
 
@@ -118,7 +107,7 @@ def render(document: dict[str, Any], base_url: str) -> str:
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
-        f"<title>{escape(info['title'])}: API</title><style>{_STYLE}</style></head><body><main>"
+        f"<title>{escape(info['title'])}: API</title></head><body><main>"
         f"<h1>{escape(info['title'])}: API</h1><p>{_prose(info['summary'])}</p>"
         f"<p>{_prose(info['description'])}</p>"
         '<p>As a document for tools: <a href="openapi.json">/openapi.json</a></p>'
@@ -151,7 +140,7 @@ def _route(method: str, path: str, operation: dict[str, Any], base_url: str) -> 
         f"<section><h3><code>{method} {escape(path)}</code></h3>"
         f"<p>{_prose(operation.get('summary', ''))}. {_prose(operation.get('description', ''))}</p>"
         f"<pre>curl {'' if method == 'GET' else f'-X {method} '}'{escape(url)}'</pre>"
-        + (f"<table>{rows}</table>" if rows else "")
+        + (f"<table border='1'>{rows}</table>" if rows else "")
         + f"<ul>{answers}</ul></section>"
     )
 
@@ -174,7 +163,7 @@ def _schema(name: str, described: dict[str, Any]) -> str:
     return (
         f'<section id="{escape(name)}"><h3>{escape(name)}</h3>'
         f"<p>{_prose(described.get('description', ''))}</p>"
-        f"<table>{rows}</table></section>"
+        f"<table border='1'>{rows}</table></section>"
     )
 
 
@@ -197,7 +186,7 @@ def _type_of(prop: dict[str, Any]) -> str:
 class _Guide(StaticFiles):
     async def get_response(self, path: str, scope: Scope) -> Response:
         response = await super().get_response(path, scope)
-        response.headers["Content-Security-Policy"] = _STYLED_POLICY
+        response.headers["Content-Security-Policy"] = _GUIDE_POLICY
         return response
 
 

@@ -155,7 +155,7 @@ def test_signing_in_for_ever_does_not_push_others_out_of_the_audit_trail(
 def test_who_is_removed_or_replaced_amid_a_sign_in_gets_no_session(
     live: Bridge, accounts: Path
 ) -> None:
-    # The parameters in the hash decide: once begun, it takes seconds, and the others wait behind it.
+    # The parameters in the hash decide: once begun, it takes seconds, and the others wait for it.
     # Sessions are checked more often, but a sign-in has none yet.
     add(accounts, secret=f"$argon2id$v=19$m=65536,t=60,p=1${'A' * 22}${'A' * 43}", slow="viewer")
     add(accounts, gone="operator", new="operator")

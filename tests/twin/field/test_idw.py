@@ -48,11 +48,12 @@ def field_over(width: int, height: int, samples: Sequence[Sample], **changes: An
 # --- rule by rule ----------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("power", [2.0, 3.0])
 @pytest.mark.parametrize("falloff", [0.0, 1.0, 1.5, 3.0])
-def test_a_coincident_sample_is_taken_exactly(falloff: float) -> None:
+def test_a_coincident_sample_is_taken_exactly(power: float, falloff: float) -> None:
     closer = math.nextafter(COINCIDENT_EPS_M, 0.0)
     samples = [(0.002, 0.0, 1e6), (closer, 0.0, 7.0)]
-    assert field_at_origin(samples, falloff_radius_m=falloff) == 7.0
+    assert field_at_origin(samples, falloff_radius_m=falloff, power=power) == 7.0
 
 
 def test_equal_distances_tie_although_their_squares_differ_by_a_rounding() -> None:
@@ -74,13 +75,14 @@ def test_equal_distances_tie_although_their_squares_differ_by_a_rounding() -> No
         assert field_at_origin(samples, falloff_radius_m=0.5, max_distance_m=2.0) == 10.0
 
 
-def test_a_distance_equal_to_the_radius_is_within_although_its_square_is_not() -> None:
+@pytest.mark.parametrize("power", [2.0, 3.0])
+def test_a_distance_equal_to_the_radius_is_within_although_its_square_is_not(power: float) -> None:
     """0.8 and 1.5 are the legs of a right triangle whose hypotenuse rounds to exactly 1.7."""
     assert 0.8 * 0.8 + 1.5 * 1.5 > 1.7 * 1.7
     assert math.sqrt(0.8 * 0.8 + 1.5 * 1.5) == 1.7
-    gate = {"falloff_radius_m": 0.0, "max_distance_m": 1.7}
+    gate = {"falloff_radius_m": 0.0, "max_distance_m": 1.7, "power": power}
     assert field_at_origin([(0.8, 1.5, 7.0)], **gate) == 7.0
-    falloff = {"falloff_radius_m": 1.7, "max_distance_m": 3.0}
+    falloff = {"falloff_radius_m": 1.7, "max_distance_m": 3.0, "power": power}
     assert field_at_origin([(0.8, 1.5, 10.0), (1.5, 0.8, 20.0)], **falloff) == 15.0
 
 

@@ -53,8 +53,15 @@ MAX_PAIRS: Final = 65_536
 # MAX_PAIRS only if more than two thousand samples reach one part.
 _MIN_POINTS: Final = 32
 
+# Up to this radius, weights are plain 1/d². Beyond it, and for any power but 2, they are scaled by
+# the nearest distance of the cell, so that none overflows and the largest is exactly 1.
+_MAX_PLAIN_REACH_M: Final = 1e6
+
 # Larger readings are clipped to this: it is far past float32, and Σ(v/dᵖ) cannot overflow.
 _LARGEST_VALUE: Final = 1e280
+
+# Least weight, at power 2, of a sample closer than COINCIDENT_EPS_M; 0.999 allows for rounding.
+_COINCIDENT_WEIGHT: Final = 0.999 / COINCIDENT_EPS_M**2
 
 IndexArray = npt.NDArray[np.intp]
 
@@ -204,10 +211,14 @@ class PairwiseIdw:
             check_finite(name, number)
             if number < 0.0:
                 raise ValueError(f"{name} is {number}, must not be less than 0")
-        self._power = power
+        self.power = power
+        self.falloff_radius = falloff_radius_m
+        self.max_distance = max_distance_m
         self.falloff_square = _largest_square_within(falloff_radius_m)
         self.max_square = _largest_square_within(max_distance_m)
         self.reach_square = max(self.falloff_square, self.max_square)
+        self._equal_radii = falloff_radius_m == max_distance_m
+        self._plain_weights = power == 2.0 and falloff_radius_m <= _MAX_PLAIN_REACH_M
         self._allocate(MAX_PAIRS)
 
     def _allocate(self, pairs: int) -> None:
@@ -224,31 +235,56 @@ class PairwiseIdw:
         return self._square[:pairs].reshape(samples, points)
 
     def evaluate(self, square: FloatArray, value: FloatArray) -> FloatArray:
-        """The points' values, NaN past `max_distance_m`; `square` is from `squares`.
+        """The points' values, NaN past `max_distance_m`; `square`, from `squares`, is overwritten.
 
         An infinite squared distance excludes a sample from a point. Call it with numpy's
         floating-point warnings off: 0/0 is a point that no sample reaches, 1/0 a sample on a point.
         """
         weight = self._weight[: square.size].reshape(square.shape)
         within = self._within[: square.size].reshape(square.shape)
-        shortest = np.minimum.reduce(square, axis=0)
         np.less_equal(square, self.falloff_square, out=within)
-        # The weights are (nearest/d)ᵖ, so that the largest is 1 and none overflows.
         weight.fill(0.0)
-        np.divide(shortest, square, out=weight, where=within)
-        if self._power != 2.0:
-            np.power(weight, self._power / 2.0, out=weight, where=within)
+        if self._plain_weights:
+            return self._evaluate_plain(square, value, weight, within)
+        return self._evaluate_normalised(square, value, weight, within)
+
+    def _evaluate_plain(
+        self, square: FloatArray, value: FloatArray, weight: FloatArray, within: BoolArray
+    ) -> FloatArray:
+        """Power 2: 1/d² needs no root, and the nearest sample is seldom needed."""
+        np.divide(1.0, square, out=weight, where=within)
+        total = np.ones(value.size).dot(weight)
         points: FloatArray = value.dot(weight)
-        points /= np.ones(value.size).dot(weight)
-        special = np.flatnonzero(
-            (shortest <= _COINCIDENT_SQUARE) | (shortest > self.falloff_square)
-        )
+        points /= total
+        # With equal radii, a point out of reach is 0/0 by now. The nearest sample matters only if
+        # the weights are so large that one may be coincident.
+        if self._equal_radii and np.maximum.reduce(total) < _COINCIDENT_WEIGHT:
+            return points
+        shortest = np.minimum.reduce(square, axis=0)
+        special = np.flatnonzero((shortest <= _COINCIDENT_SQUARE) | (total == 0.0))
         if special.size:
             # By the root: squares that differ by rounding can be the same distance, and of equally
             # near samples the first one counts.
-            distance = np.sqrt(square[:, special])
+            distance = square[:, special]
+            np.sqrt(distance, out=distance)
             points[special] = value[distance.argmin(axis=0)]
         points[shortest > self.max_square] = np.nan
+        return points
+
+    def _evaluate_normalised(
+        self, square: FloatArray, value: FloatArray, weight: FloatArray, within: BoolArray
+    ) -> FloatArray:
+        """Any power: the weights are (nearest/d)ᵖ, so that the largest is 1 and none overflows."""
+        distance = np.sqrt(square, out=square)
+        shortest = np.minimum.reduce(distance, axis=0)
+        np.divide(shortest, distance, out=weight, where=within)
+        np.power(weight, self.power, out=weight, where=within)
+        points: FloatArray = value.dot(weight)
+        points /= np.ones(value.size).dot(weight)
+        special = np.flatnonzero((shortest < COINCIDENT_EPS_M) | (shortest > self.falloff_radius))
+        if special.size:
+            points[special] = value[distance[:, special].argmin(axis=0)]
+        points[shortest > self.max_distance] = np.nan
         return points
 
 

@@ -101,9 +101,10 @@ class Hmi:
         self.page.wait_for_function(
             "size => innerWidth === size[0] && innerHeight === size[1]", arg=[width, height]
         )
-        # A size observer may cause another layout.
+        # The font may still be on its way; and a size observer may cause another layout.
         self.page.evaluate(
-            "async () => { for (const _ of '12') await new Promise(requestAnimationFrame); }"
+            "async () => { await document.fonts.ready;"
+            " for (const _ of '12') await new Promise(requestAnimationFrame); }"
         )
 
     def address(self) -> str:

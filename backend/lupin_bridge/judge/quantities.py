@@ -25,6 +25,7 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import ROUND_HALF_UP, Decimal
 from functools import cached_property
 from math import ceil, log10
 from operator import itemgetter
@@ -292,8 +293,25 @@ class Sensors:
         other = self.fallback
         return Sensor(name, other.label or name, other.unit, other.hue, other.lightness)
 
-    def digits(self, name: str) -> int | None:
-        """Decimal places of a value, as the page writes it; None: they depend on the value's size.
+    def text_of(self, name: str, value: float) -> str:
+        """A value as the page writes it in English, without its unit; empty: it is not finite.
+
+        Half is rounded away from zero, as browsers do. From 1,000 on, there are no decimals.
+        """
+        size = abs(value)
+        if not size < 1e6:
+            return f"{value:.2e}".replace("e+0", "e+") if math.isfinite(value) else ""
+        whole, digits = Decimal(1), self._digits(name)
+        if digits is None:
+            # About two digits.
+            digits = 0 if size >= 100 else 1 if size >= 1 or not size else 1 + ceil(-log10(size))
+        found = Decimal(value).quantize(whole.scaleb(-min(6, digits)), ROUND_HALF_UP)
+        if abs(found) >= 1000:
+            found = Decimal(value).quantize(whole, ROUND_HALF_UP)
+        return f"{found or abs(found):,f}"
+
+    def _digits(self, name: str) -> int | None:
+        """Decimal places of a sensor's values; None: they depend on the value's size.
 
         The largest ideal limit, of the sensor or else of its sources, gets about three digits.
         """

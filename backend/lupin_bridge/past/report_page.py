@@ -174,7 +174,7 @@ class _Page:
     def _counts(self, counts: Mapping[str, int]) -> str:
         whole = counts["tags"]
         part = counts["tags_scanned"]
-        share = round(100 * part / whole) if whole else 0
+        share = 100 * part // whole if whole else 0  # 100 % only if it is all
         names = ("raised", "cleared", "active", "critical", "scans", "failed", "inspections")
         shown = {name: self._count(counts[name]) for name in names}
         shown["scanned"] = self.say(
@@ -236,7 +236,7 @@ class _Page:
             for it in (*tag.readings, *derive(tag.readings)) if numbers else (pests,):
                 if it.name == name:
                     at_end = number(it.value, limit=limit)
-                    if it.observed_at_ns is not None:
+                    if at_end and it.observed_at_ns is not None:
                         at_end += f" ({self._clock(stamp(it.observed_at_ns))})"
         return {
             "alarm": self._what(reason),
@@ -407,11 +407,9 @@ class _Page:
         if value is None:
             return ""
         known = self._criteria.sensors
-        unit, digits, size = known.named(sensor).unit, known.digits(sensor), abs(value)
-        number = f"{value:.4g}"
-        if size < 1e6 and (digits is not None or size >= 1000):
-            number = f"{value:,.{digits if digits and size < 1000 else 0}f}"
-        text = f"{self._written(number)}\u00a0{unit}".strip()
+        # Without a sensor, it is a number of bugs.
+        number = known.text_of(sensor, value) if sensor else f"{value:.0f}"
+        text = f"{self._written(number)}\u00a0{known.named(sensor).unit}".strip() if number else ""
         if limit is None or value == limit or text != self._number(limit, sensor):
             return text
         return self.say("just_below" if value < limit else "just_above", limit=text)
@@ -428,11 +426,14 @@ class _Page:
         return digits.replace("-", "\u2212")
 
     def _length(self, seconds: int) -> str:
-        """A length of time in its two largest units, as the page writes it."""
+        """A length of time in at most its two largest units, as the page writes it."""
         days, hours, minutes = seconds // 86_400, seconds // 3600 % 24, seconds // 60 % 60
-        in_hours = f"{hours}\u00a0{self.say('hours')}"
-        rest = f"{minutes}\u00a0min" if seconds >= 60 else f"{seconds}\u00a0s"
-        return f"{days}\u00a0d {in_hours}" if days else f"{in_hours} {rest}" if hours else rest
+        texts = (
+            f"{days}\u00a0d" if days else "",
+            f"{hours}\u00a0{self.say('hours')}" if hours else "",
+            f"{minutes}\u00a0min" if minutes and not days else "",
+        )
+        return " ".join(filter(None, texts)) or f"{seconds}\u00a0s"
 
     def _zone_name(self, *moments: Mapping[str, int]) -> str:
         zone = self._zone

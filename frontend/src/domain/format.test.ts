@@ -17,11 +17,13 @@ import { sensorNamed } from '../testing/sensors';
 
 test.each([
   [0, '0.0'],
-  [0.042, '0.04'],
-  [-0.004, '0.00'],
+  [0.042, '0.042'],
+  [-0.004, '\u22120.0040'],
   [21.456, '21.5'],
   [-3.25, '\u22123.3'],
   [99.96, '100.0'],
+  [999.6, '1,000'],
+  [1_234.5, '1,235'],
   [100, '100'],
   [612.4, '612'],
   [-80_000, '\u221280,000'],
@@ -120,7 +122,7 @@ test('of a sensor that nobody knows no text is off by more than a twentieth of i
 test('all values of a sensor have as many digits, whatever their size', () => {
   const texts = (name: string, ...values: number[]): string[] =>
     values.map((value) => valueText(sensorNamed(name), value));
-  expect(texts('temperature', 0.4, 9.96, 100.4)).toEqual(['0.4', '10.0', '100.4']);
+  expect(texts('temperature', 0.4, 9.96, 20.25, -0.04)).toEqual(['0.4', '10.0', '20.3', '0.0']);
   expect(texts('vpd', 0.04, 1.1, 12)).toEqual(['0.04', '1.10', '12.00']);
   expect(texts('co2', 0, 99.6, 1_499.6)).toEqual(['0', '100', '1,500']);
   expect(texts('humidity', 0.4, 100)).toEqual(['0.4', '100.0']);

@@ -11,42 +11,36 @@ const POINT =
 /** A number's text in the reader's form: their decimal separator, and a true minus sign. */
 export const written = (text: string): string => text.replace('.', POINT).replace('-', '\u2212');
 
-/** A number with the given digits, or as precise as its size needs. */
+/** A number with the given digits, or as precise as its size needs: a small one never reads as 0. */
 function roundedText(value: number, digits: number | null): string {
   const size = Math.abs(value);
   if (size >= 1e6) return value.toExponential(2);
-  const text = value.toFixed(digits ?? (size >= 100 ? 0 : size >= 1 || value === 0 ? 1 : 2));
+  const own = size >= 1 || size === 0 ? 1 : Math.min(6, 1 + Math.ceil(-Math.log10(size)));
+  const text = value.toFixed(digits ?? (size >= 100 ? 0 : own));
   return /^-0(\.0+)?$/.test(text) ? text.slice(1) : text;
 }
 
 const WHOLE = new Intl.NumberFormat(LOCALE, { maximumFractionDigits: 0 });
 
 /** In the reader's form, with thousands separators, as on a chart's axis. */
-export const numberText = (value: number, digits: number | null = null): string =>
-  Math.abs(value) >= 1000 && Math.abs(value) < 1e6
+export function numberText(value: number, digits: number | null = null): string {
+  const text = roundedText(value, digits);
+  return Math.abs(Number(text)) >= 1000 && Math.abs(value) < 1e6
     ? WHOLE.format(value).replace('-', '\u2212')
-    : written(roundedText(value, digits));
+    : written(text);
+}
 
 /** A reading without its unit. */
 export const valueText = (sensor: Sensor, value: number): string =>
-  sized(sensor, toShown(sensor, value));
+  numberText(toShown(sensor, value), sensor.digits);
 
 /** The difference of two readings, or an error, without its unit. */
 export const differenceNumber = (sensor: Sensor, by: number): string =>
-  sized(sensor, differenceToShown(sensor, by));
-
-const sized = ({ digits }: Sensor, given: number): string =>
-  numberText(given, digits ?? digitsOfSmall(given));
+  numberText(differenceToShown(sensor, by), sensor.digits);
 
 /** A number's text and the sensor's unit, joined by a no-break space. */
 export const withUnit = ({ unit }: Sensor, text: string): string =>
   unit ? `${text}\u00a0${unit}` : text;
-
-/** Without ranges, a small value keeps two digits; otherwise it would read as 0. */
-function digitsOfSmall(value: number): number | null {
-  const size = Math.abs(value);
-  return size === 0 || size >= 0.1 ? null : Math.min(6, 1 + Math.ceil(-Math.log10(size)));
-}
 
 export const readingText = (sensor: Sensor, value: number): string =>
   withUnit(sensor, valueText(sensor, value));

@@ -297,7 +297,7 @@ const plain = (text: string): string => text.replaceAll('\u00a0', ' ');
 test.each([
   ['temperature', 22.41, 0.79, '22.4 ± 1.3 °C'],
   ['temperature', 20.2, 0.377, '20.2 ± 0.6 °C'],
-  ['temperature', 20.2, 0.02, '20.2 ± 0.03 °C'],
+  ['temperature', 20.2, 0.02, '20.2 ± 0.033 °C'],
   ['temperature', -2, 12, '−2.0 ± 19.7 °C'],
   ['co2', 536.2, 22, '536 ± 36 ppm'],
   ['co2', 536.2, 0.2, '536 ± 0.33 ppm'],

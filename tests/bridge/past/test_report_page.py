@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -236,15 +237,41 @@ def test_values_of_a_sensor_have_equal_digits_and_none_looks_like_its_limit(
     assert numbers in page_of(lang, alarms=[alarm(reason=low, worst=349.7)])
     spun = {**low, "sensor": "spin", "value": 12345.0, "limit": 20000.0}
     assert "e+04" not in page_of(lang, alarms=[alarm(reason=spun, worst=12345.0)])
-    assert re.search(r"1e\+06 \(\w+\) 20", page_of(lang, alarms=[alarm(reason=spun, worst=1e6)]))
+    large = page_of(lang, alarms=[alarm(reason=spun, worst=1e6)])
+    assert re.search(r" 1[.,]00e\+6 \(\w+\) 20", large)
     page = page_of(lang, alarms=[alarm(reason=low, worst=350.0)])
     assert re.search(rf"06:01 350 ppm \(\w+\) {limits}", page)
     hot = {**low, "sensor": "temperature", "value": 40.0, "limit": 35.0}
     assert re.search(r" 1[.,]?235 °C", page_of(lang, alarms=[alarm(reason=hot, worst=1234.6)]))
-    # As on the page: `format.test.ts`.
-    sensors = GREENHOUSE.sensors
-    names = ("temperature", "vpd", "co2", "humidity", "dew_point", "co2_dose", "spin")
-    assert [sensors.digits(name) for name in names] == [1, 2, 0, 1, 1, 0, None]
+
+
+@pytest.mark.parametrize(
+    ("sensor", "texts"),
+    [
+        ("temperature", {20.25: "20.3", -3.25: "-3.3", -0.04: "0.0", 999.96: "1,000"}),
+        ("vpd", {0.625: "0.63", 12.0: "12.00"}),
+        ("co2", {612.5: "613", 1234.5: "1,235", 1e6: "1.00e+6", math.nan: ""}),
+        ("dew_point", {0.4: "0.4"}),
+        ("co2_dose", {80.4: "80"}),
+        ("spin", {0.0: "0.0", 0.042: "0.042", 0.25: "0.25", 45.73: "45.7", 612.4: "612"}),
+    ],
+)
+def test_a_value_is_rounded_as_on_the_page(sensor: str, texts: dict[float, str]) -> None:
+    # `format.test.ts` has the same.
+    assert {value: GREENHOUSE.sensors.text_of(sensor, value) for value in texts} == texts
+
+
+def test_a_failed_reading_is_no_value_and_a_length_has_no_zero() -> None:
+    hot = {"verdict": "critical", "kind": "range", "sensor": "temperature", "value": 40.0}
+    tag = TagState("7", readings=(Reading("temperature", math.nan, BEGUN_S * 10**9),))
+    page = page_of(alarms=[alarm(reason={**hot, "limit": 35.0}, worst=40.25)], tags=[tag])
+    assert "7 06:01 40.3 °C (critical)" in page
+    lengths = {3_600: "1 h", 86_400 + 59 * 60: "1 d", 90_061: "1 d 1 h", 59: "59 s"}
+    for length, text in lengths.items():
+        page = page_of(silences=[{"tag_id": "", "from": at(300), "to": at(300 + length)}])
+        assert f" {text} Tags not scanned" in page
+    counts = body(8)["counts"] | {"tags": 201, "tags_scanned": 200}
+    assert "200 of 201 (99 %)" in page_of(counts=counts)
 
 
 def test_active_alarms_that_share_a_cause_are_below_one_heading() -> None:

@@ -413,7 +413,9 @@ def _readings_of(daily: Daily, sensors: Sensors, part: SeriesPast, until_ns: int
     ):
         last_ns = at_ns + part.bucket_ns - 1
         if last_ns <= until_ns and is_plausible(low) and is_plausible(high):
-            readings += [(at_ns, low), (at_ns, high), (at_ns, mean), (last_ns, mean)]
+            # The line from the bucket before ends at the mean: an extreme would shift every sum.
+            of_bucket = (mean, low, high, mean)
+            readings += [*((at_ns, value) for value in of_bucket), (last_ns, mean)]
     return readings
 
 

@@ -372,26 +372,29 @@ def test_a_daily_quantity_uses_buckets_where_there_are_many_readings() -> None:
     # A peak in one reading, and a dip at night: both count.
     warm = {n * 10 * S: 20.0 + 5.0 * is_day(n * 10 * S) for n in range(1, 3 * 8_640)}
     warm |= {40 * HOUR_NS + 10 * S: 33.0, 61 * HOUR_NS + 10 * S: 4.0}
+    # Many noisy readings at each visit of a robot, and none between: the mean is not their lowest.
+    visits = {n * 600 * S + k * S: 18.0 + 4.0 * (k % 2) for n in range(1, 400) for k in range(20)}
     until_ns = 62 * HOUR_NS + 3 * S
     tag = TagState("a", readings=(Reading("temperature", 20.0, until_ns),))
-    for name, tolerance in (
-        ("temperature_24h_mean", 1e-2),
-        ("temperature_night_minimum", 0.0),
-        ("growing_degree_days", 0.0),
+    for course, name, tolerance in (
+        (visits, "temperature_24h_mean", 1e-2),
+        (warm, "temperature_24h_mean", 1e-2),
+        (warm, "temperature_night_minimum", 0.0),
+        (warm, "growing_degree_days", 0.0),
     ):
         daily = DAILY[name]
-        exact = daily.at(until_ns, list(warm.items()), is_day)
+        exact = daily.at(until_ns, list(course.items()), is_day)
         [found] = derived.with_daily(
             [tag],
             daily,
             until_ns,
             sensors=own_sensors(),
             is_day=is_day,
-            find=lambda need: found_in(need, {"temperature": warm}),
+            find=lambda need, known=course: found_in(need, {"temperature": known}),
         )
         assert found.readings[-1].value == pytest.approx(exact, abs=tolerance), name
         request = SeriesRequest("a", name, until_ns - 30 * HOUR_NS, until_ns)
-        past, _ = answer_of(request, {"temperature": warm})
+        past, _ = answer_of(request, {"temperature": course})
         assert past.means[-1] == pytest.approx(exact, abs=tolerance), name
         assert past.stamps_ns[-1] <= until_ns
     years: Known = {"temperature": dict.fromkeys(range(S, 10**17, 10**13), 20.0)}

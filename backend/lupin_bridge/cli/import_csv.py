@@ -279,7 +279,7 @@ def _moment_ns(text: str, zone: ZoneInfo | None) -> int:
     seconds = seconds_of(text, zone)
     if seconds > time.time():
         raise ValueError("the time is in the future")
-    return int(seconds * 1e6) * 1000
+    return round(seconds * 1e6) * 1000
 
 
 # --- into a journal -------------------------------------------------------------------------------

@@ -322,7 +322,7 @@ async def post_observation(request: Request) -> Response:
 def _stamp_ns(observed_at: str | float | None, now_ns: int) -> int:
     if observed_at is None:
         return now_ns
-    text = observed_at if isinstance(observed_at, str) else f"{observed_at:.9f}"
+    text = observed_at if isinstance(observed_at, str) else f"{observed_at:.6f}"
     stamp_ns = moment("observed_at", text)
     ahead_s = (stamp_ns - now_ns) / NANOSECONDS_PER_SECOND
     if ahead_s > MAX_AHEAD_S:

@@ -168,8 +168,11 @@ def test_home_assistants_history_names_its_entities_and_reports_what_is_unknown(
     ],
 )
 def test_a_time_is_a_date_or_seconds_or_fractions_of_them(importing: Import, text: str) -> None:
-    importing.given(WIDE, f"\ufeffat,bench,t,rh\n{text},A,1,\n").written()
-    assert importing.rows()[0][1] == 1_714_558_200 * SECOND
+    # A float is a little below this millisecond.
+    rows = f"\ufeffat,bench,t,rh\n{text},A,1,\n1713220448650000000,A,1,\n"
+    importing.given(WIDE, rows).written()
+    stamps = [1_713_220_448_650_000_000, 1_714_558_200 * SECOND]
+    assert [row[1] for row in importing.rows()] == stamps
 
 
 def test_rows_from_before_the_twin_are_in_its_past(importing: Import) -> None:

@@ -115,7 +115,9 @@ async def _of_site(request: Request, kind: Format) -> Response:
 def span_of(given: OfExport, now_ns: int | None) -> tuple[int, int]:
     """Start and end of the period, ns of ROS time."""
     start_ns, end_ns = given.span(now_ns)
-    return start_ns, end_ns or now_ns or MAX_SECONDS * NANOSECONDS_PER_SECOND
+    # A reading with the stamp of now counts as past: the clock may be paused at it.
+    until_ns = MAX_SECONDS * NANOSECONDS_PER_SECOND if now_ns is None else now_ns + 1
+    return start_ns, end_ns or until_ns
 
 
 async def respond_export(

@@ -13,6 +13,7 @@ import pyarrow
 import pytest
 from pyarrow import parquet
 
+from lupin_bridge.bridge import Bridge
 from lupin_bridge.judge.judging import own_sensors
 from lupin_bridge.past import bodies
 from lupin_bridge.past.export import GROUP_ROWS
@@ -37,7 +38,9 @@ def rows(count: int, stamp_s: int = 1) -> list[PastRow]:
     return [PastRow(stamp_s * NS, "7", 1.0, 2.0, "co2", math.pi, 0, "robot")] * count
 
 
-async def test_all_rows_come_under_one_header(domain: int) -> None:
+async def test_all_rows_come_under_one_header(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     past = MadeUp(lots=[rows(3), [], rows(2, 5)])
     async with remembering(past) as it:
         query = "from=1&to=9&tag_id=a/b&sensor_type=co2"
@@ -52,6 +55,10 @@ async def test_all_rows_come_under_one_header(domain: int) -> None:
             'from_19700101T000001Z_to_19700101T000009Z.csv"'
         )
         assert past.requested == [(NS, 9 * NS, "a/b", "co2")]
+        # A history includes a reading of now, even if the clock is paused at it.
+        monkeypatch.setattr(Bridge, "ros_time_ns", 9 * NS)
+        await it.http.get(PATH)
+        assert past.requested[-1] == (0, 9 * NS + 1, None, None)
 
 
 async def test_head_reads_no_row_and_without_rows_there_is_a_header_or_empty_parquet(

@@ -1,4 +1,4 @@
-import { fireEvent, render, screen } from '@testing-library/react';
+import { cleanup, fireEvent, render, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi, type Mock } from 'vitest';
 
 import { Bound } from './RangeControl';
@@ -31,6 +31,15 @@ describe('one end of a fixed range', () => {
     expect(onChange).not.toHaveBeenCalled();
     fireEvent.blur(field());
     expect(onChange).toHaveBeenCalledExactlyOnceWith(20);
+  });
+
+  test('a limit of a sensor with small values has all its digits', () => {
+    cleanup();
+    const spin = sensorNamed('spin');
+    render(
+      <Bound label="Most" sensor={spin} value={0.0045} refusal={() => null} onChange={onChange} />,
+    );
+    expect(screen.getByLabelText<HTMLInputElement>('Most').value).toBe('0.0045');
   });
 
   test('takes it with Enter, once', () => {

@@ -36,7 +36,6 @@ export function RangeControl({
           <Bound
             label={S.rangeLow}
             sensor={sensor}
-
             value={fixed.low}
             refusal={(low) =>
               low < fixed.high ? null : S.rangeNotBelow(readingText(sensor, fixed.high))
@@ -48,7 +47,6 @@ export function RangeControl({
           <Bound
             label={S.rangeHigh}
             sensor={sensor}
-
             value={fixed.high}
             refusal={(high) =>
               high > fixed.low ? null : S.rangeNotAbove(readingText(sensor, fixed.low))
@@ -102,7 +100,7 @@ export function Bound({
   onChange: (value: number) => void;
 }): JSX.Element {
   const id = useId();
-  const text = String(Number(toShown(sensor, value).toFixed(2)));
+  const text = String(Number(toShown(sensor, value).toPrecision(7)));
   // null: nothing typed since the last applied value.
   const [typed, setTyped] = useState<string | null>(null);
   const wanted = typed === null || typed.trim() === '' ? NaN : Number(typed);

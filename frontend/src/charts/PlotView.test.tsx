@@ -10,6 +10,7 @@ import { bucketAt, seriesWith, timelineWith } from '../testing/timeline';
 import { readings, wireTag } from '../testing/tags';
 import CardChart from './CardChart';
 import type { Line, PlotModel } from './model';
+import { axisText } from './plot';
 import { LineValue, MarksKey, PlotView, SensorChoice } from './PlotView';
 
 test.each([
@@ -50,6 +51,12 @@ test.each([
   const model = plainModel('temperature', [lineOf(seriesWith(over))]);
   render(<PlotView model={model} height={100} />);
   expect(screen.getByTestId('plot').getAttribute('aria-label')).toMatch(words);
+});
+
+test('the numbers of an axis are exact, however small its steps are', () => {
+  expect([-0.0004, 0.00015, 0.1 + 0.2, 12_500].map(axisText)).toEqual([
+    ...['\u22120.0004', '0.00015', '0.3', '12,500'],
+  ]);
 });
 
 function said(

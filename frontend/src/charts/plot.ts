@@ -47,8 +47,10 @@ const LIMITS_ROOM = 8;
 const HALF_A_TIME = 2;
 /** All charts share one cursor. */
 const SYNC_KEY = 'lupin-charts';
-/** In the page's language: uPlot uses the browser's. */
-const AXIS_NUMBER = new Intl.NumberFormat(LOCALE);
+/** In the page's language, while uPlot uses the browser's; with all digits of a small step. */
+const AXIS_NUMBER = new Intl.NumberFormat(LOCALE, { maximumSignificantDigits: 9 });
+
+export const axisText = (value: number): string => AXIS_NUMBER.format(value).replace('-', '\u2212');
 
 type Plot = ReturnType<typeof createPlot>;
 
@@ -130,7 +132,7 @@ function createPlot(element: HTMLElement, handlers: PlotHandlers) {
             size: 48,
             // Steps are 1, 2 or 5 times a power of ten: room for six gives at least three ticks.
             space: (_self, _i, _a, _b, height) => Math.max(fontPx(), Math.min(34, height / 6)),
-            values: (_self, splits) => splits.map((at) => AXIS_NUMBER.format(at)),
+            values: (_self, splits) => splits.map(axisText),
           },
         ],
         hooks: {

@@ -208,12 +208,13 @@ describe('the period', () => {
   });
 
   test('is in its fields the one that a chart or a link has chosen since', () => {
-    act({ period: { kind: 'own', from: 3_600, to: 7_200 } });
+    act({ period: { kind: 'own', from: 3_600.5, to: 7_200 } });
     render(<TimeBar />);
     const fields = (): string[] =>
       ['From', 'To'].map((name) => screen.getByLabelText<HTMLInputElement>(name).value);
     fireEvent.change(screen.getByLabelText('To'), { target: { value: '1:30' } });
     expect(fields()).toEqual(['1:00:00', '1:30']);
+    expect(store.get().view.period).toMatchObject({ from: 3_600.5, to: 5_400 });
     flush(() => {
       act({ period: { kind: 'own', from: 4_000, to: 5_000 } });
     });

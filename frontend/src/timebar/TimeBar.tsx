@@ -143,9 +143,16 @@ type Own = Extract<Period, { kind: 'own' }>;
 
 type Typed = Readonly<Record<'from' | 'to', string>>;
 
-/** The typed period; null: invalid. */
-function periodOf(typed: Typed, isSimulated: boolean): Own | null {
-  const [from, to] = [momentOf(typed.from, isSimulated), momentOf(typed.to, isSimulated)];
+/**
+ * The typed period; null: invalid. An end that still reads as in `last` stays exact: a text has no
+ * fractions, and names two moments in the hour that comes twice in autumn.
+ */
+function periodOf(typed: Typed, last: Own, isSimulated: boolean): Own | null {
+  const end = (name: keyof Typed): number | null =>
+    typed[name] === fieldOf(last[name], isSimulated)
+      ? last[name]
+      : momentOf(typed[name], isSimulated);
+  const [from, to] = [end('from'), end('to')];
   return from === null || to === null || from >= to ? null : { kind: 'own', from, to };
 }
 
@@ -159,9 +166,9 @@ function OwnPeriod({ period, isSimulated }: { period: Own; isSimulated: boolean 
   const [last, setTyped] = useState(inForce);
   // A chart or link may have set another period since.
   const typed = last.of === period ? last : inForce;
-  const isPeriod = periodOf(typed, isSimulated) !== null;
+  const isPeriod = periodOf(typed, period, isSimulated) !== null;
   const take = (next: Typed): void => {
-    const own = periodOf(next, isSimulated);
+    const own = periodOf(next, period, isSimulated);
     setTyped({ ...next, of: own ?? period });
     if (own) act({ period: own });
   };

@@ -5,6 +5,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC
+from functools import partial
 from typing import Any
 
 import pytest
@@ -390,7 +391,7 @@ def test_a_daily_quantity_uses_buckets_where_there_are_many_readings() -> None:
             until_ns,
             sensors=own_sensors(),
             is_day=is_day,
-            find=lambda need, known=course: found_in(need, {"temperature": known}),
+            find=partial(found_in, known={"temperature": course}),
         )
         assert found.readings[-1].value == pytest.approx(exact, abs=tolerance), name
         request = SeriesRequest("a", name, until_ns - 30 * HOUR_NS, until_ns)

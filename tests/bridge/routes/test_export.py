@@ -38,9 +38,7 @@ def rows(count: int, stamp_s: int = 1) -> list[PastRow]:
     return [PastRow(stamp_s * NS, "7", 1.0, 2.0, "co2", math.pi, 0, "robot")] * count
 
 
-async def test_all_rows_come_under_one_header(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_all_rows_come_under_one_header(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
     past = MadeUp(lots=[rows(3), [], rows(2, 5)])
     async with remembering(past) as it:
         query = "from=1&to=9&tag_id=a/b&sensor_type=co2"

@@ -345,7 +345,8 @@ class _Page:
                 text = f"{heading}: {self._count(len(entries))}"
                 rows += f'<tr><th colspan="{len(columns)}">{escape(text)}</th></tr>'
             for entry in entries:
-                rows += '<tr class="critical">' if _is_critical(entry) else "<tr>"
+                is_critical = entry.get("reason", {}).get("verdict") == "critical"
+                rows += '<tr class="critical">' if is_critical else "<tr>"
                 for cell, kind in zip(cells(entry), kinds, strict=True):
                     rows += f"<td{kind}>{escape(cell)}</td>"
                 rows += "</tr>"
@@ -444,7 +445,3 @@ class _Page:
         }
         name = self.say("this_machine") if zone is None else str(zone)
         return f"{name} ({', '.join(sorted(offsets))})" if offsets else name
-
-
-def _is_critical(entry: Entry) -> bool:
-    return bool(entry.get("reason", {}).get("verdict") == "critical")

@@ -45,23 +45,10 @@ def test_the_majority_of_the_working_light_sensors_takes_precedence_over_the_clo
     assert not judge_day(light_of(0.0, 0.0, 900.0), None, None).is_day
     assert judge_day(light_of(math.nan, math.inf, 900.0), None, None) == Day(True, "light")
     assert judge_day(light_of(math.nan), CLOCK, MIDNIGHT_S) == Day(False, "clock")
+    assert judge_day(light_of(), CLOCK, NOON_S) == Day(True, "clock")
     # Exactly the limit is day.
     assert judge_day(light_of(DAY_FROM_LX), None, None).is_day
     assert not judge_day(light_of(DAY_FROM_LX - 0.1), None, None).is_day
-
-
-@pytest.mark.parametrize(
-    ("hour", "is_day"), [(5, False), (6, True), (19, True), (20, False), (23, False)]
-)
-def test_by_the_clock_a_day_begins_and_ends(hour: int, is_day: bool) -> None:
-    at_s = datetime(2026, 6, 1, hour, tzinfo=UTC).timestamp()
-    assert judge_day(light_of(), CLOCK, at_s) == Day(is_day, "clock")
-
-
-def test_the_clock_is_that_of_the_greenhouse() -> None:
-    east = ClockDay(timezone(timedelta(hours=9)))
-    assert judge_day(light_of(), east, MIDNIGHT_S).is_day
-    assert not judge_day(light_of(), east, NOON_S).is_day
 
 
 @pytest.mark.parametrize(

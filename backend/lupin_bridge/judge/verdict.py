@@ -15,7 +15,7 @@ from typing import Final
 from lupin_bridge.judge.day import COUNTS_NS
 from lupin_bridge.judge.quantities import DERIVED, Ranges, Sensor, Sensors
 from lupin_bridge.judge.scans import Recent, Scanned
-from lupin_twin.core.state import NO_FLOWER, STATUS_OK, Reading, TagState
+from lupin_twin.core.state import NO_FLOWER, STATUS_OK, Reading, TagState, sure_species
 
 # How long a bad reading counts: one that is no longer valid says nothing about now, but the last
 # news of a tag must not be forgotten if it was alarming.
@@ -78,10 +78,15 @@ class Reason:
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """A verdict and its reasons, worst first."""
+    """A verdict and its reasons, worst first.
+
+    `species` is that of the ranges, if the tag's state has another one: its last inspection was not
+    sure of any.
+    """
 
     verdict: Verdict
     reasons: tuple[Reason, ...] = ()
+    species: str = ""
 
 
 def judge_tag(
@@ -134,7 +139,9 @@ def judge_tag(
     verdict = worst(reason.verdict for reason in reasons)
     if verdict is None:
         verdict = Verdict.HEALTHY if was_judged else Verdict.UNKNOWN
-    return Health(verdict, tuple(reasons))
+    species = recent.species_at(now_ns)
+    is_shown = species == sure_species(tag.flower.species, tag.flower.confidence)
+    return Health(verdict, tuple(reasons), "" if is_shown else species)
 
 
 def failed(reading: Reading, sensor: Sensor) -> Reason:

@@ -164,6 +164,7 @@ class TagHealth(Contract):
     reasons: list[HealthReason] = Field(
         default_factory=list, description="worst first; absent: none"
     )
+    species: str = Field(default_factory=str, description="of its ranges; absent: the tag's own")
 
 
 class Day(Contract):

@@ -273,6 +273,8 @@ def _health(health: Health) -> dict[str, Any]:
     found: dict[str, Any] = {"verdict": health.verdict}
     if health.reasons:
         found["reasons"] = [reason_json(reason) for reason in health.reasons]
+    if health.species:
+        found["species"] = health.species
     return found
 
 

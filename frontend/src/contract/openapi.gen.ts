@@ -139,6 +139,7 @@ export interface components {
             /** @enum {string} */
             readonly verdict: "critical" | "stressed" | "unknown" | "healthy";
             readonly reasons?: readonly components["schemas"]["HealthReason"][];
+            readonly species?: string;
             readonly day: components["schemas"]["Day"];
             readonly patrol: components["schemas"]["Patrol"];
         };
@@ -300,6 +301,7 @@ export interface components {
             /** @enum {string} */
             readonly verdict: "critical" | "stressed" | "unknown" | "healthy";
             readonly reasons?: readonly components["schemas"]["HealthReason"][];
+            readonly species?: string;
         };
         readonly TagHistory: {
             readonly tag_id: string;

@@ -7,10 +7,11 @@ export type Schemas = components['schemas'];
 export type TwinTagState = Required<Omit<Schemas['TwinTagState'], 'readings'>> & {
   readonly readings: readonly Required<Schemas['SensorReading']>[];
 };
-export type TagHealth = Required<Schemas['TagHealth']>;
+export type TagHealth = Required<Omit<Schemas['TagHealth'], 'species'>> &
+  Pick<Schemas['TagHealth'], 'species'>;
 /** The bridge's verdicts on the greenhouse and each tag. */
 export interface Judgement {
-  readonly house: Required<Schemas['HouseHealth']>;
+  readonly house: Required<Omit<Schemas['HouseHealth'], 'species'>>;
   readonly tags: Readonly<Record<string, TagHealth>>;
 }
 type TwinState = Omit<Schemas['TwinState'], 'tags'> & {

@@ -3,6 +3,7 @@ import { describe, expect, test } from 'vitest';
 import cases from '../../../tests/twin/core/far_off.json';
 import type { Latest, TwinTagState } from '../contract/types';
 import { mapPoint } from '../geometry/coordinates';
+import { NOBODY } from '../testing/health';
 import { readings, stateFrame, tag, wireTag } from '../testing/tags';
 import { compareIds, holds, reachOf, snapshotOf, tagOf } from './twin';
 
@@ -80,6 +81,19 @@ describe('snapshot', () => {
     expect(snapshotOf(later, 2_000, first).tags[0]).toBe(first.tags[0]);
     const read = stateFrame([wireTag({ readings: readings({ co2: 1 }) })], { sec: 2 });
     expect(snapshotOf(read, 2_000, first).tags[0]).not.toBe(first.tags[0]);
+  });
+
+  test('a tag’s ranges are those of the last sure species, as the bridge has them', () => {
+    const wire = wireTag({ species: 'rose', species_confidence: 0.3 });
+    const first = snapshotOf(stateFrame([wire]), 0, null);
+    expect(first.tags[0]?.sureSpecies).toBe('');
+    const one = { verdict: 'healthy', reasons: [], species: 'lupin' } as const;
+    const judged = stateFrame([wire], {
+      sec: 106,
+      health: { ...NOBODY, tags: { [wire.tag_id]: one } },
+    });
+    const [tag] = snapshotOf(judged, 0, first).tags;
+    expect([tag?.sureSpecies, tag?.species]).toEqual(['lupin', 'rose']);
   });
 
   test('in simulation at ten times the speed ages follow the twin’s clock', () => {

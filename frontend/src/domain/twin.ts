@@ -1,4 +1,4 @@
-import type { Latest, TwinTagState, WirePoint, WireTime } from '../contract/types';
+import type { Latest, TagHealth, TwinTagState, WirePoint, WireTime } from '../contract/types';
 import { mapPoint, type MapPoint } from '../geometry/coordinates';
 import type { Shared } from './memo';
 import { secondsSince, type When } from './time';
@@ -48,7 +48,11 @@ export function whenOf(time: WireTime, { at, takenAt }: TakenState): When {
 /** Below it the bridge judges by the ranges for all species: the twin's `sure_species`. */
 const SURE = 0.5;
 
-export function tagOf(wire: TwinTagState, state: TakenState) {
+/** The species whose ranges hold: the last one that the camera was sure of; empty: none. */
+const sureSpeciesOf = (wire: TwinTagState, judged?: TagHealth): string =>
+  judged?.species || ((wire.species_confidence ?? 0) >= SURE ? wire.species : '');
+
+export function tagOf(wire: TwinTagState, state: TakenState, judged?: TagHealth) {
   const { position, orientation } = wire.pose;
   const readAt = new Map(
     wire.readings.map((reading): [string, When] => [reading.name, readAtOf(wire, reading, state)]),
@@ -79,8 +83,7 @@ export function tagOf(wire: TwinTagState, state: TakenState) {
     isObserved: wire.stale_seconds !== null,
     species: wire.species,
     speciesConfidence: wire.species_confidence,
-    /** The species whose ranges hold; empty if the camera was not sure, as in the bridge. */
-    sureSpecies: (wire.species_confidence ?? 0) >= SURE ? wire.species : '',
+    sureSpecies: sureSpeciesOf(wire, judged),
     anomaly: wire.anomaly,
     flowerCount: wire.flower_count,
     bugCount: wire.bug_count,
@@ -118,7 +121,12 @@ const JITTER_MS = 1_500;
  * The previous tag if only its age has grown: the page renders only what changed. If the twin's clock
  * runs at another speed (simulation), its ages still win.
  */
-function sharedTag(before: Tag | undefined, wire: TwinTagState, state: TakenState): Tag {
+function sharedTag(
+  before: Tag | undefined,
+  wire: TwinTagState,
+  state: TakenState,
+  judged?: TagHealth,
+): Tag {
   const isSame = (name: string, now: When): boolean => {
     const known = before?.readAt.get(name);
     return typeof known === 'number' && typeof now === 'number'
@@ -127,9 +135,10 @@ function sharedTag(before: Tag | undefined, wire: TwinTagState, state: TakenStat
   };
   const isShared =
     before?.isObserved === (wire.stale_seconds !== null) &&
+    before.sureSpecies === sureSpeciesOf(wire, judged) &&
     equal(wire, before.wire) &&
     wire.readings.every((reading) => isSame(reading.name, readAtOf(wire, reading, state)));
-  return isShared ? before : tagOf(wire, state);
+  return isShared ? before : tagOf(wire, state, judged);
 }
 
 /** Deep equality of plain JSON values, except ages. */
@@ -160,7 +169,10 @@ export function snapshotOf(latest: Latest, arrivedAt: number, before: Snapshot |
   const takenAt = isRepeated ? Math.min(before.takenAt, arrivedAt) : arrivedAt;
   const state = { at, takenAt };
   const known = new Map(before?.tags.map((tag) => [tag.id, tag]));
-  const read = latest.state.tags.map((wire) => sharedTag(known.get(wire.tag_id), wire, state));
+  const judged = latest.health.tags;
+  const read = latest.state.tags.map((wire) =>
+    sharedTag(known.get(wire.tag_id), wire, state, judged[wire.tag_id]),
+  );
   const tags = inOrder(read, known, before?.tags ?? []);
   return {
     tags,

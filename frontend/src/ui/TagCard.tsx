@@ -161,7 +161,7 @@ function CardBody({
           {tag.species && tag.speciesConfidence !== null && (
             <span className="faint"> {S.confidence(percentText(tag.speciesConfidence))}</span>
           )}
-          {tag.species && !tag.sureSpecies && ` (${S.notSure})`}
+          {tag.species && tag.species !== tag.sureSpecies && ` (${S.notSure})`}
         </Fact>
         <Fact label={S.columns.flowers}>{tag.flowerCount}</Fact>
         <Fact label={S.cardPosition}>

@@ -130,7 +130,7 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
       {names.length === 0 && <p className="faint">{S.cardNoReadings}</p>}
       <p className="faint">
         {tag.species ? <bdi>{speciesText(tag.species, 28)}</bdi> : S.unclassified}
-        {tag.species && !tag.sureSpecies && ` (${S.notSure})`}
+        {tag.species && tag.species !== tag.sureSpecies && ` (${S.notSure})`}
       </p>
     </div>
   );

@@ -21,6 +21,7 @@ from lupin_bridge.judge.scans import (
 )
 from lupin_bridge.judge.sensors_file import parse
 from lupin_bridge.judge.verdict import Health, Kind, Reason, Verdict
+from lupin_bridge.stream.state_json import judgement
 from lupin_twin.core.past import PastWrite, recent_of
 from lupin_twin.core.state import (
     Flower,
@@ -168,6 +169,9 @@ def test_a_reading_is_judged_by_the_daylight_and_the_plants_of_its_own_time() ->
     unsure = replace(tulips, flower=Flower("orchid", 0.05), looked_at_ns=START + 5 * MINUTE)
     still = judge.see(snapshot(START + 6 * MINUTE, replace(unsure, readings=reading), dark))
     assert reported(still.tags["a"]) == [("critical", 25.5, 25.0)]
+    # The state has the orchid: so the page is told which ranges hold.
+    assert [again.tags["a"].species, still.tags["a"].species] == ["", "tulip"]
+    assert b'"species":"tulip"' in judgement(still)
 
 
 def reported(health: Health) -> list[tuple[str, float | None, float | None]]:

@@ -207,7 +207,7 @@ class Webhook:
 # --- one POST, and how it is tried until it is taken ----------------------------------------------
 
 ANSWER_S: Final = 10.0
-# Read of an answer: its head, interim responses included. They would parse for as long as they come.
+# Read of an answer: its head, with interim responses, which could come without end.
 _HEAD_BYTES: Final = 16_384
 
 

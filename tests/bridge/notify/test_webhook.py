@@ -16,6 +16,8 @@ from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify import webhook
 from lupin_bridge.notify.destinations import Targets, WebhookTarget
+from lupin_bridge.notify.messages import Backoff, Condition
+from lupin_bridge.notify.push import FIRST_WAIT_S, MAX_ATTEMPTS, MOST_WAIT_S
 from lupin_bridge.notify.webhook import (
     MAX_WAITING,
     ORIGIN_S,
@@ -24,6 +26,7 @@ from lupin_bridge.notify.webhook import (
     PostError,
     Webhook,
     post,
+    until_taken,
 )
 from lupin_bridge.settings import Secrets, Settings
 from lupin_twin.core.diagnostics import Origin
@@ -305,6 +308,24 @@ def test_any_other_status_fails_a_redirect_is_not_followed_and_retry_after_is_a_
         with receiver(status(code, place, f"Retry-After: {retry_after}")) as server:
             assert message(server.port) == (code, reported_s)
     assert elsewhere.posted == []
+
+
+async def test_half_an_hour_without_internet_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 0.0
+
+    async def sleep(for_s: float) -> None:
+        nonlocal now_s
+        now_s += for_s
+
+    async def attempt() -> None:
+        if now_s < 1800.0:
+            raise PostError("its host is not known")
+
+    monkeypatch.setattr("lupin_bridge.notify.webhook.asyncio.sleep", sleep)
+    backoff, condition = Backoff(FIRST_WAIT_S, MOST_WAIT_S), Condition()
+    assert await until_taken(
+        attempt, condition, backoff, "an alarm", "push.example", max_attempts=MAX_ATTEMPTS
+    )
 
 
 def test_a_missing_receiver_is_reported_in_the_systems_words() -> None:

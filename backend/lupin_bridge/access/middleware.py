@@ -244,14 +244,16 @@ class AccessControl:
         else:
             try:
                 checked = self._check_credentials(request)
-            except AccountError as error:
-                log.warning("%s: every request is refused", error)
-                checked = _refusal(503, "the accounts cannot be read", {"retry-after": "5"})
-            if not isinstance(checked, Response):
-                checked = self._check_reach(checked, path_of(scope))
-            if not isinstance(checked, Response):
-                await self._pass_on(checked, scope, receive, send)
-                return
+                if not isinstance(checked, Response):
+                    checked = self._check_reach(checked, path_of(scope))
+                if not isinstance(checked, Response):
+                    await self._pass_on(checked, scope, receive, send)
+                    return
+            except AccountError as error:  # of a route too
+                # It names the file, and whoever signs in is not known yet.
+                log.warning("%s: a request is refused", error)
+                detail = "the accounts cannot be read or changed: the bridge's log has the reason"
+                checked = _refusal(503, detail, {"retry-after": "5"})
             refusal = checked
         await deny(refusal, scope, receive, send)
 

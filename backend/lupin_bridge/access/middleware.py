@@ -244,23 +244,21 @@ class AccessControl:
         else:
             try:
                 checked = self._check_credentials(request)
-                if not isinstance(checked, Response):
+                if isinstance(checked, Person):
                     checked = self._check_reach(checked, path_of(scope))
                 if not isinstance(checked, Response):
                     await self._pass_on(checked, scope, receive, send)
                     return
-            except AccountError as error:  # of a route too
-                # It names the file, and whoever signs in is not known yet.
+            except AccountError as error:
+                # Of a route too. It names the file, and whoever signs in is not known yet.
                 log.warning("%s: a request is refused", error)
-                detail = "the accounts cannot be read or changed: the bridge's log has the reason"
-                checked = _refusal(503, detail, {"retry-after": "5"})
+                why = "the accounts cannot be read or changed: see the bridge's log"
+                checked = _refusal(503, why, {"retry-after": "5"})
             refusal = checked
         await deny(refusal, scope, receive, send)
 
-    def _check_reach(self, person: Person | None, path: str) -> Response | Person | None:
+    def _check_reach(self, person: Person, path: str) -> Response | Person:
         """The person, or a refusal if they may not use this path."""
-        if person is None:
-            return None
         if person.role == WRITER and path != OBSERVATIONS:
             detail = f"{person.name} is a writer: it may only post to {OBSERVATIONS}"
             return _refusal(403, detail)

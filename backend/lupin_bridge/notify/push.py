@@ -52,8 +52,8 @@ FIRST_WAIT_S: Final = 2.0
 MOST_WAIT_S: Final = 60.0
 # Posts at once, to however many browsers.
 AT_ONCE: Final = 8
-# Threads that look up names: their own, and more than an account has devices. A name may have a
-# server that never answers, which blocks a thread for half a minute; the other channels go on.
+# Threads of its own that look up names, more than an account has devices: a name server that never
+# answers blocks one for half a minute.
 LOOKUPS: Final = 32
 _GONE: Final = (404, 410)
 _KEY: Final = "vapid"

@@ -218,19 +218,6 @@ async def test_a_browser_that_unsubscribes_meanwhile_is_not_tried_again(tmp_path
         assert len(on.posted_to(one)) == 1
 
 
-async def test_a_push_service_with_retry_after_delays_no_other_browser(tmp_path: Path) -> None:
-    async with pushing(tmp_path, status(503, "Retry-After: 60"), status(201)) as on:
-        phones = [on.phone("one"), on.phone("two")]
-        for phone in phones:
-            on.subscribe(phone)
-        on.board.show([alarm("7")])
-        await until(lambda: len(on.service.posted) == 2, "a try of each")
-        on.board.show([alarm("7"), alarm("8")])
-        await until(lambda: len(on.service.posted) == 3, "the next alarm")
-        [both] = [phone for phone in phones if len(on.posted_to(phone)) == 2]
-        assert both.read(on.posted_to(both)[1])["body"].startswith("Tag 8:")
-
-
 async def test_names_that_never_resolve_hold_up_no_other_phone_and_no_webhook(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

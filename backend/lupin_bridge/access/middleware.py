@@ -244,21 +244,21 @@ class AccessControl:
         else:
             try:
                 checked = self._check_credentials(request)
+                if isinstance(checked, Person):
+                    checked = self._check_reach(checked, path_of(scope))
+                if not isinstance(checked, Response):
+                    await self._pass_on(checked, scope, receive, send)
+                    return
             except AccountError as error:
-                log.warning("%s: every request is refused", error)
-                checked = _refusal(503, "the accounts cannot be read", {"retry-after": "5"})
-            if not isinstance(checked, Response):
-                checked = self._check_reach(checked, path_of(scope))
-            if not isinstance(checked, Response):
-                await self._pass_on(checked, scope, receive, send)
-                return
+                # Of a route too. It names the file, and whoever signs in is not known yet.
+                log.warning("%s: a request is refused", error)
+                why = "the accounts cannot be read or changed: see the bridge's log"
+                checked = _refusal(503, why, {"retry-after": "5"})
             refusal = checked
         await deny(refusal, scope, receive, send)
 
-    def _check_reach(self, person: Person | None, path: str) -> Response | Person | None:
+    def _check_reach(self, person: Person, path: str) -> Response | Person:
         """The person, or a refusal if they may not use this path."""
-        if person is None:
-            return None
         if person.role == WRITER and path != OBSERVATIONS:
             detail = f"{person.name} is a writer: it may only post to {OBSERVATIONS}"
             return _refusal(403, detail)

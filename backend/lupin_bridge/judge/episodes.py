@@ -290,15 +290,16 @@ class TagEpisodes:
 
     def _ongoing(self, watch: _Watch, finding: _Finding, stamp_ns: int) -> _Watch:
         """The watch after one more occasion at which its reason held."""
-        watch = replace(watch, against=0)
-        now = finding.reason
+        now, reason, extreme = finding.reason, watch.reason, watch.worst
         if now is None:
-            return watch
-        if finding.worse is not None and now.value is not None and watch.worst is not None:
-            watch = replace(watch, worst=finding.worse(watch.worst, now.value))
-        reason = watch.reason
+            return replace(watch, against=0)
+        if finding.worse is not None and now.value is not None and extreme is not None:
+            extreme = finding.worse(extreme, now.value)
         verdict = worst((reason.verdict, now.verdict)) or now.verdict
         if watch.raised_at_ns is not None:
+            # Most occasions say nothing new, and a dense day has a hundred thousand.
+            if (verdict, extreme, 0) == (reason.verdict, watch.worst, watch.against):
+                return watch
             if verdict is not reason.verdict:
                 watch = replace(watch, worse_at_ns=stamp_ns)
         elif self._has_lasted(finding.key, watch, stamp_ns):
@@ -307,7 +308,7 @@ class TagEpisodes:
             is_old = now.kind is Kind.OLD
             reason = now if is_old else replace(now, since_ns=watch.began_ns)
             watch = replace(watch, raised_at_ns=stamp_ns, raised_as=verdict)
-        return replace(watch, reason=replace(reason, verdict=verdict))
+        return replace(watch, against=0, worst=extreme, reason=replace(reason, verdict=verdict))
 
     def _has_lasted(self, key: Key, watch: _Watch, stamp_ns: int) -> bool:
         if key == _DIM:

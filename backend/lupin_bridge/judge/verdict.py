@@ -242,7 +242,7 @@ def derive(readings: Sequence[Reading]) -> list[Reading]:
     by_name = {reading.name: reading for reading in readings}
     found = []
     for derived in DERIVED.values():
-        first, second = (by_name.get(name) for name in derived.sources)
+        first, second = map(by_name.get, derived.sources)
         if derived.name in by_name or first is None or second is None:
             continue
         if first.observed_at_ns == second.observed_at_ns:

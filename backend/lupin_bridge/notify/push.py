@@ -15,8 +15,10 @@ import math
 import socket
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from ipaddress import ip_address
+from socket import SOCK_STREAM
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlsplit
 
@@ -50,6 +52,9 @@ FIRST_WAIT_S: Final = 2.0
 MOST_WAIT_S: Final = 60.0
 # Posts at once, to however many browsers.
 AT_ONCE: Final = 8
+# Threads of its own that look up names, more than an account has devices: a name server that never
+# answers blocks one for half a minute.
+LOOKUPS: Final = 32
 _GONE: Final = (404, 410)
 _KEY: Final = "vapid"
 
@@ -83,6 +88,7 @@ class Push:
         self._owed: dict[str, dict[str, Alarm]] = {}
         self._sending: dict[str, asyncio.Task[None]] = {}
         self._at_once = asyncio.Semaphore(AT_ONCE)
+        self._lookups = ThreadPoolExecutor(LOOKUPS, thread_name_prefix="push")
         known = AccountError, AdmissionError, DeviceRefused
         self._guard = Guard("a push notification was not accepted", *known)
         self._source: Source
@@ -241,8 +247,8 @@ class Push:
         """Where to connect to: an IP address that was checked, which no later lookup can change."""
         endpoint = parsed(url, self.target)
         try:
-            found = await asyncio.get_running_loop().getaddrinfo(
-                endpoint.host, endpoint.port, type=socket.SOCK_STREAM
+            found = await asyncio.get_running_loop().run_in_executor(
+                self._lookups, socket.getaddrinfo, endpoint.host, endpoint.port, 0, SOCK_STREAM
             )
         except (OSError, UnicodeError):
             raise PostError("its host is not known") from None

@@ -207,8 +207,8 @@ class Webhook:
 # --- one POST, and how it is tried until it is taken ----------------------------------------------
 
 ANSWER_S: Final = 10.0
-# Read at once; h11 has a limit of its own for the answer's head. The body is not read.
-_CHUNK_BYTES: Final = 16_384
+# Read of an answer: its head, with interim responses, which could come without end.
+_HEAD_BYTES: Final = 16_384
 
 
 class PostError(RuntimeError):
@@ -282,15 +282,16 @@ async def _exchange(
     for part in (head, h11.Data(data=body), h11.EndOfMessage()):
         writer.write(http.send(part) or b"")
     await writer.drain()
-    while True:
-        event = http.next_event()
-        if isinstance(event, h11.Response):
-            return event
+    left = _HEAD_BYTES
+    while not isinstance(event := http.next_event(), h11.Response):
         if event is h11.NEED_DATA:
-            got = await reader.read(_CHUNK_BYTES)
+            got = await reader.read(left)
             if not got:
-                raise PostError("the connection was closed before an answer")
+                end = f"{_HEAD_BYTES} bytes came" if left == 0 else "the connection was closed"
+                raise PostError(f"{end} before an answer")
+            left -= len(got)
             http.receive_data(got)
+    return event
 
 
 def _words_of(error: OSError) -> str:

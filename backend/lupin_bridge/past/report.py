@@ -9,7 +9,7 @@ from __future__ import annotations
 import heapq
 from array import array
 from bisect import bisect_left
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
@@ -172,7 +172,7 @@ class _Fold:
         self._of = of
         self._alarms_ns = alarms_ns
         self._alarm_fold: AlarmFold | None = None
-        self._sensors: dict[str, _Extremes] = {}
+        self._sensors: defaultdict[str, _Extremes] = defaultdict(_Extremes)
         self._counts = Counter({"scans": 0, "failed": 0, "inspections": 0})
         self._scanned: set[str] = set()
         # The stamps of all attempts, and of those at each tag's sensors; before the period too.
@@ -212,7 +212,7 @@ class _Fold:
         # A failed attempt may have readings all the same.
         readings = readings_of([write])
         for reading in (*readings, *derive(readings)):
-            of = self._sensors.setdefault(reading.name, _Extremes())
+            of = self._sensors[reading.name]
             if self._of.criteria.sensors.named(reading.name).is_plausible(reading.value):
                 of.add(reading.value, write)
             else:

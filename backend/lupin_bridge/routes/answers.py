@@ -19,7 +19,7 @@ from pydantic import BaseModel, ValidationError
 from starlette.requests import ClientDisconnect, HTTPConnection
 from starlette.types import Receive, Scope, Send
 
-from lupin_bridge.access.credentials import AccountError, Person
+from lupin_bridge.access.credentials import Person
 from lupin_bridge.access.middleware import PERSON_KEY, client_of
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
@@ -169,7 +169,7 @@ def error_response(
 
 REFUSALS: Final = (
     *(AdmissionError, NotRemembered, NoSuchTag, PastRefused, TwinUnavailableError),
-    *(AccountError, Refused, NotesUnwritable),
+    *(Refused, NotesUnwritable),
 )
 
 
@@ -197,7 +197,7 @@ def refusal(error: Exception) -> Response:
             status, headers = error.status, error.headers
         case TwinTimeoutError():
             status = 504
-        case AccountError() | NotesUnwritable() | NotRemembered() | TwinUnavailableError():
+        case NotesUnwritable() | NotRemembered() | TwinUnavailableError():
             status, headers = 503, retry
     return error_response(str(error), status, headers)
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
+import socket
 import ssl
 import stat
 from collections.abc import AsyncIterator, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Event
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,16 +24,15 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 from py_vapid import Vapid02
 
-from lupin_bridge.access.accounts import Device
+from lupin_bridge.access.accounts import MAX_DEVICES, Device
 from lupin_bridge.access.people import People
 from lupin_bridge.alarms.board import NOTE_BURST, AlarmBoard, Change
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.notify import push as push_module
-from lupin_bridge.notify.destinations import PushTarget
-from lupin_bridge.notify.messages import Backoff, Condition
-from lupin_bridge.notify.push import FIRST_WAIT_S, MAX_ATTEMPTS, MOST_WAIT_S, Push, encoded
-from lupin_bridge.notify.webhook import PostError, until_taken
+from lupin_bridge.notify.destinations import Endpoint, PushTarget
+from lupin_bridge.notify.push import Push, encoded
+from lupin_bridge.notify.webhook import post
 from lupin_bridge.settings import Settings
 from tests.support.access import refused_start
 from tests.support.messages import inspection
@@ -47,7 +50,7 @@ from tests.support.processes import constants
 from tests.support.receiver import Answer, Posted, Receiver, receiver, status
 from tests.support.seen import NOW_NS, Alarms, S, alarm
 from tests.support.tls import Certificate, certificate
-from tests.support.waiting import until, wait_for
+from tests.support.waiting import PATIENCE_S, until, wait_for
 from tests.support.web import Bridge, bridge
 
 CONTACT = "mailto:grower@example.org"
@@ -215,35 +218,27 @@ async def test_a_browser_that_unsubscribes_meanwhile_is_not_tried_again(tmp_path
         assert len(on.posted_to(one)) == 1
 
 
-async def test_a_push_service_with_retry_after_delays_no_other_browser(tmp_path: Path) -> None:
-    async with pushing(tmp_path, status(503, "Retry-After: 60"), status(201)) as on:
-        phones = [on.phone("one"), on.phone("two")]
-        for phone in phones:
-            on.subscribe(phone)
+async def test_names_that_never_resolve_hold_up_no_other_phone_and_no_webhook(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    is_over, resolve = Event(), socket.getaddrinfo
+
+    def hang(host: Any, *more: Any, **named: Any) -> Any:
+        if "hang" in host:
+            is_over.wait(PATIENCE_S)
+        return resolve(host, *more, **named)
+
+    monkeypatch.setattr(socket, "getaddrinfo", hang)
+    asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(4))
+    async with pushing(tmp_path, status(201)) as on:
+        for number in range(MAX_DEVICES - 1):
+            on.subscribe(Phone(f"https://hang{number}.example/"))
+        on.subscribe(on.phone("one"))
         on.board.show([alarm("7")])
-        await until(lambda: len(on.service.posted) == 2, "a try of each")
-        on.board.show([alarm("7"), alarm("8")])
-        await until(lambda: len(on.service.posted) == 3, "the next alarm")
-        [both] = [phone for phone in phones if len(on.posted_to(phone)) == 2]
-        assert both.read(on.posted_to(both)[1])["body"].startswith("Tag 8:")
-
-
-async def test_half_an_hour_without_internet_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    now_s = 0.0
-
-    async def sleep(for_s: float) -> None:
-        nonlocal now_s
-        now_s += for_s
-
-    async def attempt() -> None:
-        if now_s < 1800.0:
-            raise PostError("its host is not known")
-
-    monkeypatch.setattr("lupin_bridge.notify.webhook.asyncio.sleep", sleep)
-    backoff, condition = Backoff(FIRST_WAIT_S, MOST_WAIT_S), Condition()
-    assert await until_taken(
-        attempt, condition, backoff, "an alarm", "push.example", max_attempts=MAX_ATTEMPTS
-    )
+        await until(lambda: on.service.posted, "the message to the other phone")
+        with receiver(status(204)) as hook:
+            await post(Endpoint("localhost", hook.port, "/", "localhost"), {}, b"{}")
+        is_over.set()
 
 
 async def test_an_alarm_raised_while_the_log_is_read_at_the_start_is_new(

@@ -16,6 +16,8 @@ from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.verdict import Verdict
 from lupin_bridge.notify import webhook
 from lupin_bridge.notify.destinations import Targets, WebhookTarget
+from lupin_bridge.notify.messages import Backoff, Condition
+from lupin_bridge.notify.push import FIRST_WAIT_S, MAX_ATTEMPTS, MOST_WAIT_S
 from lupin_bridge.notify.webhook import (
     MAX_WAITING,
     ORIGIN_S,
@@ -24,6 +26,7 @@ from lupin_bridge.notify.webhook import (
     PostError,
     Webhook,
     post,
+    until_taken,
 )
 from lupin_bridge.settings import Secrets, Settings
 from lupin_twin.core.diagnostics import Origin
@@ -307,6 +310,24 @@ def test_any_other_status_fails_a_redirect_is_not_followed_and_retry_after_is_a_
     assert elsewhere.posted == []
 
 
+async def test_half_an_hour_without_internet_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 0.0
+
+    async def sleep(for_s: float) -> None:
+        nonlocal now_s
+        now_s += for_s
+
+    async def attempt() -> None:
+        if now_s < 1800.0:
+            raise PostError("its host is not known")
+
+    monkeypatch.setattr("lupin_bridge.notify.webhook.asyncio.sleep", sleep)
+    backoff, condition = Backoff(FIRST_WAIT_S, MOST_WAIT_S), Condition()
+    assert await until_taken(
+        attempt, condition, backoff, "an alarm", "push.example", max_attempts=MAX_ATTEMPTS
+    )
+
+
 def test_a_missing_receiver_is_reported_in_the_systems_words() -> None:
     assert refusal(f"http://127.0.0.1:{free_port()}/") == "Connection refused"
     assert refusal("http://a..b/") == "its host name cannot be looked up"
@@ -317,7 +338,8 @@ def test_a_missing_receiver_is_reported_in_the_systems_words() -> None:
     [
         ([b"", None], 0.05, "no answer within 0.05 s"),
         ([b"HTTP/1.1 200 OK\r\nX: ", None], 0.05, "no answer within 0.05 s"),
-        ([b"HTTP/1.1 200 OK\r\nX: ", *[b"x" * 1000] * 1000], 5.0, "no HTTP answer: Receive buffer"),
+        ([b"HTTP/1.1 200 OK\r\nX: ", *[b"x" * 1000] * 1000], 5.0, "16384 bytes came before an"),
+        ([b"HTTP/1.1 100 Continue\r\n\r\n"] * 9000, 60.0, "16384 bytes came before an answer"),
         ([b"SSH-2.0-OpenSSH\r\n\r\n"], 60.0, "no HTTP answer: "),
         ([b""], 60.0, "the connection was closed before an answer"),
         ([b"HTTP/1.1 200"], 60.0, "the connection was closed before an answer"),

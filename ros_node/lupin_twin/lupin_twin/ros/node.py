@@ -68,6 +68,7 @@ class TwinNode(AdjustableNode):
         self._clock_subscription: Any = None
         self._clock_reported: ClockState = "running"
         self._was_journal_well = True
+        self._quarantined = ""
         self._map_revision = 0
         self._rules_revision = 0
         self._topics: dict[str, str] = {}
@@ -315,6 +316,9 @@ class TwinNode(AdjustableNode):
         elif not self._was_journal_well:
             self.get_logger().info(f"journal: recovered: {condition.detail}")
         self._was_journal_well = condition.is_well
+        if condition.quarantined != self._quarantined:
+            self._quarantined = condition.quarantined
+            self.get_logger().warning(f"journal: {condition.detail}")
 
     def _watch_clock(self, now_ns: int, *, is_simulated: bool) -> None:
         watch = self._clock_watch

@@ -14,13 +14,6 @@ type Format = (seconds: number) => string;
 
 const agoText: Format = (seconds) => S.agoSuffix(ageText(seconds));
 
-const useIsWhole = (): boolean => useApp((state) => selectShown(state).snapshot?.isWhole ?? true);
-
-/** In place of a tag's readings. */
-export function NoReadings(): JSX.Element {
-  return <p className="faint">{useIsWhole() ? S.cardNoReadings : S.notKnownThenLong}</p>;
-}
-
 /** The age as text, counting on where the shown moment does; null: unknown. */
 function useAgeText(when: When, format: Format): string | null {
   const ageing = useApp((state) => selectShown(state).ageing);
@@ -39,7 +32,7 @@ export function useAgeStep(when: When): ReturnType<typeof ageStep> {
 /** An age whose seconds tick in here, so that a table of hundreds of rows does not re-render. */
 export function Age({ when, format = agoText }: { when: When; format?: Format }): JSX.Element {
   const text = useAgeText(when, format);
-  const isWhole = useIsWhole();
+  const isWhole = useApp((state) => selectShown(state).snapshot?.isWhole ?? true);
   if (when === 'never') {
     return (
       <span className="age faint" title={isWhole ? S.neverObservedLong : S.notKnownThenLong}>

@@ -32,7 +32,7 @@ import {
 import { useFetched } from '../store/fetcher';
 import { S } from '../strings';
 import { IconButton, useFocusBack } from '../widgets/controls';
-import { Age, AgeFact, Fact, NoReadings, useAgeStep } from './Age';
+import { Age, AgeFact, Fact, useAgeStep } from './Age';
 import { CardAlarms } from './alarms/CardAlarms';
 import { selectIsCurrent } from './DoNow';
 import { HealthMark } from './HealthMark';
@@ -112,7 +112,6 @@ function CardBody({
         <Reasons health={health} tagId={tag.id} hasTodo={isBad(health.verdict) && isCurrent} />
       )}
       {isNow && <CardAlarms tagId={tag.id} />}
-      {tag.readings.size === 0 && <NoReadings />}
       <ul className="card-readings">
         {[...tag.readings].map(([name, value]) => (
           <CardReading

@@ -18,7 +18,7 @@ import { robotFrame, useSelected } from '../store/create';
 import { selectCatalogue, selectHealth } from '../store/derived';
 import { selectShown, selectTag, selectTags } from '../store/moment';
 import { S } from '../strings';
-import { Age, AgeFact, NoReadings } from './Age';
+import { Age, AgeFact } from './Age';
 import { Meanwhile } from './alarms/AlarmNotes';
 import { HealthMark, HealthShape } from './HealthMark';
 import { lazyPart } from './lazyParts';
@@ -127,7 +127,6 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
         {names.length === 0 && <AgeFact label={S.cardScanned} when={tag.scannedAt} />}
       </dl>
       {hidden > 0 && <p className="faint">{S.cardMore(hidden)}</p>}
-      {names.length === 0 && <NoReadings />}
       <p className="faint">
         {tag.species ? <bdi>{speciesText(tag.species, 28)}</bdi> : S.unclassified}
         {tag.species && !tag.sureSpecies && ` (${S.notSure})`}

@@ -326,11 +326,8 @@ def _check_identity(connection: sqlite3.Connection, path: Path) -> None:
             raise DamagedFile(f"{path} is a journal with a damaged header")
         raise Foreign(f"{path} is a database, but not a journal of lupin-twin")
     if version != VERSION:
-        what = "it cannot be read"
-        if version in UPGRADED:
-            what = "a twin that starts with it upgrades it"
-        elif version > VERSION:
-            what = "a newer lupin-twin wrote it: install that"
+        is_upgraded, other = version in UPGRADED, "install the lupin-twin that wrote it"
+        what = "a twin that starts with it upgrades it" if is_upgraded else other
         raise Foreign(
             f"{path} is a journal of version {version}, this is version {VERSION}: {what}"
         )

@@ -316,6 +316,15 @@ def test_the_row_of_sensors_fades_where_there_are_more(open_at: Callable[..., Hm
         assert last.bottom < bar.bottom
 
 
+def test_many_sensors_leave_the_reasons_their_room(running: Bridge, open_page: OpenPage) -> None:
+    more = {f"sensor{number}": 1.0 for number in range(5)}
+    running.peer.observe(scan("1", {"temperature": 45.0, "humidity": 60.0, **more}, at=(0, 0)))
+    hmi = open_page(running.url)
+    expect(hmi.cell("1", "sensor4")).to_be_attached()
+    cell = hmi.row("1").locator(".cell-health")
+    hmi.expect(lambda: cell.evaluate("e => e.clientWidth") > 130, "room for the reasons")
+
+
 # Elements beyond the window, or beyond their own box, that are no scrollable list. Of a column's
 # head its words count; the arrow beside them may be hidden.
 _TOO_LONG = """() => [...document.querySelectorAll('body *')].filter((e) => {

@@ -137,9 +137,13 @@ def test_a_page_whose_session_has_ended_goes_to_the_sign_in_page(page: Page) -> 
         page.goto(first.url + "/signin")
         sign_in(page, TOKEN)
         expect_live(page)
+        page.goto(first.url + "/#tag=7&sensor=co2")
         page.context.clear_cookies()
         port = str(urlsplit(first.url).port)
     with served("--port", port, LUPIN_TOKEN=TOKEN) as second:
         assert second.url == first.url
-        expect(page).to_have_url(second.url + "/signin#ended")
+        expect(page).to_have_url(re.compile("/signin#ended&"))
         expect(page.get_by_role("alert")).to_have_text(re.compile("^Your session has ended"))
+        # And back to what was shown.
+        sign_in(page, TOKEN)
+        expect(page).to_have_url(re.compile(f"^{second.url}/#.*sensor=co2&tag=7"))

@@ -1,11 +1,13 @@
 import { act as flush, renderHook } from '@testing-library/react';
 import { afterAll, beforeAll, beforeEach, describe, expect, test, vi } from 'vitest';
 
+import { timelineOf } from '../domain/timeline';
 import { act, receive } from '../store/app';
+import { ready } from '../store/fetcher';
 import { withState } from '../store/twin';
 import { goLive, goLost, showTags, status } from '../testing/page';
 import { stateFrame, wireTag } from '../testing/tags';
-import { wireTime } from '../testing/timeline';
+import { wireTime, wireTimeline } from '../testing/timeline';
 import { pairKey } from './model';
 import { useLines, type FetchedLines } from './useLines';
 
@@ -172,6 +174,19 @@ describe('lines are fetched again', () => {
     visit(NOW_S + 1);
     await passed(60_000);
     expect(histories()).toHaveLength(2);
+  });
+
+  test('for all of the past once it is known how far it reaches, not for a day first', async () => {
+    act({ period: { kind: 'all' } });
+    show();
+    await passed(100);
+    expect(histories()).toEqual([]);
+    const value = timelineOf(wireTimeline({ from: 7_200, to: NOW_S }), NOW_S);
+    flush(() => {
+      receive({ remembered: ready(value) });
+    });
+    await passed(100);
+    expect(histories()).toEqual([7_200]);
   });
 
   test('for no visit while the page shows the past', async () => {

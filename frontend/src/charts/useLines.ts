@@ -26,18 +26,20 @@ export type FetchedLines = ReturnType<typeof useLines>;
  */
 export function useLines(pairs: readonly Pair[], points: number, hasDayBefore = false) {
   const period = useApp((state) => state.view.period);
-  const reach = useApp((state) => state.twin.remembered.value?.reach);
+  const { value: known, state: reaching } = useApp((state) => state.twin.remembered);
   const epoch = useApp((state) => state.twin.connection.epoch);
   const isOpen = useApp((state) => state.twin.connection.socket.kind === 'open');
   const dayS = useApp((state) => (hasDayBefore ? selectDayS(state) : null));
   const nowS = rosNow(store.get(), useNow());
   const visits = useVisits(pairs);
   const answered = useRef('');
-  const oldest = period.kind === 'all' ? (reach?.from ?? null) : null;
+  const oldest = period.kind === 'all' ? (known?.reach?.from ?? null) : null;
+  // How far all of it reaches is not known yet.
+  const isEarly = period.kind === 'all' && known === null && reaching === 'waiting';
   const span = nowS === null ? null : spanOf(period, nowS, oldest);
   const group = [JSON.stringify(period), points, dayS, ...pairs.map(pairKey)].join('\u0001');
   const fetched = useFetched<Lines>(
-    nowS === null || !isOpen || points === 0
+    nowS === null || !isOpen || points === 0 || isEarly
       ? null
       : {
           key: [group, epoch, oldest, turnOf(period, nowS), visits].join('\u0001'),

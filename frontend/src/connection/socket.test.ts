@@ -168,7 +168,11 @@ test('a server that requires a token leads to its sign-in page, which says why',
   const leave = vi.fn<(url: URL) => void>();
   answering(401);
   await signInIfRequired(leave);
-  expect(leave.mock.calls.map(([url]) => url.pathname + url.hash)).toEqual(['/signin#ended']);
+  location.hash = '#at=5&tag=7';
+  await signInIfRequired(leave);
+  location.hash = '';
+  const left = leave.mock.calls.map(([url]) => url.pathname + url.hash);
+  expect(left).toEqual(['/signin#ended', '/signin#ended&at=5&tag=7']);
 });
 
 test.each([200, 403, 503])('a server that answers %i keeps the page', async (status) => {

@@ -120,7 +120,9 @@ export function connect(url: string, handlers: ConnectionHandlers) {
  */
 export async function signInIfRequired(leave: (url: URL) => void = goTo): Promise<void> {
   const answer = await fetch(route('readyz'), { cache: 'no-store' }).catch(() => null);
-  if (answer?.status === 401) leave(new URL('#ended', route('signin')));
+  // The view in the fragment goes along, and comes back.
+  const place = location.hash.replace('#', '&');
+  if (answer?.status === 401) leave(new URL(`#ended${place}`, route('signin')));
 }
 
 function goTo(url: URL): void {

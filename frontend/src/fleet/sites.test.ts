@@ -86,12 +86,13 @@ test('search and filter go together', () => {
     site('north-1', { name: 'Noord 1' }),
     site('north-2', { verdict: 'critical' }),
     site('south', { verdict: 'unknown', is_live: false }),
+    site('empty', { verdict: 'unknown' }),
   );
   expect(chosen(sites, 'critical', '')).toHaveLength(1);
   expect(chosen(sites, 'all', ' NOORD ').map(({ site: id }) => id)).toEqual(['north-1']);
   expect(chosen(sites, 'silent', 'north')).toEqual([]);
   expect(countsOf(sites.values())).toEqual({
-    ...{ all: 3, critical: 1, stressed: 0, silent: 1, healthy: 1 },
+    ...{ all: 4, critical: 1, stressed: 0, unknown: 1, silent: 1, healthy: 1 },
   });
 });
 

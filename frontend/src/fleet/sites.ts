@@ -63,7 +63,7 @@ export const siteLink = ({ site }: Pick<Site, 'site'>): string =>
 
 export type Sites = ReadonlyMap<string, Site>;
 
-export const FILTERS = ['all', 'critical', 'stressed', 'silent', 'healthy'] as const;
+export const FILTERS = ['all', 'critical', 'stressed', 'unknown', 'silent', 'healthy'] as const;
 export type Filter = (typeof FILTERS)[number];
 
 /** The worst first. Not imported from `domain/health`, which the first view here does not need. */
@@ -90,18 +90,14 @@ export function withFrame(before: Sites, frame: SitesFrame): Sites {
   return sites;
 }
 
-/** The filter button that counts it; a live site without a verdict counts for none. */
-function filterOf(site: Site): Filter {
-  if (!site.is_live) return 'silent';
-  return site.verdict === 'unknown' ? 'all' : site.verdict;
-}
+/** The filter button that counts it, beside "All". */
+const filterOf = (site: Site): Filter => (site.is_live ? site.verdict : 'silent');
 
 export function countsOf(sites: Iterable<Site>): Readonly<Record<Filter, number>> {
-  const counts = { all: 0, critical: 0, stressed: 0, silent: 0, healthy: 0 };
+  const counts = { all: 0, critical: 0, stressed: 0, unknown: 0, silent: 0, healthy: 0 };
   for (const site of sites) {
     counts.all += 1;
-    const filter = filterOf(site);
-    if (filter !== 'all') counts[filter] += 1;
+    counts[filterOf(site)] += 1;
   }
   return counts;
 }

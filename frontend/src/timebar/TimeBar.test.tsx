@@ -228,7 +228,15 @@ test('a failed fetch is reported beside what is known', () => {
   render(<TimeBar />);
   expect(screen.getByTestId('timebar').textContent).toContain('too busy');
   expect(slider()).not.toBeNull();
+  // A journal that cannot be read is told of above, with the true reason.
+  const { journal } = status();
+  flush(() => {
+    goLive(status({ journal: { ...journal, state: 'foreign' } }));
+  });
+  expect(screen.getByTestId('timebar').textContent).not.toContain('too busy');
   // Without a connection, the banner says so instead.
+  flush(goLive);
+  expect(screen.getByTestId('timebar').textContent).toContain('too busy');
   flush(goLost);
   expect(screen.getByTestId('timebar').textContent).not.toContain('too busy');
 });

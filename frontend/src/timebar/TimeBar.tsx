@@ -18,7 +18,12 @@ import { chooseSpeed, playback, SPEEDS, togglePlayback } from './playback';
 export function TimeBar(): JSX.Element | null {
   const remembered = useApp((state) => state.twin.remembered);
   const period = useApp((state) => state.view.period);
-  const isDisconnected = useApp(selectIsDisconnected);
+  // Then the banner, or the line about the journal, says why.
+  const isReported = useApp(
+    (state) =>
+      selectIsDisconnected(state) ||
+      Object.hasOwn(S.journal, state.twin.connection.status?.journal.state ?? ''),
+  );
   const tick = useNow();
   const nowS = rosNow(store.get(), tick);
   if (nowS === null) return null;
@@ -40,8 +45,7 @@ export function TimeBar(): JSX.Element | null {
       {period.kind === 'own' && <OwnPeriod period={period} isSimulated={!hasDate(nowS)} />}
       <NoteMarks span={span} />
       <Slider span={span} timeline={remembered.value} nowS={nowS} />
-      {/* Without a connection, the banner says so. */}
-      {remembered.state === 'failed' && !isDisconnected && (
+      {remembered.state === 'failed' && !isReported && (
         <p className="timebar-note" role="status">
           {S.chartFailed(shown(remembered.message, 160))}
         </p>

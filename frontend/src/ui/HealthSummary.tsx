@@ -104,8 +104,9 @@ export function HouseLine(): JSX.Element | null {
   );
   if (!patrol || !snapshot || snapshot.tags.length === 0 || isSilent(health)) return null;
   const { last_scan: lastScan, overdue } = patrol;
-  // Scanned, but at an unknown time.
-  if (lastScan === null && snapshot.tags.some(({ readings }) => readings.size > 0)) return null;
+  // Scanned, but at an unknown time, or the scans are no longer stored.
+  const isKnown = snapshot.isWhole && snapshot.tags.every(({ readings }) => readings.size === 0);
+  if (lastScan === null && !isKnown) return null;
   if (isLate && last !== null) {
     return (
       <p className="patrol-line" data-testid="patrol-line">

@@ -40,6 +40,18 @@ test.each([null, 0.04])('without a scan interval none is shown: %s', (interval_s
   expect(line({ interval_s, last_scan: null, overdue: 1 })).toBe('1 tag overdue · no scan yet');
 });
 
+test('a moment whose scans were deleted is not said to have had none', () => {
+  expect(line({ interval_s: null, last_scan: null, overdue: 1 })).toBeDefined();
+  const house = { ...NO_HOUSE, snapshot: snapshotOf(stateFrame([wireTag()]), 0, null) };
+  act(() => {
+    view({ moment: 1 });
+    receive(
+      withPast({ at: 1, house: { ...house, snapshot: { ...house.snapshot, isWhole: false } } }),
+    );
+  });
+  expect(screen.queryByTestId('patrol-line')).toBeNull();
+});
+
 test('nothing is told of readings of which nobody knows when they were', () => {
   const patrol = { interval_s: null, last_scan: null, overdue: 1 };
   const lineText = [{ name: 'temperature', value: 22, observed_at: null }];

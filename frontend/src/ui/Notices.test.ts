@@ -115,7 +115,11 @@ describe('of a moment in the past', () => {
     come({ ...NO_HOUSE, snapshot: { ...snapshot([]), isWhole: false } });
     const value = timelineOf(wireTimeline({ from: 0, to: 9_000 }), 9_000);
     receive({ remembered: { value, state: 'ready', message: '' } });
-    expect(noticeFor(store.get())?.hint).toBe('This is no longer stored, or was not recorded yet.');
+    const hint = 'This is no longer stored, or was not recorded yet.';
+    expect(noticeFor(store.get())).toMatchObject({ id: 'past-nothing', hint });
+    // Its tags have positions, but their scans were deleted.
+    come({ ...NO_HOUSE, snapshot: { ...snapshot([tag()]), isWhole: false } });
+    expect(noticeFor(store.get())).toMatchObject({ id: 'past-nothing', hint, large: false });
   });
 
   test('with tags there is nothing to say', () => {

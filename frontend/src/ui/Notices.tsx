@@ -33,7 +33,8 @@ export function noticeFor(state: AppState): Notice | null {
     more: offlineMore(connection.status),
     large: true,
   };
-  if (moment !== null && !snapshot?.tags.length) {
+  const hasReadings = snapshot?.tags.some(({ readings }) => readings.size > 0);
+  if (moment !== null && !hasReadings && (!snapshot?.tags.length || !snapshot.isWhole)) {
     return pastNotice(state, moment, snapshot);
   }
   if (!snapshot) {
@@ -66,7 +67,8 @@ export function noticeFor(state: AppState): Notice | null {
   const isMapped = field.value?.sensor === sensor && field.value.sampleCount > 0;
   if (!isMapped && !snapshot.tags.some((tag) => tag.at && tag.readings.get(sensor) != null)) {
     const label = shown(selectSensor(state).label, 32);
-    return { id: 'no-reading', title: S.emptyNoReading(label), hint: S.emptyNoReadingHint };
+    const hint = moment === null ? S.emptyNoReadingHint : '';
+    return { id: 'no-reading', title: S.emptyNoReading(label), hint };
   }
   // Without a connection nothing loads; the banner says so.
   if (field.state === 'failed' && phase === 'live') {
@@ -78,16 +80,17 @@ export function noticeFor(state: AppState): Notice | null {
   return null;
 }
 
-/** A past moment has nothing to show: still loading, failed, or no tag was known then. */
+/** A past moment has nothing to show: still loading, failed, no tag was known then, or deleted. */
 function pastNotice({ twin }: AppState, moment: number, came: Snapshot | null): Notice {
   const { pastFault, remembered, latest } = twin;
   const when = rosText(moment);
   if (came) {
     const reach = remembered.value?.reach;
     const begins = reach ? S.pastReach(rosText(reach.from)) : S.pastReachNothing;
-    const isBefore = !reach || moment < reach.from;
+    const large = came.tags.length === 0;
+    const isBefore = large && (!reach || moment < reach.from);
     const hint = came.isWhole || isBefore ? begins : S.notKnownThenLong;
-    return { id: 'past-nothing', title: S.pastNothing(when), hint, large: true };
+    return { id: 'past-nothing', title: S.pastNothing(when), hint, large };
   }
   if (pastFault) {
     const isFuture = latest.snapshot !== null && moment > secondsOf(latest.snapshot.at);

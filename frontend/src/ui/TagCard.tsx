@@ -112,7 +112,6 @@ function CardBody({
         <Reasons health={health} tagId={tag.id} hasTodo={isBad(health.verdict) && isCurrent} />
       )}
       {isNow && <CardAlarms tagId={tag.id} />}
-      {tag.readings.size === 0 && <p className="faint">{S.cardNoReadings}</p>}
       <ul className="card-readings">
         {[...tag.readings].map(([name, value]) => (
           <CardReading

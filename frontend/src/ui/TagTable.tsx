@@ -73,6 +73,7 @@ export function TagTable(): JSX.Element {
     <table
       className={lines.length > SHORT_TABLE ? 'tags long' : 'tags'}
       data-testid="tag-table"
+      style={{ '--sensors': sensors.length } as CSSProperties}
       aria-rowcount={lines.length + 1}
       onFocus={(event) => {
         setFocused(rowTag(event));

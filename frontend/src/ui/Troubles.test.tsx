@@ -108,11 +108,7 @@ test.each([
     'This twin is not recording: another twin uses its file.',
     /Stop one of them, or give/,
   ],
-  [
-    'foreign',
-    'This twin is not recording: its file belongs to another program.',
-    /Give the twin another file/,
-  ],
+  ['foreign', 'This twin is not recording: it cannot read its file.', /Give the twin another file/],
   ['off', 'Recording is off.', /After a restart, all earlier data is lost/],
 ] as const)('a journal that is %s is reported, with why and what to do', (state, title, hint) => {
   render(<Troubles />);

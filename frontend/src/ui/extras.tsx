@@ -127,7 +127,6 @@ function Brief({ pin, tag }: { pin: PinUnderMouse; tag: Tag }): JSX.Element {
         {names.length === 0 && <AgeFact label={S.cardScanned} when={tag.scannedAt} />}
       </dl>
       {hidden > 0 && <p className="faint">{S.cardMore(hidden)}</p>}
-      {names.length === 0 && <p className="faint">{S.cardNoReadings}</p>}
       <p className="faint">
         {tag.species ? <bdi>{speciesText(tag.species, 28)}</bdi> : S.unclassified}
         {tag.species && tag.species !== tag.sureSpecies && ` (${S.notSure})`}

@@ -86,7 +86,8 @@ def test_another_version_is_left_alone_and_the_message_says_what_happens_to_it(
 ) -> None:
     with closing(sqlite3.connect(path)) as connection:
         connection.execute(f"PRAGMA user_version = {version}")
-    what = "a twin that starts with it upgrades it" if version in UPGRADED else "it cannot be read"
+    other = "install the lupin-twin that wrote it"
+    what = "a twin that starts with it upgrades it" if version in UPGRADED else other
     with pytest.raises(Foreign, match=f"version {version}, this is version {VERSION}: {what}"):
         open_writer(path)
 

@@ -2,8 +2,10 @@
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+from tests.support import journal
 from tests.support.domains import own_domain
 from tests.support.messages import scan
 from tests.support.processes import OFTEN, Process, twin_node
@@ -107,3 +109,15 @@ def test_a_parameter_that_does_not_exist_causes_a_warning_with_its_name(domain: 
         line = process.wait_for_output("idw_pwoer")
     assert "WARN" in line
     assert "unknown" in line
+
+
+# --- the journal --------------------------------------------------------------------------------
+
+
+def test_a_damaged_journal_is_named_in_the_log(domain: int, tmp_path: Path) -> None:
+    path = tmp_path / "j.sqlite"
+    journal.append(path, [journal.scan()])
+    path.write_bytes(path.read_bytes()[:-4096])
+    with twin_node(domain, "--ros-args", "-p", f"journal:={path}") as process:
+        line = process.wait_for_output("a damaged journal was quarantined as")
+    assert "WARN" in line

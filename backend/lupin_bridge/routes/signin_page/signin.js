@@ -10,8 +10,11 @@ const message = document.querySelector('#message');
 // What it may have to say, in the page's language.
 const words = form.dataset;
 
+// The page leads here when its session is over, with the view that it showed.
+const [reason, ...view] = location.hash.slice(1).split('&');
+
 // The page's language goes along.
-const enter = () => location.replace(`./${location.search}`);
+const enter = () => location.replace(`./${location.search}#${view.join('&')}`);
 
 /** What went wrong, for a person; the bridge words its refusals itself. */
 const reasonOf = async (response) => {
@@ -42,8 +45,7 @@ const signIn = async () => {
   return response.status === 401 ? words.wrong : reasonOf(response);
 };
 
-// The page leads here when its session is over.
-if (location.hash === '#ended') message.textContent = words.ended;
+if (reason === 'ended') message.textContent = words.ended;
 
 (person.hidden ? input : person).focus();
 

@@ -98,7 +98,7 @@ export const PAGE: In<typeof EN.PAGE> = {
       hint: 'Einen der beiden beenden oder diesem eine eigene Datei geben.',
     },
     foreign: {
-      title: 'Dieser Zwilling zeichnet nicht auf: Seine Datei gehört zu einem anderen Programm.',
+      title: 'Dieser Zwilling zeichnet nicht auf: Er kann seine Datei nicht lesen.',
       hint: 'Darin wurde nichts verändert. Dem Zwilling eine andere Datei geben oder diese verschieben.',
     },
   },

@@ -100,7 +100,7 @@ export const PAGE = {
       hint: 'Stop one of them, or give this one a file of its own.',
     },
     foreign: {
-      title: 'This twin is not recording: its file belongs to another program.',
+      title: 'This twin is not recording: it cannot read its file.',
       hint: 'Nothing in it was changed. Give the twin another file, or move this one.',
     },
   },

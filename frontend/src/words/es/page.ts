@@ -95,7 +95,7 @@ export const PAGE: In<typeof EN.PAGE> = {
       hint: 'Detenga uno de los dos o dé a este un archivo propio.',
     },
     foreign: {
-      title: 'Este gemelo no registra: su archivo es de otro programa.',
+      title: 'Este gemelo no registra: no puede leer su archivo.',
       hint: 'Su contenido no se ha tocado. Dé al gemelo otro archivo o mueva este.',
     },
   },

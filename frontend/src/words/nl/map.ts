@@ -183,7 +183,6 @@ export const TAGS: In<typeof EN.TAGS> = {
   cardGoneThen: 'De digital twin kende dit meetpunt toen niet.',
   cardShow: 'Op de kaart tonen',
   cardMore: (count) => `nog ${count}`,
-  cardNoReadings: 'Nog geen meetwaarden.',
   cardHistory: (count, from, to) => `Laatste ${count} meetwaarden, tussen ${from} en ${to}`,
   cardSource: 'Bron',
   cardFixed: 'Vaste sensor',

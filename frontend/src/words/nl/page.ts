@@ -97,7 +97,7 @@ export const PAGE: In<typeof EN.PAGE> = {
       hint: 'Stop een van beide, of geef deze een eigen bestand.',
     },
     foreign: {
-      title: 'Deze digital twin legt niets vast: zijn bestand hoort bij een ander programma.',
+      title: 'Deze digital twin legt niets vast: hij kan zijn bestand niet lezen.',
       hint: 'Er is niets in veranderd. Geef de digital twin een ander bestand, of verplaats dit.',
     },
   },

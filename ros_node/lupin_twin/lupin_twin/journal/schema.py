@@ -326,8 +326,8 @@ def _check_identity(connection: sqlite3.Connection, path: Path) -> None:
             raise DamagedFile(f"{path} is a journal with a damaged header")
         raise Foreign(f"{path} is a database, but not a journal of lupin-twin")
     if version != VERSION:
-        is_upgraded = version in UPGRADED
-        what = "a twin that starts with it upgrades it" if is_upgraded else "it cannot be read"
+        is_upgraded, other = version in UPGRADED, "install the lupin-twin that wrote it"
+        what = "a twin that starts with it upgrades it" if is_upgraded else other
         raise Foreign(
             f"{path} is a journal of version {version}, this is version {VERSION}: {what}"
         )

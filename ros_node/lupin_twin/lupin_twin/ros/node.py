@@ -67,7 +67,8 @@ class TwinNode(AdjustableNode):
         self._observed_s: float | None = None
         self._clock_subscription: Any = None
         self._clock_reported: ClockState = "running"
-        self._was_journal_well = True
+        # Whether the journal was well, and its quarantined file.
+        self._journal_was = True, ""
         self._map_revision = 0
         self._rules_revision = 0
         self._topics: dict[str, str] = {}
@@ -309,12 +310,14 @@ class TwinNode(AdjustableNode):
         self.now_ns()
         if self._clock_watch.state != before:
             self.notify_listener()
-        condition = self.memory.condition
+        condition, (was_well, quarantined) = self.memory.condition, self._journal_was
+        self._journal_was = condition.is_well, condition.quarantined
         if not condition.is_well:
             self.utilities.warn(("journal", condition.state), f"journal: {condition.detail}")
-        elif not self._was_journal_well:
+        elif condition.quarantined != quarantined:
+            self.get_logger().warning(f"journal: {condition.detail}")
+        elif not was_well:
             self.get_logger().info(f"journal: recovered: {condition.detail}")
-        self._was_journal_well = condition.is_well
 
     def _watch_clock(self, now_ns: int, *, is_simulated: bool) -> None:
         watch = self._clock_watch

@@ -183,9 +183,7 @@ def since_morning_s(past_ns: int, patrol_args: Sequence[str], now_ns: int) -> fl
 
 
 def _speed(patrol_args: Sequence[str]) -> float:
-    speed = float(_option("speed", patrol_args) or 1.0)
-    # The patrol itself refuses any other.
-    return speed if 0.1 <= speed <= 50.0 else 1.0
+    return float(_option("speed", patrol_args) or 1.0)
 
 
 def _option(name: str, patrol_args: Sequence[str]) -> str:
@@ -203,16 +201,15 @@ def run(
     settings: Settings,
     secrets: Secrets,
     ros_args: Sequence[str],
-    patrol_args: Sequence[str] = (),
+    feed_args: Sequence[str] = (),
     *,
     recording: Sequence[str] = (),
-    play_args: Sequence[str] = (),
 ) -> None:
     """Run a role until a signal ends it.
 
-    `patrol_args` are the options of the patrol, in the role `demo`; it gets `ros_args` too, so that
-    a namespace or a remapping holds for both. With `recording` (its files) and `play_args` (the
-    player's options), the player takes the patrol's place.
+    `feed_args` are the options of the patrol, in the role `demo`; it gets `ros_args` too, so that
+    a namespace or a remapping holds for both. With `recording` (its files) they are those of its
+    player, which takes the patrol's place.
 
     Raises:
         SettingError: a setting, a parameter or an argument of ROS is invalid.
@@ -223,9 +220,9 @@ def run(
             feed = None
             if recording:
                 folder = ending.enter_context(tempfile.TemporaryDirectory(prefix="lupin-twin-"))
-                feed = recorded(recording, play_args, ros_args, Path(folder))
+                feed = recorded(recording, feed_args, ros_args, Path(folder))
             elif role == "demo":
-                feed = patrolled(os.environ, patrol_args, ros_args)
+                feed = patrolled(os.environ, feed_args, ros_args)
             asyncio.run(_run(role, settings, secrets, ros_args, feed))
         except (ParameterError, RecordingError) as error:
             raise SettingError(str(error)) from error

@@ -74,6 +74,13 @@ def test_it_exits_with_1_when_its_thread_dies(domain: int) -> None:
         assert process.wait() == 1
 
 
+def test_an_argument_that_is_not_for_ros_is_refused_and_help_starts_no_twin(domain: int) -> None:
+    for word, code, said in (("--help", 0, "after --ros-args"), ("--rate", 2, "ments: --rate")):
+        with twin_node(domain, word) as process:
+            assert process.wait() == code
+            assert said in process.output
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

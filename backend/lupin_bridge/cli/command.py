@@ -217,15 +217,11 @@ def _feed_args(options: argparse.Namespace) -> list[str]:
     if not is_patrol and options.seed is not None:
         _fail("--seed is for the patrol, which --from FILE.mcap replaces")
     speeds = PATROL_SPEEDS if is_patrol else PLAYER_SPEEDS
-    for name, value, (low, high) in (
-        ("speed", options.speed, speeds),
-        ("seed", options.seed, SEEDS),
-    ):
-        if value is None:
-            continue
-        if not low <= value <= high:
+    for name, (low, high) in {"speed": speeds, "seed": SEEDS}.items():
+        value = getattr(options, name)
+        if value is not None and not low <= value <= high:
             _fail(f"--{name} is {value!r}, it must be from {low} to {high}")
-        given.append(f"--{name}={value!r}")
+        given += [f"--{name}={value!r}"] if value is not None else []
     return given
 
 

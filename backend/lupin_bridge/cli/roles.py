@@ -85,7 +85,7 @@ def patrolled(
     may name another one, and is not read here.
     """
     try:
-        path = demo_journal_path(environ, int(_option("seed", patrol_args) or 0))
+        path = demo_journal_path(environ, int(_option("seed", patrol_args, 0.0)))
     except RuntimeError:
         path = None
     is_another = {"--params-file", "use_sim_time:=true"} & {*ros_args} or any(
@@ -97,7 +97,7 @@ def patrolled(
         _parameters(
             # The robot maps the floor: fields end at its walls.
             clip_to_explored=True,
-            day_length_s=float(DAY_S / _speed(patrol_args)),
+            day_length_s=float(DAY_S / _option("speed", patrol_args, 1.0)),
             **({} if path is None else {"journal": str(path)}),
         ),
         "simulated",
@@ -179,16 +179,12 @@ def since_morning_s(past_ns: int, patrol_args: Sequence[str], now_ns: int) -> fl
     The past that was filled in ended at nine o'clock, at `past_ns`. Since then, days have gone on,
     as long as they are now.
     """
-    return (now_ns - past_ns) / 1e9 * _speed(patrol_args) % DAY_S
+    return (now_ns - past_ns) / 1e9 * _option("speed", patrol_args, 1.0) % DAY_S
 
 
-def _speed(patrol_args: Sequence[str]) -> float:
-    return float(_option("speed", patrol_args) or 1.0)
-
-
-def _option(name: str, patrol_args: Sequence[str]) -> str:
+def _option(name: str, patrol_args: Sequence[str], default: float) -> float:
     given = [word for word in patrol_args if word.startswith(f"--{name}=")]
-    return given[-1].partition("=")[2] if given else ""
+    return float(given[-1].partition("=")[2]) if given else default
 
 
 # --- roles ----------------------------------------------------------------------------------------

@@ -19,13 +19,6 @@ MOMENTS = {
 }
 
 
-def holds_back(process: Process) -> bool:
-    """Whether SIGINT and SIGTERM are blocked, by Linux's account."""
-    status = Path(f"/proc/{process.pid}/status").read_text()
-    blocked = int(status.split("SigBlk:")[1].split()[0], 16)
-    return all(blocked >> (number - 1) & 1 for number in (signal.SIGINT, signal.SIGTERM))
-
-
 def output_after_start(process: Process) -> list[str]:
     """The twin's output without the lines of its start, if it got so far."""
     starts = ("lupin_twin in ROS domain", "[lupin_twin]: journal /")
@@ -38,7 +31,7 @@ def output_after_start(process: Process) -> list[str]:
 def test_a_signal_during_the_start_ends_it_without_errors(domain: int, moment: str) -> None:
     name, number = MOMENTS[moment]
     with twin_node(domain, afresh=True) as process:
-        wait_for(lambda: holds_back(process), "signals to be held back")
+        wait_for(process.holds_signals_back, "signals to be held back")
         maps = Path(f"/proc/{process.pid}/maps")
         wait_for(lambda: name in maps.read_text(), moment)
         assert process.stop(number) == 0

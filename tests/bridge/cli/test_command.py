@@ -71,19 +71,11 @@ def test_without_a_home_directory_it_still_serves(tmp_path: Path) -> None:
 
 def test_a_signal_before_it_serves_ends_it_once_it_serves(domain: int) -> None:
     with lupin_twin(domain, "serve", afresh=True) as process:
-        # The command blocks both before its first slow import; see /proc/[pid]/status.
-        held_back = 1 << (signal.SIGINT - 1) | 1 << (signal.SIGTERM - 1)
-        wait_for(lambda: blocked_signals(process.pid) & held_back == held_back, "them held back")
+        # The command blocks both before its first slow import.
+        wait_for(process.holds_signals_back, "signals to be held back")
         process.send(signal.SIGINT)
         assert process.wait() == 0
         assert "Traceback" not in process.output
-
-
-def blocked_signals(pid: int) -> int:
-    """The blocked signals of a process's main thread, as a bit mask."""
-    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
-    (mask,) = [line.split()[1] for line in status.splitlines() if line.startswith("SigBlk")]
-    return int(mask, 16)
 
 
 LEVELS = ["debug", "info", "warning", "error"]

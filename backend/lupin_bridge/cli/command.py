@@ -37,9 +37,9 @@ from lupin_bridge.settings import (
 )
 from lupin_twin.adapt import cli as adapt
 from lupin_twin.runtime.process import (
-    USAGE_ERROR,
     exit_after,
     limit_blas_threads,
+    refuse,
     return_large_blocks,
     split_ros_args,
 )
@@ -325,8 +325,7 @@ def _prepare_process() -> None:
 
 
 def _fail(message: str) -> NoReturn:
-    print(f"lupin-twin: {message}", file=sys.stderr)  # noqa: T201  # there is no logger yet
-    raise SystemExit(USAGE_ERROR)
+    raise SystemExit(refuse("lupin-twin", message))
 
 
 if __name__ == "__main__":

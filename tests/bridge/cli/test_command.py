@@ -51,7 +51,6 @@ def test_arguments_after_ros_args_belong_to_ros_up_to_a_double_dash(
         (["demo", "--speed", "0"], "--speed is 0.0, it must be from 0.1 to 50.0"),
         (["demo", "--speed", "101", "--from", "x"], "--speed is 101.0, it must be from 0.1 to 100"),
         (["demo", "--seed", "-1"], "--seed is -1, it must be from 0 to 4294967295"),
-        (["demo", "--seed", "x"], "argument --seed: invalid int value: 'x'"),
         (["fly"], "invalid choice: 'fly'"),
         ([], "the following arguments are required: ROLE"),
     ],

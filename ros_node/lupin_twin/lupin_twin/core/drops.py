@@ -56,8 +56,7 @@ def check_length(what: str, length: int, limit: int) -> None:
 # How long a drop is reported to the operator as recent, s.
 RECENT_S: Final = 300.0
 _BUCKET_S: Final = 10.0
-# The longest period between two warnings about a cause that lasts, s.
-LONGEST_S: Final = 60.0
+LONGEST_S: Final = 60.0  # the longest period between two warnings about a cause that lasts
 
 
 class Reason(StrEnum):

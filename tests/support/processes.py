@@ -130,6 +130,13 @@ class Process:
         """Let a frozen process go on."""
         self.send(signal.SIGCONT)
 
+    def holds_signals_back(self) -> bool:
+        """Whether SIGINT and SIGTERM are blocked, by Linux's account."""
+        blocked = int(
+            Path(f"/proc/{self.pid}/status").read_text().split("SigBlk:")[1].split()[0], 16
+        )
+        return all(blocked >> (number - 1) & 1 for number in (signal.SIGINT, signal.SIGTERM))
+
     def _stands_still(self) -> bool:
         stats = [path.read_text() for path in Path(f"/proc/{self.pid}/task").glob("*/stat")]
         # proc(5): the state comes after the name, which may contain anything.

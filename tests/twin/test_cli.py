@@ -19,13 +19,6 @@ MOMENTS = {
 }
 
 
-def holds_back(process: Process) -> bool:
-    """Whether SIGINT and SIGTERM are blocked, by Linux's account."""
-    status = Path(f"/proc/{process.pid}/status").read_text()
-    blocked = int(status.split("SigBlk:")[1].split()[0], 16)
-    return all(blocked >> (number - 1) & 1 for number in (signal.SIGINT, signal.SIGTERM))
-
-
 def output_after_start(process: Process) -> list[str]:
     """The twin's output without the lines of its start, if it got so far."""
     starts = ("lupin_twin in ROS domain", "[lupin_twin]: journal /")
@@ -38,7 +31,7 @@ def output_after_start(process: Process) -> list[str]:
 def test_a_signal_during_the_start_ends_it_without_errors(domain: int, moment: str) -> None:
     name, number = MOMENTS[moment]
     with twin_node(domain, afresh=True) as process:
-        wait_for(lambda: holds_back(process), "signals to be held back")
+        wait_for(process.holds_signals_back, "signals to be held back")
         maps = Path(f"/proc/{process.pid}/maps")
         wait_for(lambda: name in maps.read_text(), moment)
         assert process.stop(number) == 0
@@ -72,6 +65,13 @@ def test_it_exits_with_1_when_its_thread_dies(domain: int) -> None:
     )
     with Process([sys.executable, "-c", program], ros_env(domain)) as process:
         assert process.wait() == 1
+
+
+def test_an_argument_that_is_not_for_ros_is_refused_and_help_starts_no_twin(domain: int) -> None:
+    for word, code, said in (("--help", 0, "after --ros-args"), ("--rate", 2, "ments: --rate")):
+        with twin_node(domain, word) as process:
+            assert process.wait() == code
+            assert said in process.output
 
 
 @pytest.mark.parametrize(

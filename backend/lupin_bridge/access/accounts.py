@@ -149,6 +149,8 @@ class Accounts:
                 (self.id,) = execute("SELECT value FROM meta WHERE key = 'id'").fetchone()
             except sqlite3.Error as error:
                 why = f"the file of accounts {path} cannot be read: {error}"
+                if not path.exists():
+                    why = f"there is no file of accounts {path}: user add or token add creates it"
                 raise AccountError(why) from error
             if_unusable.pop_all()
 

@@ -37,9 +37,9 @@ from lupin_bridge.settings import (
 )
 from lupin_twin.adapt import cli as adapt
 from lupin_twin.runtime.process import (
-    USAGE_ERROR,
     exit_after,
     limit_blas_threads,
+    refuse,
     return_large_blocks,
     split_ros_args,
 )
@@ -156,7 +156,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             of_a_file = which if options.role in {"journal", "import"} else ""
             _fail(f"{options.role} takes no ROS arguments{of_a_file}")
         return _WITHOUT_ROS[options.role](options, os.environ)
-    play_args = _play_args(options)
+    feed_args = _feed_args(options)
     try:
         settings = _settings_from(options)
         # Before any slow import, and before the first thread. Ctrl-C and SIGTERM wait until the
@@ -177,9 +177,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             settings,
             secrets,
             ros_args,
-            _patrol_args(options),
+            feed_args,
             recording=getattr(options, "recording", None) or [],
-            play_args=play_args,
         )
     except SettingError as error:
         _fail(str(error))
@@ -199,43 +198,30 @@ ROLES = {
 }
 
 
-# Passed to the patrol, which checks their ranges; what is no number is refused here already.
-PATROL_OPTIONS: dict[str, tuple[type[int | float], str]] = {
-    "speed": (
-        float,
-        "patrol seconds, or seconds of the recording, per second (default: 1)",
-    ),
-    "seed": (int, "seed of the patrol: a different seed gives a different patrol (default: 0)"),
-}
-
-
-def _patrol_args(options: argparse.Namespace) -> list[str]:
-    given = {name: getattr(options, name, None) for name in PATROL_OPTIONS}
-    return [f"--{name}={value}" for name, value in given.items() if value is not None]
-
-
-# Limits of --speed with a recording: recorded seconds per second.
+# Limits of --speed, and of --seed: of the patrol, and of a recording's player.
+PATROL_SPEEDS = (0.1, 50.0)
 PLAYER_SPEEDS = (0.1, 100.0)
+SEEDS = (0, 2**32 - 1)
 
 
-def _play_args(options: argparse.Namespace) -> list[str]:
-    """The arguments that `demo --from` passes to the player; empty without `--from`."""
+def _feed_args(options: argparse.Namespace) -> list[str]:
+    """The arguments of what feeds a demo: of the patrol, or with `--from`, of the player."""
     if options.role != "demo":
         return []
     given = [f"--start={options.start}"] if options.start is not None else []
     given += ["--loop"] if options.loop else []
     given += [f"--skip-gaps={options.skip_gaps}"] if options.skip_gaps < math.inf else []
-    if options.recording is None:
-        if given:
-            _fail(f"{given[0].partition('=')[0]} is for --from FILE.mcap")
-        return []
-    if options.seed is not None:
+    is_patrol = options.recording is None
+    if is_patrol and given:
+        _fail(f"{given[0].partition('=')[0]} is for --from FILE.mcap")
+    if not is_patrol and options.seed is not None:
         _fail("--seed is for the patrol, which --from FILE.mcap replaces")
-    if options.speed is not None:
-        low, high = PLAYER_SPEEDS
-        if not low <= options.speed <= high:
-            _fail(f"--speed is {options.speed:g}, for a recording it must be {low:g} to {high:g}")
-        given.append(f"--speed={options.speed!r}")
+    speeds = PATROL_SPEEDS if is_patrol else PLAYER_SPEEDS
+    for name, (low, high) in {"speed": speeds, "seed": SEEDS}.items():
+        value = getattr(options, name)
+        if value is not None and not low <= value <= high:
+            _fail(f"--{name} is {value!r}, it must be from {low} to {high}")
+        given += [f"--{name}={value!r}"] if value is not None else []
     return given
 
 
@@ -278,8 +264,18 @@ def parser() -> argparse.ArgumentParser:
     for role, text in ROLES.items():
         own = add_role(roles, role, text, parents=[common])
         if role == "demo":
-            for name, (kind, help_text) in PATROL_OPTIONS.items():
-                own.add_argument(f"--{name}", type=kind, metavar=name.upper(), help=help_text)
+            own.add_argument(
+                "--speed",
+                type=float,
+                metavar="SPEED",
+                help="patrol seconds, or seconds of the recording, per second (default: 1)",
+            )
+            own.add_argument(
+                "--seed",
+                type=int,
+                metavar="SEED",
+                help="seed of the patrol: a different seed gives a different patrol (default: 0)",
+            )
             own.add_argument(
                 "--from",
                 dest="recording",
@@ -329,8 +325,7 @@ def _prepare_process() -> None:
 
 
 def _fail(message: str) -> NoReturn:
-    print(f"lupin-twin: {message}", file=sys.stderr)  # noqa: T201  # there is no logger yet
-    raise SystemExit(USAGE_ERROR)
+    raise SystemExit(refuse("lupin-twin", message))
 
 
 if __name__ == "__main__":

@@ -85,7 +85,7 @@ def patrolled(
     may name another one, and is not read here.
     """
     try:
-        path = demo_journal_path(environ, int(_option("seed", patrol_args) or 0))
+        path = demo_journal_path(environ, int(_option("seed", patrol_args, 0.0)))
     except RuntimeError:
         path = None
     is_another = {"--params-file", "use_sim_time:=true"} & {*ros_args} or any(
@@ -97,7 +97,7 @@ def patrolled(
         _parameters(
             # The robot maps the floor: fields end at its walls.
             clip_to_explored=True,
-            day_length_s=float(DAY_S / _speed(patrol_args)),
+            day_length_s=float(DAY_S / _option("speed", patrol_args, 1.0)),
             **({} if path is None else {"journal": str(path)}),
         ),
         "simulated",
@@ -179,18 +179,12 @@ def since_morning_s(past_ns: int, patrol_args: Sequence[str], now_ns: int) -> fl
     The past that was filled in ended at nine o'clock, at `past_ns`. Since then, days have gone on,
     as long as they are now.
     """
-    return (now_ns - past_ns) / 1e9 * _speed(patrol_args) % DAY_S
+    return (now_ns - past_ns) / 1e9 * _option("speed", patrol_args, 1.0) % DAY_S
 
 
-def _speed(patrol_args: Sequence[str]) -> float:
-    speed = float(_option("speed", patrol_args) or 1.0)
-    # The patrol itself refuses any other.
-    return speed if 0.1 <= speed <= 50.0 else 1.0
-
-
-def _option(name: str, patrol_args: Sequence[str]) -> str:
+def _option(name: str, patrol_args: Sequence[str], default: float) -> float:
     given = [word for word in patrol_args if word.startswith(f"--{name}=")]
-    return given[-1].partition("=")[2] if given else ""
+    return float(given[-1].partition("=")[2]) if given else default
 
 
 # --- roles ----------------------------------------------------------------------------------------
@@ -203,16 +197,15 @@ def run(
     settings: Settings,
     secrets: Secrets,
     ros_args: Sequence[str],
-    patrol_args: Sequence[str] = (),
+    feed_args: Sequence[str] = (),
     *,
     recording: Sequence[str] = (),
-    play_args: Sequence[str] = (),
 ) -> None:
     """Run a role until a signal ends it.
 
-    `patrol_args` are the options of the patrol, in the role `demo`; it gets `ros_args` too, so that
-    a namespace or a remapping holds for both. With `recording` (its files) and `play_args` (the
-    player's options), the player takes the patrol's place.
+    `feed_args` are the options of the patrol, in the role `demo`; it gets `ros_args` too, so that
+    a namespace or a remapping holds for both. With `recording` (its files) they are those of its
+    player, which takes the patrol's place.
 
     Raises:
         SettingError: a setting, a parameter or an argument of ROS is invalid.
@@ -223,9 +216,9 @@ def run(
             feed = None
             if recording:
                 folder = ending.enter_context(tempfile.TemporaryDirectory(prefix="lupin-twin-"))
-                feed = recorded(recording, play_args, ros_args, Path(folder))
+                feed = recorded(recording, feed_args, ros_args, Path(folder))
             elif role == "demo":
-                feed = patrolled(os.environ, patrol_args, ros_args)
+                feed = patrolled(os.environ, feed_args, ros_args)
             asyncio.run(_run(role, settings, secrets, ros_args, feed))
         except (ParameterError, RecordingError) as error:
             raise SettingError(str(error)) from error

@@ -7,20 +7,13 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import NoReturn
 
 from lupin_twin.runtime import process
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        """Print the error in one line, without the usage."""
-        self.exit(2, f"{self.prog}: error: {message}\n")
-
-
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the options, ROS arguments excluded; it exits with 2 on a bad one."""
-    made = _Parser(
+    made = argparse.ArgumentParser(
         prog="patrol_node",
         description="Simulate a robot on patrol in a greenhouse, and publish what it observes.",
         epilog="ROS arguments follow --ros-args.",

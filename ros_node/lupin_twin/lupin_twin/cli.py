@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
@@ -11,6 +13,12 @@ from lupin_twin.runtime.process import limit_blas_threads
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the twin until a signal ends it; returns the exit code, 1 if its thread has died."""
+    own, _ = process.split_ros_args(sys.argv[1:] if args is None else args)
+    argparse.ArgumentParser(
+        prog="twin_node",
+        description="Run the twin alone, until a signal ends it.",
+        epilog="Everything after --ros-args goes to ROS: --ros-args -p idw_power:=3.0.",
+    ).parse_args(own)
     limit_blas_threads()
     process.return_large_blocks()
     process.block()  # before anything slow is imported

@@ -341,6 +341,7 @@ def printed(file: Path, words: str) -> str:
 
 
 def test_a_user_is_added_listed_and_removed(file: Path) -> None:
+    assert f"there is no file of accounts {file}: user add" in ended(file, "user list").stderr
     secret = file.with_name("password")
     secret.write_text("short\n")
     words = "user add anna --role operator --for-site gh1 --for-site gh2 --password-file"

@@ -48,8 +48,9 @@ def test_arguments_after_ros_args_belong_to_ros_up_to_a_double_dash(
     [
         (["serve", "--port", "70000"], "--port is '70000': input should be less than or equal"),
         (["serve", "--max-client", "5"], "unrecognized arguments: --max-client 5"),
-        (["demo", "--speed", "abc"], "argument --speed: invalid float value: 'abc'"),
-        (["demo", "--seed", "x"], "argument --seed: invalid int value: 'x'"),
+        (["demo", "--speed", "0"], "--speed is 0.0, it must be from 0.1 to 50.0"),
+        (["demo", "--speed", "101", "--from", "x"], "--speed is 101.0, it must be from 0.1 to 100"),
+        (["demo", "--seed", "-1"], "--seed is -1, it must be from 0 to 4294967295"),
         (["fly"], "invalid choice: 'fly'"),
         ([], "the following arguments are required: ROLE"),
     ],
@@ -69,19 +70,11 @@ def test_without_a_home_directory_it_still_serves(tmp_path: Path) -> None:
 
 def test_a_signal_before_it_serves_ends_it_once_it_serves(domain: int) -> None:
     with lupin_twin(domain, "serve", afresh=True) as process:
-        # The command blocks both before its first slow import; see /proc/[pid]/status.
-        held_back = 1 << (signal.SIGINT - 1) | 1 << (signal.SIGTERM - 1)
-        wait_for(lambda: blocked_signals(process.pid) & held_back == held_back, "them held back")
+        # The command blocks both before its first slow import.
+        wait_for(process.holds_signals_back, "signals to be held back")
         process.send(signal.SIGINT)
         assert process.wait() == 0
         assert "Traceback" not in process.output
-
-
-def blocked_signals(pid: int) -> int:
-    """The blocked signals of a process's main thread, as a bit mask."""
-    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
-    (mask,) = [line.split()[1] for line in status.splitlines() if line.startswith("SigBlk")]
-    return int(mask, 16)
 
 
 LEVELS = ["debug", "info", "warning", "error"]

@@ -103,6 +103,7 @@ def importing(tmp_path: Path) -> Import:
 def test_a_dry_run_writes_nothing_and_importing_twice_writes_each_row_once(
     importing: Import,
 ) -> None:
+    assert importing.run().stderr == f"lupin-twin: {importing.map}: No such file or directory\n"
     done = importing.given(WIDE, ROWS).run()
     assert done.returncode == 0
     assert done.stdout.splitlines() == [

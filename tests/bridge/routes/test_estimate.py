@@ -116,7 +116,7 @@ def test_a_matching_etag_gets_304_until_a_new_scan_arrives(live: Bridge) -> None
         ({"sensor_type": ""}, "sensor_type is '': string should have at least 1"),
         ({"resolution": 0}, "resolution is '0': input should be greater than 0"),
         ({"resolution": 0.0001}, "limit is 1000000 in all"),
-        ({"sensor_type": "ph"}, "no tag has a reading of the 86400 s before that moment"),
+        ({"sensor_type": "ph"}, "no tag has a reading of this sensor_type in the 86400 s"),
         ({"at": 2**31 - 1}, "at is 2147483647.000000000 s, later than now"),
         ({"layer": "median"}, "layer is 'median': input should be 'mean' or 'sd'"),
         ({"layer": "sd"}, "layer is 'sd', but only a PNG has one"),

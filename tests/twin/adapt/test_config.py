@@ -138,7 +138,7 @@ def changed(path: str, value: Any) -> dict[str, Any]:
         ("tags", {True: [0, 0]}, "tags: True is no text of 1 to 256 printable characters"),
         ("tags", {"a\0b": [0, 0]}, "is no text of 1 to 256 printable characters"),
         ("tags", {"a\ud800b": [0, 0]}, "is no text of 1 to 256 printable characters"),
-        ("tags", "none.yaml", "none.yaml: No such file or directory"),
+        ("tags", "none.yaml", "tags: none.yaml: No such file or directory"),
         ("reach_m", 0, "reach_m is 0, must be from 0.01 to 100"),
         ("window_s", True, "window_s is True, expected a number"),
         ("frame_id", "", "frame_id: '' is no text"),
@@ -159,11 +159,11 @@ def test_an_invalid_configuration_is_named(path: str, value: Any, complaint: str
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("a: [", "is not YAML"),
-        ("[" * 5000, "is not YAML"),
-        ("a: " + "9" * 5000, "is not YAML"),
-        ("\x00", "is not YAML"),
-        ("- 1", "the file is [1], expected keys"),
+        ("a: [", "adapt.yaml: not YAML"),
+        ("[" * 5000, "not YAML"),
+        ("a: " + "9" * 5000, "not YAML"),
+        ("\x00", "not YAML"),
+        ("- 1", "adapt.yaml: the file is [1], expected keys"),
         ("reach_m: 0x" + "f" * 5000, "reach_m is a very large int, expected a number"),
         # A thousand million entries, in ten lines.
         (

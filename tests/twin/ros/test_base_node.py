@@ -99,6 +99,11 @@ def test_warnings_are_limited_per_key_and_counted(utilities: NodeUtilities, logg
     utilities.drop(Drop(Reason.FRAME, "no"), "/t")
     wording = "dropped a message on /t: no"
     assert logged.lines == [wording, wording, wording, f"{wording} (2 more since the last warning)"]
+    for _ in range(3600):
+        logged.now_s += 1.0
+        utilities.drop(Drop(Reason.FRAME, "no"), "/t")
+    assert len(logged.lines) == 4 + 3 + 58  # after 10, 20 and 40 s, then once a minute
+    assert logged.lines[-1] == f"{wording} (59 more since the last warning)"
 
 
 def test_on_a_shared_topic_only_wanted_messages_are_read_and_the_others_not_counted(

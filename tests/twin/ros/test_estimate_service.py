@@ -52,7 +52,7 @@ def request(peer: Peer, **changes: Any) -> Any:
         ({"sensor_type": ""}, "sensor_type is empty"),
         ({"resolution": 0.0}, "resolution is 0.0"),
         ({"resolution": 0.0001}, "cells"),
-        ({"sensor_type": "ph"}, "no tag has a reading of the 86400 s before that moment"),
+        ({"sensor_type": "ph"}, "no tag has a reading of this sensor_type in the 86400 s"),
         ({"at": Time(sec=2**31 - 1)}, "at is 2147483647.000000000 s, later than now"),
     ],
 )

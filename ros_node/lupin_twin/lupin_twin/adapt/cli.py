@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from lupin_twin.adapt.config import Config
 
 WRONG = 1
-
-
 HELP = "turn a robot's own topics, or sensors on an MQTT broker, into observations"
 
 

@@ -117,7 +117,10 @@ def read_config(path: Path) -> Config:
         ConfigError: it cannot be read, or is invalid.
 
     """
-    return config_of(read_yaml(path), path.parent)
+    try:
+        return config_of(read_yaml(path), path.parent)
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from None
 
 
 def config_of(content: Any, folder: Path = Path()) -> Config:
@@ -186,7 +189,10 @@ def _detections(table: Table) -> Detections:
 
 def _tags(content: Any, folder: Path) -> Iterator[tuple[str, Pose | str]]:
     if isinstance(content, str):
-        content = read_yaml(folder / content)
+        try:
+            content = read_yaml(folder / content)
+        except ConfigError as error:
+            raise ConfigError(f"tags: {content}: {error}") from None
     table = Table("tags", content)
     if len(table.content) > MAX_TAGS:
         raise ConfigError(f"tags: {len(table.content)}, the limit is {MAX_TAGS}")
@@ -258,7 +264,7 @@ def _sensor(name: str, table: Table) -> Sensor:
 
 
 def read_yaml(path: Path) -> Any:
-    """Return the content of a YAML file.
+    """Return the content of a YAML file; errors do not name it.
 
     Raises:
         ConfigError: it cannot be read, is too large, or is not YAML.
@@ -281,11 +287,11 @@ def read_yaml(path: Path) -> Any:
         with path.open("rb") as file:
             content = file.read(MAX_FILE_BYTES + 1)
     except OSError as error:
-        raise ConfigError(f"{path}: {error.strerror}") from None
+        raise ConfigError(str(error.strerror)) from None
     if len(content) > MAX_FILE_BYTES:
-        raise ConfigError(f"{path} has more than {MAX_FILE_BYTES} bytes, the limit")
+        raise ConfigError(f"it has more than {MAX_FILE_BYTES} bytes, the limit")
     try:
         return yaml.load(content, Loader)  # noqa: S506  # it is a SafeLoader
     # PyYAML passes on Python's errors about encoding, numbers of thousands of digits, and [[[[[...
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ConfigError(f"{path} is not YAML: {' '.join(str(error).split())[:200]}") from None
+        raise ConfigError(f"not YAML: {' '.join(str(error).split())[:200]}") from None

@@ -90,7 +90,9 @@ def readings_of(tags: Sequence[TagPast], at_ns: int, day_length_s: float) -> Rea
             f"{present} tags have this sensor, an estimate is made of {MAX_TAGS} at most"
         )
     if not present:
-        raise FieldRefused(f"no tag has a reading of the {day_length_s:g} s before that moment")
+        raise FieldRefused(
+            f"no tag has a reading of this sensor_type in the {day_length_s:g} s before that moment"
+        )
     return those
 
 

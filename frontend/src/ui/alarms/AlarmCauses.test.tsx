@@ -56,7 +56,7 @@ test('many of one cause that one person has acknowledged say who, and when the l
     });
     report(...list);
     act(() => {
-      const items = list.map((each) => ({ alarm: each, verdict: each.reason.verdict }));
+      const items = list.map((each) => ({ alarm: each }));
       own.set(acknowledge(NO_LOCAL_ALARMS, items, 0));
     });
   };
@@ -75,7 +75,7 @@ test('only who acknowledged an alarm, or an admin, may take that back', () => {
     report(said);
     act(() => {
       person.set({ ...anna, role });
-      own.set(acknowledge(NO_LOCAL_ALARMS, [{ alarm: said, verdict: 'critical' }], 0));
+      own.set(acknowledge(NO_LOCAL_ALARMS, [{ alarm: said }], 0));
     });
     fireEvent.click(screen.getByRole('button', { name: /^Actions/ }));
     const found = screen.queryByText('Unacknowledge') !== null;

@@ -1,6 +1,5 @@
 import type { JSX } from 'react';
 
-import type { Item } from '../../alarms/list';
 import {
   spanText,
   timesOf,
@@ -79,10 +78,10 @@ export function ResolvedNote({ alarm }: { alarm: Alarm }): JSX.Element {
 
 /** The value now and the worst value, in a column each. */
 export function AlarmFacts({
-  item: { alarm, verdict },
+  alarm,
   values: { state, now: current, worst },
 }: {
-  item: Item;
+  alarm: Alarm;
   values: ValuesNow;
 }): JSX.Element {
   const sensors = useApp(selectCatalogue);
@@ -100,7 +99,7 @@ export function AlarmFacts({
         </Fact>
       )}
       {state?.kind === 'unknown' && <NotKnown alarm={alarm} state={state} />}
-      {worst !== null && <Fact name="worst" verdict={verdict} text={worst} />}
+      {worst !== null && <Fact name="worst" verdict={alarm.reason.verdict} text={worst} />}
     </>
   );
 }

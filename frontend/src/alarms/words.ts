@@ -68,7 +68,7 @@ export function valuesOf(alarm: Alarm, sensors: Catalogue, now: Now | null): Val
     if (!isPest) return S.alarmNow(text(value));
     return value > 0 ? S.alarmNow(S.pestCount(value)) : S.alarmPests.still;
   };
-  const value = now?.kind === 'known' ? now.value : null;
+  const value = lastKnown(now)?.value ?? null;
   const worstText = worst === null || (isPest && worst === 0) ? null : text(worst);
   const isMeasured = isOfRange(reason) || isPest || reason.kind === 'changed';
   return {

@@ -16,7 +16,7 @@ import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
 import { hourAgo, shortHourText } from '../../store/hourAgo';
 import { selectCatalogue } from '../../store/derived';
-import { rosNow, selectClockFault, selectHasTime } from '../../store/moment';
+import { isReceivingNow, rosNow, selectClockFault, selectHasTime } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { HealthMark } from '../HealthMark';
@@ -67,6 +67,29 @@ export function AlarmTimes({
         {text} <small className="faint">{note}</small>
       </span>
       <HealthMark verdict={verdict} text={verdict === 'healthy' ? S.alarmBack : undefined} />
+    </span>
+  );
+}
+
+/** What to do. Old values ask for nothing: only the line stays, so that no row moves. */
+export function AlarmTodo({
+  text,
+  isAgain = false,
+  isOfSilence = false,
+}: {
+  text: string;
+  /** Whether it differs from that of the alarm's heading. */
+  isAgain?: boolean;
+  isOfSilence?: boolean;
+}): JSX.Element {
+  const isCurrent = useApp(isReceivingNow) || isOfSilence;
+  return (
+    <span
+      className="alarm-do"
+      data-again={isAgain || undefined}
+      style={isCurrent ? undefined : { visibility: 'hidden' }}
+    >
+      {text}
     </span>
   );
 }
@@ -138,8 +161,9 @@ function NotKnown({
     unknownText(alarm, sensors, state, hasTime ? ageSeconds(state.lastAt, at) : null),
   );
   return (
+    // Without the age, which would take a line more than a value.
     <span data-fact="now" data-status="unknown" title={text}>
-      {text}
+      {unknownText(alarm, sensors, state, null)}
     </span>
   );
 }

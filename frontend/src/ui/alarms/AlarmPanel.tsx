@@ -36,7 +36,7 @@ import { S } from '../../strings';
 import { Disclosure, Icon, Select } from '../../widgets/controls';
 import { HealthMark } from '../HealthMark';
 import { useChosenInSight, usePaper, useTopAfter } from '../visibleRows';
-import { AlarmTimes, ResolvedNote } from './AlarmFacts';
+import { AlarmTimes, AlarmTodo, ResolvedNote } from './AlarmFacts';
 import { AlarmNotes, AlarmsWait, LastActionLine, NotifySettings } from './AlarmNotes';
 import { Acknowledge, AlarmRow, ignoreDoubleClick } from './AlarmRow';
 import { ALARMS_ID, ListChoice } from './ListChoice';
@@ -310,7 +310,7 @@ function CauseHeading({
               {S.alarmCount(own.length)} <Icon name="chevron" />
             </span>
           </span>
-          {group === 'active' && <span className="alarm-do">{todo}</span>}
+          {group === 'active' && <AlarmTodo text={todo} />}
           {counts && <span className="alarm-facts">{counts}</span>}
           <span className="alarm-facts faint">{tagsText(tags)}</span>
         </span>

@@ -21,7 +21,7 @@ import { mayAct, mayWithdraw, person, useSelected } from '../../store/create';
 import { selectCatalogue } from '../../store/derived';
 import { S } from '../../strings';
 import { Disclosure, Icon, useClose } from '../../widgets/controls';
-import { AlarmFacts, AlarmTimes, useValues } from './AlarmFacts';
+import { AlarmFacts, AlarmTimes, AlarmTodo, useValues } from './AlarmFacts';
 import { useIsRefused, useWhoAcknowledged } from './people';
 
 /** One alarm: since when, what, where, value now and at worst; a click shows its tag live. */
@@ -77,9 +77,11 @@ export const AlarmRow = memo(function AlarmRow({
           {/* A row held in "active" has no other line for the shelving reason. */}
           {group === 'active' && item.shelf?.reason && <q className="faint">{item.shelf.reason}</q>}
           {group === 'active' && !item.shelf && (
-            <span className="alarm-do" data-again={isBack || undefined}>
-              {values.todo}
-            </span>
+            <AlarmTodo
+              text={values.todo}
+              isAgain={isBack}
+              isOfSilence={alarm.reason.kind === 'silent'}
+            />
           )}
           {group === 'shelved' && item.shelf && (
             <span className="alarm-facts faint">

@@ -138,11 +138,11 @@ describe('an order that is held', () => {
   });
 });
 
-test('a second scan is waited for by what a first one found: beyond a range, or no value', () => {
+test('a second scan is waited for by what a first one found: beyond a range, no value, or no answer', () => {
   const held = { ...reason(), release: 10.4 };
-  const kinds = ['reading_failed', 'range', 'pest', 'old'] as const;
+  const kinds = ['reading_failed', 'range', 'scan_failed', 'pest', 'old'] as const;
   const awaited = [...kinds.map((kind) => reason({ kind })), held].filter(isAwaited);
-  expect(awaited.map(({ kind }) => kind)).toEqual(['reading_failed', 'range']);
+  expect(awaited.map(({ kind }) => kind)).toEqual(['reading_failed', 'range', 'scan_failed']);
 });
 
 test('what is the same stays the same, and the rest is not', () => {

@@ -141,7 +141,9 @@ export const alarmOf = (
 
 /** Whether a reason's alarm waits for a second scan to confirm it. */
 export const isAwaited = ({ kind, release }: HealthReason): boolean =>
-  kind === 'reading_failed' || (kind === 'range' && release === undefined);
+  kind === 'reading_failed' ||
+  kind === 'scan_failed' ||
+  (kind === 'range' && release === undefined);
 
 /** Changes between two lists, to be announced once. */
 export interface News {

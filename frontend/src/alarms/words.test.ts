@@ -11,6 +11,7 @@ import {
   severalText,
   spanText,
   timesOf,
+  sinceText,
   unknownText,
   valuesOf,
   whenText,
@@ -151,6 +152,16 @@ test('since when and until when: of today the time alone, to the minute', () => 
   const night = alarm('a', { raised: NOON, cleared: NOON + 50_000 });
   expect(spanText(night, NOON + 50_001)).toMatch(/^14 Nov, 12:00 until 01:53 \(13/);
   expect(whenText(100, 200)).toBe('sim 00:01:40');
+});
+
+test('what the log does not reach back to has lasted for longer than is known', () => {
+  const at = (sec: number) => ({ sec: NOON + sec, nanosec: 0 });
+  const old = alarm('a', { raised: NOON + 900, reason: { since: at(0) } });
+  const text = (known: number, each = old) => sinceText(each, NOON + 1_500, at(known), true);
+  expect(text(-899)).toBe('for over 10\u00a0min');
+  expect(text(-900), 'an earlier scan was good').toBe('since 12:15 (10\u00a0min)');
+  const pest = { kind: 'pest', since: at(900) } as const;
+  expect(text(900, alarm('b', { raised: NOON + 900, reason: pest }))).toMatch(/^since/);
 });
 
 test('a row says since when, for how long only if it began today, and the end once it is resolved', () => {

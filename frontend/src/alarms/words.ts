@@ -1,5 +1,5 @@
 /** An alarm in words: what, where, value now and at worst, since when, until when. Pure. */
-import type { Alarm, HealthReason, Verdict } from '../contract/types';
+import type { Alarm, HealthReason, Verdict, WireTime } from '../contract/types';
 import { isOldReading, trendOf, type TagThen } from '../domain/difference';
 import { ageText, beyondLimitText, minuteText, readingText } from '../domain/format';
 import { beyondText, isOfRange, reasonText, sideOf, todoText } from '../domain/health';
@@ -111,14 +111,36 @@ export function unknownText(
   return S.alarmNowUnknown(reading, age === null ? null : ageText(age));
 }
 
+/**
+ * Whether it may have begun before `known`, from when on alarms are known: its tag had no earlier scan,
+ * because its first two bad ones are farther apart.
+ */
+const isOlder = ({ reason: { kind, since }, raised_at }: Alarm, known: WireTime | null): boolean =>
+  (kind === 'range' || kind === 'reading_failed' || kind === 'scan_failed') &&
+  known !== null &&
+  since !== null &&
+  secondsOf(since) - secondsOf(known) < secondsOf(raised_at) - secondsOf(since);
+
+/** Since when, and for how long if that is wanted; at least how long, if it may be older than `known`. */
+export function sinceText(
+  alarm: Alarm,
+  nowS: number | null,
+  known: WireTime | null,
+  hasLength: boolean,
+): string {
+  const from = secondsOf(alarm.raised_at);
+  const length = nowS === null ? null : secondsSince(from, nowS);
+  if (length !== null && isOlder(alarm, known)) return S.alarmForOver(lengthText(length));
+  const long = hasLength && length !== null ? lengthText(length) : null;
+  return S.alarmSince(whenText(from, nowS), long);
+}
+
 /** Begin, end and duration. `nowS` is the twin's time, ROS seconds; null: unknown. */
-export function spanText({ raised_at, cleared_at }: Alarm, nowS: number | null): string {
+export function spanText(alarm: Alarm, nowS: number | null, known: WireTime | null = null): string {
+  const { raised_at, cleared_at } = alarm;
+  if (cleared_at === null) return sinceText(alarm, nowS, known, true);
   const from = secondsOf(raised_at);
   const begin = whenText(from, nowS);
-  if (cleared_at === null) {
-    const length = nowS === null ? null : secondsSince(from, nowS);
-    return S.alarmSince(begin, length === null ? null : lengthText(length));
-  }
   const until = secondsOf(cleared_at);
   const end = isSameDay(from, until) ? clockOf(until) : whenText(until, nowS);
   return S.alarmUntil(begin, end, lengthText(until - from));
@@ -126,19 +148,19 @@ export function spanText({ raised_at, cleared_at }: Alarm, nowS: number | null):
 
 /** Since when, and if that is today, for how long; with `isOver`, how long it was and when it ended. */
 export function timesOf(
-  { raised_at, cleared_at }: Alarm,
+  alarm: Alarm,
   nowS: number | null,
   isOver: boolean,
+  known: WireTime | null = null,
 ): { readonly text: string; readonly note: string } {
-  const from = secondsOf(raised_at);
-  const until = cleared_at ? secondsOf(cleared_at) : nowS;
+  const from = secondsOf(alarm.raised_at);
+  const until = alarm.cleared_at ? secondsOf(alarm.cleared_at) : nowS;
   const length = until === null ? null : secondsSince(from, until);
   if (isOver && until !== null && length !== null) {
     return { text: lengthText(length), note: `${S.alarmResolved} ${whenText(until, nowS)}` };
   }
   const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? from);
-  const short = length === null || !isOfToday ? null : lengthText(length);
-  return { text: S.alarmSince(whenText(from, nowS), short), note: '' };
+  return { text: sinceText(alarm, nowS, known, isOfToday), note: '' };
 }
 
 const lengthText = (seconds: number): string => inOnePiece(ageText(Math.max(0, seconds)));

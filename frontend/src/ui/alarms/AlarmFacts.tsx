@@ -14,6 +14,7 @@ import { ageSeconds } from '../../domain/time';
 import { C } from '../../notes/NoteMarks';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
+import { selectKnownSince } from '../../alarms/latest';
 import { hourAgo, shortHourText } from '../../store/hourAgo';
 import { selectCatalogue } from '../../store/derived';
 import { isReceivingNow, rosNow, selectClockFault, selectHasTime } from '../../store/moment';
@@ -53,8 +54,9 @@ export function AlarmTimes({
   isOver?: boolean;
 }): JSX.Element {
   const nowOf = (at: number): number | null => rosNow(store.get(), at);
-  const span = useTicking((at) => spanText(alarm, nowOf(at)));
-  const text = useTicking((at) => timesOf(alarm, nowOf(at), isOver).text);
+  const known = useApp(selectKnownSince);
+  const span = useTicking((at) => spanText(alarm, nowOf(at), known));
+  const text = useTicking((at) => timesOf(alarm, nowOf(at), isOver, known).text);
   const note = useTicking((at) => timesOf(alarm, nowOf(at), isOver).note);
   return (
     <span

@@ -21,6 +21,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmHouse: 'Ganzes Gewächshaus',
   alarmWhat: (where, what) => `${where}: ${what}`,
   alarmSince: (when, length) => (length === null ? `seit ${when}` : `seit ${when} (${length})`),
+  alarmForOver: (length) => `seit über ${length}`,
   alarmUntil: (from, until, length) => `${from} bis ${until} (${length})`,
   alarmNow: (reading) => `jetzt ${reading}`,
   alarmNowUnknown: (last, age) =>

@@ -19,6 +19,8 @@ export const ALARMS = {
   alarmWhat: (where: string, what: string): string => `${where}: ${what}`,
   alarmSince: (when: string, length: string | null): string =>
     length === null ? `since ${when}` : `since ${when} (${length})`,
+  /** The beginning is unknown. */
+  alarmForOver: (length: string): string => `for over ${length}`,
   alarmUntil: (from: string, until: string, length: string): string =>
     `${from} until ${until} (${length})`,
   /** An alarm's value now, at worst, and when raised. */

@@ -19,6 +19,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmHouse: 'Todo el invernadero',
   alarmWhat: (where, what) => `${where}: ${what}`,
   alarmSince: (when, length) => (length === null ? `desde ${when}` : `desde ${when} (${length})`),
+  alarmForOver: (length) => `hace más de ${length}`,
   alarmUntil: (from, until, length) => `de ${from} a ${until} (${length})`,
   alarmNow: (reading) => `ahora ${reading}`,
   alarmNowUnknown: (last, age) =>

@@ -17,6 +17,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmHouse: 'Hele kas',
   alarmWhat: (where, what) => `${where}: ${what}`,
   alarmSince: (when, length) => (length === null ? `sinds ${when}` : `sinds ${when} (${length})`),
+  alarmForOver: (length) => `al meer dan ${length}`,
   alarmUntil: (from, until, length) => `${from} tot ${until} (${length})`,
   alarmNow: (reading) => `nu ${reading}`,
   alarmNowUnknown: (last, age) =>

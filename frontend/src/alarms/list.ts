@@ -95,6 +95,8 @@ export const inOrder = (
   items
     .map((item) => {
       const reason = reasonOf(item);
+      // While nothing arrives, that is the one to act on.
+      if (reason.kind === 'silent') return { item, rank: Infinity };
       return {
         item,
         rank: severity({ verdict: reason.verdict, reasons: [reason] }, item.isAcknowledged),

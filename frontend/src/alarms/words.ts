@@ -19,6 +19,7 @@ import { S } from '../strings';
 const LONGEST_NAME = 24;
 /** Most alarms named in one message; the list has the rest. */
 const MOST_NAMED = 3;
+const TEN_HOURS_S = 36_000;
 
 export const whereText = ({ tag_id }: Pick<Alarm, 'tag_id'>): string =>
   tag_id === '' ? S.alarmHouse : S.card(shown(tag_id, LONGEST_NAME));
@@ -26,9 +27,10 @@ export const whereText = ({ tag_id }: Pick<Alarm, 'tag_id'>): string =>
 /** What is wrong, without its value, which changes. */
 export function whatText({ reason }: Pick<Alarm, 'reason'>, sensors: Catalogue): string {
   if (isOfRange(reason)) return beyondText(sensors, reason);
-  // A pest count and a changed sensor's reading are reported as current values.
+  // A pest count and a changed sensor's reading are reported as current values; the card says how long
+  // readings are valid.
   const value = reason.kind === 'pest' ? 0 : reason.kind === 'changed' ? null : reason.value;
-  return reasonText(sensors, { ...reason, value }, null);
+  return reasonText(sensors, { ...reason, value, limit: null }, null);
 }
 
 /** What and where in one line, independent of time. */
@@ -121,7 +123,7 @@ const isOlder = ({ reason: { kind, since }, raised_at }: Alarm, known: WireTime 
   since !== null &&
   secondsOf(since) - secondsOf(known) < secondsOf(raised_at) - secondsOf(since);
 
-/** Since when, and for how long if that is wanted; at least how long, if it may be older than `known`. */
+/** Since when; with `hasLength` and if that is today, for how long. At least how long, if it may be older than `known`. */
 export function sinceText(
   alarm: Alarm,
   nowS: number | null,
@@ -131,8 +133,9 @@ export function sinceText(
   const from = secondsOf(alarm.raised_at);
   const length = nowS === null ? null : secondsSince(from, nowS);
   if (length !== null && isOlder(alarm, known)) return S.alarmForOver(lengthText(length));
-  const long = hasLength && length !== null ? lengthText(length) : null;
-  return S.alarmSince(whenText(from, nowS), long);
+  const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? from);
+  const short = hasLength && isOfToday && length !== null ? lengthText(length) : null;
+  return S.alarmSince(whenText(from, nowS), short);
 }
 
 /** Begin, end and duration. `nowS` is the twin's time, ROS seconds; null: unknown. */
@@ -146,24 +149,18 @@ export function spanText(alarm: Alarm, nowS: number | null, known: WireTime | nu
   return S.alarmUntil(begin, end, lengthText(until - from));
 }
 
-/** Since when, and if that is today, for how long; with `isOver`, how long it was and when it ended. */
-export function timesOf(
-  alarm: Alarm,
-  nowS: number | null,
-  isOver: boolean,
-  known: WireTime | null = null,
-): { readonly text: string; readonly note: string } {
-  const from = secondsOf(alarm.raised_at);
-  const until = alarm.cleared_at ? secondsOf(alarm.cleared_at) : nowS;
-  const length = until === null ? null : secondsSince(from, until);
-  if (isOver && until !== null && length !== null) {
-    return { text: lengthText(length), note: `${S.alarmResolved} ${whenText(until, nowS)}` };
-  }
-  const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? from);
-  return { text: sinceText(alarm, nowS, known, isOfToday), note: '' };
-}
+/** How long a resolved alarm was active; empty: it still is. */
+export const lengthOf = ({ raised_at, cleared_at }: Alarm): string =>
+  cleared_at ? lengthText(secondsOf(cleared_at) - secondsOf(raised_at)) : '';
 
-const lengthText = (seconds: number): string => inOnePiece(ageText(Math.max(0, seconds)));
+export const resolvedText = ({ cleared_at }: Alarm, nowS: number | null): string =>
+  cleared_at ? `${S.alarmResolved} ${whenText(secondsOf(cleared_at), nowS)}` : '';
+
+/** Ten hours and more to the hour. */
+const lengthText = (seconds: number): string => {
+  const text = ageText(Math.max(0, seconds));
+  return seconds < TEN_HOURS_S ? inOnePiece(text) : (text.split(' ')[0] ?? text);
+};
 
 /** Makes the first space non-breaking. */
 export const inOnePiece = (text: string): string => text.replace(' ', '\u00a0');

@@ -1,8 +1,10 @@
 import type { JSX } from 'react';
 
 import {
+  lengthOf,
+  resolvedText,
+  sinceText,
   spanText,
-  timesOf,
   unknownText,
   valuesOf,
   type Now,
@@ -56,8 +58,10 @@ export function AlarmTimes({
   const nowOf = (at: number): number | null => rosNow(store.get(), at);
   const known = useApp(selectKnownSince);
   const span = useTicking((at) => spanText(alarm, nowOf(at), known));
-  const text = useTicking((at) => timesOf(alarm, nowOf(at), isOver, known).text);
-  const note = useTicking((at) => timesOf(alarm, nowOf(at), isOver).note);
+  const text = useTicking((at) =>
+    isOver ? lengthOf(alarm) : sinceText(alarm, nowOf(at), known, verdict !== 'healthy'),
+  );
+  const note = useTicking((at) => (isOver ? resolvedText(alarm, nowOf(at)) : ''));
   return (
     <span
       className="alarm-times"
@@ -97,7 +101,7 @@ export function AlarmTodo({
 }
 
 export function ResolvedNote({ alarm }: { alarm: Alarm }): JSX.Element {
-  const note = useTicking((at) => timesOf(alarm, rosNow(store.get(), at), true).note);
+  const note = useTicking((at) => resolvedText(alarm, rosNow(store.get(), at)));
   return <small className="faint">{note}</small>;
 }
 
@@ -123,7 +127,9 @@ export function AlarmFacts({
           )}
         </Fact>
       )}
-      {state?.kind === 'unknown' && <NotKnown alarm={alarm} state={state} />}
+      {state?.kind === 'unknown' && (
+        <NotKnown alarm={alarm} state={state} hasLast={worst === null} />
+      )}
       {worst !== null && <Fact name="worst" verdict={alarm.reason.verdict} text={worst} />}
     </>
   );
@@ -153,9 +159,11 @@ function Fact({
 function NotKnown({
   alarm,
   state,
+  hasLast,
 }: {
   alarm: Alarm;
   state: Extract<Now, { kind: 'unknown' }>;
+  hasLast: boolean;
 }): JSX.Element {
   const sensors = useApp(selectCatalogue);
   const hasTime = useApp(selectHasTime);
@@ -163,9 +171,9 @@ function NotKnown({
     unknownText(alarm, sensors, state, hasTime ? ageSeconds(state.lastAt, at) : null),
   );
   return (
-    // Without the age, which would take a line more than a value.
+    // Never more lines than a known value: then no row grows.
     <span data-fact="now" data-status="unknown" title={text}>
-      {unknownText(alarm, sensors, state, null)}
+      {hasLast ? unknownText(alarm, sensors, state, null) : S.alarmNowUnknown(null, null)}
     </span>
   );
 }

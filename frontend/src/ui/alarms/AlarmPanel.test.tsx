@@ -128,7 +128,7 @@ test('what is well again waits for one more good scan, and pests for an inspecti
     document.querySelector(`[data-where='${tag}'] .alarm-do`)?.textContent;
   expect([todo('5'), todo('6')]).toEqual([
     'The next good scan resolves it',
-    'Inspect again: a second clean inspection resolves it',
+    'Inspect again to resolve it',
   ]);
   // An active alarm is never called healthy, nor dated as if that were since then.
   expect(fact(first('active'), 'since').textContent).toMatch(/^alarm since .*Back to normal$/);

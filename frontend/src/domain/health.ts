@@ -114,7 +114,7 @@ export function sharedJudgement(before: Judgement | null, now: Judgement): Judge
 /** Longest name of an undeclared sensor or kind, characters. */
 const LONGEST_NAME = 32;
 /** A longer name gives way to its abbreviation, if it has one. */
-const LONG_NAME = 19;
+const LONG_NAME = 20;
 
 const nameOf = ({ label }: Sensor): string =>
   shown(label.length > LONG_NAME ? S.sensorShort(label) : label, LONGEST_NAME);

@@ -142,12 +142,12 @@ test('of a pest how many: now, at worst and at first', () => {
 
 test('since when and until when: of today the time alone, to the minute', () => {
   const since = alarm('a', { raised: NOON });
-  expect(spanText(since, NOON + 1_500)).toBe('since 12:00 (25\u00a0min)');
+  expect(spanText(since, NOON + 1_500, null)).toBe('since 12:00 (25\u00a0min)');
   const over = alarm('a', { raised: NOON, cleared: NOON + 600 });
-  expect(spanText(over, NOON + 1_500)).toBe('12:00 until 12:10 (10\u00a0min)');
-  expect(spanText(over, NOON + 86_400)).toBe('14 Nov, 12:00 until 12:10 (10\u00a0min)');
+  expect(spanText(over, NOON + 1_500, null)).toBe('12:00 until 12:10 (10\u00a0min)');
+  expect(spanText(over, NOON + 86_400, null)).toBe('14 Nov, 12:00 until 12:10 (10\u00a0min)');
   const night = alarm('a', { raised: NOON, cleared: NOON + 50_000 });
-  expect(spanText(night, NOON + 50_001)).toMatch(/^14 Nov, 12:00 until 01:53 \(13/);
+  expect(spanText(night, NOON + 50_001, null)).toMatch(/^14 Nov, 12:00 until 01:53 \(13/);
   expect(whenText(100, 200)).toBe('sim 00:01:40');
 });
 

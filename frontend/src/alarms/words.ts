@@ -138,15 +138,13 @@ export function sinceText(
   return S.alarmSince(whenText(from, nowS), short);
 }
 
-/** Begin, end and duration. `nowS` is the twin's time, ROS seconds; null: unknown. */
-export function spanText(alarm: Alarm, nowS: number | null, known: WireTime | null = null): string {
+/** Begin, end and duration of a resolved alarm; otherwise as `sinceText`. */
+export function spanText(alarm: Alarm, nowS: number | null, known: WireTime | null): string {
   const { raised_at, cleared_at } = alarm;
   if (cleared_at === null) return sinceText(alarm, nowS, known, true);
-  const from = secondsOf(raised_at);
-  const begin = whenText(from, nowS);
-  const until = secondsOf(cleared_at);
+  const [from, until] = [secondsOf(raised_at), secondsOf(cleared_at)];
   const end = isSameDay(from, until) ? clockOf(until) : whenText(until, nowS);
-  return S.alarmUntil(begin, end, lengthText(until - from));
+  return S.alarmUntil(whenText(from, nowS), end, lengthText(until - from));
 }
 
 /** How long a resolved alarm was active; empty: it still is. */

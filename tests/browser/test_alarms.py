@@ -10,7 +10,7 @@ from typing import Any
 
 from playwright.sync_api import Locator, expect
 
-from tests.browser.hmi import PHONE, WIDE, Hmi, OpenPage
+from tests.browser.hmi import PHONE, SERVER_GONE, WIDE, Hmi, OpenPage
 from tests.browser.places import LINES, out_of_reach, place, places, words_below
 from tests.support.messages import scan
 from tests.support.waiting import wait_for
@@ -273,6 +273,15 @@ def test_nothing_moves_while_a_finger_rests_on_the_list(domain: int, open_page: 
         assert all(place(row).bottom - place(row).top <= 64 for row in caused.all())
         assert words_below(hmi, "[data-caused=true] .alarm-go", ".alarm-tools > *") == []
         assert out_of_reach(hmi, "[data-caused=true] button") == []
+        # Old values ask for nothing, and no row grows or shrinks for it.
+        heights = [place(row).bottom - place(row).top for row in caused.all()]
+        todo = hmi.page.locator(".alarm-cause .alarm-do")
+        expect(todo).to_be_visible()
+        running.process.kill()
+        hmi.allow_noise(SERVER_GONE)
+        expect(values).to_have_text([re.compile("now unknown")] * 5)
+        expect(todo).to_be_hidden()
+        assert [place(row).bottom - place(row).top for row in caused.all()] == heights
 
 
 def where(hmi: Hmi) -> list[str]:

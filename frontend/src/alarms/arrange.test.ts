@@ -6,7 +6,7 @@ import { cataloguesOf } from '../domain/sensors';
 import { CATALOGUE, IN_FAHRENHEIT, FILE } from '../testing/sensors';
 import { alarmsCsv, arranged, countsText, filtered, tagsText } from './arrange';
 import { acknowledge, NO_LOCAL_ALARMS, shelve, type LocalAlarms } from './own';
-import { causesFirst, listOf } from './list';
+import { inOrder, listOf } from './list';
 import type { Now } from './words';
 
 const isTag = (): boolean => false;
@@ -52,7 +52,7 @@ test('a few of several causes: the worst first, whatever the cause', () => {
   const items = active(cold(1), alarm('mild', { reason: mild }), worst, hot(1));
   const [block] = arranged(items, 'cause', CATALOGUE);
   expect(block?.items.map(({ alarm: { id } }) => id)).toEqual(items.map((it) => it.alarm.id));
-  expect(items.map(({ verdict }) => verdict)).toEqual([
+  expect(items.map((it) => it.alarm.reason.verdict)).toEqual([
     ...['critical', 'critical', 'stressed', 'stressed'],
   ]);
 });
@@ -89,7 +89,7 @@ test('the newest first, or by tag: in one row', () => {
   expect(tags('tag')).toEqual([['2', '3', '10']]);
 });
 
-test('the worst cause first, then unacknowledged ones, then the most frequent', () => {
+test('the worst cause first, then unacknowledged ones, then the farthest beyond its limit', () => {
   const worst = alarm('worst', { reason: { sensor: 'light', verdict: 'critical' } });
   const dry = (tag: number) =>
     alarm(`dry${tag}`, {
@@ -100,16 +100,14 @@ test('the worst cause first, then unacknowledged ones, then the most frequent', 
   const hots = many(hot, 5).map((each) => ({ ...each, reason: { ...each.reason, ...further } }));
   const all = [...hots, ...many(dry, 7), worst];
   const order = (local: LocalAlarms, alarms = all) => {
-    const items = listOf(alarms, local, null, AT).active;
-    return arranged(
-      causesFirst(items, (item) => item.alarm.reason, CATALOGUE),
-      'cause',
-      CATALOGUE,
-    ).map(({ items: own }) => `${own[0]?.alarm.id.replace(/\d/, '')} ${own.length}`);
+    const items = inOrder(listOf(alarms, local, null, AT).active, (item) => item.alarm.reason);
+    return arranged(items, 'cause', CATALOGUE).map(
+      ({ items: own }) => `${own[0]?.alarm.id.replace(/\d/, '')} ${own.length}`,
+    );
   };
-  expect(order(NO_LOCAL_ALARMS)).toEqual(['worst 1', 'dry 7', 'hot 5']);
-  const seen = many(dry, 7).map((each) => ({ alarm: each, verdict: 'stressed' }) as const);
-  expect(order(acknowledge(NO_LOCAL_ALARMS, seen, AT))).toEqual(['worst 1', 'hot 5', 'dry 7']);
+  expect(order(NO_LOCAL_ALARMS)).toEqual(['worst 1', 'hot 5', 'dry 7']);
+  const seen = hots.map((each) => ({ alarm: each }));
+  expect(order(acknowledge(NO_LOCAL_ALARMS, seen, AT))).toEqual(['worst 1', 'dry 7', 'hot 5']);
   // Too few for a block: the worst alarm is first.
   expect(order(NO_LOCAL_ALARMS, [...many(dry, 2), ...hots.slice(0, 1)])).toEqual(['hot 3']);
 });
@@ -135,8 +133,7 @@ test.each([
 
 test('as a file: each state, values in the unit of the page, and no formula', () => {
   const evil = alarm('a', { tag_id: '=1+1', raised: 0, worst: 4.2 });
-  const rated = { alarm: evil, verdict: 'critical' } as const;
-  const local = shelve(NO_LOCAL_ALARMS, rated, AT + 60_000, 'fan, off');
+  const local = shelve(NO_LOCAL_ALARMS, { alarm: evil }, AT + 60_000, 'fan, off');
   const list = listOf([evil, alarm('b', { cleared: 960 })], local, 1_000, AT);
   const [head, shelved, resolved] = alarmsCsv(list, IN_FAHRENHEIT, () => null)
     .slice(1)

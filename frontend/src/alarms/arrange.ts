@@ -9,7 +9,7 @@ import { compareIds } from '../domain/twin';
 import { toShown } from '../domain/format';
 import { S } from '../strings';
 import { causeOf, inEach, MOST_LOOSE, type AlarmList, type Item, type Wrong } from './list';
-import { lastKnown, nameText, whatText, worstOf, type Now } from './words';
+import { nameText, reasonNow, whatText, worstOf, type Now } from './words';
 
 export const ORDERS = ['cause', 'newest', 'tag'] as const;
 /** "cause" puts the worst first. */
@@ -34,10 +34,10 @@ export function filtered(
 ): AlarmList {
   const isFound = finder(text, isTag);
   if (!isFound) return list;
-  const has = ({ alarm, verdict }: Item): boolean =>
+  const has = ({ alarm }: Item): boolean =>
     isFound(
       alarm.tag_id,
-      `${nameText(alarm, sensors)} ${causeText(alarm, sensors)} ${S.health[verdict]}`.toLowerCase(),
+      `${nameText(alarm, sensors)} ${causeText(alarm, sensors)} ${S.health[alarm.reason.verdict]}`.toLowerCase(),
     );
   return inEach(list, (items) => items.filter(has));
 }
@@ -101,7 +101,7 @@ export function tagsText(ids: readonly string[]): string {
 export function countsText(items: readonly Item[], nowOf: (alarm: Alarm) => Now | null): string {
   const active = items.filter(({ alarm }) => alarm.cleared_at === null);
   // As in its row: an alarm without a value keeps its verdict.
-  const verdicts = active.map(({ alarm, verdict }) => lastKnown(nowOf(alarm))?.verdict ?? verdict);
+  const verdicts = active.map(({ alarm }) => reasonNow(alarm, nowOf(alarm)).verdict);
   const counts = VERDICTS.flatMap((verdict) => {
     const count = verdicts.filter((each) => each === verdict).length;
     if (count === 0) return [];
@@ -127,7 +127,7 @@ export function alarmsCsv(
     ...['acknowledged', 'shelved until [UTC]', 'shelved because'],
   ];
   const lines = (['active', 'shelved', 'resolved'] as const).flatMap((state) =>
-    list[state].map(({ alarm, verdict, isAcknowledged, shelf }): Cell[] => {
+    list[state].map(({ alarm, isAcknowledged, shelf }): Cell[] => {
       const { reason } = alarm;
       const sensor = sensors.named(reason.sensor);
       const current = nowOf(alarm);
@@ -136,7 +136,7 @@ export function alarmsCsv(
           ? null
           : Number((reason.sensor === '' ? given : toShown(sensor, given)).toPrecision(7));
       return [
-        ...[state, current?.kind === 'known' ? current.verdict : null, verdict],
+        ...[state, current?.kind === 'known' ? current.verdict : null, reason.verdict],
         ...[alarm.tag_id || null, reason.kind, reason.sensor || null],
         ...[reason.sensor === '' ? null : sensor.unit, value(reason.limit)],
         value(current?.kind === 'known' ? current.value : null),

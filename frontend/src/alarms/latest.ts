@@ -1,12 +1,15 @@
 /** Alarms with the latest values, whatever moment is shown. */
-import type { Alarm, HealthReason, Verdict } from '../contract/types';
+import type { Alarm, HealthReason, Verdict, WireTime } from '../contract/types';
 import type { AppState } from '../store/app';
 import { selectCatalogue, selectLatestHealth } from '../store/derived';
 import { hourAgo, selectHourAgoNow, thenOf, type HourAgo } from '../store/hourAgo';
 import { isBack, todoText, VERDICTS } from '../domain/health';
 import { isReceivingNow, selectLatestTag } from '../store/moment';
-import { causesFirst, type Item } from './list';
+import { inOrder, type Item } from './list';
 import { alarmText, nowOf, reasonNow, type Now } from './words';
+
+/** From when on alarms are known; null: not reported. */
+export const selectKnownSince = ({ twin }: AppState): WireTime | null => twin.alarms?.since ?? null;
 
 /** An alarm's value now, whatever moment is shown; null: it has no value. */
 export function selectNow(
@@ -38,15 +41,9 @@ export function todoNow(state: AppState, items: readonly Item[]): string {
   return first ? todoText(first) : '';
 }
 
-/** Sorted by current verdict, the worst first; alarms that share a cause stay together. */
-export function worstNowFirst(state: AppState, items: readonly Item[]): readonly Item[] {
-  const reasons = new Map(items.map((item) => [item, reasonIn(state, item.alarm)]));
-  return causesFirst(
-    items,
-    (item) => reasons.get(item) ?? item.alarm.reason,
-    selectCatalogue(state),
-  );
-}
+/** Sorted as they are now, the worst first. */
+export const worstNowFirst = (state: AppState, items: readonly Item[]): readonly Item[] =>
+  inOrder(items, ({ alarm }) => reasonIn(state, alarm));
 
 /** An alarm in one line, with its current value. */
 export const textNow = (state: AppState, alarm: Alarm): string =>

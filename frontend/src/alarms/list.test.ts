@@ -56,7 +56,7 @@ describe('order', () => {
 });
 
 describe('acknowledged and shelved', () => {
-  const mild = { alarm: alarm('a', { reason: stressed }), verdict: 'stressed' } as const;
+  const mild = { alarm: alarm('a', { reason: stressed }) };
 
   test('an acknowledged alarm does not call until it gets worse', () => {
     const local = acknowledge(NO_LOCAL_ALARMS, [mild], AT);
@@ -104,7 +104,7 @@ describe('news', () => {
   });
 
   test('not what is acknowledged or shelved; what comes back from there is', () => {
-    const mild = { alarm: a, verdict: 'stressed' } as const;
+    const mild = { alarm: a };
     const local = shelve(NO_LOCAL_ALARMS, mild, AT + 1_000, 'fan off');
     expect(newsIds(EMPTY_LIST, list([a], local))).toEqual([[], []]);
     expect(newsIds(EMPTY_LIST, list([a], acknowledge(NO_LOCAL_ALARMS, [mild], AT)))).toEqual([
@@ -128,7 +128,7 @@ describe('an order that is held', () => {
     const { shown, added } = heldList(before, now);
     expect(ids(shown.active)).toEqual(['a', 'b']);
     expect(shown.active[0]?.alarm.cleared_at).not.toBeNull();
-    expect(shown.active[1]?.verdict).toBe('critical');
+    expect(shown.active[1]?.alarm.reason.verdict).toBe('critical');
     expect([ids(shown.shelved), ids(shown.resolved)]).toEqual([[], []]);
     expect(ids(added)).toEqual(['new']);
   });
@@ -138,11 +138,11 @@ describe('an order that is held', () => {
   });
 });
 
-test('a second scan is waited for by what a first one found: beyond a range, or no value', () => {
+test('a second scan is waited for by what a first one found: beyond a range, no value, or no answer', () => {
   const held = { ...reason(), release: 10.4 };
-  const kinds = ['reading_failed', 'range', 'pest', 'old'] as const;
+  const kinds = ['reading_failed', 'range', 'scan_failed', 'pest', 'old'] as const;
   const awaited = [...kinds.map((kind) => reason({ kind })), held].filter(isAwaited);
-  expect(awaited.map(({ kind }) => kind)).toEqual(['reading_failed', 'range']);
+  expect(awaited.map(({ kind }) => kind)).toEqual(['reading_failed', 'range', 'scan_failed']);
 });
 
 test('what is the same stays the same, and the rest is not', () => {

@@ -1,7 +1,7 @@
 /** The alarm list: active, shelved and resolved alarms, each sorted. Pure. */
-import type { Alarm, HealthReason, Verdict } from '../contract/types';
+import type { Alarm, HealthReason } from '../contract/types';
 import { isOfRange, severity, sideOf } from '../domain/health';
-import { groupedBy, withParts } from '../domain/memo';
+import { withParts } from '../domain/memo';
 import type { Catalogue } from '../domain/sensors';
 import { secondsOf } from '../domain/time';
 import { compareIds, equal } from '../domain/twin';
@@ -20,8 +20,6 @@ export interface Wrong {
 
 export interface Item {
   readonly alarm: Alarm;
-  /** The worst verdict so far. */
-  readonly verdict: Verdict;
   readonly isAcknowledged: boolean;
   /** Null: not shelved. */
   readonly shelf: Shelf | null;
@@ -62,12 +60,11 @@ export function listOf(
   at: number,
 ): AlarmList {
   const items = alarms.map((alarm): Item => {
-    const { verdict } = alarm.reason;
     const known = local.acknowledged.get(alarm.id);
     const shelf = local.shelved.get(faultKey(alarm));
+    const { verdict } = alarm.reason;
     return {
       alarm,
-      verdict,
       isAcknowledged: known !== undefined && !isWorse(verdict, known.verdict),
       shelf: shelf && isShelfHeld(shelf, verdict, at) ? shelf : null,
     };
@@ -91,42 +88,25 @@ const isListed = (end: number, nowS: number | null): boolean =>
 const endOf = ({ cleared_at }: Alarm): number => (cleared_at ? secondsOf(cleared_at) : Infinity);
 
 /** Sorted by the `severity` of the given reasons; ties by tag and id, so that the order is stable. */
-const inOrder = (items: readonly Item[], reasonOf: (item: Item) => HealthReason): readonly Item[] =>
+export const inOrder = (
+  items: readonly Item[],
+  reasonOf: (item: Item) => HealthReason,
+): readonly Item[] =>
   items
-    .map((item) => ({ item, rank: rankOf(reasonOf(item), item.isAcknowledged) }))
+    .map((item) => {
+      const reason = reasonOf(item);
+      // While nothing arrives, that is the one to act on.
+      if (reason.kind === 'silent') return { item, rank: Infinity };
+      return {
+        item,
+        rank: severity({ verdict: reason.verdict, reasons: [reason] }, item.isAcknowledged),
+      };
+    })
     .sort((a, b) => b.rank - a.rank || byName(a.item, b.item))
     .map(({ item }) => item);
 
-/** An alarm's `severity`, if it has that reason. */
-const rankOf = (reason: HealthReason, isAcknowledged: boolean): number =>
-  severity({ verdict: reason.verdict, reasons: [reason] }, isAcknowledged);
-
 const byName = ({ alarm: a }: Item, { alarm: b }: Item): number =>
   compareIds(a.tag_id, b.tag_id) || (a.id < b.id ? -1 : 1);
-
-/**
- * Sorted by verdict and acknowledgement (the integer part of `severity`), then by size of the cause's
- * block. A block takes the place of its first alarm. Within a block, as `inOrder`.
- */
-export function causesFirst(
-  items: readonly Item[],
-  reasonOf: (item: Item) => HealthReason,
-  sensors: Catalogue,
-): readonly Item[] {
-  const ranked = inOrder(items, reasonOf).map((item) => ({
-    item,
-    urgency: Math.floor(rankOf(reasonOf(item), item.isAcknowledged)),
-    cause: causeOf(item.alarm, sensors),
-  }));
-  const causes = groupedBy(ranked, ({ cause }) => cause);
-  const countOf = ({ cause }: (typeof ranked)[number]): number => {
-    const count = causes.get(cause)?.length ?? 0;
-    return count > MOST_LOOSE ? count : 1;
-  };
-  return ranked
-    .sort((a, b) => b.urgency - a.urgency || countOf(b) - countOf(a))
-    .map(({ item }) => item);
-}
 
 /** Key of a cause: kind, sensor, side and area, whatever the limit. */
 export const causeOf = ({ reason, tag_id }: Wrong['alarm'], sensors: Catalogue): string =>
@@ -163,7 +143,9 @@ export const alarmOf = (
 
 /** Whether a reason's alarm waits for a second scan to confirm it. */
 export const isAwaited = ({ kind, release }: HealthReason): boolean =>
-  kind === 'reading_failed' || (kind === 'range' && release === undefined);
+  kind === 'reading_failed' ||
+  kind === 'scan_failed' ||
+  (kind === 'range' && release === undefined);
 
 /** Changes between two lists, to be announced once. */
 export interface News {
@@ -174,12 +156,12 @@ export interface News {
 }
 
 export function newsOf(before: AlarmList, now: AlarmList): News {
-  const called = new Map(calling(before).map(({ alarm, verdict }) => [alarm.id, verdict]));
+  const called = new Map(calling(before).map(({ alarm }) => [alarm.id, alarm.reason.verdict]));
   const wasActive = new Set(before.active.map(({ alarm }) => alarm.id));
   return {
-    raised: calling(now).filter(({ alarm, verdict }) => {
-      const known = called.get(alarm.id);
-      return known === undefined || isWorse(verdict, known);
+    raised: calling(now).filter(({ alarm: { id, reason } }) => {
+      const known = called.get(id);
+      return known === undefined || isWorse(reason.verdict, known);
     }),
     cleared: now.resolved.filter(({ alarm }) => wasActive.has(alarm.id)),
   };

@@ -62,7 +62,7 @@ function show(raised: readonly Item[]): void {
     const shown = new Notification(origin === null ? title : `${S.origin[origin]}: ${title}`, {
       body,
       // New alarms get a new tag: browsers replace the same tag silently.
-      tag: `lupin-twin.alarms ${first.alarm.id} ${first.verdict}`,
+      tag: `lupin-twin.alarms ${first.alarm.id} ${first.alarm.reason.verdict}`,
     });
     last = shown;
     shown.onclick = () => {
@@ -237,7 +237,7 @@ export function startSound(make: () => AudioContext = () => new AudioContext()):
   document.addEventListener('keyup', onGesture);
   const stop = onNews(({ raised }) => {
     if (raised.length === 0 || !own.get().sound) return;
-    const isCritical = raised.some(({ verdict }) => verdict === 'critical');
+    const isCritical = raised.some(({ alarm }) => alarm.reason.verdict === 'critical');
     sound(NOTES[isCritical ? 'critical' : 'other']);
   });
   return () => {

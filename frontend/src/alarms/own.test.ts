@@ -14,14 +14,10 @@ import {
   faultKey,
   writeStored,
   type LocalAlarms,
-  type Rated,
 } from './own';
 
 const AT = 1_800_000_000_000;
-const rated = (id: string, verdict: Rated['verdict'] = 'stressed'): Rated => ({
-  alarm: alarm(id, { tag_id: id }),
-  verdict,
-});
+const rated = (id: string) => ({ alarm: alarm(id, { tag_id: id }) });
 
 const through = (local: LocalAlarms): LocalAlarms => {
   let text = '';
@@ -30,11 +26,7 @@ const through = (local: LocalAlarms): LocalAlarms => {
 };
 
 test('what was acknowledged, shelved and wished for comes back after a reload', () => {
-  const acknowledged = acknowledge(
-    { ...NO_LOCAL_ALARMS, sound: true },
-    [rated('a', 'critical')],
-    AT,
-  );
+  const acknowledged = acknowledge({ ...NO_LOCAL_ALARMS, sound: true }, [rated('a')], AT);
   const local = shelve(acknowledged, rated('b'), AT + 900_000, 'fan off');
   expect(through(local)).toEqual(local);
 });

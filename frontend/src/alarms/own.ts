@@ -63,32 +63,33 @@ export const isWorse = (a: Verdict, b: Verdict): boolean =>
 export const faultKey = ({ tag_id, reason }: Pick<Alarm, 'tag_id' | 'reason'>): string =>
   JSON.stringify([tag_id, reason.kind, reason.sensor, isOfRange(reason) ? sideOf(reason) : '']);
 
-/** An alarm and its current verdict. */
-export interface Rated {
+interface WithAlarm {
   readonly alarm: Alarm;
-  readonly verdict: Verdict;
 }
 
 export const acknowledge = (
   local: LocalAlarms,
-  alarms: readonly Rated[],
+  items: readonly WithAlarm[],
   at: number,
 ): LocalAlarms => ({
   ...local,
   acknowledged: new Map([
     ...local.acknowledged,
-    ...alarms.map(({ alarm, verdict }) => [alarm.id, { verdict, at }] as const),
+    ...items.map(({ alarm: { id, reason } }) => [id, { verdict: reason.verdict, at }] as const),
   ]),
 });
 
 export const shelve = (
   local: LocalAlarms,
-  { alarm, verdict }: Rated,
+  { alarm }: WithAlarm,
   until: number,
   reason: string,
 ): LocalAlarms => ({
   ...local,
-  shelved: new Map([...local.shelved, [faultKey(alarm), { verdict, until, reason }]]),
+  shelved: new Map([
+    ...local.shelved,
+    [faultKey(alarm), { verdict: alarm.reason.verdict, until, reason }],
+  ]),
 });
 
 const without = <Value>(map: ReadonlyMap<string, Value>, key: string): ReadonlyMap<string, Value> =>
@@ -196,7 +197,7 @@ function change(what: LastAction['what'], count: number, next: LocalAlarms): voi
   acting.share?.(before, next);
 }
 
-export const acknowledgeAlarms = (items: readonly Rated[]): void => {
+export const acknowledgeAlarms = (items: readonly WithAlarm[]): void => {
   change('acknowledge', items.length, acknowledge(own.get(), items, timeOfDay()));
 };
 
@@ -205,7 +206,7 @@ export const unacknowledgeAlarm = (alarm: Alarm): void => {
   change('unacknowledge', 1, { ...local, acknowledged: without(local.acknowledged, alarm.id) });
 };
 
-export const shelveAlarm = (item: Rated, minutes: number, reason: string): void => {
+export const shelveAlarm = (item: WithAlarm, minutes: number, reason: string): void => {
   change('shelve', 1, shelve(own.get(), item, timeOfDay() + minutes * 60_000, reason));
 };
 

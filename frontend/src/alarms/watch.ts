@@ -164,7 +164,7 @@ function newsText({ raised, cleared }: News): string {
 /** Announces changes to screen readers; returns a stop function. */
 export const startVoices = (): (() => void) =>
   onNews((news) => {
-    const isUrgent = news.raised.some(({ verdict }) => verdict === 'critical');
+    const isUrgent = news.raised.some(({ alarm }) => alarm.reason.verdict === 'critical');
     announce(isUrgent ? urgentVoice : politeVoice, newsText(news));
   });
 

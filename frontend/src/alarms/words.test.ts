@@ -7,10 +7,12 @@ import { S } from '../strings';
 import { CATALOGUE, IN_FAHRENHEIT } from '../testing/sensors';
 import {
   alarmText,
+  lengthOf,
   nameText,
+  resolvedText,
   severalText,
   spanText,
-  timesOf,
+  sinceText,
   unknownText,
   valuesOf,
   whenText,
@@ -69,7 +71,7 @@ test('its limit is that of now: what is critical; on the way back it stands besi
     todo: 'Heat, or close the vents',
   });
   expect(valuesOf(cold, C, at(18.02, 18, 'stressed', 18.5))).toMatchObject({
-    what: 'Temperature was below 18.0\u00a0°C; stressed until above 18.5\u00a0°C',
+    what: 'Temperature, stressed until above 18.5\u00a0°C',
     todo: 'Keep an eye on it',
     now: 'now 18.0\u00a0°C',
     first: '17.9\u00a0°C when raised',
@@ -140,34 +142,43 @@ test('of a pest how many: now, at worst and at first', () => {
 
 test('since when and until when: of today the time alone, to the minute', () => {
   const since = alarm('a', { raised: NOON });
-  expect(spanText(since, NOON + 1_500)).toBe('since 12:00 (25\u00a0min)');
-  expect(spanText(since, NOON + 86_400)).toBe('since 14 Nov, 12:00 (1\u00a0d)');
-  expect(spanText(since, null)).toBe('since 14 Nov, 12:00');
-  // The clock was set back since.
-  expect(spanText(since, NOON - 60)).toBe('since 12:00');
+  expect(spanText(since, NOON + 1_500, null)).toBe('since 12:00 (25\u00a0min)');
   const over = alarm('a', { raised: NOON, cleared: NOON + 600 });
-  expect(spanText(over, NOON + 1_500)).toBe('12:00 until 12:10 (10\u00a0min)');
-  expect(spanText(over, NOON + 86_400)).toBe('14 Nov, 12:00 until 12:10 (10\u00a0min)');
+  expect(spanText(over, NOON + 1_500, null)).toBe('12:00 until 12:10 (10\u00a0min)');
+  expect(spanText(over, NOON + 86_400, null)).toBe('14 Nov, 12:00 until 12:10 (10\u00a0min)');
   const night = alarm('a', { raised: NOON, cleared: NOON + 50_000 });
-  expect(spanText(night, NOON + 50_001)).toMatch(/^14 Nov, 12:00 until 01:53 \(13/);
+  expect(spanText(night, NOON + 50_001, null)).toMatch(/^14 Nov, 12:00 until 01:53 \(13/);
   expect(whenText(100, 200)).toBe('sim 00:01:40');
 });
 
-test('a row says since when, for how long only if it began today, and the end once it is resolved', () => {
+test('what the log does not reach back to has lasted for longer than is known', () => {
+  const at = (sec: number) => ({ sec: NOON + sec, nanosec: 0 });
+  const old = alarm('a', { raised: NOON + 900, reason: { since: at(0) } });
+  const text = (known: number, each = old) => sinceText(each, NOON + 1_500, at(known), true);
+  expect(text(-899)).toBe('for over 10\u00a0min');
+  expect(text(-900), 'an earlier scan was good').toBe('since 12:15 (10\u00a0min)');
+  const pest = { kind: 'pest', since: at(900) } as const;
+  expect(text(900, alarm('b', { raised: NOON + 900, reason: pest }))).toMatch(/^since/);
+});
+
+test('since when; for how long only if it began today, in hours from ten on', () => {
   const since = alarm('a', { raised: NOON });
-  const text = (nowS: number | null): string => timesOf(since, nowS, false).text;
+  const text = (nowS: number | null, hasLength = true): string =>
+    sinceText(since, nowS, null, hasLength);
   expect(text(NOON + 7_500)).toBe('since 12:00 (2\u00a0h\u00a05\u00a0min)');
+  expect(text(NOON + 39_500)).toBe('since 12:00 (10\u00a0h)');
+  expect(text(NOON + 7_500, false)).toBe('since 12:00');
   expect(text(NOON + 86_400)).toBe('since 14 Nov, 12:00');
   expect(text(null)).toBe('since 14 Nov, 12:00');
+  // The clock was set back since.
   expect(text(NOON - 60)).toBe('since 12:00');
-  const over = alarm('a', { raised: NOON, cleared: NOON + 600 });
-  expect(timesOf(over, NOON + 1_500, true)).toEqual({
-    text: '10\u00a0min',
-    note: 'resolved 12:10',
-  });
   // A simulated clock has no days.
-  expect(timesOf(alarm('a', { raised: 100 }), 160, false).text).toMatch(
+  expect(sinceText(alarm('a', { raised: 100 }), 160, null, true)).toMatch(
     /^since sim .* \(1\u00a0min\)$/,
+  );
+  const over = alarm('a', { raised: NOON, cleared: NOON + 600 });
+  expect(`${lengthOf(over)}, ${resolvedText(over, NOON + 1_500)}`).toBe(
+    '10\u00a0min, resolved 12:10',
   );
 });
 

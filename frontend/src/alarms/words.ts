@@ -1,5 +1,5 @@
 /** An alarm in words: what, where, value now and at worst, since when, until when. Pure. */
-import type { Alarm, HealthReason, Verdict } from '../contract/types';
+import type { Alarm, HealthReason, Verdict, WireTime } from '../contract/types';
 import { isOldReading, trendOf, type TagThen } from '../domain/difference';
 import { ageText, beyondLimitText, minuteText, readingText } from '../domain/format';
 import { beyondText, isOfRange, reasonText, sideOf, todoText } from '../domain/health';
@@ -19,6 +19,7 @@ import { S } from '../strings';
 const LONGEST_NAME = 24;
 /** Most alarms named in one message; the list has the rest. */
 const MOST_NAMED = 3;
+const TEN_HOURS_S = 36_000;
 
 export const whereText = ({ tag_id }: Pick<Alarm, 'tag_id'>): string =>
   tag_id === '' ? S.alarmHouse : S.card(shown(tag_id, LONGEST_NAME));
@@ -26,9 +27,10 @@ export const whereText = ({ tag_id }: Pick<Alarm, 'tag_id'>): string =>
 /** What is wrong, without its value, which changes. */
 export function whatText({ reason }: Pick<Alarm, 'reason'>, sensors: Catalogue): string {
   if (isOfRange(reason)) return beyondText(sensors, reason);
-  // A pest count and a changed sensor's reading are reported as current values.
+  // A pest count and a changed sensor's reading are reported as current values; the card says how long
+  // readings are valid.
   const value = reason.kind === 'pest' ? 0 : reason.kind === 'changed' ? null : reason.value;
-  return reasonText(sensors, { ...reason, value }, null);
+  return reasonText(sensors, { ...reason, value, limit: null }, null);
 }
 
 /** What and where in one line, independent of time. */
@@ -68,7 +70,7 @@ export function valuesOf(alarm: Alarm, sensors: Catalogue, now: Now | null): Val
     if (!isPest) return S.alarmNow(text(value));
     return value > 0 ? S.alarmNow(S.pestCount(value)) : S.alarmPests.still;
   };
-  const value = now?.kind === 'known' ? now.value : null;
+  const value = lastKnown(now)?.value ?? null;
   const worstText = worst === null || (isPest && worst === 0) ? null : text(worst);
   const isMeasured = isOfRange(reason) || isPest || reason.kind === 'changed';
   return {
@@ -111,37 +113,52 @@ export function unknownText(
   return S.alarmNowUnknown(reading, age === null ? null : ageText(age));
 }
 
-/** Begin, end and duration. `nowS` is the twin's time, ROS seconds; null: unknown. */
-export function spanText({ raised_at, cleared_at }: Alarm, nowS: number | null): string {
-  const from = secondsOf(raised_at);
-  const begin = whenText(from, nowS);
-  if (cleared_at === null) {
-    const length = nowS === null ? null : secondsSince(from, nowS);
-    return S.alarmSince(begin, length === null ? null : lengthText(length));
-  }
-  const until = secondsOf(cleared_at);
-  const end = isSameDay(from, until) ? clockOf(until) : whenText(until, nowS);
-  return S.alarmUntil(begin, end, lengthText(until - from));
-}
+/**
+ * Whether it may have begun before `known`, from when on alarms are known: its tag had no earlier scan,
+ * because its first two bad ones are farther apart.
+ */
+const isOlder = ({ reason: { kind, since }, raised_at }: Alarm, known: WireTime | null): boolean =>
+  (kind === 'range' || kind === 'reading_failed' || kind === 'scan_failed') &&
+  known !== null &&
+  since !== null &&
+  secondsOf(since) - secondsOf(known) < secondsOf(raised_at) - secondsOf(since);
 
-/** Since when, and if that is today, for how long; with `isOver`, how long it was and when it ended. */
-export function timesOf(
-  { raised_at, cleared_at }: Alarm,
+/** Since when; with `hasLength` and if that is today, for how long. At least how long, if it may be older than `known`. */
+export function sinceText(
+  alarm: Alarm,
   nowS: number | null,
-  isOver: boolean,
-): { readonly text: string; readonly note: string } {
-  const from = secondsOf(raised_at);
-  const until = cleared_at ? secondsOf(cleared_at) : nowS;
-  const length = until === null ? null : secondsSince(from, until);
-  if (isOver && until !== null && length !== null) {
-    return { text: lengthText(length), note: `${S.alarmResolved} ${whenText(until, nowS)}` };
-  }
+  known: WireTime | null,
+  hasLength: boolean,
+): string {
+  const from = secondsOf(alarm.raised_at);
+  const length = nowS === null ? null : secondsSince(from, nowS);
+  if (length !== null && isOlder(alarm, known)) return S.alarmForOver(lengthText(length));
   const isOfToday = !hasDate(from) || isSameDay(from, nowS ?? from);
-  const short = length === null || !isOfToday ? null : lengthText(length);
-  return { text: S.alarmSince(whenText(from, nowS), short), note: '' };
+  const short = hasLength && isOfToday && length !== null ? lengthText(length) : null;
+  return S.alarmSince(whenText(from, nowS), short);
 }
 
-const lengthText = (seconds: number): string => inOnePiece(ageText(Math.max(0, seconds)));
+/** Begin, end and duration of a resolved alarm; otherwise as `sinceText`. */
+export function spanText(alarm: Alarm, nowS: number | null, known: WireTime | null): string {
+  const { raised_at, cleared_at } = alarm;
+  if (cleared_at === null) return sinceText(alarm, nowS, known, true);
+  const [from, until] = [secondsOf(raised_at), secondsOf(cleared_at)];
+  const end = isSameDay(from, until) ? clockOf(until) : whenText(until, nowS);
+  return S.alarmUntil(whenText(from, nowS), end, lengthText(until - from));
+}
+
+/** How long a resolved alarm was active; empty: it still is. */
+export const lengthOf = ({ raised_at, cleared_at }: Alarm): string =>
+  cleared_at ? lengthText(secondsOf(cleared_at) - secondsOf(raised_at)) : '';
+
+export const resolvedText = ({ cleared_at }: Alarm, nowS: number | null): string =>
+  cleared_at ? `${S.alarmResolved} ${whenText(secondsOf(cleared_at), nowS)}` : '';
+
+/** Ten hours and more to the hour. */
+const lengthText = (seconds: number): string => {
+  const text = ageText(Math.max(0, seconds));
+  return seconds < TEN_HOURS_S ? inOnePiece(text) : (text.split(' ')[0] ?? text);
+};
 
 /** Makes the first space non-breaking. */
 export const inOnePiece = (text: string): string => text.replace(' ', '\u00a0');

@@ -162,7 +162,7 @@ describe('a reason in words', () => {
     [
       { sensor: 'vpd', value: 1.68, limit: 1.3, verdict: 'stressed' } as const,
       null,
-      `Vapour pressure deficit 1.68${NBSP}kPa, above 1.30`,
+      `VPD 1.68${NBSP}kPa, above 1.30`,
     ],
     [
       { kind: 'reading_failed', sensor: 'humidity', value: null } as const,

@@ -3,7 +3,7 @@ import type { HealthReason, Judgement, TagHealth, Verdict } from '../contract/ty
 import { S } from '../strings';
 import { ageText, beyondLimitText, readingText, valueText } from './format';
 import type { Shared } from './memo';
-import type { Catalogue } from './sensors';
+import type { Catalogue, Sensor } from './sensors';
 import { shown } from './text';
 import type { Tag } from './twin';
 
@@ -113,6 +113,11 @@ export function sharedJudgement(before: Judgement | null, now: Judgement): Judge
 
 /** Longest name of an undeclared sensor or kind, characters. */
 const LONGEST_NAME = 32;
+/** A longer name gives way to its abbreviation, if it has one. */
+const LONG_NAME = 20;
+
+const nameOf = ({ label }: Sensor): string =>
+  shown(label.length > LONG_NAME ? S.sensorShort(label) : label, LONGEST_NAME);
 
 /**
  * A reason as a sentence without its full stop. `age` is that of the observation behind it, seconds;
@@ -126,7 +131,7 @@ export function reasonText(
 ): string {
   const { kind, sensor: name, value, limit } = reason;
   const sensor = sensors.named(name);
-  const label = name === '' ? '' : shown(sensor.label, LONGEST_NAME);
+  const label = name === '' ? '' : nameOf(sensor);
   const R = S.reasons;
   const ago = age === null ? '' : ` (${S.agoSuffix(ageText(age))})`;
   if (isOfRange(reason)) {
@@ -187,15 +192,13 @@ const heldText = (reason: OfRange, text: (value: number) => string): string | nu
   return S.reasons.heldUntil(S.health[verdict].toLowerCase(), isBelow, text(release));
 };
 
-/** Names sensor, side and limit, without the value, which changes. */
+/** Names sensor, side and limit, or what the value has yet to pass; without the value, which changes. */
 export function beyondText(sensors: Catalogue, reason: OfRange): string {
   const sensor = sensors.named(reason.sensor);
   const text = (value: number): string => readingText(sensor, value);
   const side = S.reasons.sides[sideOf(reason)];
   const held = heldText(reason, text);
-  const limit = text(reason.limit);
-  const said = held ? `${S.reasons.wasBeyond(side, limit)}; ${held}` : `${side} ${limit}`;
-  return `${shown(sensor.label, LONGEST_NAME)} ${said}`;
+  return `${nameOf(sensor)}${held ? `, ${held}` : ` ${side} ${text(reason.limit)}`}`;
 }
 
 /** What to do about it; for what is healthy again, what its alarm still waits for. */

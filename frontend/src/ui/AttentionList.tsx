@@ -3,7 +3,7 @@ import { useRef, type CSSProperties, type JSX } from 'react';
 import { byCause, tagsText } from '../alarms/arrange';
 import { timeOfDay } from '../clock';
 import { minuteText, shortAgeText } from '../domain/format';
-import { isBad, severity, todoText, type HouseHealth } from '../domain/health';
+import { isBad, isSilent, severity, todoText, type HouseHealth } from '../domain/health';
 import { shown } from '../domain/text';
 import { useApp } from '../store/app';
 import { useSelected } from '../store/create';
@@ -12,7 +12,7 @@ import { selectCatalogue, selectHealth, selectSensor } from '../store/derived';
 import { selectHasSnapshot } from '../store/moment';
 import { S } from '../strings';
 import { useTicking } from '../widgets/useNow';
-import { selectIsCurrent, useSince, useUrgent, type Urgent } from './DoNow';
+import { restOf, restText, selectIsCurrent, useSince, useUrgent, type Urgent } from './DoNow';
 import { useFitting } from './fitting';
 import { HealthShape } from './HealthMark';
 import { Reasons, useReasonText } from './Reasons';
@@ -35,12 +35,22 @@ export function AttentionList(): JSX.Element {
   const lines = useLines(urgent);
   const health = useApp(selectHealth);
   const hasSnapshot = useApp(selectHasSnapshot);
-  const heading = urgent.length > 0 ? S.attention : hasSnapshot ? noneText(health) : null;
+  const heading =
+    urgent.length > 0
+      ? isSilent(health)
+        ? S.alarmsLost
+        : S.attention
+      : hasSnapshot
+        ? noneText(health)
+        : null;
   const list = useRef<HTMLUListElement>(null);
   const count = useFitting(list, lines.length);
   // A cause needs the height of two tags.
   const rows = lines.reduce((sum, { cause }) => sum + (cause === null ? 1 : 2), 0);
-  const rest = lines.slice(count).reduce((sum, { tags }) => sum + tags.length, 0);
+  const rest = restOf(
+    urgent,
+    lines.slice(0, count).flatMap(({ tags }) => tags),
+  );
   return (
     <div className="attention">
       {heading && <h3>{heading}</h3>}
@@ -49,7 +59,7 @@ export function AttentionList(): JSX.Element {
           <Row key={key} {...line} fits={index < count} />
         ))}
       </ul>
-      {rest > 0 && <p className="attention-more">{S.attentionMore(rest)}</p>}
+      {rest > 0 && <p className="attention-more">{restText(rest)}</p>}
     </div>
   );
 }

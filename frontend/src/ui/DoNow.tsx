@@ -1,6 +1,7 @@
 import { Fragment, useMemo, type JSX } from 'react';
 
-import { whenText } from '../alarms/words';
+import { selectKnownSince } from '../alarms/latest';
+import { sinceText } from '../alarms/words';
 import { alarmOf, isAwaited, type Item } from '../alarms/list';
 import { alarmList } from '../alarms/watch';
 import { now } from '../clock';
@@ -14,7 +15,6 @@ import {
   todoText,
   VERDICTS,
 } from '../domain/health';
-import { secondsOf } from '../domain/time';
 import { groupedBy } from '../domain/memo';
 import { rowsOf } from '../domain/table';
 import { shown } from '../domain/text';
@@ -48,8 +48,8 @@ export interface Urgent {
 }
 
 /**
- * What needs attention, most severe first; values back in range come last. Old readings do not count:
- * they wait for the robot's next visit.
+ * What needs attention, most severe first; values back in range come last. Old readings and a first
+ * failed scan do not count: they wait for the robot's next visit.
  */
 export function useUrgent(): readonly Urgent[] {
   const tags = useApp(selectTags);
@@ -65,6 +65,8 @@ export function useUrgent(): readonly Urgent[] {
         const rank = (reason: HealthReason): number => {
           const own = reason.verdict;
           if (reason.kind === 'old' || !(isBad(own) || own === verdict)) return 0;
+          // A single failed scan is ordinary.
+          if (isNow && reason.kind === 'scan_failed' && !has(alarms.active, id, reason)) return 0;
           const judged = { verdict: isBack(reason) ? 'healthy' : own, reasons: [reason] };
           return severity(judged, has(acknowledged, id, reason));
         };
@@ -97,7 +99,8 @@ export function useSince(tagId: string, reason: HealthReason): string | null {
   if (!isCurrent) return null;
   if (!found) return isKnown && isAwaited(reason) ? S.alarmNotYet : null;
   if (found.isAcknowledged) return S.healthAcknowledged;
-  return S.alarmSince(whenText(secondsOf(found.alarm.raised_at), rosNow(store.get(), now())), null);
+  const state = store.get();
+  return sinceText(found.alarm, rosNow(state, now()), selectKnownSince(state), false);
 }
 
 /**
@@ -121,7 +124,7 @@ export function DoNow({
   const count = hasOwn && most > 1 ? most - 1 : most;
   const hasAlso = most > 1;
   const lines = byTodo(urgent).slice(0, count);
-  const rest = urgent.length - (hasAlso ? lines.flat() : lines).length;
+  const rest = restOf(urgent, hasAlso ? lines.flat() : lines.map(([first]) => first));
   const own = isOfTags && count < most && (
     <li>
       <Overall health={health} id="health-own" />
@@ -152,11 +155,12 @@ export function DoNow({
               <button
                 type="button"
                 className="do-more"
+                data-short={S.attentionMore(rest)}
                 onClick={() => {
                   act(withList('tags'));
                 }}
               >
-                {S.attentionMore(rest)}
+                <span>{restText(rest)}</span>
               </button>
             )}
           </li>
@@ -170,6 +174,16 @@ export function DoNow({
     </ul>
   );
 }
+
+/** How many tags have a task that is not shown; of those that are named already, only if no other has. */
+export function restOf(all: readonly Urgent[], shownOnes: readonly Urgent[]): number {
+  const named = new Set(shownOnes.map(({ tagId }) => tagId));
+  const isShown = new Set(shownOnes);
+  const hidden = new Set(all.filter((each) => !isShown.has(each)).map(({ tagId }) => tagId));
+  return [...hidden].filter((id) => !named.has(id)).length || hidden.size;
+}
+
+export const restText = (tags: number): string => `+ ${S.shownOf(tags, tags)}`;
 
 /** Grouped by task, the most severe tag first; acknowledged ones form groups of their own. */
 const byTodo = (urgent: readonly Urgent[]) => [

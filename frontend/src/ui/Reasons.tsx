@@ -94,10 +94,12 @@ function Todo({ tagId, reason }: { tagId: string; reason: HealthReason }): JSX.E
   const { active, shelved } = useSelected(alarmList);
   const isKnown = useApp(selectAreAlarmsKnown);
   if (alarmOf(shelved, tagId, reason)) return null;
-  const isWaiting = isKnown && isAwaited(reason) && !alarmOf(active, tagId, reason);
+  const isNone = !alarmOf(active, tagId, reason);
+  const isWaiting = isKnown && isAwaited(reason) && isNone;
   return (
     <span>
-      <strong>{todoText(reason)}</strong>{' '}
+      {/* A single failed scan is ordinary. */}
+      {!(isNone && reason.kind === 'scan_failed') && <strong>{todoText(reason)}</strong>}{' '}
       {isWaiting && <small className="faint">{S.alarmNotYet}</small>}
     </span>
   );

@@ -21,7 +21,7 @@ export function Trend({
   return (
     <span data-trend={way} title={title}>
       <span aria-hidden="true">
-        {ARROWS[way]} {rate}
+        {ARROWS[way]} <span className="rate">{rate}</span>
       </span>{' '}
       <span className="unseen">{title}</span>
     </span>

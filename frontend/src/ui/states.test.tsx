@@ -65,7 +65,7 @@ const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
       co2: 'CO₂',
       light: 'Light',
       soil_moisture: 'Soil moisture',
-      vpd: 'Vapour pressure deficit',
+      vpd: 'VPD',
     },
     sides: ['below', 'above'],
     says: {
@@ -96,12 +96,12 @@ const LANGUAGES: Readonly<Record<'en' | 'de', Language>> = {
       co2: 'CO₂',
       light: 'Licht',
       soil_moisture: 'Bodenfeuchte',
-      vpd: 'Dampfdruckdefizit (VPD)',
+      vpd: 'VPD',
     },
     sides: ['unter', 'über'],
     says: {
       range: /\d.*, (unter|über) \d/,
-      reading_failed: /Der Sensor liefert keinen Wert$/,
+      reading_failed: /Sensor liefert keinen Wert$/,
       scan_failed: /^Fehlversuch: (nicht erreichbar|nicht erkannt|nicht lesbar)/,
       pest: /^\d+ Schädlinge? gefunden$/,
       old: /gemessen|kein Messwert|[Kk]eine Messung/,

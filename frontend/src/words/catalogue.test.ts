@@ -118,7 +118,7 @@ const SAME: Readonly<Record<string, readonly string[]>> = {
     ...['phase.live', 'keys.time.3.1', 'menu', 'attemptOutcomes.ok', 'sensors', 'alarmCount'],
     ...['rangeAuto', 'saveCsvShort', 'trend', 'legendMore', 'robotLayer', 'robotAt'],
     ...['keys.global.11.0', 'keys.map.3.0', 'keys.time.1.0', 'keys.time.2.0', 'keys.time.3.0'],
-    ...['speciesNames.gerbera', 'phase.offline', 'reasons.wasBeyond'],
+    ...['speciesNames.gerbera', 'phase.offline'],
   ],
   es: [
     ...['robotLayer', 'robotAt', 'attemptOutcomes.ok', 'sensors', 'rangeAuto', 'saveCsvShort'],

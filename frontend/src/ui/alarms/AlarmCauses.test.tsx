@@ -48,26 +48,6 @@ test('of many of one cause the worst, then five, then a hundred more at a time',
   expect(group('active')).toHaveLength(150);
 });
 
-test('many of one cause that one person has acknowledged say who, and when the last was', () => {
-  const saidBy = (...names: readonly string[]): void => {
-    const list = names.map((acknowledged_by, at) => {
-      const acknowledged_at = { sec: 1_000 + at, nanosec: 0 };
-      return alarm(`a${at}`, { tag_id: `${at}`, acknowledged_by, acknowledged_at });
-    });
-    report(...list);
-    act(() => {
-      const items = list.map((each) => ({ alarm: each, verdict: each.reason.verdict }));
-      own.set(acknowledge(NO_LOCAL_ALARMS, items, 0));
-    });
-  };
-  const status = (): string | null | undefined =>
-    document.querySelector('.alarm-status')?.textContent;
-  saidBy('anna', 'anna', 'anna', 'anna', 'anna');
-  expect(status()).toBe('acknowledged by anna, sim 00:16:44');
-  saidBy('anna', 'anna', 'anna', 'anna', 'ben');
-  expect(status()).toBe('acknowledged');
-});
-
 test('only who acknowledged an alarm, or an admin, may take that back', () => {
   const anna = { can_sign_out: true, seconds_left: null, name: 'anna', can_write_notes: true };
   const isOffered = (role: 'operator' | 'admin', acknowledged_by: string | null): boolean => {
@@ -75,7 +55,7 @@ test('only who acknowledged an alarm, or an admin, may take that back', () => {
     report(said);
     act(() => {
       person.set({ ...anna, role });
-      own.set(acknowledge(NO_LOCAL_ALARMS, [{ alarm: said, verdict: 'critical' }], 0));
+      own.set(acknowledge(NO_LOCAL_ALARMS, [{ alarm: said }], 0));
     });
     fireEvent.click(screen.getByRole('button', { name: /^Actions/ }));
     const found = screen.queryByText('Unacknowledge') !== null;

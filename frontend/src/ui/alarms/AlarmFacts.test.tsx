@@ -18,7 +18,8 @@ test('how old the last value is nobody knows after a sleep', () => {
     reportAlarms(alarm('a'));
     goLost();
   });
-  const now = (): string | undefined => document.querySelector('[data-fact=now]')?.textContent;
+  const now = (): string | undefined =>
+    document.querySelector<HTMLElement>('[data-fact=now]')?.title;
   expect(now()).toMatch(/^now unknown, last 8.0\u00a0°C .+ ago$/);
   flush(() => {
     receive({ isTimeLost: true });
@@ -27,7 +28,7 @@ test('how old the last value is nobody knows after a sleep', () => {
   stop();
 });
 
-test('back to normal is of now, not of a twin that is silent', () => {
+test('a silent twin’s values are neither back to normal nor ask for anything, and move no row', () => {
   showTags([wireTag({ readings: readings({ temperature: 20 }) })], judgement({ 1: 'healthy' }));
   const stop = startAlarms();
   const { container } = render(<AlarmPanel />);
@@ -35,10 +36,22 @@ test('back to normal is of now, not of a twin that is silent', () => {
     reportAlarms(alarm('a'));
   });
   const row = (): string | undefined => container.querySelector('[data-alarm]')?.textContent;
+  const todo = (): string | undefined => {
+    const line = container.querySelector('.alarm-do');
+    return line ? getComputedStyle(line).visibility : undefined;
+  };
   expect(row()).toContain('Back to normal');
+  expect(todo()).toBe('visible');
   flush(goLost);
   expect(row()).toContain('Unknown');
   expect(row()).not.toContain('Back to normal');
+  expect(todo()).toBe('hidden');
+  // What to do about the silence itself stays.
+  flush(() => {
+    reportAlarms(alarm('s', { tag_id: '', reason: { kind: 'silent', sensor: '', value: null } }));
+  });
+  expect(row()).toContain('Check the twin');
+  expect(todo()).toBe('visible');
   stop();
 });
 

@@ -1,9 +1,10 @@
 import type { JSX } from 'react';
 
-import type { Item } from '../../alarms/list';
 import {
+  lengthOf,
+  resolvedText,
+  sinceText,
   spanText,
-  timesOf,
   unknownText,
   valuesOf,
   type Now,
@@ -15,9 +16,10 @@ import { ageSeconds } from '../../domain/time';
 import { C } from '../../notes/NoteMarks';
 import { store, useApp } from '../../store/app';
 import { useSelected } from '../../store/create';
+import { selectKnownSince } from '../../alarms/latest';
 import { hourAgo, shortHourText } from '../../store/hourAgo';
 import { selectCatalogue } from '../../store/derived';
-import { rosNow, selectClockFault, selectHasTime } from '../../store/moment';
+import { isReceivingNow, rosNow, selectClockFault, selectHasTime } from '../../store/moment';
 import { S } from '../../strings';
 import { useTicking } from '../../widgets/useNow';
 import { HealthMark } from '../HealthMark';
@@ -54,9 +56,12 @@ export function AlarmTimes({
   isOver?: boolean;
 }): JSX.Element {
   const nowOf = (at: number): number | null => rosNow(store.get(), at);
-  const span = useTicking((at) => spanText(alarm, nowOf(at)));
-  const text = useTicking((at) => timesOf(alarm, nowOf(at), isOver).text);
-  const note = useTicking((at) => timesOf(alarm, nowOf(at), isOver).note);
+  const known = useApp(selectKnownSince);
+  const span = useTicking((at) => spanText(alarm, nowOf(at), known));
+  const text = useTicking((at) =>
+    isOver ? lengthOf(alarm) : sinceText(alarm, nowOf(at), known, verdict !== 'healthy'),
+  );
+  const note = useTicking((at) => (isOver ? resolvedText(alarm, nowOf(at)) : ''));
   return (
     <span
       className="alarm-times"
@@ -72,17 +77,40 @@ export function AlarmTimes({
   );
 }
 
+/** What to do. Old values ask for nothing: only the line stays, so that no row moves. */
+export function AlarmTodo({
+  text,
+  isAgain = false,
+  isOfSilence = false,
+}: {
+  text: string;
+  /** Whether it differs from that of the alarm's heading. */
+  isAgain?: boolean;
+  isOfSilence?: boolean;
+}): JSX.Element {
+  const isCurrent = useApp(isReceivingNow) || isOfSilence;
+  return (
+    <span
+      className="alarm-do"
+      data-again={isAgain || undefined}
+      style={isCurrent ? undefined : { visibility: 'hidden' }}
+    >
+      {text}
+    </span>
+  );
+}
+
 export function ResolvedNote({ alarm }: { alarm: Alarm }): JSX.Element {
-  const note = useTicking((at) => timesOf(alarm, rosNow(store.get(), at), true).note);
+  const note = useTicking((at) => resolvedText(alarm, rosNow(store.get(), at)));
   return <small className="faint">{note}</small>;
 }
 
 /** The value now and the worst value, in a column each. */
 export function AlarmFacts({
-  item: { alarm, verdict },
+  alarm,
   values: { state, now: current, worst },
 }: {
-  item: Item;
+  alarm: Alarm;
   values: ValuesNow;
 }): JSX.Element {
   const sensors = useApp(selectCatalogue);
@@ -99,8 +127,10 @@ export function AlarmFacts({
           )}
         </Fact>
       )}
-      {state?.kind === 'unknown' && <NotKnown alarm={alarm} state={state} />}
-      {worst !== null && <Fact name="worst" verdict={verdict} text={worst} />}
+      {state?.kind === 'unknown' && (
+        <NotKnown alarm={alarm} state={state} hasLast={worst === null} />
+      )}
+      {worst !== null && <Fact name="worst" verdict={alarm.reason.verdict} text={worst} />}
     </>
   );
 }
@@ -129,9 +159,11 @@ function Fact({
 function NotKnown({
   alarm,
   state,
+  hasLast,
 }: {
   alarm: Alarm;
   state: Extract<Now, { kind: 'unknown' }>;
+  hasLast: boolean;
 }): JSX.Element {
   const sensors = useApp(selectCatalogue);
   const hasTime = useApp(selectHasTime);
@@ -139,8 +171,9 @@ function NotKnown({
     unknownText(alarm, sensors, state, hasTime ? ageSeconds(state.lastAt, at) : null),
   );
   return (
+    // Never more lines than a known value: then no row grows.
     <span data-fact="now" data-status="unknown" title={text}>
-      {text}
+      {hasLast ? unknownText(alarm, sensors, state, null) : S.alarmNowUnknown(null, null)}
     </span>
   );
 }

@@ -84,9 +84,10 @@ export function Meanwhile(): JSX.Element | null {
   const text = useApp((state) => (worst ? textNow(state, worst.alarm) : ''));
   if (!worst) return null;
   const { alarm } = worst;
+  const { verdict } = alarm.reason;
   return (
-    <div className="meanwhile" data-testid="meanwhile" data-health={worst.verdict}>
-      <HealthMark verdict={worst.verdict} word={false} />
+    <div className="meanwhile" data-testid="meanwhile" data-health={verdict}>
+      <HealthMark verdict={verdict} word={false} />
       <strong>{S.alarmsMeanwhile(text, items.length - 1)}</strong>
       <button
         type="button"

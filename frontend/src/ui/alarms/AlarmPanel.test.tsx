@@ -128,7 +128,7 @@ test('what is well again waits for one more good scan, and pests for an inspecti
     document.querySelector(`[data-where='${tag}'] .alarm-do`)?.textContent;
   expect([todo('5'), todo('6')]).toEqual([
     'The next good scan resolves it',
-    'Inspect again: a second clean inspection resolves it',
+    'Inspect again to resolve it',
   ]);
   // An active alarm is never called healthy, nor dated as if that were since then.
   expect(fact(first('active'), 'since').textContent).toMatch(/^alarm since .*Back to normal$/);
@@ -138,7 +138,7 @@ test('who acknowledged it and when, by the clock of the twin', () => {
   const said = { acknowledged_by: 'anna', acknowledged_at: { sec: 1_000, nanosec: 0 } };
   report(alarm('a', { tag_id: '5', ...said }));
   flush(() => {
-    own.set(acknowledge(NO_LOCAL_ALARMS, [{ alarm: alarm('a'), verdict: 'critical' }], 0));
+    own.set(acknowledge(NO_LOCAL_ALARMS, [{ alarm: alarm('a') }], 0));
   });
   expect(status('5')).toBe('acknowledged by anna, sim 00:16:40');
 });
@@ -324,7 +324,7 @@ test('without an alarm it says so; where that is not known it says that', () => 
   report(ofTag);
   expect(screen.queryByText(wait)).toBeNull();
   flush(() => {
-    shelveAlarm({ alarm: ofTag, verdict: 'critical' }, 15, 'fan');
+    shelveAlarm({ alarm: ofTag }, 15, 'fan');
   });
   expect(group('shelved')).toHaveLength(1);
   expect(screen.queryByText(wait)).toBeNull();

@@ -24,8 +24,6 @@ import { acknowledgeAlarms } from '../../alarms/own';
 import { selectNow, todoNow, worstNow, worstNowFirst } from '../../alarms/latest';
 import { alarmList } from '../../alarms/watch';
 import { timeOfDay } from '../../clock';
-import type { Alarm } from '../../contract/types';
-import { secondsOf } from '../../domain/time';
 import { saveCsv } from '../../export/save';
 import { store, useApp } from '../../store/app';
 import { mayAct, person, useSelected } from '../../store/create';
@@ -36,11 +34,11 @@ import { S } from '../../strings';
 import { Disclosure, Icon, Select } from '../../widgets/controls';
 import { HealthMark } from '../HealthMark';
 import { useChosenInSight, usePaper, useTopAfter } from '../visibleRows';
-import { AlarmTimes, ResolvedNote } from './AlarmFacts';
+import { AlarmTimes, AlarmTodo, ResolvedNote } from './AlarmFacts';
 import { AlarmNotes, AlarmsWait, LastActionLine, NotifySettings } from './AlarmNotes';
 import { Acknowledge, AlarmRow, ignoreDoubleClick } from './AlarmRow';
 import { ALARMS_ID, ListChoice } from './ListChoice';
-import { sharingText, useIsRefused, useWhoAcknowledged } from './people';
+import { sharingText, useIsRefused } from './people';
 
 /** Rows shown when a shared cause is opened; for others, and with each "more", `MOST_ROWS`. */
 const MOST_OF_CAUSE = 5;
@@ -286,7 +284,6 @@ function CauseHeading({
   const shown = own.length > 0 ? own : items;
   const verdict = useApp((state) => worstNow(state, shown));
   const todo = useApp((state) => todoNow(state, shown));
-  const who = useWhoAcknowledged(lastOfOne(own.map(({ alarm }) => alarm)));
   if (!verdict) return null;
   const waiting = unacknowledged(own);
   const oldest = group === 'resolved' ? undefined : oldestOf(shown);
@@ -310,7 +307,7 @@ function CauseHeading({
               {S.alarmCount(own.length)} <Icon name="chevron" />
             </span>
           </span>
-          {group === 'active' && <span className="alarm-do">{todo}</span>}
+          {group === 'active' && <AlarmTodo text={todo} />}
           {counts && <span className="alarm-facts">{counts}</span>}
           <span className="alarm-facts faint">{tagsText(tags)}</span>
         </span>
@@ -322,11 +319,8 @@ function CauseHeading({
             label={S.alarmWhat(S.alarmAcknowledge, cause)}
             text={S.alarmAcknowledgeAll(waiting.length)}
             status={
-              waiting.length > 0
-                ? null
-                : own.length > 0
-                  ? (who ?? S.healthAcknowledged)
-                  : S.alarmCount(0)
+              // By whom, its first row says.
+              waiting.length > 0 ? null : own.length > 0 ? S.healthAcknowledged : S.alarmCount(0)
             }
             onAcknowledge={() => {
               acknowledgeAlarms(waiting);
@@ -336,13 +330,6 @@ function CauseHeading({
       </div>
     </div>
   );
-}
-
-/** Of alarms that one person has acknowledged, the last; null: they are not. */
-function lastOfOne(alarms: readonly Alarm[]): Alarm | null {
-  const at = ({ acknowledged_at: time }: Alarm): number => (time ? secondsOf(time) : Infinity);
-  const [last = null] = [...alarms].sort((a, b) => at(b) - at(a));
-  return alarms.every((alarm) => alarm.acknowledged_by === last?.acknowledged_by) ? last : null;
 }
 
 /** Holds the order while the pointer or keyboard focus is in the list: no row moves. */

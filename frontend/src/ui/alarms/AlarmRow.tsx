@@ -1,5 +1,6 @@
 import { memo, useLayoutEffect, useRef, useState, type JSX, type MouseEvent } from 'react';
 
+import type { Alarm } from '../../contract/types';
 import { goToStart, showAlarm } from '../../alarms/follow';
 import { groupOf, type AlarmList, type Item } from '../../alarms/list';
 import {
@@ -20,7 +21,7 @@ import { mayAct, mayWithdraw, person, useSelected } from '../../store/create';
 import { selectCatalogue } from '../../store/derived';
 import { S } from '../../strings';
 import { Disclosure, Icon, useClose } from '../../widgets/controls';
-import { AlarmFacts, AlarmTimes, useValues } from './AlarmFacts';
+import { AlarmFacts, AlarmTimes, AlarmTodo, useValues } from './AlarmFacts';
 import { useIsRefused, useWhoAcknowledged } from './people';
 
 /** One alarm: since when, what, where, value now and at worst; a click shows its tag live. */
@@ -32,7 +33,8 @@ export const AlarmRow = memo(function AlarmRow({
   /** The group that lists the row; while the order is held, the alarm may belong to another. */
   group: keyof AlarmList;
 }): JSX.Element {
-  const { alarm, verdict, isAcknowledged } = item;
+  const { alarm, isAcknowledged } = item;
+  const { verdict } = alarm.reason;
   const isSelected = useApp((state) => state.view.selected === alarm.tag_id);
   const values = useValues(alarm);
   const known = lastKnown(values.state)?.verdict ?? verdict;
@@ -75,9 +77,11 @@ export const AlarmRow = memo(function AlarmRow({
           {/* A row held in "active" has no other line for the shelving reason. */}
           {group === 'active' && item.shelf?.reason && <q className="faint">{item.shelf.reason}</q>}
           {group === 'active' && !item.shelf && (
-            <span className="alarm-do" data-again={isBack || undefined}>
-              {values.todo}
-            </span>
+            <AlarmTodo
+              text={values.todo}
+              isAgain={isBack}
+              isOfSilence={alarm.reason.kind === 'silent'}
+            />
           )}
           {group === 'shelved' && item.shelf && (
             <span className="alarm-facts faint">
@@ -89,7 +93,7 @@ export const AlarmRow = memo(function AlarmRow({
             </span>
           )}
         </span>
-        <AlarmFacts item={item} values={values} />
+        <AlarmFacts alarm={alarm} values={values} />
       </button>
       <div className="alarm-tools">
         <Acknowledge
@@ -143,13 +147,13 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
       </button>
     </li>
   );
-  const then = (action: (alarm: Item['alarm']) => void) => () => {
+  const then = (action: (alarm: Alarm) => void) => () => {
     close();
     action(alarm);
   };
   return (
     <div className="row-actions" ref={root}>
-      {form === 'shelve' && <Shelving item={item} name={name} />}
+      {form === 'shelve' && <Shelving alarm={alarm} name={name} />}
       {form === 'comment' && (
         <CommentField
           subject={`alarm:${alarm.id}`}
@@ -185,12 +189,13 @@ function Actions({ item, name }: { item: Item; name: string }): JSX.Element {
 }
 
 /** Form to shelve an alarm; a critical one for a shorter time, and only with a reason. */
-function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
+function Shelving({ alarm, name }: { alarm: Alarm; name: string }): JSX.Element {
   const [reason, setReason] = useState('');
   const close = useClose();
   const root = useRef<HTMLDivElement>(null);
   const field = useRef<HTMLInputElement>(null);
-  const isNeeded = needsReason(item.verdict);
+  const { verdict } = alarm.reason;
+  const isNeeded = needsReason(verdict);
   useLayoutEffect(() => {
     // Focused at once, so that typing fills in the reason instead of running shortcuts.
     (isNeeded ? field : root).current?.focus({ preventScroll: true });
@@ -215,14 +220,14 @@ function Shelving({ item, name }: { item: Item; name: string }): JSX.Element {
         />
       </label>
       <div className="shelf-times">
-        {shelfMinutes(item.verdict).map((minutes) => (
+        {shelfMinutes(verdict).map((minutes) => (
           <button
             key={minutes}
             type="button"
             disabled={isNeeded && given === ''}
             onClick={ignoreDoubleClick(() => {
               close();
-              shelveAlarm(item, minutes, given);
+              shelveAlarm({ alarm }, minutes, given);
             })}
           >
             {S.alarmShelveFor(ageText(minutes * 60))}

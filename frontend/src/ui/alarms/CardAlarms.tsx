@@ -2,7 +2,7 @@ import type { JSX } from 'react';
 
 import { oldestOf, unacknowledged, type Item } from '../../alarms/list';
 import { acknowledgeAlarms, unshelveAlarm } from '../../alarms/own';
-import { todoNow, worstNow } from '../../alarms/latest';
+import { selectKnownSince, todoNow, worstNow } from '../../alarms/latest';
 import { spanText, whatText } from '../../alarms/words';
 import { alarmList } from '../../alarms/watch';
 import { minuteText } from '../../domain/format';
@@ -30,7 +30,9 @@ function Active({ tagId }: { tagId: string }): JSX.Element | null {
   const items = active.filter(({ alarm }) => alarm.tag_id === tagId);
   const waiting = unacknowledged(items);
   const oldest = oldestOf(items);
-  const since = useTicking((at) => (oldest ? spanText(oldest, rosNow(store.get(), at)) : ''));
+  const since = useTicking((at) =>
+    oldest ? spanText(oldest, rosNow(store.get(), at), selectKnownSince(store.get())) : '',
+  );
   const well = useApp((state) =>
     worstNow(state, items) === 'healthy' ? todoNow(state, items) : '',
   );

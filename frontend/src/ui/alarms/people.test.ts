@@ -117,7 +117,7 @@ test('who has signed in is known also where the bridge was away at first', async
 
 test('what a viewer had acknowledged by themselves holds no more', async () => {
   person.set(null);
-  acknowledgeAlarms([{ alarm: COLD, verdict: 'stressed' }]);
+  acknowledgeAlarms([{ alarm: COLD }]);
   role = 'viewer';
   await signedIn();
   reportAlarms(COLD);
@@ -128,7 +128,7 @@ test('what a viewer had acknowledged by themselves holds no more', async () => {
 test('own actions are sent to the bridge, and withdrawn there', async () => {
   await signedIn();
   reportAlarms(COLD);
-  acknowledgeAlarms([{ alarm: COLD, verdict: 'stressed' }]);
+  acknowledgeAlarms([{ alarm: COLD }]);
   await vi.waitFor(() => {
     expect(requests).toEqual([
       { method: 'POST', path: '/api/notes', body: { kind: 'acknowledge', subject: 'alarm:cold' } },
@@ -150,7 +150,7 @@ test('undo takes back only one’s own words: what others have said since stays'
   const [same, other] = ['same', 'other'].map((id) => alarm(id, { tag_id: id }));
   if (!same || !other) throw new Error('two alarms');
   reportAlarms(COLD, same, other);
-  acknowledgeAlarms([COLD, same].map((each) => ({ alarm: each, verdict: 'stressed' })));
+  acknowledgeAlarms([COLD, same].map((each) => ({ alarm: each })));
   await vi.waitFor(() => {
     expect(requests).toHaveLength(2);
   });
@@ -181,7 +181,7 @@ test('what the bridge has taken holds here before the frame that says so', async
     isAnswered = true;
     return answer;
   });
-  acknowledgeAlarms([{ alarm: COLD, verdict: 'stressed' }]);
+  acknowledgeAlarms([{ alarm: COLD }]);
   await vi.waitFor(() => {
     expect(isAnswered).toBe(true);
   });
@@ -196,7 +196,7 @@ test('what the bridge refuses does not hold here either', async () => {
   await signedIn();
   reportAlarms(COLD);
   status = 503;
-  acknowledgeAlarms([{ alarm: COLD, verdict: 'stressed' }]);
+  acknowledgeAlarms([{ alarm: COLD }]);
   await vi.waitFor(() => {
     expect(own.get().acknowledged.size).toBe(0);
   });
@@ -217,7 +217,7 @@ test.each([
   const other = alarm('other', { tag_id: '2' });
   reportAlarms(COLD, other);
   lose();
-  acknowledgeAlarms([COLD, other].map((each) => ({ alarm: each, verdict: 'critical' })));
+  acknowledgeAlarms([COLD, other].map((each) => ({ alarm: each })));
   expect([own.get().acknowledged.size, lastAction.get()]).toEqual([0, null]);
   expect(toast.get()).toBe('Not saved: The server is busy or unreachable.');
   expect(requests).toEqual([]);

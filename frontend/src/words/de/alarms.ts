@@ -21,6 +21,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmHouse: 'Ganzes Gewächshaus',
   alarmWhat: (where, what) => `${where}: ${what}`,
   alarmSince: (when, length) => (length === null ? `seit ${when}` : `seit ${when} (${length})`),
+  alarmForOver: (length) => `seit über ${length}`,
   alarmUntil: (from, until, length) => `${from} bis ${until} (${length})`,
   alarmNow: (reading) => `jetzt ${reading}`,
   alarmNowUnknown: (last, age) =>
@@ -33,9 +34,9 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     gone: 'nicht mehr gefunden',
   },
   alarmWorst: {
-    below: (reading) => `Tiefstwert ${reading}`,
-    above: (reading) => `Höchstwert ${reading}`,
-    pest: (reading) => `höchste Anzahl ${reading}`,
+    below: (reading) => `min. ${reading}`,
+    above: (reading) => `max. ${reading}`,
+    pest: (reading) => `max. ${reading}`,
   },
   alarmFirst: (reading) => `anfangs ${reading}`,
   alarmStatus: { critical: 'kritisch', healthy: 'im Idealbereich' },
@@ -127,13 +128,12 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'unter', above: 'über' },
-    wasBeyond: (side, limit) => `war ${side} ${limit}`,
     heldUntil: (status, isBelow, until) => `${status} bis ${isBelow ? 'unter' : 'über'} ${until}`,
     just: {
       below: (limit) => `knapp unter ${limit}`,
       above: (limit) => `knapp über ${limit}`,
     },
-    readingFailed: (sensor) => `${sensor}: Der Sensor liefert keinen Wert`,
+    readingFailed: (sensor) => `${sensor}: Sensor liefert keinen Wert`,
     implausible: (reading) => `${reading}: kein plausibler Wert`,
     scanFailed: (outcome, age) => `Fehlversuch: ${outcome}${age === null ? '' : `, vor ${age}`}`,
     pest: (count) =>
@@ -178,7 +178,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     stopped: 'Nach dem Roboter sehen',
     other: 'Vor Ort prüfen',
   },
-  todoPestAgain: 'Nochmals kontrollieren: Ohne Befund ist der Alarm behoben',
+  todoPestAgain: 'Zum Beheben nochmals kontrollieren',
   todoWell: 'Mit der nächsten guten Messung behoben',
   todoAlso: (tags) => (tags === 1 ? 'auch Messpunkt' : 'auch Messpunkte'),
   todoLabel: 'Jetzt zu tun',

@@ -19,6 +19,8 @@ export const ALARMS = {
   alarmWhat: (where: string, what: string): string => `${where}: ${what}`,
   alarmSince: (when: string, length: string | null): string =>
     length === null ? `since ${when}` : `since ${when} (${length})`,
+  /** The beginning is unknown. */
+  alarmForOver: (length: string): string => `for over ${length}`,
   alarmUntil: (from: string, until: string, length: string): string =>
     `${from} until ${until} (${length})`,
   /** An alarm's value now, at worst, and when raised. */
@@ -130,7 +132,6 @@ export const HEALTH = {
   /** Why a tag or the greenhouse has its verdict. */
   reasons: {
     sides: { below: 'below', above: 'above' },
-    wasBeyond: (side: string, limit: string): string => `was ${side} ${limit}`,
     /** A value that was out of range keeps its status until it is well within (hysteresis). */
     heldUntil: (status: string, isBelow: boolean, until: string): string =>
       `${status} until ${isBelow ? 'below' : 'above'} ${until}`,
@@ -186,7 +187,7 @@ export const HEALTH = {
     stopped: 'Check the robot',
     other: 'Check on site',
   },
-  todoPestAgain: 'Inspect again: a second clean inspection resolves it',
+  todoPestAgain: 'Inspect again to resolve it',
   todoWell: 'The next good scan resolves it',
   todoAlso: (tags: number): string => (tags === 1 ? 'also tag' : 'also tags'),
   todoLabel: 'Do this now',

@@ -19,6 +19,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmHouse: 'Todo el invernadero',
   alarmWhat: (where, what) => `${where}: ${what}`,
   alarmSince: (when, length) => (length === null ? `desde ${when}` : `desde ${when} (${length})`),
+  alarmForOver: (length) => `hace más de ${length}`,
   alarmUntil: (from, until, length) => `de ${from} a ${until} (${length})`,
   alarmNow: (reading) => `ahora ${reading}`,
   alarmNowUnknown: (last, age) =>
@@ -27,9 +28,9 @@ export const ALARMS: In<typeof EN.ALARMS> = {
       : `ahora sin dato, último ${last}${age === null ? '' : ` hace ${age}`}`,
   alarmPests: { seen: 'detectada', still: 'aún se detecta', gone: 'ya no se detecta' },
   alarmWorst: {
-    below: (reading) => `mínimo ${reading}`,
-    above: (reading) => `máximo ${reading}`,
-    pest: (reading) => `máximo ${reading}`,
+    below: (reading) => `mín. ${reading}`,
+    above: (reading) => `máx. ${reading}`,
+    pest: (reading) => `máx. ${reading}`,
   },
   alarmFirst: (reading) => `al inicio ${reading}`,
   alarmStatus: { critical: 'crítico', healthy: 'dentro del rango' },
@@ -127,7 +128,6 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   },
   reasons: {
     sides: { below: 'inferior a', above: 'superior a' },
-    wasBeyond: (side, limit) => `ha sido ${side} ${limit}`,
     heldUntil: (status, isBelow, until) =>
       `${status} hasta ${isBelow ? 'bajar de' : 'superar'} ${until}`,
     just: {
@@ -185,7 +185,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     stopped: 'Revisar el robot',
     other: 'Comprobar in situ',
   },
-  todoPestAgain: 'Revisar otra vez: si no hay plaga, queda resuelta',
+  todoPestAgain: 'Revisar otra vez para resolverla',
   todoWell: 'Queda resuelta con la próxima medición buena',
   todoAlso: (tags) => (tags === 1 ? 'también punto' : 'también puntos'),
   todoLabel: 'Hacer ahora',

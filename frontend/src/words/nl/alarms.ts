@@ -17,6 +17,7 @@ export const ALARMS: In<typeof EN.ALARMS> = {
   alarmHouse: 'Hele kas',
   alarmWhat: (where, what) => `${where}: ${what}`,
   alarmSince: (when, length) => (length === null ? `sinds ${when}` : `sinds ${when} (${length})`),
+  alarmForOver: (length) => `al meer dan ${length}`,
   alarmUntil: (from, until, length) => `${from} tot ${until} (${length})`,
   alarmNow: (reading) => `nu ${reading}`,
   alarmNowUnknown: (last, age) =>
@@ -25,9 +26,9 @@ export const ALARMS: In<typeof EN.ALARMS> = {
       : `nu onbekend, laatst ${last}${age === null ? '' : ` ${age} geleden`}`,
   alarmPests: { seen: 'gezien', still: 'nog steeds gezien', gone: 'niet meer gezien' },
   alarmWorst: {
-    below: (reading) => `laagste ${reading}`,
-    above: (reading) => `hoogste ${reading}`,
-    pest: (reading) => `hoogste aantal ${reading}`,
+    below: (reading) => `min. ${reading}`,
+    above: (reading) => `max. ${reading}`,
+    pest: (reading) => `max. ${reading}`,
   },
   alarmFirst: (reading) => `bij aanvang ${reading}`,
   alarmStatus: { critical: 'kritiek', healthy: 'binnen de grenzen' },
@@ -119,16 +120,15 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthMany: ONE_OR_MANY,
   reasons: {
     sides: { below: 'onder', above: 'boven' },
-    wasBeyond: (side, limit) => `was ${side} ${limit}`,
     heldUntil: (status, isBelow, until) => `${status} tot ${isBelow ? 'onder' : 'boven'} ${until}`,
     just: {
       below: (limit) => `net onder ${limit}`,
       above: (limit) => `net boven ${limit}`,
     },
-    readingFailed: (sensor) => `${sensor}: de sensor geeft geen waarde`,
+    readingFailed: (sensor) => `${sensor}: sensor geeft geen waarde`,
     implausible: (reading) => `${reading}: onwaarschijnlijke waarde`,
     scanFailed: (outcome, age) =>
-      `Laatste meting mislukt: ${outcome}${age === null ? '' : `, ${age} geleden`}`,
+      `Meting mislukt: ${outcome}${age === null ? '' : `, ${age} geleden`}`,
     pest: (count) =>
       count > 0 ? `${counted(count, 'plaagdier', 'plaagdieren')} gezien` : 'Plaag gezien',
     old: (sensor, age, holds, isDated) => {
@@ -171,7 +171,7 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     stopped: 'Bij de robot gaan kijken',
     other: 'Ter plaatse gaan kijken',
   },
-  todoPestAgain: 'Nogmaals controleren: zonder plaag is het alarm opgelost',
+  todoPestAgain: 'Nogmaals controleren',
   todoWell: 'Opgelost bij de volgende goede meting',
   todoAlso: (tags) => (tags === 1 ? 'ook meetpunt' : 'ook meetpunten'),
   todoLabel: 'Nu doen',

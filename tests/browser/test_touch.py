@@ -99,7 +99,7 @@ def test_a_played_recording_shows_its_time_on_each_tab(phone: Hmi) -> None:
 
 def test_charts_have_one_line_of_tools_and_the_whole_width(phone: Hmi) -> None:
     phone.go("chart.tag=10&tag=10", "?lang=nl")
-    expect(phone.page.get_by_role("combobox", name="Nr.")).to_have_value("10")
+    expect(phone.page.get_by_role("combobox", name="Meetpunten")).to_have_value("10")
     head = phone.page.locator(".chart-view > header")
     # More lines until its styles and all its parts are there.
     phone.expect(lambda: place(head).bottom - place(head).top < 60, "one line of tools")

@@ -13,7 +13,7 @@ import {
   type View,
 } from '../geometry/coordinates';
 import { act, moveViewport, store, type AppState } from '../store/app';
-import { robotBox } from '../store/create';
+import { marksOnMap } from '../store/create';
 import { withTag } from '../store/view';
 import {
   selectAreaOf,
@@ -97,7 +97,7 @@ export function runMap(
     }
     if (parts.has('pins') || parts.has('view')) {
       const boxes = camera.isHeld ? null : covered;
-      painter.paintPins(state, view, at, parts.has('pins'), boxes, robotBox.get());
+      painter.paintPins(state, view, at, parts.has('pins'), boxes, marksOnMap.get());
     }
     if (parts.has('overlay') || parts.has('view')) {
       pulses = pulses.filter(({ since }) => at - since < PULSE_MS);
@@ -342,7 +342,7 @@ export function runMap(
 
   const stops = [
     store.subscribe(guarded(update)),
-    robotBox.subscribe(() => {
+    marksOnMap.subscribe(() => {
       spoil('pins');
     }),
     onThemeChange(() => {

@@ -302,6 +302,9 @@ export function runMap(
     const wasSeen = isChosenSeen();
     moveViewport({ size: { width, height } });
     if (width === 0 || height === 0) return;
+    // For paper, see print.css.
+    element.parentElement?.style.setProperty('--map-width', String(width));
+    element.parentElement?.style.setProperty('--map-height', String(height));
     // Labels grow with the page's text: on a wall screen, and by the browser's setting.
     const textScale = parseFloat(getComputedStyle(element).fontSize) / TEXT_PX || 1;
     painter.resize({ width, height }, window.devicePixelRatio, textScale);

@@ -75,6 +75,9 @@ def test_most_of_the_height_is_content(phone: Hmi) -> None:
     frame, card = heights(".map-frame", ".card")
     assert frame >= 200
     assert frame + card >= tall
+    # The legend leaves its title to the sensor above the map, but not the way out of a comparison.
+    phone.turn("compare=-600")
+    expect(phone.page.get_by_role("button", name="Stop comparing")).to_be_in_viewport(ratio=1)
 
 
 def test_a_played_recording_shows_its_time_on_each_tab(phone: Hmi) -> None:

@@ -226,8 +226,12 @@ def test_a_row_leads_to_its_tag_as_it_is_now_and_a_button_to_its_start(
         hmi.turn(f"list=alarms&tag=a&at={int(raised_s) + 1}")
         expect(hmi.app).to_have_attribute("data-pane", "tags")
         content = hmi.card("a").locator(".card-body")
-        content.evaluate("it => it.scrollTo(0, it.scrollHeight)")
-        assert apart(content.locator("> *").last, news)
+
+        def is_clear() -> bool:
+            content.evaluate("it => it.scrollTo(0, it.scrollHeight)")
+            return apart(content.locator("> *").last, news)
+
+        hmi.expect(is_clear, "the card's end clear of the message")
         assert news.get_by_role("button").evaluate(LINES) == 1
         news.get_by_role("button", name="Back to live, show tag b").click()
         expect(hmi.card("b")).to_be_visible()

@@ -249,7 +249,7 @@ def test_hover_shows_the_time_and_a_click_goes_there(garden: Garden, open_page: 
     quarter = garden.from_s + 0.25 * (garden.now_s - garden.from_s)
     assert at == pytest.approx(quarter, abs=60)
     # Another tag without the list; and the way back to it.
-    choice = hmi.page.get_by_role("combobox", name="Tag", exact=True)
+    choice = hmi.page.get_by_role("combobox", name="Tags")
     choice.select_option("2")
     expect(plot(hmi)).to_have_attribute("aria-label", re.compile("Tag 2:"))
     hmi.page.keyboard.press("Escape")

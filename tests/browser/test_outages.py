@@ -7,7 +7,8 @@ from urllib.parse import urlsplit
 
 from playwright.sync_api import expect
 
-from tests.browser.hmi import PHONE, SERVER_GONE, Hmi, OpenPage
+from tests.browser.hmi import PHONE, SERVER_GONE, WIDE, Hmi, OpenPage
+from tests.browser.places import places
 from tests.support.journal import SECOND, append
 from tests.support.journal import scan as row
 from tests.support.messages import occupancy_grid, scan
@@ -74,6 +75,15 @@ def test_a_server_that_is_killed_and_restarts_with_other_tags(
     hmi.expect_phase("reconnecting")
     expect_frozen(hmi, "Connection to the server lost")
     hmi.expect_rows("a", "gone")
+    # On a phone, the banner leaves the map its room.
+    hmi.resize(*PHONE.values())
+
+    def has_room() -> bool:
+        (frame,) = places(hmi, ".map-frame")
+        return frame.bottom - frame.top >= 330
+
+    hmi.expect(has_room, "a high map")
+    hmi.resize(*WIDE.values())
 
     with (
         lupin_twin(domain, "serve", "--port", str(urlsplit(url).port)) as new,

@@ -5,11 +5,13 @@ import math
 import re
 from functools import partial
 
+import pytest
 from PIL import Image, ImageStat
 from playwright.sync_api import Download, ViewportSize, expect
 
 from tests.browser.greenhouse import TAGS
 from tests.browser.hmi import PHONE, Hmi, OpenPage, changed_box
+from tests.browser.places import places
 from tests.support.web import Bridge
 
 
@@ -132,6 +134,8 @@ def test_paper_has_every_row_and_its_time_and_is_light(
     hmi.expect_map()
     line = hmi.test_id("paper-line")
     expect(line).to_be_hidden()
+    (frame,) = places(hmi, ".map-frame")
+    proportion = (frame.right - frame.left) / (frame.bottom - frame.top)
     assert typical_luminance(hmi.settled_picture()) < 60
 
     # As a browser does before printing.
@@ -148,6 +152,14 @@ def test_paper_has_every_row_and_its_time_and_is_light(
     expect(line).to_have_text(re.compile(taken))
     expect(line).to_be_visible()
     expect(hmi.test_id("ideal-scale")).to_be_visible()
+    # The canvases are those of the screen: in another shape, round pins would be oval.
+    (frame,) = places(hmi, ".map-frame")
+    assert frame.right <= A4["width"]
+    assert (frame.right - frame.left) / (frame.bottom - frame.top) == pytest.approx(
+        proportion, rel=0.01
+    )
+    # Chromium paints no button in a heading that it repeats.
+    expect(hmi.page.locator("thead button").first).to_have_css("display", "contents")
     assert hmi.page.evaluate(CONTROLS) == []
     assert set(hmi.page.evaluate(HEAD)) == {"table-header-group static", "table-cell static"}
     # All reasons, where the screen has a line of them and the number of the others.

@@ -9,6 +9,7 @@ from functools import cache
 from html import escape
 from pathlib import Path
 from typing import Any, Final
+from urllib.parse import quote
 
 import orjson
 from fastapi import APIRouter, FastAPI, Request, Response
@@ -96,10 +97,16 @@ async def _written_once(
 def render(document: dict[str, Any], base_url: str) -> str:
     """An OpenAPI document as one HTML page: routes, parameters, answers, and lines for curl."""
     info = document["info"]
-    routes = "".join(
-        _route(method.upper(), path, operation, base_url)
-        for path, operations in document["paths"].items()
-        for method, operation in operations.items()
+    title = f"{escape(info['title'])}: API"
+    operations = [
+        (f"{method.upper()} {path}", operation)
+        for path, methods in document["paths"].items()
+        for method, operation in methods.items()
+    ]
+    routes = "".join(_route(name, operation, base_url) for name, operation in operations)
+    names = [*(name for name, _ in operations), *document["components"]["schemas"]]
+    contents = "".join(
+        f'<li><a href="#{quote(_id_of(name))}">{escape(name)}</a></li>' for name in names
     )
     schemas = "".join(
         _schema(name, described) for name, described in document["components"]["schemas"].items()
@@ -107,8 +114,9 @@ def render(document: dict[str, Any], base_url: str) -> str:
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width">'
-        f"<title>{escape(info['title'])}: API</title></head><body><main>"
-        f"<h1>{escape(info['title'])}: API</h1><p>{_prose(info['summary'])}</p>"
+        f'<title>{title}</title><link rel="stylesheet" href="docs.css"></head><body>'
+        f'<nav aria-label="Contents"><ul>{contents}</ul></nav><main>'
+        f"<h1>{title}</h1><p>{_prose(info['summary'])}</p>"
         f"<p>{_prose(info['description'])}</p>"
         '<p>As a document for tools: <a href="openapi.json">/openapi.json</a></p>'
         '<p>For people, with tutorials: <a href="docs/guide/">the guide</a></p>'
@@ -121,7 +129,12 @@ def _prose(text: str) -> str:
     return re.sub("`([^`]+)`", r"<code>\1</code>", escape(text))
 
 
-def _route(method: str, path: str, operation: dict[str, Any], base_url: str) -> str:
+def _id_of(name: str) -> str:
+    return name.replace(" ", "-")  # HTML forbids spaces
+
+
+def _route(name: str, operation: dict[str, Any], base_url: str) -> str:
+    method, _, path = name.partition(" ")
     parameters = operation.get("parameters", [])
     required = [p for p in parameters if p.get("required") and p["in"] == "query"]
     query = "&".join(f"{p['name']}=…" for p in required)
@@ -137,11 +150,12 @@ def _route(method: str, path: str, operation: dict[str, Any], base_url: str) -> 
     )
     url = f"{base_url}{path}{'?' + query if query else ''}"
     return (
-        f"<section><h3><code>{method} {escape(path)}</code></h3>"
+        f'<section id="{escape(_id_of(name))}"><h3><code>{escape(name)}</code></h3>'
         f"<p>{_prose(operation.get('summary', ''))}. {_prose(operation.get('description', ''))}</p>"
         f"<pre>curl {'' if method == 'GET' else f'-X {method} '}'{escape(url)}'</pre>"
-        + (f"<table border='1'>{rows}</table>" if rows else "")
-        + f"<ul>{answers}</ul></section>"
+        + (f"<table>{rows}</table>" if rows else "")
+        + f"<details><summary>Answers {', '.join(map(escape, operation['responses']))}</summary>"
+        f"<ul>{answers}</ul></details></section>"
     )
 
 
@@ -163,7 +177,7 @@ def _schema(name: str, described: dict[str, Any]) -> str:
     return (
         f'<section id="{escape(name)}"><h3>{escape(name)}</h3>'
         f"<p>{_prose(described.get('description', ''))}</p>"
-        f"<table border='1'>{rows}</table></section>"
+        f"<table>{rows}</table></section>"
     )
 
 
@@ -330,6 +344,7 @@ def _add_file(name: str, media_type: str) -> None:
 
 _add_file("signin.css", "text/css; charset=utf-8")
 _add_file("signin.js", "text/javascript; charset=utf-8")
+_add_file("docs.css", "text/css; charset=utf-8")
 
 
 @read_route(router, "/font.woff2", include_in_schema=False)

@@ -82,7 +82,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
         </h2>
         {charted.by === 'tag' && (
           <Select
-            aria-label={S.columns.tag}
+            aria-label={S.tags}
             value={tagId}
             options={tagIds}
             text={tagLabel}

@@ -111,11 +111,14 @@ describe('pins', () => {
     expect(order('critical', 'healthy', 'unknown', 'stressed')).toEqual([0.9, 0.8, 0.7, 1]);
   });
 
-  test('where pins crowd only a critical one has room for its sign', () => {
+  test('where pins crowd only a critical one has room for its sign; closer still, only warnings stay', () => {
     // Halo, outline and cross.
-    const lines = (verdict: Verdict): number | undefined =>
-      draw([pin({ verdict })], 0.02).sprites[0]?.named('stroke').length;
-    expect(VERDICTS.map(lines)).toEqual(VERDICTS.map((each) => (each === 'critical' ? 3 : 2)));
+    const lines = (spacing: number) =>
+      VERDICTS.map(
+        (verdict) => draw([pin({ verdict })], spacing).sprites[0]?.named('stroke').length,
+      );
+    expect(lines(0.09)).toEqual([3, 2, 2, 2]);
+    expect(lines(0.05)).toEqual([3, 2, undefined, undefined]);
   });
 
   test('the pest’s ring is dashed and carries a bug', () => {
@@ -143,6 +146,10 @@ test('blooms share a sprite a colour, each in its place; what is out of sight is
   const sprites = [...new Set(drawn.map(([sprite]) => sprite as HTMLCanvasElement))];
   const fills = sprites.map((it) => FakeContext.recordOf(it)?.named('fill')[0]?.state['fillStyle']);
   expect(fills).toEqual(['rgb(1 0 0)', 'rgb(2 0 0)']);
+  // Zoomed out, they would hide the heat map.
+  const far = new FakeContext();
+  drawBlooms(penOn(far, { view: { ...view, scale: 10 } }), [dot(1, 1)]);
+  expect(far.named('drawImage')).toHaveLength(0);
 });
 
 test('the chosen pin’s label comes before all others', () => {

@@ -23,6 +23,8 @@ export function pinRadius(scale: number, spacing = Infinity): number {
   return Math.min(usual, Math.max(LEAST_PX.healthy, Math.round(scale * spacing * 0.22)));
 }
 
+/** Closer together than this, CSS pixels, pins would hide the heat map: only warnings are drawn. */
+const LEAST_SPACING_PX = 8;
 /** Least size of crowded pins: the worse, the larger. */
 const LEAST_PX = { healthy: 2, unknown: 2, stressed: 3, critical: 5 };
 /** Smaller pins have no room for a sign. */
@@ -35,8 +37,12 @@ export function bloomRadius(scale: number): number {
 const inside = ({ size }: Surface, x: number, y: number, margin: number): boolean =>
   x > -margin && y > -margin && x < size.width + margin && y < size.height + margin;
 
+/** Pixels a metre below which a box's blooms are one blot, which would hide the heat map. */
+const LEAST_BLOOM_SCALE = 15;
+
 export function drawBlooms(pen: Pen, blooms: Scene['blooms']): void {
   const { view, sprites, colour } = pen;
+  if (view.scale < LEAST_BLOOM_SCALE) return;
   const radius = bloomRadius(view.scale);
   const box = Math.ceil(radius * 1.3 + 2) * 2;
   for (const { at, look } of blooms) {
@@ -85,7 +91,9 @@ const BY_SEVERITY = [...VERDICTS].reverse();
 export function drawPins(pen: Pen, pins: readonly Pin[], spacing: number): void {
   const { context: target, view, sprites, colour } = pen;
   const usual = pinRadius(view.scale, spacing);
+  const isTooDense = view.scale * spacing < LEAST_SPACING_PX;
   for (const verdict of BY_SEVERITY) {
+    if (isTooDense && !isBad(verdict)) continue;
     const radius = Math.max(usual, LEAST_PX[verdict]);
     const box = (radius + WARNING_PX + 4) * 2;
     for (const pin of pins) {

@@ -94,8 +94,8 @@ export interface Room {
   /** The visible part; labels of pins inside it are not cut off. */
   readonly within: Box;
   readonly covered: readonly Box[];
-  /** The robot's mark: labels keep clear of it, but a pin below it still has its label. */
-  readonly robot?: Box | null;
+  /** The robot's and other marks: labels keep clear of them, but a pin below one still has its label. */
+  readonly marks?: readonly Box[];
 }
 
 const GAP = 4;
@@ -109,8 +109,8 @@ export function placeLabels(
   room: Room | null = null,
 ) {
   const taken = new Buckets();
-  const robot = room?.robot ?? null;
-  for (const box of [...(room?.covered ?? []), ...(robot ? [robot] : [])]) taken.add(box);
+  const marks = room?.marks ?? [];
+  for (const box of [...(room?.covered ?? []), ...marks]) taken.add(box);
   const ordered = requests
     .map((request, index) => {
       const { x, y } = request;
@@ -123,7 +123,7 @@ export function placeLabels(
 
   return ordered.flatMap(({ request, pin }) => {
     // Among overlapping pins only warnings get labels: more would be unreadable.
-    if (request.priority < URGENT && !taken.isFree(pin, [pin, robot])) return [];
+    if (request.priority < URGENT && !taken.isFree(pin, [pin, ...marks])) return [];
     const spot = firstFree(request, height, taken, room?.within ?? null);
     if (!spot) return [];
     const { text, box, width } = spot;
@@ -180,7 +180,7 @@ class Buckets {
     }
   }
 
-  isFree(box: Box, ignored: readonly (Box | null)[] = []): boolean {
+  isFree(box: Box, ignored: readonly Box[] = []): boolean {
     for (const key of keys(box)) {
       for (const other of this.#boxes.get(key) ?? []) {
         const apart =

@@ -51,8 +51,8 @@ const isSame = (a: View, b: View): boolean =>
 /** Insets of a fit: less on a phone, in both orientations, as each pixel counts. */
 function fitInsets({ width, height }: Size): Box {
   return width < 560 || height < 280
-    ? { top: 26, right: 60, bottom: 40, left: 26 }
-    : { top: 30, right: 76, bottom: 52, left: 40 };
+    ? { top: 26, right: 26, bottom: 40, left: 26 }
+    : { top: 30, right: 40, bottom: 52, left: 40 };
 }
 
 const viewport = () => store.get().viewport;

@@ -13,7 +13,7 @@ import {
   type View,
 } from '../geometry/coordinates';
 import { act, moveViewport, store, type AppState } from '../store/app';
-import { robotBox } from '../store/create';
+import { marksOnMap } from '../store/create';
 import { withTag } from '../store/view';
 import {
   selectAreaOf,
@@ -97,7 +97,7 @@ export function runMap(
     }
     if (parts.has('pins') || parts.has('view')) {
       const boxes = camera.isHeld ? null : covered;
-      painter.paintPins(state, view, at, parts.has('pins'), boxes, robotBox.get());
+      painter.paintPins(state, view, at, parts.has('pins'), boxes, marksOnMap.get());
     }
     if (parts.has('overlay') || parts.has('view')) {
       pulses = pulses.filter(({ since }) => at - since < PULSE_MS);
@@ -302,6 +302,9 @@ export function runMap(
     const wasSeen = isChosenSeen();
     moveViewport({ size: { width, height } });
     if (width === 0 || height === 0) return;
+    // For paper, see print.css.
+    element.parentElement?.style.setProperty('--map-width', String(width));
+    element.parentElement?.style.setProperty('--map-height', String(height));
     // Labels grow with the page's text: on a wall screen, and by the browser's setting.
     const textScale = parseFloat(getComputedStyle(element).fontSize) / TEXT_PX || 1;
     painter.resize({ width, height }, window.devicePixelRatio, textScale);
@@ -342,7 +345,7 @@ export function runMap(
 
   const stops = [
     store.subscribe(guarded(update)),
-    robotBox.subscribe(() => {
+    marksOnMap.subscribe(() => {
       spoil('pins');
     }),
     onThemeChange(() => {

@@ -131,14 +131,14 @@ describe('painter', () => {
     expect(named(canvases.pins, 'drawImage')).toHaveLength(1);
   });
 
-  test('a label gives way to the robot', () => {
+  test('a label gives way to the robot and other marks', () => {
     show('pins', 'labels');
     // Where tag 1's label begins, pixels: its sprite is the last that is drawn.
-    const labelAt = (robot: Box | null): number[] => {
-      painter.paintPins(store.get(), view, 0, true, [], robot);
+    const labelAt = (...marks: Box[]): number[] => {
+      painter.paintPins(store.get(), view, 0, true, [], marks);
       return named(canvases.pins, 'drawImage').at(-1)?.args.slice(1, 3) as number[];
     };
-    const [x = NaN, y = NaN] = labelAt(null);
+    const [x = NaN, y = NaN] = labelAt();
     const [left, top] = [x - view.x, y - view.y];
     // It lies over half of the pin too.
     const [away = NaN] = labelAt({ left: left - 12, top, right: left + 30, bottom: top + 40 });

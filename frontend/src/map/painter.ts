@@ -193,8 +193,8 @@ export class Painter {
   }
 
   /**
-   * `covered`: elements over the map; null while the map moves, and labels with it. `robot`: its mark,
-   * relative to the map's origin.
+   * `covered`: elements over the map; null while the map moves, and labels with it. `marks`: of the
+   * robot and of suggested tags, relative to the map's origin.
    */
   paintPins(
     state: AppState,
@@ -202,7 +202,7 @@ export class Painter {
     now: number,
     isNew: boolean,
     covered: readonly Box[] | null,
-    robot: Box | null = null,
+    marks: readonly Box[] = [],
   ): void {
     const pen = this.#penOn(this.canvases.pins, view);
     if (covered) {
@@ -216,7 +216,7 @@ export class Painter {
         scale: view.scale,
         within: moved({ left: 0, top: 0, right: width, bottom: height }),
         covered: covered.map(moved),
-        robot,
+        marks,
       });
     }
     if (isNew) this.#pinBuffer.spoil();

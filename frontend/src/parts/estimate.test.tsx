@@ -7,6 +7,7 @@ import { snapshotOf } from '../domain/twin';
 import { mapPoint } from '../geometry/coordinates';
 import { pointedAt } from '../map/commands';
 import { act, moveViewport, prefer, receive, store } from '../store/app';
+import { marksOnMap } from '../store/create';
 import { withPast } from '../store/twin';
 import { selectTag } from '../store/moment';
 import { bodies, estimated, type Expected, expectedReading, grade } from '../testing/field';
@@ -240,6 +241,8 @@ describe('where another tag would help', () => {
       'translate(5000px, 200px)',
     ]);
     expect(marks.map(({ dataset }) => dataset['inView'])).toEqual(['true', 'true', 'false']);
+    const [first] = marksOnMap.get();
+    expect(first).toEqual({ left: 84, top: -216, right: 116, bottom: -184 });
   });
 
   test('says where there is none, or none of the past', async () => {

@@ -1,6 +1,6 @@
 import '../styles/estimate.css';
 
-import type { JSX } from 'react';
+import { type JSX, useEffect } from 'react';
 
 import { answer } from '../contract/api';
 import type {
@@ -31,6 +31,7 @@ import type { Tag } from '../domain/twin';
 import { type MapPoint, mapPoint, toCanvas } from '../geometry/coordinates';
 import { useApp } from '../store/app';
 import { selectCatalogue, selectHealth, selectHeat, selectSensor } from '../store/derived';
+import { keepClear } from '../store/create';
 import { type Fetched, useFetched } from '../store/fetcher';
 import { selectShown, selectTags } from '../store/moment';
 import { LANGUAGE, S } from '../strings';
@@ -247,11 +248,27 @@ export function CardEstimate({
 
 /** Number of suggested places: few buy more sensors at once. */
 const PLACES = 5;
+/** Half of a mark and its gap to a label, pixels. */
+const MARK_PX = 16;
 
 /** Where another tag would help: numbers on the map, a list for screen readers. */
 export function AdviceMarks(): JSX.Element {
   const isNow = useApp((state) => selectShown(state).moment === null);
   const { value, state, message } = useEstimateQuery<Advice>('advice', 'places', PLACES);
+  const { scale } = useApp((shownIn) => shownIn.viewport.view);
+  const places = isNow ? value?.places : undefined;
+  useEffect(
+    () =>
+      keepClear(
+        (places ?? []).map((place) => ({
+          left: place.x * scale - MARK_PX,
+          top: -place.y * scale - MARK_PX,
+          right: place.x * scale + MARK_PX,
+          bottom: -place.y * scale + MARK_PX,
+        })),
+      ),
+    [places, scale],
+  );
   if (!isNow) return <Note text={E.adviceNow} />;
   if (!value) {
     return <Note text={state === 'failed' ? E.adviceFailed(shown(message, 160)) : ''} />;

@@ -2,7 +2,7 @@ import { render, act as rendered, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
 import { moveViewport } from '../store/app';
-import { robotBox, robotFrame } from '../store/create';
+import { marksOnMap, robotFrame } from '../store/create';
 import { goLive, goLost, nextStamp, showTags, status } from '../testing/page';
 import { wireTag } from '../testing/tags';
 import {
@@ -52,12 +52,12 @@ test('the robot is marked at its reported position, and labels keep clear of it'
     robotFrame.set({ type: 'robot', ...robot });
   });
   expect(screen.getByTestId('robot-mark').getAttribute('transform')).toBe('translate(514 540)');
-  const { left = NaN, top = NaN, right = NaN, bottom = NaN } = robotBox.get() ?? {};
+  const { left = NaN, top = NaN, right = NaN, bottom = NaN } = marksOnMap.get()[0] ?? {};
   expect([left < 214 - 16, top < 340 - 16, right > 214 + 16, bottom > 340 + 16]).toEqual(
     Array(4).fill(true),
   );
   unmount();
-  expect(robotBox.get()).toBeNull();
+  expect(marksOnMap.get()).toEqual([]);
 });
 
 test.each([

@@ -10,7 +10,7 @@ import { ageSeconds, ageStep, secondsOf } from '../domain/time';
 import { mapPoint, toCanvas } from '../geometry/coordinates';
 import { act, type AppState, keepFetched, store, useApp } from '../store/app';
 import { withLayer } from '../store/view';
-import { robotBox, robotFrame, useSelected } from '../store/create';
+import { keepClear, robotFrame, useSelected } from '../store/create';
 import { isReceivingNow, rosNow, selectLatest, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { Check } from '../widgets/controls';
@@ -105,13 +105,11 @@ function useClearOfLabels(at: Place | null, hasAge: boolean): void {
   const left = at && start(at[0]);
   const top = at && start(at[1]);
   useEffect(() => {
+    if (left === null || top === null) return undefined;
     const size = 2 * MARK_PX + CLEAR_STEP_PX;
-    if (left !== null && top !== null) {
-      robotBox.set({ left, top, right: left + size + (hasAge ? AGE_PX : 0), bottom: top + size });
-    }
-    return () => {
-      robotBox.set(null);
-    };
+    return keepClear([
+      { left, top, right: left + size + (hasAge ? AGE_PX : 0), bottom: top + size },
+    ]);
   }, [left, top, hasAge]);
 }
 

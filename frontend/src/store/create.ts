@@ -94,5 +94,13 @@ export const pointedBy =
 /** The robot's latest frame; null: none received. */
 export const robotFrame = createStore<RobotFrame | null>(null);
 
-/** Where labels keep clear of the robot's mark, pixels relative to the map's origin; null: none shown. */
-export const robotBox = createStore<Box | null>(null);
+/** Marks that labels keep clear of, pixels relative to the map's origin. */
+export const marksOnMap = createStore<readonly Box[]>([]);
+
+/** Keeps labels off these marks until the returned function is called. */
+export function keepClear(marks: readonly Box[]): () => void {
+  marksOnMap.set([...marksOnMap.get(), ...marks]);
+  return () => {
+    marksOnMap.set(marksOnMap.get().filter((each) => !marks.includes(each)));
+  };
+}

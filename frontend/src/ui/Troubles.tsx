@@ -163,23 +163,25 @@ export function FrozenBanner(): JSX.Element | null {
   if (phase === 'live' || takenAt === undefined) return null;
   return (
     <div className="frozen" role="alert" data-testid="frozen">
-      {isDated && (
-        <strong>
-          {(isPast ? S.frozenBehindPast : S.frozenSince)(clockText(epochOf(takenAt)))}
-        </strong>
-      )}
-      {/* A running count must not be read out every second. */}
-      {isDated && !isTimeLost && (
-        <span aria-hidden="true" className="frozen-age">
-          {S.agoSuffix(ageText(Math.max(0, now - takenAt) / 1000))}
+      <div>
+        {isDated && (
+          <strong>
+            {(isPast ? S.frozenBehindPast : S.frozenSince)(clockText(epochOf(takenAt)))}
+          </strong>
+        )}
+        {/* A running count must not be read out every second. */}
+        {isDated && !isTimeLost && (
+          <span aria-hidden="true" className="frozen-age">
+            {S.agoSuffix(ageText(Math.max(0, now - takenAt) / 1000))}
+          </span>
+        )}
+        <span>
+          {fault && <strong>{S.clockTodo[fault]} </strong>}
+          {phase === 'offline' ? offlineReason(connection.status) : S.frozenWhy[phase]}
         </span>
-      )}
-      <span>
-        {fault && <strong>{S.clockTodo[fault]} </strong>}
-        {phase === 'offline' ? offlineReason(connection.status) : S.frozenWhy[phase]}
-      </span>
-      {phase === 'offline' && <More label={S.more} text={offlineMore(connection.status)} />}
-      {isPast && <span>{S.frozenPastStays}</span>}
+        {phase === 'offline' && <More label={S.more} text={offlineMore(connection.status)} />}
+        {isPast && <span>{S.frozenPastStays}</span>}
+      </div>
       {phase === 'reconnecting' && (
         <button type="button" onClick={retryConnection}>
           {S.retryNow}

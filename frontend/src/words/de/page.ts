@@ -171,8 +171,8 @@ export const PAGE: In<typeof EN.PAGE> = {
   emptyNoReading: (sensor) => `Noch keine Messwerte auf der Karte: ${sensor}`,
   emptyNoReadingHint:
     'Wählen Sie einen anderen Sensor, oder warten Sie, bis der Roboter weitere gemessen hat.',
-  emptyNoMap: 'Kein Grundriss: Der Roboter hat seine Karte noch nicht geschickt.',
-  emptyNoMapMore: 'Der Grundriss ist die SLAM-Karte des Roboters, die auf /map kommt.',
+  emptyNoMap: 'Noch kein Grundriss',
+  emptyNoMapMore: 'Der Roboter hat seine SLAM-Karte, die auf /map kommt, noch nicht geschickt.',
 
   helpGlobal: 'Überall',
   helpMap: 'Auf der Karte',

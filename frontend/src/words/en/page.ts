@@ -170,8 +170,8 @@ export const PAGE = {
   emptyNoPinsHint: 'All tags are listed in the table; a pin appears with the first good scan.',
   emptyNoReading: (sensor: string): string => `No pinned tag has a reading of ${sensor} yet`,
   emptyNoReadingHint: 'Choose another sensor, or wait for the robot to scan more tags.',
-  emptyNoMap: 'No floor plan yet: the robot has not sent its map.',
-  emptyNoMapMore: 'The floor plan is the robot’s SLAM map, which comes on /map.',
+  emptyNoMap: 'No floor plan yet',
+  emptyNoMapMore: 'The robot has not sent its SLAM map, which comes on /map.',
 
   helpGlobal: 'Anywhere',
   helpMap: 'With the map in focus',

@@ -166,8 +166,8 @@ export const PAGE: In<typeof EN.PAGE> = {
     'Todos los puntos están en la tabla; con la primera medición buena aparecen en el mapa.',
   emptyNoReading: (sensor) => `Aún no hay lecturas en el mapa: ${sensor}`,
   emptyNoReadingHint: 'Elija otro sensor o espere a que el robot mida más puntos.',
-  emptyNoMap: 'Aún no hay plano: el robot no ha enviado su mapa.',
-  emptyNoMapMore: 'El plano es el mapa SLAM del robot, que llega por /map.',
+  emptyNoMap: 'Aún no hay plano',
+  emptyNoMapMore: 'El robot aún no ha enviado su mapa SLAM, que llega por /map.',
 
   helpGlobal: 'En cualquier parte',
   helpMap: 'En el mapa',

@@ -168,8 +168,8 @@ export const PAGE: In<typeof EN.PAGE> = {
     'Alle meetpunten staan in de tabel; na de eerste goede meting komen ze op de kaart.',
   emptyNoReading: (sensor) => `Nog geen meetwaarden op de kaart: ${sensor}`,
   emptyNoReadingHint: 'Kies een andere sensor, of wacht tot de robot meer heeft gemeten.',
-  emptyNoMap: 'Geen plattegrond: de robot heeft zijn kaart nog niet gestuurd.',
-  emptyNoMapMore: 'De plattegrond is de SLAM-kaart van de robot, die op /map komt.',
+  emptyNoMap: 'Nog geen plattegrond',
+  emptyNoMapMore: 'De robot heeft zijn SLAM-kaart, die op /map komt, nog niet gestuurd.',
 
   helpGlobal: 'Overal',
   helpMap: 'Op de kaart',

@@ -1,7 +1,7 @@
 /** Views of the alarm list: filtered, sorted, grouped by cause and area, or as CSV. Pure. */
 import type { Alarm, WireTime } from '../contract/types';
 import { type Cell, csv, finder, shown } from '../domain/text';
-import { isOfRange, sideOf, VERDICTS } from '../domain/health';
+import { isOfRange, nameOf, sideOf, VERDICTS } from '../domain/health';
 import { groupedBy } from '../domain/memo';
 import type { Catalogue } from '../domain/sensors';
 import { secondsOf } from '../domain/time';
@@ -87,7 +87,7 @@ export function causeWords(alarm: Pick<Alarm, 'reason'>, sensors: Catalogue): st
   const { reason } = alarm;
   if (!isOfRange(reason)) return whatText(alarm, sensors);
   const beyond = sideOf(reason) === 'below' ? S.tooLow(null) : S.tooHigh(null);
-  return `${shown(sensors.named(reason.sensor).label, 32)} ${beyond}`;
+  return `${nameOf(sensors.named(reason.sensor))} ${beyond}`;
 }
 
 /** Lists tags by name, up to `MOST_NAMED`; instead of "1 more", it names that tag too. */

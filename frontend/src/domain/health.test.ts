@@ -192,11 +192,7 @@ describe('a reason in words', () => {
       `Soil moisture: no reading for 1${NBSP}d 1${NBSP}h (readings are valid for 1${NBSP}d)`,
     ],
     [{ ...old, limit: 600 }, null, `Not scanned recently (readings are valid for 10${NBSP}min)`],
-    [
-      { ...old, limit: 5_400, since: null },
-      null,
-      `No reading of known age (readings are valid for 1${NBSP}h 30${NBSP}min)`,
-    ],
+    [{ ...old, limit: 5_400, since: null }, null, 'No reading yet'],
     [
       { kind: 'changed', value: 22, limit: null } as const,
       null,

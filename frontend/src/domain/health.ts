@@ -116,7 +116,8 @@ const LONGEST_NAME = 32;
 /** A longer name gives way to its abbreviation, if it has one. */
 const LONG_NAME = 20;
 
-const nameOf = ({ label }: Sensor): string =>
+/** A sensor's name in sentences and headings. */
+export const nameOf = ({ label }: Sensor): string =>
   shown(label.length > LONG_NAME ? S.sensorShort(label) : label, LONGEST_NAME);
 
 /**

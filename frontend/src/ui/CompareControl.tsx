@@ -3,7 +3,7 @@ import { useState, type JSX } from 'react';
 import { now } from '../clock';
 import { differenceText, divergingColours, signedText, type Compare } from '../domain/difference';
 import { shown } from '../domain/text';
-import { hasDate, rosText } from '../domain/time';
+import { hasDate, rosText, shortRosText } from '../domain/time';
 import { act, store, useApp } from '../store/app';
 import { selectHeat, selectSensor } from '../store/derived';
 import { rosNow, selectDayS } from '../store/moment';
@@ -110,7 +110,8 @@ export function DifferenceLegend({ kiosk }: { kiosk: boolean }): JSX.Element | n
         )}
       </div>
       {range ? (
-        <>
+        <div className="difference-scale">
+          <span>{signedText(sensor, range.low)}</span>
           <div
             className="difference-bar"
             aria-hidden="true"
@@ -118,12 +119,8 @@ export function DifferenceLegend({ kiosk }: { kiosk: boolean }): JSX.Element | n
               backgroundImage: `linear-gradient(to right, ${divergingColours().join(', ')})`,
             }}
           />
-          <div className="difference-ends">
-            <span>{signedText(sensor, range.low)}</span>
-            <span>{S.differenceNone}</span>
-            <span>{differenceText(sensor, range.high)}</span>
-          </div>
-        </>
+          <span>{differenceText(sensor, range.high)}</span>
+        </div>
       ) : (
         <p role="status">
           {fetched === 'failed'
@@ -133,9 +130,16 @@ export function DifferenceLegend({ kiosk }: { kiosk: boolean }): JSX.Element | n
               : S.differenceLoading}
         </p>
       )}
-      {range && value && (
-        <p className="faint">{S.differenceTimes(rosText(value.at), rosText(value.against))}</p>
-      )}
+      {range && value && <p className="faint">{timesText(value)}</p>}
     </div>
   );
 }
+
+/** Both moments on one line of a phone: the year only where it differs. */
+function timesText({ at, against }: { at: number; against: number }): string {
+  const isSameYear = yearOf(at) === yearOf(against);
+  const text = isSameYear ? shortRosText : rosText;
+  return S.differenceTimes(text(at), text(against));
+}
+
+const yearOf = (at: number): number => new Date(at * 1000).getFullYear();

@@ -118,9 +118,9 @@ describe('legend', () => {
         (part) => part.textContent,
       );
     expect(parts()).toEqual([
-      'too low below ideal',
+      'too low',
       'night-time ideal per species ',
-      'too high above ideal',
+      'too high',
     ]);
     expect(at('ideal-species')).toBe(
       'tulip 8.0\u00a0to\u00a018.0\u00a0°C; others 15.0\u00a0to\u00a024.0\u00a0°C',

@@ -227,18 +227,19 @@ function IdealLegend({ sensor }: { sensor: Sensor }): JSX.Element {
         aria-hidden="true"
         style={{ backgroundImage: `linear-gradient(to right, ${colours[name].join(', ')})` }}
       />
-      <strong>{word}</strong> {limits && <span>{limits}</span>}
+      {word && <strong>{word} </strong>}
+      {limits && <span>{limits}</span>}
     </div>
   );
   return (
     <div className="ideal-scale" data-testid="ideal-scale" title={species}>
-      {step('low', S.tooLow(null), low ? S.legendBelow(low) : S.below)}
+      {step('low', low ? S.tooLow(null) : '', low ? S.legendBelow(low) : S.below)}
       {step(
         'right',
         species === '' ? part : S.legendEach(part),
         species === '' && ideal && rangeText(sensor, ideal),
       )}
-      {step('high', S.tooHigh(null), high ? S.legendAbove(high) : S.above)}
+      {step('high', high ? S.tooHigh(null) : '', high ? S.legendAbove(high) : S.above)}
     </div>
   );
 }

@@ -59,9 +59,10 @@ export function AlarmTimes({
   const known = useApp(selectKnownSince);
   const span = useTicking((at) => spanText(alarm, nowOf(at), known));
   const text = useTicking((at) =>
-    isOver ? lengthOf(alarm) : sinceText(alarm, nowOf(at), known, verdict !== 'healthy'),
+    isOver
+      ? `${resolvedText(alarm, nowOf(at))} (${lengthOf(alarm)})`
+      : sinceText(alarm, nowOf(at), known, verdict !== 'healthy'),
   );
-  const note = useTicking((at) => (isOver ? resolvedText(alarm, nowOf(at)) : ''));
   return (
     <span
       className="alarm-times"
@@ -70,7 +71,7 @@ export function AlarmTimes({
     >
       <span>
         {verdict === 'healthy' && `${C.alarm('')} `}
-        {text} <small className="faint">{note}</small>
+        {text}{' '}
       </span>
       <HealthMark verdict={verdict} text={verdict === 'healthy' ? S.alarmBack : undefined} />
     </span>

@@ -78,7 +78,7 @@ test('each in words: for how long, what, where, now, at worst; what is resolved 
   press('Resolved in the last 24 h (1)');
   const resolved = first('resolved');
   expect(resolved.textContent).toContain('Whole greenhouse: No tag is being scanned');
-  expect(fact(resolved, 'since').textContent).toMatch(/^1\u00a0min resolved sim 00:02:40/);
+  expect(fact(resolved, 'since').textContent).toMatch(/^resolved sim 00:02:40 \(1\u00a0min\)/);
   expect(fact(resolved, 'since').title).toContain('sim 00:01:40 until sim 00:02:40 (1\u00a0min)');
   press(/^Actions: Whole greenhouse/);
   expect(within(resolved).queryByRole('button', { name: 'Shelve' })).toBeNull();

@@ -139,11 +139,9 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     pest: (count) =>
       count > 0 ? `${counted(count, 'Schädling', 'Schädlinge')} gefunden` : 'Schädlinge gefunden',
     old: (sensor, age, holds, isDated) => {
-      const since = !isDated
-        ? sensor === ''
-          ? 'Kein Messwert mit bekanntem Alter'
-          : 'kein Messwert mit bekanntem Alter'
-        : age === null
+      if (!isDated) return sensor === '' ? 'Noch kein Messwert' : `${sensor}: noch kein Messwert`;
+      const since =
+        age === null
           ? sensor === ''
             ? 'Schon länger nicht gemessen'
             : 'schon länger nicht gemessen'

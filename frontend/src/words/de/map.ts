@@ -93,7 +93,6 @@ export const MAP: In<typeof EN.MAP> = {
   compareEnd: 'Vergleich beenden',
   compareMoment: 'Zeitpunkt, mit dem verglichen wird',
   difference: (sensor) => `${sensor}: Unterschied`,
-  differenceNone: 'unverändert',
   differenceLoading: 'Der Unterschied wird geladen',
   differenceNothing: (at) => `Keine Daten für ${at}.`,
   differenceFailed: (reason) => `Kein Unterschied: ${reason}`,

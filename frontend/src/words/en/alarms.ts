@@ -148,11 +148,9 @@ export const HEALTH = {
       count > 0 ? `${counted(count, 'pest', 'pests')} seen` : 'Pest seen',
     /** An empty `sensor`: no sensor of the tag has a valid reading. */
     old: (sensor: string, age: string | null, holds: string | null, isDated: boolean): string => {
-      const since = !isDated
-        ? sensor === ''
-          ? 'No reading of known age'
-          : 'no reading of known age'
-        : age === null
+      if (!isDated) return sensor === '' ? 'No reading yet' : `${sensor}: no reading yet`;
+      const since =
+        age === null
           ? `${sensor === '' ? 'Not' : 'not'} scanned recently`
           : sensor === ''
             ? `Not scanned for ${age}`
@@ -239,6 +237,6 @@ export const HEALTH = {
   tooHigh: (by: string | null): string => (by === null ? 'too high' : `too high by ${by}`),
   /** Before a value beyond its limit: short, in a narrow column. */
   side: { below: 'low', above: 'high' },
-  below: 'below ideal',
-  above: 'above ideal',
+  below: 'too low',
+  above: 'too high',
 } as const;

@@ -90,7 +90,6 @@ export const MAP = {
   compareEnd: 'Stop comparing',
   compareMoment: 'The moment to compare with',
   difference: (sensor: string): string => `${sensor}: difference`,
-  differenceNone: 'no change',
   differenceLoading: 'Loading the difference',
   differenceNothing: (at: string): string => `No data for ${at}.`,
   differenceFailed: (reason: string): string => `No difference: ${reason}`,

@@ -143,11 +143,9 @@ export const HEALTH: In<typeof EN.HEALTH> = {
         ? `Plaga detectada: ${counted(count, 'individuo', 'individuos')}`
         : 'Plaga detectada',
     old: (sensor, age, holds, isDated) => {
-      const since = !isDated
-        ? sensor === ''
-          ? 'Ninguna lectura de antigüedad conocida'
-          : 'ninguna lectura de antigüedad conocida'
-        : age === null
+      if (!isDated) return sensor === '' ? 'Aún sin lecturas' : `${sensor}: aún sin lecturas`;
+      const since =
+        age === null
           ? sensor === ''
             ? 'Sin medir últimamente'
             : 'sin medir últimamente'

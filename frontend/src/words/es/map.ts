@@ -91,7 +91,6 @@ export const MAP: In<typeof EN.MAP> = {
   compareEnd: 'Dejar de comparar',
   compareMoment: 'El momento con el que se compara',
   difference: (sensor) => `${sensor}: diferencia`,
-  differenceNone: 'sin cambios',
   differenceLoading: 'Cargando la diferencia',
   differenceNothing: (at) => `Sin datos de ${at}.`,
   differenceFailed: (reason) => `Sin diferencia: ${reason}`,

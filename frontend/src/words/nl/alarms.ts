@@ -132,11 +132,9 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     pest: (count) =>
       count > 0 ? `${counted(count, 'plaagdier', 'plaagdieren')} gezien` : 'Plaag gezien',
     old: (sensor, age, holds, isDated) => {
-      const since = !isDated
-        ? sensor === ''
-          ? 'Geen meetwaarde met bekende leeftijd'
-          : 'geen meetwaarde met bekende leeftijd'
-        : age === null
+      if (!isDated) return sensor === '' ? 'Nog geen meetwaarde' : `${sensor}: nog geen meetwaarde`;
+      const since =
+        age === null
           ? sensor === ''
             ? 'Al een tijd niet gemeten'
             : 'al een tijd niet gemeten'

@@ -91,7 +91,6 @@ export const MAP: In<typeof EN.MAP> = {
   compareEnd: 'Vergelijking stoppen',
   compareMoment: 'Het moment om mee te vergelijken',
   difference: (sensor) => `${sensor}: verschil`,
-  differenceNone: 'onveranderd',
   differenceLoading: 'Het verschil wordt geladen',
   differenceNothing: (at) => `Geen gegevens van ${at}.`,
   differenceFailed: (reason) => `Geen verschil: ${reason}`,

@@ -83,6 +83,9 @@ def test_a_server_that_is_killed_and_restarts_with_other_tags(
         return frame.bottom - frame.top >= 330
 
     hmi.expect(has_room, "a high map")
+    # Nothing to do about old data: no line is kept for it.
+    expect(hmi.page.locator(".health-strip .do-why")).to_be_visible()
+    expect(hmi.page.locator(".health-strip .do-what")).to_be_hidden()
     hmi.resize(*WIDE.values())
 
     with (

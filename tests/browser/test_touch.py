@@ -79,6 +79,13 @@ def test_most_of_the_height_is_content(phone: Hmi) -> None:
     # The legend leaves its title to the sensor above the map, but not the way out of a comparison.
     phone.turn("compare=-600")
     expect(phone.page.get_by_role("button", name="Stop comparing")).to_be_in_viewport(ratio=1)
+    # Both on one line: the comparison takes as little of the map as it can.
+
+    def are_on_one_line() -> bool:
+        end, details = places(phone, ".legend-difference button", ".legend-more summary")
+        return details.top < end.bottom and end.top < details.bottom
+
+    phone.expect(are_on_one_line, "one line")
 
 
 def test_a_played_recording_shows_its_time_on_each_tab(phone: Hmi) -> None:

@@ -4,7 +4,7 @@ import type { Alarm } from '../contract/types';
 import { alarm } from '../testing/alarms';
 import { cataloguesOf } from '../domain/sensors';
 import { CATALOGUE, IN_FAHRENHEIT, FILE } from '../testing/sensors';
-import { alarmsCsv, arranged, countsText, filtered, tagsText } from './arrange';
+import { alarmsCsv, arranged, causeWords, countsText, filtered, tagsText } from './arrange';
 import { acknowledge, NO_LOCAL_ALARMS, shelve, type LocalAlarms } from './own';
 import { inOrder, listOf } from './list';
 import type { Now } from './words';
@@ -30,6 +30,9 @@ test('many of one cause stand together, the worst cause first; a few stand by th
     ['Temperature too low', 5],
     ['Temperature too high', 6],
   ]);
+  // Named as in its rows.
+  const dry = alarm('dry', { reason: { sensor: 'vpd', value: 1.7, limit: 1.3 } });
+  expect(causeWords(dry, CATALOGUE)).toBe('VPD too high');
   const loose = arranged(active(...many(hot, 4), ...many(cold, 4)), 'cause', CATALOGUE);
   expect(loose.map(({ cause, items }) => [cause, items.length])).toEqual([[null, 8]]);
 });

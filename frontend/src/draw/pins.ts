@@ -26,7 +26,7 @@ export function pinRadius(scale: number, spacing = Infinity): number {
 /** Closer together than this, CSS pixels, pins would hide the heat map: only warnings are drawn. */
 const LEAST_SPACING_PX = 8;
 /** Least size of crowded pins: the worse, the larger. */
-const LEAST_PX = { healthy: 2, unknown: 2, stressed: 3, critical: 5 };
+const LEAST_PX = { healthy: 2, unknown: 2, stressed: 2, critical: 4 };
 /** Smaller pins have no room for a sign. */
 const LEAST_SIGN_PX = 5;
 

@@ -94,7 +94,7 @@ export function DifferenceLegend({ kiosk }: { kiosk: boolean }): JSX.Element | n
   return (
     <div className="legend-difference" data-testid="difference-legend">
       <div className="legend-title">
-        <strong>{S.difference(shown(sensor.label, 32))}</strong> <span>{sensor.unit}</span>
+        <strong>{S.difference(shown(sensor.label, 32))}</strong>{' '}
         {!kiosk && (
           <button
             type="button"

@@ -23,7 +23,7 @@ from lupin_bridge.alarms.board import (
 )
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.tasks import Guard, end
-from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, AlarmFold, Found
+from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, AlarmFold, Found, Reach
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.scans import recent_writes, writes_of
@@ -36,7 +36,6 @@ from lupin_twin.core.past import (
     PastWrite,
     PastWrites,
     RunSpan,
-    WritesRequest,
 )
 from lupin_twin.core.state import Snapshot, TagState
 
@@ -64,8 +63,6 @@ log = logging.getLogger(__name__)
 # Writes per lot: some tens of milliseconds of a worker.
 LOT: Final = 500
 LOT_S: Final = 0.05
-# Writes of the past in all: the last day of a large greenhouse, weeks of a small one.
-REACH_COUNT: Final = 300_000
 # After this long, an observation is in the journal; it is read once more later, for a slow disk.
 JOURNAL_S: Final = 0.15
 AGAIN_S: Final = 1.5
@@ -106,7 +103,9 @@ class AlarmFeed:
         self.judge = judge
         self._board = board
         self._now_ns = now_ns
-        self._reach_ns = int(days * DAY_NS)
+        self._days = days
+        self._reach = Reach(days)
+        self._first = 0
         self._wake = asyncio.Event()
         self._fold: AlarmFold | None = None
         self._journal = ""
@@ -200,6 +199,7 @@ class AlarmFeed:
         self._generation += 1
         self._alarm_source = says
         self._fold, self._last, self._journal = None, 0, ""
+        self._reach = Reach(self._days)
         self._received, self._seen = [], None
         self._since_ns, self._is_caught_up = None, False
 
@@ -238,8 +238,7 @@ class AlarmFeed:
         had = self._last
         while True:
             generation = self._generation
-            request = WritesRequest(self._last, self._reach_ns / 1e9, REACH_COUNT, LOT)
-            past = await self._source.writes(request)
+            past = await self._source.writes(self._reach.request(self._last, LOT))
             if generation != self._generation:
                 return  # begun anew meanwhile, and woken
             if self._is_another(past):
@@ -247,17 +246,28 @@ class AlarmFeed:
                 continue
             if self._fold is None:
                 self._fold = AlarmFold(self.judge.criteria, past.spans)
+                self._first = past.first
             self._journal, self._last = past.journal, past.last
             if self._is_caught_up:
                 self.judge.note_writes(past.of_newest_run)
             await self._take(past.writes)
+            is_short = past.is_all and not self._is_caught_up and await self._reaches_further()
             if generation != self._generation:
                 return
-            if past.is_all:
+            if is_short:
+                self._fold, self._last, self._since_ns = None, 0, None
+            elif past.is_all:
                 break
         await self._publish()
         if self._last != had:
             self._ask_again(AGAIN_S)
+
+    async def _reaches_further(self) -> bool:
+        """Whether an alarm may be older than what was read, which then has to be read again."""
+        if self._fold is None or self._seen is None:
+            return False
+        grow = partial(self._reach.grow, self._fold, self._first, self._last, self._seen.tags)
+        return await self._on_worker(lambda _: grow())
 
     def _is_another(self, past: PastWrites) -> bool:
         """Whether it is another journal than the one read so far, or the clock began a new run."""
@@ -285,7 +295,7 @@ class AlarmFeed:
         if fold is None or now_ns is None:
             await self._publish_silence(0.0)
             return
-        moment_ns, since_ns = now_ns, max(0, now_ns - self._reach_ns)
+        moment_ns, since_ns = now_ns, max(0, now_ns - int(self._days * DAY_NS))
         beside = tuple(self._silences)
 
         def find(_: object) -> tuple[Board, Change, Found]:

@@ -10,7 +10,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar
 
 from lupin_bridge.alarms.board import notes_of_alarms
@@ -24,7 +24,7 @@ from lupin_bridge.archive.database import (
 from lupin_bridge.feed.query import Child, Now, Search
 from lupin_bridge.feed.query import main as serve
 from lupin_bridge.fleet.overview import LIVE_S, Site, causes, dots, now_json, worst_first
-from lupin_bridge.judge.alarm_fold import AlarmFold
+from lupin_bridge.judge.alarm_fold import AlarmFold, Reach
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge, judge_once
 from lupin_bridge.judge.scans import recent_writes
@@ -40,7 +40,6 @@ from lupin_twin.core.past import (
     PastWrite,
     RecentRequest,
     ScansRequest,
-    WritesRequest,
 )
 from lupin_twin.core.state import Snapshot, TagState, same_tags
 from lupin_twin.journal.fold import state_at
@@ -65,8 +64,6 @@ _AGE_S: Final = 10.0
 _LOT: Final = 2_000
 # The worst alarms of a site that are shown, shelved ones last; its own page has all of them.
 MAX_ALARMS: Final = 20
-# As many as a bridge reads of the past, see `alarms.feed`.
-_REACH_COUNT: Final = 300_000
 
 # No value that a site has written, whatever it is, may break this query of all sites.
 _FACTS: Final = (
@@ -122,6 +119,8 @@ class _Judged:
     snapshot: Snapshot | None = None
     is_simulated: bool = False
     alarm_fold: AlarmFold | None = None
+    reach: Reach = field(default_factory=lambda: Reach(Limits().alarm_days))
+    first: int = 0
     after: int = 0
     seq: int = -1
     is_caught_up: bool = False
@@ -337,17 +336,23 @@ class Watcher:
             judged.judge.learn(_recent(log, newest_ns))
 
     def _follow(self, log: Any, judged: _Judged) -> None:
-        request = WritesRequest(judged.after, Limits().alarm_days * 86_400, _REACH_COUNT, _LOT)
-        past = writes(log, request)
-        if judged.alarm_fold is None or judged.alarm_fold.spans != past.spans:
-            if judged.alarm_fold is not None:
-                judged.alarm_fold, judged.after, judged.is_caught_up = None, 0, False
-                past = writes(log, replace(request, after=0))
-            judged.alarm_fold = AlarmFold(self._criteria, past.spans)
+        past = writes(log, judged.reach.request(judged.after, _LOT))
+        if judged.alarm_fold is not None and judged.alarm_fold.spans != past.spans:
+            judged.alarm_fold, judged.is_caught_up = None, False
+            judged.reach = Reach(Limits().alarm_days)
+            past = writes(log, judged.reach.request(0, _LOT))
+        if judged.alarm_fold is None:
+            judged.alarm_fold, judged.first = AlarmFold(self._criteria, past.spans), past.first
         judged.alarm_fold.take(past.writes)
+        judged.after = past.last
         if judged.is_caught_up:
             judged.judge.note_writes(past.of_newest_run)
-        judged.after, judged.is_caught_up = past.last, past.is_all
+        elif past.is_all and judged.snapshot is not None:
+            tags, fold = judged.snapshot.tags, judged.alarm_fold
+            if judged.reach.grow(fold, judged.first, past.last, tags):
+                judged.alarm_fold, judged.after = None, 0
+                return
+        judged.is_caught_up = past.is_all
 
 
 def _recent(log: Any, at_ns: int) -> list[PastWrite]:

@@ -18,13 +18,17 @@ from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.scans import LONGEST_NS, SHORTEST_NS, Stretches
 from lupin_bridge.judge.tag_log import Gap, TagStates, is_long
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
-from lupin_twin.core.past import FOREVER_NS, HOUR_NS, PastWrite, RunSpan
-from lupin_twin.core.state import Reading
+from lupin_twin.core.past import FOREVER_NS, HOUR_NS, PastWrite, RunSpan, WritesRequest
+from lupin_twin.core.state import Reading, TagState
 
 # Writes kept for all tags together, roughly; each tag has an equal share. They take 9 MB.
 KEPT: Final = 20_000
 # Interval of dropping what is over and no longer reported.
 FORGET_EVERY_NS: Final = HOUR_NS
+# Writes of the past that are read in all: the last day of a large greenhouse, weeks of a small one.
+REACH_COUNT: Final = 300_000
+# How much further back the log is read, again and again, for an alarm that may be older.
+_FURTHER: Final = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +111,15 @@ class AlarmFold:
             self._take(run, write)
         for run in self._runs.values():
             self._settle(run)
+
+    def may_begin_earlier(self, tag_ids: Iterable[str]) -> bool:
+        """Whether an alarm of now, at one of these tags, may be older than what was taken.
+
+        Then it began with the first observation of its tag, or nothing of its tag was taken.
+        """
+        run = self._runs.get(self.spans[-1].run) if self.spans else None
+        tags = {} if run is None else run.tags
+        return any(name not in tags or tags[name].episodes.may_begin_earlier for name in tag_ids)
 
     def found(self, now_ns: int, since_ns: int = 0) -> Found:
         """The alarms at `now_ns`.
@@ -276,6 +289,34 @@ class AlarmFold:
             ]
             limit_ns = run.limits[at_ns] = int(median(holds)) if holds else LONGEST_NS
         return limit_ns
+
+
+class Reach:
+    """How far back a log is read at a start: `days`, and further while an alarm may be older.
+
+    So an alarm has the same id after a restart, and keeps the notes on it.
+    """
+
+    def __init__(self, days: float) -> None:
+        self._reach_s = days * 86_400.0
+        self._first = FOREVER_NS
+
+    def request(self, after: int, max_count: int) -> WritesRequest:
+        """The request for the next writes, after a number."""
+        return WritesRequest(after, self._reach_s, REACH_COUNT, max_count)
+
+    def grow(self, fold: AlarmFold, first: int, last: int, tags: Iterable[TagState]) -> bool:
+        """Whether the log has to be read again, from further back; it is read from `first` on.
+
+        `last` is the last number read, `tags` is the state of now.
+        """
+        is_more = first < self._first and first > 1 and last - first < REACH_COUNT - 1
+        self._first = first
+        observed = [tag.tag_id for tag in tags if tag.last_observed_ns is not None]
+        if not (is_more and fold.may_begin_earlier(observed)):
+            return False
+        self._reach_s = min(1e9, self._reach_s * _FURTHER)
+        return True
 
 
 def _matters(run: _Run) -> Callable[[int, int, int], bool]:

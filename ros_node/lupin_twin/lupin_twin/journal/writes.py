@@ -188,7 +188,7 @@ def _of_inspections(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
 
 LOT: Final = 1_000
 # Approximate number of readings that are read at once, and what that costs, s.
-_STRETCH: Final = 40_000
+STRETCH: Final = 40_000
 STRETCH_S: Final = 0.1
 _FIRST_STRETCH_NS: Final = 60 * 1_000_000_000
 _NOWHERE: Final = (math.nan, math.nan)
@@ -270,17 +270,17 @@ class Export:
         while True:
             until_ns = min(start_ns + self._length_ns, span.end_ns)
             # The scans of one stamp cannot be divided.
-            limit = "" if self._length_ns == 1 else f" LIMIT {_STRETCH}"
+            limit = "" if self._length_ns == 1 else f" LIMIT {STRETCH}"
             scans = self._ask(log, _EXPORTED + limit, start_ns, until_ns)
             read = sum(1 + scan[-1].count(",") for scan in scans)
-            if self._length_ns == 1 or read < _STRETCH:
+            if self._length_ns == 1 or read < STRETCH:
                 break
             self._length_ns = max(1, self._length_ns // 8)
         self._at_ns = until_ns
         if not scans:
             ((next_ns,),) = self._ask(log, _NEXT, until_ns, span.end_ns)
             self._at_ns = span.end_ns if next_ns is None else next_ns
-        more = _STRETCH / 4 / max(read, _STRETCH // 32)
+        more = STRETCH / 4 / max(read, STRETCH // 32)
         self._length_ns = max(1, int(self._length_ns * more))
         self._has_begun |= bool(scans)
         return self._read(sorted(scans))

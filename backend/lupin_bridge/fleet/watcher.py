@@ -10,7 +10,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar
 
 from lupin_bridge.alarms.board import notes_of_alarms
@@ -24,7 +24,7 @@ from lupin_bridge.archive.database import (
 from lupin_bridge.feed.query import Child, Now, Search
 from lupin_bridge.feed.query import main as serve
 from lupin_bridge.fleet.overview import LIVE_S, Site, causes, dots, now_json, worst_first
-from lupin_bridge.judge.alarm_fold import AlarmFold, Reach
+from lupin_bridge.judge.alarm_fold import AlarmLog
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge, judge_once
 from lupin_bridge.judge.scans import recent_writes
@@ -113,17 +113,13 @@ class _Judged:
     """
 
     judge: Judge
+    alarms: AlarmLog
     was_live: bool = False
     notes: tuple[Note, ...] = ()
     note_count: int = 0
     snapshot: Snapshot | None = None
     is_simulated: bool = False
-    alarm_fold: AlarmFold | None = None
-    reach: Reach = field(default_factory=lambda: Reach(Limits().alarm_days))
-    first: int = 0
-    after: int = 0
     seq: int = -1
-    is_caught_up: bool = False
     is_failing: bool = False
     judged_s: float = 0.0
     hour_ago: _HourAgo | None = None
@@ -186,7 +182,7 @@ class Watcher:
         judged, self._judged = self._judged, {}
         for site, *facts in execute(_FACTS, (LIVE_S, ORIGIN)).fetchall():
             name, heartbeat_ns, is_live, seqs, origin, note_count = facts
-            self._judged[site] = judged.get(site) or _Judged(Judge(self._criteria))
+            self._judged[site] = judged.get(site) or self._unjudged()
             self.sites[site] = replace(
                 before.get(site, Site(site)),
                 name=name,
@@ -213,12 +209,15 @@ class Watcher:
                 self._judge_safely(name, now_ns)
                 yield name
 
+    def _unjudged(self) -> _Judged:
+        return _Judged(Judge(self._criteria), AlarmLog(self._criteria, Limits().alarm_days))
+
     def _is_due(self, name: str) -> bool:
         """Whether a site has to be judged."""
         site, judged = self.sites[name], self._judged[name]
         is_behind = (
             judged.seq != site.last_seq
-            or not judged.is_caught_up
+            or not judged.alarms.is_caught_up
             or judged.was_live != site.is_live
             or judged.note_count != site.notes
         )
@@ -239,9 +238,8 @@ class Watcher:
                 why = "site %s cannot be judged: its status is unknown: %s"
                 log.warning(why, name, error, exc_info=not is_known)
             # Tried again from its first row on, when others are judged for their age.
-            self._judged[name] = _Judged(
-                Judge(self._criteria), is_failing=True, judged_s=time.monotonic()
-            )
+            anew = replace(self._unjudged(), is_failing=True, judged_s=time.monotonic())
+            self._judged[name] = anew
             self.sites[name] = replace(
                 self.sites[name], verdict=None, active_alarms=None, causes=(), alarms=(), dots=""
             )
@@ -255,7 +253,7 @@ class Watcher:
             if judged.seq != site.last_seq:
                 self._read(log, judged)
                 judged.seq = site.last_seq
-            if not judged.is_caught_up or judged.after < site.last_seq:
+            if not judged.alarms.is_caught_up or judged.alarms.last < site.last_seq:
                 self._follow(log, judged)
             if judged.note_count != site.notes:
                 judged.notes = notes(log, NotesRequest()).notes or ()
@@ -268,7 +266,7 @@ class Watcher:
         moment_ns = now_ns if site.is_live else min(now_ns, max(site.heartbeat_ns, newest_ns))
         alarms = _alarms(site, judged, moment_ns)
         judgement = judged.judge.see(replace(judged.snapshot, stamp_ns=moment_ns))
-        if judged.is_caught_up:
+        if judged.alarms.is_caught_up:
             said = notes_of_alarms(alarms, judged.notes, now_ns)
             tags = {tag.tag_id: tag for tag in judged.snapshot.tags} if site.is_live else {}
             active: list[tuple[Alarm, dict[str, Any]]] = [
@@ -336,23 +334,12 @@ class Watcher:
             judged.judge.learn(_recent(log, newest_ns))
 
     def _follow(self, log: Any, judged: _Judged) -> None:
-        past = writes(log, judged.reach.request(judged.after, _LOT))
-        if judged.alarm_fold is not None and judged.alarm_fold.spans != past.spans:
-            judged.alarm_fold, judged.is_caught_up = None, False
-            judged.reach = Reach(Limits().alarm_days)
-            past = writes(log, judged.reach.request(0, _LOT))
-        if judged.alarm_fold is None:
-            judged.alarm_fold, judged.first = AlarmFold(self._criteria, past.spans), past.first
-        judged.alarm_fold.take(past.writes)
-        judged.after = past.last
-        if judged.is_caught_up:
+        assert judged.snapshot is not None  # it was read before
+        was_caught_up = judged.alarms.is_caught_up
+        past = writes(log, judged.alarms.request(_LOT))
+        judged.alarms.take(past, judged.snapshot.tags)
+        if was_caught_up and judged.alarms.is_caught_up:
             judged.judge.note_writes(past.of_newest_run)
-        elif past.is_all and judged.snapshot is not None:
-            tags, fold = judged.snapshot.tags, judged.alarm_fold
-            if judged.reach.grow(fold, judged.first, past.last, tags):
-                judged.alarm_fold, judged.after = None, 0
-                return
-        judged.is_caught_up = past.is_all
 
 
 def _recent(log: Any, at_ns: int) -> list[PastWrite]:
@@ -369,8 +356,8 @@ def _alarms(site: Site, judged: _Judged, moment_ns: int) -> list[Alarm]:
     """
     reach_ns = int(Limits().alarm_days * 86_400e9)
     found: list[Alarm] = []
-    if judged.alarm_fold is not None:
-        of_log = judged.alarm_fold.found(moment_ns, max(0, moment_ns - reach_ns))
+    if judged.alarms.fold is not None:
+        of_log = judged.alarms.fold.found(moment_ns, max(0, moment_ns - reach_ns))
         judged.judge.note_days(of_log.days)
         found += of_log.alarms
     if site.heartbeat_ns and not site.is_live:

@@ -28,7 +28,7 @@ from typing import Final
 from lupin_bridge.judge.day import LIGHT, TagDays
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.quantities import DAILY, DERIVED, IsDay
-from lupin_bridge.judge.scans import INTERVALS, holds_ns, interval_ns
+from lupin_bridge.judge.scans import INTERVALS, holds_ns
 from lupin_bridge.judge.verdict import (
     DEADBAND,
     Kind,
@@ -41,7 +41,7 @@ from lupin_bridge.judge.verdict import (
     worst,
 )
 from lupin_twin.core.history import KIND_FLOWER
-from lupin_twin.core.past import FOREVER_NS, PastWrite
+from lupin_twin.core.past import FOREVER_NS, PastWrite, interval_ns
 from lupin_twin.core.state import STATUS_OK, Reading
 
 # The `tag_id` of an alarm of the whole greenhouse.

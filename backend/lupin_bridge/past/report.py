@@ -13,7 +13,6 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
-from statistics import median
 from typing import Any, Final
 
 import orjson
@@ -23,7 +22,6 @@ from lupin_bridge.feed.query import Find
 from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.episodes import SITE, readings_of
 from lupin_bridge.judge.judging import Criteria
-from lupin_bridge.judge.scans import SHORTEST_NS, TIMES_MEDIAN
 from lupin_bridge.judge.verdict import Verdict, derive
 from lupin_bridge.past import bodies
 from lupin_bridge.past.plans import Plan, of_content
@@ -35,6 +33,7 @@ from lupin_twin.core.notes import WITHDRAW, Note, NotesRequest, PastNotes, withd
 from lupin_twin.core.past import (
     EVERY_TAG,
     HOUR_NS,
+    RECENT_COUNT,
     Event,
     PastRefused,
     PastWrite,
@@ -43,6 +42,7 @@ from lupin_twin.core.past import (
     RunSpan,
     SeriesPast,
     SeriesRequest,
+    silence_ns,
 )
 from lupin_twin.core.state import STATUS_OK, Snapshot, TagState
 
@@ -185,7 +185,8 @@ class _Fold:
             self._attempted_ns.append(write.stamp_ns)
             if write.kind != KIND_FLOWER:
                 mine = self._attempted_at_ns.setdefault(write.tag_id, array("q"))
-                mine.append(write.stamp_ns)
+                if not mine or mine[-1] != write.stamp_ns:
+                    mine.append(write.stamp_ns)
             if write.stamp_ns >= self._of.start_ns:
                 self._count(write)
         if self._alarm_fold is None:
@@ -300,11 +301,12 @@ class _Fold:
     def _silences(self) -> list[tuple[str, Stretch]]:
         """The silences of the greenhouse, then those of single tags, each longest first."""
         start_ns, end_ns = self._of.start_ns, self._of.known_ns
-        whole = list(silences(self._attempted_ns, end_ns))
+        last_ns = {tag: list(at_ns[-RECENT_COUNT:]) for tag, at_ns in self._attempted_at_ns.items()}
+        whole = list(silences(self._attempted_ns, end_ns, silence_ns(last_ns.values())))
         found = [
             (tag_id, silence)
             for tag_id, attempted_ns in self._attempted_at_ns.items()
-            for silence in silences(attempted_ns, end_ns, whole)
+            for silence in silences(attempted_ns, end_ns, silence_ns([last_ns[tag_id]]), whole)
         ]
         cut = [
             (tag_id, (max(from_ns, start_ns), to_ns))
@@ -315,17 +317,15 @@ class _Fold:
 
 
 def silences(
-    attempted_ns: Sequence[int], end_ns: int, but: Sequence[Stretch] = ()
+    attempted_ns: Sequence[int], end_ns: int, longest_ns: int, but: Sequence[Stretch] = ()
 ) -> Iterator[Stretch]:
-    """Yield stretches without an attempt, over three times the usual interval and ten minutes.
+    """Yield stretches without an attempt that are longer than `longest_ns`.
 
     Time within `but`, ascending stretches, does not count. Before the first attempt there is no
     silence.
     """
     if not attempted_ns:
         return
-    intervals = [later - at_ns for at_ns, later in pairwise(attempted_ns)]
-    longest_ns = max(SHORTEST_NS, TIMES_MEDIAN * (median(intervals) if intervals else 0))
     starts_ns = [from_ns for from_ns, _ in but]
     up_to = [0, *accumulate(to_ns - from_ns for from_ns, to_ns in but)]
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from datetime import UTC
 from itertools import pairwise
-from statistics import fmean, median
+from statistics import fmean
 from typing import Any
 
 import orjson
@@ -27,7 +27,7 @@ from lupin_twin.journal.schema import SiteLog
 from lupin_twin.journal.writes import put_note
 from tests.support.alarms_reference import Plain, alarms
 from tests.support.journal import past_write, scan
-from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, steps
+from tests.support.log_life import BEGUN, LATEST, MINUTE, Life, longest, steps
 from tests.support.past import answered_by
 from tests.twin.journal.conftest import Engines, Living
 
@@ -190,21 +190,26 @@ def check_sensors(found: list[dict[str, Any]], scans: list[PastWrite]) -> None:
 def check_silences(
     found: list[dict[str, Any]], reported: list[PastWrite], start_ns: int, end_ns: int
 ) -> None:
-    def gaps(stamps: list[int], pauses: list[tuple[int, int]]) -> list[tuple[int, int]]:
-        usual = median(b - a for a, b in pairwise(stamps)) if len(stamps) > 1 else 0
-        longest = max(600 * 10**9, 3 * usual)
+    scans = {
+        tag_id: sorted({it.stamp_ns for it in reported if (it.tag_id, it.kind) == (tag_id, 0)})
+        for tag_id in {it.tag_id for it in reported}
+    }
+
+    def gaps(
+        stamps: list[int], tags: list[list[int]], pauses: list[tuple[int, int]]
+    ) -> list[tuple[int, int]]:
+        limit = longest(tags)
         return [
             (a, b)
             for a, b in pairwise([*stamps, end_ns])
-            if b - a - sum(max(0, min(b, d) - max(a, c)) for c, d in pauses) > longest
+            if b - a - sum(max(0, min(b, d) - max(a, c)) for c, d in pauses) > limit
         ]
 
-    whole = gaps([it.stamp_ns for it in reported], [])
+    whole = gaps([it.stamp_ns for it in reported], [*scans.values()], [])
     right = {("", max(a, start_ns), b) for a, b in whole if b > start_ns}
-    for tag_id in {it.tag_id for it in reported}:
-        mine = [it.stamp_ns for it in reported if it.tag_id == tag_id and it.kind == 0]
+    for tag_id, mine in scans.items():
         right |= {
-            (tag_id, max(a, start_ns), b) for a, b in (gaps(mine, whole) if mine else [])
+            (tag_id, max(a, start_ns), b) for a, b in (gaps(mine, [mine], whole) if mine else [])
             if b > start_ns
         }  # fmt: skip
     if not reported:

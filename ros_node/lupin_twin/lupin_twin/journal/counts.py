@@ -18,15 +18,13 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from lupin_twin.core.history import KIND_TAG_READING
-from lupin_twin.core.past import HOUR_NS, Event, Grid, SeriesPast, grid
+from lupin_twin.core.past import HOUR_NS, SILENCE_NS, Event, Grid, SeriesPast, grid
 from lupin_twin.core.state import STATUS_OK
 from lupin_twin.journal import sql
 from lupin_twin.journal.rows import numbers_of
 from lupin_twin.journal.runs import Span
 from lupin_twin.journal.schema import DamagedFile, SiteLog, insert_into
 
-# A shorter time without an attempt is no silence, whatever interval is usual.
-SILENCE_NS: Final = 600 * 1_000_000_000
 # Followed by the number of a run: the last stamp of its deleted rows.
 DELETED: Final = "purged_ns:"
 # Followed by the number of a run: up to when the site's counts include rows forgotten since.

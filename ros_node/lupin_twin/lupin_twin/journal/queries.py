@@ -8,25 +8,26 @@ deleted; rare events are stored one by one.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
-from statistics import median
 from typing import Any, Final
 
 from lupin_twin.core.past import (
     EVERY_TAG,
     FOREVER_NS,
-    HOUR_NS,
     MAX_POINTS,
+    RECENT_COUNT,
+    SILENCE_NS,
     Event,
     SeriesPast,
     SeriesRequest,
     grid,
+    silence_ns,
 )
 from lupin_twin.journal import sql
 from lupin_twin.journal.counts import (
-    SILENCE_NS,
     TALLIED,
     Buckets,
     Entry,
@@ -34,7 +35,6 @@ from lupin_twin.journal.counts import (
     Table,
     answer,
     bounds,
-    deleted_ns,
     extent,
     individually,
     is_counted,
@@ -116,9 +116,6 @@ def _at(sensors: str, place: int, texts: list[str]) -> list[float]:
 
 # --- what happened -------------------------------------------------------------------------------
 
-# A silence is longer than this many median intervals between the attempts of the period.
-INTERVALS: Final = 3
-
 # The first and the last attempt of a period without a silence.
 Extent = tuple[int, int]
 
@@ -185,8 +182,7 @@ def _silences(
     Before the first known attempt, there is no silence.
     """
     start_ns, end_ns = period
-    within = cut(axis, start_ns, end_ns)
-    longest_ns = max(SILENCE_NS, int(INTERVALS * _usual_ns(source, within, end_ns - start_ns)))
+    longest_ns = silence_ns(source.scans(axis, end_ns))
     earlier = [span for span in axis if span.end_ns <= start_ns]
     held = [span for span in axis if span.end_ns > start_ns and span.start_ns < end_ns]
     later = [span for span in axis if span.start_ns >= end_ns]
@@ -204,16 +200,6 @@ def _silences(
             begun_ns, ended_ns = max(silent_ns, start_ns), min(until_ns, end_ns)
             if begun_ns < ended_ns:
                 yield begun_ns, (ended_ns - begun_ns) / 1e9
-
-
-def _usual_ns(source: _Source, within: Sequence[Span], period_ns: int) -> float:
-    """The median interval between attempts, ns; 0 if it is too short to matter."""
-    # With more attempts, half of the intervals cannot be long enough to matter within the period.
-    most = 1 + 2 * INTERVALS * period_ns / SILENCE_NS
-    if sum(source.attempts(span) for span in within) > most:
-        return 0.0
-    stamps = sorted(stamp_ns for span in within for stamp_ns in source.stamps(span))
-    return median(b - a for a, b in pairwise(stamps)) if len(stamps) > 1 else 0.0
 
 
 def _outermost(source: _Source, axis: Iterable[Span], which: int) -> int | None:
@@ -248,28 +234,13 @@ class _Source:
             for span in cut(axis, start_ns, end_ns)
         ]
 
-    def attempts(self, span: Span) -> int:
-        """Number of attempts, at least."""
-        if self.tag is not None:
-            return 0
-        first, last = -(-span.start_ns // HOUR_NS), span.end_ns // HOUR_NS
-        return int(self.ask(sql.total(sql.TALLIES), span, first=first, last=last)[0][0])
-
-    def stamps(self, span: Span) -> Iterator[int]:
-        """The stamp of each attempt; deleted attempts of the site are spread over their hour."""
-        kept_ns = 0
-        if self.tag is None:
-            kept_ns = (deleted_ns(self._log, span.run.id) // HOUR_NS + 1) * HOUR_NS
-        for part in cut([span], kept_ns, FOREVER_NS):
-            for (stamp_ns,) in self.ask(sql.STAMPS, part):
-                yield stamp_ns
-        for part in cut([span], 0, kept_ns):
-            select = f"SELECT n, first_ns, last_ns {sql.TALLIES}"
-            for n, first_ns, last_ns in self.ask(select, part):
-                for number in range(n):
-                    stamp_ns = first_ns + (last_ns - first_ns) * number // max(1, n - 1)
-                    if part.start_ns <= stamp_ns < part.end_ns:
-                        yield stamp_ns
+    def scans(self, axis: Sequence[Span], end_ns: int) -> list[list[int]]:
+        """Each tag's last attempts to scan it before a moment, oldest first."""
+        found = defaultdict[str, list[int]](list)
+        for span in cut(axis, 0, end_ns)[-1:]:
+            for tag, stamp_ns in self.ask(sql.RECENT_STAMPS, span, more=RECENT_COUNT - 1):
+                found[tag].append(stamp_ns)
+        return [sorted(stamps)[-RECENT_COUNT:] for stamps in found.values()]
 
     def stretches(self, span: Span, longest_ns: int, period: Extent) -> Iterable[Extent]:
         """The attempts of a period and the next ones on both sides, as extents in order.
@@ -277,7 +248,7 @@ class _Source:
         Attempts that follow each other within `longest_ns` may be in one extent.
         """
         if self.tag is not None:
-            found = [stamp_ns for part in cut([span], *period) for stamp_ns in self.stamps(part)]
+            found = [row[0] for part in cut([span], *period) for row in self.ask(sql.STAMPS, part)]
             for part in cut([span], 0, period[0]):
                 found += (self.ends(part) or ())[1:]
             for part in cut([span], period[1], FOREVER_NS):

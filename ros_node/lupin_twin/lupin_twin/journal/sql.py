@@ -131,6 +131,10 @@ RECENT_SCANS: Final = f"{_SCAN} " + _recent("scan", _OF_SERIES, "s.kind = 0 AND 
 RECENT_INSPECTIONS: Final = f"{_INSPECTION} " + _recent(
     "look", "r.run = s.run AND r.tag = s.tag", "s.kind = 1"
 )
+# Of each tag, the last attempts to scan it.
+RECENT_STAMPS: Final = "SELECT DISTINCT s.tag, r.stamp_ns " + _recent(
+    "scan", _OF_SERIES, "s.kind = 0{tag}"
+)
 # Of the series with the same :sensors.
 RECENT_READINGS: Final = "SELECT s.tag, r.stamp_ns, r.seq, r.readings " + _recent(
     "scan", _OF_SERIES, "s.kind = 0 AND s.sensors = :sensors"

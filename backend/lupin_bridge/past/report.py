@@ -10,7 +10,7 @@ import heapq
 from array import array
 from bisect import bisect_left
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
 from typing import Any, Final
@@ -44,7 +44,7 @@ from lupin_twin.core.past import (
     SeriesRequest,
     silence_ns,
 )
-from lupin_twin.core.state import STATUS_OK, Snapshot, TagState
+from lupin_twin.core.state import STATUS_OK, Reading, Snapshot, TagState
 
 # A day at one scan a second has 86,400. Each takes some 25 us, and three times that where alarms
 # are derived; an answer has ten seconds.
@@ -96,10 +96,17 @@ class Report:
         notes: PastNotes = find(NotesRequest())
         snapshot: Snapshot = find(self.end_ns - 1)
         known = [tag.tag_id for tag in snapshot.tags]
-        return self.plan(fold.body(notes.notes or (), known), snapshot.tags)
+        body, days = fold.body(notes.notes or (), known), fold.days()
+        return self.plan(
+            body,
+            [
+                replace(tag, readings=(*tag.readings, *days.get(tag.tag_id, ())))
+                for tag in snapshot.tags
+            ],
+        )
 
     def plan(self, body: dict[str, Any], tags: Sequence[TagState]) -> Plan:  # noqa: ARG002
-        """The plan of the answer; `tags` as they were at the end."""
+        """The plan of the answer; `tags` as they were at the end, with their daily quantities."""
         return of_content(content_answer(orjson.dumps(body), headers=self._headers()))
 
     def _headers(self) -> dict[str, str]:
@@ -279,6 +286,10 @@ class _Fold:
             },
             **bodies.period_fields(self._of.journal, start_ns, end_ns),
         }
+
+    def days(self) -> Mapping[str, Sequence[Reading]]:
+        """By tag, the daily quantities of its last day."""
+        return self._alarm_fold.found(self._of.known_ns - 1).days if self._alarm_fold else {}
 
     def _of_sensor(self, name: str) -> dict[str, Any]:
         of = self._sensors[name]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from datetime import UTC
 from itertools import pairwise
@@ -18,6 +19,7 @@ from lupin_bridge.judge.day import ClockDay
 from lupin_bridge.judge.judging import Criteria, own_sensors
 from lupin_bridge.judge.verdict import derive
 from lupin_bridge.past.report import Report
+from lupin_bridge.past.report_page import ReportPage
 from lupin_twin.core.diagnostics import Condition, JournalState
 from lupin_twin.core.notes import SHELVE, Note
 from lupin_twin.core.past import PastWrite, RunSpan
@@ -76,6 +78,15 @@ def test_no_scans_is_reported_only_as_far_as_the_log_is_complete(living: Living)
             found = report(life.connection, BEGUN, END, journal)
             assert [ns(it["to"]) for it in found["silences"]] == silences
             assert [it["reason"]["kind"] for it in found["alarms"]] == stops
+
+
+def test_on_paper_an_alarm_of_a_daily_quantity_has_its_last_value(living: Living) -> None:
+    scans = [scan(at_ns=BEGUN + 60 * hour * MINUTE, temperature=40.0) for hour in range(72)]
+    period = scans[50].stamp_ns, scans[71].stamp_ns
+    with living([("rows", scans)]) as life:
+        answer = answered_by(life.connection, ReportPage(*period, CRITERIA, JOURNAL))
+    (row,) = re.findall("<tr[^>]*><td>24-h mean.*?</tr>", answer.decode())
+    assert re.findall("<td[^>]*>(.*?)</td>", row)[3] == "40.0\u00a0°C (06:00)"
 
 
 def test_hundreds_of_alarms_of_one_tag_are_all_counted(living: Living) -> None:

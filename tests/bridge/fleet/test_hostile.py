@@ -282,6 +282,8 @@ def test_an_unreadable_or_slow_site_costs_no_other_site_its_status(
             found = running.site(name, last_verdict=None, active_alarms=None)
             assert found["verdict"] == "unknown"
             running.process.wait_for_output(f"site {name} cannot be judged: its status is unknown")
+        for sites, total in (("gh2", 0), ("gh1,gh2", None)):
+            assert running.http.get(f"/api/alarms?sites={sites}").json()["total"] == total
         assert running.http.get("/readyz").status_code == 200
         assert running.metric("lupin_fleet_watcher_starts") == 1
         assert "Traceback" not in running.process.output

@@ -249,7 +249,7 @@ async def test_an_alarm_raised_while_the_log_is_read_at_the_start_is_new(
     async def notify(_: Push, alarms: Mapping[str, Alarm]) -> None:
         notified.extend(it.tag_id for it in alarms.values())
 
-    monkeypatch.setattr(Push, "_notify", notify)
+    monkeypatch.setattr(Push, "notify", notify)
     monkeypatch.setattr(push_module, "TOGETHER_S", 0.0)
     source = source_of(AlarmBoard())
     source.ros_time_ns = None

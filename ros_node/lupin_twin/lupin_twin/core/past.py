@@ -360,6 +360,11 @@ class PastWrites:
     is_all: bool
 
     @property
+    def first(self) -> int:
+        """The number of the first; without any, the next number."""
+        return self.writes[0].number if self.writes else self.last + 1
+
+    @property
     def of_newest_run(self) -> list[PastWrite]:
         """Those of the run of the clock that goes on."""
         return [write for write in self.writes if write.run == self.spans[-1].run]

@@ -387,7 +387,7 @@ def test_an_error_that_may_pass_is_reported_and_the_page_is_served(archive: Arch
 
 
 def test_a_slow_and_failing_archive_is_reported_once() -> None:
-    soon = constants(**{"lupin_bridge.fleet.source:_START_S": 0.5})
+    soon = constants(**{"lupin_bridge.fleet.source:START_S": 0.5})
     with socket.create_server(("127.0.0.1", 0)) as database:
         url = f"postgresql://a@127.0.0.1:{database.getsockname()[1]}/b"
         with lupin_twin(0, "fleet", "--archive-url", url, *soon) as process:

@@ -192,10 +192,10 @@ async def test_a_message_waits_while_an_error_lasts_or_the_accounts_cannot_be_re
         on.subscribe(on.phone("one"))
         accounts.rename(aside)
         on.board.show([alarm("7"), alarm("8")])
-        await until(lambda: "was not accepted: the file of accounts" in caplog.text, "why")
+        await until(lambda: "was not accepted: there is no file of accounts" in caplog.text, "why")
         aside.rename(accounts)
         await until(lambda: on.service.posted, "the first attempt")
-        await until(lambda: "will be retried: the file of accounts" in caplog.text, "why")
+        await until(lambda: "will be retried: there is no file of accounts" in caplog.text, "why")
         aside.rename(accounts)
         await until(lambda: len(on.service.posted) == 2, "the next attempt")
 

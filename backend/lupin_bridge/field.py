@@ -208,7 +208,7 @@ def rgb(hue: float, saturation: float, lightness: float) -> tuple[int, int, int]
 # Palette index 0 is "not known"; the ramp has the other 255.
 _RAMP_STEPS: Final = 255
 # Numbers per call of orjson, about a millisecond: no other thread of this process runs meanwhile.
-_AT_ONCE: Final = 16_384
+AT_ONCE: Final = 16_384
 
 
 def extent(grid: FieldGrid | EstimateGrid, sensor: Sensor) -> dict[str, str]:
@@ -281,8 +281,8 @@ def _json(
 def numbers(cells: npt.NDArray[np.float32]) -> Iterator[bytes]:
     """Yield an array's numbers as JSON in parts, row-major, without the brackets; NaN is null."""
     flat = np.ascontiguousarray(cells).ravel()
-    for start in range(0, flat.size, _AT_ONCE):
-        part = flat[start : start + _AT_ONCE]
+    for start in range(0, flat.size, AT_ONCE):
+        part = flat[start : start + AT_ONCE]
         if start:
             yield b","
         yield orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY)[1:-1]

@@ -21,6 +21,7 @@ from lupin_twin.core.past import (
     DEFAULT_POINTS,
     MAX_POINTS,
     Event,
+    NotRemembered,
     PastRefused,
     check_moment,
     seconds,
@@ -313,13 +314,14 @@ def report(given: OfReport, now_ns: int | None) -> tuple[int, int]:
     """The period of a report, ns of ROS time; it ends now at the latest.
 
     Raises:
-        PastRefused: the period is empty or too long, or now is not known.
+        PastRefused: the period is empty or too long.
+        NotRemembered: what time it is now is not known.
 
     """
     to_ns = None if given.to is None else moment("to", given.to)
     if now_ns is None:
         to = "missing" if to_ns is None else f"{seconds(to_ns)} s"
-        raise PastRefused(f"to is {to}, and what time it is now is not known here")
+        raise NotRemembered(f"to is {to}, and what time it is now is not known here")
     end_ns = now_ns if to_ns is None else min(to_ns, now_ns)
     shift_ns = SHIFT_S * NANOSECONDS_PER_SECOND
     start_ns = max(0, end_ns - shift_ns) if given.from_ is None else moment("from", given.from_)

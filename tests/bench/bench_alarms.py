@@ -11,8 +11,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from random import Random
 
-from lupin_bridge.alarms.feed import LOT, REACH_COUNT
-from lupin_bridge.judge.alarm_fold import AlarmFold
+from lupin_bridge.alarms.feed import LOT
+from lupin_bridge.judge.alarm_fold import REACH_COUNT, AlarmFold
 from lupin_twin.core.past import PastWrite, RunSpan
 from tests.support.ordinary_day import DAY_NS, S, ordinary_days
 from tests.support.proc_stat import resident_mb

@@ -146,7 +146,7 @@ def test_the_root_says_how_to_build_the_page(tmp_path: Path, method: str) -> Non
 
 
 def test_the_font_is_that_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pages, "_ASSETS", tmp_path)
+    monkeypatch.setattr(pages, "ASSETS", tmp_path)
     assert query(tmp_path, "GET", "/font.woff2").status_code == 404
     (tmp_path / "inter-1.woff2").write_bytes(b"wOF2")
     answer = query(tmp_path, "GET", "/font.woff2")

@@ -29,7 +29,7 @@ from lupin_bridge.query_string import (
 )
 from lupin_bridge.routes.state import ListenQuery
 from lupin_twin.core.drops import MAX_TEXT_LENGTH
-from lupin_twin.core.past import DEFAULT_POINTS, PastRefused, seconds
+from lupin_twin.core.past import DEFAULT_POINTS, NotRemembered, PastRefused, seconds
 from lupin_twin.field.engine import FieldRequest
 
 
@@ -212,7 +212,7 @@ def test_the_default_period_is_all_that_is_stored_and_none_may_be_inverted() -> 
 def test_a_report_of_the_first_hours_begins_at_0_and_without_a_known_time_it_needs_an_end() -> None:
     assert query_string.report(query_string.OfReport(), NOW_NS) == (0, NOW_NS)
     for to, what in ((None, "missing"), ("100", r"100\.000000000 s")):
-        with pytest.raises(PastRefused, match=f"^to is {what}, and what time it is now is not kno"):
+        with pytest.raises(NotRemembered, match=f"^to is {what}, and what time it is now is not"):
             query_string.report(query_string.OfReport(to=to), None)
 
 

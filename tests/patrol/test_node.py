@@ -111,7 +111,7 @@ def test_it_waits_for_a_subscriber_before_it_begins(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Otherwise a fast patrol would push its first observations out of the latch during discovery.
-    monkeypatch.setattr(node, "_SUBSCRIBERS_S", PATIENCE_S)
+    monkeypatch.setattr(node, "SUBSCRIBERS_S", PATIENCE_S)
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
     has_begun = Event()
 

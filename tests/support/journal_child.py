@@ -17,7 +17,7 @@ from tests.support.journal import CLOCK, LIMITS, NOW, scan
 
 def main(path: Path, rows_a_second: int, log_bytes: int, first: int = 0) -> None:
     """Feed the journal; rows count from `first`."""
-    file._LOG_BYTES = log_bytes  # type: ignore[misc]
+    file.LOG_BYTES = log_bytes  # type: ignore[misc]
     path.parent.mkdir(parents=True, exist_ok=True)
     marks = os.open(path.with_name("marks"), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
     journal = Journal(path, "/child", LIMITS)

@@ -43,6 +43,12 @@ def _seen(row: Write) -> Flower | None:
     return row.flower if isinstance(row, Inspection) else None
 
 
+def longest(tags: Iterable[list[int]]) -> float:
+    """How long a time without an attempt may be, by the scans of each tag."""
+    usual = [median(b - a for a, b in pairwise(it[-9:])) for it in tags if len(it) > 1]
+    return max(SILENCE_NS, 3 * median(usual) if usual else 0)
+
+
 @dataclass
 class Life:
     """Writes rows into a log and records each new one, with its run."""
@@ -174,14 +180,20 @@ class Life:
         self, tag_id: str, start_ns: int, end_ns: int, now_ns: int
     ) -> list[tuple[int, float]]:
         attempts = self.attempts(tag_id)
-        within = [stamp_ns for stamp_ns in attempts if start_ns <= stamp_ns < end_ns]
-        usual_ns = median(b - a for a, b in pairwise(within)) if len(within) > 1 else 0
+        scans: dict[str, set[int]] = {}
+        last_run = None
+        for span in spans(runs(self.connection.execute)):
+            last_run = span.run.id if span.start_ns < end_ns else last_run
+        for number, row in self._of(tag_id):
+            if isinstance(row, Scan) and row.stamp_ns < end_ns and self.rows[number][0] == last_run:
+                scans.setdefault(row.tag_id, set()).add(row.stamp_ns)
+        longest_ns = longest(sorted(stamps) for stamps in scans.values())
         if attempts:
             attempts.append(max(now_ns, attempts[-1]))
         return [
             (max(a, start_ns), (min(b, end_ns) - max(a, start_ns)) / 1e9)
             for a, b in pairwise(attempts)
-            if b - a > max(SILENCE_NS, 3 * usual_ns) and max(a, start_ns) < min(b, end_ns)
+            if b - a > longest_ns and max(a, start_ns) < min(b, end_ns)
         ]
 
     def export(self, start_ns: int, end_ns: int, tag_id: str | None) -> list[PastRow]:

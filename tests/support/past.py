@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from statistics import fmean
 from typing import Any, TypeVar
 
-from lupin_bridge.feed.query import Now, PastQuery, _found
+from lupin_bridge.feed.query import Now, PastQuery, found_in
 from lupin_bridge.past.plans import Query, answered
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL
 from lupin_twin.core.notes import NotesRequest, PastNotes
@@ -132,6 +132,6 @@ class MadeUp:
 def answered_by(log: Any, query: Query) -> bytes:
     """The body of a query's answer over a log, as the past process makes it."""
     now = Now(2**62, "map", UNKNOWN_JOURNAL)
-    answer = answered(query, "", lambda need: _found(need, now, log), lambda: False).answer
+    answer = answered(query, "", lambda need: found_in(need, now, log), lambda: False).answer
     assert answer is not None
     return answer.body

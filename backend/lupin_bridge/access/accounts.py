@@ -23,7 +23,7 @@ from lupin_twin.journal.paths import state_folder
 # A shift: whoever takes over a control room's screen signs in under their own name.
 SESSION_S: Final = 12 * 3600
 _MAX_SESSIONS: Final = 20
-_MAX_AUDITED: Final = 100_000
+MAX_AUDITED: Final = 100_000
 # Devices that one name may have notified.
 MAX_DEVICES: Final = 10
 
@@ -379,5 +379,5 @@ def _lines(text: str) -> tuple[str, ...]:
 def _audit(connection: sqlite3.Connection, done: Audited) -> None:
     connection.execute("INSERT INTO audit VALUES (NULL, ?, ?, ?, ?, ?)", done)
     connection.execute(
-        "DELETE FROM audit WHERE number <= (SELECT max(number) FROM audit) - ?", (_MAX_AUDITED,)
+        "DELETE FROM audit WHERE number <= (SELECT max(number) FROM audit) - ?", (MAX_AUDITED,)
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Final, TypeVar
@@ -23,7 +23,7 @@ from lupin_bridge.alarms.board import (
 )
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.tasks import Guard, end
-from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, AlarmFold, Found
+from lupin_bridge.judge.alarm_fold import FORGET_EVERY_NS, AlarmLog, Found
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Judge
 from lupin_bridge.judge.scans import recent_writes, writes_of
@@ -36,7 +36,6 @@ from lupin_twin.core.past import (
     PastWrite,
     PastWrites,
     RunSpan,
-    WritesRequest,
 )
 from lupin_twin.core.state import Snapshot, TagState
 
@@ -64,8 +63,6 @@ log = logging.getLogger(__name__)
 # Writes per lot: some tens of milliseconds of a worker.
 LOT: Final = 500
 LOT_S: Final = 0.05
-# Writes of the past in all: the last day of a large greenhouse, weeks of a small one.
-REACH_COUNT: Final = 300_000
 # After this long, an observation is in the journal; it is read once more later, for a slow disk.
 JOURNAL_S: Final = 0.15
 AGAIN_S: Final = 1.5
@@ -106,13 +103,10 @@ class AlarmFeed:
         self.judge = judge
         self._board = board
         self._now_ns = now_ns
-        self._reach_ns = int(days * DAY_NS)
+        self._days = days
+        self._log = AlarmLog(judge.criteria, days)
         self._wake = asyncio.Event()
-        self._fold: AlarmFold | None = None
-        self._journal = ""
-        self._last = 0
         self._written = 0
-        self._since_ns: int | None = None
         self._due_ns = FOREVER_NS
         self._is_caught_up = False
         self._generation = 0
@@ -199,9 +193,9 @@ class AlarmFeed:
         """Forget all that was read, to read it again."""
         self._generation += 1
         self._alarm_source = says
-        self._fold, self._last, self._journal = None, 0, ""
+        self._log = AlarmLog(self.judge.criteria, self._days)
         self._received, self._seen = [], None
-        self._since_ns, self._is_caught_up = None, False
+        self._is_caught_up = False
 
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
@@ -228,64 +222,47 @@ class AlarmFeed:
 
     async def _take_received(self) -> None:
         lot, self._received = self._received, []
-        if self._fold is None:
-            self._fold = AlarmFold(self.judge.criteria, _ALL_TIME)
-        for first in range(0, len(lot), LOT):
-            await self._take(lot[first : first + LOT])
+        for first in range(0, max(1, len(lot)), LOT):
+            part, last = tuple(lot[first : first + LOT]), self._received_number - 1
+            await self._take(PastWrites("", _ALL_TIME, part, last, is_all=True))
         await self._publish()
 
     async def _follow(self) -> None:
-        had = self._last
-        while True:
-            generation = self._generation
-            request = WritesRequest(self._last, self._reach_ns / 1e9, REACH_COUNT, LOT)
-            past = await self._source.writes(request)
-            if generation != self._generation:
+        alarm_log = self._log
+        had, is_all = alarm_log.last, False
+        while not is_all:
+            past = await self._source.writes(alarm_log.request(LOT))
+            if alarm_log is not self._log:
                 return  # begun anew meanwhile, and woken
-            if self._is_another(past):
-                self._begin("journal")
-                continue
-            if self._fold is None:
-                self._fold = AlarmFold(self.judge.criteria, past.spans)
-            self._journal, self._last = past.journal, past.last
-            if self._is_caught_up:
-                self.judge.note_writes(past.of_newest_run)
-            await self._take(past.writes)
-            if generation != self._generation:
+            was_caught_up = alarm_log.is_caught_up
+            is_all = await self._take(past)
+            if alarm_log is not self._log:
                 return
-            if past.is_all:
-                break
+            if was_caught_up and alarm_log.is_caught_up:
+                self.judge.note_writes(past.of_newest_run)
+            self._is_caught_up &= was_caught_up
         await self._publish()
-        if self._last != had:
+        if alarm_log.last != had:
             self._ask_again(AGAIN_S)
 
-    def _is_another(self, past: PastWrites) -> bool:
-        """Whether it is another journal than the one read so far, or the clock began a new run."""
-        is_other_axis = self._fold is not None and self._fold.spans != past.spans
-        is_other = bool(self._journal) and past.journal != self._journal
-        return is_other or past.last < self._last or is_other_axis
-
-    async def _take(self, lot: Sequence[PastWrite]) -> None:
-        fold = self._fold
-        if fold is None or not lot:
-            return
-        oldest_ns = min(write.stamp_ns for write in lot)
-        if self._since_ns is None or oldest_ns < self._since_ns:
-            self._since_ns = oldest_ns
-        missed = self.missed - fold.missed
-        await self._on_worker(lambda _: fold.take(lot))
-        if fold.missed and not self.missed:
+    async def _take(self, past: PastWrites) -> bool:
+        """Take writes; returns whether nothing more is to be read."""
+        alarm_log, tags = self._log, () if self._seen is None else self._seen.tags
+        missed = alarm_log.missed
+        is_all = await self._on_worker(lambda _: alarm_log.take(past, tags))
+        if alarm_log.missed and not self.missed:
             log.warning(
                 "an observation arrived too late for its alarms; lupin_alarms_missed counts these"
             )
-        self.missed = missed + fold.missed
+        self.missed += alarm_log.missed - missed
+        return is_all
 
     async def _publish(self) -> None:
-        fold, now_ns = self._fold, self._now_ns()
+        alarm_log, fold, now_ns = self._log, self._log.fold, self._now_ns()
         if fold is None or now_ns is None:
             await self._publish_silence(0.0)
             return
-        moment_ns, since_ns = now_ns, max(0, now_ns - self._reach_ns)
+        moment_ns, since_ns = now_ns, max(0, now_ns - int(self._days * DAY_NS))
         beside = tuple(self._silences)
 
         def find(_: object) -> tuple[Board, Change, Found]:
@@ -297,7 +274,7 @@ class AlarmFeed:
         self._due_ns = found.due_ns
         self.judge.note_days(found.days)
         is_past, self._is_caught_up = not self._is_caught_up, True
-        begins_ns = moment_ns if self._since_ns is None else self._since_ns
+        begins_ns = moment_ns if alarm_log.since_ns is None else alarm_log.since_ns
         self._board.put(board, replace(change, is_past=is_past), self._alarm_source, begins_ns)
 
     async def _publish_silence(self, unanswered_s: float) -> None:

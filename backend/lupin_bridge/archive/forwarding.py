@@ -320,7 +320,7 @@ class Forwarder:
 # --- the process that `serve` starts, so that it never holds up the twin --------------------------
 
 _LOOK_S: Final = 0.2
-_RESTART_S: Final = 5.0
+RESTART_S: Final = 5.0
 
 
 def check(settings: Settings, role: str) -> None:
@@ -402,7 +402,7 @@ class Forwarding:
                     process.kill()
                     await process.wait()
             log.error("the forwarder %s; it is restarted", ended)
-            await asyncio.sleep(_RESTART_S)
+            await asyncio.sleep(RESTART_S)
 
     async def _write(self, line: bytes) -> None:
         await self._put(Note(**json.loads(line)))

@@ -18,6 +18,7 @@ from typing import Any, Final
 
 from lupin_bridge.archive.database import ArchiveError
 from lupin_twin.core.past import Event
+from lupin_twin.journal import sql
 from lupin_twin.journal.appending import PURGED_SEQ, Appender
 from lupin_twin.journal.follow import rows_behind
 from lupin_twin.journal.paths import files_of, forwarded_seq, note_forwarded
@@ -141,9 +142,7 @@ class Source:
 
     def note_ids(self) -> set[str]:
         """The ids of all its notes."""
-        return {
-            note_id for (note_id,) in self.log.execute("SELECT id FROM note WHERE site = :site")
-        }
+        return {note_id for (note_id,) in self.log.execute(sql.NOTE_IDS)}
 
     def batch(self, epoch: Epoch) -> Batch:
         """The next batch, as of one moment, and synced to the disk.

@@ -27,6 +27,7 @@ from lupin_bridge.bags.recording import MESSAGE_ENCODING
 from lupin_bridge.feed.relay import ENCODING, schema_text
 from lupin_twin.core.interfaces import CLOCK, DISCOVERED_TAGS, OBSERVATIONS, Topic
 from lupin_twin.core.state import Pin, Pose, Write
+from lupin_twin.journal import sql
 from lupin_twin.journal.rows import listed_rows
 from lupin_twin.journal.runs import Run, cut, runs, spans
 from lupin_twin.journal.schema import LOCAL_SITE, one_view
@@ -95,13 +96,7 @@ class JournalRows:
 
     def _observed(self) -> Iterator[tuple[int, Run, Write]]:
         """Yield scans and inspections as (number, run, row), in the order of their numbers."""
-        within = "site = :site AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
-        found = self._connection.execute(
-            f"SELECT seq FROM scan WHERE {within} UNION ALL"  # noqa: S608
-            f" SELECT seq FROM look WHERE {within} ORDER BY seq",
-            self._period,
-        )
-        seqs = [seq for (seq,) in found]
+        seqs = [seq for (seq,) in self._connection.execute(sql.NUMBERS, self._period)]
         for start in range(0, len(seqs), LOT):
             lot = seqs[start : start + LOT]
             rows = [
@@ -122,11 +117,9 @@ class JournalRows:
         return sorted(rows, key=itemgetter(0))
 
     def _pins(self, run: Run) -> Iterator[tuple[int, Pin, bool]]:
-        for seq, tag, stamp_ns, arrival_ns, is_copy, *pose in self._connection.execute(
-            "SELECT seq, tag, stamp_ns, arrival_ns, is_copy, x, y, z, qx, qy, qz, qw FROM place"
-            " WHERE site = :site AND run = :run ORDER BY seq",
-            self._period | {"run": run.id},
-        ):
+        of_run = self._period | {"run": run.id}
+        for row in self._connection.execute(sql.PLACES, of_run):
+            seq, tag, stamp_ns, arrival_ns, is_copy, *pose = row
             yield seq, Pin(tag, Pose(*pose), stamp_ns, arrival_ns), bool(is_copy)
 
     def _holds(self, run: Run, stamp_ns: int) -> bool:

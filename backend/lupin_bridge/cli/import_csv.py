@@ -263,7 +263,7 @@ def _text(what: str, text: str) -> str:
 
 def _number(name: str, text: str, column: Value) -> float:
     try:
-        value = float(text) * column.factor + column.offset
+        value = column.convert(float(text))
     except ValueError:
         if text in ("unknown", "unavailable"):  # a sensor of Home Assistant that is offline
             raise ValueError(f"{name} is {text}") from None
@@ -319,7 +319,9 @@ def run(options: argparse.Namespace, environ: Mapping[str, str]) -> int:
         return fail(f"{options.columns}: {error}")
     except (UnicodeDecodeError, csv.Error) as error:
         return fail(f"{options.file} is not CSV in UTF-8: {error}")
-    except (*SHOWN, *FILE_ERRORS, OSError) as error:
+    except OSError as error:
+        return fail(f"{error.filename or options.file}: {error.strerror or error}")
+    except (*SHOWN, *FILE_ERRORS) as error:
         return fail(str(error))
 
 

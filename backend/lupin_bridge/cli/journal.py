@@ -39,6 +39,7 @@ from lupin_twin.journal.checking import (
     row_counts,
     sensors_of,
     size_of,
+    tags_of,
 )
 from lupin_twin.journal.paths import InUse, demo_journal_path, holder_of, journal_path
 from lupin_twin.journal.rebuild import handle_interrupts, vacuum
@@ -321,9 +322,19 @@ def _export(path: Path, options: argparse.Namespace, environ: Mapping[str, str])
     with closing(_reader(path)) as connection:
         lots = rows(connection, start_ns, end_ns, options.tag, options.sensor)
         standard(bodies.CSV_HEADER)
+        is_empty = True
         for lot in lots:
             standard(bodies.csv_lines(lot, sensors))
+            is_empty = False
+        if is_empty:
+            tags, names = _some(tags_of(connection)), _some(sensors_of(connection))
+            say(f"nothing matches; the journal has the tags {tags} and the sensors {names}")
     return 0
+
+
+def _some(names: list[str]) -> str:
+    more = f" and {len(names) - _MAX_SHOWN:,} more" if len(names) > _MAX_SHOWN else ""
+    return (", ".join(names[:_MAX_SHOWN]) or "none") + more
 
 
 def _record(path: Path, options: argparse.Namespace, start_ns: int, end_ns: int) -> int:

@@ -146,7 +146,7 @@ class Child:
             def find(need: Any) -> Any:
                 if should_stop():  # as SQLite ends an interrupted statement
                     raise sqlite3.OperationalError("interrupted")
-                return _found(need, now, log)
+                return found_in(need, now, log)
 
             return query(find, should_stop)
 
@@ -175,7 +175,8 @@ _OF_LOG: Final[dict[Any, Callable[[sqlite3.Connection, Any], Any]]] = {
 }
 
 
-def _found(need: Any, now: Now, log: sqlite3.Connection) -> Any:
+def found_in(need: Any, now: Now, log: sqlite3.Connection) -> Any:
+    """What a query needs, looked up in a log."""
     match need:
         case SeriesRequest():
             return series(log, need, now.stamp_ns)

@@ -212,7 +212,8 @@ MAX_LISTED: Final = 200
 def alarms_json(sites: Iterable[Site], archive: Archive) -> dict[str, Any]:
     """`/api/alarms`: active ones, worst first, then newest; of silent sites, the last known.
 
-    Shelved ones are last. `total` does not count them; it includes those that are left out.
+    Shelved ones are last. `total` does not count them; it includes those that are left out. It is
+    None while the alarms of a site are not known.
     """
     every = list(sites)
     found = [
@@ -228,7 +229,8 @@ def alarms_json(sites: Iterable[Site], archive: Archive) -> dict[str, Any]:
     worst = heapq.nsmallest(
         MAX_LISTED, found, key=lambda alarm: (*worst_first(alarm), alarm["site"])
     )
-    return {"alarms": worst, "total": sum(site.active_alarms or 0 for site in every)}
+    counts = [site.active_alarms for site in every if site.active_alarms is not None]
+    return {"alarms": worst, "total": sum(counts) if len(counts) == len(every) else None}
 
 
 def worst_first(alarm: Mapping[str, Any]) -> tuple[Any, ...]:

@@ -38,8 +38,8 @@ log = logging.getLogger(__name__)
 # a dead link.
 STUCK_S: Final = 6.0
 # Longer before its first answer: it has to start and connect.
-_START_S: Final = 15.0
-_RETRY_S: Final = 1.0
+START_S: Final = 15.0
+RETRY_S: Final = 1.0
 
 
 class Watching:
@@ -77,7 +77,7 @@ class Watching:
         while True:
             await guard.run(self._see())
             if not self.archive.is_reachable:
-                await asyncio.sleep(_RETRY_S)
+                await asyncio.sleep(RETRY_S)
 
     async def _see(self) -> None:
         try:
@@ -93,7 +93,7 @@ class Watching:
         settings: Any = self._settings  # see `WatchChild`
         look: asyncio.Task[News] = asyncio.create_task(self.process.ask(settings, about, 0.0))
         try:
-            patience_s = STUCK_S if self.looks else _START_S
+            patience_s = STUCK_S if self.looks else START_S
             while not (await asyncio.wait((look,), timeout=patience_s))[0]:
                 # Not the look itself, because another one must not run beside it.
                 self.process.cancel()

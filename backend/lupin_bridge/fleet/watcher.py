@@ -24,7 +24,7 @@ from lupin_bridge.archive.database import (
 from lupin_bridge.feed.query import Child, Now, Search
 from lupin_bridge.feed.query import main as serve
 from lupin_bridge.fleet.overview import LIVE_S, Site, causes, dots, now_json, worst_first
-from lupin_bridge.judge.alarm_fold import AlarmFold
+from lupin_bridge.judge.alarm_fold import AlarmLog
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge, judge_once
 from lupin_bridge.judge.scans import recent_writes
@@ -40,7 +40,6 @@ from lupin_twin.core.past import (
     PastWrite,
     RecentRequest,
     ScansRequest,
-    WritesRequest,
 )
 from lupin_twin.core.state import Snapshot, TagState, same_tags
 from lupin_twin.journal.fold import state_at
@@ -65,8 +64,6 @@ _AGE_S: Final = 10.0
 _LOT: Final = 2_000
 # The worst alarms of a site that are shown, shelved ones last; its own page has all of them.
 MAX_ALARMS: Final = 20
-# As many as a bridge reads of the past, see `alarms.feed`.
-_REACH_COUNT: Final = 300_000
 
 # No value that a site has written, whatever it is, may break this query of all sites.
 _FACTS: Final = (
@@ -116,15 +113,13 @@ class _Judged:
     """
 
     judge: Judge
+    alarms: AlarmLog
     was_live: bool = False
     notes: tuple[Note, ...] = ()
     note_count: int = 0
     snapshot: Snapshot | None = None
     is_simulated: bool = False
-    alarm_fold: AlarmFold | None = None
-    after: int = 0
     seq: int = -1
-    is_caught_up: bool = False
     is_failing: bool = False
     judged_s: float = 0.0
     hour_ago: _HourAgo | None = None
@@ -187,7 +182,7 @@ class Watcher:
         judged, self._judged = self._judged, {}
         for site, *facts in execute(_FACTS, (LIVE_S, ORIGIN)).fetchall():
             name, heartbeat_ns, is_live, seqs, origin, note_count = facts
-            self._judged[site] = judged.get(site) or _Judged(Judge(self._criteria))
+            self._judged[site] = judged.get(site) or self._unjudged()
             self.sites[site] = replace(
                 before.get(site, Site(site)),
                 name=name,
@@ -214,12 +209,15 @@ class Watcher:
                 self._judge_safely(name, now_ns)
                 yield name
 
+    def _unjudged(self) -> _Judged:
+        return _Judged(Judge(self._criteria), AlarmLog(self._criteria, Limits().alarm_days))
+
     def _is_due(self, name: str) -> bool:
         """Whether a site has to be judged."""
         site, judged = self.sites[name], self._judged[name]
         is_behind = (
             judged.seq != site.last_seq
-            or not judged.is_caught_up
+            or not judged.alarms.is_caught_up
             or judged.was_live != site.is_live
             or judged.note_count != site.notes
         )
@@ -240,9 +238,8 @@ class Watcher:
                 why = "site %s cannot be judged: its status is unknown: %s"
                 log.warning(why, name, error, exc_info=not is_known)
             # Tried again from its first row on, when others are judged for their age.
-            self._judged[name] = _Judged(
-                Judge(self._criteria), is_failing=True, judged_s=time.monotonic()
-            )
+            anew = replace(self._unjudged(), is_failing=True, judged_s=time.monotonic())
+            self._judged[name] = anew
             self.sites[name] = replace(
                 self.sites[name], verdict=None, active_alarms=None, causes=(), alarms=(), dots=""
             )
@@ -256,7 +253,7 @@ class Watcher:
             if judged.seq != site.last_seq:
                 self._read(log, judged)
                 judged.seq = site.last_seq
-            if not judged.is_caught_up or judged.after < site.last_seq:
+            if not judged.alarms.is_caught_up or judged.alarms.last < site.last_seq:
                 self._follow(log, judged)
             if judged.note_count != site.notes:
                 judged.notes = notes(log, NotesRequest()).notes or ()
@@ -269,7 +266,7 @@ class Watcher:
         moment_ns = now_ns if site.is_live else min(now_ns, max(site.heartbeat_ns, newest_ns))
         alarms = _alarms(site, judged, moment_ns)
         judgement = judged.judge.see(replace(judged.snapshot, stamp_ns=moment_ns))
-        if judged.is_caught_up:
+        if judged.alarms.is_caught_up:
             said = notes_of_alarms(alarms, judged.notes, now_ns)
             tags = {tag.tag_id: tag for tag in judged.snapshot.tags} if site.is_live else {}
             active: list[tuple[Alarm, dict[str, Any]]] = [
@@ -337,17 +334,12 @@ class Watcher:
             judged.judge.learn(_recent(log, newest_ns))
 
     def _follow(self, log: Any, judged: _Judged) -> None:
-        request = WritesRequest(judged.after, Limits().alarm_days * 86_400, _REACH_COUNT, _LOT)
-        past = writes(log, request)
-        if judged.alarm_fold is None or judged.alarm_fold.spans != past.spans:
-            if judged.alarm_fold is not None:
-                judged.alarm_fold, judged.after, judged.is_caught_up = None, 0, False
-                past = writes(log, replace(request, after=0))
-            judged.alarm_fold = AlarmFold(self._criteria, past.spans)
-        judged.alarm_fold.take(past.writes)
-        if judged.is_caught_up:
+        assert judged.snapshot is not None  # it was read before
+        was_caught_up = judged.alarms.is_caught_up
+        past = writes(log, judged.alarms.request(_LOT))
+        judged.alarms.take(past, judged.snapshot.tags)
+        if was_caught_up and judged.alarms.is_caught_up:
             judged.judge.note_writes(past.of_newest_run)
-        judged.after, judged.is_caught_up = past.last, past.is_all
 
 
 def _recent(log: Any, at_ns: int) -> list[PastWrite]:
@@ -364,8 +356,8 @@ def _alarms(site: Site, judged: _Judged, moment_ns: int) -> list[Alarm]:
     """
     reach_ns = int(Limits().alarm_days * 86_400e9)
     found: list[Alarm] = []
-    if judged.alarm_fold is not None:
-        of_log = judged.alarm_fold.found(moment_ns, max(0, moment_ns - reach_ns))
+    if judged.alarms.fold is not None:
+        of_log = judged.alarms.fold.found(moment_ns, max(0, moment_ns - reach_ns))
         judged.judge.note_days(of_log.days)
         found += of_log.alarms
     if site.heartbeat_ns and not site.is_live:

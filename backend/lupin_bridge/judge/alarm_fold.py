@@ -18,13 +18,24 @@ from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.scans import LONGEST_NS, SHORTEST_NS, Stretches
 from lupin_bridge.judge.tag_log import Gap, TagStates, is_long
 from lupin_bridge.judge.verdict import Kind, Reason, Verdict
-from lupin_twin.core.past import FOREVER_NS, HOUR_NS, PastWrite, RunSpan
-from lupin_twin.core.state import Reading
+from lupin_twin.core.past import (
+    FOREVER_NS,
+    HOUR_NS,
+    PastWrite,
+    PastWrites,
+    RunSpan,
+    WritesRequest,
+)
+from lupin_twin.core.state import Reading, TagState
 
 # Writes kept for all tags together, roughly; each tag has an equal share. They take 9 MB.
 KEPT: Final = 20_000
 # Interval of dropping what is over and no longer reported.
 FORGET_EVERY_NS: Final = HOUR_NS
+# Writes of the past that are read in all: the last day of a large greenhouse, weeks of a small one.
+REACH_COUNT: Final = 300_000
+# How much further back the log is read, again and again, for an alarm that may be older.
+_FURTHER: Final = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +118,15 @@ class AlarmFold:
             self._take(run, write)
         for run in self._runs.values():
             self._settle(run)
+
+    def may_begin_earlier(self, tag_ids: Iterable[str]) -> bool:
+        """Whether an alarm of now, at one of these tags, may be older than what was taken.
+
+        Then it began with the first observation of its tag, or nothing of its tag was taken.
+        """
+        run = self._runs.get(self.spans[-1].run) if self.spans else None
+        tags = {} if run is None else run.tags
+        return any(name not in tags or tags[name].episodes.may_begin_earlier for name in tag_ids)
 
     def found(self, now_ns: int, since_ns: int = 0) -> Found:
         """The alarms at `now_ns`.
@@ -276,6 +296,65 @@ class AlarmFold:
             ]
             limit_ns = run.limits[at_ns] = int(median(holds)) if holds else LONGEST_NS
         return limit_ns
+
+
+class AlarmLog:
+    """Reads a log into a fold, lot by lot: the last `days`, and more while an alarm may be older.
+
+    So an alarm has the same id after a restart, and keeps the notes on it.
+    """
+
+    def __init__(self, criteria: Criteria, days: float) -> None:
+        self._criteria = criteria
+        self._days = days
+        self.missed = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        self.fold: AlarmFold | None = None
+        self.is_caught_up = False
+        # The stamp of the oldest write.
+        self.since_ns: int | None = None
+        # The last number that was read; the first, now and in the reading before.
+        self.last = 0
+        self._first = self._first_before = FOREVER_NS
+        self._journal = ""
+        self._reach_s = self._days * 86_400.0
+
+    def request(self, max_count: int) -> WritesRequest:
+        """The request for the next writes."""
+        return WritesRequest(self.last, self._reach_s, REACH_COUNT, max_count)
+
+    def take(self, past: PastWrites, tags: Iterable[TagState]) -> bool:
+        """Take the answer; returns whether nothing more is to be read. `tags` is the state of now.
+
+        Another journal, or a new run of the clock, is read from its beginning.
+        """
+        is_other = bool(self._journal) and past.journal != self._journal
+        is_other |= self.fold is not None and self.fold.spans != past.spans
+        if is_other or past.last < self.last:
+            self._begin()
+            return False
+        if self.fold is None:
+            self.fold, self.since_ns = AlarmFold(self._criteria, past.spans), None
+            self._first_before, self._first = self._first, past.first
+        self._journal, self.last = past.journal, past.last
+        stamps = [write.stamp_ns for write in past.writes]
+        self.since_ns = min((*stamps, self.since_ns or FOREVER_NS)) if stamps else self.since_ns
+        missed = self.fold.missed
+        self.fold.take(past.writes)
+        self.missed += self.fold.missed - missed
+        if past.is_all and not self.is_caught_up:
+            observed = (tag.tag_id for tag in tags if tag.last_observed_ns is not None)
+            # Writes that are made from states have no journal.
+            has_more = bool(self._journal) and 1 < self._first < self._first_before
+            has_more &= self.last - self._first < REACH_COUNT - 1
+            if has_more and self.fold.may_begin_earlier(observed):
+                self._reach_s = min(1e9, self._reach_s * _FURTHER)
+                self.fold, self.last = None, 0
+                return False
+            self.is_caught_up = True
+        return past.is_all
 
 
 def _matters(run: _Run) -> Callable[[int, int, int], bool]:

@@ -28,7 +28,7 @@ from typing import Final
 from lupin_bridge.judge.day import LIGHT, TagDays
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.quantities import DAILY, DERIVED, IsDay
-from lupin_bridge.judge.scans import INTERVALS, holds_ns, interval_ns
+from lupin_bridge.judge.scans import INTERVALS, holds_ns
 from lupin_bridge.judge.verdict import (
     DEADBAND,
     Kind,
@@ -41,7 +41,7 @@ from lupin_bridge.judge.verdict import (
     worst,
 )
 from lupin_twin.core.history import KIND_FLOWER
-from lupin_twin.core.past import PastWrite
+from lupin_twin.core.past import FOREVER_NS, PastWrite, interval_ns
 from lupin_twin.core.state import STATUS_OK, Reading
 
 # The `tag_id` of an alarm of the whole greenhouse.
@@ -153,6 +153,7 @@ class TagEpisodes:
     by: Criteria
     days: TagDays
     max_episodes: int = MAX_EPISODES
+    _first_ns: int = FOREVER_NS
     _species: str = ""
     _scans_ns: tuple[int, ...] = ()
     # By sensor: the last scan that had it, and the time since the one before, ns.
@@ -176,9 +177,16 @@ class TagEpisodes:
             if watch.raised_at_ns is not None:
                 yield self._alarm(key, watch, ended_ns)
 
+    @property
+    def may_begin_earlier(self) -> bool:
+        """Whether an alarm of now began with the first occasion, so that it may be older."""
+        raised = (it.began_ns for it in self._watches.values() if it.raised_at_ns is not None)
+        return self._first_ns in raised
+
     def step(self, writes: Sequence[PastWrite], is_day: IsDay) -> None:
         """Take the next occasion: `writes` of one stamp, in the order of receipt."""
         stamp_ns = writes[0].stamp_ns
+        self._first_ns = min(self._first_ns, stamp_ns)
         for write in writes:
             if write.has_seen and write.species:
                 self._species = write.species

@@ -25,7 +25,6 @@ from lupin_bridge.judge.scans import (
     Patrol,
     RecentScans,
     holds_ns,
-    interval_ns,
     writes_of,
 )
 from lupin_bridge.judge.verdict import (
@@ -39,7 +38,7 @@ from lupin_bridge.judge.verdict import (
     stopped,
 )
 from lupin_bridge.settings import SettingError, Settings, read_text
-from lupin_twin.core.past import DAY_NS, FOREVER_NS, PastWrite
+from lupin_twin.core.past import DAY_NS, FOREVER_NS, PastWrite, interval_ns
 from lupin_twin.core.state import Reading, Snapshot, TagState
 
 # More than anybody writes.

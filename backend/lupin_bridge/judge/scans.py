@@ -14,29 +14,27 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from heapq import nlargest
-from itertools import chain, groupby, pairwise, takewhile
+from itertools import chain, groupby, takewhile
 from operator import attrgetter, itemgetter
-from statistics import median
 from typing import Final
 
 from lupin_bridge.judge.day import LEFT_OUT_NS, LIGHT, SINCE_NS, Day, Light, says_day
 from lupin_twin.core.history import KIND_FLOWER, KIND_TAG_READING
-from lupin_twin.core.past import PastWrite, RecentRequest, ScansRequest
+from lupin_twin.core.past import (
+    SILENCE_NS,
+    SILENT_INTERVALS,
+    PastWrite,
+    RecentRequest,
+    ScansRequest,
+    usual_ns,
+)
 from lupin_twin.core.state import STATUS_OK, TagState, sure_species
 
 _S: Final = 1_000_000_000
-SHORTEST_NS: Final = 600 * _S
+SHORTEST_NS: Final = SILENCE_NS
 LONGEST_NS: Final = 24 * 3600 * _S
-TIMES_MEDIAN: Final = 3
 # How many of the last intervals count: a patrol may change its pace.
 INTERVALS: Final = 8
-
-
-def interval_ns(scans_ns: Sequence[int]) -> int | None:
-    """The median of the intervals between scans, oldest first; None: there are fewer than two."""
-    if len(scans_ns) < 2:
-        return None
-    return int(median(after - before for before, after in pairwise(scans_ns)))
 
 
 def holds_ns(interval_ns: int | None) -> int:
@@ -47,20 +45,19 @@ def holds_ns(interval_ns: int | None) -> int:
     """
     if interval_ns is None:
         return LONGEST_NS
-    return min(LONGEST_NS, max(SHORTEST_NS, TIMES_MEDIAN * interval_ns))
+    return min(LONGEST_NS, max(SHORTEST_NS, SILENT_INTERVALS * interval_ns))
 
 
-# How many of the last intervals count: about a lap, so that the way back to its start is included.
-LAP_INTERVALS: Final = 30
+# How many of the tags that were scanned last count for the scan interval of the greenhouse.
+USUAL_TAGS: Final = 30
 
 
 @dataclass(frozen=True, slots=True)
 class Patrol:
-    """How the greenhouse is scanned; `interval_ns` is the median of the last intervals of any tags.
+    """How the greenhouse is scanned; `interval_ns` is the usual one between two scans of a tag.
 
-    Each tag's recent scans count, those of one time once. None: fewer than two scans are known, or
-    none. `overdue` counts the tags whose readings are all too old, including those that never had
-    one.
+    None: no tag was scanned twice, or none at all. `overdue` counts the tags whose readings are all
+    too old, including those that never had one.
     """
 
     interval_ns: int | None = None
@@ -244,8 +241,8 @@ class RecentScans:
         self._tags: defaultdict[str, Recent] = defaultdict(Recent)
         self._light = Light()
         self._newest_ns = -1
-        # The last scans of any tags; None: to be found again.
-        self._lap_ns: list[int] | None = None
+        # The last scans of the tags that were scanned last; None: to be found again.
+        self._last: list[tuple[int, ...]] | None = None
 
     @classmethod
     def of(
@@ -264,14 +261,15 @@ class RecentScans:
 
     def patrol(self, now_ns: int | None, overdue: int) -> Patrol:
         """How the greenhouse is scanned; scans after `now_ns` do not count."""
-        if self._lap_ns is None:
-            last = ((it.scans[-1].stamp_ns, name) for name, it in self._tags.items() if it.scans)
-            lap = [self._tags[name].scans for _, name in nlargest(LAP_INTERVALS + 1, last)]
-            self._lap_ns = sorted({scan.stamp_ns for scans in lap for scan in scans})
-        scans = [at_ns for at_ns in self._lap_ns if now_ns is None or at_ns <= now_ns]
-        if not scans:
-            return Patrol(overdue=overdue)
-        return Patrol(interval_ns(scans[-LAP_INTERVALS - 1 :]), scans[-1], overdue)
+        if self._last is None:
+            every = (it.stamps_ns for it in self._tags.values() if it.scans)
+            self._last = nlargest(USUAL_TAGS, every, key=itemgetter(-1))
+        by_now = [
+            [at_ns for at_ns in stamps_ns if now_ns is None or at_ns <= now_ns]
+            for stamps_ns in self._last
+        ]
+        last_ns = max((stamps_ns[-1] for stamps_ns in by_now if stamps_ns), default=None)
+        return Patrol(usual_ns(by_now), last_ns, overdue)
 
     def day(self, at_ns: int) -> Day:
         """Whether it is day at a moment, by the last scans of all tags."""
@@ -295,7 +293,7 @@ class RecentScans:
                 recent = self.tag(name)
                 self._light.put(name, recent.day_at(recent.scans[-1].stamp_ns))
             if names:
-                self._lap_ns = None
+                self._last = None
                 others |= {*names}
             if at_ns > self._newest_ns:
                 self._newest_ns = at_ns
@@ -309,7 +307,7 @@ class RecentScans:
     def forget(self, tag_id: str) -> None:
         """Forget a tag that is gone."""
         self._tags.pop(tag_id, None)
-        self._lap_ns = None
+        self._last = None
         self._light.put(tag_id, None)
 
     def _decide_since(self, at_ns: int) -> set[str]:

@@ -155,7 +155,7 @@ class Push:
             await asyncio.sleep(TOGETHER_S)
             self._is_news.clear()
             alarms, self._new = self._new, {}
-            error = await self._guard.run(self._notify(alarms))
+            error = await self._guard.run(self.notify(alarms))
             if error is not None:
                 self.condition.failing(str(error))
                 self._new = alarms | self._new
@@ -164,7 +164,8 @@ class Push:
                 self.condition.taken(0)
             has_failed = error is not None
 
-    async def _notify(self, alarms: dict[str, Alarm]) -> None:
+    async def notify(self, alarms: dict[str, Alarm]) -> None:
+        """Send alarms, by their ids, to all devices, but for shelved ones."""
         source = self._source
         notes = source.notes.notes or ()
         said = notes_of_alarms(source.alarms.now.alarms, notes, source.ros_time_ns)

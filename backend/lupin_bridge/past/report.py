@@ -10,10 +10,9 @@ import heapq
 from array import array
 from bisect import bisect_left
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
-from statistics import median
 from typing import Any, Final
 
 import orjson
@@ -23,7 +22,6 @@ from lupin_bridge.feed.query import Find
 from lupin_bridge.judge.alarm_fold import AlarmFold
 from lupin_bridge.judge.episodes import SITE, readings_of
 from lupin_bridge.judge.judging import Criteria
-from lupin_bridge.judge.scans import SHORTEST_NS, TIMES_MEDIAN
 from lupin_bridge.judge.verdict import Verdict, derive
 from lupin_bridge.past import bodies
 from lupin_bridge.past.plans import Plan, of_content
@@ -35,6 +33,7 @@ from lupin_twin.core.notes import WITHDRAW, Note, NotesRequest, PastNotes, withd
 from lupin_twin.core.past import (
     EVERY_TAG,
     HOUR_NS,
+    RECENT_COUNT,
     Event,
     PastRefused,
     PastWrite,
@@ -43,8 +42,9 @@ from lupin_twin.core.past import (
     RunSpan,
     SeriesPast,
     SeriesRequest,
+    silence_ns,
 )
-from lupin_twin.core.state import STATUS_OK, Snapshot, TagState
+from lupin_twin.core.state import STATUS_OK, Reading, Snapshot, TagState
 
 # A day at one scan a second has 86,400. Each takes some 25 us, and three times that where alarms
 # are derived; an answer has ten seconds.
@@ -96,10 +96,17 @@ class Report:
         notes: PastNotes = find(NotesRequest())
         snapshot: Snapshot = find(self.end_ns - 1)
         known = [tag.tag_id for tag in snapshot.tags]
-        return self.plan(fold.body(notes.notes or (), known), snapshot.tags)
+        body, days = fold.body(notes.notes or (), known), fold.days()
+        return self.plan(
+            body,
+            [
+                replace(tag, readings=(*tag.readings, *days.get(tag.tag_id, ())))
+                for tag in snapshot.tags
+            ],
+        )
 
     def plan(self, body: dict[str, Any], tags: Sequence[TagState]) -> Plan:  # noqa: ARG002
-        """The plan of the answer; `tags` as they were at the end."""
+        """The plan of the answer; `tags` as they were at the end, with their daily quantities."""
         return of_content(content_answer(orjson.dumps(body), headers=self._headers()))
 
     def _headers(self) -> dict[str, str]:
@@ -185,7 +192,8 @@ class _Fold:
             self._attempted_ns.append(write.stamp_ns)
             if write.kind != KIND_FLOWER:
                 mine = self._attempted_at_ns.setdefault(write.tag_id, array("q"))
-                mine.append(write.stamp_ns)
+                if not mine or mine[-1] != write.stamp_ns:
+                    mine.append(write.stamp_ns)
             if write.stamp_ns >= self._of.start_ns:
                 self._count(write)
         if self._alarm_fold is None:
@@ -279,6 +287,10 @@ class _Fold:
             **bodies.period_fields(self._of.journal, start_ns, end_ns),
         }
 
+    def days(self) -> Mapping[str, Sequence[Reading]]:
+        """By tag, the daily quantities of its last day."""
+        return self._alarm_fold.found(self._of.known_ns - 1).days if self._alarm_fold else {}
+
     def _of_sensor(self, name: str) -> dict[str, Any]:
         of = self._sensors[name]
 
@@ -300,11 +312,12 @@ class _Fold:
     def _silences(self) -> list[tuple[str, Stretch]]:
         """The silences of the greenhouse, then those of single tags, each longest first."""
         start_ns, end_ns = self._of.start_ns, self._of.known_ns
-        whole = list(silences(self._attempted_ns, end_ns))
+        last_ns = {tag: list(at_ns[-RECENT_COUNT:]) for tag, at_ns in self._attempted_at_ns.items()}
+        whole = list(silences(self._attempted_ns, end_ns, silence_ns(last_ns.values())))
         found = [
             (tag_id, silence)
             for tag_id, attempted_ns in self._attempted_at_ns.items()
-            for silence in silences(attempted_ns, end_ns, whole)
+            for silence in silences(attempted_ns, end_ns, silence_ns([last_ns[tag_id]]), whole)
         ]
         cut = [
             (tag_id, (max(from_ns, start_ns), to_ns))
@@ -315,17 +328,15 @@ class _Fold:
 
 
 def silences(
-    attempted_ns: Sequence[int], end_ns: int, but: Sequence[Stretch] = ()
+    attempted_ns: Sequence[int], end_ns: int, longest_ns: int, but: Sequence[Stretch] = ()
 ) -> Iterator[Stretch]:
-    """Yield stretches without an attempt, over three times the usual interval and ten minutes.
+    """Yield stretches without an attempt that are longer than `longest_ns`.
 
     Time within `but`, ascending stretches, does not count. Before the first attempt there is no
     silence.
     """
     if not attempted_ns:
         return
-    intervals = [later - at_ns for at_ns, later in pairwise(attempted_ns)]
-    longest_ns = max(SHORTEST_NS, TIMES_MEDIAN * (median(intervals) if intervals else 0))
     starts_ns = [from_ns for from_ns, _ in but]
     up_to = [0, *accumulate(to_ns - from_ns for from_ns, to_ns in but)]
 

@@ -252,7 +252,7 @@ def _known_language(tag: str, known: Collection[str]) -> str | None:
 
 # Not in the HMI's folder: its build empties that, and sign-in comes before the HMI may be read.
 _SIGNIN_FOLDER: Final = Path(__file__).parent / "signin_page"
-_ASSETS: Final = Path(__file__).parents[1] / "static" / "assets"
+ASSETS: Final = Path(__file__).parents[1] / "static" / "assets"
 
 
 @router.post("/api/signin", include_in_schema=False)
@@ -350,7 +350,7 @@ _add_file("docs.css", "text/css; charset=utf-8")
 @read_route(router, "/font.woff2", include_in_schema=False)
 async def font() -> Response:
     """The HMI's font, under a fixed name for the report and the sign-in page."""
-    found = next(_ASSETS.glob("inter-*.woff2"), None)
+    found = next(ASSETS.glob("inter-*.woff2"), None)
     if found is None:
         return error_response("the page was not built, and has no font", 404)
     return FileResponse(found, headers={"Cache-Control": "max-age=604800"}, media_type="font/woff2")

@@ -178,8 +178,8 @@ class Patrol(Contract):
     """The progress of scanning the greenhouse; none of this is a verdict."""
 
     interval_s: float | None = Field(
-        description="s, median of the latest intervals between scans of any tags; "
-        "null: fewer than two are known"
+        description="s, usual interval between two scans of the same tag; "
+        "null: no tag was scanned twice"
     )
     last_scan: Time | None = Field(description="ROS time; null: none is known")
     overdue: int = Field(description="tags without a reading that is still valid")

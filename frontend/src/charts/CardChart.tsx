@@ -23,7 +23,7 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
     [sensor, tagId],
   );
   const { fetched, models } = useCharts(plans, pointsFor(width));
-  const { lines, state } = fetched;
+  const { state } = fetched;
   const [model] = models;
   if (sensor === undefined) return null;
   return (
@@ -38,7 +38,7 @@ export default function CardChart({ tagId }: { tagId: string }): JSX.Element | n
       {model && model.lines.length > 0 ? (
         <>
           <PlotView key={sensor} model={model} height={HEIGHT} />
-          <MarksKey marks={[...lines.marks.values()].flat()} />
+          <MarksKey marks={model.lines.flatMap(({ marks }) => marks)} />
         </>
       ) : (
         <ChartState fetched={fetched} hasLines={false} lacks={null} />

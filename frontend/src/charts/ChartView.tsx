@@ -56,7 +56,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
 
   const plans = useMemo(() => plansOf(charted, sensors, sensor), [charted, sensors, sensor]);
   const { fetched, models } = useCharts(plans, pointsFor(size.width), hasDayBefore);
-  const { lines, span } = fetched;
+  const { span } = fetched;
   const withLines = models.filter(({ lines }) => lines.length > 0);
   const room = (size.height - TIMES_HEIGHT) / Math.max(1, plans.length);
   const least = LEAST_HEIGHT[charted.by];
@@ -157,7 +157,7 @@ export default function ChartView({ charted }: { charted: Charted }): JSX.Elemen
             );
           })}
       </div>
-      <MarksKey marks={[...lines.marks.values()].flat()} />
+      <MarksKey marks={models[0]?.lines.flatMap(({ marks }) => marks) ?? []} />
       {withLines.length > 0 && span && (
         <ChartFiles
           models={withLines}

@@ -206,7 +206,6 @@ export function drawMarks({ context, ratio, x, box, colour }: Frame, { marks }: 
     for (const mark of marks) {
       const at = x(mark.at + mark.widthS / 2);
       if (mark.kind !== kind || at - last < MARK_ROOM * ratio) continue;
-      if (at < box.left || at > box.left + box.width) continue;
       last = at;
       const size = MARK_SIZE * ratio;
       context.stroke(new Path2D(markerPath(isFailure ? 'cross' : 'ring', at, y, size)));

@@ -252,7 +252,8 @@ test('the band is that of the plants, and of several kinds there is none', () =>
     plan.tagIds.map((tagId) => [pairKey({ tagId, sensor: plan.sensor }), seriesWith({ tagId })]),
   );
   const of = (...species: string[]) => {
-    const lines = { series, before: new Map(), marks: new Map() };
+    const marks = [-3, -1, 98].map((at) => ({ at, widthS: 4, kind: 'failure' as const, count: 1 }));
+    const lines = { series, before: new Map(), marks: new Map([['1', marks]]) };
     const span = { from: 0, to: 100 };
     return modelOf(CATALOGUE, cataloguesOf(FILE), plan, species, lines, span, null, null);
   };
@@ -262,4 +263,6 @@ test('the band is that of the plants, and of several kinds there is none', () =>
   expect(of('Tulip', 'tulip').isMixed).toBe(false);
   expect(ideals('tulip', '')).toEqual([]);
   expect(of('tulip', '').isMixed).toBe(true);
+  // Buckets may begin before the period, and end after it.
+  expect(of('').lines[0]?.marks.map(({ at }) => at)).toEqual([-1, 98]);
 });

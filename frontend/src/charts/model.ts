@@ -253,7 +253,11 @@ export function modelOf(
         /** Index for `lookOf`. */
         look,
         label: tagLabel(tagId),
-        marks: marks.get(tagId) ?? [],
+        /** Those of its period: a bucket belongs to where its middle is. */
+        marks: (marks.get(tagId) ?? []).filter(({ at, widthS }) => {
+          const middle = at + widthS / 2;
+          return middle >= span.from && middle <= span.to;
+        }),
       },
     ];
   });

@@ -38,6 +38,12 @@ export const valueText = (sensor: Sensor, value: number): string =>
 export const differenceNumber = (sensor: Sensor, by: number): string =>
   numberText(differenceToShown(sensor, by), sensor.digits);
 
+/** Half the width of an interval of errors: rounded like a value, unless that would round it to zero. */
+export function errorNumber(sensor: Sensor, by: number): string {
+  const text = differenceNumber(sensor, by);
+  return /[1-9]/.test(text) ? text : numberText(differenceToShown(sensor, by));
+}
+
 /** A number's text and the sensor's unit, joined by a no-break space. */
 export const withUnit = ({ unit }: Sensor, text: string): string =>
   unit ? `${text}\u00a0${unit}` : text;

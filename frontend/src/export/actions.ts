@@ -2,7 +2,7 @@
 import { epochOf, now as pageNow, timeZone } from '../clock';
 import { differenceText, divergingColours, signedText } from '../domain/difference';
 import { errorColours } from '../domain/field';
-import { differenceNumber, readingText, valueText, withUnit, written } from '../domain/format';
+import { errorNumber, readingText, valueText, withUnit, written } from '../domain/format';
 import { IDEAL_ALPHA, idealParts } from '../domain/ideal';
 import { rgbText, sensorColour } from '../domain/ramp';
 import { tableCsv } from '../domain/table';
@@ -114,7 +114,7 @@ function legendOf(state: AppState): Pick<Footer, 'title' | 'ends' | 'ramps'> {
     };
   }
   if (heat?.isError) {
-    const most = withUnit(sensor, differenceNumber(sensor, heat.range.high));
+    const most = withUnit(sensor, errorNumber(sensor, heat.range.high));
     return {
       title: `${label}: ${S.heats.error}`,
       ends: ['±\u00a00', `±\u00a0${most}`],

@@ -12,12 +12,10 @@ import type {
   Schemas,
   TagHealth,
 } from '../contract/types';
-import { cellAt, errorColours, NINE_OF_TEN, plusMinus } from '../domain/field';
+import { cellAt, errorColours, plusMinus } from '../domain/field';
 import {
-  differenceNumber,
-  differenceToShown,
+  errorNumber,
   metresText,
-  numberText,
   percentText,
   ageText,
   valueText,
@@ -200,7 +198,7 @@ export function ErrorScale(): JSX.Element {
         <strong>{E.error}</strong>
         <span data-testid="error-high">
           ±{'\u00a0'}
-          {errorText(sensor, most / NINE_OF_TEN)}
+          {withUnit(sensor, errorNumber(sensor, most))}
         </span>
       </div>
     </div>
@@ -316,19 +314,13 @@ const Note = ({ text }: { text: string }): JSX.Element => (
   </p>
 );
 
-/** Rounded like a value, unless that would round it to zero. */
-function errorNumber(sensor: Sensor, sd: number): string {
-  const text = differenceNumber(sensor, plusMinus(sd));
-  return /[1-9]/.test(text) ? text : numberText(differenceToShown(sensor, plusMinus(sd)));
-}
-
 /** Half the width of the 90 % interval: "1.3 °C". */
 export const errorText = (sensor: Sensor, sd: number): string =>
-  withUnit(sensor, errorNumber(sensor, sd));
+  withUnit(sensor, errorNumber(sensor, plusMinus(sd)));
 
 /** "22.4 ± 1.3 °C". */
 export const estimateText = (sensor: Sensor, mean: number, sd: number): string =>
-  withUnit(sensor, `${valueText(sensor, mean)}\u00a0±\u00a0${errorNumber(sensor, sd)}`);
+  withUnit(sensor, `${valueText(sensor, mean)}\u00a0±\u00a0${errorNumber(sensor, plusMinus(sd))}`);
 
 /** Polling interval: the twin's answers about its estimate change slowly. */
 const EVERY_MS = 10_000;

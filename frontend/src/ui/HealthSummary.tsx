@@ -73,19 +73,16 @@ function dayText({ day }: HouseHealth): string | undefined {
   return day ? S.healthDay(day.is_day, S.healthDaySource[day.source]) : undefined;
 }
 
-/** Shorter intervals come from tags that report on their own, all at once: not a scan interval. */
-const LEAST_INTERVAL_S = 0.1;
-/** No scan for longer than both this, s, and ten usual intervals: the robot may have stopped. */
+/** No scan for longer than both this, s, and one and a half rounds: the robot may have stopped. */
 const LATE_S = 60;
-const LATE_INTERVALS = 10;
+const LATE_ROUNDS = 1.5;
 
 /** The patrol as the bridge reports it: scan interval, last scan, and overdue tags. */
 export function HouseLine(): JSX.Element | null {
   const health = useApp(selectHealth);
   const { patrol } = health;
   const { snapshot, ageing } = useApp(selectShown);
-  const interval = patrol?.interval_s ?? 0;
-  const hasInterval = interval >= LEAST_INTERVAL_S;
+  const interval = patrol?.interval_s ?? null;
   const ageOf = (now: number): number | null =>
     patrol?.last_scan && snapshot
       ? ageSeconds(whenOf(patrol.last_scan, snapshot), now, ageing)
@@ -96,9 +93,9 @@ export function HouseLine(): JSX.Element | null {
   });
   // In the past, or while the clock is paused, nobody can check on the robot.
   const isLate = useTicking((now) =>
-    hasInterval &&
+    interval !== null &&
     ageing.kind === 'growing' &&
-    (ageOf(now) ?? 0) > Math.max(LATE_S, LATE_INTERVALS * interval)
+    (ageOf(now) ?? 0) > Math.max(LATE_S, LATE_ROUNDS * interval)
       ? 'late'
       : null,
   );
@@ -107,7 +104,7 @@ export function HouseLine(): JSX.Element | null {
   // Scanned, but at an unknown time, or the scans are no longer stored.
   const isKnown = snapshot.isWhole && snapshot.tags.every(({ readings }) => readings.size === 0);
   if (lastScan === null && !isKnown) return null;
-  if (isLate && last !== null) {
+  if (isLate && last !== null && interval !== null) {
     return (
       <p className="patrol-line" data-testid="patrol-line">
         <span data-overdue>{S.houseLate(last, intervalText(interval))}</span>
@@ -118,7 +115,7 @@ export function HouseLine(): JSX.Element | null {
   }
   const rest = [
     lastScan === null ? S.houseNever : last === null ? null : S.houseLast(last),
-    hasInterval ? S.scanInterval(intervalText(interval)) : null,
+    interval !== null ? S.scanInterval(intervalText(interval)) : null,
   ].filter((part) => part !== null);
   return (
     <p className="patrol-line" data-testid="patrol-line">

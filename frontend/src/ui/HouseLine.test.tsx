@@ -19,8 +19,10 @@ const line = (patrol: Judgement['house']['patrol']): string | undefined => {
 
 test('shows the scan interval, the last scan and overdue tags', () => {
   // Built states are seconds old, whatever their stamp.
-  const lineText = line({ interval_s: 40, last_scan: { sec: 0, nanosec: 1 }, overdue: 2 });
-  expect(lineText).toMatch(/^2 tags overdue · last scan .+ ago · a scan every 40\u00a0s$/);
+  const lineText = line({ interval_s: 4000, last_scan: { sec: 0, nanosec: 1 }, overdue: 2 });
+  expect(lineText).toMatch(
+    /^2 tags overdue · last scan .+ ago · each tag every 1\u00a0h 6\u00a0min$/,
+  );
 });
 
 test.each([
@@ -32,12 +34,14 @@ test.each([
   [43_200, '12\u00a0h'],
 ])('of %s s between two scans', (interval_s, lineText) => {
   expect(line({ interval_s, last_scan: null, overdue: 0 })).toBe(
-    `no tag overdue · no scan yet · a scan every ${lineText}`,
+    `no tag overdue · no scan yet · each tag every ${lineText}`,
   );
 });
 
-test.each([null, 0.04])('without a scan interval none is shown: %s', (interval_s) => {
-  expect(line({ interval_s, last_scan: null, overdue: 1 })).toBe('1 tag overdue · no scan yet');
+test('without a scan interval none is shown', () => {
+  expect(line({ interval_s: null, last_scan: null, overdue: 1 })).toBe(
+    '1 tag overdue · no scan yet',
+  );
 });
 
 test('a moment whose scans were deleted is not said to have had none', () => {
@@ -74,14 +78,13 @@ test('there is none for a silent greenhouse', () => {
 
 test.each([
   [
-    'after ten intervals and a minute',
+    'after one and a half rounds and a minute',
     1.2,
     61,
-    /^No scan for 1\u00a0min \(usually every 1.2\u00a0s\) · Check the robot$/,
+    /^No scan for 1\u00a0min \(usually each tag every 1.2\u00a0s\) · Check the robot$/,
   ],
   ['not within a minute', 1.2, 59, /^no tag overdue/],
-  ['not within ten intervals', 30, 299, /^no tag overdue/],
-  ['of tags that report all at once', 0.04, 600, /^no tag overdue/],
+  ['not while it rests between two rounds', 1200, 1200, /^no tag overdue/],
 ])('who drives no more is looked after: %s', (_, interval_s, late, lineText) => {
   const health = judgement({ '1': 'healthy' }, undefined, {
     ...{ interval_s, last_scan: { sec: 1, nanosec: 0 }, overdue: 0 },

@@ -45,7 +45,7 @@ from lupin_twin.runtime import process
 
 # A running twin is discovered within this time. Without the wait, a fast patrol's first
 # observations would drop out of the latch before any subscriber could receive them.
-_SUBSCRIBERS_S = 3.0
+SUBSCRIBERS_S = 3.0
 # How long a finished patrol waits until its last messages are acknowledged.
 _DELIVERY_S = 5.0
 _POLL_S = 0.05
@@ -132,7 +132,7 @@ def play(
         with spinning(node):
             node.get_logger().info(f"patrol starts at speed {speed:g}")
             subscribers = node.observations.get_subscription_count
-            if _stopped_before(stop, lambda: subscribers() > 0, _SUBSCRIBERS_S):
+            if _stopped_before(stop, lambda: subscribers() > 0, SUBSCRIBERS_S):
                 return
             start = monotonic()
             for event in events:

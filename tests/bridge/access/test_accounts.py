@@ -209,7 +209,7 @@ def test_another_users_file_is_left_alone(path: Path) -> None:
 def test_a_reader_cannot_write_and_the_audit_trail_drops_its_oldest_rows(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lupin_bridge.access.accounts._MAX_AUDITED", 3)
+    monkeypatch.setattr("lupin_bridge.access.accounts.MAX_AUDITED", 3)
     add(path, anna="operator")
     with changing(path) as accounts:
         for number in range(9):

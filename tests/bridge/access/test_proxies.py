@@ -5,6 +5,7 @@ import signal
 import socket
 import ssl
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -21,7 +22,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lupin_bridge.access.policy import BehindProxies, Proxies, path_of
-from lupin_bridge.serving.server import check_pair
+from lupin_bridge.serving.server import Certificates, check_pair
 from lupin_bridge.settings import SettingError, Settings
 from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
 from tests.support.people import TOKEN as SCADA
@@ -255,6 +256,22 @@ def refusal(cert: Path, key: Path) -> str:
     message = str(refused.value)
     assert "\n" not in message
     return message
+
+
+def test_an_expired_certificate_is_served_and_reported_once(
+    caplog: pytest.LogCaptureFixture, tmp_path: Path
+) -> None:
+    ours = certificate(tmp_path)
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    certificates = Certificates(str(ours.cert), str(ours.key), context)
+    certificates.look()
+    assert caplog.text == ""
+    issued = ours.authority.issue_cert("localhost", not_after=datetime(2024, 5, 1, tzinfo=UTC))
+    issued.private_key_pem.write_to_path(str(ours.key))
+    issued.cert_chain_pems[0].write_to_path(str(ours.cert))
+    certificates.look()
+    certificates.look()
+    assert caplog.text.count(f"{ours.cert} expired at 2024-05-01") == 1
 
 
 def test_a_pair_of_files_that_cannot_be_served_is_named(ours: Certificate, tmp_path: Path) -> None:

@@ -272,7 +272,7 @@ async def test_a_forwarder_that_writes_nonsense_stops_no_note(
     script.write_text(f"#!/bin/sh\n{words}\necho '{json.dumps(asdict(note))}'\nexec cat\n")
     script.chmod(0o755)
     monkeypatch.setattr("sys.executable", str(script))
-    monkeypatch.setattr(forwarding, "_RESTART_S", 0.01)
+    monkeypatch.setattr(forwarding, "RESTART_S", 0.01)
 
     async def put(it: Note) -> None:
         written.append(it)

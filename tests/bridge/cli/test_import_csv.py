@@ -104,6 +104,8 @@ def test_a_dry_run_writes_nothing_and_importing_twice_writes_each_row_once(
     importing: Import,
 ) -> None:
     assert importing.run().stderr == f"lupin-twin: {importing.map}: No such file or directory\n"
+    importing.given(WIDE, ROWS).file.rename(importing.map.with_suffix(".csv"))
+    assert importing.run().stderr == f"lupin-twin: {importing.file}: No such file or directory\n"
     done = importing.given(WIDE, ROWS).run()
     assert done.returncode == 0
     assert done.stdout.splitlines() == [
@@ -119,7 +121,7 @@ def test_a_dry_run_writes_nothing_and_importing_twice_writes_each_row_once(
     then_ns = int(datetime(2024, 5, 1, 10, tzinfo=UTC).timestamp()) * SECOND
     rows = importing.rows()
     assert rows[0] == (
-        "A", then_ns, then_ns, '["temperature","humidity"]', "[21.5,55.00000000000001]", "import"
+        "A", then_ns, then_ns, '["temperature","humidity"]', "[21.5,55.0]", "import"
     )  # fmt: skip
     assert [(row[0], row[4]) for row in rows[1:]] == [("A", "[22.5]"), ("B", "[20.0,60.0]")]
     assert "0 scans are new" in importing.written()

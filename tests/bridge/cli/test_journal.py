@@ -239,7 +239,9 @@ def test_export_writes_the_same_rows_as_the_route(path: Path) -> None:
     assert "2025-11-21T04:40:03.000000000Z,1763700003.000000000,7,1.5,2.5,a,,1.0,0,robot" in every
     two = exported("--from", "1763700003", "--to", "2025-11-21T05:40:05+01:00", "--tag", "7")
     assert [line.split(",")[7] for line in two[1:]] == ["1.0", "1.3333333333333333"]
-    assert exported("--sensor", "none") == every[:1]
+    nothing = journal("export", "--journal", path, "--sensor", "none")
+    assert (nothing.returncode, nothing.stdout.splitlines()) == (0, every[:1])
+    assert "nothing matches; the journal has the tags 7, 8 and the sensors a" in nothing.stderr
 
 
 def test_export_uses_the_units_of_the_operators_file(

@@ -87,7 +87,7 @@ def test_json_has_null_for_what_is_not_finite_and_a_large_field_is_written_in_pa
     assert b'"resolution_used":0.1,' in text
     assert (body["value_min"], body["value_max"], body["sample_count"]) == (10.0, 30.0, 5)
     whole = formats.write_json(GRID)
-    monkeypatch.setattr(formats, "_AT_ONCE", 4)
+    monkeypatch.setattr(formats, "AT_ONCE", 4)
     assert formats.write_json(GRID) == whole
     parts = list(formats.numbers(GRID.values))
     assert parts == [b"10.0,null,20.0,12.5", b",", b"15.0,30.0"]

@@ -282,6 +282,8 @@ def test_an_unreadable_or_slow_site_costs_no_other_site_its_status(
             found = running.site(name, last_verdict=None, active_alarms=None)
             assert found["verdict"] == "unknown"
             running.process.wait_for_output(f"site {name} cannot be judged: its status is unknown")
+        for sites, total in (("gh2", 0), ("gh1,gh2", None)):
+            assert running.http.get(f"/api/alarms?sites={sites}").json()["total"] == total
         assert running.http.get("/readyz").status_code == 200
         assert running.metric("lupin_fleet_watcher_starts") == 1
         assert "Traceback" not in running.process.output
@@ -385,7 +387,7 @@ def test_an_error_that_may_pass_is_reported_and_the_page_is_served(archive: Arch
 
 
 def test_a_slow_and_failing_archive_is_reported_once() -> None:
-    soon = constants(**{"lupin_bridge.fleet.source:_START_S": 0.5})
+    soon = constants(**{"lupin_bridge.fleet.source:START_S": 0.5})
     with socket.create_server(("127.0.0.1", 0)) as database:
         url = f"postgresql://a@127.0.0.1:{database.getsockname()[1]}/b"
         with lupin_twin(0, "fleet", "--archive-url", url, *soon) as process:

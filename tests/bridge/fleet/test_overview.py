@@ -153,7 +153,7 @@ def dots_of(picture: str) -> dict[str, list[str]]:
 async def test_an_unexpected_error_is_logged_once_and_ends_neither_overview_nor_site(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(source, "_RETRY_S", 0.01)
+    monkeypatch.setattr(source, "RETRY_S", 0.01)
     monkeypatch.setattr(source, "HEARTBEAT_S", 0.01)
     looks = updates = 0
     is_broken = False
@@ -270,7 +270,7 @@ async def test_a_process_is_checked_as_long_as_it_does_not_answer(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """It may be stopped after a check, while it waits for the archive."""
-    monkeypatch.setattr(source, "_START_S", 0.01)
+    monkeypatch.setattr(source, "START_S", 0.01)
     watching = source.Watching(Settings())
     checks: list[None] = []
     monkeypatch.setattr(watching.process, "ask", lambda *_: asyncio.sleep(60.0))

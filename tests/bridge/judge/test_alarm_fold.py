@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 
 from lupin_bridge.alarms.board import board_of
 from lupin_bridge.judge import alarm_fold
-from lupin_bridge.judge.alarm_fold import AlarmFold
+from lupin_bridge.judge.alarm_fold import AlarmFold, AlarmLog
 from lupin_bridge.judge.day import ClockDay, Day
 from lupin_bridge.judge.episodes import Alarm
 from lupin_bridge.judge.judging import Criteria, own_sensors
-from lupin_twin.core.past import PastWrite, RunSpan
+from lupin_twin.core.past import PastWrite, PastWrites, RunSpan
+from lupin_twin.core.state import TagState
 from tests.support.alarms_reference import Plain, S, alarms
 from tests.support.ordinary_day import DAY_NS, ordinary_days
 
@@ -312,3 +313,38 @@ def test_ordinary_days_raise_less_than_an_alarm_in_ten_minutes_and_none_is_false
     # Attempts that failed twice in one round are not reported; failures in two rounds are.
     for lost in (one for one in raised if one.reason.kind == "scan_failed"):
         assert lost.raised_at_ns - (lost.reason.since_ns or 0) > 48 * MINUTE
+
+
+def test_an_alarm_older_than_what_is_read_at_first_keeps_its_id() -> None:
+    """At a it is hot for 40 of 60 days, b had pests 30 days ago, c is fine."""
+    now_ns = 100 * DAY_NS
+    times = [(day, now_ns - (60 - day) * DAY_NS) for day in range(60)]
+    every = [write for day, at_ns in times for write in of_day(day, at_ns)]
+    every = [replace(write, number=number) for number, write in enumerate(every, 1)]
+    fold = AlarmFold(BY, SPANS[0])
+    fold.take(every)
+    running = board_of(fold.found(now_ns).alarms).active
+    assert {alarm.tag_id for alarm in running} == {"a", "b"}
+    state = [TagState(tag_id, last_observed_ns=now_ns) for tag_id in "abc"]
+    started, is_all, passes = AlarmLog(BY, 7.0), False, 0
+    while not is_all:
+        request = started.request(50)
+        passes += not request.after
+        since_ns = 0 if request.after else now_ns - int(request.reach_s * 1e9)
+        found = [it for it in every if it.number > request.after and it.stamp_ns >= since_ns]
+        part = tuple(found[: request.max_count])
+        past = PastWrites("id", SPANS[0], part, part[-1].number, len(part) == len(found))
+        is_all = started.take(past, state)
+    assert started.fold is not None
+    assert board_of(started.fold.found(now_ns).alarms).active == running
+    assert passes == 3
+
+
+def of_day(day: int, at_ns: int) -> list[PastWrite]:
+    found = [
+        PastWrite(0, 1, tag_id, at_ns, SCAN, 0, ("temperature",), (value,))
+        for tag_id, value in (("a", 40.0 if day >= 20 else 22.0), ("c", 22.0))
+    ]
+    if day == 30:
+        found.append(PastWrite(0, 1, "b", at_ns, LOOK, 0, (), (), True, "", True, 3))
+    return found

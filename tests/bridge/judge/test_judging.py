@@ -12,7 +12,7 @@ from lupin_bridge.judge import scans
 from lupin_bridge.judge.day import Day
 from lupin_bridge.judge.judging import MAX_AT_ONCE, Judge, Judged, judge_once
 from lupin_bridge.judge.scans import (
-    LAP_INTERVALS,
+    INTERVALS,
     SHORTEST_NS,
     Patrol,
     RecentScans,
@@ -194,10 +194,10 @@ def test_the_greenhouses_activity_is_reported_beside_its_verdict() -> None:
     judge = Judge(replace(BY_LIGHT, recent_s=600.0))
     tags = [tag(str(i), START + i * 40 * S, temperature=22.0) for i in range(4)]
     judged = judge.see(snapshot(START + 120 * S, *tags))
-    assert judged.patrol == Patrol(40 * S, START + 120 * S, 0)
+    assert judged.patrol == Patrol(None, START + 120 * S, 0)
     # No more scans: the last one stays, and all readings age.
     judged = judge.see(snapshot(START + 721 * S, *tags))
-    assert judged.patrol == Patrol(40 * S, START + 120 * S, 4)
+    assert judged.patrol == Patrol(None, START + 120 * S, 4)
     again = [replace(tags[0], readings=(Reading("temperature", 22.0, START + 722 * S),)), *tags[1:]]
     assert judge.see(snapshot(START + 722 * S, *again)).patrol.overdue == 3
     assert judge.see(snapshot(START + 722 * S, *tags[1:])).patrol.overdue == 3
@@ -381,18 +381,21 @@ def interval_ns(*stamps_s: float) -> int | None:
     return scanned(*stamps_s).patrol(None, 0).interval_ns
 
 
-def test_a_way_back_or_a_pause_does_not_change_the_interval() -> None:
-    assert interval_ns(0, 40, 80, 120, 700, 740) == 40 * S
+def test_the_interval_is_that_between_two_scans_of_one_tag() -> None:
+    # Ten tags, five seconds apart, then a rest; the robot was away once.
+    rounds = [at_s + 5 * tag for at_s in (0, 1200, 2400, 36_000, 37_200) for tag in range(10)]
+    assert interval_ns(*rounds) == 1200 * S
+    assert interval_ns(*rounds[:10]) is None
 
 
 def test_only_the_last_intervals_count() -> None:
-    slow = [i * 600 for i in range(2 * LAP_INTERVALS)]
-    fast = [slow[-1] + 5 * (i + 1) for i in range(LAP_INTERVALS)]
-    assert interval_ns(*slow, *fast) == 5 * S
+    slow = [i * 60 for i in range(20 * INTERVALS)]
+    fast = [slow[-1] + 5 * (i + 1) for i in range(10 * INTERVALS)]
+    assert interval_ns(*slow, *fast) == 50 * S
 
 
-def test_scans_at_one_moment_count_once_and_those_still_to_come_do_not_count() -> None:
-    scans = scanned(100, 140, 120, 140, 151)
+def test_scans_still_to_come_do_not_count() -> None:
+    scans = scanned(100, 140, 120, 140, 151, tags=1)
     assert scans.patrol(150 * S, 0) == Patrol(20 * S, 140 * S, 0)
     assert scans.patrol(151 * S, 0).last_scan_ns == 151 * S
 

@@ -192,10 +192,10 @@ async def test_a_message_waits_while_an_error_lasts_or_the_accounts_cannot_be_re
         on.subscribe(on.phone("one"))
         accounts.rename(aside)
         on.board.show([alarm("7"), alarm("8")])
-        await until(lambda: "was not accepted: the file of accounts" in caplog.text, "why")
+        await until(lambda: "was not accepted: there is no file of accounts" in caplog.text, "why")
         aside.rename(accounts)
         await until(lambda: on.service.posted, "the first attempt")
-        await until(lambda: "will be retried: the file of accounts" in caplog.text, "why")
+        await until(lambda: "will be retried: there is no file of accounts" in caplog.text, "why")
         aside.rename(accounts)
         await until(lambda: len(on.service.posted) == 2, "the next attempt")
 
@@ -249,7 +249,7 @@ async def test_an_alarm_raised_while_the_log_is_read_at_the_start_is_new(
     async def notify(_: Push, alarms: Mapping[str, Alarm]) -> None:
         notified.extend(it.tag_id for it in alarms.values())
 
-    monkeypatch.setattr(Push, "_notify", notify)
+    monkeypatch.setattr(Push, "notify", notify)
     monkeypatch.setattr(push_module, "TOGETHER_S", 0.0)
     source = source_of(AlarmBoard())
     source.ros_time_ns = None

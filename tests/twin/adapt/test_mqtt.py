@@ -46,7 +46,7 @@ def test_json_is_read_by_paths_with_its_own_time() -> None:
     )
     payload = {"air": {"t": 212}, "list": [1, 2], "at": "2024-05-01T10:00:00Z"}
     (found,) = message(configured, "house/x/climate", payload)
-    assert dict(found.readings) == pytest.approx({"temperature": 100.0, "co2": 2.0})
+    assert dict(found.readings) == {"temperature": 100.0, "co2": 2.0}
     assert found.stamp_s == 1_714_557_600.0
     for at, seconds in (
         (1_700_000_000.5, 1_700_000_000.5),
@@ -61,8 +61,8 @@ def test_json_is_read_by_paths_with_its_own_time() -> None:
 
 def test_a_tag_or_a_sensor_as_long_as_a_topic_may_be_is_refused() -> None:
     configured = broker({"topic": "gh/{tag}/{sensor}"})
-    for topic in (f"gh/{'x' * 257}/co2", f"gh/A/{'x' * 257}"):
-        with pytest.raises(Rejected, match="has 257 characters, the limit is 256"):
+    for what, topic in (("tag", f"gh/{'x' * 257}/co2"), ("sensor", f"gh/A/{'x' * 257}")):
+        with pytest.raises(Rejected, match=f"^{what} 'x+'… has 257 characters, the limit is 256"):
             message(configured, topic, b"1")
 
 

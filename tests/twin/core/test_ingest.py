@@ -176,5 +176,6 @@ def test_an_accepted_write_is_stored_and_known_and_a_refused_one_is_neither() ->
         drop = ingest.apply(write, store, repeats)
         assert drop is not None
         assert drop.reason is Reason.REJECTED
+        assert drop.why.startswith("tag_id 'x")
         assert f"the limit is {MAX_TEXT_LENGTH}" in drop.why
     assert repeats.news(Scan(too_long, S)) is not None

@@ -76,7 +76,7 @@ def test_the_mask_is_the_map_cell_under_each_centre(
         rows, resolution=map_resolution, origin_x=origin[0], origin_y=origin[1], origin_yaw=yaw
     )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(explored, "_CELLS_AT_ONCE", 40)
+        patch.setattr(explored, "CELLS_AT_ONCE", 40)
         mask = mask_of(occupancy, 14, 11, origin=(-2.0, -1.5), resolution=resolution)
     for row in range(11):
         for column in range(14):

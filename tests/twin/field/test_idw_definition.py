@@ -107,7 +107,7 @@ def test_the_field_matches_its_definition_however_it_is_split(case: Case, is_spl
     with pytest.MonkeyPatch.context() as patch:
         if is_split:  # even a tiny grid, down to single cells
             patch.setattr(idw, "MAX_PAIRS", 12)
-            patch.setattr(idw, "_MIN_POINTS", 1)
+            patch.setattr(idw, "MIN_POINTS", 1)
         case.compare()
 
 

@@ -73,7 +73,7 @@ def test_the_error_matches_its_definition(
     rules = {"falloff_radius_m": falloff, "max_distance_m": max_distance, "power": power}
     with pytest.MonkeyPatch.context() as patch:  # in many parts
         patch.setattr(idw, "MAX_PAIRS", 16)
-        patch.setattr(idw, "_MIN_POINTS", 1)
+        patch.setattr(idw, "MIN_POINTS", 1)
         quality = quality_of(spots, **rules)
     errors = [
         value_at((x, y), [*spots[:index], *spots[index + 1 :]], **rules) - value

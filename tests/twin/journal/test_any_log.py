@@ -121,7 +121,7 @@ def check_export(life: Life, connection: Any, period: Period, tag: str | None) -
         for row in life.export(start_ns, end_ns, tag)
     ]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("lupin_twin.journal.writes._STRETCH", 64)
+        patch.setattr("lupin_twin.journal.writes.STRETCH", 64)
         patch.setattr("lupin_twin.journal.writes.LOT", 3)
         export = Export(start_ns, end_ns, tag, None)
         found = [lot for step in iter(partial(export.step, connection), None) for lot in lots(step)]

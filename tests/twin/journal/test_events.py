@@ -1,8 +1,7 @@
 from pathlib import Path
 from sqlite3 import Connection
 
-from lupin_twin.core.past import EVERY_TAG, Event, SeriesPast, SeriesRequest
-from lupin_twin.journal.counts import SILENCE_NS
+from lupin_twin.core.past import EVERY_TAG, SILENCE_NS, Event, SeriesPast, SeriesRequest
 from lupin_twin.journal.queries import series
 from tests.support.journal import SECOND, inspection, scan
 from tests.support.log_life import BEGUN, HOUR, LATEST, MINUTE, lived
@@ -78,6 +77,22 @@ def test_a_silence_is_longer_than_ten_minutes_and_than_three_usual_intervals(
         life.write([scan("9", at_ns=BEGUN + second * SECOND) for second in seconds])
         silences = reported(query(log, Event.SILENCES, "9", now=BEGUN + seconds[-1] * SECOND))
         assert silences == [(BEGUN + 7 * HOUR, 3 * 3600 + 1.0)]
+
+
+def test_a_rest_between_two_patrols_is_no_silence(tmp_path: Path) -> None:
+    rounds = [20 * MINUTE * number for number in (*range(4), *range(30, 34))]
+    with lived(tmp_path / "j.sqlite") as life:
+        life.write(
+            scan(str(tag), at_ns=BEGUN + at_ns + 5 * SECOND * tag)
+            for at_ns in rounds
+            for tag in range(6)
+        )
+        end = BEGUN + rounds[-1] + 20 * MINUTE
+        # Also where nothing but a rest is in the period.
+        for start in (BEGUN, BEGUN + rounds[-2] + 5 * MINUTE):
+            found = reported(query(life.connection, Event.SILENCES, start=start, now=end))
+            away = (BEGUN + rounds[3] + 25 * SECOND, 27 * 20 * 60 - 25.0)
+            assert found == ([away] if start == BEGUN else [])
 
 
 def test_silences_in_deleted_years_are_still_reported(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ def test_batches_come_on_demand_and_nothing_stays_open_between_them(tmp_path: Pa
 def test_a_deletion_of_rows_still_to_come_ends_the_export(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lupin_twin.journal.writes._STRETCH", 400)
+    monkeypatch.setattr("lupin_twin.journal.writes.STRETCH", 400)
     total = 3_000
     with lived(tmp_path / "j.sqlite") as life:
         life.write(scan(at_ns=BEGUN + n * SECOND) for n in range(total))

@@ -63,8 +63,8 @@ def test_runs_are_written_to_a_replaced_file(path: Path) -> None:
 
 
 def test_maintenance_purges_and_checkpoints(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lupin_twin.journal.file._LOG_BYTES", 10_000)
-    monkeypatch.setattr("lupin_twin.journal.file._PURGE_EVERY_S", 0.0)
+    monkeypatch.setattr("lupin_twin.journal.file.LOG_BYTES", 10_000)
+    monkeypatch.setattr("lupin_twin.journal.file.PURGE_EVERY_S", 0.0)
     with opened(path, Limits(days=36_500, max_bytes=60_000)) as file:
         run = file.start(CLOCK, is_believed=False).run
         file.append([(run, scan(at_ns=NOW + n)) for n in range(5000)])
@@ -82,7 +82,7 @@ def test_maintenance_purges_and_checkpoints(path: Path, monkeypatch: pytest.Monk
 def test_a_lack_of_room_for_scans_beside_the_hours_is_reported(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lupin_twin.journal.file._PURGE_EVERY_S", 0.0)
+    monkeypatch.setattr("lupin_twin.journal.file.PURGE_EVERY_S", 0.0)
     append(path, [scan(at_ns=NOW + n) for n in range(500)])
     with recording(path, limits=Limits(days=36_500, max_bytes=10_000)) as journal:
         wait_state(

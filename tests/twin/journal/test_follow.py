@@ -163,8 +163,10 @@ def test_whatever_happens_to_a_journal_a_whole_copy_has_the_same(  # noqa: C901 
                     rows.append(some(now_ns))
                 append(source, rows)
             case "note":
+                # One that was made in the fleet has a number of there.
+                note_id = chance.choice(("", f"{1:016x}{chance.getrandbits(32):08x}"))
                 with opened(source) as file:
-                    file.put_note(Note("", now_ns, "anna", ACKNOWLEDGE, "alarm:a", "seen"))
+                    file.put_note(Note(note_id, now_ns, "anna", ACKNOWLEDGE, "alarm:a", "seen"))
             case "late":
                 append(source, [some(NOW + chance.randrange(now_ns - NOW + 1))])
             case "delete":

@@ -122,10 +122,12 @@ def is_another(name: str, query: list[Any]) -> bool:
     if query[0] != "series":
         return False
     _, tag_id, sensor, *_ = query
+    if sensor == "~silences":
+        # To the old build, the usual interval was that between any two tags.
+        return True
     if name in ("purged", VERSION4):
-        # For deleted attempts the old build had counts by five minutes, now there are hours; a
-        # pause is then longer than the usual interval of hours, not of five minutes.
-        return tag_id == "*" and sensor in ("~scans", "~failures", "~looks", "~silences")
+        # For deleted attempts the old build had counts by five minutes, now there are hours.
+        return tag_id == "*" and sensor in ("~scans", "~failures", "~looks")
     # The old build had counted damaged rows: in an hour, in five minutes, and in the total of
     # an index. Now such a row is nowhere.
     return name in ("flipped", "damaged")

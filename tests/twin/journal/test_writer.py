@@ -238,7 +238,7 @@ def test_beyond_the_limit_the_oldest_writes_are_lost_and_counted(
 
 
 def test_age_and_size_limits_are_applied(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lupin_twin.journal.file._PURGE_EVERY_S", 0.0)
+    monkeypatch.setattr("lupin_twin.journal.file.PURGE_EVERY_S", 0.0)
     now = time.time_ns()
     old = now - 3 * 86_400 * SECOND
     with recording(path, Clock(old, old, is_simulated=False), limits=Limits(1.0, 10**9)) as journal:

@@ -12,6 +12,7 @@ from rclpy.qos import DurabilityPolicy
 from rclpy.serialization import serialize_message
 
 from lupin_twin.core.drops import Drop, Reason
+from lupin_twin.ros import base_node
 from lupin_twin.ros.base_node import (
     BEHIND_S,
     BELIEVED_S,
@@ -132,7 +133,7 @@ def test_on_a_shared_topic_only_wanted_messages_are_read_and_the_others_not_coun
 
 
 def test_waiting_messages_are_taken_one_right_after_the_other(
-    utilities: NodeUtilities, domain: int
+    utilities: NodeUtilities, domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In one round of the executor, whatever else is due; and before any slow work."""
     received: list[float] = []
@@ -166,6 +167,12 @@ def test_waiting_messages_are_taken_one_right_after_the_other(
         publish(range(40, 90))
         utilities.drain()
         assert received == list(map(float, range(90)))
+        publish(range(90, 130))
+        monkeypatch.setattr(base_node, "WORK_DRAIN_S", 0.0)
+        utilities.drain()
+        assert len(received) == 91, "messages that take long do not hold up the work"
+        monkeypatch.undo()
+        utilities.drain()
         assert utilities.counts().dropped.get(Reason.LOST, 0) == 0
     executor.shutdown()
 

@@ -205,10 +205,10 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthNothing: 'Noch kein Messwert zu beurteilen',
   healthNoRange: 'Kein Messwert mit Idealbereich',
   healthFilter: ', nur diese Messpunkte anzeigen',
-  scanInterval: (interval) => `alle ${interval} eine Messung`,
+  scanInterval: (interval) => `je Messpunkt alle ${interval}`,
   houseLast: (age) => `letzte Messung vor ${age}`,
   houseNever: 'noch keine Messung',
-  houseLate: (age, interval) => `Seit ${age} keine Messung (sonst alle ${interval})`,
+  houseLate: (age, interval) => `Seit ${age} keine Messung (sonst je Messpunkt alle ${interval})`,
   houseOverdue: (count) =>
     count === 0
       ? 'kein Messpunkt überfällig'

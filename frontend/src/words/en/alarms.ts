@@ -217,11 +217,11 @@ export const HEALTH = {
   /** Of a tag that is unknown although it has recent readings. */
   healthNoRange: 'No reading with an ideal range',
   healthFilter: ', show only these tags',
-  scanInterval: (interval: string): string => `a scan every ${interval}`,
+  scanInterval: (interval: string): string => `each tag every ${interval}`,
   houseLast: (age: string): string => `last scan ${age} ago`,
   houseNever: 'no scan yet',
   houseLate: (age: string, interval: string): string =>
-    `No scan for ${age} (usually every ${interval})`,
+    `No scan for ${age} (usually each tag every ${interval})`,
   houseOverdue: (count: number): string =>
     count === 0 ? 'no tag overdue' : counted(count, 'tag overdue', 'tags overdue'),
   /** For screen readers. */

@@ -211,10 +211,11 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthNothing: 'Aún no hay lecturas que evaluar',
   healthNoRange: 'Ninguna lectura con rango ideal',
   healthFilter: ', mostrar solo estos puntos',
-  scanInterval: (interval) => `una medición cada ${interval}`,
+  scanInterval: (interval) => `cada punto cada ${interval}`,
   houseLast: (age) => `última medición hace ${age}`,
   houseNever: 'aún sin mediciones',
-  houseLate: (age, interval) => `Sin mediciones desde hace ${age} (normalmente cada ${interval})`,
+  houseLate: (age, interval) =>
+    `Sin mediciones desde hace ${age} (normalmente, cada punto cada ${interval})`,
   houseOverdue: (count) =>
     count === 0
       ? 'ningún punto con retraso'

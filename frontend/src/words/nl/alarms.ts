@@ -197,10 +197,10 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   healthNothing: 'Nog geen meetwaarde om te beoordelen',
   healthNoRange: 'Geen meetwaarde met een ideaal bereik',
   healthFilter: ', alleen deze meetpunten tonen',
-  scanInterval: (interval) => `elke ${interval} een meting`,
+  scanInterval: (interval) => `elk meetpunt elke ${interval}`,
   houseLast: (age) => `laatste meting ${age} geleden`,
   houseNever: 'nog geen meting',
-  houseLate: (age, interval) => `Al ${age} geen meting (normaal elke ${interval})`,
+  houseLate: (age, interval) => `Al ${age} geen meting (normaal elk meetpunt elke ${interval})`,
   houseOverdue: (count) =>
     count === 0
       ? 'alle meetpunten op tijd'

@@ -129,7 +129,8 @@ def measured(pattern: Pattern, tag: str, sensor: str, payload: bytes) -> Measure
         Rejected: a number is missing or out of range, or a name or the payload is too long.
 
     """
-    check_texts(tag, sensor)
+    check_texts("tag", tag)
+    check_texts("sensor", sensor)
     if len(payload) > MAX_PAYLOAD_BYTES:
         raise Rejected(f"it has more than {MAX_PAYLOAD_BYTES} bytes, the limit")
     if pattern.is_availability:

@@ -11,6 +11,7 @@ from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, tzinfo
+from decimal import Decimal
 from typing import Any, Final
 
 from lupin_twin.core.drops import MAX_SENSORS_PER_TAG, MAX_TEXT_LENGTH, Rejected
@@ -130,6 +131,13 @@ class Value:
     low: float = -math.inf
     high: float = math.inf
 
+    def convert(self, raw: float) -> float:
+        """Convert a number to the sensor's unit, without noise: 0.55 * 100 is 55 to people."""
+        if (self.factor, self.offset) == (1.0, 0.0) or not math.isfinite(raw):
+            return raw * self.factor
+        of, factor, offset = (Decimal(repr(it)) for it in (raw, self.factor, self.offset))
+        return float(f"{of * factor + offset:.15g}")
+
     def reading(self, raw: Any, what: str) -> float:
         """Convert a number, or its text, to the sensor's unit.
 
@@ -139,7 +147,7 @@ class Value:
         """
         try:
             # In Python, true is a number; as a temperature, it is not.
-            number = float("" if isinstance(raw, bool) else raw) * self.factor + self.offset
+            number = self.convert(float("" if isinstance(raw, bool) else raw))
         except (TypeError, ValueError, OverflowError):
             raise Rejected(f"{what} is {shown(raw)}, expected a number") from None
         if not math.isfinite(number):

@@ -28,10 +28,10 @@ class Rejected(ValueError):
     """A write or a reading that is refused; the message names the value and the limit."""
 
 
-def check_texts(*texts: str) -> None:
-    """Raise `Rejected` for a text longer than `MAX_TEXT_LENGTH` characters."""
+def check_texts(what: str, *texts: str) -> None:
+    """Raise `Rejected` for a text longer than `MAX_TEXT_LENGTH` characters; `what` names it."""
     for text in texts:
-        if why := too_long("text", text):
+        if why := too_long(what, text):
             raise Rejected(why)
 
 

@@ -9,9 +9,11 @@ number of the last one, it gets all that followed, late observations included, a
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import pairwise
+from statistics import median
 from typing import Final
 
 from lupin_twin.core.drops import too_long
@@ -29,6 +31,10 @@ SLOT_NS: Final = 300 * 1_000_000_000
 # The journal counts by the hour while it writes.
 HOUR_NS: Final = 3_600 * 1_000_000_000
 DAY_NS: Final = 24 * HOUR_NS
+# A shorter time without an attempt is no silence, whatever scan interval is usual.
+SILENCE_NS: Final = 600 * 1_000_000_000
+# A silence is longer than this many scan intervals.
+SILENT_INTERVALS: Final = 3
 # Later than any stamp: the largest integer of SQLite.
 FOREVER_NS: Final = 2**63 - 1
 # The `tag_id` of a query for events of the whole site.
@@ -64,6 +70,27 @@ class NotRemembered(RuntimeError):
 
 class NotFound(NotRemembered):
     """The requested data does not exist; repeating the request does not help."""
+
+
+def interval_ns(scans_ns: Sequence[int]) -> int | None:
+    """The median of the intervals between scans, oldest first; None: there are fewer than two."""
+    if len(scans_ns) < 2:
+        return None
+    return int(median(after - before for before, after in pairwise(scans_ns)))
+
+
+def usual_ns(tags: Iterable[Sequence[int]]) -> int | None:
+    """The usual interval between two scans of the same tag, by each tag's last scans.
+
+    Not of any two tags: a robot that rests after each round would seem to scan all the time.
+    """
+    found = [usual for scans_ns in tags if (usual := interval_ns(scans_ns)) is not None]
+    return int(median(found)) if found else None
+
+
+def silence_ns(tags: Iterable[Sequence[int]]) -> int:
+    """How long a time without an attempt has to be to be a silence, by each tag's last scans."""
+    return max(SILENCE_NS, SILENT_INTERVALS * (usual_ns(tags) or 0))
 
 
 def check_moment(at_ns: int, now_ns: int) -> None:
@@ -358,6 +385,11 @@ class PastWrites:
     writes: tuple[PastWrite, ...]
     last: int
     is_all: bool
+
+    @property
+    def first(self) -> int:
+        """The number of the first; without any, the next number."""
+        return self.writes[0].number if self.writes else self.last + 1
 
     @property
     def of_newest_run(self) -> list[PastWrite]:

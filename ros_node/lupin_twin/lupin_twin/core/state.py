@@ -276,7 +276,8 @@ class TwinStore:
             Rejected: a text or a list is over its limit; nothing is stored then.
 
         """
-        check_texts(scan.tag_id, *(reading.name for reading in scan.readings))
+        check_texts("tag_id", scan.tag_id)
+        check_texts("a reading's name", *(reading.name for reading in scan.readings))
         tag = self._tag(scan.tag_id)
         readings = {reading.name: reading for reading in tag.readings}
         for reading in scan.readings:
@@ -296,9 +297,9 @@ class TwinStore:
 
         """
         flower = inspection.flower
-        check_texts(inspection.tag_id)
+        check_texts("tag_id", inspection.tag_id)
         if flower is not None:
-            check_texts(flower.species, *(b.species for b in flower.blooms))
+            check_texts("species", flower.species, *(b.species for b in flower.blooms))
             check_length("flowers of a tag", len(flower.blooms), MAX_BLOOMS_PER_TAG)
             check_length("box_footprint points", len(flower.footprint), MAX_FOOTPRINT_POINTS)
         tag = self._tag(inspection.tag_id)
@@ -315,7 +316,7 @@ class TwinStore:
             Rejected: a text is over its limit, or there is one tag too many.
 
         """
-        check_texts(tag_id)
+        check_texts("tag_id", tag_id)
         tag = self._tag(tag_id)
         if tag.pose is None:
             self._store(replace(tag, pose=pose))

@@ -31,7 +31,7 @@ _KNOWN_MAX: Final = 100
 _EDGE_NOISE_CELLS: Final = 1e-4
 
 # Field cells that are looked up at once; bounds the memory.
-_CELLS_AT_ONCE: Final = 16_384
+CELLS_AT_ONCE: Final = 16_384
 
 # The fields that locate a map.
 _PLACE: Final = "frame_id", "width", "height", "resolution", "origin_x", "origin_y", "origin_yaw"
@@ -127,7 +127,7 @@ def explored_mask(
     if occupancy.cells.size == 0:
         return explored
     cos, sin = math.cos(occupancy.origin_yaw), math.sin(occupancy.origin_yaw)
-    rows_at_once = max(1, _CELLS_AT_ONCE // width)
+    rows_at_once = max(1, CELLS_AT_ONCE // width)
     for top in range(0, height, rows_at_once):
         band = y[top : top + rows_at_once, None]
         columns, on_columns = _indices(cos * x + sin * band, occupancy.resolution, occupancy.width)

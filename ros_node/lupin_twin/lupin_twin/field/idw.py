@@ -51,7 +51,7 @@ COINCIDENT_EPS_M: Final = 1e-3
 MAX_PAIRS: Final = 65_536
 # With fewer points than this per sample, numpy's loops are mostly overhead. It takes memory past
 # MAX_PAIRS only if more than two thousand samples reach one part.
-_MIN_POINTS: Final = 32
+MIN_POINTS: Final = 32
 
 # Up to this radius, weights are plain 1/d². Beyond it, and for any power but 2, they are scaled by
 # the nearest distance of the cell, so that none overflows and the largest is exactly 1.
@@ -290,7 +290,7 @@ class PairwiseIdw:
 
 def fits(samples: int, points: int) -> bool:
     """Whether this many samples and points are better evaluated at once than in parts."""
-    return samples * points <= MAX_PAIRS or points <= _MIN_POINTS
+    return samples * points <= MAX_PAIRS or points <= MIN_POINTS
 
 
 def _parts(

@@ -1,4 +1,3 @@
-# ruff: noqa: S608  # SQL is put together of constants
 """Counts for long views of the past, and the answers that are made of them.
 
 They are upserted in the transaction that writes the counted rows. By the hour: readings of each
@@ -19,14 +18,13 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from lupin_twin.core.history import KIND_TAG_READING
-from lupin_twin.core.past import HOUR_NS, Event, Grid, SeriesPast, grid
+from lupin_twin.core.past import HOUR_NS, SILENCE_NS, Event, Grid, SeriesPast, grid
 from lupin_twin.core.state import STATUS_OK
+from lupin_twin.journal import sql
 from lupin_twin.journal.rows import numbers_of
 from lupin_twin.journal.runs import Span
 from lupin_twin.journal.schema import DamagedFile, SiteLog, insert_into
 
-# A shorter time without an attempt is no silence, whatever interval is usual.
-SILENCE_NS: Final = 600 * 1_000_000_000
 # Followed by the number of a run: the last stamp of its deleted rows.
 DELETED: Final = "purged_ns:"
 # Followed by the number of a run: up to when the site's counts include rows forgotten since.
@@ -92,8 +90,8 @@ def extent(log: SiteLog, run: int) -> tuple[int, int] | None:
     found = [
         row
         for event in TALLIED
-        for sql in (_FIRST, _LAST)
-        for row in log.execute(sql, {"run": run, "event": event}).fetchall()
+        for end in (sql.FIRST_TALLY, sql.LAST_TALLY)
+        for row in log.execute(end, {"run": run, "event": event}).fetchall()
     ]
     return (min(found)[0], max(last for _, last in found)) if found else None
 
@@ -124,12 +122,6 @@ _ADD_TALLY: Final = (
     f"{insert_into('tally')}{_ADD},"
     " first_ns = min(first_ns, excluded.first_ns), last_ns = max(last_ns, excluded.last_ns)"
 )
-_ENDS: Final = (
-    "SELECT first_ns, last_ns FROM tally WHERE site = :site AND run = :run AND event = :event"
-    " ORDER BY hour {} LIMIT 1"
-)
-_FIRST: Final = _ENDS.format("ASC")
-_LAST: Final = _ENDS.format("DESC")
 
 
 # In the order of the tables, so that each of their pages is visited once.
@@ -162,16 +154,12 @@ _NOT_EVENT: Final = (
     "DELETE FROM event WHERE site = :site AND run = :run AND event = :event AND stamp_ns = :at"
     " AND seq = :seq"
 )
-_SILENCE_OVER: Final = (
-    "SELECT stamp_ns, stamp_ns + value FROM event WHERE site = :site AND run = :run"
-    " AND event = :event AND stamp_ns < :at ORDER BY stamp_ns DESC LIMIT 1"
-)
 
 
 def silence_over(log: SiteLog, run: int, at_ns: int) -> tuple[int, int] | None:
     """The attempts around a moment, if a silence lies between them; the later may be at it."""
     query = {"run": run, "event": Event.SILENCES, "at": at_ns}
-    found = log.execute(_SILENCE_OVER, query).fetchone()
+    found = log.execute(sql.SILENCE_BEFORE, query).fetchone()
     return (found[0], found[1]) if found and found[1] >= at_ns else None
 
 
@@ -280,10 +268,10 @@ class Part:
         self._of = of
         self._deleted_ns = deleted_ns(log, span.run.id) if table.hours else -1
 
-    def ask(self, sql: str, span: Span | None = None, /, **more: int) -> list[tuple[Any, ...]]:
+    def ask(self, select: str, span: Span | None = None, /, **more: int) -> list[tuple[Any, ...]]:
         """Execute SQL over a part of the span, or all of it; returns the rows."""
         query = {**bounds(span or self.span), **self._of, **more}
-        return list(self._log.execute(sql, query).fetchall())
+        return list(self._log.execute(select, query).fetchall())
 
     def is_deleted(self) -> bool:
         """Whether some of it is left only as hourly counts."""
@@ -296,7 +284,7 @@ class Part:
         """Number of values, by the hourly counts."""
         if not self._table.hours:
             return 0
-        return int(self.ask(f"SELECT coalesce(sum(n), 0) {self._table.hours}")[0][0])
+        return int(self.ask(sql.total(self._table.hours))[0][0])
 
     def oldest(self) -> list[int]:
         """The first stamp, or the beginning of the first hour where rows were deleted."""
@@ -308,8 +296,7 @@ class Part:
 
     def count(self, most: int) -> int:
         """Number of values; counting ends at `most`."""
-        first = f"(SELECT stamp_ns {self._table.rows} LIMIT :most) AS first"
-        return int(self.ask(f"SELECT count(*) FROM {first}", most=most)[0][0])
+        return int(self.ask(sql.count(self._table.rows), most=most)[0][0])
 
     def entries(self, span: Span | None = None) -> list[Entry]:
         """Entries within a part of the span, or all of it."""
@@ -324,8 +311,7 @@ class Part:
         if self._table.hours and steps.bucket_ns >= HOUR_NS:
             hours, rest = whole_hours(self.span, self._deleted_ns)
             for index, count, *numbers in self.ask(
-                "SELECT (hour - :origin) / :width AS bucket, sum(n), sum(total), min(low),"
-                f" max(high) {self._table.hours} GROUP BY bucket",
+                sql.buckets(self._table.hours),
                 first=hours[0],
                 last=hours[1],
                 origin=steps.start_ns // HOUR_NS,

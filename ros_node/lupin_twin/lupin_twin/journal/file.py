@@ -48,8 +48,8 @@ from lupin_twin.journal.writes import number_of, put_note
 # A file up to this size is checked for damage when it is opened: a quarter of a second.
 _CHECKED_BYTES: Final = 64_000_000
 # The WAL is checkpointed at this size: the larger it is, the fewer pages are written twice.
-_LOG_BYTES: Final = 8_000_000
-_PURGE_EVERY_S: Final = 60.0
+LOG_BYTES: Final = 8_000_000
+PURGE_EVERY_S: Final = 60.0
 _POLL_EVERY_S: Final = 1.0
 # Least time between two maps that are written: a robot that explores sends one every second.
 _MAP_REST_S: Final = 10.0
@@ -344,13 +344,13 @@ class JournalFile:
                 self.lost_log = f"{self._log} was removed: restart the twin, nothing is lost so far"
         # A removed WAL is lost when the process ends, so its content goes into the file at once. We
         # cannot begin a new one, because readers still have the old one open.
-        if self.lost_log or size_of(self._log) > _LOG_BYTES:
+        if self.lost_log or size_of(self._log) > LOG_BYTES:
             self._connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
         return may_purge and self._purge(now_s)
 
     def _purge(self, now_s: float) -> bool:
         if self._purges_before_ns is None and not self._is_shrinking:
-            if now_s - self._purged_s < _PURGE_EVERY_S:
+            if now_s - self._purged_s < PURGE_EVERY_S:
                 return False
             self._purged_s = now_s
             with self._transaction():

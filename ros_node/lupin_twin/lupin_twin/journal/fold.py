@@ -31,39 +31,13 @@ from lupin_twin.core.state import (
     TagState,
     Write,
 )
+from lupin_twin.journal import sql
 from lupin_twin.journal.rows import flower_of, listed_rows, named_numbers
 from lupin_twin.journal.runs import Run, runs, since_seq, span_at
 from lupin_twin.journal.schema import LOCAL_SITE
 
 # Approximate cost of a state, seconds of one core for each tag.
 STATE_S_PER_TAG: Final = 1e-5
-
-_NEWEST: Final = (
-    "(SELECT seq FROM scan WHERE site = s.site AND series = s.series AND stamp_ns <= :at"
-    " AND seq >= :since {but}ORDER BY stamp_ns DESC, seq DESC LIMIT 1)"
-)
-_SCANS: Final = (
-    "SELECT s.series, s.tag, s.kind, s.sensors, r.seq, r.stamp_ns, r.status, r.detail, r.readings"
-    " FROM series AS s CROSS JOIN scan AS r"
-    " WHERE s.site = :site AND s.run = :run {which} AND r.site = s.site AND r.seq = {newest}"
-)
-_INSPECTIONS: Final = (
-    "SELECT s.series, s.tag, r.seq, r.stamp_ns, r.species, r.confidence, r.anomaly,"
-    " r.flower_count, r.bug_count, r.blooms, r.box"
-    " FROM series AS s JOIN look AS r ON r.site = s.site"
-    " AND r.seq = (SELECT seq FROM look WHERE site = s.site AND run = s.run AND tag = s.tag"
-    " AND stamp_ns <= :at AND seq >= :since ORDER BY stamp_ns DESC, seq DESC LIMIT 1)"
-    " WHERE s.site = :site AND s.run = :run AND s.kind = 1"
-)
-_FIRST_FAILURE: Final = (
-    "SELECT min(stamp_ns) FROM series AS s JOIN scan AS r ON r.site = s.site"
-    " AND r.series = s.series WHERE s.site = :site AND run = :run AND tag = :tag"
-    " AND seq >= :since AND stamp_ns <= :at"
-)
-_PLACES: Final = (
-    "SELECT seq, tag, stamp_ns, x, y, z, qx, qy, qz, qw FROM place"
-    " WHERE site = :site AND run = :run ORDER BY seq"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,12 +108,8 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> FoldedState
     last_attempts: dict[str, tuple[int, int, int, str]] = {}
     observed: dict[str, int] = {}
     found: dict[str, list[tuple[int, int, tuple[Reading, ...]]]] = {}
-    scans = execute(_SCANS.format(newest=_NEWEST.format(but=""), which=""), query).fetchall()
-    scans.sort()
-    # In a series without sensors, the latest row may be a failure, and an earlier one a success.
-    succeeded = _NEWEST.format(but=f"AND status = {STATUS_OK} AND readings = '[]' ")
-    which = f"AND s.kind = {KIND_TAG_READING} AND s.sensors = '[]'"
-    scans += execute(_SCANS.format(newest=succeeded, which=which), query).fetchall()
+    scans = sorted(execute(sql.STATE_SCANS, query).fetchall())
+    scans += execute(sql.STATE_BARE_SCANS, query).fetchall()
     for row, readings in zip(scans, _readings(scans), strict=True):
         series, tag, kind, _, seq, stamp_ns, status, detail, _ = row
         first.setdefault(tag, series)
@@ -151,7 +121,7 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> FoldedState
                 observed[tag] = stamp_ns
             found.setdefault(tag, []).append((stamp_ns, seq, readings))
     flowers: dict[str, tuple[int, Flower]] = {}
-    inspections = execute(_INSPECTIONS, query).fetchall()
+    inspections = execute(sql.STATE_INSPECTIONS, query).fetchall()
     for series, tag, seq, stamp_ns, *flower in inspections:
         first[tag] = min(series, first.get(tag, series))
         last_attempts[tag] = max(
@@ -161,7 +131,7 @@ def _known(connection: sqlite3.Connection, query: dict[str, Any]) -> FoldedState
         flowers[tag] = (stamp_ns, flower_of(flower))
     poses, placed_ns = _places(execute, query, first)
     failed = {
-        tag: execute(_FIRST_FAILURE, query | {"tag": tag}).fetchone()[0]
+        tag: execute(sql.FIRST_FAILURE, query | {"tag": tag}).fetchone()[0]
         for tag in last_attempts.keys() - observed.keys()
     }
     tags = sorted(first, key=first.__getitem__)
@@ -193,7 +163,7 @@ def _places(
     """The pose of each tag, from its first row, and the time from which the tag has one."""
     placed_ns: dict[str, int] = {}
     rows: dict[str, tuple[Any, ...]] = {}
-    for row in execute(_PLACES, query).fetchall():
+    for row in execute(sql.PLACES, query).fetchall():
         _, tag, stamp_ns = row[:3]
         if tag not in rows:
             rows[tag], placed_ns[tag] = row, stamp_ns
@@ -203,7 +173,7 @@ def _places(
     for seq, tag, *_ in known:
         if seq < first.get(tag, FOREVER_NS):
             first[tag] = seq
-    return {tag: Pose(*pose) for _, tag, _, *pose in known}, placed_ns
+    return {row[1]: Pose(*row[5:]) for row in known}, placed_ns
 
 
 def _latest(scans: Sequence[tuple[int, int, tuple[Reading, ...]]]) -> tuple[Reading, ...]:
@@ -247,7 +217,7 @@ def copies(connection: sqlite3.Connection, run: Run, *, places_only: bool) -> li
 
 
 def _readings(rows: list[tuple[Any, ...]]) -> list[tuple[Reading, ...]]:
-    """The readings of rows that `_SCANS` selects."""
+    """The readings of rows that `sql.STATE_SCANS` selects."""
     every = named_numbers((row[3] for row in rows), [row[8] for row in rows])
     return [
         tuple(map(Reading, names, values, repeat(row[5])))

@@ -23,6 +23,7 @@ from typing import Any, Final, NamedTuple
 
 from lupin_twin.core.parameters import World
 from lupin_twin.core.past import FOREVER_NS, HOUR_NS, Event
+from lupin_twin.journal import sql
 from lupin_twin.journal.appending import PURGED_SEQ, simulated
 from lupin_twin.journal.counts import DELETED, FORGOTTEN, TALLIED, count_rows
 from lupin_twin.journal.retention import (
@@ -56,6 +57,8 @@ from lupin_twin.journal.writes import id_behind, number_of
 
 MAX_ROWS: Final = 2_000
 _MAX_BYTES: Final = 1_000_000
+# Newest notes in each lot.
+_NOTES: Final = 20
 # Ordered as rows with the same number have to be written.
 _NUMBERED: Final = ("series", "scan", "look", "place", "note")
 _COPIED: Final = {*_NUMBERED, "run", "meta", "hour", "tally", "event"}
@@ -157,6 +160,9 @@ def read(connection: sqlite3.Connection, after: int, most: int = MAX_ROWS) -> Lo
     found, last, is_all = rows_behind(log, after, most)
     found += [("meta", row) for row in _all(log, "meta") if row[1].startswith(_FACTS)]
     found.append(("meta", ("", _UP_TO, _up_to(connection, after))))
+    # A note that was made in the fleet has a number of there, which may not be after this one.
+    notes = log.execute(sql.NEWEST_NOTES, {"most": _NOTES}).fetchall()
+    found += [("note", ("", *note)) for note in notes]
     if after == 0:
         begun = max(last_row(log)[0], _gone_seq(connection))
         found.append(("meta", ("", _BEGUN, str(begun))))
@@ -315,8 +321,10 @@ def _put(connection: sqlite3.Connection, lot: Lot) -> None:
             counted.append((table, row))
         elif table not in WRITTEN or row[0] > after:
             is_anew = table in {"run", "meta"}
-            sql = upsert_into(table) if is_anew else f"{insert_into(table)} ON CONFLICT DO NOTHING"
-            connection.execute(sql, (LOCAL_SITE, *row))
+            statement = (
+                upsert_into(table) if is_anew else f"{insert_into(table)} ON CONFLICT DO NOTHING"
+            )
+            connection.execute(statement, (LOCAL_SITE, *row))
     # Another process may have written later counts.
     if lot.last >= after:
         log.execute(_OTHER_EVENTS, {"after": after, "last": lot.last, "every": False})

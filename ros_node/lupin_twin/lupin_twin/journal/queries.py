@@ -1,4 +1,3 @@
-# ruff: noqa: S608  # SQL is put together of constants
 """Queries over a period: one sensor of one tag, or events of one tag or of the whole site.
 
 The answer has each reading or event, or buckets of them, as in GetHistory.srv. Queries go by spans:
@@ -9,25 +8,26 @@ deleted; rare events are stored one by one.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
-from statistics import median
 from typing import Any, Final
 
-from lupin_twin.core.history import KIND_TAG_READING
 from lupin_twin.core.past import (
     EVERY_TAG,
     FOREVER_NS,
-    HOUR_NS,
     MAX_POINTS,
+    RECENT_COUNT,
+    SILENCE_NS,
     Event,
     SeriesPast,
     SeriesRequest,
     grid,
+    silence_ns,
 )
+from lupin_twin.journal import sql
 from lupin_twin.journal.counts import (
-    SILENCE_NS,
     TALLIED,
     Buckets,
     Entry,
@@ -35,7 +35,6 @@ from lupin_twin.journal.counts import (
     Table,
     answer,
     bounds,
-    deleted_ns,
     extent,
     individually,
     is_counted,
@@ -50,15 +49,6 @@ SERIES_S: Final = 0.01
 SERIES_S_PER_TAG: Final = 1e-5
 # Approximate cost of the latest readings of a sensor, s for each tag.
 NEWEST_S_PER_TAG: Final = 3e-4
-
-_WITHIN: Final = (
-    "FROM scan WHERE site = :site AND series = :series AND stamp_ns >= :start AND stamp_ns < :end"
-    " AND is_copy = 0"
-)
-_HOURS_WITHIN: Final = (
-    "FROM hour WHERE site = :site AND series = :series AND hour >= :first AND hour < :last"
-    " AND sensor = :place"
-)
 
 
 def series(connection: Any, request: SeriesRequest, now_ns: int) -> SeriesPast:
@@ -78,18 +68,6 @@ def series(connection: Any, request: SeriesRequest, now_ns: int) -> SeriesPast:
     return answer(partial(_parts, log, request), start_ns, end_ns, request.max_points)
 
 
-# For each series, rows from the stamp of the oldest that counts; LIMIT keeps that search separate.
-_NEWEST: Final = (
-    "SELECT s.tag, r.stamp_ns, r.seq, r.readings FROM (SELECT s.*, coalesce((SELECT stamp_ns"
-    " FROM scan WHERE site = s.site AND series = s.series AND stamp_ns >= :start"
-    " AND stamp_ns < :end AND is_copy = 0 ORDER BY stamp_ns DESC LIMIT 1 OFFSET :more), :start)"
-    " AS first_ns FROM series AS s WHERE s.site = :site AND s.run = :run AND s.kind = 0"
-    " AND s.sensors = :sensors LIMIT 1000000) AS s CROSS JOIN scan AS r WHERE r.site = s.site"
-    " AND r.series = s.series AND r.stamp_ns >= s.first_ns AND r.stamp_ns < :end AND r.is_copy = 0"
-)
-_SETS: Final = "SELECT DISTINCT sensors FROM series WHERE site = :site AND run = :run AND kind = 0"
-
-
 def newest(
     connection: Any, sensor_type: str, start_ns: int, end_ns: int, each: int
 ) -> dict[str, list[tuple[int, float]]]:
@@ -101,12 +79,12 @@ def newest(
     found: dict[str, list[Entry]] = {}
     for span in cut(spans(runs(log.execute)), start_ns, end_ns):
         within = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
-        for (text,) in log.execute(_SETS, within).fetchall():
+        for (text,) in log.execute(sql.SENSORS, within).fetchall():
             names = sensor_names(text)
             if sensor_type not in names:
                 continue
             query = within | {"sensors": text, "more": each - 1}
-            rows = log.execute(_NEWEST, query).fetchall()
+            rows = log.execute(sql.RECENT_READINGS, query).fetchall()
             place = names.index(sensor_type)
             every = named_numbers([text] * len(rows), [row[-1] for row in rows])
             for (tag, stamp_ns, seq, _), (_, values) in zip(rows, every, strict=True):
@@ -121,17 +99,13 @@ def newest(
 def _parts(log: SiteLog, request: SeriesRequest, start_ns: int, end_ns: int) -> list[Part]:
     found = []
     for span in cut(spans(runs(log.execute)), start_ns, end_ns):
-        of_run = {"run": span.run.id, "tag": request.tag_id, "kind": KIND_TAG_READING}
-        for number, text in log.execute(
-            "SELECT series, sensors FROM series WHERE site = :site AND run = :run AND tag = :tag"
-            " AND kind = :kind ORDER BY series",
-            of_run,
-        ).fetchall():
+        of_run = {"run": span.run.id, "tag": request.tag_id}
+        for number, text in log.execute(sql.SERIES, of_run).fetchall():
             names = sensor_names(text)
             if request.sensor_type in names:
                 place = names.index(request.sensor_type)
                 read = partial(_at, text, place)
-                table = Table(_WITHIN, "readings", read, _HOURS_WITHIN)
+                table = Table(sql.READINGS, "readings", read, sql.HOURS)
                 found.append(Part(log, span, table, {"series": number, "place": place}))
     return found
 
@@ -142,53 +116,17 @@ def _at(sensors: str, place: int, texts: list[str]) -> list[float]:
 
 # --- what happened -------------------------------------------------------------------------------
 
-# A silence is longer than this many median intervals between the attempts of the period.
-INTERVALS: Final = 3
-
 # The first and the last attempt of a period without a silence.
 Extent = tuple[int, int]
 
-# Rows that are no copies, of all tags or of one.
-FROM_SCAN: Final = (
-    "FROM series CROSS JOIN scan WHERE series.site = :site AND run = :run{tag}"
-    " AND scan.site = :site AND scan.series = series.series"
-    " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
-)
-_FROM_INSPECTION: Final = (
-    "FROM look WHERE site = :site AND run = :run{tag}"
-    " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
-)
-_FROM_EVENT: Final = (
-    "FROM event WHERE site = :site AND run = :run AND event = :event{tag}"
-    " AND stamp_ns >= :start AND stamp_ns < :end"
-)
 # By event: the column of its value, and the rows that it is read from.
 _ROWS: Final = {
-    Event.SCANS: ("sensors", f"{FROM_SCAN} AND kind = 0 AND status = 0"),
-    Event.FAILURES: ("status", f"{FROM_SCAN} AND status != 0"),
-    Event.INSPECTIONS: ("bug_count", _FROM_INSPECTION),
-    Event.PESTS_SEEN: ("value", _FROM_EVENT),
-    Event.PESTS_CLEARED: ("value", _FROM_EVENT),
+    Event.SCANS: ("sensors", f"{sql.SCANS} AND kind = 0 AND status = 0"),
+    Event.FAILURES: ("status", f"{sql.SCANS} AND status != 0"),
+    Event.INSPECTIONS: ("bug_count", sql.INSPECTIONS),
+    Event.PESTS_SEEN: ("value", sql.EVENTS),
+    Event.PESTS_CLEARED: ("value", sql.EVENTS),
 }
-_STAMPS: Final = f"SELECT stamp_ns {FROM_SCAN} UNION ALL SELECT stamp_ns {_FROM_INSPECTION}"
-# A few steps in the index for each series.
-_IN_SERIES: Final = (
-    "(SELECT {0}(stamp_ns) FROM scan WHERE site = s.site AND series = s.series"
-    " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0)"
-)
-_ENDS: Final = (
-    f"SELECT min({_IN_SERIES.format('min')}), max({_IN_SERIES.format('max')})"
-    " FROM series AS s WHERE site = :site AND run = :run{tag}"
-    f" UNION ALL SELECT min(stamp_ns), max(stamp_ns) {_FROM_INSPECTION}"
-)
-_FROM_TALLY: Final = (
-    "FROM tally WHERE site = :site AND run = :run AND hour >= :first AND hour < :last"
-)
-_SILENCES: Final = (
-    "SELECT stamp_ns, stamp_ns + value FROM event WHERE site = :site AND run = :run"
-    " AND event = :event AND value > :longest AND stamp_ns < :end AND stamp_ns + value > :start"
-    " AND stamp_ns >= :least AND stamp_ns + value <= :most ORDER BY stamp_ns"
-)
 
 
 def _events(log: SiteLog, request: SeriesRequest, now_ns: int) -> SeriesPast:
@@ -244,8 +182,7 @@ def _silences(
     Before the first known attempt, there is no silence.
     """
     start_ns, end_ns = period
-    within = cut(axis, start_ns, end_ns)
-    longest_ns = max(SILENCE_NS, int(INTERVALS * _usual_ns(source, within, end_ns - start_ns)))
+    longest_ns = silence_ns(source.scans(axis, end_ns))
     earlier = [span for span in axis if span.end_ns <= start_ns]
     held = [span for span in axis if span.end_ns > start_ns and span.start_ns < end_ns]
     later = [span for span in axis if span.start_ns >= end_ns]
@@ -263,16 +200,6 @@ def _silences(
             begun_ns, ended_ns = max(silent_ns, start_ns), min(until_ns, end_ns)
             if begun_ns < ended_ns:
                 yield begun_ns, (ended_ns - begun_ns) / 1e9
-
-
-def _usual_ns(source: _Source, within: Sequence[Span], period_ns: int) -> float:
-    """The median interval between attempts, ns; 0 if it is too short to matter."""
-    # With more attempts, half of the intervals cannot be long enough to matter within the period.
-    most = 1 + 2 * INTERVALS * period_ns / SILENCE_NS
-    if sum(source.attempts(span) for span in within) > most:
-        return 0.0
-    stamps = sorted(stamp_ns for span in within for stamp_ns in source.stamps(span))
-    return median(b - a for a, b in pairwise(stamps)) if len(stamps) > 1 else 0.0
 
 
 def _outermost(source: _Source, axis: Iterable[Span], which: int) -> int | None:
@@ -299,37 +226,21 @@ class _Source:
         """The events of a period, by spans."""
         value, rows = _ROWS[event]
         is_tallied = self.tag is None and event in TALLIED
-        hours = f"{_FROM_TALLY} AND event = :event" if is_tallied else ""
-        table = Table(self._of_tag(rows), value, _numbers, hours)
+        hours = f"{sql.TALLIES} AND event = :event" if is_tallied else ""
+        table = Table(sql.of_tag(rows, self.tag), value, _numbers, hours)
         of = {"tag": self.tag, "event": event}
         return [
             Part(self._log, span, table, of | {"run": span.run.id})
             for span in cut(axis, start_ns, end_ns)
         ]
 
-    def attempts(self, span: Span) -> int:
-        """Number of attempts, at least."""
-        if self.tag is not None:
-            return 0
-        first, last = -(-span.start_ns // HOUR_NS), span.end_ns // HOUR_NS
-        sql = f"SELECT coalesce(sum(n), 0) {_FROM_TALLY}"
-        return int(self.ask(sql, span, first=first, last=last)[0][0])
-
-    def stamps(self, span: Span) -> Iterator[int]:
-        """The stamp of each attempt; deleted attempts of the site are spread over their hour."""
-        kept_ns = 0
-        if self.tag is None:
-            kept_ns = (deleted_ns(self._log, span.run.id) // HOUR_NS + 1) * HOUR_NS
-        for part in cut([span], kept_ns, FOREVER_NS):
-            for (stamp_ns,) in self.ask(_STAMPS, part):
-                yield stamp_ns
-        for part in cut([span], 0, kept_ns):
-            sql = f"SELECT n, first_ns, last_ns {_FROM_TALLY}"
-            for n, first_ns, last_ns in self.ask(sql, part):
-                for number in range(n):
-                    stamp_ns = first_ns + (last_ns - first_ns) * number // max(1, n - 1)
-                    if part.start_ns <= stamp_ns < part.end_ns:
-                        yield stamp_ns
+    def scans(self, axis: Sequence[Span], end_ns: int) -> list[list[int]]:
+        """Each tag's last attempts to scan it before a moment, oldest first."""
+        found = defaultdict[str, list[int]](list)
+        for span in cut(axis, 0, end_ns)[-1:]:
+            for tag, stamp_ns in self.ask(sql.RECENT_STAMPS, span, more=RECENT_COUNT - 1):
+                found[tag].append(stamp_ns)
+        return [sorted(stamps)[-RECENT_COUNT:] for stamps in found.values()]
 
     def stretches(self, span: Span, longest_ns: int, period: Extent) -> Iterable[Extent]:
         """The attempts of a period and the next ones on both sides, as extents in order.
@@ -337,7 +248,7 @@ class _Source:
         Attempts that follow each other within `longest_ns` may be in one extent.
         """
         if self.tag is not None:
-            found = [stamp_ns for part in cut([span], *period) for stamp_ns in self.stamps(part)]
+            found = [row[0] for part in cut([span], *period) for row in self.ask(sql.STAMPS, part)]
             for part in cut([span], 0, period[0]):
                 found += (self.ends(part) or ())[1:]
             for part in cut([span], period[1], FOREVER_NS):
@@ -348,14 +259,14 @@ class _Source:
             return []
         query = {"run": span.run.id, "event": Event.SILENCES, "longest": longest_ns}
         query |= {"start": period[0], "end": period[1], "least": ends[0], "most": ends[1]}
-        silences = self._log.execute(_SILENCES, query).fetchall()
+        silences = self._log.execute(sql.SILENCES, query).fetchall()
         edges = [ends[0], *(at_ns for silence in silences for at_ns in silence), ends[1]]
         return list(zip(edges[::2], edges[1::2], strict=True))
 
     def ends(self, span: Span) -> Extent | None:
         """The first and the last attempt; None if there was none."""
         if self.tag is not None:
-            found = [row for row in self.ask(_ENDS, span) if row[0] is not None]
+            found = [row for row in self.ask(sql.ENDS, span) if row[0] is not None]
             return (min(found)[0], max(last for _, last in found)) if found else None
         every = extent(self._log, span.run.id)
         if every is None or every[1] < span.start_ns or every[0] >= span.end_ns:
@@ -376,18 +287,15 @@ class _Source:
         if over is not None:
             return over[which]
         start_ns = at_ns if which else at_ns - SILENCE_NS
-        rows = self.ask(_ENDS, Span(run, start_ns, start_ns + SILENCE_NS + 1))
+        rows = self.ask(sql.ENDS, Span(run, start_ns, start_ns + SILENCE_NS + 1))
         found: list[int] = [row[1 - which] for row in rows if row[0] is not None]
         if not found:  # its rows are deleted
             return at_ns
         return min(found) if which else max(found)
 
-    def ask(self, sql: str, span: Span, **more: int) -> list[tuple[Any, ...]]:
+    def ask(self, select: str, span: Span, **more: int) -> list[tuple[Any, ...]]:
         query = bounds(span) | {"run": span.run.id, "tag": self.tag} | more
-        return list(self._log.execute(self._of_tag(sql), query).fetchall())
-
-    def _of_tag(self, sql: str) -> str:
-        return sql.replace("{tag}", "" if self.tag is None else " AND tag = :tag")
+        return list(self._log.execute(sql.of_tag(select, self.tag), query).fetchall())
 
 
 def _numbers(values: list[int | str]) -> list[float]:

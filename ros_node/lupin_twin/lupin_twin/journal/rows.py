@@ -1,4 +1,3 @@
-# ruff: noqa: S608  # SQL is put together of constants
 """Reads scans and inspections from the journal's tables, and parses the JSON in them."""
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from lupin_twin.core.drops import valid_text
 from lupin_twin.core.history import KIND_FLOWER, LatestRequest
 from lupin_twin.core.past import FOREVER_NS
 from lupin_twin.core.state import STATUS_OK, Bloom, Flower, Inspection, Reading, Scan, Write
+from lupin_twin.journal import sql
 from lupin_twin.journal.runs import Run, runs, span_at
 from lupin_twin.journal.schema import LOCAL_SITE, WRITTEN, DamagedFile, SiteLog
 
@@ -27,7 +27,6 @@ def weight(write: Write) -> int:
     return 1
 
 
-_OF_RUN: Final = "r.site = :site AND r.run = :run"
 # More than all publishers of a robot latch.
 LATCHED: Final = 1_000
 
@@ -35,14 +34,10 @@ LATCHED: Final = 1_000
 def last_rows(connection: sqlite3.Connection, run: Run, most: int) -> list[Scan | Inspection]:
     """The last scans and inspections that were received in a run, in that order."""
     query = {"site": LOCAL_SITE, "run": run.id, "since": run.begun_seq, "most": most}
-    last = " AND r.seq >= :since ORDER BY r.seq DESC LIMIT :most"
-    found = _rows(
-        connection,
-        "scan AS r CROSS JOIN series AS s ON s.site = r.site AND s.series = r.series"
-        f" WHERE r.site = :site AND s.run = :run{last}",
-        f"look AS r WHERE {_OF_RUN}{last}",
-        query,
-    )
+    found = [
+        *_scans(connection, sql.LAST_SCANS, query),
+        *_inspections(connection, sql.LAST_INSPECTIONS, query),
+    ]
     return [row for _, row in sorted(found, key=lambda entry: entry[0])[-most:]]
 
 
@@ -53,11 +48,7 @@ def outermost(
     return [
         row
         for table in tables
-        for row in log.execute(
-            f"SELECT seq, stamp_ns, arrival_ns FROM {table} WHERE site = :site AND seq <= :upto"
-            f" ORDER BY seq {way} LIMIT 1",
-            {"upto": upto},
-        ).fetchall()
+        for row in log.execute(sql.outermost(table, way), {"upto": upto}).fetchall()
     ]
 
 
@@ -67,28 +58,15 @@ def last_row(log: SiteLog, upto: int = FOREVER_NS) -> tuple[int, int, int]:
 
 
 def latest(connection: sqlite3.Connection, request: LatestRequest) -> list[Scan | Inspection]:
-    """The last scans and inspections of a tag in the current run, in the order of arrival.
-
-    Each series is read by itself, which is fast in both SQLite and PostgreSQL.
-    """
+    """The last scans and inspections of a tag in the current run, in the order of arrival."""
     span = span_at(runs(connection.execute), FOREVER_NS)
     if span is None:
         return []
     parameters: dict[str, Any] = {"site": LOCAL_SITE, "run": span.run.id}
     parameters |= {"tag": request.tag_id, "depth": request.count}
-    of_tag = "s.site = :site AND s.run = :run AND s.tag = :tag"
-    newest = " ORDER BY r.stamp_ns DESC, r.seq DESC LIMIT :depth"
-    found = _inspections(
-        connection, f"look AS r WHERE {_OF_RUN} AND r.tag = :tag{newest}", parameters
-    )
-    of_tag = f"SELECT series FROM series AS s WHERE {of_tag}"
-    for (number,) in connection.execute(of_tag, parameters).fetchall():
-        found += _scans(
-            connection,
-            "series AS s CROSS JOIN scan AS r WHERE s.site = :site AND s.series = :series"
-            f" AND r.site = s.site AND r.series = s.series{newest}",
-            parameters | {"series": number},
-        )
+    found = _inspections(connection, sql.LATEST_INSPECTIONS, parameters)
+    for (number,) in connection.execute(sql.SERIES_OF_TAG, parameters).fetchall():
+        found += _scans(connection, sql.LATEST_SCANS, parameters | {"series": number})
     return [row for _, row in sorted(found, key=lambda entry: entry[0])]
 
 
@@ -101,32 +79,17 @@ def listed_rows(
     """The scans and inspections of a run with these seqs, as (seq, write)."""
     query = {"site": LOCAL_SITE, "run": run, "scans": json.dumps(scans)}
     query["looks"] = json.dumps(inspections)
-    return _rows(
-        connection,
-        "scan AS r CROSS JOIN series AS s ON s.site = r.site AND s.series = r.series"
-        " WHERE r.site = :site AND r.seq IN (SELECT value FROM json_each(:scans)) AND s.run = :run",
-        "look AS r WHERE r.site = :site AND r.seq IN (SELECT value FROM json_each(:looks))"
-        " AND r.run = :run",
-        query,
-    )
-
-
-def _rows(
-    connection: sqlite3.Connection, scans: str, inspections: str, query: dict[str, Any]
-) -> list[tuple[int, Scan | Inspection]]:
-    """Scans and inspections (`r`), as (seq, write), from these joins with the series (`s`)."""
-    return [*_scans(connection, scans, query), *_inspections(connection, inspections, query)]
+    return [
+        *_scans(connection, sql.LISTED_SCANS, query),
+        *_inspections(connection, sql.LISTED_INSPECTIONS, query),
+    ]
 
 
 def _scans(
-    connection: sqlite3.Connection, joined: str, query: dict[str, Any]
+    connection: sqlite3.Connection, select: str, query: dict[str, Any]
 ) -> list[tuple[int, Scan | Inspection]]:
     found: list[tuple[int, Scan | Inspection]] = []
-    rows = connection.execute(
-        "SELECT seq, tag, kind, sensors, readings, stamp_ns, own_stamp_ns, arrival_ns, status,"
-        f" source, mission, detail FROM {joined}",
-        query,
-    ).fetchall()
+    rows = connection.execute(select, query).fetchall()
     every = named_numbers((row[3] for row in rows), [row[4] for row in rows])
     for row, (names, values) in zip(rows, every, strict=True):
         seq, tag, kind, _, _, stamp_ns, own_ns, arrival_ns, *reported = row
@@ -142,14 +105,11 @@ def _scans(
 
 
 def _inspections(
-    connection: sqlite3.Connection, joined: str, query: dict[str, Any]
+    connection: sqlite3.Connection, select: str, query: dict[str, Any]
 ) -> list[tuple[int, Scan | Inspection]]:
     found: list[tuple[int, Scan | Inspection]] = []
-    for seq, tag, stamp_ns, own_ns, arrival_ns, source, mission, *flower in connection.execute(
-        "SELECT seq, r.tag, stamp_ns, own_stamp_ns, arrival_ns, source, mission, species,"
-        f" confidence, anomaly, flower_count, bug_count, blooms, box FROM {joined}",
-        query,
-    ).fetchall():
+    for row in connection.execute(select, query).fetchall():
+        seq, tag, stamp_ns, own_ns, arrival_ns, source, mission, *flower = row
         sent_ns = stamp_ns if own_ns is None else own_ns
         seen = flower_of(flower)
         reported = (None, STATUS_OK, "", source, sent_ns, mission, arrival_ns)

@@ -20,6 +20,7 @@ from typing import Any, Final
 from lupin_twin.core.diagnostics import origin_of
 from lupin_twin.core.parameters import DAY_S, World
 from lupin_twin.core.past import FOREVER_NS
+from lupin_twin.journal import sql
 from lupin_twin.journal.schema import DAY_LENGTH, LOCAL_SITE, ORIGIN, SiteLog, insert_into
 
 # A wall clock that is set back by at most this was only corrected: the run goes on.
@@ -79,11 +80,7 @@ def runs(execute: Callable[..., Any]) -> list[Run]:
     """Every run and step, in the order in which they began; in SQLite or PostgreSQL."""
     return [
         Run(row[0], Clock(row[2], row[3], bool(row[1])), row[4], row[5], row[6])
-        for row in execute(
-            "SELECT run, is_simulated, begun_stamp_ns, begun_arrival_ns, begun_seq, joins,"
-            " ended_stamp_ns FROM run WHERE site = :site ORDER BY run",
-            {"site": LOCAL_SITE},
-        ).fetchall()
+        for row in execute(sql.RUNS, {"site": LOCAL_SITE}).fetchall()
     ]
 
 

@@ -34,6 +34,8 @@ from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
 
+from lupin_twin.journal import sql
+
 APPLICATION_ID: Final = 0x4C55504A  # "LUPJ"
 VERSION: Final = 5
 # Earlier versions that are upgraded (see `rebuild`); no release wrote others.
@@ -381,7 +383,6 @@ MAP: Final = "map"
 
 Row = tuple[Any, ...]
 _NOTHING: Final[Mapping[str, Any]] = {}
-_META: Final = "SELECT value FROM meta WHERE site = :site AND key = :key"
 _SET_META: Final = (
     "INSERT INTO meta VALUES (:site, :key, :value)"
     " ON CONFLICT (site, key) DO UPDATE SET value = excluded.value"
@@ -411,7 +412,7 @@ class SiteLog:
 
     def meta(self, key: str) -> str | None:
         """A noted fact about the journal as a whole; None if it is not noted."""
-        found = self.execute(_META, {"key": key}).fetchone()
+        found = self.execute(sql.META, {"key": key}).fetchone()
         return None if found is None else str(found[0])
 
     @property

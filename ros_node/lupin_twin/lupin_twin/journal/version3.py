@@ -17,7 +17,7 @@ from contextlib import suppress
 from typing import Any, Final, NamedTuple
 
 from lupin_twin.core.history import KIND_FLOWER
-from lupin_twin.core.past import HOUR_NS, SLOT_NS, Event
+from lupin_twin.core.past import HOUR_NS, SILENCE_NS, SLOT_NS, Event
 from lupin_twin.core.state import (
     STATUS_OK,
     Bloom,
@@ -29,7 +29,6 @@ from lupin_twin.core.state import (
     Scan,
     Write,
 )
-from lupin_twin.journal.counts import SILENCE_NS
 from lupin_twin.journal.rows import sensor_names
 from lupin_twin.journal.runs import Clock
 from lupin_twin.journal.salvage import readable

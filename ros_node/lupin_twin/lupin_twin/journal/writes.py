@@ -1,4 +1,3 @@
-# ruff: noqa: S608  # SQL is put together of constants
 """Queries for single writes (after a number, recent, of a period), exports, and notes.
 
 An export reads a short stretch of time in each transaction. So a client that takes an hour for ten
@@ -35,58 +34,14 @@ from lupin_twin.core.past import (
     recent_of,
 )
 from lupin_twin.core.state import STATUS_OK, sure_species
+from lupin_twin.journal import sql
 from lupin_twin.journal.counts import deleted_ns
-from lupin_twin.journal.queries import FROM_SCAN
 from lupin_twin.journal.rows import last_row, named_numbers, sensor_names
 from lupin_twin.journal.runs import Run, Span, cut, runs, span_at, spans
 from lupin_twin.journal.schema import SiteLog, one_view
 
 # Approximate cost of a full answer of writes, s.
 WRITES_S: Final = 0.05
-
-_ARRIVAL: Final = (
-    "SELECT seq, arrival_ns FROM scan WHERE site = :site AND seq > :after ORDER BY seq LIMIT 1"
-)
-_SCAN: Final = "SELECT seq, run, tag, stamp_ns, kind, status, sensors, readings"
-_INSPECTION: Final = (
-    "SELECT seq, run, tag, stamp_ns, species, confidence, anomaly, bug_count FROM look"
-)
-_SCANS: Final = (
-    f"{_SCAN} FROM scan JOIN series"
-    " ON series.site = scan.site AND series.series = scan.series"
-    " WHERE scan.site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
-)
-_INSPECTIONS: Final = (
-    f"{_INSPECTION} WHERE site = :site AND seq > :after AND is_copy = 0 ORDER BY seq LIMIT :count"
-)
-# For each series, or tag, the stamp of its oldest recent row. LIMIT keeps this search out of the
-# join in both databases; in the join, PostgreSQL would repeat it for each row.
-_FIRST_RECENT: Final = (
-    "(SELECT s.*, coalesce((SELECT DISTINCT stamp_ns FROM {table} WHERE site = s.site"
-    " AND {which} AND stamp_ns <= :at AND is_copy = 0 ORDER BY stamp_ns DESC LIMIT 1 OFFSET :more),"
-    " 0) AS first_ns FROM series AS s WHERE s.site = :site AND s.run = :run AND {kind}"
-    " LIMIT 1000000) AS s CROSS JOIN {table} AS r"
-)
-_FIRST_SCAN: Final = _FIRST_RECENT.format(
-    table="scan", which="series = s.series", kind="s.kind = 0 AND s.sensors != '[]'"
-)
-_FIRST_INSPECTION: Final = _FIRST_RECENT.format(
-    table="look", which="run = s.run AND tag = s.tag", kind="s.kind = 1"
-)
-_IN_TIME: Final = "r.is_copy = 0 AND r.stamp_ns <= :at AND r.stamp_ns >= s.first_ns"
-_RECENT_SCANS: Final = (
-    f"{_SCAN} FROM {_FIRST_SCAN} WHERE r.site = s.site AND r.series = s.series AND {_IN_TIME}"
-)
-_RECENT_INSPECTIONS: Final = (
-    "SELECT r.seq, r.run, r.tag, r.stamp_ns, r.species, r.confidence,"
-    f" r.anomaly, r.bug_count FROM {_FIRST_INSPECTION}"
-    f" WHERE r.site = s.site AND r.run = s.run AND r.tag = s.tag AND {_IN_TIME}"
-)
-_SCANS_BETWEEN: Final = f"{_SCAN} {FROM_SCAN.format(tag='')}"
-_INSPECTIONS_BETWEEN: Final = (
-    f"{_INSPECTION} WHERE site = :site AND run = :run"
-    " AND stamp_ns >= :start AND stamp_ns < :end AND is_copy = 0"
-)
 
 
 def observed(connection: Any, request: PeriodRequest) -> PastWrites:
@@ -96,8 +51,8 @@ def observed(connection: Any, request: PeriodRequest) -> PastWrites:
     found: list[PastWrite] = []
     for span in cut(axis, request.start_ns, request.end_ns):
         query = {"run": span.run.id, "start": span.start_ns, "end": span.end_ns}
-        found += _of_scans(log.execute(_SCANS_BETWEEN, query).fetchall())
-        found += _of_inspections(log.execute(_INSPECTIONS_BETWEEN, query).fetchall())
+        found += _of_scans(log.execute(sql.SCANS_OF_PERIOD, query).fetchall())
+        found += _of_inspections(log.execute(sql.INSPECTIONS_OF_PERIOD, query).fetchall())
     found.sort(key=lambda write: (write.stamp_ns, write.number))
     return PastWrites(log.journal_id, _axis(axis), tuple(found), 0, is_all=True)
 
@@ -108,9 +63,9 @@ def recent(connection: Any, request: RecentRequest) -> tuple[PastWrite, ...]:
     span = span_at(runs(log.execute), request.at_ns)
     if span is None:
         return ()
-    query = {"run": span.run.id, "at": request.at_ns, "more": RECENT_COUNT - 1}
-    scans = log.execute(_RECENT_SCANS, query).fetchall()
-    inspections = log.execute(_RECENT_INSPECTIONS, query).fetchall()
+    query = {"run": span.run.id, "start": 0, "end": request.at_ns + 1, "more": RECENT_COUNT - 1}
+    scans = log.execute(sql.RECENT_SCANS, query).fetchall()
+    inspections = log.execute(sql.RECENT_INSPECTIONS, query).fetchall()
     return recent_of([*_of_scans(scans), *_of_inspections(inspections)], request.at_ns)
 
 
@@ -121,8 +76,8 @@ def scans(connection: Any, request: ScansRequest) -> tuple[PastWrite, ...]:
     if span is None:
         return ()
     query = {"run": span.run.id, "start": request.since_ns, "end": request.at_ns + 1}
-    sql = f"{_SCANS_BETWEEN} AND kind = 0 LIMIT {MAX_SCANS + 1}"
-    rows = log.execute(sql, query).fetchall()
+    select = f"{sql.SCANS_OF_PERIOD} AND kind = 0 LIMIT {MAX_SCANS + 1}"
+    rows = log.execute(select, query).fetchall()
     if len(rows) > MAX_SCANS:
         return ()
     wanted = {
@@ -139,8 +94,8 @@ def writes(connection: Any, request: WritesRequest) -> PastWrites:
     newest_seq = last_row(log)[0]
     after = request.after or _beginning(log, request, newest_seq)
     query = {"after": after, "count": request.max_count}
-    scans = log.execute(_SCANS, query).fetchall()
-    inspections = log.execute(_INSPECTIONS, query).fetchall()
+    scans = log.execute(sql.NEXT_SCANS, query).fetchall()
+    inspections = log.execute(sql.NEXT_INSPECTIONS, query).fetchall()
     found = sorted(
         [*_of_scans(scans), *_of_inspections(inspections)], key=lambda write: write.number
     )
@@ -163,7 +118,7 @@ def _beginning(log: SiteLog, request: WritesRequest, high: int) -> int:
     since_ns = time.time_ns() - int(request.reach_s * 1e9)
     while low < high:
         middle = (low + high) // 2
-        row = log.execute(_ARRIVAL, {"after": middle}).fetchone()
+        row = log.execute(sql.NEXT_ARRIVAL, {"after": middle}).fetchone()
         if row is None or row[1] >= since_ns:
             high = middle
         else:
@@ -188,14 +143,11 @@ def _of_inspections(rows: list[tuple[Any, ...]]) -> Iterator[PastWrite]:
 
 LOT: Final = 1_000
 # Approximate number of readings that are read at once, and what that costs, s.
-_STRETCH: Final = 40_000
+STRETCH: Final = 40_000
 STRETCH_S: Final = 0.1
 _FIRST_STRETCH_NS: Final = 60 * 1_000_000_000
 _NOWHERE: Final = (math.nan, math.nan)
 _NO_READING: Final = (("", math.nan),)
-
-_EXPORTED: Final = f"SELECT stamp_ns, seq, tag, sensors, status, source, readings {FROM_SCAN}"
-_NEXT: Final = f"SELECT min(stamp_ns) {FROM_SCAN}"  # constants
 
 
 def rows(
@@ -270,26 +222,25 @@ class Export:
         while True:
             until_ns = min(start_ns + self._length_ns, span.end_ns)
             # The scans of one stamp cannot be divided.
-            limit = "" if self._length_ns == 1 else f" LIMIT {_STRETCH}"
-            scans = self._ask(log, _EXPORTED + limit, start_ns, until_ns)
+            limit = "" if self._length_ns == 1 else f" LIMIT {STRETCH}"
+            scans = self._ask(log, sql.EXPORTED + limit, start_ns, until_ns)
             read = sum(1 + scan[-1].count(",") for scan in scans)
-            if self._length_ns == 1 or read < _STRETCH:
+            if self._length_ns == 1 or read < STRETCH:
                 break
             self._length_ns = max(1, self._length_ns // 8)
         self._at_ns = until_ns
         if not scans:
-            ((next_ns,),) = self._ask(log, _NEXT, until_ns, span.end_ns)
+            ((next_ns,),) = self._ask(log, sql.FIRST_STAMP, until_ns, span.end_ns)
             self._at_ns = span.end_ns if next_ns is None else next_ns
-        more = _STRETCH / 4 / max(read, _STRETCH // 32)
+        more = STRETCH / 4 / max(read, STRETCH // 32)
         self._length_ns = max(1, int(self._length_ns * more))
         self._has_begun |= bool(scans)
         return self._read(sorted(scans))
 
-    def _ask(self, log: SiteLog, sql: str, start_ns: int, end_ns: int) -> list[tuple[Any, ...]]:
+    def _ask(self, log: SiteLog, select: str, start_ns: int, end_ns: int) -> list[tuple[Any, ...]]:
         assert self._run is not None
-        of_tag = "" if self._tag_id is None else " AND tag = :tag"
         query = {"run": self._run.id, "tag": self._tag_id, "start": start_ns, "end": end_ns}
-        return list(log.execute(sql.replace("{tag}", of_tag), query).fetchall())
+        return list(log.execute(sql.of_tag(select, self._tag_id), query).fetchall())
 
     def _read(self, scans: list[tuple[Any, ...]]) -> list[PastRow]:
         found: list[PastRow] = []
@@ -309,11 +260,8 @@ class Export:
 
 def _places(log: SiteLog, run: Run) -> dict[str, tuple[float, float]]:
     """Position of each tag: its first row in the run counts, copies included."""
-    found = log.execute(
-        "SELECT tag, x, y FROM place WHERE site = :site AND run = :run ORDER BY seq DESC",
-        {"run": run.id},
-    )
-    return {tag: (x, y) for tag, x, y in found.fetchall()}
+    found = log.execute(sql.PLACES, {"run": run.id}).fetchall()
+    return {row[1]: (row[5], row[6]) for row in reversed(found)}
 
 
 # --- notes ----------------------------------------------------------------------------------------
@@ -324,11 +272,6 @@ _DIGITS: Final = 16
 _OURS: Final = re.compile(rf"[0-9a-f]{{{_DIGITS}}}", re.ASCII)
 # No journal has as many; the limit of SQLite is twice that.
 _MOST: Final = 2**62
-_COUNT: Final = "SELECT count(*) FROM note WHERE site = :site"
-_NEWEST_NOTES: Final = (
-    "SELECT id, made_at_ns, made_by, kind, subject, text, until_ns FROM note WHERE site = :site"
-    " ORDER BY made_at_ns DESC, id DESC LIMIT :most"
-)
 # Approximate cost of a query for notes, s of one core.
 NOTES_S: Final = 0.02
 
@@ -349,7 +292,7 @@ def number_of(note_id: str) -> int:
 def last_number(log: SiteLog) -> int:
     """The number of the journal's last note; 0 if there is none."""
     # In descending order, skipping ids of other programs.
-    found = log.execute("SELECT id FROM note WHERE site = :site ORDER BY id DESC")
+    found = log.execute(sql.NOTE_IDS)
     return next((number for (text,) in found if (number := number_of(text))), 0)
 
 
@@ -372,10 +315,10 @@ def notes(connection: Any, request: NotesRequest) -> PastNotes:
     """Return the notes of a journal."""
     log = SiteLog(connection)
     journal = log.journal_id
-    (count,) = log.execute(_COUNT).fetchone()
+    (count,) = log.execute(sql.NOTE_COUNT).fetchone()
     if (journal, count) == (request.journal, request.count):
         return PastNotes(journal, count, None)
-    rows = log.execute(_NEWEST_NOTES, {"most": MAX_NOTES}).fetchall()
+    rows = log.execute(sql.NEWEST_NOTES, {"most": MAX_NOTES}).fetchall()
     # Not by id alone: notes from elsewhere have numbers of their own.
     found = sorted((Note(*row) for row in rows), key=lambda note: (note.made_at_ns, note.id))
     return PastNotes(journal, count, tuple(found))

@@ -42,6 +42,8 @@ from lupin_twin.runtime import process
 WARNING_PERIOD_S: Final = 5.0
 # How long, s, waiting messages are taken one after the other before other callbacks have a turn.
 DRAIN_S: Final = 0.02
+# The same before long work; the full queues of a working robot take less.
+WORK_DRAIN_S: Final = 0.25
 # A message that waited longer than this, s, shows that the thread is too slow. At 200 a second, ten
 # of the fifty that may wait do so by then. The thread then counts as behind for `BELIEVED_S`.
 BEHIND_S: Final = 0.05
@@ -179,7 +181,7 @@ class NodeUtilities:
                 event_callbacks=events,
             )
             if depth > 1:
-                self._drain_behind(subscription, read, depth)
+                self._drain_behind(subscription, read)
             return str(subscription.topic_name)
 
         with naming(parameter, topic):
@@ -230,7 +232,7 @@ class NodeUtilities:
         return self.input_problems
 
     def _drain_behind(
-        self, subscription: Any, read: Callable[[bytes, dict[str, Any]], None], depth: int
+        self, subscription: Any, read: Callable[[bytes, dict[str, Any]], None]
     ) -> None:
         """After each message, also take those that wait.
 
@@ -238,29 +240,27 @@ class NodeUtilities:
         more messages arrive than are taken, and the queue overflows.
         """
 
-        def drain(most: float, most_s: float) -> None:
+        def drain(most_s: float) -> None:
             until_s = time.monotonic() + most_s
             handle, kind = subscription.handle, subscription.msg_type
-            taken = 0
             with handle:
                 while (more := handle.take_message(kind, True)) is not None:
                     read(*more)
-                    taken += 1
-                    if taken >= most or time.monotonic() > until_s:
+                    if time.monotonic() >= until_s:
                         return
 
         def take(data: bytes, info: dict[str, Any]) -> None:
             read(data, info)
-            drain(math.inf, DRAIN_S)
+            drain(DRAIN_S)
 
         subscription.callback = take
-        self._drains.append(lambda: drain(depth, math.inf))
+        self._drains.append(lambda: drain(WORK_DRAIN_S))
 
     def drain(self) -> None:
         """Take the waiting messages, before work that occupies the thread for long.
 
-        It takes as many as the queues can hold, however long that takes, so that they are empty
-        when the work begins.
+        So the queues are empty when the work begins. Not for longer than `WORK_DRAIN_S`: one who
+        publishes huge messages without end must not silence the twin.
         """
         for drain in self._drains:
             drain()

@@ -43,7 +43,7 @@ WARNING_PERIOD_S: Final = 5.0
 # How long, s, waiting messages are taken one after the other before other callbacks have a turn.
 DRAIN_S: Final = 0.02
 # The same before long work; the full queues of a working robot take less.
-WORK_DRAIN_S: Final = 0.25
+WORK_DRAIN_S: Final = 1.0
 # A message that waited longer than this, s, shows that the thread is too slow. At 200 a second, ten
 # of the fifty that may wait do so by then. The thread then counts as behind for `BELIEVED_S`.
 BEHIND_S: Final = 0.05

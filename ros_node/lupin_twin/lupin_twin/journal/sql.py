@@ -116,13 +116,18 @@ NEXT_ARRIVAL: Final = (
 
 
 def _recent(table: str, joined: str, which: str) -> str:
-    """Of each series in a period, the rows from the stamp on that is the last but :more."""
-    rows = f"r.site = s.site AND {joined} AND {_PERIOD}"
+    """Of each series in a period, the rows from the stamp on that is the last but :more.
+
+    The rows have one lower bound: of two, SQLite's index may take the one that reads every row.
+    """
+    of_series = f"r.site = s.site AND {joined}"
+    rows = f"{of_series} AND {_PERIOD}"
     return (
         f"FROM (SELECT s.*, coalesce((SELECT DISTINCT stamp_ns FROM {table} AS r WHERE {rows}"
         " ORDER BY stamp_ns DESC LIMIT 1 OFFSET :more), :start) AS first_ns FROM series AS s"
         f" WHERE s.site = :site AND s.run = :run AND {which} LIMIT 1000000) AS s"
-        f" CROSS JOIN {table} AS r WHERE {rows} AND r.stamp_ns >= s.first_ns"
+        f" CROSS JOIN {table} AS r WHERE {of_series} AND r.stamp_ns >= s.first_ns"
+        " AND r.stamp_ns < :end AND r.is_copy = 0"
     )
 
 

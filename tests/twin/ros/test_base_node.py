@@ -137,6 +137,13 @@ def test_waiting_messages_are_taken_one_right_after_the_other(
 ) -> None:
     """In one round of the executor, whatever else is due; and before any slow work."""
     received: list[float] = []
+    flood: list[bool] = []
+
+    def take(value: float) -> None:
+        received.append(value)
+        if flood:
+            publish(range(1))
+
     large = MessageShape(Observation, max_bytes=10_000)
     group = utilities.node.default_callback_group
     utilities.subscribe(
@@ -145,7 +152,7 @@ def test_waiting_messages_are_taken_one_right_after_the_other(
         large,
         depth=50,
         group=group,
-        callback=lambda message: received.append(message.tag_reading.readings[0].value),
+        callback=lambda message: take(message.tag_reading.readings[0].value),
     )
     executor = SingleThreadedExecutor(context=utilities.node.context)
     executor.add_node(utilities.node)
@@ -173,6 +180,11 @@ def test_waiting_messages_are_taken_one_right_after_the_other(
         assert len(received) == 91, "messages that take long do not hold up the work"
         monkeypatch.undo()
         utilities.drain()
+        assert received == list(map(float, range(130)))
+        flood.append(True)
+        publish(range(1))
+        utilities.drain()
+        assert len(received) == 130 + 50, "a flood ends no later than a full queue"
         assert utilities.counts().dropped.get(Reason.LOST, 0) == 0
     executor.shutdown()
 

@@ -181,7 +181,7 @@ class NodeUtilities:
                 event_callbacks=events,
             )
             if depth > 1:
-                self._drain_behind(subscription, read)
+                self._drain_behind(subscription, read, depth)
             return str(subscription.topic_name)
 
         with naming(parameter, topic):
@@ -232,7 +232,7 @@ class NodeUtilities:
         return self.input_problems
 
     def _drain_behind(
-        self, subscription: Any, read: Callable[[bytes, dict[str, Any]], None]
+        self, subscription: Any, read: Callable[[bytes, dict[str, Any]], None], depth: int
     ) -> None:
         """After each message, also take those that wait.
 
@@ -240,27 +240,29 @@ class NodeUtilities:
         more messages arrive than are taken, and the queue overflows.
         """
 
-        def drain(most_s: float) -> None:
+        def drain(most: float, most_s: float) -> None:
             until_s = time.monotonic() + most_s
             handle, kind = subscription.handle, subscription.msg_type
+            taken = 0
             with handle:
                 while (more := handle.take_message(kind, True)) is not None:
                     read(*more)
-                    if time.monotonic() >= until_s:
+                    taken += 1
+                    if taken >= most or time.monotonic() >= until_s:
                         return
 
         def take(data: bytes, info: dict[str, Any]) -> None:
             read(data, info)
-            drain(DRAIN_S)
+            drain(math.inf, DRAIN_S)
 
         subscription.callback = take
-        self._drains.append(lambda: drain(WORK_DRAIN_S))
+        self._drains.append(lambda: drain(depth, WORK_DRAIN_S))
 
     def drain(self) -> None:
         """Take the waiting messages, before work that occupies the thread for long.
 
-        So the queues are empty when the work begins. Not for longer than `WORK_DRAIN_S`: one who
-        publishes huge messages without end must not silence the twin.
+        It takes as many as the queues can hold, so that they are empty when the work begins. But a
+        flood of huge ones must not silence the twin: it ends after `WORK_DRAIN_S`.
         """
         for drain in self._drains:
             drain()

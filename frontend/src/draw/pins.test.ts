@@ -111,14 +111,14 @@ describe('pins', () => {
     expect(order('critical', 'healthy', 'unknown', 'stressed')).toEqual([0.9, 0.8, 0.7, 1]);
   });
 
-  test('where pins crowd only a critical one has room for its sign; closer still, only warnings stay', () => {
+  test('where pins crowd only a critical one has room for its sign; closer still, healthy ones go', () => {
     // Halo, outline and cross.
     const lines = (spacing: number) =>
       VERDICTS.map(
         (verdict) => draw([pin({ verdict })], spacing).sprites[0]?.named('stroke').length,
       );
     expect(lines(0.09)).toEqual([3, 2, 2, 2]);
-    expect(lines(0.05)).toEqual([3, 2, undefined, undefined]);
+    expect(lines(0.05)).toEqual([3, 2, 2, undefined]);
   });
 
   test('the pest’s ring is dashed and carries a bug', () => {

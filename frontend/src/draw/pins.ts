@@ -23,7 +23,7 @@ export function pinRadius(scale: number, spacing = Infinity): number {
   return Math.min(usual, Math.max(LEAST_PX.healthy, Math.round(scale * spacing * 0.22)));
 }
 
-/** Closer together than this, CSS pixels, pins would hide the heat map: only warnings are drawn. */
+/** Closer together than this, CSS pixels, pins would hide the heat map: healthy ones are left out. */
 const LEAST_SPACING_PX = 8;
 /** Least size of crowded pins: the worse, the larger. */
 const LEAST_PX = { healthy: 2, unknown: 2, stressed: 2, critical: 4 };
@@ -93,7 +93,7 @@ export function drawPins(pen: Pen, pins: readonly Pin[], spacing: number): void 
   const usual = pinRadius(view.scale, spacing);
   const isTooDense = view.scale * spacing < LEAST_SPACING_PX;
   for (const verdict of BY_SEVERITY) {
-    if (isTooDense && !isBad(verdict)) continue;
+    if (isTooDense && verdict === 'healthy') continue;
     const radius = Math.max(usual, LEAST_PX[verdict]);
     const box = (radius + WARNING_PX + 4) * 2;
     for (const pin of pins) {

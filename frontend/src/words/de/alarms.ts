@@ -139,7 +139,11 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     pest: (count) =>
       count > 0 ? `${counted(count, 'Schädling', 'Schädlinge')} gefunden` : 'Schädlinge gefunden',
     old: (sensor, age, holds, isDated) => {
-      if (!isDated) return sensor === '' ? 'Noch kein Messwert' : `${sensor}: noch kein Messwert`;
+      if (!isDated) {
+        return sensor === ''
+          ? 'Noch kein Messwert'
+          : `${sensor}: kein Messwert mit bekanntem Alter`;
+      }
       const since =
         age === null
           ? sensor === ''

@@ -148,7 +148,9 @@ export const HEALTH = {
       count > 0 ? `${counted(count, 'pest', 'pests')} seen` : 'Pest seen',
     /** An empty `sensor`: no sensor of the tag has a valid reading. */
     old: (sensor: string, age: string | null, holds: string | null, isDated: boolean): string => {
-      if (!isDated) return sensor === '' ? 'No reading yet' : `${sensor}: no reading yet`;
+      if (!isDated) {
+        return sensor === '' ? 'No reading yet' : `${sensor}: no reading of known age`;
+      }
       const since =
         age === null
           ? `${sensor === '' ? 'Not' : 'not'} scanned recently`

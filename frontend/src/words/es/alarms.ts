@@ -143,7 +143,11 @@ export const HEALTH: In<typeof EN.HEALTH> = {
         ? `Plaga detectada: ${counted(count, 'individuo', 'individuos')}`
         : 'Plaga detectada',
     old: (sensor, age, holds, isDated) => {
-      if (!isDated) return sensor === '' ? 'Aún sin lecturas' : `${sensor}: aún sin lecturas`;
+      if (!isDated) {
+        return sensor === ''
+          ? 'Aún sin lecturas'
+          : `${sensor}: ninguna lectura de antigüedad conocida`;
+      }
       const since =
         age === null
           ? sensor === ''

@@ -132,7 +132,11 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     pest: (count) =>
       count > 0 ? `${counted(count, 'plaagdier', 'plaagdieren')} gezien` : 'Plaag gezien',
     old: (sensor, age, holds, isDated) => {
-      if (!isDated) return sensor === '' ? 'Nog geen meetwaarde' : `${sensor}: nog geen meetwaarde`;
+      if (!isDated) {
+        return sensor === ''
+          ? 'Nog geen meetwaarde'
+          : `${sensor}: geen meetwaarde met bekende leeftijd`;
+      }
       const since =
         age === null
           ? sensor === ''

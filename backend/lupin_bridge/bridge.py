@@ -85,10 +85,10 @@ class Bridge:
         self.cache = AnswerCache() if cache is None else cache
         self.answering: Shared[Answer] = Shared()
         self.looking_back: Shared[Answered] = Shared()
-        self.frames = FrameWriter()
+        self.criteria = criteria or Criteria.of(settings)
+        self.frames = FrameWriter(self.criteria.sensors.by_name)
         self.offer = Offer(source)
         self.rosbridge_writer = Writer(source.relay, source.workers)
-        self.criteria = criteria or Criteria.of(settings)
         self.judge = Judge(self.criteria, knows_recent=False)
         self._judged = NOTHING_JUDGED
         self._states_unjudged = 0

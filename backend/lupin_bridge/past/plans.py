@@ -135,27 +135,32 @@ class StateQuery:
 
 @dataclass(frozen=True, slots=True)
 class WholeState(StateQuery):
-    """`schema.TwinState`: every tag."""
+    """`schema.TwinState`: every tag, with what is derived of these sensors."""
+
+    sensors: Sensors = field(compare=False)
 
     def look(self, find: Find) -> Plan:
         """See `Query`."""
         snapshot: Snapshot = find(self.at_ns or 0)
-        etag = etag_of("state", (snapshot.stamp_ns, snapshot.frame_id, snapshot.tags))
-        return plan_of(etag, lambda _: StateJson().state(snapshot, snapshot.now_ns))
+        content = snapshot.stamp_ns, snapshot.frame_id, snapshot.tags, self.sensors.text
+        etag, derived = etag_of("state", content), self.sensors.by_name
+        return plan_of(etag, lambda _: StateJson(derived).state(snapshot, snapshot.now_ns))
 
 
 @dataclass(frozen=True, slots=True)
 class OneTag(StateQuery):
-    """`schema.TwinTagState` of one tag."""
+    """`schema.TwinTagState` of one tag, as in `WholeState`."""
 
     tag_id: str
+    sensors: Sensors = field(compare=False)
 
     def look(self, find: Find) -> Plan:
         """See `Query`, and `tag_of`."""
         snapshot: Snapshot = find(self.at_ns or 0)
         found = tag_of(snapshot, self.tag_id)
-        etag = etag_of("tag", (snapshot.stamp_ns, found))
-        return plan_of(etag, lambda _: StateJson().tag(found, snapshot.now_ns))
+        etag = etag_of("tag", (snapshot.stamp_ns, found, self.sensors.text))
+        derived = self.sensors.by_name
+        return plan_of(etag, lambda _: StateJson(derived).tag(found, snapshot.now_ns))
 
 
 @dataclass(frozen=True, slots=True)

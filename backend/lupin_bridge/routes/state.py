@@ -110,7 +110,7 @@ async def state(request: Request) -> Response:
     bridge = bridge_of(request)
     at_ns = query_string.at(request.query_params.multi_items(), bridge.ros_time_ns)
     if at_ns is not None:
-        return await respond_as_of(request, WholeState(at_ns))
+        return await respond_as_of(request, WholeState(at_ns, bridge.criteria.sensors))
     newest = newest_of(bridge)
     # Always the newest state, with ages that may be a little older: so thousands of tags are
     # written only a few times a second, even for thousands of clients.
@@ -160,10 +160,11 @@ async def tag(request: Request, tag_id: str) -> Response:
 
 
 async def _tag_as_of(request: Request, tag_id: str, at_ns: int) -> Response:
+    bridge = bridge_of(request)
     try:
-        return await respond_as_of(request, OneTag(at_ns, tag_id))
+        return await respond_as_of(request, OneTag(at_ns, tag_id, bridge.criteria.sensors))
     except NoSuchTag as error:
-        journal = bridge_of(request).source.journal()
+        journal = bridge.source.journal()
         response = error_response(f"{error}{bodies.why_not(journal, at_ns)}", 404)
         response.headers.update(bodies.moment_headers(journal, at_ns))
         return response

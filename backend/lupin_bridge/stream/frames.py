@@ -9,7 +9,7 @@ an argument, s of a monotonic clock.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any, Final, Literal
@@ -261,8 +261,12 @@ class StateFrame:
         self._wires.clear()
 
     def full(self) -> bytes:
-        """`schema.StateFrame` as a WebSocket frame."""
-        return self.wire("full", self._full)
+        """`schema.StateFrame` as a WebSocket frame, without derived quantities."""
+        return self.wire("full", lambda: self._full(self._writer.plain_json))
+
+    def first(self) -> bytes:
+        """The same with derived quantities, for a client that gets deltas from then on."""
+        return self.wire("first", lambda: self._full(self._writer.json))
 
     def delta(self) -> bytes:
         """`schema.DeltaFrame` as a WebSocket frame: only what differs from `base`."""
@@ -275,11 +279,11 @@ class StateFrame:
             wire = self._wires[kind] = text_frame(payload())
         return wire
 
-    def _full(self) -> bytes:
+    def _full(self, json: StateJson) -> bytes:
         return b'{"type":"state","seq":%d,"revision":%b,"state":%b,"health":%b}' % (
             self.seq,
             orjson.dumps(self.revision),
-            self._writer.json.state(self.snapshot, self.snapshot.now_ns),
+            json.state(self.snapshot, self.snapshot.now_ns),
             judgement(self.judged),
         )
 
@@ -318,10 +322,14 @@ def difference(
 
 
 class FrameWriter:
-    """Makes and numbers the frames; `seq` starts at 1 and grows by one per frame."""
+    """Makes and numbers the frames; `seq` starts at 1 and grows by one per frame.
 
-    def __init__(self) -> None:
-        self.json = StateJson()
+    `derived` names the derived quantities to write.
+    """
+
+    def __init__(self, derived: Collection[str] = ()) -> None:
+        self.json = StateJson(derived)
+        self.plain_json = StateJson()
         self.message_json = StateJson(has_times=False)
         self._newest: StateFrame | None = None
 
@@ -342,5 +350,6 @@ class FrameWriter:
         )
         self._newest = frame
         self.json.keep_only(snapshot)
+        self.plain_json.keep_only(snapshot)
         self.message_json.keep_only(snapshot)
         return frame

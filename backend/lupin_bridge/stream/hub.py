@@ -106,10 +106,10 @@ class Writable(Protocol):
 
 def plain_wire(client: Client, frame: StateFrame) -> bytes:
     """A frame for a client of `/ws/state`: a delta if it requested deltas and has the base."""
-    base = frame.base
-    if client.delta and base is not None and base.seq == client.sent_seq:
-        return frame.delta()
-    return frame.full()
+    if not client.delta:
+        return frame.full()
+    has_base = frame.base is not None and frame.base.seq == client.sent_seq
+    return frame.delta() if has_base else frame.first()
 
 
 @dataclass(slots=True, eq=False)

@@ -122,6 +122,16 @@ class TwinTagState(Contract):
         "scan failed, 3 skipped; null: as for last_try",
     )
     last_try_detail: str = Field(default_factory=str, description="why it was not OK")
+    derived: dict[str, float] = Field(
+        default_factory=dict,
+        description="values derived from the latest readings of one scan, to four decimals: vpd "
+        "(kPa), dew_point (°C), condensation_margin (K); one that cannot be derived is absent. A "
+        "frame has them only for clients with ?delta=1",
+    )
+    derived_at: Time | None = Field(
+        default_factory=lambda: None,
+        description="ROS time of that scan; null: not known; absent: last_observed",
+    )
 
 
 class TwinState(Contract):

@@ -8,11 +8,12 @@ where it has its usual value (see `schema`): every browser gets it ten times a s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import orjson
 
+from lupin_bridge.judge.verdict import derive
 from lupin_twin.core.history import TagHistory
 from lupin_twin.core.notes import Note
 from lupin_twin.core.state import (
@@ -37,11 +38,12 @@ _NO_AGE: Final = b'"stale_seconds":null'
 class StateJson:
     """Writes snapshots as JSON and keeps the text of unchanged tags.
 
-    `has_times`: as in the web contract, with the times of each reading, the last inspection and the
-    last attempt; False: as in the ROS message.
+    `derived` names the derived quantities to write. `has_times`: as in the web contract, with the
+    times of each reading, the last inspection and the last attempt; False: as in the ROS message.
     """
 
-    def __init__(self, *, has_times: bool = True) -> None:
+    def __init__(self, derived: Collection[str] = (), *, has_times: bool = True) -> None:
+        self._derived = derived
         self._has_times = has_times
         # By tag_id: the tag, and its text before and after the age.
         self._cache: dict[str, tuple[TagState, bytes, bytes]] = {}
@@ -81,6 +83,11 @@ class StateJson:
             if own.observed_at_ns != usual_ns:
                 usual_ns = own.observed_at_ns
                 reading["observed_at"] = moment(usual_ns)
+        if derived := [it for it in derive(tag.readings) if it.name in self._derived]:
+            # No sensor is more precise, and short numbers make short frames.
+            fields["derived"] = {it.name: short(round(it.value, 4)) for it in derived}
+            if (scanned_ns := derived[0].observed_at_ns) != last_observed_ns:
+                fields["derived_at"] = moment(scanned_ns)
         if tag.looked_at_ns is not None:
             fields["looked_at"] = stamp(tag.looked_at_ns)
         last = tag.last_try
@@ -163,7 +170,7 @@ def history(tag_id: str, past: TagHistory) -> dict[str, Any]:
     """`schema.TagHistory`."""
     sensors: dict[str, list[dict[str, Any]]] = {}
     for scan in past.scans:
-        for reading in scan.readings:
+        for reading in (*scan.readings, *derive(scan.readings)):
             value = reading.value if math.isfinite(reading.value) else None
             sensors.setdefault(reading.name, []).append(
                 {"stamp": stamp(scan.stamp_ns), "value": value}

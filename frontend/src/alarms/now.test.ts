@@ -9,8 +9,13 @@ import { readings, tag } from '../testing/tags';
 import { nowOf, reasonNow } from './words';
 
 const cold = alarm('a', { worst: 4 });
-const state = (value: number | null, ...reasons: readonly Partial<HealthReason>[]): TagThen => ({
-  tag: tag({ readings: readings({ temperature: value }) }),
+const state = (value: number | null, ...reasons: readonly Partial<HealthReason>[]): TagThen =>
+  stateOf({ temperature: value }, ...reasons);
+const stateOf = (
+  values: Parameters<typeof readings>[0],
+  ...reasons: readonly Partial<HealthReason>[]
+): TagThen => ({
+  tag: tag({ readings: readings(values) }),
   // The code under test reads the verdict only if there are no reasons.
   health: { verdict: reasons.length > 0 ? 'unknown' : 'healthy', reasons: reasons.map(reason) },
 });
@@ -70,19 +75,28 @@ test.each([
   if (isOld) expect(reasonNow(raised, nowOf(raised, then, null, true))).toEqual(last);
 });
 
-test('another sensor’s age does not matter, but of what is derived', () => {
+test('another sensor’s age does not matter, but of the same scan', () => {
   const others = { ...old, sensor: 'humidity' };
   expect(nowOf(cold, state(8, {}, others), null, true)?.kind).toBe('known');
-  const vpd = { sensor: 'vpd', value: 1.7, limit: 1.3 };
-  const dry = alarm('b', { reason: vpd });
-  expect(nowOf(dry, state(8, vpd), null, true)).toMatchObject({ kind: 'known', value: 1.7 });
-  expect(nowOf(dry, state(8, vpd, others), null, true)).toMatchObject({ kind: 'unknown' });
-  // A derived value in range has no reason: like its tag, it counts as healthy.
-  expect(nowOf(dry, state(8), null, true)).toMatchObject({ value: null, verdict: 'healthy' });
-  expect(nowOf(dry, state(8, others), null, true)).toMatchObject({ kind: 'unknown', last: null });
-  // If one of its input readings failed, it has no reason either.
+  const air = stateOf({ temperature: 8, humidity: 60, vpd: 0.9 }, others);
+  const dry = alarm('b', { reason: { sensor: 'vpd' } });
+  expect(nowOf(dry, air, null, true)).toMatchObject({ kind: 'unknown', last: 0.9 });
+  const healthy = stateOf({ vpd: 0.9 });
+  expect(nowOf(dry, healthy, null, true)).toMatchObject({ value: 0.9, verdict: 'healthy' });
+});
+
+test('of a quantity of a day the value is that of its reason', () => {
+  const others = { ...old, sensor: 'humidity' };
+  const mean = { sensor: 'temperature_24h_mean', value: 30, limit: 28 };
+  const hot = alarm('b', { reason: mean });
+  expect(nowOf(hot, state(8, mean), null, true)).toMatchObject({ kind: 'known', value: 30 });
+  expect(nowOf(hot, state(8, mean, others), null, true)).toMatchObject({ kind: 'unknown' });
+  // In range it has no reason: like its tag, it counts as healthy.
+  expect(nowOf(hot, state(8), null, true)).toMatchObject({ value: null, verdict: 'healthy' });
+  expect(nowOf(hot, state(8, others), null, true)).toMatchObject({ kind: 'unknown', last: null });
+  // If its sensor failed, it has no reason either.
   const failed = { kind: 'reading_failed', verdict: 'stressed', sensor: 'humidity' } as const;
-  expect(nowOf(dry, state(8, failed), null, true)).toMatchObject({ kind: 'unknown', last: null });
+  expect(nowOf(hot, state(8, failed), null, true)).toMatchObject({ kind: 'unknown', last: null });
 });
 
 test('the last count of a pest', () => {

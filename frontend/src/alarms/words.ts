@@ -249,13 +249,13 @@ export function nowOf(
     const value = said ? (said.value ?? 0) : null;
     return { kind: 'known', value, verdict, reason: said ?? null, trend: null };
   }
-  // A derived value has no reading: only its reason holds the value.
-  const isDerived = readings.size > 0 && !readings.has(sensor);
-  const last = isDerived ? (said?.value ?? null) : (readings.get(sensor) ?? null);
-  // A derived value in range has no reason, and so no known value.
+  // A quantity of a day has no reading: only its reason holds the value.
+  const isOfDay = readings.size > 0 && !readings.has(sensor);
+  const last = isOfDay ? (said?.value ?? null) : (readings.get(sensor) ?? null);
+  // In range, it has no reason, and so no known value.
   const lacks = ({ kind: why, verdict: how }: HealthReason): boolean =>
     how === 'unknown' || why === 'reading_failed';
-  if (isDerived && !said && !reasons.some(lacks)) {
+  if (isOfDay && !said && !reasons.some(lacks)) {
     return { kind: 'known', value: null, verdict, reason: null, trend: null };
   }
   if (last === null) return unknown(null, readAt.get(sensor) ?? 'unknown');

@@ -112,8 +112,13 @@ describe('filled', () => {
       last_try: undefined,
       last_try_status: undefined,
       last_try_detail: undefined,
+      derived: { dew_point: 14 },
+      derived_at: sec(40),
     },
-    wireTag({ tag_id: 'b', last_observed: sec(0), stale_seconds: null }),
+    {
+      ...wireTag({ tag_id: 'b', last_observed: sec(0), stale_seconds: null }),
+      derived: { dew_point: 15 },
+    },
   ];
   const health = {
     house: { ...NOBODY.house, reasons: undefined },
@@ -137,9 +142,15 @@ describe('filled', () => {
         reading('ph', 3, 40),
         reading('ec', 4, null),
         reading('vpd', 5, null),
+        reading('dew_point', 14, 40),
       ] as never,
     }),
-    tags[1],
+    wireTag({
+      tag_id: 'b',
+      last_observed: sec(0),
+      stale_seconds: null,
+      readings: [reading('dew_point', 15, 0)] as never,
+    }),
   ];
   const said = judgement({ a: 'healthy', b: [reason()] });
   const verdicts = { house: NOBODY.house, tags: said.tags };

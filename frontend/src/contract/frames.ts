@@ -46,14 +46,20 @@ function filled(frame: Frame): Frame | null {
 
 type WireTag = Schemas['TwinTagState'];
 
-/** Restores the defaults that the server leaves out; `filledHealth` does so for verdicts. */
-export function filledTag(tag: WireTag): TwinTagState {
+/**
+ * Restores the defaults that the server leaves out; `filledHealth` does so for verdicts. Derived values
+ * are readings from here on: the catalogue knows which sensors are derived.
+ */
+export function filledTag({ derived = {}, derived_at: derivedAt, ...tag }: WireTag): TwinTagState {
   const { last_observed: last } = tag;
   let observedAt: WireTag['readings'][number]['observed_at'] = last;
   const readings = tag.readings.map((reading) => {
     if (reading.observed_at !== undefined) observedAt = reading.observed_at;
     return { ...reading, observed_at: observedAt ?? null };
   });
+  observedAt = derivedAt === undefined ? last : derivedAt;
+  for (const [name, value] of Object.entries(derived))
+    readings.push({ name, value, observed_at: observedAt });
   return {
     looked_at: null,
     last_try: last,

@@ -353,6 +353,10 @@ export interface components {
             readonly last_try?: components["schemas"]["Time"] | null;
             readonly last_try_status?: number | null;
             readonly last_try_detail?: string;
+            readonly derived?: {
+                readonly [key: string]: number;
+            };
+            readonly derived_at?: components["schemas"]["Time"] | null;
         };
         readonly StateFrame: {
             /** @constant */

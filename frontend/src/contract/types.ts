@@ -4,7 +4,10 @@ import type { components } from './openapi.gen';
 export type Schemas = components['schemas'];
 
 /** With the defaults that `frames.ts` restores. */
-export type TwinTagState = Required<Omit<Schemas['TwinTagState'], 'readings'>> & {
+export type TwinTagState = Required<
+  Omit<Schemas['TwinTagState'], 'readings' | 'derived' | 'derived_at'>
+> & {
+  /** Derived values too. */
   readonly readings: readonly Required<Schemas['SensorReading']>[];
 };
 export type TagHealth = Required<Omit<Schemas['TagHealth'], 'species'>> &

@@ -140,12 +140,14 @@ export function changeOf(now: Taken, then: Taken) {
 const held = (sensor: string, then: TagThen): number | null =>
   isOldReading(sensor, then) ? null : (then.tag.readings.get(sensor) ?? null);
 
-/** Whether the bridge judges a reading too old; for a derived sensor, any of the tag's readings. */
+/** Whether the bridge judges a reading too old; without a reading of this sensor, any of the tag's. */
 export function isOldReading(sensor: string, { tag, health }: TagThen): boolean {
-  const isDerived = !tag.readings.has(sensor);
+  const when = tag.readAt.get(sensor);
   return health.reasons.some(
     (reason) =>
-      reason.kind === 'old' && (isDerived || reason.sensor === '' || reason.sensor === sensor),
+      reason.kind === 'old' &&
+      // Without a sensor's name the reason is about all of the tag; a derived value is as old as its scan.
+      (when === undefined || reason.sensor === '' || tag.readAt.get(reason.sensor) === when),
   );
 }
 

@@ -163,7 +163,10 @@ const tag = (id: string, x: number, said: Parameters<typeof readings>[0]): Tag =
     wireTag({
       tag_id: id,
       pose: { position: { x, y: 0.5, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
-      readings: readings(said),
+      // CO₂ is of a scan before.
+      readings: Object.entries(said).flatMap(([name, value]) =>
+        readings({ [name]: value }, name === 'co2' ? 50 : 100),
+      ),
     }),
     { at: { sec: 100, nanosec: 0 }, takenAt: 0 },
   );
@@ -196,8 +199,8 @@ test('a field is made of the tags that read its sensor, old as the judge says of
   ]);
 });
 
-test('what is derived is old where all that it is made of is', () => {
-  const both = { temperature: 22, humidity: 60, co2: 600 };
+test('what is derived is old where its scan is', () => {
+  const both = { temperature: 22, humidity: 60, vpd: 1.06, co2: 600 };
   const tags = [tag('all', 1, both), tag('two', 2, both), tag('one', 3, both), tag('few', 4, {})];
   const { tags: said } = judgement({
     all: [old('')],

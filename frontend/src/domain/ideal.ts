@@ -2,10 +2,12 @@
 import type { Field, Judgement } from '../contract/types';
 import type { MapPoint } from '../geometry/coordinates';
 import { S } from '../strings';
+import { isOldReading } from './difference';
 import { differenceNumber, rangeText, withUnit } from './format';
+import { NOT_JUDGED } from './health';
 import { speciesText } from './marks';
 import { mix, type Rgb, rgbText, type Shade } from './ramp';
-import { partsOf, type Ranges, rangesFor, type Sensor, type Span } from './sensors';
+import { readingOf, type Ranges, rangesFor, type Sensor, type Span } from './sensors';
 import type { Tag } from './twin';
 
 /** Distance beyond the ideal range, in the sensor's unit: below 0 too low, 0 right; null: no ideal. */
@@ -166,14 +168,11 @@ export function readSites(
   said: Judgement['tags'],
   sensor: Pick<Sensor, 'name' | 'madeOf'>,
 ) {
-  return tags.flatMap(({ id, at, readings }) => {
-    const parts = partsOf(sensor, (part) => readings.has(part));
-    if (!at || parts.some((part) => (readings.get(part) ?? null) === null)) return [];
-    const old = said[id]?.reasons.filter(({ kind }) => kind === 'old') ?? [];
-    // Without a sensor's name the reason is about all of the tag. A derived value has no age of its
-    // own; if only one part is old, the parts are of different scans, and nothing is derived.
-    const isOld = parts.every((part) => old.some(({ sensor }) => sensor === '' || sensor === part));
-    return [{ at, isOld }];
+  return tags.flatMap((tag) => {
+    const { id, at, readings } = tag;
+    const name = readingOf(sensor, readings);
+    if (!at || readings.get(name) == null) return [];
+    return [{ at, isOld: isOldReading(name, { tag, health: said[id] ?? NOT_JUDGED }) }];
   });
 }
 

@@ -22,7 +22,7 @@ export type Catalogue = ReturnType<typeof catalogueOf>;
 /** By day and by night. */
 export type Catalogues = ReturnType<typeof cataloguesOf>;
 
-/** Whether tags can have readings of it; a derived sensor appears only in reasons. */
+/** Whether sensors read it; else it is computed. */
 export const isMeasured = ({ madeOf }: Sensor): boolean => madeOf.length === 0;
 
 /** Whether it is computed from one sensor's readings of a day: charts offer it. */
@@ -34,11 +34,11 @@ export const isHad = (
   has: (sensor: string) => boolean,
 ): boolean => has(name) || (madeOf.length > 0 && madeOf.every(has));
 
-/** The sources of a tag's value: its own reading, or those that it is computed from. */
-export const partsOf = (
+/** The reading behind a tag's value: a quantity of a day has none of its own. */
+export const readingOf = (
   { name, madeOf }: Pick<Sensor, 'name' | 'madeOf'>,
-  has: (sensor: string) => boolean,
-): readonly string[] => (madeOf.length > 0 && !has(name) ? madeOf : [name]);
+  readings: ReadonlyMap<string, unknown>,
+): string => (madeOf.length === 1 && !readings.has(name) && madeOf[0]) || name;
 
 /** The ranges for plants of a species; for an unknown species, those for all. */
 export const rangesFor = (sensor: Sensor, species: string): Ranges =>
@@ -137,7 +137,7 @@ function sensorOf(
     maxAlpha: file.ramp.max_alpha,
     /** Digits after the point of every value; null: as many as the value's size needs. */
     digits: digitsOf([entry]) ?? digitsOf(madeOf.map((of) => file.sensors[of])),
-    /** The sensors that it is computed from: it has fields and a history, but no readings. */
+    /** The sensors that it is computed from, by the bridge. */
     madeOf,
     /** Whether its ranges are those of day or night; null: both are the same. */
     part: entry.night ? (isDay ? ('day' as const) : ('night' as const)) : null,

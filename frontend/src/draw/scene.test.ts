@@ -2,7 +2,6 @@ import { describe, expect, test } from 'vitest';
 
 import { GROWING } from '../domain/time';
 import { houseHealth } from '../domain/health';
-import { NO_CATALOGUES } from '../domain/sensors';
 import { judgement, NOBODY } from '../testing/health';
 import { readings, tag } from '../testing/tags';
 import type { TwinTagState as WireTag } from '../contract/types';
@@ -45,31 +44,18 @@ describe('pins', () => {
     expect(kinds).toEqual(['value', 'failed', 'lacking']);
   });
 
-  test('what is computed of two sensors is where a tag has both, and its number is no tag’s own', () => {
-    const kinds = [
-      { temperature: 20, humidity: 50 },
-      { temperature: 20, humidity: null },
-      { humidity: 50 },
-    ].map((values) => {
-      const [pin] = scene([tag({ readings: readings(values) })], 0, NOBODY, null, 'vpd').pins;
-      return [pin?.kind, pin?.texts];
-    });
-    expect(kinds).toEqual([
-      ['value', ['1']],
-      ['failed', ['1']],
+  test('a derived value is labelled; a quantity of a day is where a tag has its sensor, without a number', () => {
+    const air = { temperature: 20, humidity: 50 };
+    const pins = [
+      scene([tag({ readings: readings({ ...air, vpd: 1.17 }) })], 0, NOBODY, null, 'vpd').pins,
+      scene([tag({ readings: readings(air) })], 0, NOBODY, null, 'vpd').pins,
+      scene([tag({ readings: readings(air) })], 0, NOBODY, null, 'day_night_difference').pins,
+    ];
+    expect(pins.map(([pin]) => [pin?.kind, pin?.texts])).toEqual([
+      ['value', ['1 · 1.17\u00a0kPa', '1']],
       ['lacking', ['1']],
+      ['value', ['1']],
     ]);
-  });
-
-  test('after a reload it is full once it is known what its sensor is computed of, and how the tag is', () => {
-    const tags = [tag({ readings: readings({ temperature: 20, humidity: 50 }) })];
-    const input = { tags, now: 0, ageing: GROWING, listed: null };
-    const unread = NO_CATALOGUES.day.named('vpd');
-    const first = buildScene({ ...input, sensor: unread, health: houseHealth(tags, NOBODY, true) });
-    expect(first.pins[0]).toMatchObject({ kind: 'lacking', verdict: 'unknown' });
-    const health = houseHealth(tags, judgement({ '1': 'healthy' }), true);
-    const [pin] = buildScene({ ...input, sensor: sensorNamed('vpd'), health }).pins;
-    expect(pin).toMatchObject({ kind: 'value', verdict: 'healthy' });
   });
 
   test('has the verdict that was given, unknown where none was', () => {
@@ -124,12 +110,6 @@ describe('pins', () => {
     expect(pin?.strength).toBeLessThan(0.5);
     const unknown = old.map((each) => ({ ...each, observed_at: null }));
     expect(scene([tag({ readings: unknown })]).pins[0]?.strength).toBeLessThan(0.5);
-  });
-
-  test('what is computed is as old as the oldest that it is computed of', () => {
-    const old = readings({ temperature: 20 }, -3_495);
-    const tags = [tag({ readings: [...old, ...readings({ humidity: 50 }, 104)] })];
-    expect(scene(tags, 0, NOBODY, null, 'vpd').pins[0]?.strength).toBeLessThan(0.5);
   });
 
   test('a pest is marked and its label comes first', () => {

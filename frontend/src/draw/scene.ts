@@ -4,7 +4,7 @@ import { ageSeconds, freshness, type Ageing } from '../domain/time';
 import { readingText } from '../domain/format';
 import { isBad, type HouseHealth } from '../domain/health';
 import { memoLast, memoOne, type Shared } from '../domain/memo';
-import { partsOf, type Sensor } from '../domain/sensors';
+import { readingOf, type Sensor } from '../domain/sensors';
 import { speciesLooks, UNKNOWN_SPECIES, type BloomLook } from '../domain/marks';
 import { shown } from '../domain/text';
 import type { Tag } from '../domain/twin';
@@ -68,23 +68,18 @@ function spacingOf(pins: readonly Pin[]): number {
 function pinOf(tag: Tag, at: MapPoint, input: SceneInput) {
   const { health, sensor, now, ageing, listed } = input;
   const isLeftOut = listed !== null && !listed.has(tag.id);
-  // A computed number is the field's and includes neighbours, so it is no label.
-  const parts = partsOf(sensor, (part) => tag.readings.has(part));
-  const values = parts.map((part) => tag.readings.get(part));
-  const isLacking = values.includes(undefined);
-  const isFailed = values.includes(null);
-  const fresh = Math.min(
-    ...parts.map((part) =>
-      freshness(ageSeconds(tag.readAt.get(part) ?? tag.scannedAt, now, ageing)),
-    ),
-  );
+  const name = readingOf(sensor, tag.readings);
+  const value = tag.readings.get(name);
+  const isLacking = value === undefined;
+  const isFailed = value === null;
+  const fresh = freshness(ageSeconds(tag.readAt.get(name) ?? tag.scannedAt, now, ageing));
   const verdict: Verdict = health.byTag.get(tag.id)?.verdict ?? 'unknown';
   const isWarning = isBad(verdict);
   return {
     id: tag.id,
     at,
     /**
-     * - value: the tag has a reading of this sensor, or all that it is computed from
+     * - value: the tag has a reading of this sensor, or of the one that it is computed from
      * - failed: the tag has this sensor, but its reading is not a number
      * - lacking: the tag has no such sensor
      */

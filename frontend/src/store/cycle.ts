@@ -1,6 +1,6 @@
 /** If set, a wall screen changes to the next sensor every few seconds. */
 import { now } from '../clock';
-import type { Sensor } from '../domain/sensors';
+import { isMeasured, type Sensor } from '../domain/sensors';
 import type { Tag } from '../domain/twin';
 import { act, store } from './app';
 import { createStore } from './create';
@@ -21,7 +21,7 @@ export function cycleSetting(search: string) {
 }
 
 export const sensorsOf = (tags: readonly Tag[], offered: readonly Sensor[]): readonly Sensor[] =>
-  offered.filter(({ name }) => tags.some((tag) => tag.readings.has(name)));
+  offered.filter((each) => isMeasured(each) && tags.some((tag) => tag.readings.has(each.name)));
 
 /** The sensor after `current`, the first after the last; null: there is no other. */
 function sensorAfter(sensors: readonly Sensor[], current: string): Sensor | null {

@@ -67,13 +67,18 @@ test('health is worked out once a snapshot', () => {
   expect(selectHealth(store.get()).byTag.size).toBe(2);
 });
 
-test('what is derived can be chosen, and has no column: no tag has readings of it', () => {
+test('of what is derived, the chosen sensor has a column; a quantity of a day has none', () => {
   const names = (sensors: ReturnType<typeof selectSensors>): string[] =>
     sensors.map(({ name }) => name);
+  const air = { temperature: 20, humidity: 60, vpd: 0.94, dew_point: 12 };
+  showTags([wireTag({ readings: readings({ ...air, ph: 7 }) })]);
   expect(names(selectSensors(store.get()))).toEqual(
     expect.arrayContaining(['humidity', 'ph', 'vpd']),
   );
-  expect(names(selectColumns(store.get()))).toEqual(expect.arrayContaining(['humidity', 'ph']));
-  expect(names(selectColumns(store.get()))).not.toContain('vpd');
+  expect(names(selectColumns(store.get()))).toEqual(['temperature', 'humidity', 'ph']);
   expect(selectColumns(store.get())).toBe(selectColumns(store.get()));
+  act({ sensor: 'vpd' });
+  expect(names(selectColumns(store.get()))).toEqual(['temperature', 'humidity', 'vpd', 'ph']);
+  act({ sensor: 'day_night_difference' });
+  expect(names(selectColumns(store.get()))).toEqual(['temperature', 'humidity', 'ph']);
 });

@@ -16,6 +16,7 @@ import {
 import {
   cataloguesOf,
   isMeasured,
+  isOfDay,
   NO_CATALOGUES,
   rangesFor,
   type Catalogue,
@@ -86,10 +87,13 @@ const offered = memoLast((catalogue: Catalogue, names: readonly string[]) => cat
 export const selectSensors = (state: AppState): readonly Sensor[] =>
   offered(selectCatalogue(state), namesIn(selectTags(state), state.view.sensor));
 
-const measuredIn = memoOne((sensors: readonly Sensor[]) => sensors.filter(isMeasured));
+const columnsIn = memoLast((sensors: readonly Sensor[], chosen: string) =>
+  sensors.filter((sensor) => isMeasured(sensor) || (sensor.name === chosen && !isOfDay(sensor))),
+);
 
+/** All measured sensors; and the chosen one, if tags have derived values of it. */
 export const selectColumns = (state: AppState): readonly Sensor[] =>
-  measuredIn(selectSensors(state));
+  columnsIn(selectSensors(state), state.view.sensor);
 
 const notHidden = memoLast((columns: readonly Sensor[], hidden: readonly string[]) =>
   columns.filter(({ name }) => isColumnShown({ hidden }, name)),

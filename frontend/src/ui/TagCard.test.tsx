@@ -1,6 +1,7 @@
-import { fireEvent, render, screen } from '@testing-library/react';
+import { act as flush, fireEvent, render, screen } from '@testing-library/react';
 import { beforeEach, describe, expect, test, vi } from 'vitest';
 
+import { filledTag } from '../contract/frames';
 import { act, receive, store } from '../store/app';
 import { withTag } from '../store/view';
 import { NO_HOUSE, withPast, withState } from '../store/twin';
@@ -101,6 +102,31 @@ describe('card', () => {
     showTags(tags, judgement({ 7: 'healthy' }, { is_day: false, source: 'light' }));
     render(<TagCard tagId="7" />);
     expect(ideals()[0]).toBe('night-time ideal 8.0\u00a0to\u00a018.0\u00a0°C');
+  });
+
+  test('a derived value is in the card, and in the table while it is chosen', () => {
+    const air = wireTag({ tag_id: '7', readings: readings({ temperature: 30, humidity: 60 }) });
+    const dry = reason({ verdict: 'stressed', sensor: 'vpd', value: 1.7, limit: 1.3 });
+    showTags(
+      [filledTag({ ...air, derived: { vpd: 1.697, dew_point: 21.4 } })],
+      judgement({ 7: [dry] }),
+    );
+    render(
+      <>
+        <TagCard tagId="7" />
+        <TagTable />
+      </>,
+    );
+    const texts = (name: string): (string | null)[] =>
+      [...document.querySelectorAll(`:is(li, td)[data-sensor="${name}"]`)].map(
+        (it) => it.textContent,
+      );
+    expect(texts('vpd')).toEqual([expect.stringMatching(/1\.70\u00a0kPa.*high, ideal 0\.20/)]);
+    flush(() => {
+      act({ sensor: 'vpd' });
+    });
+    expect(texts('vpd')[1]).toMatch(/^high .*1\.70/);
+    expect(texts('dew_point')).toEqual([expect.stringContaining('21.4\u00a0°C')]);
   });
 
   test('a value that reads like its limit says on which side of it it is', () => {

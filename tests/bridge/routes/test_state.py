@@ -19,6 +19,7 @@ from websockets.asyncio.client import connect
 
 from lupin_bridge.alarms.board import Change, board_of
 from lupin_bridge.judge.judging import own_sensors
+from lupin_bridge.judge.quantities import DERIVED
 from lupin_bridge.routes.state import MAX_REASON_BYTES
 from lupin_bridge.routes.status import MAX_ALARMS
 from lupin_bridge.stream import schema
@@ -116,9 +117,12 @@ def history(twin: Bridge, tag_id: str) -> dict[str, list[Any]]:
 def test_a_history_holds_the_last_scans_and_no_inspection(twin: Bridge) -> None:
     for number, value in enumerate((0.0, 1.0, 2.0, 3.0, math.nan)):
         twin.peer.observe(scan("past", {"co2": value}, stamp_s=100.25 + number))
-    twin.peer.observe(scan("past", {"light": 900.0}, stamp_s=110.0), inspection("past"))
+    air = {"temperature": 25.0, "humidity": 60.0}
+    twin.peer.observe(scan("past", {"light": 900.0, **air}, stamp_s=110.0), inspection("past"))
     twin.tag("past", lambda tag: tag["species"])
-    expected = {"co2": [3.0, None], "light": [900.0]}  # `buffer_len` is 3
+    # `buffer_len` is 3.
+    expected = {"co2": [3.0, None], "light": [900.0], "temperature": [25.0], "humidity": [60.0]}
+    expected |= {it.name: [pytest.approx(it.formula(25.0, 60.0))] for it in DERIVED.values()}
     wait_for(lambda: history(twin, "past") == expected, "all in the log")
     values = twin.json("/api/tags/past/history")["sensors"][0]["values"]
     assert values[0]["stamp"] == {"sec": 103, "nanosec": 250_000_000}

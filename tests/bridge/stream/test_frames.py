@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lupin_bridge.judge.judging import Judge
+from lupin_bridge.judge.quantities import DERIVED, dew_point_c, vapour_pressure_deficit_kpa
 from lupin_bridge.stream import schema
 from lupin_bridge.stream.frames import FrameWriter, StateFrame
 from lupin_bridge.stream.state_json import StateJson
@@ -319,6 +320,47 @@ def test_times_and_attempts_are_written_where_they_differ() -> None:
         written = json.loads(StateJson().tag(replace(tag, last_try=attempted), 5 * S))
         assert written["last_try"] == (attempted and stamp(attempted.stamp_ns))
         assert written["last_try_status"] == (attempted and attempted.status)
+
+
+def air(temperature_at_s: int | None, *others: Reading) -> TagState:
+    readings = (Reading("humidity", 60.0, 10 * S), *others)
+    if temperature_at_s is not None:
+        readings = (Reading("temperature", 25.1, temperature_at_s * S), *readings)
+    return TagState("7", POSE, readings, last_observed_ns=10 * S)
+
+
+@pytest.mark.parametrize("other", [air(None), air(9), air(10, Reading("humidity", math.nan, 10))])
+def test_nothing_is_derived_of_readings_that_are_missing_invalid_or_of_several_scans(
+    other: TagState,
+) -> None:
+    assert not {"derived", "derived_at"} & json.loads(StateJson(DERIVED).tag(other, None)).keys()
+
+
+def test_a_tag_has_what_is_derived_of_one_scan_as_far_as_the_sensors_file_names_it() -> None:
+    scanned = air(10)
+    written = json.loads(StateJson(DERIVED).tag(scanned, None))
+    dew_c = dew_point_c(25.1, 60.0)
+    expected = {
+        "vpd": vapour_pressure_deficit_kpa(25.1, 60.0),
+        "dew_point": dew_c,
+        "condensation_margin": 25.1 - dew_c,
+    }
+    assert written["derived"] == pytest.approx(expected, abs=5e-5)
+    assert "derived_at" not in written
+    schema.TwinTagState.model_validate(written)
+    inspected = replace(scanned, last_observed_ns=12 * S)
+    assert json.loads(StateJson(DERIVED).tag(inspected, None))["derived_at"] == stamp(10 * S)
+    assert json.loads(StateJson(["vpd"]).tag(scanned, None))["derived"].keys() == {"vpd"}
+
+
+def test_frames_have_what_is_derived_for_clients_with_deltas_alone() -> None:
+    writer = FrameWriter(DERIVED)
+    writer.state(snapshot(), "r")
+    frame = writer.state(snapshot(air(10)), "r")
+    [changed] = content(frame.delta())["changed"]
+    assert changed["derived"].keys() == DERIVED.keys()
+    assert content(frame.first())["state"]["tags"] == [changed]
+    assert "derived" not in content(frame.full())["state"]["tags"][0]
 
 
 @pytest.mark.parametrize("clock", ["none", "stopped"])

@@ -10,11 +10,12 @@ import pytest
 from lupin_bridge.alarms.board import board_of
 from lupin_bridge.stream.frames import FrameWriter, Reason, Status, alarms_message
 from lupin_bridge.stream.hub import CLOSE_POLICY, LARGE_BYTES, Client, Hub
-from lupin_twin.core.state import Snapshot, TagState
+from lupin_twin.core.state import Reading, Snapshot, TagState
 from tests.bridge.stream.test_frames import received
 from tests.support.seen import alarm
 
 TIMEOUT_S = 30.0
+AIR = (Reading("temperature", 25.0), Reading("humidity", 60.0))
 
 
 class Socket:
@@ -58,11 +59,11 @@ class Stage:
         self.hub = Hub(max_clients, TIMEOUT_S, self.status_at)
         self.reason: Reason = "live"
         self.since_s = 0.0
-        self.writer = FrameWriter()
+        self.writer = FrameWriter(["vpd"])
 
     def publish(self, now_s: float = 0.0) -> int:
         """Publish the next frame; returns its number."""
-        frame = self.writer.state(Snapshot(0, "map", (TagState("7"),)), "r")
+        frame = self.writer.state(Snapshot(0, "map", (TagState("7", readings=AIR),)), "r")
         self.hub.publish(frame, now_s)
         return frame.seq
 
@@ -198,6 +199,8 @@ def test_deltas_go_to_clients_that_chose_them_and_have_the_frame_before(stage: S
     stage.publish()
     stage.publish()
     assert socket.got == [1, (1, 2), (2, 3)]
+    first, full = (it.wires[0] for it in (socket, whole))
+    assert (b'"derived"' in first, b'"derived"' in full) == (True, False)
     assert whole.got == [1, 2, 3]
     socket.room = 0
     stage.publish()

@@ -130,7 +130,7 @@ class TwinTagState(Contract):
     )
     derived_at: Time | None = Field(
         default_factory=lambda: None,
-        description="ROS time of that scan; null: not known; absent: last_observed",
+        description="ROS time of that scan; null: not known; absent: that of the last of readings",
     )
 
 

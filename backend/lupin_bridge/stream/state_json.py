@@ -86,8 +86,8 @@ class StateJson:
         if derived := [it for it in derive(tag.readings) if it.name in self._derived]:
             # No sensor is more precise, and short numbers make short frames.
             fields["derived"] = {it.name: short(round(it.value, 4)) for it in derived}
-            if (scanned_ns := derived[0].observed_at_ns) != last_observed_ns:
-                fields["derived_at"] = moment(scanned_ns)
+            if derived[0].observed_at_ns != usual_ns:
+                fields["derived_at"] = moment(derived[0].observed_at_ns)
         if tag.looked_at_ns is not None:
             fields["looked_at"] = stamp(tag.looked_at_ns)
         last = tag.last_try

@@ -117,6 +117,7 @@ describe('filled', () => {
     },
     {
       ...wireTag({ tag_id: 'b', last_observed: sec(0), stale_seconds: null }),
+      readings: [{ name: 'co2', value: 1, observed_at: sec(3) }],
       derived: { dew_point: 15 },
     },
   ];
@@ -149,7 +150,7 @@ describe('filled', () => {
       tag_id: 'b',
       last_observed: sec(0),
       stale_seconds: null,
-      readings: [reading('dew_point', 15, 0)] as never,
+      readings: [reading('co2', 1, 3), reading('dew_point', 15, 3)] as never,
     }),
   ];
   const said = judgement({ a: 'healthy', b: [reason()] });

@@ -57,9 +57,9 @@ export function filledTag({ derived = {}, derived_at: derivedAt, ...tag }: WireT
     if (reading.observed_at !== undefined) observedAt = reading.observed_at;
     return { ...reading, observed_at: observedAt ?? null };
   });
-  observedAt = derivedAt === undefined ? last : derivedAt;
+  if (derivedAt !== undefined) observedAt = derivedAt;
   for (const [name, value] of Object.entries(derived))
-    readings.push({ name, value, observed_at: observedAt });
+    readings.push({ name, value, observed_at: observedAt ?? null });
   return {
     looked_at: null,
     last_try: last,

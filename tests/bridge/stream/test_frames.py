@@ -348,8 +348,8 @@ def test_a_tag_has_what_is_derived_of_one_scan_as_far_as_the_sensors_file_names_
     assert written["derived"] == pytest.approx(expected, abs=5e-5)
     assert "derived_at" not in written
     schema.TwinTagState.model_validate(written)
-    inspected = replace(scanned, last_observed_ns=12 * S)
-    assert json.loads(StateJson(DERIVED).tag(inspected, None))["derived_at"] == stamp(10 * S)
+    later = air(10, Reading("co2", 600.0, 12 * S))
+    assert json.loads(StateJson(DERIVED).tag(later, None))["derived_at"] == stamp(10 * S)
     assert json.loads(StateJson(["vpd"]).tag(scanned, None))["derived"].keys() == {"vpd"}
 
 

@@ -192,7 +192,7 @@ def _quality(
     rules: FieldRules,
     should_stop: ShouldStop,
 ) -> bytes:
-    """`schema.FieldQuality` of a field and of the tags that it was made from."""
+    """`routes_schema.FieldQuality` of a field and of the tags that it was made from."""
     quality = leave_one_out(
         tags,
         sensor.name,

@@ -35,7 +35,7 @@ from lupin_bridge.routes.answers import (
     respond_past,
 )
 from lupin_bridge.serving.admission import ClientLimitError
-from lupin_bridge.stream import pollers, schema
+from lupin_bridge.stream import pollers, routes_schema, schema
 from lupin_twin.core.past import PastRefused
 from lupin_twin.field.engine import FieldRefused
 from lupin_twin.runtime.estimates import DEFAULT_PLACES, MAX_PLACES, Report, ReportRequest
@@ -172,7 +172,7 @@ FIELDS.register(router, _answer)
     router,
     "/api/field/quality",
     summary="The error of the field, and the share of it that is known",
-    responses={200: {"model": schema.FieldQuality}, **FIELDS.refusals()},
+    responses={200: {"model": routes_schema.FieldQuality}, **FIELDS.refusals()},
     openapi_extra={"parameters": [p for p in FIELDS.parameters if p["name"] != "scale"]},
 )
 async def field_quality(request: Request) -> Response:

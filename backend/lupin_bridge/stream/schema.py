@@ -367,30 +367,6 @@ class GetFieldResponse(Contract):
     sample_count: int
 
 
-class TagError(Contract):
-    """One tag's reading against the prediction from the other tags."""
-
-    tag_id: str
-    measured: float
-    predicted: float
-    error: float = Field(description="predicted minus measured, sensor's unit")
-
-
-class FieldQuality(Contract):
-    """The quality of a field: its leave-one-out error, and how much of it is known."""
-
-    sensor_type: str
-    unit: str
-    sample_count: int = Field(description="tags that contribute: pinned, with a finite reading")
-    judged_count: int = Field(description="those of them with another tag in reach")
-    rmse: float | None = Field(description="sensor's unit; null: no tag could be judged")
-    worst: TagError | None
-    painted_share: float = Field(description="share of cells that are known, 0 to 1")
-    far_off_tags: list[str] = Field(
-        description="tags too far from the others for a map: the default box leaves them out"
-    )
-
-
 class MapMetaData(Contract):
     """Size and origin of the occupancy grid; resolution in m per cell."""
 

@@ -14,7 +14,7 @@ from PIL import Image
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
-from lupin_bridge.stream import schema
+from lupin_bridge.stream import routes_schema, schema
 from tests.oracle_idw import field_by_loop
 from tests.support.messages import discovered, occupancy_grid, pose, scan
 from tests.support.processes import limits
@@ -262,7 +262,7 @@ def test_only_with_clip_to_explored_a_live_field_ends_where_the_map_does(
 
 
 def test_quality_describes_the_requested_field(live: Bridge) -> None:
-    quality = schema.FieldQuality.model_validate(live.json("/api/field/quality", **QUERY))
+    quality = routes_schema.FieldQuality.model_validate(live.json("/api/field/quality", **QUERY))
     values = npy(live, **QUERY)
     assert quality.sensor_type == "temperature"
     assert quality.painted_share == pytest.approx(np.isfinite(values).mean())

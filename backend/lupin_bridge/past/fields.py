@@ -13,7 +13,7 @@ from typing import Final
 import orjson
 
 from lupin_bridge import field as formats
-from lupin_bridge.feed.query import Find
+from lupin_bridge.feed.query import LogReader
 from lupin_bridge.field import JSON, EstimateQuery, FieldFormat, FieldQuery
 from lupin_bridge.judge.judging import Criteria
 from lupin_bridge.judge.quantities import DAILY, Sensor, Sensors
@@ -46,7 +46,6 @@ from lupin_twin.runtime.estimates import (
     Report,
     ReportRequest,
     estimate_at,
-    readings_at,
     report_of,
 )
 from lupin_twin.runtime.workers import ShouldStop
@@ -101,15 +100,15 @@ class Field(StateQuery):
         rules, sensors = self.rules, self.criteria.sensors
         return etag_of(f"newest {name}", (revision, self.query, rules, sensors.text))
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `Query`."""
         at_ns = self.at_ns or 0
-        snapshot: Snapshot = find(at_ns)
+        snapshot = log.state(at_ns)
         daily = DAILY.get(self.query.sensor_type)
         if daily is not None:
             by = self.criteria
             tags = with_daily(
-                snapshot.tags, daily, at_ns, sensors=by.sensors, is_day=by.is_day, find=find
+                snapshot.tags, daily, at_ns, sensors=by.sensors, is_day=by.is_day, find=log.series
             )
             snapshot = replace(snapshot, tags=tuple(tags))
         return self.plan(snapshot)
@@ -238,7 +237,7 @@ class Estimated(Field):
         request = EstimateRequest(self.query.request(box, max_cells))
         return tags * NEWEST_S_PER_TAG + AS_OF * estimate_cost_s(request, tags, max_cells)
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `Query`.
 
         Raises:
@@ -246,14 +245,11 @@ class Estimated(Field):
 
         """
         at_ns = self.now_ns if self.at_ns is None else self.at_ns
-        snapshot: Snapshot = find(at_ns)
+        snapshot = log.state(at_ns)
         box = self.request(snapshot)
         # A minute more than a day: so no reading is missing while the estimate stays the same.
         reach_s = self.day_length_s * (1.0 + 1.0 / MINUTES_A_DAY)
-        up_to_ns = at_ns
-        pasts: list[TagPast] = find(
-            lambda log: readings_at(log, box.sensor_type, up_to_ns, reach_s)
-        )
+        pasts = log.readings(box.sensor_type, at_ns, reach_s)
         if self.at_ns is None:
             at_ns = moment_of(pasts, at_ns, self.day_length_s)
         sensor = self.criteria.sensors.named(box.sensor_type)
@@ -310,10 +306,10 @@ class Reported:
     sensors: Sensors = field(compare=False)
     occupancy: OccupancyMap | None = field(default=None, compare=False)
 
-    def __call__(self, find: Find, should_stop: ShouldStop) -> Report:
+    def __call__(self, log: LogReader) -> Report:
         """Make the report of what the log has."""
-        pasts, at_ns = self.look_up(find)
-        return self.report(pasts, at_ns, should_stop)
+        pasts, at_ns = self.look_up(log)
+        return self.report(pasts, at_ns, log.should_stop)
 
     @property
     def up_to_ns(self) -> int:
@@ -325,14 +321,12 @@ class Reported:
         """The approximate cost of a report, s of one core."""
         return REPORT_DAYS * tags * NEWEST_S_PER_TAG + REPORT_S
 
-    def look_up(self, find: Find) -> tuple[list[TagPast], int]:
+    def look_up(self, log: LogReader) -> tuple[list[TagPast], int]:
         """The plausible readings of `REPORT_DAYS`, and the moment of the report."""
         name, day_s = self.request.sensor_type, self.day_length_s
         up_to_ns = self.up_to_ns
-        find(up_to_ns)  # refuses a moment that is yet to come
-        pasts: list[TagPast] = find(
-            lambda log: readings_at(log, name, up_to_ns, day_s, REPORT_DAYS)
-        )
+        log.state(up_to_ns)  # refuses a moment that is yet to come
+        pasts = log.readings(name, up_to_ns, day_s, REPORT_DAYS)
         at_ns = moment_of(pasts, up_to_ns, day_s) if self.at_ns is None else self.at_ns
         return _that_count(pasts, 0, self.sensors.named(name)), at_ns
 
@@ -356,14 +350,13 @@ class Reports:
         """See `Query`: a greenhouse has a handful of sensors."""
         return self.wanted.cost_s(tags) * (5 if self.is_of_all else 1)
 
-    def look(self, find: Find) -> Plan:
+    def look(self, log: LogReader) -> Plan:
         """See `Query`."""
         every = [self.wanted]
         if self.is_of_all:
-            snapshot: Snapshot = find(self.wanted.up_to_ns)
-            names = sensors_of(snapshot)
+            names = sensors_of(log.state(self.wanted.up_to_ns))
             every = [replace(self.wanted, request=ReportRequest(name)) for name in names]
-        found = [(one, *one.look_up(find)) for one in every]
+        found = [(one, *one.look_up(log)) for one in every]
         occupancy = self.wanted.occupancy
         built_from = (
             [(one.request, at_ns, pasts) for one, pasts, at_ns in found],

@@ -123,14 +123,6 @@ class TagHistory:
     source: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class LatestRequest:
-    """Request for a tag's last scans and inspections in the journal, `count` of each series."""
-
-    tag_id: str
-    count: int
-
-
 def tag_history(
     writes: Iterable[Scan | Inspection], newest: TagState | None, count: int
 ) -> TagHistory:

@@ -26,7 +26,6 @@ from lupin_bridge.past import bodies
 from lupin_bridge.serving.admission import REVALIDATE, Answer, content_answer
 from lupin_bridge.stream.state_json import StateJson, history, judgement
 from lupin_twin.core.diagnostics import Condition
-from lupin_twin.core.history import tag_history
 from lupin_twin.core.past import (
     DAY_NS,
     DEFAULT_POINTS,
@@ -274,7 +273,7 @@ class LatestOfTag:
     def look(self, log: LogReader) -> Plan:
         """See `Query`."""
         found = log.latest(self.tag_id, self.count)
-        return of_json(history(self.tag_id, tag_history(found, self.newest, self.count)))
+        return of_json(history(self.tag_id, found, self.newest, self.count))
 
 
 def series_s(tag_id: str, points: int, tags: int) -> float:

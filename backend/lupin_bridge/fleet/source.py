@@ -12,6 +12,7 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 from lupin_bridge.feed.past_process import PastProcess
@@ -20,7 +21,7 @@ from lupin_bridge.feed.relay import Relay, TwinNames
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.tasks import Guard, Periodic, end
 from lupin_bridge.fleet.overview import Archive, Site
-from lupin_bridge.fleet.reader import Latest, Reported
+from lupin_bridge.fleet.reader import Reported, latest
 from lupin_bridge.fleet.watcher import News
 from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
@@ -208,7 +209,8 @@ class SiteTwin(TwinSource):
         last_seq = self._site.last_seq
         if last_seq == self._seq or not self._watching.archive.is_reachable:
             return
-        found: Reported = await self._in_time(self._reading(Latest(self._map_hash)))
+        query = partial(latest, self._map_hash, self._parameters.frame_id)
+        found: Reported = await self._in_time(self._reading(query))
         if found.map_hash != self._map_hash:
             self._map, self._map_hash = found.occupancy_map, found.map_hash
         self._reported = found

@@ -3,7 +3,7 @@ import { beforeEach, expect, test, vi } from 'vitest';
 
 import { acknowledge, lastAction, NO_LOCAL_ALARMS, own, shelveAlarm } from '../../alarms/own';
 import { startAlarms } from '../../alarms/watch';
-import { isPushed, notifyState } from '../../alarms/notify';
+import { notifyState } from '../../alarms/notify';
 import type { Alarm, HealthReason } from '../../contract/types';
 import { act as dispatch, receive, store } from '../../store/app';
 import { person } from '../../store/create';
@@ -397,14 +397,4 @@ test('nothing makes itself heard unless it is wished, and what cannot says why',
   const [sound, notify] = screen.getAllByRole<HTMLInputElement>('checkbox');
   expect([sound?.checked, notify?.checked, notify?.disabled]).toEqual([false, false, true]);
   expect(screen.getByText(/https:\/\/ or http:\/\/localhost/)).toBeTruthy();
-  // A grower who relies on the phone learns whether the bridge reaches it.
-  flush(() => {
-    notifyState.set('granted');
-  });
-  expect(screen.getByText(/while this page is open in the background\.$/)).toBeTruthy();
-  flush(() => {
-    isPushed.set(true);
-  });
-  expect(screen.getByText(/Critical alarms also come while it is closed\.$/)).toBeTruthy();
-  isPushed.set(false);
 });

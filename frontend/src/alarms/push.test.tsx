@@ -1,5 +1,7 @@
+import { render, screen } from '@testing-library/react';
 import { afterEach, expect, test, vi } from 'vitest';
 
+import { NotifySettings } from '../ui/alarms/AlarmNotes';
 import { isPushed, setNotify, setPush, startNotify } from './notify';
 import { NO_LOCAL_ALARMS, own } from './own';
 
@@ -50,9 +52,10 @@ test('each visit subscribes anew: the push service may have ended the subscripti
   vi.stubGlobal('isSecureContext', true);
   own.set({ ...NO_LOCAL_ALARMS, notify: true });
   startNotify()();
-  await vi.waitFor(() => {
-    expect(isPushed.get()).toBe(true);
-  });
+  render(<NotifySettings />);
+  // A grower who relies on the phone learns whether the bridge reaches it.
+  screen.getByText(/while this page is open in the background\.$/);
+  await screen.findByText(/Critical alarms also come while it is closed\.$/);
   expect(log).toEqual([options, subscribed]);
   await setNotify(false);
   expect(isPushed.get()).toBe(false);

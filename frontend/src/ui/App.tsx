@@ -1,5 +1,6 @@
 import type { JSX } from 'react';
 
+import { selectIsWide } from '../map/camera';
 import type { CycleSetting } from '../store/cycle';
 import { act, useApp } from '../store/app';
 import { withList } from '../store/view';
@@ -33,6 +34,7 @@ export function App({
   const moment = useApp((state) => selectShown(state).moment);
   const isPast = moment !== null;
   const isRecorded = useApp(selectIsRecorded);
+  const isWide = useApp(selectIsWide);
 
   return (
     <div
@@ -59,7 +61,7 @@ export function App({
         <SimulatedNote />
       </div>
       <WithParts>{(parts) => <parts.PaperLine />}</WithParts>
-      <main className="panels">
+      <main className="panels" data-wide={isWide && !kiosk}>
         <MapPanel kiosk={kiosk} />
         <TagsPanel kiosk={kiosk} />
         {selected !== null && !kiosk && (

@@ -1,7 +1,7 @@
 /** The map's camera and its programmed moves; gestures are in `gestures.ts`. */
 import type { Field } from '../contract/types';
 import { fieldCorners } from '../domain/field';
-import { memoLast, memoOne } from '../domain/memo';
+import { memoOne } from '../domain/memo';
 import { holds, isPossible, reachOfTags, type Tag } from '../domain/twin';
 import { fitClear, isClear } from '../geometry/clear';
 import {
@@ -20,9 +20,8 @@ import {
   type View,
   viewOf,
 } from '../geometry/coordinates';
-import { act, type AppState, moveViewport, store } from '../store/app';
+import { act, moveViewport, store } from '../store/app';
 import { createStore } from '../store/create';
-import { selectLatest } from '../store/moment';
 import type { House } from '../store/twin';
 
 export interface Hand {
@@ -197,19 +196,6 @@ export function contentOf({ snapshot, map }: House, field: Field | null): Conten
   const bounds = boundsOf([...planted, ...(hasField ? fieldCorners(field) : []), ...known]);
   return bounds && { bounds, pins };
 }
-
-/** A greenhouse is wide if it is at least this many times as wide as deep. */
-const WIDE = 2;
-
-const isWideOf = memoLast((house: House) => {
-  const content = contentOf(house, null);
-  if (!content) return false;
-  const { minX, minY, maxX, maxY } = content.bounds;
-  return maxX - minX >= WIDE * (maxY - minY);
-});
-
-/** Of now, so that the layout stays while looking back. A single tag or row says nothing about the greenhouse. */
-export const selectIsWide = (state: AppState): boolean => isWideOf(selectLatest(state));
 
 export function together(a: Content | null, b: Content | null): Content | null {
   if (!a || !b) return a ?? b;

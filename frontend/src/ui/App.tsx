@@ -1,11 +1,10 @@
 import type { JSX } from 'react';
 
-import { selectIsWide } from '../map/camera';
 import type { CycleSetting } from '../store/cycle';
 import { act, useApp } from '../store/app';
 import { withList } from '../store/view';
 import { useSelected } from '../store/create';
-import { selectHealth } from '../store/derived';
+import { selectHealth, selectIsWide } from '../store/derived';
 import { selectHasSnapshot, selectIsRecorded, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { AlarmsLabel } from './alarms/ListChoice';

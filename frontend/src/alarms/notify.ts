@@ -10,9 +10,8 @@ import { S } from '../strings';
 import { showAlarm } from './follow';
 import type { Item } from './list';
 import { own, updateNotifySettings } from './own';
-import { textNow, worstNow } from './latest';
+import { severalNow, worstNow } from './latest';
 import { alarmList, onNews } from './watch';
-import { severalText } from './words';
 
 /**
  * The browser's permission. "prompt": it will ask the operator. "insecure": it allows notifications only
@@ -50,11 +49,7 @@ let last: Notification | null = null;
 function show(raised: readonly Item[]): void {
   const [first] = raised;
   if (!first) return;
-  const body = severalText(
-    raised.map(({ alarm }) => alarm),
-    (alarm) => textNow(store.get(), alarm),
-    S.alarmsRaised,
-  );
+  const body = severalNow(store.get(), raised, S.alarmsRaised);
   try {
     const origin = selectOrigin(store.get());
     const title = S.alarmNotifyTitle(raised.length);

@@ -77,6 +77,37 @@ test('says what to do first, and since when', () => {
   stop();
 });
 
+test('a damp spell at a tag is one task, from its first alarm on; what failed while the past is read counts', () => {
+  const humid = reason({ sensor: 'humidity', verdict: 'stressed', value: 93, limit: 85 });
+  const vpd = reason({ sensor: 'vpd', verdict: 'stressed', value: 0.15, limit: 0.2 });
+  const margin = reason({ ...vpd, sensor: 'condensation_margin', value: 1.1, limit: 1.5 });
+  const failed = reason({ kind: 'scan_failed', verdict: 'unknown', sensor: '', value: 1 });
+  showTags(TAGS, judgement({ 1: [failed], 5: [humid, vpd, margin] }));
+  const stop = startAlarms();
+  render(<HealthSummary kiosk={false} />);
+  const tasks = () =>
+    [...screen.getByRole('list', { name: 'Do this now' }).children].map((it) => it.textContent);
+  const air = 'Air too damp: Dew margin 1.1\u00a0K, VPD 0.15\u00a0kPa, Humidity 93.0\u00a0%';
+  act(() => {
+    receive({ alarms: alarms([], { source: 'starting' }) });
+  });
+  expect(tasks()).toEqual([
+    `StressedTag 5: ${air}Ventilate and heat `,
+    'UnknownTag 1: Last scan failed: not reachableCheck the path and the tag ',
+  ]);
+  act(() => {
+    const at = { tag_id: '5' };
+    reportAlarms(
+      alarm('b', { ...at, raised: 200, reason: humid }),
+      alarm('a', { ...at, raised: 100, reason: vpd }),
+    );
+  });
+  expect(tasks()).toEqual([
+    expect.stringMatching(`^StressedTag 5: ${air}Ventilate and heat since sim 00:01:40$`),
+  ]);
+  stop();
+});
+
 test('nobody is called for what is shelved, and all the rest is counted', () => {
   const tags = ['1', '2', '3', '4', '5'].map((tag_id) => wireTag({ tag_id }));
   const mild = reason({ verdict: 'stressed' });

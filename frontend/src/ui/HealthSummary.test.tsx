@@ -98,8 +98,8 @@ test('a damp spell at a tag is one task, from its first alarm on; what failed wh
   act(() => {
     const at = { tag_id: '5' };
     reportAlarms(
-      alarm('b', { ...at, raised: 200, reason: humid }),
-      alarm('a', { ...at, raised: 100, reason: vpd }),
+      alarm('rh', { ...at, raised: 200, reason: humid }),
+      alarm('vpd', { ...at, raised: 100, reason: vpd }),
     );
   });
   expect(tasks()).toEqual([

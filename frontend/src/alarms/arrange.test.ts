@@ -173,7 +173,7 @@ test.each([
 
 test('as a file: each state, values in the unit of the page, and no formula', () => {
   const evil = alarm('a', { tag_id: '=1+1', raised: 0, worst: 4.2 });
-  const local = shelve(NO_LOCAL_ALARMS, { alarm: evil }, AT + 60_000, 'fan, off');
+  const local = shelve(NO_LOCAL_ALARMS, evil, AT + 60_000, 'fan, off');
   const list = listOf([evil, alarm('b', { cleared: 960 })], local, 1_000, AT);
   const [head, shelved, resolved] = alarmsCsv(list, IN_FAHRENHEIT, () => null)
     .slice(1)

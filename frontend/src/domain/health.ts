@@ -30,17 +30,20 @@ const SILENT: HealthReason = {
 
 /**
  * The greenhouse as judged. If `isReceiving` is false, its own verdict is unknown, whatever came last;
- * the tags' verdicts stay, beside the age of their readings.
+ * the tags' verdicts stay, beside the age of their readings. Without an age, that all was well says nothing.
  */
 export function houseHealth(
   tags: readonly Tag[],
   judgement: Judgement | null,
   isReceiving: boolean,
+  areAged = true,
 ) {
   const counts = { critical: 0, stressed: 0, unknown: 0, healthy: 0 };
   const byTag = new Map<string, TagHealth>();
-  for (const { id } of tags) {
-    const health = judgement?.tags[id] ?? NOT_JUDGED;
+  for (const { id, scannedAt } of tags) {
+    const judged = judgement?.tags[id] ?? NOT_JUDGED;
+    const isDated = isReceiving || (areAged && scannedAt !== 'unknown');
+    const health = isDated || judged.verdict !== 'healthy' ? judged : NOT_JUDGED;
     byTag.set(id, health);
     counts[health.verdict] += 1;
   }

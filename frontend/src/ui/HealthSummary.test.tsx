@@ -129,7 +129,7 @@ test('nobody is called for what is shelved, and all the rest is counted', () => 
   expect(store.get().view.list).toBe('tags');
   expect(house().textContent).not.toContain('Shelved');
   act(() => {
-    for (const item of calling(alarmList.get()).slice(0, 1)) shelveAlarm(item, 15, 'fan');
+    for (const item of calling(alarmList.get()).slice(0, 1)) shelveAlarm(item.alarm, 15, 'fan');
   });
   expect(todo.textContent).toMatch(/^StressedTag 4: .*StressedTag 2: .*also tag 3 .*\+ 1 tag$/);
   fireEvent.click(screen.getByRole('button', { name: '+ 1 tag' }));
@@ -153,7 +153,7 @@ test('that it is too cold is not shelved with that it was too warm', () => {
   render(<HealthSummary kiosk={false} />);
   act(() => {
     reportAlarms(alarm('warm', { tag_id: '5', reason: warm }));
-    for (const item of calling(alarmList.get())) shelveAlarm(item, 15, 'fan');
+    for (const item of calling(alarmList.get())) shelveAlarm(item.alarm, 15, 'fan');
   });
   const todo = screen.getByRole('list', { name: 'Do this now' });
   expect(todo.textContent).toBe('');
@@ -327,7 +327,7 @@ test('beside an active alarm, healthy says why', () => {
   );
   // A shelved one is not called active, but counted.
   act(() => {
-    for (const item of calling(alarmList.get())) shelveAlarm(item, 15, 'fan');
+    for (const item of calling(alarmList.get())) shelveAlarm(item.alarm, 15, 'fan');
   });
   expect(driver().textContent).toMatch(/^All assessed readings/);
   expect(screen.getByRole('button', { name: 'Shelved (1)' })).toBeTruthy();

@@ -10,9 +10,8 @@ import { S } from '../strings';
 import { showAlarm } from './follow';
 import type { Item } from './list';
 import { own, updateNotifySettings } from './own';
-import { textNow, worstNow } from './latest';
+import { severalNow, worstNow } from './latest';
 import { alarmList, onNews } from './watch';
-import { severalText } from './words';
 
 /**
  * The browser's permission. "prompt": it will ask the operator. "insecure": it allows notifications only
@@ -55,11 +54,7 @@ let last: Notification | null = null;
 async function show(raised: readonly Item[]): Promise<void> {
   const [first] = raised;
   if (!first) return;
-  const body = severalText(
-    raised.map(({ alarm }) => alarm),
-    (alarm) => textNow(store.get(), alarm),
-    S.alarmsRaised,
-  );
+  const body = severalNow(store.get(), raised, S.alarmsRaised);
   const origin = selectOrigin(store.get());
   const several = S.alarmNotifyTitle(raised.length);
   const title = origin === null ? several : `${S.origin[origin]}: ${several}`;

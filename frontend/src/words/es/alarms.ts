@@ -131,7 +131,9 @@ export const HEALTH: In<typeof EN.HEALTH> = {
   reasons: {
     sides: { below: 'inferior a', above: 'superior a' },
     heldUntil: (status, isBelow, until) =>
-      `${status} hasta ${isBelow ? 'bajar de' : 'superar'} ${until}`,
+      until === null
+        ? `aún ${status}`
+        : `${status} hasta ${isBelow ? 'bajar de' : 'superar'} ${until}`,
     just: {
       below: (limit) => `justo por debajo de ${limit}`,
       above: (limit) => `justo por encima de ${limit}`,
@@ -166,18 +168,18 @@ export const HEALTH: In<typeof EN.HEALTH> = {
     stopped: 'No se mide ningún punto: el robot se ha parado o no llegan sus datos',
     other: (kind, sensor) => (sensor === '' ? kind : `${sensor}: ${kind}`),
   },
+  airCause: { damp: 'Aire demasiado húmedo', dry: 'Aire demasiado seco' },
   todo: {
     sensors: {
       temperature: { below: 'Calefactar o cerrar ventanas', above: 'Ventilar o sombrear' },
-      humidity: { below: 'Humidificar', above: 'Ventilar y calefactar' },
       co2: {
         below: 'Dosificar CO₂ o ventilar',
         above: 'Ventilar y revisar la dosificación de CO₂',
       },
       light: { below: 'Encender la iluminación', above: 'Sombrear' },
       soil_moisture: { below: 'Regar', above: 'Regar menos y revisar el drenaje' },
-      vpd: { below: 'Ventilar y calefactar', above: 'Humidificar o sombrear' },
     },
+    air: { damp: 'Ventilar y calefactar', dry: 'Humidificar o sombrear' },
     range: 'Revisar el control del clima',
     watch: 'Vigilar',
     reading_failed: 'Revisar el sensor',

@@ -13,6 +13,7 @@ import pytest
 from lupin_bridge.bridge import Bridge
 from lupin_bridge.feed.query import PastQuery
 from lupin_bridge.feed.source import TwinTimeoutError, TwinUnavailableError
+from lupin_bridge.judge.quantities import DERIVED
 from lupin_bridge.past import fields, plans
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.stream import routes_schema, schema
@@ -269,6 +270,13 @@ async def test_every_route_answers_as_of_a_moment(domain: int) -> None:
         assert answer.status_code == 404
         # Before the start of the log, nothing is known.
         assert "no tag 'c' is known (1 others are); what was received" in answer.text
+        air = (Reading("temperature", 25.0, NS), Reading("humidity", 60.0, NS))
+        past.snapshot = Snapshot(0, "map", (TagState("a/b", None, air, NS),))
+        [tag] = (await it.http.get("/api/state?at=8")).json()["tags"]
+        assert tag["derived"] == pytest.approx(
+            {name: it.formula(25.0, 60.0) for name, it in DERIVED.items()}, abs=5e-5
+        )
+        assert (await it.http.get("/api/tags/a%2Fb?at=8")).json() == tag
 
 
 async def test_a_daily_quantity_is_queried_like_a_sensor(domain: int) -> None:
@@ -349,7 +357,7 @@ async def test_simultaneous_equal_queries_run_once(domain: int) -> None:
         return past.snapshot
 
     async with remembering(past) as it:
-        past.state_at = held  # type: ignore[method-assign]
+        past.state = held  # type: ignore[method-assign]
         number = it.bridge.state_number
         asking = [asyncio.create_task(it.http.get(f"{PATHS[0]}&at=9")) for _ in range(5)]
         in_flight = it.bridge.admission.in_flight

@@ -59,6 +59,10 @@ def test_a_sensor_has_its_colours_texts_legend_and_column(hmi: Hmi) -> None:
     hmi.page.get_by_role("button", name="Use ideal range").click()
     expect(hmi.test_id("range-low")).to_have_text("50.0")
 
+    hmi.choose_sensor("Vapour pressure deficit")
+    expect(chosen).to_have_attribute("data-column", "vpd")
+    expect(hmi.cell("1", "vpd")).to_have_text("0.94")
+
     hmi.choose_sensor("Soil moisture")
     hmi.expect_samples(1)
     hmi.choose_sensor("Light")  # its only tag has no pose

@@ -23,12 +23,20 @@ from lupin_bridge.archive.database import (
 )
 from lupin_bridge.feed.query import Child, LogReader, Now
 from lupin_bridge.feed.query import main as serve
-from lupin_bridge.fleet.overview import LIVE_S, Site, causes, dots, now_json, worst_first
+from lupin_bridge.fleet.overview import (
+    LIVE_S,
+    MAX_AHEAD_NS,
+    Site,
+    causes,
+    dots,
+    now_json,
+    worst_first,
+)
 from lupin_bridge.judge.alarm_fold import AlarmLog
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge, judge_once
 from lupin_bridge.judge.scans import recent_writes
-from lupin_bridge.judge.verdict import Health
+from lupin_bridge.judge.verdict import Health, Verdict
 from lupin_bridge.serving.admission import Limits
 from lupin_bridge.settings import Settings
 from lupin_bridge.stream.state_json import alarm_json
@@ -290,7 +298,9 @@ class Watcher:
         judged.judged_s, judged.was_live = time.monotonic(), site.is_live
         self.sites[name] = replace(
             site,
-            verdict=judgement.house.verdict,
+            verdict=Verdict.UNKNOWN
+            if newest_ns - now_ns > MAX_AHEAD_NS
+            else judgement.house.verdict,
             dots=dots(judged.snapshot.tags, judgement.tags),
         )
 

@@ -19,9 +19,9 @@ from lupin_bridge.feed.query import Now
 from lupin_bridge.feed.relay import Relay, TwinNames
 from lupin_bridge.feed.source import TwinSource, TwinUnavailableError, TwinUpdate
 from lupin_bridge.feed.tasks import Guard, Periodic, end
-from lupin_bridge.fleet.overview import MAX_AHEAD_NS, Archive, Site
+from lupin_bridge.fleet.overview import Archive, Site
 from lupin_bridge.fleet.reader import Latest, Reported
-from lupin_bridge.fleet.watcher import News
+from lupin_bridge.fleet.watcher import MAX_AHEAD_NS, News
 from lupin_bridge.settings import Settings
 from lupin_twin.core.diagnostics import UNKNOWN_JOURNAL, Condition, JournalState
 from lupin_twin.core.notes import Note, NotesUnwritable

@@ -7,7 +7,7 @@
 // and overrides of writing direction, invisible operators, byte-order mark, tag characters. First what
 // is none of these: the joiner within one emoji, such as a farmer.
 const INVISIBLE =
-  /(\p{Extended_Pictographic}[\ufe0f\u{1f3fb}-\u{1f3ff}]?\u200d(?=\p{Extended_Pictographic}))|[\p{Cc}\p{Cs}\u00ad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\u{e0000}-\u{e007f}]/gu;
+  /(\p{Extended_Pictographic}[\ufe0f\p{Emoji_Modifier}]?\u200d(?=\p{Extended_Pictographic}))|[\p{Cc}\p{Cs}\u00ad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\u{e0000}-\u{e007f}]/gu;
 /** More combining marks on one letter would reach into other lines. */
 const STACKED_MARKS = /(\p{M}{3})\p{M}+/gu;
 

@@ -23,15 +23,7 @@ from lupin_bridge.archive.database import (
 )
 from lupin_bridge.feed.query import Child, LogReader, Now
 from lupin_bridge.feed.query import main as serve
-from lupin_bridge.fleet.overview import (
-    LIVE_S,
-    MAX_AHEAD_NS,
-    Site,
-    causes,
-    dots,
-    now_json,
-    worst_first,
-)
+from lupin_bridge.fleet.overview import LIVE_S, Site, causes, dots, now_json, worst_first
 from lupin_bridge.judge.alarm_fold import AlarmLog
 from lupin_bridge.judge.episodes import Alarm, silence
 from lupin_bridge.judge.judging import Criteria, Judge, judge_once
@@ -67,6 +59,9 @@ _GATHER_S: Final = 0.05
 _JUDGING_S: Final = 1.0
 # Interval of judging a site again without new rows, because its readings grow old.
 _AGE_S: Final = 10.0
+# How far a site's clock may be ahead of the archive's, ns; readings are valid for longer than that.
+# Beyond it, old readings would pass for new ones: no status is known.
+MAX_AHEAD_NS: Final = 600 * 10**9
 _LOT: Final = 2_000
 # The worst alarms of a site that are shown, shelved ones last; its own page has all of them.
 MAX_ALARMS: Final = 20
@@ -296,11 +291,10 @@ class Watcher:
                 alarms=tuple(entry for _, entry in active[:MAX_ALARMS]),
             )
         judged.judged_s, judged.was_live = time.monotonic(), site.is_live
+        is_ahead = newest_ns - now_ns > MAX_AHEAD_NS
         self.sites[name] = replace(
             site,
-            verdict=Verdict.UNKNOWN
-            if newest_ns - now_ns > MAX_AHEAD_NS
-            else judgement.house.verdict,
+            verdict=Verdict.UNKNOWN if is_ahead else judgement.house.verdict,
             dots=dots(judged.snapshot.tags, judgement.tags),
         )
 

@@ -70,7 +70,7 @@ test('a mixture of two twins is told, for nothing of it is to be relied on', () 
 
 test('what the twin does not hear is told with the remedy, to its end', () => {
   const why = `/a_node publishes ${'/long'.repeat(60)} as VOLATILE`;
-  goLive(status({ input_problems: [`${why}; use TRANSIENT_LOCAL`, 'nothing has come yet'] }));
+  goLive(status({ input_problems: [`${why}; use TRANSIENT_LOCAL`, 'nothing has come yet.'] }));
   render(<Troubles />);
   expect(lines()).toEqual([
     `Not all data arrives here. ${why}; use TRANSIENT_LOCAL.`,

@@ -1,6 +1,7 @@
 """The access checks of a live bridge, what holds for every answer, and no secret in the log."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import httpx
 import pytest
@@ -282,11 +283,17 @@ def test_an_impossible_host_or_origin_is_refused_at_the_start(
     assert f"lupin-twin: {option}: '{wrong}' is not {is_no}" in refused_start(option, wrong)
 
 
-def test_listening_beyond_loopback_is_logged_as_a_warning() -> None:
-    with served("--host", "0.0.0.0") as live:
+def test_accounts_that_are_missing_and_listening_beyond_loopback_are_warnings(
+    tmp_path: Path,
+) -> None:
+    missing = tmp_path / "acounts.sqlite"
+    with served("--host", "0.0.0.0", "--accounts", str(missing)) as live:
         warnings = [line for line in live.process.output.splitlines() if "WARNING" in line]
-        assert "without LUPIN_TOKEN" in warnings[0]
-        assert "without --tls-cert" in warnings[1]
+        assert (
+            f"--accounts: {missing} does not exist; until it does, nobody is asked" in warnings[0]
+        )
+        assert "without LUPIN_TOKEN" in warnings[1]
+        assert "without --tls-cert" in warnings[2]
         assert live.get("/api/state").status_code == 200, "it goes by its addresses"
 
 

@@ -72,9 +72,10 @@ def test_the_most_specific_reason_comes_first_and_the_log_is_known_before_the_tw
     assert liveness.status(0.0).reason == "thread_dead"
     liveness.shutting_down = True
     assert liveness.status(0.0).reason == "shutting_down"
-    status = Liveness(lambda: World("simulated", 1_440.0)).status(5.0)
+    status = Liveness(lambda: World("simulated", 1_440.0), lambda: ("no archive",)).status(5.0)
     found = (status.reason, status.update.origin, status.day_length_s)
     assert found == ("never_seen", "simulated", 1_440.0)
+    assert status.frame()["input_problems"] == ["no archive"]
 
 
 @pytest.mark.parametrize("reason", get_args(Reason))

@@ -144,9 +144,6 @@ def test_the_settings_are_valid_including_those_that_are_commented_out(
     assert bool(settings.tls_key) != is_bare
 
 
-# --- the container -------------------------------------------------------------------------------
-
-
 def image() -> dict[str, str]:
     """The last of each instruction in the image's last stage; ENV by its variables."""
     text = (DEPLOY / "Containerfile").read_text(encoding="utf-8").replace("\\\n", " ")

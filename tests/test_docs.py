@@ -72,9 +72,6 @@ def commands(of: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
     return dict(below.choices)
 
 
-# --- the reference is complete --------------------------------------------------------------------
-
-
 def test_every_option_of_the_bridge_is_a_setting_of_the_reference() -> None:
     taken = options_of(commands(parser())["serve"]) - {"--help", "--config"}
     assert len(taken) > 20
@@ -148,9 +145,6 @@ def test_the_policy_beside_the_systemd_unit_is_that_of_the_table() -> None:
     assert file.read_text(encoding="utf-8") == GENERATOR["policy"](), "python docs/generate.py"
 
 
-# --- all names on the pages exist -----------------------------------------------------------------
-
-
 @EVERY_PAGE
 def test_every_option_on_a_page_exists(page: Path) -> None:
     known = set(re.findall(r"--[a-z][a-z-]*", reference()["commands"])) | FOREIGN_OPTIONS
@@ -213,9 +207,6 @@ def test_every_file_on_a_page_exists(page: Path) -> None:
             assert target.stem in reference(), name
     for name in re.findall(r"`((?:backend|frontend|ros_node|tests|docs)/[^`\s:]*)`", text):
         assert list(ROOT.glob(name.rstrip("/"))), name
-
-
-# --- the maps of the folders ----------------------------------------------------------------------
 
 
 def test_the_bridges_page_names_every_package_and_only_existing_files() -> None:

@@ -61,8 +61,6 @@ def test_every_answer_is_described_by_the_document(case: Any, live: Bridge) -> N
     case.validate_response(answer, excluded_checks=[positive_data_acceptance])
 
 
-# --- no HTTP ------------------------------------------------------------------------------------
-
 GOOD = b"GET /api/state HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n"
 PIECES = (
     *(b"GET", b"POST", b"\x00", b" ", b"/", b"//", b"/../..", b"/%00", b"/%ff", b"?", b"?a=%zz"),

@@ -24,9 +24,6 @@ def reason(client: Listener, expected: str) -> Frame:
     return client.until("status", lambda frame: frame["reason"] == expected)
 
 
-# --- the twin goes ------------------------------------------------------------------------------
-
-
 def test_a_twin_is_killed_and_its_successor_has_fewer_tags(domain: int) -> None:
     with (
         lupin_twin(domain, "web") as process,
@@ -156,9 +153,6 @@ def test_a_twin_without_times_has_no_history_and_no_times_of_readings(domain: in
         tag = live.json("/api/tags/1")
         assert (tag["last_try"], tag["last_try_status"]) == (None, None)
         assert "looked_at" not in tag
-
-
-# --- an exception in a callback -----------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

@@ -28,9 +28,6 @@ SETTLED_S = 1.0
 SETTLES_SOON = constants(**{"lupin_twin.ros.inputs:SETTLED_S": SETTLED_S})
 
 
-# --- publishers whose QoS does not match the contract ---------------------------------------------
-
-
 @pytest.fixture
 def running() -> Iterator[Bridge]:
     with bridge(*OFTEN) as live:
@@ -78,9 +75,6 @@ def test_a_publisher_with_other_qos_is_received_and_reported(
     wait_for(lambda: not running.json("/readyz")["input_problems"], "nothing to be wrong")
 
 
-# --- losses ---------------------------------------------------------------------------------------
-
-
 def test_every_loss_of_a_new_publisher_is_counted(domain: int) -> None:
     count = 1_000
     with lupin_twin(domain, "serve", *SETTLES_SOON) as twin, Peer(domain) as peer:
@@ -103,8 +97,6 @@ def test_every_loss_of_a_new_publisher_is_counted(domain: int) -> None:
         assert diagnosed(peer, is_all)
         assert f"on {TOPIC}: they arrived too fast" in twin.output
 
-
-# --- other users ----------------------------------------------------------------------------------
 
 NOBODY = 65534
 # Everything is imported while the files can be read.

@@ -82,9 +82,6 @@ def greenhouse(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Greenhouse]
         yield it
 
 
-# --- everything below the prefix ------------------------------------------------------------------
-
-
 def test_the_page_and_all_its_requests_are_below_the_prefix(greenhouse: Greenhouse) -> None:
     with httpx.Client(base_url=greenhouse.url, trust_env=False, timeout=PATIENCE_S) as browser:
         page = {"Accept": "text/html", "Host": "twin.example"}
@@ -141,8 +138,6 @@ def test_limits_and_logs_go_by_the_client_and_not_by_nginx(greenhouse: Greenhous
     assert httpx.get(url, headers=BEARER, trust_env=False, timeout=PATIENCE_S).is_success
 
 
-# --- the same from each replica ------------------------------------------------------------------
-
 FIELD: dict[str, Any] = {"sensor_type": "co2", "resolution": 0.25}
 WITH_ETAGS: tuple[tuple[str, dict[str, Any]], ...] = (
     *((f"/api/field.{suffix}", FIELD) for suffix in ("json", "npy", "png")),
@@ -170,9 +165,6 @@ def test_replicas_give_the_same_answers_and_take_each_others_etags(greenhouse: G
             return without_ages(of.json("/api/state"))
 
         wait_for(lambda: state(first) == state(other), "the same state")  # noqa: B023
-
-
-# --- a replica stops ------------------------------------------------------------------------------
 
 
 @dataclass

@@ -42,9 +42,6 @@ HOUR = 3_600 * SECOND
 DAY = Greenhouse(tags=TAGS, days=1.0, every_s=120.0, inspection_days=0.0, failing=0)
 
 
-# --- lag ------------------------------------------------------------------------------------------
-
-
 class _TimedSink(Sink):
     """The sink, which records for each scan how long after its arrival it is committed."""
 
@@ -146,9 +143,6 @@ def lag(sites: int) -> None:
         " late",
         flush=True,
     )
-
-
-# --- growth ---------------------------------------------------------------------------------------
 
 
 def measure(archive: Archive, sites: int, days: int) -> None:

@@ -82,8 +82,6 @@ class Hmi:
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.on("websocket", on_websocket)
 
-    # --- navigation -------------------------------------------------------------------------
-
     def go(self, fragment: str = "", query: str = "") -> None:
         """Load the page anew; a permalink's fragment comes without its `#`."""
         if self.page.url.partition("#")[0] == f"{self.url}/{query}":
@@ -130,8 +128,6 @@ class Hmi:
             for url in self.requests
             if urlsplit(url).netloc != own and not url.startswith(("blob:", "data:", "about:"))
         ] == []
-
-    # --- content ----------------------------------------------------------------------------
 
     @property
     def app(self) -> Locator:
@@ -206,8 +202,6 @@ class Hmi:
         """The page opens in the colours of the ideal range."""
         self.open_details()
         self.page.get_by_role("radio", name="Value").check()
-
-    # --- the map, pixel by pixel ------------------------------------------------------------
 
     @property
     def map(self) -> Locator:
@@ -310,8 +304,6 @@ class Hmi:
         """Move the mouse to a point of the map frame, m."""
         left, top = self.view().pixel(x, y)
         self.map.hover(position={"x": left, "y": top})
-
-    # --- the keyboard -----------------------------------------------------------------------
 
     def tab_to(self, target: Locator) -> None:
         """Reach an element with the Tab key alone."""

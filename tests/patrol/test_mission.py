@@ -62,15 +62,9 @@ def many_first_passes() -> list[list[Event]]:
     return [played(seed) for seed in range(4)]
 
 
-# --- repeatable ----------------------------------------------------------------------------------
-
-
 def test_the_same_seed_gives_the_same_events(patrol: list[Event]) -> None:
     random.seed(2026)  # the simulator uses the global random generator
     assert played(passes=PASSES) == patrol
-
-
-# --- the map -------------------------------------------------------------------------------------
 
 
 def test_the_map_grows_and_never_forgets(patrol: list[Event]) -> None:
@@ -82,9 +76,6 @@ def test_the_map_grows_and_never_forgets(patrol: list[Event]) -> None:
         assert (new[old != -1] == old[old != -1]).all()
 
 
-# --- discovery -----------------------------------------------------------------------------------
-
-
 def test_a_tag_is_discovered_before_its_first_attempt(many_first_passes: list[list[Event]]) -> None:
     for events in many_first_passes:
         discovered: set[str] = set()
@@ -93,9 +84,6 @@ def test_a_tag_is_discovered_before_its_first_attempt(many_first_passes: list[li
                 discovered = {tag.tag_id for tag in event.tags}
             elif isinstance(event, Visited):
                 assert event.write.tag_id in discovered
-
-
-# --- scans ---------------------------------------------------------------------------------------
 
 
 def test_every_tag_is_read_within_a_minute_with_its_retries(
@@ -142,9 +130,6 @@ def test_a_retry_may_fail_too_and_a_later_round_reads_the_tag(patrol: list[Event
         for visit in only(Visited, patrol)
         if visit.write.tag_id == tag_id and visit.pass_index > pass_index
     )
-
-
-# --- the robot and the day -----------------------------------------------------------------------
 
 
 def test_the_robot_never_enters_a_table_and_never_jumps(patrol: list[Event]) -> None:

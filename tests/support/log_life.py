@@ -128,8 +128,6 @@ class Life:
     def _of(self, tag_id: str) -> list[tuple[int, Write]]:
         return [(n, row) for n, row in self.holds() if tag_id in (EVERY_TAG, row.tag_id)]
 
-    # --- the expected rows --------------------------------------------------------------------
-
     def readings(self, tag_id: str, sensor: str) -> list[Entry]:
         return sorted(
             (row.stamp_ns, number, reading.value)
@@ -259,7 +257,7 @@ def check(answer: SeriesPast, request: SeriesRequest, entries: list[Entry], *, n
         assert high == float(f"{max(values):.12g}")
 
 
-# --- for hypothesis: rows in any order, some late, some again; clocks go back ---------------------
+# For hypothesis: rows in any order, some late, some again; clocks go back.
 
 _stamps = st.builds(
     lambda minute, ns: BEGUN + minute * MINUTE + ns, st.integers(0, LATEST), st.integers(0, 3)

@@ -70,8 +70,6 @@ class Peer:
         self.node.destroy_node()
         rclpy.try_shutdown(context=self._context)
 
-    # --- publishing -------------------------------------------------------------------------
-
     def publish(self, topic: str, message: Any, depth: int = 50) -> Any:
         """Publish latched, without waiting for subscribers; returns the publisher."""
         publisher = self.publisher(topic, type(message), depth)
@@ -110,8 +108,6 @@ class Peer:
         if not self.states:
             self.listen()
         self.until(tick, f"a state at {seconds} s")
-
-    # --- listening --------------------------------------------------------------------------
 
     def listen(self, durability: DurabilityPolicy = DurabilityPolicy.TRANSIENT_LOCAL) -> None:
         """Subscribe to `/twin/state`; states are appended to `states`."""

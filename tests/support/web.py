@@ -157,9 +157,6 @@ def bridge(
         yield Bridge(process, str(http.base_url).rstrip("/"), peer, http)
 
 
-# --- clients that do not read -------------------------------------------------------------------
-
-
 @contextmanager
 def deaf_client(url: str, *paths: str) -> Iterator[socket.socket]:
     """A client that requests all of the paths at once, and reads nothing; its buffers are small.

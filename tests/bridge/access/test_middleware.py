@@ -55,9 +55,6 @@ def refusal_of(answer: httpx.Response) -> str:
     return schema.ErrorMessage.model_validate_json(answer.content).detail
 
 
-# --- Host ---------------------------------------------------------------------------------------
-
-
 def test_a_rebound_name_gets_nothing(open_bridge: Served) -> None:
     rebound = {"Host": "evil.example:8000", "Origin": "http://evil.example:8000"}
     requested = [(path, rebound) for path in ("/api/state", "/healthz", "/", "/signin", "/nowhere")]
@@ -67,9 +64,6 @@ def test_a_rebound_name_gets_nothing(open_bridge: Served) -> None:
         detail = refusal_of(answer)
         assert "'evil.example'" in detail
         assert detail.endswith("--allow-host evil.example")
-
-
-# --- Origin -------------------------------------------------------------------------------------
 
 
 def test_a_foreign_page_gets_no_answer_and_no_permission_to_read_one(open_bridge: Served) -> None:
@@ -137,9 +131,6 @@ def test_a_request_target_has_a_length_limit(open_bridge: Served) -> None:
         refused = open_bridge.get(path)
         assert refused.status_code == 414
         assert refusal_of(refused) == "the path has 65 segments, the limit is 64"
-
-
-# --- the token ----------------------------------------------------------------------------------
 
 
 # Without a token, existing and missing paths look the same.
@@ -266,9 +257,6 @@ def test_valid_tokens_and_expired_cookies_do_not_count_as_guesses(closed: Served
         assert client.get("/api/state", headers=BEARER).status_code == 200
 
 
-# --- at the start -------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("option", "wrong", "is_no"),
     [
@@ -288,9 +276,6 @@ def test_listening_beyond_loopback_is_logged_as_a_warning() -> None:
         assert "without LUPIN_TOKEN" in warnings[0]
         assert "without --tls-cert" in warnings[1]
         assert live.get("/api/state").status_code == 200, "it goes by its addresses"
-
-
-# --- what holds for every answer ------------------------------------------------------------------
 
 
 ELSEWHERE = ["/", "/nowhere", "/ws/state"]

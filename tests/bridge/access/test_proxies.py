@@ -236,9 +236,6 @@ def test_proxy_settings_that_depend_on_each_other_are_checked_together() -> None
     assert "must be a header's name" in wrong
 
 
-# --- TLS ------------------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def ours(tmp_path_factory: pytest.TempPathFactory) -> Certificate:
     return certificate(tmp_path_factory.mktemp("tls"))

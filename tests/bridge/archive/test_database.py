@@ -177,9 +177,6 @@ def test_part_of_a_password_is_never_taken_for_a_host() -> None:
     assert "two@" not in done.stderr
 
 
-# --- TLS ------------------------------------------------------------------------------------------
-
-
 def test_the_servers_certificate_is_checked(tmp_path: Path) -> None:
     journal = tmp_path / "journal.sqlite"
     write(journal, recent_scans())
@@ -207,9 +204,6 @@ def test_the_servers_certificate_is_checked(tmp_path: Path) -> None:
         done = forwarded(trusted)
         assert done.returncode == 0, done.stderr
         assert len(archive.rows()["scan"]) == len(recent_scans()) - 5
-
-
-# --- parts by month -------------------------------------------------------------------------------
 
 
 DAY = 86_400 * SECOND

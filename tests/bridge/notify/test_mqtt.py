@@ -250,9 +250,6 @@ async def test_a_password_and_an_authority_satisfy_a_broker_that_needs_them(tmp_
             assert "certificate verify failed" in channel.condition.detail
 
 
-# --- changes, once, in their latest form ----------------------------------------------------------
-
-
 def mirror(discovery: str = "homeassistant") -> Mirror:
     return Mirror(Topics("lt", discovery), SENSORS)
 

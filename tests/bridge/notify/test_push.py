@@ -114,9 +114,6 @@ def push_service(folder: Path, *answers: Answer) -> Iterator[tuple[Stage, Certif
         yield Stage(service, accounts), ours
 
 
-# --- Push alone ---------------------------------------------------------------------------------
-
-
 @dataclass
 class Pushing(Stage):
     """Push without a bridge: how it reacts to each answer, with short waits."""
@@ -264,9 +261,6 @@ async def test_an_alarm_raised_while_the_log_is_read_at_the_start_is_new(
     push.on_alarms(Change((alarm("later"),)))
     await until(lambda: notified == ["meanwhile", "later"], "the next one")
     await push.stop()
-
-
-# --- a bridge -----------------------------------------------------------------------------------
 
 
 @dataclass

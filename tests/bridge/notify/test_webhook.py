@@ -192,9 +192,6 @@ async def test_it_stops_at_once_while_a_receiver_hangs() -> None:
                 await hook.stop()
 
 
-# --- changes of alarms ----------------------------------------------------------------------------
-
-
 def put(news: AlarmNews, *alarms: Alarm, is_past: bool = False) -> list[tuple[str, str]]:
     found = news.of(Change(alarms, is_past=is_past), NOW_NS)
     return [(it.change, it.id) for it in found]
@@ -247,9 +244,6 @@ def test_active_alarms_and_those_of_the_last_day_are_sent_again_with_the_same_id
     assert ids == [("raised", f"{active.id}.raised")]
     after = put(AlarmNews(), old, active, just, missed, is_past=True)
     assert after == [*ids, ("cleared", f"{just.id}.cleared.{edge}")]
-
-
-# --- one POST -------------------------------------------------------------------------------------
 
 
 def target(url: str, ca: str = "") -> WebhookTarget:

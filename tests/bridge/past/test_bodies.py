@@ -48,18 +48,12 @@ def history(past: SeriesPast, requested: SeriesRequest = REQUESTED) -> dict[str,
     return found
 
 
-# --- the body -------------------------------------------------------------------------------------
-
-
 def test_each_value_has_its_unit_and_events_have_no_gaps() -> None:
     for sensor_type, unit in (("co2", "ppm"), ("x", ""), ("~silences", "s"), ("~looks", "")):
         assert history(readings(), SeriesRequest("7", sensor_type))["unit"] == unit
     past = readings(1, 2, 3, 90)
     assert history(past, SeriesRequest("7", "~failures"))["gaps"] == []
     assert len(history(past)["gaps"]) == 2
-
-
-# --- gaps -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -119,9 +113,6 @@ def test_a_gap_between_buckets_holds_no_reading_and_is_at_least_a_bucket_long(
         assert not [stamp for stamp in stamps if since <= stamp < until]
         assert until - since >= width_ns or not stamps
     assert found == sorted(found)
-
-
-# --- events over time -----------------------------------------------------------------------------
 
 
 # The runs, the period, the events, the silences.
@@ -256,9 +247,6 @@ def test_single_and_bucketed_events_give_the_same_counts(
     assert timeline_body(runs, period, mixed, silences) == plain
 
 
-# --- how complete an answer is --------------------------------------------------------------------
-
-
 # Two runs; a part of the first one was deleted.
 JOURNAL = Condition(
     JournalState.RECORDING,
@@ -314,9 +302,6 @@ def test_unknown_limits_are_omitted_and_the_reasons_for_missing_data_are_explain
         "; the journal is complete only up to 100.000000000 s"
     )
     assert bodies.why_not(JOURNAL, 70 * NS) == ""
-
-
-# --- rows as CSV ----------------------------------------------------------------------------------
 
 
 ROW = PastRow(1_795_270_500 * NS + 5, "7", 1.5, -2.0, "co2", 412.5, 0, "robot-1")

@@ -135,9 +135,6 @@ def test_a_refusal_comes_from_the_service_with_its_reason(
     assert live.get("/api/estimate", headers={"Accept": "text/css"}, **QUERY).status_code == 406
 
 
-# --- how accurate estimates are, and how a changed sensor is reported -----------------------------
-
-
 TAGS = {"a": (0.5, 0.5), "b": (1.75, 2.75), "c": (0.5, 2.0), "d": (2.5, 1.0)}
 SENSOR = {"sensor_type": "temperature"}
 

@@ -217,9 +217,6 @@ async def test_queries_declare_their_cost_and_are_timed_by_their_kind(domain: in
         assert "lupin_exports_running 0.0" in text
 
 
-# --- as of a moment -------------------------------------------------------------------------------
-
-
 FIELD = "sensor_type=co2&resolution=0.5"
 PATHS = (
     "/api/state?",

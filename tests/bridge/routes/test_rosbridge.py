@@ -58,9 +58,6 @@ def test_the_limits_of_fields_hold_here_too() -> None:
         assert greenhouse.get("/api/field", **other).status_code == 429, "of one client, together"
 
 
-# --- in the test's own process, with a twin that can be blocked -----------------------------------
-
-
 def calls(count: int) -> list[Message]:
     """Calls for different fields: equal ones would share one computation."""
     return [

@@ -29,9 +29,6 @@ def cookie_of(answer: httpx.Response) -> Morsel[str]:
     return cookie
 
 
-# --- the page -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("path", "media_type"),
     [("/signin", "text/html"), ("/signin.js", "text/javascript"), ("/signin.css", "text/css")],
@@ -87,9 +84,6 @@ def test_the_page_has_the_same_texts_in_all_languages() -> None:
         assert [key for key in words if "%" in words[key]] == ["refused"]
 
 
-# --- the exchange -------------------------------------------------------------------------------
-
-
 def test_the_token_is_exchanged_for_a_strict_cookie(closed: Served) -> None:
     answer = closed.post("/api/signin", BEARER)
     assert (answer.status_code, answer.content) == (204, b"")
@@ -127,8 +121,6 @@ def test_without_a_token_there_is_no_sign_in() -> None:
         assert "needs no token" in exchange.json()["detail"]
         assert "set-cookie" not in exchange.headers
 
-
-# --- signing out --------------------------------------------------------------------------------
 
 SAME_ORIGIN = {"Sec-Fetch-Site": "same-origin", "Sec-Fetch-Mode": "cors", "Sec-Fetch-Dest": "empty"}
 

@@ -43,9 +43,6 @@ def test_in_a_simulation_what_was_later_than_a_reset_clock_is_news(retains_keys:
     assert (repeats.news(scan("1", at_s=3600.0, co2=1.0)) is None) is retains_keys
 
 
-# --- a tag's history ------------------------------------------------------------------------------
-
-
 WRITES = st.lists(
     st.builds(
         lambda at_s, sensor, value, source: scan(

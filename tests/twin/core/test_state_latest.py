@@ -43,9 +43,6 @@ def test_only_a_clock_that_goes_back_moves_times_and_is_no_revision() -> None:
     assert store.observation_count == count
 
 
-# --- against a model ----------------------------------------------------------------------------
-
-
 def plainest(writes: list[Write]) -> dict[str, TagState]:
     """The state of each tag, from the list of all writes: the only rule is their order.
 

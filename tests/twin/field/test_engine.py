@@ -76,9 +76,6 @@ def answer(store: TwinStore, **rules: float) -> FieldGrid:
     return compute_field(request_of(), samples, None, rules_of(**rules))
 
 
-# --- the request -----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -130,9 +127,6 @@ def test_a_grid_bomb_is_refused_without_an_allocation(changes: dict[str, Any]) -
     assert peak < 20_000
 
 
-# --- the field ------------------------------------------------------------------------------
-
-
 def test_the_field_uses_the_samples_of_the_store_and_the_rules(store: TwinStore) -> None:
     grid = answer(store)
     assert (grid.width, grid.height, grid.sample_count) == (4, 2, 2)
@@ -182,9 +176,6 @@ def test_cost_follows_cells_and_the_windows_of_the_samples(
     assert cost == pytest.approx(expected_s, rel=0.01)
 
 
-# --- explored --------------------------------------------------------------------------------
-
-
 def test_a_map_clips_to_known_cells_wherever_the_box_begins(store: TwinStore) -> None:
     request, samples = request_of(bbox_min_x=1.0), store.samples_for_sensor("temperature")
     occupancy = map_of([[0, -1, 0, 0], [0, 0, 0, -1]])
@@ -195,9 +186,6 @@ def test_a_map_clips_to_known_cells_wherever_the_box_begins(store: TwinStore) ->
     assert not np.isnan(unclipped).any()
     known = np.array([0, 1, 1, 1, 1, 0], dtype=np.bool_)
     np.testing.assert_array_equal(clipped, np.where(known, unclipped, np.float32(np.nan)))
-
-
-# --- the default box -------------------------------------------------------------------------
 
 
 def test_the_default_box_covers_the_tags_and_their_reach() -> None:

@@ -45,9 +45,6 @@ def field_over(width: int, height: int, samples: Sequence[Sample], **changes: An
     )
 
 
-# --- rule by rule ----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("power", [2.0, 3.0])
 @pytest.mark.parametrize("falloff", [0.0, 1.0, 1.5, 3.0])
 def test_a_coincident_sample_is_taken_exactly(power: float, falloff: float) -> None:
@@ -86,9 +83,6 @@ def test_a_distance_equal_to_the_radius_is_within_although_its_square_is_not(pow
     assert field_at_origin([(0.8, 1.5, 10.0), (1.5, 0.8, 20.0)], **falloff) == 15.0
 
 
-# --- the grid --------------------------------------------------------------------------------
-
-
 def test_the_range_leaves_out_what_float32_cannot_hold() -> None:
     samples = [(0.5, 0.5, 1e39), (3.5, 0.5, 8.0), (6.5, 0.5, -1e39)]
     grid = field_over(7, 1, samples, max_distance_m=0.5, falloff_radius_m=0.5)
@@ -96,9 +90,6 @@ def test_the_range_leaves_out_what_float32_cannot_hold() -> None:
     assert (grid.value_min, grid.value_max) == (8.0, 8.0)
     only = field_over(1, 1, samples[:1])
     assert (only.value_min, only.value_max) == (0.0, 0.0)
-
-
-# --- refusals --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

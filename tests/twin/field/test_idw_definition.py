@@ -29,9 +29,6 @@ def assert_same_values(
     assert (np.abs(actual[known] - wanted[known]) <= rounding).all()
 
 
-# --- against the oracle ----------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Case:
     """A field to be computed twice."""

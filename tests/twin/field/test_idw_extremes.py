@@ -11,8 +11,6 @@ from lupin_twin.field import idw
 from lupin_twin.field.idw import FieldSample
 from tests.twin.field.test_idw import field_at_origin, field_over
 
-# --- at the extremes -------------------------------------------------------------------------
-
 
 @pytest.mark.parametrize("power", [100.0, 1000.0])
 def test_high_powers_neither_overflow_nor_vanish(power: float) -> None:

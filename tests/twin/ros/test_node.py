@@ -42,9 +42,6 @@ def running_twin(*ros_args: str) -> Iterator[Twin]:
         yield Twin(process, peer)
 
 
-# --- the state ----------------------------------------------------------------------------------
-
-
 def test_a_twin_alone_publishes_an_empty_state_at_once(domain: int) -> None:
     with twin_node(domain, "--ros-args", "-p", "state_publish_rate_hz:=0.01"), Peer(domain) as peer:
         state = peer.state(lambda _: True, "a state")
@@ -62,9 +59,6 @@ def test_fifty_observations_latched_before_the_twin_started_are_all_received(dom
             state = producer.state(lambda s: len(s.tags) >= 50, "all 50 tags")
     assert [tag.tag_id for tag in state.tags] == [f"t{i}" for i in range(50)]
     assert [tag.readings[0].value for tag in state.tags] == [400.0 + i for i in range(50)]
-
-
-# --- time ---------------------------------------------------------------------------------------
 
 
 def test_stamps_and_staleness_follow_the_simulated_clock(domain: int) -> None:
@@ -101,17 +95,11 @@ def test_stamps_and_staleness_follow_the_simulated_clock(domain: int) -> None:
         assert ages() == {"before": 10.0, "now": 5.0}
 
 
-# --- parameters ---------------------------------------------------------------------------------
-
-
 def test_a_parameter_that_does_not_exist_causes_a_warning_with_its_name(domain: int) -> None:
     with twin_node(domain, "--ros-args", "-p", "idw_pwoer:=3.0") as process:
         line = process.wait_for_output("idw_pwoer")
     assert "WARN" in line
     assert "unknown" in line
-
-
-# --- the journal --------------------------------------------------------------------------------
 
 
 def test_a_damaged_journal_is_named_in_the_log(domain: int, tmp_path: Path) -> None:

@@ -90,13 +90,11 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
 
 @pytest.fixture(autouse=True)
 def state(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A state folder per test: no test sees the state of another."""
     monkeypatch.setenv("XDG_STATE_HOME", tempfile.mkdtemp(dir=STATE))
 
 
 @pytest.fixture
 def domain() -> Iterator[int]:
-    """A ROS domain of the test's own."""
     with own_domain() as leased:
         yield leased
 

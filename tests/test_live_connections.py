@@ -33,7 +33,6 @@ def plain() -> Iterator[Served]:
 
 @pytest.fixture(scope="module")
 def secret(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    """With a token, and over TLS."""
     files = certificate(tmp_path_factory.mktemp("tls"))
     options = (*limits(client_timeout_s=TIMEOUT_S), *files.options)
     with served(*options, trust=files.trust, afresh=True, LUPIN_TOKEN=TOKEN) as running:

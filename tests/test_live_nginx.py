@@ -263,8 +263,6 @@ def test_clients_of_a_replica_that_stops_under_load_are_back_in_time(
 
 @dataclass
 class Load:
-    """A client that requests fields all the time."""
-
     url: str
     answers: int = 0
     refused: list[int] = field(default_factory=list)

@@ -38,7 +38,6 @@ def play(url: str, scenario: str) -> Any:
 
 @pytest.fixture(scope="module")
 def greenhouse() -> Iterator[Bridge]:
-    """A twin with one tag."""
     with bridge() as running:
         running.peer.observe(messages.scan("1", {"temperature": 20.0}, at=(0.0, 0.0)))
         running.peer.wait_for_twin()

@@ -26,7 +26,6 @@ BENCHES = (
 
 
 def main() -> int:
-    """Run the benchmarks named on the command line, or all."""
     use_own()
     # As in the twin, and before anything imports numpy.
     os.environ["OPENBLAS_NUM_THREADS"] = "1"

@@ -105,7 +105,6 @@ def ordinary() -> None:
 
 
 def main() -> None:
-    """Print all of it."""
     print(f"\n{'tags':>7}  {'five sensors each':<44}{'ms':>12}{'at most':>12}")
     for tags in SIZES:
         alarms_of(tags)

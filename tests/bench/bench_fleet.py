@@ -48,7 +48,6 @@ class _TimedSink(Sink):
     lags: list[tuple[float, float]] = []  # noqa: RUF012  # one for all
 
     def put(self, batch: Batch, epoch: Epoch) -> Epoch:
-        """Append a batch."""
         put = super().put(batch, epoch)
         now_ns = time.time_ns()
         lags = [(now_ns / 1e9, (now_ns - row[5]) / 1e9) for row in batch.rows.get("scan", ())]
@@ -88,7 +87,6 @@ class _Twin:
         (self._seq,) = self._connection.execute("SELECT max(seq) FROM scan").fetchone()
 
     def record(self) -> None:
-        """Write them in one transaction."""
         now_ns = time.time_ns()
         self._connection.execute("BEGIN")
         self._connection.executemany(
@@ -114,7 +112,6 @@ def record(twins: Sequence[_Twin], seconds: float) -> float:
 
 
 def lag(sites: int) -> None:
-    """Print how far the archive is behind."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         archive = Archive(stack.enter_context(server(fsync=True, connections=sites + 20)), "gh0")
@@ -195,7 +192,6 @@ def growth() -> None:
 
 
 def main() -> None:
-    """Print the figures."""
     lag(200)
     growth()
 

@@ -15,7 +15,6 @@ WEEK = Greenhouse(tags=30, days=7.0, every_s=120.0, inspection_days=0.0, failing
 
 
 def main() -> None:
-    """Print the figures."""
     journal, scans = filled(WEEK), WEEK.scans * WEEK.tags
     with server(fsync=True) as postgresql:
         archive = Archive(postgresql)

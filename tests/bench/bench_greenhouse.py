@@ -35,7 +35,6 @@ SETTLED = "() => new Promise((r) => requestAnimationFrame(() => setTimeout(r, 50
 
 
 def main() -> None:
-    """Measure both sizes and print them."""
     with chromium() as browser, bridge() as running:
         for count in SIZES:
             with page_of(browser) as page:

@@ -38,7 +38,6 @@ def rows() -> list[Write]:
 
 
 def serve(page: Page) -> None:
-    """Print the times of the server."""
     begun_s = time.monotonic()
     wait_for(
         lambda: sum(it["active_alarms"] is not None for it in page.sites().values()) == SITES,
@@ -57,7 +56,6 @@ def serve(page: Page) -> None:
 
 
 def paint(page: BrowserPage, url: str) -> None:
-    """Print the times of a browser."""
     page.goto(url, wait_until="commit")
     page.locator(".fleet-site").nth(SITES - 1).wait_for(state="attached")
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => setTimeout(done)))")
@@ -67,7 +65,6 @@ def paint(page: BrowserPage, url: str) -> None:
 
 
 def main() -> None:
-    """Print the figures."""
     with tempfile.TemporaryDirectory() as folder, server() as postgresql:
         archive = Archive(postgresql, "gh0")
         archive.add_user("page", "lupin_page")

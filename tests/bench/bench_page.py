@@ -56,7 +56,6 @@ async (seconds) => {
 
 
 def main() -> None:
-    """Measure both and print them."""
     expect.set_options(timeout=PATIENCE_MS)
     with chromium() as browser:
         print_first_paint(browser)

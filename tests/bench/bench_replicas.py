@@ -65,7 +65,6 @@ def measure(ports: Sequence[int], pids: Sequence[int], count: int) -> None:
 
 
 def main() -> None:
-    """Print the figures."""
     print(
         " browsers  delivered %  median ms   p99 ms  joined s  cores a replica  MB a replica  load"
     )

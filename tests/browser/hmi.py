@@ -106,7 +106,6 @@ class Hmi:
         )
 
     def address(self) -> str:
-        """The current address."""
         address = self.page.evaluate("location.href")
         assert isinstance(address, str)
         return address
@@ -147,7 +146,6 @@ class Hmi:
         return self.page.get_by_test_id(name)
 
     def row(self, tag_id: str) -> Locator:
-        """A tag's row of the table."""
         return self.page.locator(f"tr[data-tag-id={json.dumps(tag_id)}]")
 
     def cell(self, tag_id: str, sensor: str) -> Locator:
@@ -380,7 +378,6 @@ def open_hmi(
 
 
 def slider(hmi: Hmi) -> Locator:
-    """The slider of the time bar."""
     return hmi.page.get_by_role("slider", name="Time shown")
 
 

@@ -59,7 +59,6 @@ def counts(running: Bridge) -> dict[str, Any]:
 
 
 def printed(open_page: OpenPage, address: str) -> Page:
-    """The page as it is printed."""
     page = open_page(address, go=False, viewport={"width": A4_PX, "height": 1000}).page
     page.goto(address)
     page.emulate_media(media="print")

@@ -66,7 +66,6 @@ def plan(live: Bridge, *points: tuple[float, float]) -> None:
 
 
 def mark(hmi: Hmi) -> tuple[float, float]:
-    """The centre of the robot's mark, m."""
     box = hmi.test_id("robot-mark").locator(".robot-body").bounding_box()
     around, view = hmi.map.bounding_box(), hmi.view()
     assert box is not None

@@ -53,7 +53,6 @@ def scans_of(events: list[Event]) -> list[Scan]:
 
 @pytest.fixture(scope="module")
 def patrol() -> list[Event]:
-    """The first rounds with the default seed."""
     return played(passes=PASSES)
 
 

@@ -21,8 +21,6 @@ OWN = {"X-Lupin-Twin": "1"}
 
 @dataclass(frozen=True)
 class Served:
-    """A `lupin-twin serve` and its address."""
-
     process: Process
     url: str
     trust: ssl.SSLContext | bool = False

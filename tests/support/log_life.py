@@ -33,13 +33,11 @@ Entry = tuple[int, int, float]  # stamp, number, value
 def failure(
     tag: str = "7", at_ns: int = BEGUN, status: int = 2, kind: int = 0
 ) -> Scan | Inspection:
-    """An attempt that failed."""
     reported = (None, status, "no", "robot", 0, "", at_ns + 1000)
     return Inspection(tag, at_ns, None, *reported) if kind else Scan(tag, at_ns, (), *reported)
 
 
 def _seen(row: Write) -> Flower | None:
-    """What an inspection saw."""
     return row.flower if isinstance(row, Inspection) else None
 
 

@@ -14,7 +14,6 @@ from lupin_twin.runtime.workers import ShouldStop
 
 
 def tags_at(at_ns: int, find: Find, _: ShouldStop) -> int:
-    """The number of tags."""
     snapshot: Snapshot = find(at_ns)
     return len(snapshot.tags)
 
@@ -33,7 +32,6 @@ def at_work(_: Find, __: ShouldStop) -> tuple[int, int]:
 
 
 def sevens(count: int, _: Find, __: ShouldStop) -> Answered:
-    """An answer with that many bytes."""
     return Answered("x", Answer(b"7" * count, "text/plain", {}))
 
 

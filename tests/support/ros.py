@@ -27,7 +27,6 @@ def latched(depth: int) -> QoSProfile:
 
 
 def clock_at(seconds: float) -> Clock:
-    """A message for `/clock`."""
     clock = Clock()
     clock.clock.sec = int(seconds)
     clock.clock.nanosec = int((seconds % 1) * 1e9)
@@ -85,16 +84,13 @@ class Peer:
         return self._publishers[topic]
 
     def observe(self, *messages: Any) -> None:
-        """Publish observations."""
         for message in messages:
             self.publish("/floranova/observations", message)
 
     def discover(self, message: Any) -> None:
-        """Publish discovered tags."""
         self.publish("/perception/discovered_tags", message)
 
     def publish_map(self, message: Any) -> None:
-        """Publish an occupancy grid."""
         self.publish("/map", message, depth=1)
 
     def set_clock(self, seconds: float) -> None:
@@ -145,11 +141,9 @@ class Peer:
         return next(tag for tag in state.tags if tag.tag_id == tag_id)
 
     def get_field(self, **request: Any) -> Any:
-        """Call `/twin/get_field` and return the response."""
         return self.call(GetField, "/twin/get_field", **request)
 
     def call(self, kind: Any, service: str, **request: Any) -> Any:
-        """Call a service and return the response."""
         [answer] = self.call_all(kind, service, [kind.Request(**request)])
         return answer
 

@@ -46,7 +46,6 @@ class Listener:
         self.connection = connection
 
     def next(self, timeout_s: float = PATIENCE_S) -> Frame:
-        """The next frame, whatever its type."""
         message = self.connection.recv(timeout=timeout_s)
         frame: Frame = json.loads(message)
         return frame

@@ -321,7 +321,6 @@ def file(tmp_path: Path) -> Path:
 
 
 def ended(file: Path, words: str) -> CompletedProcess[str]:
-    """The command on this file."""
     return run_here(*words.split(), "--accounts", file)
 
 

@@ -180,7 +180,6 @@ def test_a_websocket_needs_the_token(closed: Served, path: str) -> None:
 
 
 def session_of(closed: Served) -> str:
-    """The Cookie header of a new session."""
     return closed.post("/api/signin", BEARER).headers["set-cookie"].partition(";")[0]
 
 

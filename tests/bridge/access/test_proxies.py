@@ -356,7 +356,6 @@ def test_old_versions_of_tls_are_refused(secure: Served, ours: Certificate) -> N
 
 
 def renew(ours: Certificate, folder: Path) -> Certificate:
-    """Replace the served pair by a new one."""
     folder.mkdir()
     new = certificate(folder)
     new.key.replace(ours.key)

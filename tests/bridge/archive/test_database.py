@@ -84,7 +84,6 @@ def test_the_page_reads_every_site_and_writes_notes_alone(two_sites: Archive) ->
 
 
 def command(action: str, url: str, **env: str) -> CompletedProcess[str]:
-    """`lupin-twin archive` of that archive."""
     return run("archive", action, "--archive-url", url, **env)
 
 

@@ -47,7 +47,6 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def journal(*words: object) -> CompletedProcess[str]:
-    """What `lupin-twin journal` prints."""
     return run_here("journal", *words)
 
 

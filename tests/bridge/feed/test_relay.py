@@ -80,8 +80,6 @@ class Ros:
 
 
 class Ear:
-    """What a listener has received."""
-
     def __init__(self) -> None:
         self.received: list[bytes] = []
 

@@ -74,7 +74,6 @@ async def telling(
 
 
 async def until_reported(received: Subscriber, value: float) -> None:
-    """Wait until a broker has received this temperature."""
     await until(
         lambda: (received.last(READING) or {}).get("value") == value, f"the reading {value}"
     )

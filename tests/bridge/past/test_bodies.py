@@ -120,7 +120,6 @@ Parts = tuple[SeriesPast, Grid, dict[Event, SeriesPast], SeriesPast]
 
 
 def one_by_one(stamps_ns: list[int], start_ns: int, end_ns: int) -> SeriesPast:
-    """The events one by one."""
     ones = (1.0,) * len(stamps_ns)
     stamps = tuple(sorted(stamps_ns))
     return SeriesPast(start_ns, end_ns, None, stamps, (1,) * len(stamps), ones, ones, ones)

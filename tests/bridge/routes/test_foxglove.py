@@ -42,7 +42,6 @@ def play(url: str, scenario: str, *topics: str) -> Any:
 
 @pytest.fixture(scope="module")
 def greenhouse() -> Iterator[Bridge]:
-    """A twin with one tag, a map and a layer."""
     with bridge("--ros-args", "-p", "layers:=[temperature]") as running:
         running.peer.wait_for_twin()
         running.peer.observe(messages.scan("1", {"temperature": 20.5}, at=(1.0, 2.0), stamp_s=9.0))
@@ -158,7 +157,6 @@ SIM = ("--ros-args", "-p", "use_sim_time:=true")
 
 
 def subscribing(offer: Any, *topics: str) -> bytes:
-    """The frame that subscribes to these topics."""
     ids = {channel.topic.name: channel.id for channel in offer.channels.values()}
     entries = [{"id": n, "channelId": ids[topic]} for n, topic in enumerate(topics)]
     return masked(TEXT, json.dumps({"op": "subscribe", "subscriptions": entries}).encode())

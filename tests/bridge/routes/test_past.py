@@ -36,7 +36,6 @@ HISTORY = "/api/history?tag_id=7&sensor_type=co2"
 
 @asynccontextmanager
 async def remembering(past: MadeUp, limits: Limits | None = None) -> AsyncIterator[Running]:
-    """A bridge whose twin has this past."""
     async with running(limits) as it:
         twin = it.twin
         twin.rows = past.rows  # type: ignore[method-assign]

@@ -126,7 +126,6 @@ SAME_ORIGIN = {"Sec-Fetch-Site": "same-origin", "Sec-Fetch-Mode": "cors", "Sec-F
 
 
 def session(closed: Served) -> dict[str, str]:
-    """The Cookie header of a new session."""
     cookie = cookie_of(closed.post("/api/signin", BEARER))
     return {"Cookie": f"{cookie.key}={cookie.value}"}
 
@@ -140,7 +139,6 @@ def ending_in(seconds: float) -> dict[str, str]:
 
 @contextmanager
 def listening(closed: Served, headers: dict[str, str], path: str) -> Iterator[ClientConnection]:
-    """A WebSocket of that session."""
     url = closed.url.replace("http", "ws", 1) + path
     with connect(
         url, additional_headers=headers, proxy=None, ping_interval=None, open_timeout=PATIENCE_S

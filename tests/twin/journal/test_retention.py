@@ -29,7 +29,6 @@ ROWS = 2_000
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A journal with a scan every minute."""
     made = tmp_path / "j.sqlite"
     append(made, [pin(), inspection(), *(scan(at_ns=NOW + n * 60 * SECOND) for n in range(ROWS))])
     return made

@@ -35,7 +35,6 @@ SCANS = "SELECT seq, series, stamp_ns, readings FROM scan"
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A journal of 2,000 scans."""
     path = tmp_path_factory.mktemp("whole") / "j.sqlite"
     append(path, ROWS)
     return path

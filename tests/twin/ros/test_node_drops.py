@@ -14,7 +14,6 @@ from tests.twin.ros.test_node import Twin, running_twin
 
 @pytest.fixture
 def twin() -> Iterator[Twin]:
-    """A twin of the test's own."""
     yield from running_twin(*OFTEN)
 
 

@@ -30,8 +30,6 @@ T = TypeVar("T")
 
 
 class Clock:
-    """A clock that the test advances."""
-
     now_s = 0.0
 
     def __call__(self) -> float:

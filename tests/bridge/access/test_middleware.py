@@ -9,8 +9,9 @@ from lupin_bridge.access.credentials import MAX_COOKIE_BYTES
 from lupin_bridge.access.middleware import GUESS_BURST, MAX_TARGET_BYTES, OPEN_PATHS
 from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES
 from lupin_bridge.stream import schema
-from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
+from tests.support.access import BEARER, TOKEN, Served, refused_start, served
 from tests.support.messages import occupancy_grid, scan
+from tests.support.people import OWN
 from tests.support.proc_stat import cpu_s
 from tests.support.waiting import wait_for
 from tests.support.web import ROUTES, Bridge, bridge
@@ -146,11 +147,6 @@ def test_every_route_needs_the_token(closed: Served, path: str) -> None:
         "a token is needed: send it as Authorization: Bearer, or sign in at /signin"
     )
     assert closed.get(path, BEARER).status_code not in (401, 403, 429)
-
-
-@pytest.mark.parametrize("path", sorted(OPEN_PATHS))
-def test_liveness_and_the_sign_in_page_need_no_token(closed: Served, path: str) -> None:
-    assert closed.get(path).status_code == 200
 
 
 @pytest.mark.parametrize(

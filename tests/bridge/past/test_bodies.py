@@ -101,20 +101,6 @@ def test_gaps_equal_the_simplest_rule(
     assert gaps(past, now_ns) == plain_gaps(known, min(end_ns, now_ns or end_ns))
 
 
-@given(st.lists(st.integers(0, 999)), st.integers(1, 200))
-def test_a_gap_between_buckets_holds_no_reading_and_is_at_least_a_bucket_long(
-    stamps: list[int], width_ns: int
-) -> None:
-    counts: dict[int, int] = {}
-    for stamp in sorted(stamps):
-        counts[stamp // width_ns] = counts.get(stamp // width_ns, 0) + 1
-    found = gaps(buckets(width_ns, counts, end_ns=1_000), None)
-    for since, until in found:
-        assert not [stamp for stamp in stamps if since <= stamp < until]
-        assert until - since >= width_ns or not stamps
-    assert found == sorted(found)
-
-
 # The runs, the period, the events, the silences.
 Parts = tuple[SeriesPast, Grid, dict[Event, SeriesPast], SeriesPast]
 

@@ -104,7 +104,7 @@ def refuse(constant: str) -> None:
 
 
 def past_every_bound() -> Iterator[Any]:
-    """Observations; `test_message_limits` and `test_state` have each bound at its limit."""
+    """Observations; `test_cdr` and `test_state` have each bound at its limit."""
     for many, name in ((100_000, ""), (40_000, "same")):
         msg = scan("many readings")
         msg.tag_reading.readings = [SensorReading(name=name, value=1.0) for _ in range(many)]

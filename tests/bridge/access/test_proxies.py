@@ -24,9 +24,9 @@ from hypothesis import strategies as st
 from lupin_bridge.access.policy import BehindProxies, Proxies, path_of
 from lupin_bridge.serving.server import Certificates, check_pair
 from lupin_bridge.settings import SettingError, Settings
-from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
+from tests.support.access import BEARER, TOKEN, Served, refused_start, served
+from tests.support.people import OWN, add, changing
 from tests.support.people import TOKEN as SCADA
-from tests.support.people import add, changing
 from tests.support.processes import limits
 from tests.support.raw_http import handshake
 from tests.support.tls import Certificate, certificate

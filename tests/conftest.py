@@ -17,9 +17,8 @@ import httpx
 import pytest
 from hypothesis import HealthCheck, settings
 
-from tests.support.domains import own_domain
+from tests.support.domains import own_domain, remove_what_the_dead_left
 from tests.support.needs import let_nothing_in
-from tests.support.shared_memory import remove_what_the_dead_left
 from tests.support.state_home import use_own
 
 if TYPE_CHECKING:

@@ -19,7 +19,6 @@ BENCHES = (
     "bench_import",
     "bench_fleet",
     "bench_overview",
-    "bench_replicas",
 )
 
 

@@ -149,6 +149,11 @@ def test_every_route_needs_the_token(closed: Served, path: str) -> None:
     assert closed.get(path, BEARER).status_code not in (401, 403, 429)
 
 
+@pytest.mark.parametrize("path", sorted(OPEN_PATHS))
+def test_liveness_and_the_sign_in_page_need_no_token(closed: Served, path: str) -> None:
+    assert closed.get(path).status_code == 200
+
+
 @pytest.mark.parametrize(
     ("path", "location"),
     [

@@ -126,10 +126,13 @@ def test_the_label_of_now_has_one_line_of_the_time_bar(
     hmi = open_page(greenhouse.url, query="?lang=es", viewport={"width": 1100, "height": 800})
     now = hmi.test_id("timebar-when")
     expect(now).to_have_text("En directo")
+    hmi.expect_layout()
     assert place(now).bottom - place(now).top < 24
     # A moment of the past takes two, beside the choices.
     hmi.go("at=1795970265", "?lang=de")
     expect(now).to_contain_text("Nov.")
+    hmi.expect_parts()
+    hmi.view()
     assert words_below(hmi, ".timebar-when", ".timebar-period") == []
 
 
@@ -139,6 +142,7 @@ def test_the_legend_is_one_line_and_its_details_open_over_the_map(
     for language, width in (*((each, 1100) for each in LANGUAGES), ("de", 1440)):
         viewport = {"width": width, "height": 900}
         hmi = open_page(greenhouse.url, query=f"?lang={language}", viewport=viewport)
+        hmi.expect_layout()
         scale = place(hmi.test_id("ideal-scale"))
         assert scale.bottom - scale.top < 36, f"{language}: one line below the colours"
         for line in (
@@ -398,11 +402,11 @@ def test_every_language_has_room_on_a_phone(greenhouse: Bridge, open_page: OpenP
         hmi.go(query=f"?lang={language}")
         expect(hmi.test_id("sample-count")).to_contain_text(contribute)
         expect(hmi.page.locator("html")).to_have_attribute("lang", language)
+        hmi.expect_layout()
         assert hmi.page.evaluate(_TOO_LONG) == []
         # "Since" shares the last line of what to do first, or has no room.
         todo, since = places(hmi, ".health-strip .do-what strong", ".health-strip small")
         assert since.top < todo.bottom, language
-        hmi.expect_parts()
         hmi.page.locator(".menu > button").click()
         expect(hmi.test_id("language")).to_have_value(language)
         assert hmi.page.evaluate(_TOO_LONG) == []

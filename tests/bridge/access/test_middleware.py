@@ -10,8 +10,9 @@ from lupin_bridge.access.credentials import MAX_COOKIE_BYTES
 from lupin_bridge.access.middleware import GUESS_BURST, MAX_TARGET_BYTES, OPEN_PATHS
 from lupin_bridge.serving.http_protocol import MAX_HEAD_BYTES
 from lupin_bridge.stream import schema
-from tests.support.access import BEARER, OWN, TOKEN, Served, refused_start, served
+from tests.support.access import BEARER, TOKEN, Served, refused_start, served
 from tests.support.messages import occupancy_grid, scan
+from tests.support.people import OWN
 from tests.support.proc_stat import cpu_s
 from tests.support.waiting import wait_for
 from tests.support.web import ROUTES, Bridge, bridge
@@ -56,9 +57,6 @@ def refusal_of(answer: httpx.Response) -> str:
     return schema.ErrorMessage.model_validate_json(answer.content).detail
 
 
-# --- Host ---------------------------------------------------------------------------------------
-
-
 def test_a_rebound_name_gets_nothing(open_bridge: Served) -> None:
     rebound = {"Host": "evil.example:8000", "Origin": "http://evil.example:8000"}
     requested = [(path, rebound) for path in ("/api/state", "/healthz", "/", "/signin", "/nowhere")]
@@ -68,9 +66,6 @@ def test_a_rebound_name_gets_nothing(open_bridge: Served) -> None:
         detail = refusal_of(answer)
         assert "'evil.example'" in detail
         assert detail.endswith("--allow-host evil.example")
-
-
-# --- Origin -------------------------------------------------------------------------------------
 
 
 def test_a_foreign_page_gets_no_answer_and_no_permission_to_read_one(open_bridge: Served) -> None:
@@ -140,9 +135,6 @@ def test_a_request_target_has_a_length_limit(open_bridge: Served) -> None:
         assert refusal_of(refused) == "the path has 65 segments, the limit is 64"
 
 
-# --- the token ----------------------------------------------------------------------------------
-
-
 # Without a token, existing and missing paths look the same.
 NOWHERE = ["/nowhere", "/assets/app.js", "/manifest.webmanifest", "/healthz/", "/SIGNIN"]
 
@@ -190,7 +182,6 @@ def test_a_websocket_needs_the_token(closed: Served, path: str) -> None:
 
 
 def session_of(closed: Served) -> str:
-    """The Cookie header of a new session."""
     return closed.post("/api/signin", BEARER).headers["set-cookie"].partition(";")[0]
 
 
@@ -267,9 +258,6 @@ def test_valid_tokens_and_expired_cookies_do_not_count_as_guesses(closed: Served
         assert client.get("/api/state", headers=BEARER).status_code == 200
 
 
-# --- at the start -------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("option", "wrong", "is_no"),
     [
@@ -295,9 +283,6 @@ def test_accounts_that_are_missing_and_listening_beyond_loopback_are_warnings(
         assert "without LUPIN_TOKEN" in warnings[1]
         assert "without --tls-cert" in warnings[2]
         assert live.get("/api/state").status_code == 200, "it goes by its addresses"
-
-
-# --- what holds for every answer ------------------------------------------------------------------
 
 
 ELSEWHERE = ["/", "/nowhere", "/ws/state"]

@@ -47,6 +47,9 @@ test('of many of one cause the worst, then five, then a hundred more at a time',
   expect(group('active')).toHaveLength(105);
   fireEvent.click(screen.getByText('+ 45 more'));
   expect(group('active')).toHaveLength(150);
+  // The bridge sends no more than 1,000.
+  report(...Array.from({ length: 1_000 }, (_, at) => alarm(`a${at}`, { tag_id: String(at) })));
+  expect(screen.getByText('Active (1,000+)')).toBeTruthy();
 });
 
 test('only who acknowledged an alarm, or an admin, may take that back', () => {

@@ -13,6 +13,7 @@ import {
 } from '../../alarms/arrange';
 import {
   calling,
+  countText,
   groupOf,
   heldList,
   itemsOf,
@@ -169,11 +170,7 @@ export function AlarmPanel(): JSX.Element {
             {(name === 'active' ? shown : seen)[name].length > 0 && (
               <Group
                 name={name}
-                count={
-                  filter === ''
-                    ? String(all[name].length)
-                    : `${counted[name].length}/${all[name].length}`
-                }
+                count={`${filter === '' ? '' : `${counted[name].length}/`}${countText(all, name)}`}
                 blocks={arranged(seen[name], order, sensors)}
               />
             )}

@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 
 from tests.browser.hmi import PHONE, Box, Hmi, OpenPage
 from tests.browser.places import LINES, expect_in_reach, place, places, words_below
-from tests.support.messages import scan
+from tests.support.messages import occupancy_grid, scan
 from tests.support.web import Bridge, bridge
 
 Size = tuple[int, int]
@@ -195,6 +195,35 @@ def test_a_phone_has_room_for_the_facts_a_fixed_range_and_missing_data(
     assert notice.top > frame.bottom - (frame.bottom - frame.top) / 3
 
 
+def test_a_wide_greenhouse_is_as_wide_as_half_the_window_below_its_status(
+    running: Bridge, open_page: OpenPage
+) -> None:
+    running.peer.observe(scan("1", {"temperature": 22.0}, at=(1, 1)))
+    hmi = open_page(running.url, viewport={"width": 1440, "height": 900})
+    parts = (".health", ".map-panel", ".list")
+    status, map_, table = places(hmi, *parts)
+    assert (status.left, status.bottom) == (table.left, table.top)
+    narrow = map_.right
+    running.peer.publish_map(occupancy_grid([[0] * 60] * 18))
+    expect(hmi.page.locator(".panels")).to_have_attribute("data-wide", "true")
+    for size in ((1440, 900), (1100, 800)):
+        hmi.resize(*size)
+        status, map_, table = places(hmi, *parts)
+        assert (status.left, status.bottom) == (map_.left, map_.top), size
+        assert (table.left, table.top) == (map_.right, status.top), size
+        expect_in_reach(hmi, ".map-controls button, .legend, tbody tr, .health button")
+        assert hmi.page.locator(".table-scroll").evaluate(HIDDEN) == 0, size
+        assert size != (1440, 900) or map_.right > 1.2 * narrow
+    # Its card is below the table; in one pane, nothing changes.
+    hmi.turn("tag=1")
+    expect(hmi.card("1")).to_be_visible()
+    assert place(hmi.card("1")).left == place(hmi.page.locator(".list")).left
+    hmi.resize(*SIZES[0])
+    show(hmi, "Tags")
+    status, table = places(hmi, ".health", ".list")
+    assert (status.left, status.bottom) == (table.left, table.top)
+
+
 def test_a_longer_message_about_the_greenhouse_does_not_move_the_table(
     running: Bridge, open_page: OpenPage
 ) -> None:
@@ -272,9 +301,8 @@ def test_all_text_grows_with_the_browsers_text_size(open_at: Callable[..., Hmi])
     hmi = open_at((1440, 900))
     # In one go, so that nothing arrives meanwhile.
     grow = """() => {
-      const texts = () => [...document.querySelectorAll('.app *')]
-        .filter((e) => e.checkVisibility() && !e.closest('.unseen'))
-        .map((e) => parseFloat(getComputedStyle(e).fontSize));
+      const all = [...document.querySelectorAll('.app *:not(.unseen, .unseen *)')];
+      const texts = () => all.map((e) => parseFloat(getComputedStyle(e).fontSize));
       document.documentElement.style.fontSize = '';
       const usual = texts();
       document.documentElement.style.fontSize = '200%';

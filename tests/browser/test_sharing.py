@@ -11,7 +11,7 @@ from playwright.sync_api import Download, ViewportSize, expect
 
 from tests.browser.greenhouse import TAGS
 from tests.browser.hmi import PHONE, Hmi, OpenPage, changed_box
-from tests.browser.places import places
+from tests.browser.places import place, places
 from tests.support.web import Bridge
 
 
@@ -171,6 +171,8 @@ def test_paper_has_every_row_and_its_time_and_is_light(
     expect(why).to_have_text(reasons, use_inner_text=True)
     expect(why.locator(".why-count")).to_be_hidden()
     assert why.evaluate(CUT) == []
+    # Fifty rows a sheet: on paper, none needs a finger's height.
+    assert place(hmi.row("2")).bottom - place(hmi.row("2")).top < 30
     assert screen is not None
     hmi.page.set_viewport_size(screen)
     # In a PDF each canvas must be a group of its own, or the clearing of one whitens those below.

@@ -165,7 +165,7 @@ test('among crowded pins only the worst and the chosen are named, or few that a 
     pin({ id: `${index}`, verdict: index === 3 ? 'critical' : 'stressed', pest: index === 5 }),
   );
   expect(named(pins, 10)).toEqual(['3', '5', '7']);
-  expect(named(pins, 40)).toHaveLength(99);
+  expect(named(pins, 80)).toHaveLength(99);
   const few = pins.map((each, index) => (index < 9 ? each : { ...each, texts: [] }));
   expect(named(few, 10)).toHaveLength(99);
 });

@@ -202,8 +202,8 @@ function paintBug(context: CanvasRenderingContext2D, colour: Colours): void {
   context.fill();
 }
 
-/** Pins closer together than a label is high cannot all be named, CSS pixels. */
-const LABELLED_PX = 28;
+/** Pins closer together than a label with a value is wide cannot all be named, CSS pixels. */
+const LABELLED_PX = 70;
 
 /**
  * Input of `placeLabels`, relative to the map's origin. Among pins too crowded for labels, only the worst are

@@ -35,6 +35,7 @@ import { equal, type Tag } from '../domain/twin';
 import type { AppState } from './app';
 import { retainEqual, memoLast, memoOne } from '../domain/memo';
 import { isReceivingNow, selectIsReceiving, selectLatest, selectShown, selectTags } from './moment';
+import { boundsOf } from '../geometry/coordinates';
 import type { MapPicture } from '../geometry/image';
 import type { Difference } from './twin';
 import { isColumnShown } from './settings';
@@ -57,6 +58,15 @@ export function selectHealth(state: AppState): HouseHealth {
 export function selectLatestHealth(state: AppState): HouseHealth | null {
   const { snapshot, health } = selectLatest(state);
   return snapshot && healthNow(snapshot.tags, health, isReceivingNow(state));
+}
+
+/** A greenhouse is wide if it is at least this many times as wide as deep. */
+const WIDE = 2;
+
+/** By the floor plan: few tags say nothing about it. Of now, so that the layout stays while looking back. */
+export function selectIsWide(state: AppState): boolean {
+  const bounds = boundsOf(selectLatest(state).map.value?.known ?? []);
+  return bounds !== null && bounds.maxX - bounds.minX >= WIDE * (bounds.maxY - bounds.minY);
 }
 
 const cataloguesIn = memoLast(cataloguesOf);

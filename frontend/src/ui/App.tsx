@@ -4,7 +4,7 @@ import type { CycleSetting } from '../store/cycle';
 import { act, useApp } from '../store/app';
 import { withList } from '../store/view';
 import { useSelected } from '../store/create';
-import { selectHealth } from '../store/derived';
+import { selectHealth, selectIsWide } from '../store/derived';
 import { selectHasSnapshot, selectIsRecorded, selectShown } from '../store/moment';
 import { S } from '../strings';
 import { AlarmsLabel } from './alarms/ListChoice';
@@ -33,6 +33,7 @@ export function App({
   const moment = useApp((state) => selectShown(state).moment);
   const isPast = moment !== null;
   const isRecorded = useApp(selectIsRecorded);
+  const isWide = useApp(selectIsWide);
 
   return (
     <div
@@ -59,7 +60,7 @@ export function App({
         <SimulatedNote />
       </div>
       <WithParts>{(parts) => <parts.PaperLine />}</WithParts>
-      <main className="panels">
+      <main className="panels" data-wide={isWide && !kiosk}>
         <MapPanel kiosk={kiosk} />
         <TagsPanel kiosk={kiosk} />
         {selected !== null && !kiosk && (

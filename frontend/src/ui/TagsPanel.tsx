@@ -20,13 +20,17 @@ export function TagsPanel({ kiosk }: { kiosk: boolean }): JSX.Element {
       <HealthSummary kiosk={kiosk} />
       {kiosk ? (
         <WithParts>{(parts) => <parts.AttentionList />}</WithParts>
-      ) : list === 'alarms' ? (
-        <WithParts>{(parts) => <parts.AlarmPanel />}</WithParts>
       ) : (
-        <>
-          <FilterBar />
-          <Rows />
-        </>
+        <div className="list">
+          {list === 'alarms' ? (
+            <WithParts>{(parts) => <parts.AlarmPanel />}</WithParts>
+          ) : (
+            <>
+              <FilterBar />
+              <Rows />
+            </>
+          )}
+        </div>
       )}
     </section>
   );

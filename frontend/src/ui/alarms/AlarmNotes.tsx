@@ -1,7 +1,7 @@
 import { useId, useMemo, type JSX, type ReactNode } from 'react';
 
 import { alarmOf, isAwaited } from '../../alarms/list';
-import { notifyState, soundState, setNotify, setSound } from '../../alarms/notify';
+import { isPushed, notifyState, soundState, setNotify, setSound } from '../../alarms/notify';
 import { lastAction, own, undo } from '../../alarms/own';
 import { severalNow } from '../../alarms/latest';
 import { alarmList, meanwhile } from '../../alarms/watch';
@@ -144,6 +144,7 @@ export function NotifySettings(): JSX.Element {
   const sound = useSelected(soundState);
   const notify = useSelected(notifyState);
   const isPossible = notify === 'granted' || notify === 'prompt';
+  const also = useSelected(isPushed) ? ` ${S.alarmNotifyPushed}` : '';
   return (
     <>
       <Way
@@ -158,7 +159,7 @@ export function NotifySettings(): JSX.Element {
         label={S.alarmNotify}
         isOn={local.notify && notify === 'granted'}
         isPossible={isPossible}
-        hint={isPossible ? S.alarmNotifyHint : S.alarmNotifyNot[notify]}
+        hint={isPossible ? S.alarmNotifyHint + also : S.alarmNotifyNot[notify]}
         onChange={setNotify}
       />
     </>

@@ -99,7 +99,9 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     none: 'Dieser Browser kann keinen Ton abspielen.',
   },
   alarmNotify: 'Benachrichtigung',
-  alarmNotifyHint: 'Der Browser meldet neue Alarme, auch wenn Sie gerade etwas anderes ansehen.',
+  alarmNotifyHint:
+    'Der Browser meldet neue Alarme, solange diese Seite im Hintergrund geöffnet ist.',
+  alarmNotifyPushed: 'Kritische Alarme kommen auch bei geschlossener Seite.',
   alarmNotifyNot: {
     insecure:
       'Browser erlauben das nur bei Adressen, die mit https:// oder http://localhost beginnen.',

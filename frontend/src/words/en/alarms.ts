@@ -100,7 +100,9 @@ export const ALARMS = {
     none: 'This browser cannot play sound.',
   },
   alarmNotify: 'Notification',
-  alarmNotifyHint: 'The browser notifies you of new alarms while you look at something else.',
+  alarmNotifyHint:
+    'The browser notifies you of new alarms while this page is open in the background.',
+  alarmNotifyPushed: 'Critical alarms also come while it is closed.',
   alarmNotifyNot: {
     insecure: 'Browsers allow this only on addresses that begin with https:// or http://localhost.',
     refused: 'This browser blocks notifications. Allow them for this page in its settings.',

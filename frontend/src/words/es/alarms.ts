@@ -95,7 +95,9 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     none: 'Este navegador no puede reproducir sonido.',
   },
   alarmNotify: 'Notificación',
-  alarmNotifyHint: 'El navegador avisa de las alarmas nuevas aunque usted esté en otra ventana.',
+  alarmNotifyHint:
+    'El navegador avisa de las alarmas nuevas mientras esta página esté abierta en segundo plano.',
+  alarmNotifyPushed: 'Las alarmas críticas llegan también con la página cerrada.',
   alarmNotifyNot: {
     insecure:
       'Los navegadores solo lo permiten en direcciones que empiezan por https:// o http://localhost.',

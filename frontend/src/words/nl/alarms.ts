@@ -91,7 +91,8 @@ export const ALARMS: In<typeof EN.ALARMS> = {
     none: 'Deze browser kan geen geluid afspelen.',
   },
   alarmNotify: 'Melding',
-  alarmNotifyHint: 'De browser meldt nieuwe alarmen, ook als u in een ander venster werkt.',
+  alarmNotifyHint: 'De browser meldt nieuwe alarmen zolang deze pagina op de achtergrond open is.',
+  alarmNotifyPushed: 'Kritieke alarmen komen ook als de pagina gesloten is.',
   alarmNotifyNot: {
     insecure:
       'Browsers staan dit alleen toe op adressen die beginnen met https:// of http://localhost.',

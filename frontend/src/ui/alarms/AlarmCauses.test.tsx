@@ -81,8 +81,10 @@ test('many of one cause that are resolved have nothing to do, and say when the l
   );
   fireEvent.click(screen.getByText('Resolved in the last 24 h (5)'));
   const heading = screen.getByRole('button', { name: /Temperature too low 5 alarms/ });
-  expect(heading.querySelector('.alarm-do, [data-fact=since]')).toBeNull();
-  expect(heading.querySelector('small')?.textContent).toBe('resolved sim 00:15:54');
+  expect(heading.querySelector('.alarm-do')).toBeNull();
+  expect(heading.querySelector('[data-fact=since]')?.textContent).toMatch(
+    /^resolved sim 00:15:54 /,
+  );
   // The empty tools cell stays, to align the columns.
   expect(heading.parentElement?.querySelector('.alarm-tools')?.children).toHaveLength(0);
 });
